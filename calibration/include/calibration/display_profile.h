@@ -1,0 +1,18 @@
+// Display profiles as JSON: the measured facts about a screen that the perceptual model needs.
+#pragma once
+
+#include <filesystem>
+
+#include <perception/display.h>
+#include <vdtree/result.h>
+
+namespace unseen::calibration {
+
+// Keys carry their units: name, width_px, height_px, pixel_pitch_m or diagonal_m (one of them), viewing_distance_m,
+// peak_cdm2, black_cdm2, transfer ("srgb", "linear", or a gamma as a number), ambient_lux, reflectivity, source.
+// Missing optional keys (name, transfer, ambient_lux, reflectivity, source) take Display's defaults; unknown keys, missing sizes and bad values are
+// errors that name the file and the key.
+Result<perception::Display> read_display(const std::filesystem::path& file);
+Result<void> write_display(const std::filesystem::path& file, const perception::Display& display);
+
+} // namespace unseen::calibration

@@ -1,0 +1,37 @@
+# unseen_add_library(name SOURCES ... HEADERS ... DEPENDS ... PRIVATE_DEPENDS ...)
+#
+# One module of the house: a static library `unseen_<name>`, alias and export name `unseen::<name>`, whose public headers lie in
+# include/<name> and are installed to <include>/unseen/<name>. DEPENDS is what its headers need, PRIVATE_DEPENDS what
+# only its sources need.
+function(unseen_add_library name)
+    cmake_parse_arguments(arg "" "" "SOURCES;HEADERS;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
+    set(target unseen_${name})
+    add_library(${target} STATIC ${arg_SOURCES})
+    add_library(unseen::${name} ALIAS ${target})
+    target_sources(${target} PUBLIC FILE_SET HEADERS BASE_DIRS include FILES ${arg_HEADERS})
+    target_include_directories(${target} PRIVATE src)
+    target_compile_features(${target} PUBLIC cxx_std_20)
+    target_link_libraries(${target} PUBLIC ${arg_DEPENDS} PRIVATE ${arg_PRIVATE_DEPENDS})
+    set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
+    unseen_set_warnings(${target})
+    if(UNSEEN_INSTALL)
+        install(TARGETS ${target} EXPORT unseen_${name}_targets
+            ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${name}
+            FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/unseen COMPONENT ${name})
+        install(EXPORT unseen_${name}_targets NAMESPACE unseen:: FILE unseen_${name}_targets.cmake
+            DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/unseen COMPONENT ${name})
+    endif()
+endfunction()
+
+function(unseen_set_warnings target)
+    target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wconversion -Wshadow)
+endfunction()
+
+function(unseen_install_package)
+    include(CMakePackageConfigHelpers)
+    configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/unseenConfig.cmake.in
+        ${PROJECT_BINARY_DIR}/unseenConfig.cmake INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/unseen)
+    write_basic_package_version_file(${PROJECT_BINARY_DIR}/unseenConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+    install(FILES ${PROJECT_BINARY_DIR}/unseenConfig.cmake ${PROJECT_BINARY_DIR}/unseenConfigVersion.cmake
+        DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/unseen)
+endfunction()

@@ -1,0 +1,59 @@
+// The perceptual fold test: a fold's worst-case grating against the contrast sensitivity table.
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+#include <glm/vec2.hpp>
+
+#include <perception/csf.h>
+#include <perception/display.h>
+#include <vdtree/criteria.h>
+
+namespace unseen::perception {
+
+// What a fold can be seen against: the scene's darkest and brightest relative luminance, background included.
+struct SceneLuminance {
+    float darkest = 0;
+    float brightest = 1;
+};
+
+struct FoldTestOptions {
+    Display display = {};
+    SceneLuminance scene = {};
+    std::optional<glm::dvec2> gaze_px = {}; // in the window, from the top left; may lie outside. Default: foveal everywhere
+    const CsfTable* csf = nullptr;          // must outlive the criterion; default: CsfTable::standard()
+};
+
+// Luebke and Hallen 2001, section 3.3, in its safe form: extent and luminance range of the ring, facing of the dilated
+// ring. For a node whose ring's sphere has the angular radius asin(r/d) on the screen:
+//   theta' = max(2 asin(r/d), one pixel)
+//   c      = Michelson contrast of the ring's luminance range after the display's mapping; for silhouette nodes of that range
+//            united with the scene's
+//   cost   = 2 theta' rho*, S(rho*) = 1/c on the falling branch (0 where even the peak cannot be seen; infinite with the
+//            eye inside the sphere or the sphere across the camera's plane)
+// so cost = v*/v: v the viewer's distance from the screen, v* the distance from which the fold is invisible.
+// Silhouette nodes: a mixed facing mask, or an irregular edge in the ring.
+class LuebkeHallenCriterion {
+public:
+    LuebkeHallenCriterion(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options,
+                          const vdtree::Similarity& placement = {});
+    void operator()(const vdtree::VertexTree& tree, std::span<const vdtree::NodeId> nodes, std::span<float> costs) const;
+
+private:
+    const CsfTable* csf_;
+    glm::dvec3 eye_;              // in the tree's frame, relative to its origin
+    glm::dvec3 back_;             // unit, from the target to the eye, in the tree's frame
+    glm::dvec3 gaze_;             // unit, from the eye; used where has_gaze_
+    glm::dvec3 right_, up_;
+    bool has_gaze_ = false;
+    double screen_scale_ = 1;     // tangent on the screen over tangent in the camera
+    double pixel_deg_ = 0;        // one pixel at the screen's centre
+    double black_ = 0, span_ = 1; // cd/m2 = black + span * relative
+    SceneLuminance scene_;
+};
+
+// The names that --fold-test takes.
+inline constexpr std::string_view fold_test_names[] = {"luebke-hallen", "extent", "displacement"};
+
+} // namespace unseen::perception

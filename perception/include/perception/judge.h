@@ -1,0 +1,61 @@
+// Judges of image pairs: which pixels show a visible difference. They check the fold test; they are not its model.
+#pragma once
+
+#include <optional>
+
+#include <glm/vec2.hpp>
+
+#include <perception/csf.h>
+#include <perception/display.h>
+#include <perception/image.h>
+
+namespace unseen::perception {
+
+struct JudgeOptions {
+    Display display = {};
+    std::optional<glm::dvec2> gaze_px = {};   // pixels from the top left, may lie outside; default: no gaze, eccentricity 0 everywhere
+    CsfModel csf = CsfModel::castle;
+    double beta = 3.5;                        // Minkowski exponent over the bands; V = 1 is 75% detection
+};
+
+struct Judgement {
+    Image visibility;                  // V by pixel: at or above 1 is visible
+    std::uint64_t visible_pixels = 0;
+    std::uint64_t pixels = 0;
+    double max_ratio = 0;              // the largest V
+};
+
+// The modern map, in double. Both images are luminance in cd/m2 and of one size. A decimated Laplacian pyramid with its
+// base band; Weber contrast of the difference against the reference's local luminance; sensitivity by pixel and
+// band (luminance, eccentricity, area pi (1.5 / rho)^2); Daly masking from the reference alone; Minkowski sum over the
+// bands. A hit in a low band counts its whole block. A NaN or negative luminance is an error.
+Result<Judgement> judge_modern(const Image& reference, const Image& test, const JudgeOptions& options);
+
+// The threshold map of judge_modern, cd/m2: the luminance step at the pixel's most sensitive band that is just
+// visible there, given the reference's masking.
+Result<Image> threshold_map_modern(const Image& reference, const JudgeOptions& options);
+
+// Ramasubramanian, Pattanaik and Greenberg 1999 as Yee's PerceptualDiff computes it, kept for comparison; almost blind
+// to high-frequency changes: not a gate. `field_degrees` is the horizontal field of the image.
+// `masked_by_both`: elevation and adaptation from the larger/mean of both images, as that program does; else the reference's.
+struct Rpg99Options {
+    double field_degrees = 45;
+    double peak_cdm2 = 100;
+    bool masked_by_both = true;
+};
+struct Rpg99Map {
+    Image adaptation; // cd/m2
+    Image elevation;  // F, 1..10
+    Image threshold;  // cd/m2
+};
+Result<Rpg99Map> rpg99_map(const Image& reference, const Image& test, const Rpg99Options& options);
+Result<Judgement> judge_rpg99(const Image& reference, const Image& test, const Rpg99Options& options);
+
+// Luminance as PerceptualDiff computes it from code values 0..1: gamma 2.2, AdobeRGB weights, black 0.
+Image perceptualdiff_luminance(const Image& codes, double peak_cdm2);
+
+// Wang et al. 2004 on Rec. 601 luma of 8-bit codes: Gaussian window of sigma 1.5, 11 x 11, K1 = 0.01, K2 = 0.03, biased
+// covariance, mean over the image without the window's margin. Images are code values 0..1.
+Result<double> ssim(const Image& reference_codes, const Image& test_codes);
+
+} // namespace unseen::perception

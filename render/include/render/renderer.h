@@ -1,0 +1,64 @@
+// Draws cuts of a vertex tree: linear colour and luminance in float, antialiased by N-rooks samples.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include <render/context.h>
+#include <vdtree/cut.h>
+#include <vdtree/view.h>
+
+namespace unseen::render {
+
+enum class Shading {
+    smooth, // luminance by vertex, linearly interpolated (lit or pre-lit, as the tree's luminance is)
+    flat,   // one luminance a triangle: the mean of its corners
+};
+
+struct DrawOptions {
+    Shading shading = Shading::smooth;
+    bool wireframe = false;               // the triangles' edges over the shaded surface, hidden lines removed
+    int samples = 16;                     // N-rooks samples a pixel, 1..256
+    std::uint32_t seed = 1;               // of the sample pattern: equal for images that are compared
+    float background = 0.19597990f;       // relative luminance; 20 cd/m2 on the default display
+};
+
+// A drawn frame. Row-major from the top left.
+struct Frame {
+    int width = 0;
+    int height = 0;
+    std::vector<float> luminance;  // relative, linear, 0..1, background included
+    std::vector<float> colour;     // linear RGB, three values a pixel
+    double draw_ms = 0;            // drawing of all samples and reading back, wall clock
+};
+
+// Keeps the tree's vertices on the GPU. The context must be current and outlive the renderer.
+class Renderer {
+public:
+    static Result<Renderer> create(Context& context, const vdtree::VertexTree& tree);
+    Renderer(Renderer&&) noexcept;
+    Renderer& operator=(Renderer&&) noexcept;
+    ~Renderer();
+
+    // Draws off screen and reads back. Fails on an invalid view or when the GPU has too little memory, or on a GL error.
+    Result<Frame> draw(const vdtree::Cut& cut, const vdtree::View& view, const DrawOptions& options = {},
+                       const vdtree::Similarity& placement = {});
+
+    // Draws to the window's framebuffer, one sample a pixel with hardware multisampling if it has any, encoded as sRGB.
+    Result<void> draw_to_window(const vdtree::Cut& cut, const vdtree::View& view, const DrawOptions& options = {},
+                                const vdtree::Similarity& placement = {});
+
+private:
+    struct Impl;
+    explicit Renderer(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+// The N-rooks pattern: n points in the unit square, one in each of n rows and of n columns.
+std::vector<glm::dvec2> n_rooks(int n, std::uint32_t seed);
+
+} // namespace unseen::render

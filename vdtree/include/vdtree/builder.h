@@ -1,0 +1,59 @@
+// Builds vertex trees: a clusterer decides which vertices merge, everything else is derived from the mesh.
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include <vdtree/function_ref.h>
+#include <vdtree/mesh.h>
+#include <vdtree/result.h>
+#include <vdtree/vertex_tree.h>
+
+namespace unseen::vdtree {
+
+// A hierarchy over n vertices: clusters 0 .. n-1 are the vertices themselves, the others are numbered in the order
+// in which they were made, so a cluster's parent has a higher number. The last cluster is the root.
+struct Clustering {
+    std::vector<Index> parents;          // by cluster; the root's own number stands for "none"
+    std::vector<glm::dvec3> positions;   // by cluster from n on: the proxy's position; empty: the area-weighted mean
+};
+
+struct BuildOptions;
+
+// What a clusterer is given, besides the mesh: per-vertex luminance (relative, 0..1), unit normals and area weights.
+struct ClusterInput {
+    const MeshView& mesh;
+    std::span<const float> luminance;
+    std::span<const glm::vec3> normals;
+    std::span<const double> areas;      // a third of the area of the triangles around, mesh units squared; 0: unreferenced
+    std::span<const Index> coincident;  // by vertex: the first vertex at the same position
+};
+
+// A user's own clustering. Called once, on the calling thread. Every vertex must reach the root; clusters with one
+// child are removed; clusters may have any number of children.
+using Clusterer = FunctionRef<Result<Clustering>(const ClusterInput&)>;
+
+// Octree over the bounding cube, subdivided until a cell holds one position; any soup; fast. Depth follows the data, not
+// a path code: cells that do not split their points are passed over, and coincident vertices share a node.
+Result<Clustering> cluster_octree(const ClusterInput& input, const Progress& progress = {});
+
+// Contraction of vertex pairs in the order of their quadric error over position and luminance (Garland and Heckbert 1997, 1998),
+// with boundary terms and optimal proxies; pairs are the edges, and, for parts that no edge connects, near neighbours.
+Result<Clustering> cluster_quadric(const ClusterInput& input, const Progress& progress = {});
+
+enum class ClustererKind { quadric, octree };
+std::string_view name(ClustererKind kind);
+
+struct BuildOptions {
+    ClustererKind clusterer = ClustererKind::quadric;
+    Light light = {};
+    int threads = 0; // 0: as many as there are cores. The tree does not depend on it.
+    Progress progress = {};
+};
+
+// Drops triangles that use a vertex twice (counted in the tree); fails where none is left, on non-finite positions and on
+// indices out of range. Memory: about 300 bytes a triangle while building.
+Result<VertexTree> build_tree(const MeshView& mesh, const BuildOptions& options = {});
+Result<VertexTree> build_tree(const MeshView& mesh, Clusterer clusterer, const BuildOptions& options = {});
+
+} // namespace unseen::vdtree

@@ -1,0 +1,65 @@
+// Callbacks that join the modules: fold criteria and visibility; and the geometric criteria.
+#pragma once
+
+#include <span>
+
+#include <vdtree/function_ref.h>
+#include <vdtree/vertex_tree.h>
+#include <vdtree/view.h>
+
+namespace unseen::vdtree {
+
+// Fills the fold cost of each interior node in `nodes`: 0 and more, fold where cost <= 1, NaN unfolds. Costs must not
+// fall from a node to its parent. Called in batches on the thread that adjusts the cut; must not throw.
+using FoldCriterion = FunctionRef<void(const VertexTree&, std::span<const NodeId> nodes, std::span<float> costs)>;
+
+// Fills, for each interior node, whether its ring can be seen. Nodes that are out are folded at no cost. A child
+// of a node that is out must be out, and a child of one that is wholly in must be wholly in.
+enum class Visibility : std::uint8_t { out, partly, wholly_in };
+using VisibilityTest = FunctionRef<void(const VertexTree&, std::span<const NodeId> nodes, std::span<Visibility> seen)>;
+
+// The eye in the tree's own frame: what the criteria share. Relative to VertexTree::origin().
+glm::dvec3 eye_in_tree(const VertexTree& tree, const View& view, const Similarity& placement);
+
+// Frustum test of the ring spheres against the window's five planes (no far plane).
+class FrustumVisibility {
+public:
+    FrustumVisibility(const VertexTree& tree, const View& view, const Similarity& placement = {});
+    void operator()(const VertexTree& tree, std::span<const NodeId> nodes, std::span<Visibility> seen) const;
+
+private:
+    struct Plane {
+        glm::dvec3 normal; // unit, pointing inward
+        double offset;
+    };
+    Plane planes_[5];
+};
+
+// Projected size at the window's centre, in pixels, of an angle: pixels = angle * height / (2 tan(fov / 2)).
+double pixels_per_radian(const View& view);
+
+// Node extent, VDSlib's own measure: the angular diameter of the support's sphere in pixels over the tolerance.
+// Infinite where the eye is inside.
+class ExtentCriterion {
+public:
+    ExtentCriterion(const VertexTree& tree, const View& view, double tolerance_pixels, const Similarity& placement = {});
+    void operator()(const VertexTree& tree, std::span<const NodeId> nodes, std::span<float> costs) const;
+
+private:
+    glm::dvec3 eye_;
+    double scale_;
+};
+
+// Vertex displacement: the largest movement of a supported vertex, seen from the nearest point of the support's
+// sphere, in pixels over the tolerance. Infinite where the eye is inside; 0 where nothing moves.
+class DisplacementCriterion {
+public:
+    DisplacementCriterion(const VertexTree& tree, const View& view, double tolerance_pixels, const Similarity& placement = {});
+    void operator()(const VertexTree& tree, std::span<const NodeId> nodes, std::span<float> costs) const;
+
+private:
+    glm::dvec3 eye_;
+    double scale_;
+};
+
+} // namespace unseen::vdtree

@@ -1,0 +1,153 @@
+// The vertex tree: a hierarchical clustering of a mesh's vertices, with bounds for every fold.
+//
+// Nodes. Interior nodes are numbered 0 .. interior_count()-1 in depth-first pre-order (a parent before its
+// children, a subtree contiguous; 0 is the root), leaves follow: node interior_count() + k is leaf k. Leaves are
+// the mesh's vertices in depth-first order, so a node supports a contiguous range of leaves. Folding an interior
+// node replaces all leaves it supports by its proxy vertex.
+//
+// Triangles are sorted by the node at which they vanish (the deepest node that supports two of their corners), so
+// those that a fold removes are a contiguous range, and so are those that a folded subtree removes. Corners are
+// leaf numbers.
+//
+// Two regions per interior node: its *support* (the leaves under it) and its *ring* (all corners of all triangles
+// that touch the support). Everything stored about them nests: a parent's sphere contains its children's, its mask,
+// intervals and flags include theirs, so every fold criterion built on them is monotone up the tree.
+//
+// Positions are floats relative to origin(); lengths are mesh units. Immutable once built; any number of cuts and
+// threads may read one tree.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+
+#include <vdtree/mesh.h>
+#include <vdtree/normal_mask.h>
+#include <vdtree/result.h>
+
+namespace unseen::vdtree {
+
+using NodeId = std::uint32_t;
+inline constexpr NodeId no_node = 0xffffffffu;
+
+struct Sphere {
+    glm::vec3 centre = glm::vec3(0); // relative to VertexTree::origin()
+    float radius = 0;
+};
+
+// Relative luminance, 0..1, linear, before the display's mapping.
+struct LuminanceRange {
+    float lo = 0;
+    float hi = 0;
+};
+
+// One directional light and ambient light, for meshes whose luminance is not pre-lit by colours:
+// relative luminance = albedo * (ambient + (1 - ambient) * max(0, n.direction)).
+struct Light {
+    glm::vec3 direction = {0.39800623f, 0.69651091f, 0.59700935f}; // towards the light: (0.4, 0.7, 0.6) normalised
+    float ambient = 0.2f;                                          // share of the luminance that needs no light, 0..1
+    bool operator==(const Light&) const = default;
+};
+
+// The albedo of surfaces without colours: 0.8, a light matt grey.
+inline constexpr float default_albedo = 0.8f;
+
+enum NodeFlags : std::uint8_t {
+    irregular_ring = 1, // the ring has a boundary, non-manifold or inconsistently oriented edge
+};
+
+class VertexTree {
+public:
+    VertexTree(VertexTree&&) noexcept;
+    VertexTree& operator=(VertexTree&&) noexcept;
+    ~VertexTree();
+
+    // Sizes. A tree has at least three leaves and one triangle.
+    NodeId node_count() const noexcept;
+    NodeId interior_count() const noexcept;
+    NodeId leaf_count() const noexcept;
+    Index triangle_count() const noexcept;
+    bool is_leaf(NodeId node) const noexcept { return node >= interior_count(); }
+    static constexpr NodeId root() noexcept { return 0; }
+
+    // Structure. By node: the parent (no_node for the root). By interior node: the leaves supported,
+    // [first_leaf, leaf_end), the end of its subtree among the interior nodes, and its triangles,
+    // [first_triangle[n], first_triangle[n + 1]) (one longer than the nodes).
+    std::span<const NodeId> parents() const noexcept;
+    std::span<const Index> first_leaf() const noexcept;
+    std::span<const Index> leaf_end() const noexcept;
+    std::span<const NodeId> subtree_end() const noexcept;
+    std::span<const Index> first_triangle() const noexcept;
+    std::span<const Triangle> triangles() const noexcept; // corners are leaf numbers, oriented like the input
+
+    // Calls f(child) for each child of an interior node in depth-first order. Cost: the number of children.
+    template <class F>
+    void for_each_child(NodeId node, F&& f) const;
+
+    // Proxy vertices, by node; a leaf's proxy is the input vertex. Attributes the mesh did not have are empty.
+    glm::dvec3 origin() const noexcept;
+    std::span<const glm::vec3> positions() const noexcept;
+    std::span<const float> luminance() const noexcept;    // under light(); never empty
+    std::span<const glm::vec3> normals() const noexcept;  // unit length or zero; never empty
+    std::span<const glm::vec4> colours() const noexcept;  // linear
+    std::span<const glm::vec2> uvs() const noexcept;
+
+    // Bounds, by interior node.
+    std::span<const Sphere> support_spheres() const noexcept;         // leaves and proxies of the subtree
+    std::span<const Sphere> ring_spheres() const noexcept;            // the ring, and the proxies of the subtree
+    std::span<const NormalMask> masks() const noexcept;               // facing of the ring dilated by one more ring
+    std::span<const std::uint8_t> flags() const noexcept;             // NodeFlags
+    std::span<const LuminanceRange> support_luminance() const noexcept;
+    std::span<const LuminanceRange> ring_luminance() const noexcept;
+    std::span<const float> adaptation_luminance() const noexcept;     // middle of ring_luminance, saturated up the tree
+    std::span<const float> displacement() const noexcept;             // largest distance of a supported leaf from the proxy
+
+    // The mesh. By leaf: the input vertex. By triangle: the input triangle's range (groups, materials); empty when
+    // the input had none.
+    std::span<const Index> source_vertices() const noexcept;
+    std::span<const Index> source_triangles() const noexcept; // by triangle: the input triangle
+    std::span<const MeshRange> ranges() const noexcept;       // over input triangles
+    std::uint64_t dropped_triangles() const noexcept;         // input triangles that used a vertex twice
+    Closedness closedness() const noexcept;
+    Sphere bounding_sphere() const noexcept; // of the triangles' corners
+    LuminanceRange luminance_range() const noexcept;
+
+    // Luminance and its bounds under another light; everything else is shared with this tree. Cost: one pass over the
+    // triangles and the nodes. A pre-lit mesh (with colours) is shaded by its colours times the light.
+    const Light& light() const noexcept;
+    bool is_prelit() const noexcept; // luminance comes from the colours alone
+    VertexTree relit(const Light& light) const;
+
+    std::uint64_t byte_size() const noexcept; // resident bytes
+
+    struct Data; // the arrays, for the builder and the file reader
+    explicit VertexTree(std::shared_ptr<const Data> data);
+    const Data& data() const noexcept { return *data_; }
+
+private:
+    std::shared_ptr<const Data> data_;
+};
+
+template <class F>
+void VertexTree::for_each_child(NodeId node, F&& f) const {
+    const auto first = first_leaf(), end = leaf_end();
+    const auto skip = subtree_end();
+    NodeId child = node + 1;
+    for (Index leaf = first[node]; leaf < end[node];) {
+        if (child < skip[node] && first[child] == leaf) {
+            f(child);
+            leaf = end[child];
+            child = skip[child];
+        } else {
+            f(static_cast<NodeId>(interior_count() + leaf));
+            ++leaf;
+        }
+    }
+}
+
+} // namespace unseen::vdtree
