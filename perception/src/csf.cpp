@@ -120,7 +120,8 @@ double foveal_sensitivity(const ModelConstants& k, double freq_cpd, double lum, 
     const double sustained_response =
         std::exp(-std::pow(omega_hz, sustained_temporal_exponent) / k.sustained_temporal_scale);
     const double omega0 = std::max(k.omega0_at_1_cdm2 + k.omega0_per_decade * std::log10(lum), omega0_floor_hz);
-    const double distance = std::pow(omega_hz, transient_temporal_exponent) - std::pow(omega0, transient_temporal_exponent);
+    const double distance =
+        std::pow(omega_hz, transient_temporal_exponent) - std::pow(omega0, transient_temporal_exponent);
     const double transient_response = std::exp(-distance * distance / k.transient_temporal_scale);
 
     const double sustained_max = evaluate(k.sustained_peak, lum) * evaluate(k.sustained_glare, lum);
