@@ -1,0 +1,759 @@
+// Luminance images and their files: PNG by libpng, EXR by OpenEXR, PFM by hand. A file is read into memory whole; what
+// its header claims is checked against its length before anything is allocated for it, and pixels grow as they decode.
+#include <perception/image.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <csetjmp>
+#include <cstdint>
+#include <cstring>
+#include <exception>
+#include <fstream>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include <unistd.h>
+
+#include <Iex.h>
+#include <ImfArray.h>
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfIO.h>
+#include <ImfInputFile.h>
+#include <ImfOutputFile.h>
+#include <png.h>
+
+namespace unseen::perception {
+namespace {
+
+constexpr std::uint64_t largest_side = 32768;                   // pixels
+constexpr std::uint64_t largest_count = std::uint64_t{1} << 28; // pixels
+// No compressed byte of PNG or EXR's deflate can grow to more than 1032 bytes; other EXR methods stay near that.
+constexpr std::uint64_t largest_expansion = 2048;
+constexpr std::uint64_t small_buffer = std::uint64_t{1} << 26;  // bytes that any file may ask for
+constexpr std::uint64_t most_exr_channels = 64;                 // of one file; more is no picture
+
+using Bytes = std::vector<unsigned char>;
+
+Error malformed(const std::filesystem::path& file, const std::string& what) {
+    return {ErrorCode::malformed_data, file.string() + ": " + what};
+}
+Error io_error(const std::filesystem::path& file, const std::string& what) {
+    return {ErrorCode::io_failure, file.string() + ": " + what};
+}
+Error unsupported(const std::filesystem::path& file, const std::string& what) {
+    return {ErrorCode::unsupported, file.string() + ": " + what};
+}
+
+// Sizes as a header gives them, before they are believed.
+std::optional<std::string> size_complaint(std::uint64_t width, std::uint64_t height) {
+    const std::string size = std::to_string(width) + " x " + std::to_string(height);
+    if (width == 0 || height == 0) return "the header gives an empty image (" + size + ")";
+    if (width > largest_side || height > largest_side) {
+        return "the header gives " + size + " pixels; at most 32768 a side can be read, so scale the image down";
+    }
+    if (width * height > largest_count) {
+        return "the header gives " + size + " pixels; at most 2^28 in all can be read, so scale the image down";
+    }
+    return std::nullopt;
+}
+
+Result<Bytes> read_bytes(const std::filesystem::path& file) {
+    std::error_code code;
+    if (std::filesystem::is_directory(file, code)) return io_error(file, "is a folder, not an image");
+    std::ifstream stream(file, std::ios::binary);
+    if (!stream) return io_error(file, "cannot be opened; check the name and the permissions");
+    Bytes bytes;
+    std::array<char, 1 << 16> block;
+    while (stream.read(block.data(), block.size()) || stream.gcount() > 0) {
+        bytes.insert(bytes.end(), block.data(), block.data() + stream.gcount());
+    }
+    if (stream.bad()) return io_error(file, "cannot be read to its end");
+    if (bytes.empty()) return malformed(file, "is empty, not an image");
+    return bytes;
+}
+
+std::optional<Error> non_finite(const std::filesystem::path& file, const Image& image) {
+    for (std::size_t i = 0; i < image.values.size(); ++i) {
+        if (std::isfinite(image.values[i])) continue;
+        const std::size_t pixel = i / static_cast<std::size_t>(image.channels);
+        const auto width = static_cast<std::size_t>(image.width);
+        return malformed(file, "the value of pixel (" + std::to_string(pixel % width) + ", " +
+                                   std::to_string(pixel / width) + ") is not a finite number");
+    }
+    return std::nullopt;
+}
+
+// ---- PNG ----------------------------------------------------------------------------------------------------------
+
+// libpng leaves by longjmp. So every object with a destructor lives out here, and `guarded` runs one step at a time, whose
+// own frame holds nothing to destroy.
+struct PngReader {
+    const Bytes* bytes = nullptr;
+    std::size_t position = 0;
+    png_structp png = nullptr;
+    png_infop info = nullptr;
+    std::string message;
+    bool is_interlaced = false;
+    std::size_t row_bytes = 0;
+    png_bytep row = nullptr;
+    png_bytepp rows = nullptr;
+
+    PngReader() = default;
+    PngReader(const PngReader&) = delete;
+    PngReader& operator=(const PngReader&) = delete;
+    ~PngReader() {
+        if (png != nullptr) png_destroy_read_struct(&png, &info, nullptr);
+    }
+};
+
+struct PngWriter {
+    Bytes bytes;
+    png_structp png = nullptr;
+    png_infop info = nullptr;
+    std::string message;
+    png_uint_32 width = 0, height = 0;
+    int colour_type = 0;
+    png_bytepp rows = nullptr;
+
+    PngWriter() = default;
+    PngWriter(const PngWriter&) = delete;
+    PngWriter& operator=(const PngWriter&) = delete;
+    ~PngWriter() {
+        if (png != nullptr) png_destroy_write_struct(&png, &info);
+    }
+};
+
+template <class Codec>
+[[noreturn]] void on_png_error(png_structp png, png_const_charp text) {
+    static_cast<Codec*>(png_get_error_ptr(png))->message = text;
+    png_longjmp(png, 1);
+}
+void on_png_warning(png_structp, png_const_charp) {}
+
+template <class Codec>
+bool guarded(Codec& codec, void (*step)(Codec&)) {
+    if (setjmp(png_jmpbuf(codec.png)) != 0) return false;
+    step(codec);
+    return true;
+}
+
+void png_read_from_memory(png_structp png, png_bytep to, std::size_t count) {
+    auto* reader = static_cast<PngReader*>(png_get_io_ptr(png));
+    if (count > reader->bytes->size() - reader->position) png_error(png, "the file ends too early");
+    std::memcpy(to, reader->bytes->data() + reader->position, count);
+    reader->position += count;
+}
+
+void png_read_header(PngReader& r) {
+    png_set_read_fn(r.png, &r, png_read_from_memory);
+    png_set_user_limits(r.png, largest_side, largest_side);
+    png_read_info(r.png, r.info);
+}
+
+// To grey or RGB of 8 or 16 bits. Gamma and colour profiles are left alone: code values are wanted as they are.
+void png_set_transforms(PngReader& r) {
+    png_set_expand(r.png);
+    png_set_strip_alpha(r.png);
+    png_set_interlace_handling(r.png);
+    png_read_update_info(r.png, r.info);
+}
+
+void png_decode_row(PngReader& r) { png_read_row(r.png, r.row, nullptr); }
+void png_decode_all(PngReader& r) { png_read_image(r.png, r.rows); }
+void png_finish(PngReader& r) { png_read_end(r.png, nullptr); }
+
+void append_row(const unsigned char* row, std::size_t values, int bits, std::vector<float>& out) {
+    for (std::size_t i = 0; i < values; ++i) {
+        const double code = bits == 16 ? row[2 * i] * 256 + row[2 * i + 1] : row[i];
+        out.push_back(static_cast<float>(code / (bits == 16 ? 65535 : 255)));
+    }
+}
+
+Result<void> decode_png_rows(PngReader& reader, ImageFile& out) {
+    const auto values = static_cast<std::size_t>(out.image.width) * static_cast<std::size_t>(out.image.channels);
+    const auto height = static_cast<std::size_t>(out.image.height);
+    // Interlaced rows arrive in seven passes, so the whole image has to stand.
+    Bytes pixels(reader.row_bytes * (reader.is_interlaced ? height : 1));
+    std::vector<png_bytep> rows;
+    if (reader.is_interlaced) {
+        for (std::size_t y = 0; y < height; ++y) rows.push_back(pixels.data() + y * reader.row_bytes);
+        reader.rows = rows.data();
+        if (!guarded(reader, png_decode_all)) return Error{ErrorCode::malformed_data, reader.message};
+    }
+    for (std::size_t y = 0; y < height; ++y) {
+        reader.row = reader.is_interlaced ? rows[y] : pixels.data();
+        if (!reader.is_interlaced && !guarded(reader, png_decode_row)) {
+            return Error{ErrorCode::malformed_data, "row " + std::to_string(y) + ": " + reader.message};
+        }
+        append_row(reader.row, values, out.bits, out.image.values);
+    }
+    if (!guarded(reader, png_finish)) return Error{ErrorCode::malformed_data, "after the pixels: " + reader.message};
+    return {};
+}
+
+Result<ImageFile> read_png(const std::filesystem::path& file, const Bytes& bytes) {
+    PngReader reader;
+    reader.bytes = &bytes;
+    reader.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &reader, on_png_error<PngReader>, on_png_warning);
+    if (reader.png != nullptr) reader.info = png_create_info_struct(reader.png);
+    if (reader.info == nullptr) return io_error(file, "libpng could not be started");
+    const auto complain = [&](const std::string& what) {
+        return malformed(file, "damaged PNG at byte " + std::to_string(reader.position) + ", " + what);
+    };
+    if (!guarded(reader, png_read_header)) return complain(reader.message);
+
+    const std::uint64_t width = png_get_image_width(reader.png, reader.info);
+    const std::uint64_t height = png_get_image_height(reader.png, reader.info);
+    if (const auto complaint = size_complaint(width, height)) return malformed(file, *complaint);
+    const std::uint64_t raw = height * (1 + png_get_rowbytes(reader.png, reader.info));
+    if (raw / largest_expansion > bytes.size()) {
+        return malformed(file, "the header gives " + std::to_string(width) + " x " + std::to_string(height) +
+                                   " pixels, which " + std::to_string(bytes.size()) + " bytes cannot hold");
+    }
+    reader.is_interlaced = png_get_interlace_type(reader.png, reader.info) != PNG_INTERLACE_NONE;
+    if (!guarded(reader, png_set_transforms)) return complain(reader.message);
+    reader.row_bytes = png_get_rowbytes(reader.png, reader.info);
+
+    ImageFile out;
+    out.bits = png_get_bit_depth(reader.png, reader.info) == 16 ? 16 : 8;
+    out.image.width = static_cast<int>(width);
+    out.image.height = static_cast<int>(height);
+    out.image.channels = png_get_channels(reader.png, reader.info);
+    if (out.image.channels != 1 && out.image.channels != 3) return complain("neither grey nor RGB");
+    if (auto ok = decode_png_rows(reader, out); !ok) return complain(ok.error().message);
+    return out;
+}
+
+void png_write_to_memory(png_structp png, png_bytep from, std::size_t count) {
+    auto* writer = static_cast<PngWriter*>(png_get_io_ptr(png));
+    bool is_stored = true;
+    try {
+        writer->bytes.insert(writer->bytes.end(), from, from + count);
+    } catch (const std::exception&) { // must not pass through libpng's C frames
+        is_stored = false;
+    }
+    if (!is_stored) png_error(png, "out of memory");
+}
+void png_flush_nothing(png_structp) {}
+
+void png_write_all(PngWriter& w) {
+    png_set_write_fn(w.png, &w, png_write_to_memory, png_flush_nothing);
+    png_set_user_limits(w.png, largest_side, largest_side);
+    png_set_IHDR(w.png, w.info, w.width, w.height, 8, w.colour_type, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+                 PNG_FILTER_TYPE_DEFAULT);
+    png_write_info(w.png, w.info);
+    png_write_image(w.png, w.rows);
+    png_write_end(w.png, w.info);
+}
+
+Result<Bytes> encode_png(const std::filesystem::path& file, const Image& image) {
+    Bytes codes;
+    codes.reserve(image.values.size());
+    for (const float v : image.values) {
+        codes.push_back(static_cast<unsigned char>(std::lround(255 * std::clamp(v, 0.0F, 1.0F))));
+    }
+    std::vector<png_bytep> rows;
+    for (int y = 0; y < image.height; ++y) rows.push_back(codes.data() + image.index(0, y, 0));
+
+    PngWriter writer;
+    writer.png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &writer, on_png_error<PngWriter>, on_png_warning);
+    if (writer.png != nullptr) writer.info = png_create_info_struct(writer.png);
+    if (writer.info == nullptr) return io_error(file, "libpng could not be started");
+    writer.width = static_cast<png_uint_32>(image.width);
+    writer.height = static_cast<png_uint_32>(image.height);
+    writer.colour_type = image.channels == 1 ? PNG_COLOR_TYPE_GRAY : PNG_COLOR_TYPE_RGB;
+    writer.rows = rows.data();
+    if (!guarded(writer, png_write_all)) return io_error(file, "libpng: " + writer.message);
+    return std::move(writer.bytes);
+}
+
+// ---- PFM ----------------------------------------------------------------------------------------------------------
+
+// The three whitespace-separated words after the magic; one white character ends the header.
+struct PfmHeader {
+    int channels = 1;
+    std::uint64_t width = 0, height = 0;
+    double scale = 0;
+    std::size_t data = 0; // byte at which the pixels begin
+};
+
+bool is_white(unsigned char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+
+// The next word of the header, empty where there is none or where it is longer than any number need be.
+std::string_view next_word(const Bytes& bytes, std::size_t& position) {
+    constexpr std::size_t longest = 64;
+    while (position < bytes.size() && is_white(bytes[position])) ++position;
+    const std::size_t begin = position;
+    while (position < bytes.size() && !is_white(bytes[position])) {
+        if (++position - begin > longest) return {};
+    }
+    return {reinterpret_cast<const char*>(bytes.data()) + begin, position - begin};
+}
+
+template <class Number>
+bool parse(std::string_view word, Number& number) {
+    if (!word.empty() && word.front() == '+') word.remove_prefix(1);
+    const auto [end, code] = std::from_chars(word.data(), word.data() + word.size(), number);
+    return code == std::errc() && end == word.data() + word.size();
+}
+
+Result<PfmHeader> parse_pfm_header(const std::filesystem::path& file, const Bytes& bytes) {
+    PfmHeader header;
+    header.channels = bytes[1] == 'F' ? 3 : 1;
+    std::size_t position = 2;
+    const auto complain = [&](const char* what) {
+        return malformed(file, std::string("the PFM header has no valid ") + what + " before byte " +
+                                   std::to_string(position));
+    };
+    if (!parse(next_word(bytes, position), header.width)) return complain("width");
+    if (!parse(next_word(bytes, position), header.height)) return complain("height");
+    if (!parse(next_word(bytes, position), header.scale) || !std::isfinite(header.scale) || header.scale == 0) {
+        return complain("scale (negative: little-endian, positive: big-endian)");
+    }
+    if (const auto complaint = size_complaint(header.width, header.height)) return malformed(file, *complaint);
+    header.data = position + 1;
+    const std::uint64_t need = header.width * header.height * static_cast<std::uint64_t>(header.channels) * 4;
+    const std::uint64_t have = bytes.size() > header.data ? bytes.size() - header.data : 0;
+    if (have != need) {
+        return malformed(file, "the PFM header asks for " + std::to_string(need) + " bytes of pixels, the file holds " +
+                                   std::to_string(have));
+    }
+    return header;
+}
+
+float float_at(const unsigned char* bytes, bool is_little) {
+    std::uint32_t word = 0;
+    for (unsigned i = 0; i < 4; ++i) word |= std::uint32_t{bytes[i]} << (8 * (is_little ? i : 3 - i));
+    return std::bit_cast<float>(word);
+}
+
+// The size of the scale is not applied: programs disagree on its meaning, and ours are absolute values.
+Result<ImageFile> read_pfm(const std::filesystem::path& file, const Bytes& bytes) {
+    const auto header = parse_pfm_header(file, bytes);
+    if (!header) return header.error();
+    ImageFile out;
+    out.is_absolute = true;
+    out.bits = 32;
+    out.image = {static_cast<int>(header->width), static_cast<int>(header->height), header->channels, {}};
+    const std::size_t row = static_cast<std::size_t>(header->width) * static_cast<std::size_t>(header->channels);
+    out.image.values.resize(row * static_cast<std::size_t>(header->height));
+    for (std::size_t y = 0; y < header->height; ++y) {
+        const std::size_t from_bottom = static_cast<std::size_t>(header->height) - 1 - y;
+        const unsigned char* line = bytes.data() + header->data + 4 * row * from_bottom;
+        for (std::size_t i = 0; i < row; ++i) {
+            out.image.values[y * row + i] = float_at(line + 4 * i, header->scale < 0);
+        }
+    }
+    if (auto error = non_finite(file, out.image)) return *std::move(error);
+    return out;
+}
+
+Bytes encode_pfm(const Image& image) {
+    const std::string header = std::string(image.channels == 3 ? "PF" : "Pf") + "\n" + std::to_string(image.width) + " " +
+                               std::to_string(image.height) + "\n-1.0\n";
+    Bytes bytes(header.begin(), header.end());
+    bytes.reserve(header.size() + 4 * image.values.size());
+    const std::size_t row = image.index(0, 1, 0);
+    for (int y = image.height - 1; y >= 0; --y) {
+        for (std::size_t i = 0; i < row; ++i) {
+            const auto word = std::bit_cast<std::uint32_t>(image.values[image.index(0, y, 0) + i]);
+            for (unsigned k = 0; k < 4; ++k) bytes.push_back(static_cast<unsigned char>((word >> (8 * k)) & 255U));
+        }
+    }
+    return bytes;
+}
+
+// ---- EXR ----------------------------------------------------------------------------------------------------------
+
+class MemoryInput : public Imf::IStream {
+public:
+    explicit MemoryInput(const Bytes& bytes) : Imf::IStream("image"), bytes_(bytes) {}
+    bool read(char to[], int count) override {
+        if (count < 0 || static_cast<std::uint64_t>(count) > bytes_.size() - position_) {
+            throw Iex::InputExc("the file ends too early");
+        }
+        std::memcpy(to, bytes_.data() + position_, static_cast<std::size_t>(count));
+        position_ += static_cast<std::uint64_t>(count);
+        return position_ < bytes_.size();
+    }
+    std::uint64_t tellg() override { return position_; }
+    void seekg(std::uint64_t position) override {
+        if (position > bytes_.size()) throw Iex::InputExc("an offset points behind the end of the file");
+        position_ = position;
+    }
+
+private:
+    const Bytes& bytes_;
+    std::uint64_t position_ = 0;
+};
+
+class MemoryOutput : public Imf::OStream {
+public:
+    MemoryOutput() : Imf::OStream("image") {}
+    void write(const char from[], int count) override {
+        const std::size_t end = static_cast<std::size_t>(position_) + static_cast<std::size_t>(count);
+        if (bytes.size() < end) bytes.resize(end);
+        std::memcpy(bytes.data() + position_, from, static_cast<std::size_t>(count));
+        position_ = end;
+    }
+    std::uint64_t tellp() override { return position_; }
+    void seekp(std::uint64_t position) override { position_ = position; }
+    Bytes bytes;
+
+private:
+    std::uint64_t position_ = 0;
+};
+
+// A walk over the header's attributes that believes nothing. OpenEXR allocates what an attribute's length, the data
+// window and the channel list claim, so those are settled against the file before it is called.
+class ExrHeaderCheck {
+public:
+    ExrHeaderCheck(const std::filesystem::path& file, const Bytes& bytes) : file_(file), bytes_(bytes) {}
+
+    Result<void> run() {
+        const std::uint32_t version = word(4);
+        if ((version & 255U) != 2) return unsupported(file_, "is an EXR file of another version than 2");
+        if ((version & 0x1A00U) != 0) {
+            return unsupported(file_, "is a tiled, deep or multi-part EXR file; save it as one part of scan lines");
+        }
+        std::size_t position = 8;
+        while (true) {
+            const auto name = text(position);
+            if (!name) return truncated(position);
+            if (name->empty()) break;
+            const auto type = text(position);
+            if (!type || bytes_.size() - position < 4) return truncated(position);
+            const std::uint64_t size = word(position);
+            position += 4;
+            if (size > bytes_.size() - position) return truncated(position);
+            if (auto ok = attribute(*name, *type, position, static_cast<std::size_t>(size)); !ok) return ok;
+            position += static_cast<std::size_t>(size);
+        }
+        return check_sizes(bytes_.size() - position);
+    }
+
+private:
+    Result<void> truncated(std::size_t position) const {
+        return malformed(file_, "the EXR header runs past the end of the file at byte " + std::to_string(position));
+    }
+    std::uint32_t word(std::size_t position) const {
+        std::uint32_t value = 0;
+        for (unsigned i = 0; i < 4; ++i) value |= std::uint32_t{bytes_[position + i]} << (8 * i);
+        return value;
+    }
+    // A zero-terminated name of at most 255 characters.
+    std::optional<std::string_view> text(std::size_t& position) const {
+        const auto begin = bytes_.begin() + static_cast<std::ptrdiff_t>(position);
+        const auto limit = begin + static_cast<std::ptrdiff_t>(std::min<std::size_t>(bytes_.size() - position, 256));
+        const auto end = std::find(begin, limit, 0);
+        if (end == limit) return std::nullopt;
+        const std::string_view found(reinterpret_cast<const char*>(bytes_.data()) + position,
+                                     static_cast<std::size_t>(end - begin));
+        position += found.size() + 1;
+        return found;
+    }
+
+    // OpenEXR reads what a known type needs, whatever length the file gives; where the two differ it would go on in the
+    // middle of an attribute and see another header than this walk.
+    bool has_its_length(std::string_view type, std::size_t position, std::size_t size) const {
+        static constexpr std::pair<std::string_view, std::size_t> lengths[] = {
+            {"box2f", 16}, {"box2i", 16}, {"chromaticities", 32}, {"compression", 1}, {"deepImageState", 1},
+            {"double", 8}, {"envmap", 1}, {"float", 4}, {"int", 4}, {"keycode", 28}, {"lineOrder", 1}, {"m33f", 36},
+            {"m33d", 72}, {"m44f", 64}, {"m44d", 128}, {"rational", 8}, {"tiledesc", 9}, {"timecode", 8}, {"v2f", 8},
+            {"v2i", 8}, {"v2d", 16}, {"v3f", 12}, {"v3i", 12}, {"v3d", 24}};
+        for (const auto& [known, length] : lengths) {
+            if (type == known) return size == length;
+        }
+        if (type == "floatvector") return size % 4 == 0;
+        if (type != "preview") return true;
+        return size >= 8 && std::uint64_t{4} * word(position) * word(position + 4) == size - 8;
+    }
+
+    Result<void> attribute(std::string_view name, std::string_view type, std::size_t position, std::size_t size) {
+        if (!has_its_length(type, position, size)) {
+            return malformed(file_, "the EXR attribute at byte " + std::to_string(position) + " has a wrong length");
+        }
+        if (name == "dataWindow" && type == "box2i") {
+            std::array<std::int64_t, 4> box{};
+            for (std::size_t i = 0; i < 4; ++i) box[i] = std::bit_cast<std::int32_t>(word(position + 4 * i));
+            const std::int64_t width = box[2] - box[0] + 1, height = box[3] - box[1] + 1;
+            if (width <= 0 || height <= 0) return malformed(file_, "the EXR data window is empty");
+            if (auto complaint = size_complaint(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height))) {
+                return malformed(file_, *complaint);
+            }
+            width_ = static_cast<std::uint64_t>(width);
+            height_ = static_cast<std::uint64_t>(height);
+        } else if (name == "compression" && type == "compression") {
+            compression_ = bytes_[position];
+        } else if (type == "chlist" && !count_channels(position, position + size)) {
+            return malformed(file_, "the EXR channel list at byte " + std::to_string(position) + " is damaged");
+        }
+        return {};
+    }
+
+    bool count_channels(std::size_t position, std::size_t end) {
+        constexpr std::size_t after_name = 16; // type, linearity, sampling rates
+        std::uint64_t count = 0;
+        while (true) {
+            const auto name = text(position);
+            if (!name || position > end) return false;
+            if (name->empty()) break;
+            ++count;
+            if (end - position < after_name) return false;
+            position += after_name;
+        }
+        channels_ = std::max(channels_, count);
+        return position == end;
+    }
+
+    Result<void> check_sizes(std::uint64_t rest) const {
+        if (width_ == 0) return malformed(file_, "the EXR header has no data window");
+        if (channels_ > most_exr_channels) {
+            return unsupported(file_, "has " + std::to_string(channels_) + " channels; keep Y or R, G and B");
+        }
+        const std::uint64_t lines = lines_per_chunk();
+        const std::uint64_t chunks = (height_ + lines - 1) / lines;
+        if (chunks * 8 > rest) {
+            return malformed(file_, "the EXR header promises " + std::to_string(chunks) + " chunks, but only " +
+                                        std::to_string(rest) + " bytes follow it");
+        }
+        if (lines * width_ * channels_ * 4 > std::max(small_buffer, bytes_.size() * largest_expansion)) {
+            return malformed(file_, "a chunk of the EXR file would be out of proportion to its " +
+                                        std::to_string(bytes_.size()) + " bytes");
+        }
+        return {};
+    }
+
+    std::uint64_t lines_per_chunk() const {
+        switch (compression_) {
+        case Imf::NO_COMPRESSION:
+        case Imf::RLE_COMPRESSION:
+        case Imf::ZIPS_COMPRESSION: return 1;
+        case Imf::ZIP_COMPRESSION:
+        case Imf::PXR24_COMPRESSION: return 16;
+        case Imf::DWAB_COMPRESSION: return 256;
+        default: return 32;
+        }
+    }
+
+    const std::filesystem::path& file_;
+    const Bytes& bytes_;
+    std::uint64_t width_ = 0, height_ = 0, channels_ = 0;
+    unsigned compression_ = 0;
+};
+
+// Luminance where there is one, else colour, else the only channel.
+Result<std::vector<std::string>> choose_channels(const std::filesystem::path& file, const Imf::ChannelList& list) {
+    std::vector<std::string> all;
+    for (auto it = list.begin(); it != list.end(); ++it) all.emplace_back(it.name());
+    std::vector<std::string> chosen;
+    if (list.findChannel("Y") != nullptr) chosen = {"Y"};
+    else if (list.findChannel("R") != nullptr && list.findChannel("G") != nullptr && list.findChannel("B") != nullptr)
+        chosen = {"R", "G", "B"};
+    else if (all.size() == 1) chosen = all;
+    else return unsupported(file, "has neither a channel Y, nor R, G and B, nor a single channel");
+    for (const std::string& name : chosen) {
+        const Imf::Channel& channel = list[name.c_str()];
+        if (channel.type == Imf::UINT || channel.xSampling != 1 || channel.ySampling != 1) {
+            return unsupported(file, "channel " + name + " is not float or half at full resolution");
+        }
+    }
+    return chosen;
+}
+
+// Decodes a strip of rows at a time, so that memory grows only with pixels that were really there.
+void read_exr_pixels(Imf::InputFile& input, const std::vector<std::string>& channels, Image& image) {
+    constexpr int strip_rows = 32; // lines of a usual chunk, so that none is decoded twice
+    const auto window = input.header().dataWindow();
+    const std::size_t pixel_bytes = channels.size() * sizeof(float);
+    std::vector<float> strip(static_cast<std::size_t>(image.width) * channels.size() * strip_rows);
+    for (int row = 0; row < image.height; row += strip_rows) {
+        const int rows = std::min(strip_rows, image.height - row);
+        const int top = window.min.y + row;
+        Imf::FrameBuffer frame;
+        for (std::size_t c = 0; c < channels.size(); ++c) {
+            frame.insert(channels[c], Imf::Slice::Make(Imf::FLOAT, strip.data() + c, Imath::V2i(window.min.x, top),
+                                                       image.width, rows, pixel_bytes,
+                                                       pixel_bytes * static_cast<std::size_t>(image.width)));
+        }
+        input.setFrameBuffer(frame);
+        input.readPixels(top, top + rows - 1);
+        const auto count = static_cast<std::size_t>(rows) * static_cast<std::size_t>(image.width) * channels.size();
+        image.values.insert(image.values.end(), strip.begin(), strip.begin() + static_cast<std::ptrdiff_t>(count));
+    }
+}
+
+Result<ImageFile> read_exr(const std::filesystem::path& file, const Bytes& bytes) {
+    if (bytes.size() < 8) return malformed(file, "ends within the EXR header");
+    if (auto ok = ExrHeaderCheck(file, bytes).run(); !ok) return ok.error();
+    try {
+        MemoryInput stream(bytes);
+        Imf::InputFile input(stream, 0); // decode on this thread
+        const auto window = input.header().dataWindow();
+        const auto channels = choose_channels(file, input.header().channels());
+        if (!channels) return channels.error();
+        ImageFile out;
+        out.is_absolute = true;
+        out.bits = 32;
+        out.image = {window.max.x - window.min.x + 1, window.max.y - window.min.y + 1,
+                     static_cast<int>(channels->size()), {}};
+        read_exr_pixels(input, *channels, out.image);
+        if (auto error = non_finite(file, out.image)) return *std::move(error);
+        return out;
+    } catch (const std::exception& e) {
+        return malformed(file, std::string("damaged EXR: ") + e.what());
+    }
+}
+
+Result<Bytes> encode_exr(const std::filesystem::path& file, const Image& image) {
+    try {
+        Imf::Header header(image.width, image.height);
+        Imf::FrameBuffer frame;
+        const std::size_t pixel_bytes = static_cast<std::size_t>(image.channels) * sizeof(float);
+        for (int c = 0; c < image.channels; ++c) {
+            const char* name = image.channels == 1 ? "Y" : std::array{"R", "G", "B"}[static_cast<std::size_t>(c)];
+            header.channels().insert(name, Imf::Channel(Imf::FLOAT));
+            frame.insert(name, Imf::Slice::Make(Imf::FLOAT, image.values.data() + c, Imath::V2i(0, 0), image.width,
+                                                image.height, pixel_bytes,
+                                                pixel_bytes * static_cast<std::size_t>(image.width)));
+        }
+        MemoryOutput stream;
+        {
+            Imf::OutputFile output(stream, header, 0);
+            output.setFrameBuffer(frame);
+            output.writePixels(image.height);
+        } // its destructor writes the table of chunks
+        return std::move(stream.bytes);
+    } catch (const std::exception& e) {
+        return io_error(file, std::string("OpenEXR: ") + e.what());
+    }
+}
+
+// ---- writing ------------------------------------------------------------------------------------------------------
+
+// To a temporary name in the same folder, then renamed: readers see the old file or the new one, never a part.
+Result<void> write_bytes(const std::filesystem::path& file, const Bytes& bytes) {
+    static std::atomic<unsigned> counter{0};
+    std::filesystem::path temporary = file;
+    temporary += ".part-" + std::to_string(::getpid()) + "-" + std::to_string(counter++);
+    std::error_code code;
+    {
+        std::ofstream stream(temporary, std::ios::binary | std::ios::trunc);
+        stream.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+        stream.close();
+        if (!stream) {
+            std::filesystem::remove(temporary, code);
+            return io_error(file, "cannot be written; check that the folder exists and has space");
+        }
+    }
+    std::filesystem::rename(temporary, file, code);
+    if (code) {
+        const std::string reason = code.message();
+        std::filesystem::remove(temporary, code);
+        return io_error(file, "cannot be replaced: " + reason);
+    }
+    return {};
+}
+
+Result<Bytes> encode(const std::filesystem::path& file, const Image& image) {
+    std::string ending = file.extension().string();
+    for (char& c : ending) c = static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
+    if (ending == ".png") return encode_png(file, image);
+    if (ending == ".pfm") return encode_pfm(image);
+    if (ending == ".exr") return encode_exr(file, image);
+    return Error{ErrorCode::invalid_argument, file.string() + ": images are written as .png, .pfm or .exr, not '" +
+                                                  ending + "'"};
+}
+
+bool begins_with(const Bytes& bytes, std::initializer_list<unsigned char> magic) {
+    return bytes.size() >= magic.size() && std::equal(magic.begin(), magic.end(), bytes.begin());
+}
+
+// decode() costs a power; an 8- or 16-bit file has few codes and many pixels.
+class CodeDecoder {
+public:
+    CodeDecoder(const Display& display, int bits) : display_(display), largest_(bits == 16 ? 65535 : 255) {
+        for (int code = 0; code <= largest_; ++code) table_.push_back(decode(display, exact(code)));
+    }
+    double operator()(float value) const {
+        const long code = value >= 0 && value <= 1 ? std::lround(value * static_cast<float>(largest_)) : -1;
+        const bool is_code = code >= 0 && static_cast<float>(exact(static_cast<int>(code))) == value;
+        return is_code ? table_[static_cast<std::size_t>(code)] : decode(display_, static_cast<double>(value));
+    }
+
+private:
+    double exact(int code) const { return static_cast<double>(code) / largest_; }
+    const Display& display_;
+    int largest_;
+    std::vector<double> table_;
+};
+
+} // namespace
+
+Result<ImageFile> read_image(const std::filesystem::path& file) {
+    auto bytes = read_bytes(file);
+    if (!bytes) return bytes.error();
+    try {
+        if (begins_with(*bytes, {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'})) return read_png(file, *bytes);
+        if (begins_with(*bytes, {0x76, 0x2f, 0x31, 0x01})) return read_exr(file, *bytes);
+        if (begins_with(*bytes, {'P', 'f'}) || begins_with(*bytes, {'P', 'F'})) return read_pfm(file, *bytes);
+    } catch (const std::bad_alloc&) {
+        return unsupported(file, "needs more memory than this machine has");
+    }
+    return malformed(file, "is neither PNG, nor PFM, nor EXR (told by its first bytes)");
+}
+
+Result<void> write_image(const std::filesystem::path& file, const Image& image) {
+    const auto complain = [&](const std::string& what) {
+        return Error{ErrorCode::invalid_argument, file.string() + ": " + what};
+    };
+    if (image.channels != 1 && image.channels != 3) {
+        return complain("an image to write has 1 or 3 channels, not " + std::to_string(image.channels));
+    }
+    if (image.width <= 0 || image.height <= 0 || image.width > static_cast<int>(largest_side) ||
+        image.height > static_cast<int>(largest_side)) {
+        return complain("an image to write has 1 to 32768 pixels a side, not " + std::to_string(image.width) + " x " +
+                        std::to_string(image.height));
+    }
+    if (image.values.size() != image.index(0, image.height, 0)) {
+        return complain("the image says " + std::to_string(image.index(0, image.height, 0)) + " values but holds " +
+                        std::to_string(image.values.size()));
+    }
+    for (std::size_t i = 0; i < image.values.size(); ++i) {
+        if (!std::isfinite(image.values[i])) return complain("value " + std::to_string(i) + " is not a finite number");
+    }
+    auto bytes = encode(file, image);
+    if (!bytes) return bytes.error();
+    return write_bytes(file, *bytes);
+}
+
+Image to_luminance(const ImageFile& file, const Display& display) {
+    const Image& in = file.image;
+    Image out{in.width, in.height, 1, {}};
+    const auto channels = static_cast<std::size_t>(in.channels);
+    const std::size_t pixels = in.values.size() / channels;
+    out.values.reserve(pixels);
+    const CodeDecoder code_to_light(display, file.bits);
+    for (std::size_t p = 0; p < pixels; ++p) {
+        double y = 0;
+        for (std::size_t c = 0; c < channels; ++c) {
+            const float value = in.values[p * channels + c];
+            y += (channels == 1 ? 1 : luminance_weights[c]) *
+                 (file.is_absolute ? static_cast<double>(value) : code_to_light(value));
+        }
+        out.values.push_back(static_cast<float>(file.is_absolute ? y : to_luminance(display, y).value()));
+    }
+    return out;
+}
+
+} // namespace unseen::perception
