@@ -10,6 +10,9 @@ struct GLFWwindow;
 
 namespace unseen::render {
 
+class Platform;
+class Renderer;
+
 struct WindowOptions {
     int width = 1024;
     int height = 1024;
@@ -17,18 +20,24 @@ struct WindowOptions {
     bool visible = true;
 };
 
-// Move-only; current on the thread that made it, for as long as it lives. GL debug output of severity medium and high is
-// collected as errors, see take_errors().
+// Move-only; current on the thread that made it until another one is made or used there; stays on that thread. GL debug
+// output of severity medium and high is collected as errors, see take_errors(); remarks on performance are not.
 class Context {
 public:
     // EGL without a display: enumerated devices first (so that a GPU is found), then the surfaceless platform
     // (software rendering works). Fails with a clear error where there is neither.
     static Result<Context> headless();
+
+    // A window of GLFW's, sRGB-capable and multisampled where there is such a thing. On the main thread only; the caller
+    // polls events and swaps buffers. Fails where there is no display.
     static Result<Context> window(const WindowOptions& options = {});
 
     Context(Context&&) noexcept;
     Context& operator=(Context&&) noexcept;
     ~Context();
+
+    // Makes the context current again after another one was. Cheap where it already is. Everything below does it itself.
+    Result<void> make_current();
 
     std::string renderer_name() const; // GL_RENDERER
     std::string version() const;       // GL_VERSION
@@ -38,8 +47,10 @@ public:
     std::string take_errors();
 
 private:
+    friend class Renderer;
     struct Impl;
     explicit Context(std::unique_ptr<Impl> impl);
+    static Result<Context> adopt(std::unique_ptr<Platform> platform);
     std::unique_ptr<Impl> impl_;
 };
 

@@ -1,0 +1,41 @@
+// A linked shader program.
+#pragma once
+
+#include <span>
+#include <string_view>
+
+#include <glm/mat4x4.hpp>
+
+#include <render/gl_object.h>
+#include <vdtree/result.h>
+
+namespace unseen::render {
+
+// GLSL 4.50 text. Sources have no #version line, it is put first.
+struct ShaderSource {
+    enum class Stage { vertex, geometry, fragment };
+    Stage stage = Stage::vertex;
+    std::string_view text;
+};
+
+// Move-only; needs a current context. Uniforms are set by their explicit layout(location = N).
+class Program {
+public:
+    // Compiles each source with the `defines` (such as "FLAT") before it, and links. The error is the compiler's log,
+    // which counts lines as the sources do.
+    static Result<Program> build(std::string_view label, std::span<const ShaderSource> sources,
+                                 std::span<const std::string_view> defines = {});
+
+    unsigned id() const noexcept { return object_.id(); }
+    void use() const;
+
+    // A location that the program does not use is an error of the caller, which the debug output reports.
+    void set(int location, float value) const;
+    void set(int location, const glm::mat4& value) const;
+
+private:
+    explicit Program(ProgramObject object) : object_(std::move(object)) {}
+    ProgramObject object_;
+};
+
+} // namespace unseen::render

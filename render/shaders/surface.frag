@@ -1,0 +1,64 @@
+// The surface's shade, with the triangles' edges drawn over it (WIREFRAME). WINDOW: for a window's framebuffer, opaque
+// and, with ENCODE_SRGB, encoded here because the framebuffer does not do it.
+#ifdef FLAT
+layout(location = 0) flat in vec4 surface_shade;
+#else
+layout(location = 0) in vec4 surface_shade;
+#endif
+#ifdef WIREFRAME
+layout(location = 1) in vec3 corner_weights;
+#endif
+
+layout(location = 0) out vec4 pixel; // linear RGB; relative luminance in a
+
+#ifdef WIREFRAME
+const float half_line = 0.5;             // pixels, on each side of an edge
+const float half_line_of_height = 0.15;  // lines get thinner where triangles are so small that lines would cover them
+const float dark_surface = 0.18;         // relative luminance; below it lines are brighter than the surface
+const float line_on_bright = 0.15;       // share of the surface's luminance
+const float line_on_dark = 0.4;          // added to the surface's luminance
+
+// The share of this sample that an edge's line covers. The weights are interpolated with perspective, so their
+// derivatives give distances in pixels, also in triangles that reach behind the eye.
+float line_coverage() {
+    vec3 per_pixel = vec3(length(vec2(dFdx(corner_weights.x), dFdy(corner_weights.x))),
+                          length(vec2(dFdx(corner_weights.y), dFdy(corner_weights.y))),
+                          length(vec2(dFdx(corner_weights.z), dFdy(corner_weights.z))));
+    vec3 heights = 1.0 / max(per_pixel, vec3(1e-20));
+    vec3 distances = corner_weights * heights;
+    float nearest = min(distances.x, min(distances.y, distances.z));
+    float width = min(half_line, half_line_of_height * min(heights.x, min(heights.y, heights.z)));
+#ifdef WINDOW
+    return clamp(width - nearest + 0.5, 0.0, 1.0); // one sample a pixel: soft edges, one pixel wide
+#else
+    return nearest < width ? 1.0 : 0.0;
+#endif
+}
+
+vec4 line_shade(vec4 surface) {
+    if (surface.a > dark_surface)
+        return surface * line_on_bright;
+    return surface + vec4(line_on_dark);
+}
+#endif
+
+#ifdef ENCODE_SRGB
+vec3 srgb_encoded(vec3 linear) {
+    vec3 c = clamp(linear, 0.0, 1.0);
+    return mix(1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, 12.92 * c, lessThanEqual(c, vec3(0.0031308)));
+}
+#endif
+
+void main() {
+    vec4 result = surface_shade;
+#ifdef WIREFRAME
+    result = mix(result, line_shade(result), line_coverage());
+#endif
+#ifdef ENCODE_SRGB
+    result.rgb = srgb_encoded(result.rgb);
+#endif
+#ifdef WINDOW
+    result.a = 1.0;
+#endif
+    pixel = result;
+}

@@ -1,0 +1,28 @@
+// What a triangle knows of itself. FLAT: the mean of its corners' shades; WIREFRAME: the weights of its corners.
+layout(triangles) in;
+layout(triangle_strip, max_vertices = 3) out;
+
+layout(location = 0) in vec4 shade[];
+
+#ifdef FLAT
+layout(location = 0) flat out vec4 surface_shade;
+#else
+layout(location = 0) out vec4 surface_shade;
+#endif
+layout(location = 1) out vec3 corner_weights;
+
+invariant gl_Position;
+
+void main() {
+    for (int corner = 0; corner < 3; ++corner) {
+        gl_Position = gl_in[corner].gl_Position;
+#ifdef FLAT
+        surface_shade = (shade[0] + shade[1] + shade[2]) / 3.0;
+#else
+        surface_shade = shade[corner];
+#endif
+        corner_weights = vec3(corner == 0, corner == 1, corner == 2);
+        EmitVertex();
+    }
+    EndPrimitive();
+}

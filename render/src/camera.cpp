@@ -1,0 +1,81 @@
+// The projection: camera-relative, in units of the model's own size, with reversed depth.
+#include "camera.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/gtc/matrix_transform.hpp>
+#include <glm/gtc/quaternion.hpp>
+
+namespace unseen::render {
+namespace {
+
+// Near plane at least so far, as a share of the ball's radius: with the eye inside of the model, what is nearer is cut off.
+// Depth is float and reversed, so a near plane that is too near costs no precision.
+constexpr double least_near = 1e-4;
+
+// The ball's bounds and the vertices are rounded to float: the near plane keeps this share away from them.
+constexpr double near_margin = 0.5;
+
+// What stands for the radius of a ball of no size (coincident vertices), units of the frame.
+constexpr double point_radius = 1e-6;
+
+double near_plane(glm::dvec3 centre_in_view, double radius, double tan_x, double tan_y) {
+    const double distance = glm::length(centre_in_view);
+    const double nearest = distance - radius;
+    const double floor = least_near * std::max(radius, point_radius);
+    if (!(nearest > 0))
+        return floor;
+    // A point that far away in the corner of the picture has the least depth.
+    const double corner_cosine = 1 / std::sqrt(1 + tan_x * tan_x + tan_y * tan_y);
+    const double depth = std::max(-centre_in_view.z - radius, nearest * corner_cosine);
+    return std::max(near_margin * depth, floor);
+}
+
+} // namespace
+
+UnitFrame unit_frame(const vdtree::Sphere& bounds) {
+    UnitFrame frame;
+    frame.centre = glm::dvec3(bounds.centre);
+    int exponent = 0;
+    const double radius = bounds.radius;
+    if (radius > 0 && std::isfinite(radius))
+        std::frexp(radius, &exponent);
+    frame.unit = std::ldexp(1.0, exponent);
+    frame.radius = radius / frame.unit;
+    return frame;
+}
+
+Camera camera_for(const vdtree::View& view, const vdtree::Similarity& placement, glm::dvec3 origin,
+                  const UnitFrame& frame) {
+    const vdtree::CameraFrame axes = vdtree::camera_frame(view);
+    const glm::dmat3 view_from_world = glm::transpose(glm::dmat3(axes.right, axes.up, axes.back));
+    const glm::dmat3 rotation = view_from_world * glm::mat3_cast(placement.rotation);
+    const double world_unit = placement.scale * frame.unit;
+    const glm::dvec3 from_eye = placement.to_world(origin + frame.centre) - view.eye;
+    const glm::dvec3 centre_in_view = view_from_world * from_eye / world_unit;
+
+    glm::dmat4 view_from_unit(rotation);
+    view_from_unit[3] = glm::dvec4(centre_in_view, 1);
+
+    const double tan_y = std::tan(glm::radians(view.fov_y_degrees) / 2);
+    const double tan_x = tan_y * view.width / view.height;
+    glm::dmat4 clip_from_view(0);
+    clip_from_view[0][0] = 1 / tan_x;
+    clip_from_view[1][1] = 1 / tan_y;
+    clip_from_view[2][3] = -1;
+    clip_from_view[3][2] = near_plane(centre_in_view, frame.radius, tan_x, tan_y);
+
+    Camera camera;
+    camera.clip_from_unit = clip_from_view * view_from_unit;
+    camera.eye_inside = !(glm::length(centre_in_view) > frame.radius);
+    return camera;
+}
+
+glm::mat4 jittered(const Camera& camera, const vdtree::View& view, glm::dvec2 sample) {
+    // y points up in clip space and down in the pixel.
+    const glm::dvec3 shift(2 * (0.5 - sample.x) / view.width, 2 * (sample.y - 0.5) / view.height, 0);
+    return glm::mat4(glm::translate(glm::dmat4(1), shift) * camera.clip_from_unit);
+}
+
+} // namespace unseen::render

@@ -1,0 +1,119 @@
+// Compiles and links shader programs.
+#include <render/program.h>
+
+#include <string>
+#include <vector>
+
+#include <glm/gtc/type_ptr.hpp>
+
+#include "gl.h"
+
+namespace unseen::render {
+namespace {
+
+GLenum gl_stage(ShaderSource::Stage stage) {
+    switch (stage) {
+    case ShaderSource::Stage::vertex: return GL_VERTEX_SHADER;
+    case ShaderSource::Stage::geometry: return GL_GEOMETRY_SHADER;
+    case ShaderSource::Stage::fragment: return GL_FRAGMENT_SHADER;
+    }
+    return 0;
+}
+
+const char* stage_name(ShaderSource::Stage stage) {
+    switch (stage) {
+    case ShaderSource::Stage::vertex: return "vertex";
+    case ShaderSource::Stage::geometry: return "geometry";
+    case ShaderSource::Stage::fragment: return "fragment";
+    }
+    return "unknown";
+}
+
+// A shader lives until its program is linked.
+class Shader {
+public:
+    explicit Shader(GLenum stage) : id_(glCreateShader(stage)) {}
+    Shader(Shader&& other) noexcept : id_(std::exchange(other.id_, 0u)) {}
+    Shader(const Shader&) = delete;
+    Shader& operator=(const Shader&) = delete;
+    Shader& operator=(Shader&&) = delete;
+    ~Shader() { glDeleteShader(id_); } // 0 is ignored
+
+    GLuint id() const noexcept { return id_; }
+
+private:
+    GLuint id_;
+};
+
+std::string prologue(std::span<const std::string_view> defines) {
+    std::string text = "#version 450 core\n";
+    for (std::string_view define : defines)
+        text.append("#define ").append(define).append(" 1\n");
+    return text + "#line 1\n";
+}
+
+using GetParameter = void (*)(GLuint, GLenum, GLint*);
+using GetLog = void (*)(GLuint, GLsizei, GLsizei*, GLchar*);
+
+std::string info_log(GLuint id, GetParameter get_parameter, GetLog get_log) {
+    GLint size = 0;
+    get_parameter(id, GL_INFO_LOG_LENGTH, &size);
+    if (size <= 1)
+        return "the compiler gives no reason";
+    std::string text(static_cast<std::size_t>(size), '\0');
+    GLsizei written = 0;
+    get_log(id, size, &written, text.data());
+    text.resize(static_cast<std::size_t>(written));
+    while (!text.empty() && text.back() == '\n')
+        text.pop_back();
+    return text;
+}
+
+Error shader_error(std::string_view label, std::string_view step, const std::string& log) {
+    return {ErrorCode::unsupported,
+            "The shader program '" + std::string(label) + "' cannot be made: " + std::string(step) + " failed: " + log};
+}
+
+} // namespace
+
+Result<Program> Program::build(std::string_view label, std::span<const ShaderSource> sources,
+                               std::span<const std::string_view> defines) {
+    const std::string first = prologue(defines);
+    ProgramObject program = ProgramObject::create(label);
+    std::vector<Shader> shaders;
+    for (const ShaderSource& source : sources) {
+        const Shader& shader = shaders.emplace_back(gl_stage(source.stage));
+        const GLchar* texts[] = {first.data(), source.text.data()};
+        const GLint sizes[] = {static_cast<GLint>(first.size()), static_cast<GLint>(source.text.size())};
+        glShaderSource(shader.id(), 2, texts, sizes);
+        glCompileShader(shader.id());
+        GLint compiled = GL_FALSE;
+        glGetShaderiv(shader.id(), GL_COMPILE_STATUS, &compiled);
+        if (compiled != GL_TRUE)
+            return shader_error(label, std::string("compiling the ") + stage_name(source.stage) + " shader",
+                                info_log(shader.id(), glGetShaderiv, glGetShaderInfoLog));
+        glAttachShader(program.id(), shader.id());
+    }
+    glLinkProgram(program.id());
+    for (const Shader& shader : shaders)
+        glDetachShader(program.id(), shader.id());
+    GLint linked = GL_FALSE;
+    glGetProgramiv(program.id(), GL_LINK_STATUS, &linked);
+    if (linked != GL_TRUE)
+        return shader_error(label, "linking", info_log(program.id(), glGetProgramiv, glGetProgramInfoLog));
+    return Program(std::move(program));
+}
+
+void Program::use() const {
+    glUseProgram(id());
+}
+
+void Program::set(int location, float value) const {
+    glProgramUniform1f(id(), location, value);
+}
+
+void Program::set(int location, const glm::mat4& value) const {
+    glProgramUniformMatrix4fv(id(), location, 1, GL_FALSE, glm::value_ptr(value));
+}
+
+} // namespace unseen::render

@@ -1,0 +1,14 @@
+// The GLSL files under shaders/, embedded by EmbedShaders.cmake. They have no #version line: program.cpp puts it first.
+#pragma once
+
+#include <string_view>
+
+namespace unseen::render::shaders {
+
+extern const std::string_view accumulate_frag;
+extern const std::string_view full_screen_vert;
+extern const std::string_view surface_vert;
+extern const std::string_view surface_geom;
+extern const std::string_view surface_frag;
+
+} // namespace unseen::render::shaders

@@ -1,0 +1,302 @@
+// Uploads vertices, draws samples and adds them up.
+#include "triangle_drawer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+
+#include "gl.h"
+#include "shaders.h"
+
+namespace unseen::render {
+namespace {
+
+// Rec. 709 luminance of linear RGB, as everywhere in Unseen.
+constexpr glm::dvec3 rec709(0.2126, 0.7152, 0.0722);
+
+struct Vertex {
+    glm::vec3 position;
+    glm::vec4 shade; // linear RGB; relative luminance in a
+};
+static_assert(sizeof(Vertex) == 28, "the vertex layout below counts on it");
+
+constexpr std::size_t upload_batch = 1u << 16;              // vertices; bounds the memory that uploading takes
+constexpr std::uint64_t most_indices_a_call = 3ull << 28;    // a multiple of 3 that fits GLsizei
+
+enum UniformLocation { clip_from_unit_location = 0, background_location = 0 };
+
+// The colour scaled to the luminance; grey where it has none.
+glm::vec3 shaded_colour(glm::vec4 colour, float luminance) {
+    const glm::dvec3 rgb(colour);
+    const double own = glm::dot(rgb, rec709);
+    if (!(own > 0) || !std::isfinite(own))
+        return glm::vec3(luminance);
+    const glm::dvec3 scaled = rgb * (static_cast<double>(luminance) / own);
+    return glm::vec3(scaled);
+}
+
+Vertex vertex_at(const VertexArrays& arrays, std::size_t i) {
+    const float luminance = arrays.luminance[i];
+    const glm::vec3 rgb = arrays.colours.empty() ? glm::vec3(luminance) : shaded_colour(arrays.colours[i], luminance);
+    const glm::dvec3 position = (glm::dvec3(arrays.positions[i]) - arrays.frame.centre) / arrays.frame.unit;
+    return {glm::vec3(position), glm::vec4(rgb, luminance)};
+}
+
+void describe_vertices(GLuint arrays, GLuint vertices, GLuint indices) {
+    glVertexArrayVertexBuffer(arrays, 0, vertices, 0, sizeof(Vertex));
+    glVertexArrayElementBuffer(arrays, indices);
+    glEnableVertexArrayAttrib(arrays, 0);
+    glVertexArrayAttribFormat(arrays, 0, 3, GL_FLOAT, GL_FALSE, offsetof(Vertex, position));
+    glVertexArrayAttribBinding(arrays, 0, 0);
+    glEnableVertexArrayAttrib(arrays, 1);
+    glVertexArrayAttribFormat(arrays, 1, 4, GL_FLOAT, GL_FALSE, offsetof(Vertex, shade));
+    glVertexArrayAttribBinding(arrays, 1, 0);
+}
+
+// Everything that drawing depends on is set each time: a window's other users may have changed it.
+void set_fixed_state(int width, int height) {
+    glViewport(0, 0, width, height);
+    glDepthRange(0, 1);
+    glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
+    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+    glDepthMask(GL_TRUE);
+    for (GLenum off : {GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_DITHER, GL_RASTERIZER_DISCARD, GL_COLOR_LOGIC_OP,
+                       GL_DEPTH_CLAMP, GL_POLYGON_OFFSET_FILL, GL_SAMPLE_ALPHA_TO_COVERAGE, GL_SAMPLE_MASK,
+                       GL_PRIMITIVE_RESTART, GL_FRAMEBUFFER_SRGB})
+        glDisable(off);
+}
+
+void set_surface_state(Cull cull) {
+    glDisable(GL_BLEND);
+    glEnable(GL_DEPTH_TEST);
+    glDepthFunc(GL_GREATER); // depth is reversed
+    glFrontFace(GL_CCW);
+    if (cull == Cull::nothing) {
+        glDisable(GL_CULL_FACE);
+    } else {
+        glEnable(GL_CULL_FACE);
+        glCullFace(cull == Cull::back ? GL_BACK : GL_FRONT);
+    }
+}
+
+void set_sum_state() {
+    glDisable(GL_DEPTH_TEST);
+    glDisable(GL_CULL_FACE);
+    glEnable(GL_BLEND);
+    glBlendEquation(GL_FUNC_ADD);
+    glBlendFunc(GL_ONE, GL_ONE);
+}
+
+void clear(GLuint framebuffer, glm::vec4 colour, bool depth) {
+    glClearNamedFramebufferfv(framebuffer, GL_COLOR, 0, &colour.x);
+    const GLfloat infinitely_far = 0;
+    if (depth)
+        glClearNamedFramebufferfv(framebuffer, GL_DEPTH, 0, &infinitely_far);
+}
+
+float srgb_encoded(float linear) {
+    const float c = std::clamp(linear, 0.0f, 1.0f);
+    return c <= 0.0031308f ? 12.92f * c : 1.055f * std::pow(c, 1 / 2.4f) - 0.055f;
+}
+
+Result<void> check_window() {
+    const GLenum status = glCheckNamedFramebufferStatus(0, GL_DRAW_FRAMEBUFFER);
+    if (status == GL_FRAMEBUFFER_UNDEFINED)
+        return Error{ErrorCode::unsupported, "There is no window to draw to: the OpenGL context is headless."};
+    if (status != GL_FRAMEBUFFER_COMPLETE)
+        return Error{ErrorCode::unsupported, "The window's framebuffer cannot be drawn to."};
+    return {};
+}
+
+bool window_encodes_srgb() {
+    GLint encoding = GL_LINEAR;
+    glGetNamedFramebufferAttachmentParameteriv(0, GL_BACK_LEFT, GL_FRAMEBUFFER_ATTACHMENT_COLOR_ENCODING, &encoding);
+    return encoding == GL_SRGB;
+}
+
+// GL keeps the pixels in the order of its own rows; with the origin at the upper left that is from the top.
+void read_pixels(const Framebuffer& from, std::span<glm::vec4> pixels) {
+    glPixelStorei(GL_PACK_ALIGNMENT, 4);
+    glPixelStorei(GL_PACK_ROW_LENGTH, 0);
+    glPixelStorei(GL_PACK_SKIP_ROWS, 0);
+    glPixelStorei(GL_PACK_SKIP_PIXELS, 0);
+    glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
+    glBindFramebuffer(GL_READ_FRAMEBUFFER, from.id());
+    glReadBuffer(GL_COLOR_ATTACHMENT0);
+    glReadPixels(0, 0, from.width(), from.height(), GL_RGBA, GL_FLOAT, pixels.data());
+}
+
+} // namespace
+
+Result<TriangleDrawer> TriangleDrawer::create(const VertexArrays& vertices) {
+    TriangleDrawer drawer;
+    drawer.vertices_ = Buffer::create("vertices");
+    drawer.indices_ = Buffer::create("triangles");
+    drawer.surface_arrays_ = VertexArray::create("surface");
+    drawer.no_arrays_ = VertexArray::create("full screen");
+    if (auto uploaded = drawer.upload(vertices); !uploaded)
+        return uploaded.error();
+    describe_vertices(drawer.surface_arrays_.id(), drawer.vertices_.id(), drawer.indices_.id());
+
+    const ShaderSource sources[] = {{ShaderSource::Stage::vertex, shaders::full_screen_vert},
+                                    {ShaderSource::Stage::fragment, shaders::accumulate_frag}};
+    auto accumulate = Program::build("accumulate", sources);
+    if (!accumulate)
+        return accumulate.error();
+    drawer.accumulate_ = std::move(*accumulate);
+    return drawer;
+}
+
+Result<void> TriangleDrawer::upload(const VertexArrays& vertices) {
+    const std::size_t count = vertices.positions.size();
+    glNamedBufferStorage(vertices_.id(), static_cast<GLsizeiptr>(std::max<std::size_t>(count, 1) * sizeof(Vertex)),
+                         nullptr, GL_DYNAMIC_STORAGE_BIT);
+    if (glGetError() == GL_OUT_OF_MEMORY)
+        return Error{ErrorCode::unsupported, "The graphics memory does not hold the tree's " + std::to_string(count) +
+                                                 " vertices (" + std::to_string(count * sizeof(Vertex) >> 20) +
+                                                 " MiB)."};
+    std::vector<Vertex> batch;
+    batch.reserve(std::min(count, upload_batch));
+    for (std::size_t first = 0; first < count; first += batch.size()) {
+        batch.clear();
+        for (std::size_t i = first; i < std::min(count, first + upload_batch); ++i)
+            batch.push_back(vertex_at(vertices, i));
+        glNamedBufferSubData(vertices_.id(), static_cast<GLintptr>(first * sizeof(Vertex)),
+                             static_cast<GLsizeiptr>(batch.size() * sizeof(Vertex)), batch.data());
+    }
+    return {};
+}
+
+void TriangleDrawer::set_triangles(std::span<const std::uint32_t> indices) {
+    index_count_ = indices.size();
+    if (indices.empty())
+        return;
+    if (indices.size_bytes() > index_capacity_) {
+        index_capacity_ = indices.size_bytes();
+        glNamedBufferData(indices_.id(), static_cast<GLsizeiptr>(index_capacity_), indices.data(), GL_STREAM_DRAW);
+        return;
+    }
+    glInvalidateBufferData(indices_.id()); // so that the driver need not wait for the last frame
+    glNamedBufferSubData(indices_.id(), 0, static_cast<GLsizeiptr>(indices.size_bytes()), indices.data());
+}
+
+Result<std::span<const glm::vec4>> TriangleDrawer::draw(int width, int height,
+                                                        std::span<const glm::mat4> clip_from_unit,
+                                                        const SurfaceStyle& style) {
+    if (auto fitted = fit_targets(width, height); !fitted)
+        return fitted.error();
+    const auto program = program_for(style, Target::image);
+    if (!program)
+        return program.error();
+
+    set_fixed_state(width, height);
+    glClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE); // rows from the top, as they are read back
+    clear(sum_.id(), glm::vec4(0), false);
+    for (const glm::mat4& matrix : clip_from_unit) {
+        glBindFramebuffer(GL_DRAW_FRAMEBUFFER, sample_.id());
+        clear(sample_.id(), glm::vec4(style.background), true);
+        draw_surface(**program, matrix, style);
+        glBindFramebuffer(GL_DRAW_FRAMEBUFFER, sum_.id());
+        add_sample_to_sum(style.background);
+    }
+    read_pixels(sum_, pixels_);
+
+    const double share = 1.0 / static_cast<double>(std::max<std::size_t>(clip_from_unit.size(), 1));
+    for (glm::vec4& pixel : pixels_)
+        pixel = glm::vec4(glm::dvec4(pixel) * share + glm::dvec4(style.background));
+    return std::span<const glm::vec4>(pixels_);
+}
+
+Result<void> TriangleDrawer::draw_to_window(int width, int height, const glm::mat4& clip_from_unit,
+                                            const SurfaceStyle& style) {
+    if (auto window = check_window(); !window)
+        return window;
+    const bool encodes = window_encodes_srgb();
+    const auto program = program_for(style, encodes ? Target::window : Target::window_to_encode);
+    if (!program)
+        return program.error();
+
+    set_fixed_state(width, height);
+    glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+    glEnable(GL_MULTISAMPLE);
+    if (encodes)
+        glEnable(GL_FRAMEBUFFER_SRGB);
+    glBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);
+    const float background = encodes ? style.background : srgb_encoded(style.background);
+    clear(0, glm::vec4(glm::vec3(background), 1), true);
+    draw_surface(**program, clip_from_unit, style);
+    return {};
+}
+
+Result<void> TriangleDrawer::fit_targets(int width, int height) {
+    if (sum_.width() == width && sum_.height() == height)
+        return {};
+    sample_ = {};
+    sum_ = {}; // the old ones first, so that both sizes need not fit at a time
+    auto sample = Framebuffer::create(width, height, {.depth = true, .label = "sample"});
+    if (!sample)
+        return sample.error();
+    auto sum = Framebuffer::create(width, height, {.depth = false, .label = "sum of samples"});
+    if (!sum)
+        return sum.error();
+    pixels_.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), glm::vec4(0));
+    sample_ = std::move(*sample);
+    sum_ = std::move(*sum);
+    return {};
+}
+
+Result<const Program*> TriangleDrawer::program_for(const SurfaceStyle& style, Target target) {
+    const bool flat = style.shading == Shading::flat;
+    auto& program = programs_[static_cast<std::size_t>(target) * 4 + (flat ? 2u : 0u) + (style.wireframe ? 1u : 0u)];
+    if (program)
+        return &*program;
+
+    std::vector<std::string_view> defines;
+    if (flat)
+        defines.push_back("FLAT");
+    if (style.wireframe)
+        defines.push_back("WIREFRAME");
+    if (target != Target::image)
+        defines.push_back("WINDOW");
+    if (target == Target::window_to_encode)
+        defines.push_back("ENCODE_SRGB");
+
+    std::vector<ShaderSource> sources = {{ShaderSource::Stage::vertex, shaders::surface_vert},
+                                         {ShaderSource::Stage::fragment, shaders::surface_frag}};
+    if (flat || style.wireframe)
+        sources.push_back({ShaderSource::Stage::geometry, shaders::surface_geom});
+    auto built = Program::build("surface", sources, defines);
+    if (!built)
+        return built.error();
+    program = std::move(*built);
+    return &*program;
+}
+
+void TriangleDrawer::draw_surface(const Program& program, const glm::mat4& clip_from_unit,
+                                  const SurfaceStyle& style) const {
+    if (index_count_ == 0)
+        return;
+    set_surface_state(style.cull);
+    program.set(clip_from_unit_location, clip_from_unit);
+    program.use();
+    glBindVertexArray(surface_arrays_.id());
+    for (std::uint64_t first = 0; first < index_count_; first += most_indices_a_call) {
+        const std::uint64_t count = std::min(most_indices_a_call, index_count_ - first);
+        glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(count), GL_UNSIGNED_INT,
+                       reinterpret_cast<const void*>(static_cast<std::uintptr_t>(first * sizeof(std::uint32_t))));
+    }
+    glBindVertexArray(0);
+}
+
+void TriangleDrawer::add_sample_to_sum(float background) const {
+    set_sum_state();
+    glBindTextureUnit(0, sample_.colour_texture());
+    accumulate_->set(background_location, background);
+    accumulate_->use();
+    glBindVertexArray(no_arrays_.id());
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+    glBindVertexArray(0);
+}
+
+} // namespace unseen::render

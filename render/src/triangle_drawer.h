@@ -1,0 +1,80 @@
+// Draws indexed triangles: knows vertices, matrices and targets, nothing of trees and cuts.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+
+#include <render/framebuffer.h>
+#include <render/gl_object.h>
+#include <render/program.h>
+#include <render/renderer.h>
+
+#include "camera.h"
+
+namespace unseen::render {
+
+// Which faces are left out.
+enum class Cull { nothing, back, front };
+
+// The vertices as they lie in memory; all spans but `colours`, which may be empty, are equally long.
+struct VertexArrays {
+    std::span<const glm::vec3> positions; // mesh units
+    std::span<const float> luminance;     // relative, linear
+    std::span<const glm::vec4> colours;   // linear; only their hue and saturation count
+    UnitFrame frame;                      // that the positions are uploaded in
+};
+
+// How triangles look.
+struct SurfaceStyle {
+    Shading shading = Shading::smooth;
+    bool wireframe = false;
+    Cull cull = Cull::nothing;
+    float background = 0; // relative luminance, grey
+};
+
+// Move-only; needs a current context for everything. GL errors are left for the caller to ask for.
+class TriangleDrawer {
+public:
+    static Result<TriangleDrawer> create(const VertexArrays& vertices);
+
+    // The triangles of all draws until the next call; corners are vertex numbers. The memory is reused.
+    void set_triangles(std::span<const std::uint32_t> indices);
+
+    // The mean over the matrices of the image that each gives: width x height pixels of linear RGB and relative luminance,
+    // row-major from the top left. The pixels belong to the drawer and stay until its next draw.
+    Result<std::span<const glm::vec4>> draw(int width, int height, std::span<const glm::mat4> clip_from_unit,
+                                            const SurfaceStyle& style);
+
+    // One image into the window's framebuffer, encoded as sRGB.
+    Result<void> draw_to_window(int width, int height, const glm::mat4& clip_from_unit, const SurfaceStyle& style);
+
+private:
+    enum class Target { image, window, window_to_encode };
+
+    TriangleDrawer() = default;
+    Result<void> upload(const VertexArrays& vertices);
+    Result<void> fit_targets(int width, int height);
+    Result<const Program*> program_for(const SurfaceStyle& style, Target target);
+    void draw_surface(const Program& program, const glm::mat4& clip_from_unit, const SurfaceStyle& style) const;
+    void add_sample_to_sum(float background) const;
+
+    Buffer vertices_;
+    Buffer indices_;
+    VertexArray surface_arrays_;
+    VertexArray no_arrays_; // for the full-screen triangle, which comes from nowhere
+    std::uint64_t index_capacity_ = 0; // bytes
+    std::uint64_t index_count_ = 0;
+    std::array<std::optional<Program>, 12> programs_; // 3 targets x shading x wireframe, made when first used
+    std::optional<Program> accumulate_;
+    Framebuffer sample_;
+    Framebuffer sum_;
+    std::vector<glm::vec4> pixels_;
+};
+
+} // namespace unseen::render
