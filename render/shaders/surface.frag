@@ -14,7 +14,7 @@ layout(location = 0) out vec4 pixel; // linear RGB; relative luminance in a
 #ifdef WIREFRAME
 const float half_line = 0.5;             // pixels, on each side of an edge
 const float half_line_of_height = 0.15;  // lines get thinner where triangles are so small that lines would cover them
-const float dark_surface = 0.18;         // relative luminance; below it lines are brighter than the surface
+const float dark_surface = 0.08;         // relative luminance; below it lines are brighter than the surface
 const float line_on_bright = 0.15;       // share of the surface's luminance
 const float line_on_dark = 0.4;          // added to the surface's luminance
 

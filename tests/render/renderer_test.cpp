@@ -268,6 +268,7 @@ TEST_F(RendererTest, DrawsAnInsideOutMeshLikeItsMirrorImage) {
     ASSERT_EQ(inward.tree.closedness(), unseen::vdtree::Closedness::closed_inward);
     View view = frontal_view(64, 64);
     view.eye = {2.5, 3, 3.5};
+    view.fov_y_degrees = 40;
     EXPECT_LT(difference(draw(outward, view), draw(inward, view)).largest, value_tolerance);
 
     DrawOptions options;
