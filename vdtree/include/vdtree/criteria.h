@@ -13,6 +13,11 @@ namespace unseen::vdtree {
 // fall from a node to its parent. Called in batches on the thread that adjusts the cut; must not throw.
 using FoldCriterion = FunctionRef<void(const VertexTree&, std::span<const NodeId> nodes, std::span<float> costs)>;
 
+// Costs from here on are infinite: no finite change of distance hides the fold. They differ so that budgets have an order.
+inline constexpr float least_unbounded_cost = 1e30f;
+inline bool is_unbounded(float cost) noexcept { return !(cost < least_unbounded_cost); }
+inline float unbounded_cost(float order) noexcept { return least_unbounded_cost * (1 + order); }
+
 // Fills, for each interior node, whether its ring can be seen. Nodes that are out are folded at no cost. A child
 // of a node that is out must be out, and a child of one that is wholly in must be wholly in.
 enum class Visibility : std::uint8_t { out, partly, wholly_in };
@@ -47,7 +52,7 @@ public:
 
 private:
     glm::dvec3 eye_;
-    double scale_;
+    double scale_; // cost per radian
 };
 
 // Vertex displacement: the largest movement of a supported vertex, seen from the nearest point of the support's
@@ -59,7 +64,7 @@ public:
 
 private:
     glm::dvec3 eye_;
-    double scale_;
+    double scale_; // cost per radian
 };
 
 } // namespace unseen::vdtree

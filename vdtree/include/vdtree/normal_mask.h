@@ -1,4 +1,4 @@
-// The normal-cube mask: which directions a set of triangles faces, in 48 bytes.
+// Normal masks and slabs: which directions a set of triangles faces, in 48 bytes.
 //
 // The Gauss sphere is projected on a cube whose six faces have 8 x 8 cells of equal angle (the cube coordinate is
 // warped by the arctangent); one bit per cell. After Luebke and Hallen 2001, section 3.3 (their masks are of the
@@ -37,20 +37,57 @@ inline constexpr int normal_cell_count = 384;
 // The cell of a direction of any positive length, or -1 for zero and non-finite ones.
 int normal_cell(glm::dvec3 normal) noexcept;
 
-// A cone that contains a cell: its axis and its half-angle's sine and cosine, rounded outward.
+// The unit vectors at a cell's corners. Its sides are arcs of great circles, so the cell lies in a cap of the sphere (up to
+// a hemisphere) iff its corners do.
 struct NormalCell {
-    glm::vec3 axis;
-    float sine;
-    float cosine;
+    std::array<float, 4> x, y, z;
 };
 const std::array<NormalCell, normal_cell_count>& normal_cells() noexcept;
+
+// Slabs that contain the same directions as a mask, in 14 bytes: the least and the largest coordinate along the three axes
+// and the four diagonals of the cube, in 1/127, rounded outward. Cheaper to test than the mask, and much tighter where the
+// directions are alike; unions are exact, so nothing is lost up the tree.
+struct NormalSlabs {
+    static constexpr int axis_count = 7; // x, y, z, then the diagonals (1,1,1), (-1,1,1), (1,-1,1), (1,1,-1)
+    std::array<std::int8_t, axis_count> lo{127, 127, 127, 127, 127, 127, 127};
+    std::array<std::int8_t, axis_count> hi{-127, -127, -127, -127, -127, -127, -127};
+
+    void insert(glm::dvec3 unit_normal) noexcept;
+    bool empty() const noexcept { return lo[0] > hi[0]; }
+    NormalSlabs& operator|=(const NormalSlabs& other) noexcept {
+        for (std::size_t i = 0; i < axis_count; ++i) {
+            lo[i] = lo[i] < other.lo[i] ? lo[i] : other.lo[i];
+            hi[i] = hi[i] > other.hi[i] ? hi[i] : other.hi[i];
+        }
+        return *this;
+    }
+    bool includes(const NormalSlabs& other) const noexcept {
+        NormalSlabs both = *this;
+        return (both |= other) == *this;
+    }
+    static NormalSlabs everything() noexcept {
+        NormalSlabs all;
+        all.lo.fill(-127);
+        all.hi.fill(127);
+        return all;
+    }
+    bool operator==(const NormalSlabs&) const = default;
+};
 
 enum class Facing : std::uint8_t { none, front, back, mixed };
 
 // How triangles with the mask's normals, each with a point within `radius` of a centre at distance `distance` and
 // direction `to_eye` (unit) from the eye, can face the eye. `mixed` whenever both cannot be ruled out, also when
 // the eye is inside the sphere; `none` for an empty mask. Conservative for a perspective view: the directions to
-// the eye from points of the sphere differ from `to_eye` by asin(radius / distance) at most. Cost: one product per set cell.
+// the eye from points of the sphere differ from `to_eye` by asin(radius / distance) at most. Cost: four products per set cell.
 Facing facing(const NormalMask& mask, glm::vec3 to_eye, float distance, float radius) noexcept;
+Facing facing(const NormalSlabs& slabs, glm::vec3 to_eye, float distance, float radius) noexcept;
+
+// Both hold, so what either rules out is ruled out: the slabs first.
+inline Facing facing(const NormalSlabs& slabs, const NormalMask& mask, glm::vec3 to_eye, float distance,
+                     float radius) noexcept {
+    const Facing by_slabs = facing(slabs, to_eye, distance, radius);
+    return by_slabs == Facing::mixed ? facing(mask, to_eye, distance, radius) : by_slabs;
+}
 
 } // namespace unseen::vdtree

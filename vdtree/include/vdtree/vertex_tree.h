@@ -101,6 +101,7 @@ public:
     std::span<const Sphere> support_spheres() const noexcept;         // leaves and proxies of the subtree
     std::span<const Sphere> ring_spheres() const noexcept;            // the ring, and the proxies of the subtree
     std::span<const NormalMask> masks() const noexcept;               // facing of the ring dilated by one more ring
+    std::span<const NormalSlabs> slabs() const noexcept;              // of the same directions as the masks
     std::span<const std::uint8_t> flags() const noexcept;             // NodeFlags
     std::span<const LuminanceRange> support_luminance() const noexcept;
     std::span<const LuminanceRange> ring_luminance() const noexcept;

@@ -1,0 +1,154 @@
+#include <vdtree/normal_mask.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numbers>
+
+#include <glm/geometric.hpp>
+
+namespace unseen::vdtree {
+
+namespace {
+
+constexpr int cells_per_side = 8;
+
+// Covers the rounding of the cell's index and of the products in facing(): share of a unit vector, and radians.
+constexpr double cell_margin = 1e-5;
+
+constexpr double inverse_sqrt3 = 0.57735026918962576451; // the diagonals' coordinates
+constexpr double slab_units = 127;                       // of NormalSlabs in 1
+constexpr double slab_margin = 1e-4;                     // units; covers the rounding of unit vectors in floats
+
+// The cube coordinate -1..1 of the warped coordinate -1..1: equal steps are equal angles along the axis.
+double unwarp(double warped) { return std::tan(warped * (std::numbers::pi / 4)); }
+
+int cell_index(double cube_coordinate) {
+    const double warped = std::atan(cube_coordinate) * (4 / std::numbers::pi);
+    return std::clamp(static_cast<int>((warped + 1) * (cells_per_side / 2.0)), 0, cells_per_side - 1);
+}
+
+// The point of the cube's face `face` (axis * 2 + sign) with the coordinates u, v on the two other axes.
+glm::dvec3 on_face(int face, double u, double v) {
+    const int axis = face / 2;
+    glm::dvec3 p;
+    p[axis] = face % 2 ? -1 : 1;
+    p[(axis + 1) % 3] = u;
+    p[(axis + 2) % 3] = v;
+    return p;
+}
+
+std::array<NormalCell, normal_cell_count> make_cells() {
+    std::array<NormalCell, normal_cell_count> cells;
+    for (int face = 0; face < 6; ++face) {
+        for (int row = 0; row < cells_per_side; ++row) {
+            for (int column = 0; column < cells_per_side; ++column) {
+                NormalCell& cell = cells[static_cast<std::size_t>(face * 64 + row * cells_per_side + column)];
+                for (int corner = 0; corner < 4; ++corner) {
+                    const double u = unwarp((column + corner % 2) * 2.0 / cells_per_side - 1);
+                    const double v = unwarp((row + corner / 2) * 2.0 / cells_per_side - 1);
+                    const glm::vec3 p(glm::normalize(on_face(face, u, v)));
+                    const auto k = static_cast<std::size_t>(corner);
+                    cell.x[k] = p.x, cell.y[k] = p.y, cell.z[k] = p.z;
+                }
+            }
+        }
+    }
+    return cells;
+}
+
+} // namespace
+
+int normal_cell(glm::dvec3 normal) noexcept {
+    const glm::dvec3 size = glm::abs(normal);
+    const double largest = std::max({size.x, size.y, size.z});
+    if (!(largest > 0) || !std::isfinite(size.x + size.y + size.z)) return -1;
+    const int axis = size.x >= size.y ? (size.x >= size.z ? 0 : 2) : (size.y >= size.z ? 1 : 2);
+    const int face = axis * 2 + (normal[axis] < 0 ? 1 : 0);
+    const int column = cell_index(normal[(axis + 1) % 3] / largest);
+    const int row = cell_index(normal[(axis + 2) % 3] / largest);
+    return face * 64 + row * cells_per_side + column;
+}
+
+const std::array<NormalCell, normal_cell_count>& normal_cells() noexcept {
+    static const std::array<NormalCell, normal_cell_count> cells = make_cells();
+    return cells;
+}
+
+Facing facing(const NormalMask& mask, glm::vec3 to_eye, float distance, float radius) noexcept {
+    if (mask.empty()) return Facing::none;
+    if (!(distance > radius)) return Facing::mixed;
+    // A normal n faces the eye from every point of the sphere iff the angle between n and to_eye is below 90 degrees
+    // less asin(radius / distance): n . to_eye > radius / distance. That is a cap, so the cells' corners decide.
+    const float limit = radius / distance + static_cast<float>(cell_margin);
+    const auto& cells = normal_cells();
+    bool some_front = false, some_back = false;
+    for (std::size_t face = 0; face < 6; ++face) {
+        for (std::uint64_t bits = mask.faces[face]; bits; bits &= bits - 1) {
+            const NormalCell& cell = cells[face * 64 + static_cast<std::size_t>(std::countr_zero(bits))];
+            float lowest = 2, highest = -2;
+            for (std::size_t k = 0; k < 4; ++k) {
+                const float towards = cell.x[k] * to_eye.x + cell.y[k] * to_eye.y + cell.z[k] * to_eye.z;
+                lowest = std::min(lowest, towards);
+                highest = std::max(highest, towards);
+            }
+            if (lowest > limit) some_front = true;
+            else if (highest < -limit) some_back = true;
+            else return Facing::mixed;
+            if (some_front && some_back) return Facing::mixed;
+        }
+    }
+    return some_front ? Facing::front : Facing::back;
+}
+
+void NormalSlabs::insert(glm::dvec3 n) noexcept {
+    const double along[axis_count] = {n.x,
+                                      n.y,
+                                      n.z,
+                                      (n.x + n.y + n.z) * inverse_sqrt3,
+                                      (-n.x + n.y + n.z) * inverse_sqrt3,
+                                      (n.x - n.y + n.z) * inverse_sqrt3,
+                                      (n.x + n.y - n.z) * inverse_sqrt3};
+    for (std::size_t i = 0; i < axis_count; ++i) {
+        const double units = std::clamp(along[i], -1.0, 1.0) * slab_units;
+        lo[i] = std::min(lo[i], static_cast<std::int8_t>(std::floor(units - slab_margin)));
+        hi[i] = std::max(hi[i], static_cast<std::int8_t>(std::ceil(units + slab_margin)));
+    }
+}
+
+namespace {
+
+// An upper bound of n . u over the slabs: for some ways to write u as a sum of axes, the sum of the axes' own bounds. The
+// ways: x, y, z; and the diagonal of u's octant in place of one of the three. The least of them is the tightest.
+float largest_along(const NormalSlabs& slabs, glm::vec3 u) {
+    const auto slab = [&](std::size_t axis, float weight) {
+        return std::max(weight * static_cast<float>(slabs.hi[axis]), weight * static_cast<float>(slabs.lo[axis]));
+    };
+    float least = slab(0, u.x) + slab(1, u.y) + slab(2, u.z);
+    // The diagonals are named by the coordinate whose sign differs from the other two.
+    const bool x = u.x < 0, y = u.y < 0, z = u.z < 0;
+    const std::size_t diagonal = x == y ? (y == z ? 3 : 6) : (x == z ? 5 : 4);
+    const float sign = (diagonal == 4 ? y : x) ? -1.0f : 1.0f;
+    const glm::vec3 size = glm::abs(u);
+    for (int replaced = 0; replaced < 3; ++replaced) {
+        const float weight = size[replaced];
+        float sum = slab(diagonal, sign * weight * static_cast<float>(1 / inverse_sqrt3));
+        for (int other = 0; other < 3; ++other)
+            if (other != replaced)
+                sum += slab(static_cast<std::size_t>(other), std::copysign(1.0f, u[other]) * (size[other] - weight));
+        least = std::min(least, sum);
+    }
+    return least;
+}
+
+} // namespace
+
+Facing facing(const NormalSlabs& slabs, glm::vec3 to_eye, float distance, float radius) noexcept {
+    if (slabs.empty()) return Facing::none;
+    if (!(distance > radius)) return Facing::mixed;
+    const float limit = (radius / distance + static_cast<float>(cell_margin)) * static_cast<float>(slab_units);
+    if (largest_along(slabs, to_eye) < -limit) return Facing::back;
+    return largest_along(slabs, -to_eye) < -limit ? Facing::front : Facing::mixed;
+}
+
+} // namespace unseen::vdtree

@@ -1,0 +1,30 @@
+// What the builder finds out about the surface before it clusters anything.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <vdtree/mesh.h>
+
+namespace unseen::vdtree {
+
+// By vertex: the lowest-numbered vertex at exactly the same position.
+std::vector<Index> find_coincident(std::span<const glm::dvec3> positions);
+
+struct SurfaceTopology {
+    Closedness closedness = Closedness::open;
+    std::vector<std::uint8_t> irregular; // by vertex: at a boundary, non-manifold or inconsistently oriented edge
+};
+
+// After welding coincident vertices; triangles that the welding degenerates have no edges.
+SurfaceTopology analyse_topology(const MeshView& mesh, std::span<const Index> coincident);
+
+// By vertex: a third of the area of the triangles around.
+std::vector<double> vertex_areas(const MeshView& mesh);
+
+// By vertex: the mesh's own normal where it has length, else the area-weighted mean of the normals of the faces
+// around the position; unit length, or zero where there is no face with an area. Turned outward on an
+// inside-out surface.
+std::vector<glm::vec3> vertex_normals(const MeshView& mesh, std::span<const Index> coincident, Closedness closedness);
+
+} // namespace unseen::vdtree

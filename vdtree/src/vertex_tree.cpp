@@ -1,0 +1,195 @@
+#include "vertex_tree_data.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/geometric.hpp>
+
+namespace unseen::vdtree {
+
+namespace {
+
+template <class T>
+std::uint64_t bytes_of(const std::vector<T>& v) {
+    return v.capacity() * sizeof(T);
+}
+
+constexpr LuminanceRange empty_range{1.0f, 0.0f};
+
+LuminanceRange unite(LuminanceRange a, LuminanceRange b) { return {std::min(a.lo, b.lo), std::max(a.hi, b.hi)}; }
+LuminanceRange unite(LuminanceRange a, float y) { return unite(a, LuminanceRange{y, y}); }
+
+// A third of the area of the triangles around each leaf, in double against overflow at extreme scales.
+std::vector<double> leaf_areas(const TreeGeometry& g, NodeId interior) {
+    std::vector<double> areas(g.first_leaf.empty() ? 0 : g.leaf_end[0], 0.0);
+    for (const Triangle& t : g.triangles) {
+        const glm::dvec3 a = g.positions[interior + t[0]], b = g.positions[interior + t[1]],
+                         c = g.positions[interior + t[2]];
+        const double area = glm::length(glm::cross(b - a, c - a)) / 6;
+        for (const Index leaf : t) areas[leaf] += area;
+    }
+    return areas;
+}
+
+// Whether all leaves of a node lie at one point, its proxy's: then folding it moves nothing.
+bool is_coincident(const TreeGeometry& g, NodeId node) { return g.support_spheres[node].radius == 0; }
+
+} // namespace
+
+float vertex_luminance(glm::vec3 normal, const glm::vec4* colour, const Light& light, bool prelit) {
+    const float albedo =
+        colour ? std::clamp(0.2126f * colour->r + 0.7152f * colour->g + 0.0722f * colour->b, 0.0f, 1.0f)
+               : default_albedo;
+    if (prelit) return albedo;
+    return albedo * (light.ambient + (1 - light.ambient) * std::max(0.0f, glm::dot(normal, light.direction)));
+}
+
+TreeLuminance derive_luminance(const TreeGeometry& g, const Light& light, bool prelit) {
+    const NodeId interior = static_cast<NodeId>(g.first_leaf.size());
+    const Index leaves = g.leaf_end[0];
+    TreeLuminance out;
+    out.light = light;
+    out.prelit = prelit;
+    out.luminance.resize(std::size_t{interior} + leaves);
+    out.support_range.resize(interior);
+    out.ring_range.resize(interior);
+    out.adaptation.assign(interior, 0);
+
+    std::vector<LuminanceRange> leaf_ring(leaves);
+    for (Index leaf = 0; leaf < leaves; ++leaf) {
+        const NodeId node = interior + leaf;
+        const float y =
+            vertex_luminance(g.normals[node], g.colours.empty() ? nullptr : &g.colours[node], light, prelit);
+        out.luminance[node] = y;
+        leaf_ring[leaf] = {y, y};
+    }
+    for (const Triangle& t : g.triangles) {
+        LuminanceRange range = empty_range;
+        for (const Index leaf : t) range = unite(range, out.luminance[interior + leaf]);
+        for (const Index leaf : t) leaf_ring[leaf] = unite(leaf_ring[leaf], range);
+    }
+
+    // A proxy's luminance is the area-weighted mean of its leaves: folds keep the mean of their surroundings.
+    const std::vector<double> areas = leaf_areas(g, interior);
+    std::vector<double> area_sum(leaves + 1, 0.0), weighted_sum(leaves + 1, 0.0), plain_sum(leaves + 1, 0.0);
+    double largest = 0;
+    for (const double a : areas) largest = std::max(largest, a);
+    const double scale = largest > 0 ? 1 / largest : 0;
+    for (Index leaf = 0; leaf < leaves; ++leaf) {
+        const double area = areas[leaf] * scale, y = out.luminance[interior + leaf];
+        area_sum[leaf + 1] = area_sum[leaf] + area;
+        weighted_sum[leaf + 1] = weighted_sum[leaf] + area * y;
+        plain_sum[leaf + 1] = plain_sum[leaf] + y;
+    }
+    // Below this share of the largest vertex area, per leaf, the difference of two running sums is rounding noise.
+    constexpr double least_mean_area = 1e-9;
+
+    out.range = empty_range;
+    for (NodeId node = interior; node-- > 0;) {
+        const Index begin = g.first_leaf[node], end = g.leaf_end[node];
+        LuminanceRange support = empty_range, ring = empty_range;
+        float adaptation = 0;
+        // Interior children have higher numbers and are done.
+        NodeId child = node + 1;
+        for (Index leaf = begin; leaf < end;) {
+            if (child < g.subtree_end[node] && g.first_leaf[child] == leaf) {
+                support = unite(support, out.support_range[child]);
+                ring = unite(ring, out.ring_range[child]);
+                if (is_coincident(g, child)) // its ring_range is narrower than its ring
+                    for (Index l = g.first_leaf[child]; l < g.leaf_end[child]; ++l) ring = unite(ring, leaf_ring[l]);
+                adaptation = std::max(adaptation, out.adaptation[child]);
+                leaf = g.leaf_end[child];
+                child = g.subtree_end[child];
+            } else {
+                support = unite(support, out.luminance[interior + leaf]);
+                ring = unite(ring, leaf_ring[leaf]);
+                ++leaf;
+            }
+        }
+        const double area = area_sum[end] - area_sum[begin];
+        double mean;
+        if (area > least_mean_area * (end - begin)) mean = (weighted_sum[end] - weighted_sum[begin]) / area;
+        else mean = (plain_sum[end] - plain_sum[begin]) / (end - begin);
+        // The mean lies within the leaves' range but for rounding.
+        const float y = std::clamp(static_cast<float>(mean), support.lo, support.hi);
+        out.luminance[node] = y;
+        support = unite(support, y);
+        ring = unite(ring, y);
+        if (is_coincident(g, node)) {
+            // Nothing moves; a pixel of the ring changes by the spread of the coincident vertices at most. The
+            // contrast of that is largest on the ring's darkest luminance.
+            ring.hi = std::min(ring.hi, ring.lo + (support.hi - support.lo));
+        }
+        out.support_range[node] = support;
+        out.ring_range[node] = ring;
+        out.adaptation[node] = std::max(adaptation, 0.5f * (ring.lo + ring.hi));
+    }
+    for (const Triangle& t : g.triangles)
+        for (const Index leaf : t) out.range = unite(out.range, out.luminance[interior + leaf]);
+    return out;
+}
+
+VertexTree::VertexTree(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
+VertexTree::VertexTree(VertexTree&&) noexcept = default;
+VertexTree& VertexTree::operator=(VertexTree&&) noexcept = default;
+VertexTree::~VertexTree() = default;
+
+NodeId VertexTree::node_count() const noexcept { return static_cast<NodeId>(data_->geometry->parents.size()); }
+NodeId VertexTree::interior_count() const noexcept { return static_cast<NodeId>(data_->geometry->first_leaf.size()); }
+NodeId VertexTree::leaf_count() const noexcept { return node_count() - interior_count(); }
+Index VertexTree::triangle_count() const noexcept { return static_cast<Index>(data_->geometry->triangles.size()); }
+
+std::span<const NodeId> VertexTree::parents() const noexcept { return data_->geometry->parents; }
+std::span<const Index> VertexTree::first_leaf() const noexcept { return data_->geometry->first_leaf; }
+std::span<const Index> VertexTree::leaf_end() const noexcept { return data_->geometry->leaf_end; }
+std::span<const NodeId> VertexTree::subtree_end() const noexcept { return data_->geometry->subtree_end; }
+std::span<const Index> VertexTree::first_triangle() const noexcept { return data_->geometry->first_triangle; }
+std::span<const Triangle> VertexTree::triangles() const noexcept { return data_->geometry->triangles; }
+
+glm::dvec3 VertexTree::origin() const noexcept { return data_->geometry->origin; }
+std::span<const glm::vec3> VertexTree::positions() const noexcept { return data_->geometry->positions; }
+std::span<const float> VertexTree::luminance() const noexcept { return data_->light.luminance; }
+std::span<const glm::vec3> VertexTree::normals() const noexcept { return data_->geometry->normals; }
+std::span<const glm::vec4> VertexTree::colours() const noexcept { return data_->geometry->colours; }
+std::span<const glm::vec2> VertexTree::uvs() const noexcept { return data_->geometry->uvs; }
+
+std::span<const Sphere> VertexTree::support_spheres() const noexcept { return data_->geometry->support_spheres; }
+std::span<const Sphere> VertexTree::ring_spheres() const noexcept { return data_->geometry->ring_spheres; }
+std::span<const NormalMask> VertexTree::masks() const noexcept { return data_->geometry->masks; }
+std::span<const NormalSlabs> VertexTree::slabs() const noexcept { return data_->geometry->slabs; }
+std::span<const std::uint8_t> VertexTree::flags() const noexcept { return data_->geometry->flags; }
+std::span<const LuminanceRange> VertexTree::support_luminance() const noexcept { return data_->light.support_range; }
+std::span<const LuminanceRange> VertexTree::ring_luminance() const noexcept { return data_->light.ring_range; }
+std::span<const float> VertexTree::adaptation_luminance() const noexcept { return data_->light.adaptation; }
+std::span<const float> VertexTree::displacement() const noexcept { return data_->geometry->displacement; }
+
+std::span<const Index> VertexTree::source_vertices() const noexcept { return data_->geometry->source_vertices; }
+std::span<const Index> VertexTree::source_triangles() const noexcept { return data_->geometry->source_triangles; }
+std::span<const MeshRange> VertexTree::ranges() const noexcept { return data_->geometry->ranges; }
+std::uint64_t VertexTree::dropped_triangles() const noexcept { return data_->geometry->dropped_triangles; }
+Closedness VertexTree::closedness() const noexcept { return data_->geometry->closedness; }
+Sphere VertexTree::bounding_sphere() const noexcept { return data_->geometry->bounding_sphere; }
+LuminanceRange VertexTree::luminance_range() const noexcept { return data_->light.range; }
+
+const Light& VertexTree::light() const noexcept { return data_->light.light; }
+bool VertexTree::is_prelit() const noexcept { return data_->light.prelit; }
+
+VertexTree VertexTree::relit(const Light& light) const {
+    auto data = std::make_shared<Data>();
+    data->geometry = data_->geometry;
+    data->light = derive_luminance(*data_->geometry, light, false);
+    return VertexTree(std::move(data));
+}
+
+std::uint64_t VertexTree::byte_size() const noexcept {
+    const TreeGeometry& g = *data_->geometry;
+    const TreeLuminance& l = data_->light;
+    return bytes_of(g.parents) + bytes_of(g.positions) + bytes_of(g.normals) + bytes_of(g.colours) + bytes_of(g.uvs) +
+           bytes_of(g.first_leaf) + bytes_of(g.leaf_end) + bytes_of(g.subtree_end) + bytes_of(g.first_triangle) +
+           bytes_of(g.support_spheres) + bytes_of(g.ring_spheres) + bytes_of(g.masks) + bytes_of(g.slabs) + bytes_of(g.flags) +
+           bytes_of(g.displacement) + bytes_of(g.triangles) + bytes_of(g.source_triangles) +
+           bytes_of(g.source_vertices) + bytes_of(g.ranges) + bytes_of(l.luminance) + bytes_of(l.support_range) +
+           bytes_of(l.ring_range) + bytes_of(l.adaptation);
+}
+
+} // namespace unseen::vdtree
