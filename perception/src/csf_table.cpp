@@ -294,7 +294,7 @@ void CsfTable::prepare_extrapolation() {
 
 double CsfTable::sensitivity(CyclesPerDegree frequency, Degrees eccentricity, Luminance luminance) const {
     const double log2_cpd = std::log2(frequency.value()), log2_cdm2 = std::log2(luminance.value());
-    if (std::isnan(log2_cpd + log2_cdm2) || std::isnan(eccentricity.value())) return nan;
+    if (std::isnan(log2_cpd) || std::isnan(log2_cdm2) || std::isnan(eccentricity.value())) return nan;
     const Cell f = locate(frequency_, log2_cpd), e = locate(eccentricity_, eccentricity.value());
     const Cell l = locate(luminance_, log2_cdm2);
     const std::size_t frequencies = frequency_.positions.size(), luminances = luminance_.positions.size();

@@ -1,0 +1,422 @@
+// The table: how near it comes to the closed form, how it interpolates, and that its conservative form is monotone and
+// inverted exactly.
+#include <perception/csf.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace unseen::perception {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
+// Relative, what the table promises wherever S > 1.
+constexpr double table_accuracy = 0.01;
+// Relative; some ten operations in double on logarithms of up to 500.
+constexpr double rounding = 1e-11;
+// Relative; the monotone form keeps logarithms of up to 500 in float, most of them below 10.
+constexpr double float_rounding = 1e-5;
+
+struct Place {
+    double cpd, degrees, cdm2;
+};
+
+class RandomPlaces {
+public:
+    explicit RandomPlaces(unsigned seed) : engine_(seed) {}
+    double uniform(double low, double high) { return std::uniform_real_distribution<>(low, high)(engine_); }
+    // Within the table's axes, half of them within 25 degrees, where most is visible.
+    Place next() {
+        return {std::exp2(uniform(-4, 6)), uniform(0, 1) < 0.5 ? uniform(0, 25) : uniform(0, 120),
+                std::pow(10, uniform(-3, 4))};
+    }
+
+private:
+    std::mt19937 engine_;
+};
+
+double closed_form(CsfModel model, const Place& p) {
+    return sensitivity(model, {.frequency = CyclesPerDegree(p.cpd),
+                               .luminance = Luminance(p.cdm2),
+                               .eccentricity = Degrees(p.degrees),
+                               .area = patch_area(CyclesPerDegree(p.cpd))});
+}
+double interpolated(const CsfTable& t, const Place& p) {
+    return t.sensitivity(CyclesPerDegree(p.cpd), Degrees(p.degrees), Luminance(p.cdm2));
+}
+double monotone(const CsfTable& t, const Place& p) {
+    return t.monotone_sensitivity(CyclesPerDegree(p.cpd), Degrees(p.degrees), Luminance(p.cdm2));
+}
+double inverse(const CsfTable& t, double contrast, double degrees, double cdm2) {
+    return t.highest_visible_frequency(contrast, Degrees(degrees), Luminance(cdm2)).value();
+}
+
+// Two of everything: S = 1/cpd at the fovea and 100 cd/m2, a tenth of it 10 degrees out, a quarter in dimmer light.
+CsfSamples small_samples() {
+    return {.source = "made up",
+            .frequency_cpd = {1, 4, 16},
+            .eccentricity_deg = {0, 10},
+            .luminance_cdm2 = {1, 100},
+            .sensitivity = {16, 4, 1, 64, 16, 4, 1.6, 0.4, 0.1, 6.4, 1.6, 0.4}};
+}
+CsfTable create(CsfSamples samples) {
+    auto table = CsfTable::create(std::move(samples));
+    EXPECT_TRUE(table) << table.error().message;
+    return *std::move(table);
+}
+
+// A measured table as it may come: noisy, uneven, and monotone nowhere.
+CsfTable noisy_table(unsigned seed) {
+    RandomPlaces random(seed);
+    CsfSamples s;
+    s.source = "noise";
+    for (double cpd = 0.3; cpd < 40; cpd *= random.uniform(1.01, 1.9)) s.frequency_cpd.push_back(cpd);
+    for (double degrees = 0; degrees < 70; degrees += random.uniform(0.01, 15)) s.eccentricity_deg.push_back(degrees);
+    for (double cdm2 = 0.1; cdm2 < 2000; cdm2 *= random.uniform(1.01, 6)) s.luminance_cdm2.push_back(cdm2);
+    const std::size_t count = s.frequency_cpd.size() * s.eccentricity_deg.size() * s.luminance_cdm2.size();
+    for (std::size_t i = 0; i < count; ++i) s.sensitivity.push_back(std::pow(10, random.uniform(-2, 3)));
+    return create(std::move(s));
+}
+
+TEST(CsfTable, IsWithinOnePercentOfTheClosedForm) {
+    for (const CsfModel model : {CsfModel::castle, CsfModel::stela}) {
+        const CsfTable table = CsfTable::from_model(model);
+        RandomPlaces random(1);
+        int checked = 0;
+        for (int i = 0; i < 100000; ++i) {
+            const Place p = random.next();
+            const double s = closed_form(model, p);
+            if (!(s > 1)) continue;
+            ++checked;
+            ASSERT_NEAR(interpolated(table, p) / s, 1, table_accuracy)
+                << name(model) << ": " << p.cpd << " cpd, " << p.degrees << " deg, " << p.cdm2 << " cd/m2";
+        }
+        EXPECT_GT(checked, 20000);
+    }
+}
+
+TEST(CsfTable, IsExactAtItsSamples) {
+    const CsfTable& table = CsfTable::standard();
+    const CsfSamples& s = table.samples();
+    for (std::size_t e = 0; e < s.eccentricity_deg.size(); e += 3) {
+        for (std::size_t l = 0; l < s.luminance_cdm2.size(); l += 5) {
+            for (std::size_t f = 0; f < s.frequency_cpd.size(); f += 7) {
+                const Place p{s.frequency_cpd[f], s.eccentricity_deg[e], s.luminance_cdm2[l]};
+                const double stored = s.sensitivity[(e * s.luminance_cdm2.size() + l) * s.frequency_cpd.size() + f];
+                EXPECT_NEAR(interpolated(table, p) / stored, 1, rounding);
+                EXPECT_NEAR(closed_form(CsfModel::castle, p) / stored, 1, rounding);
+            }
+        }
+    }
+}
+
+TEST(CsfTable, HasASampleWhereTheFieldsCross) {
+    // castle: (0.0239853 - 0.0400662) = (0.00813619 - 0.0189038) rho.
+    const double crossing = (0.0400662 - 0.0239853) / (0.0189038 - 0.00813619);
+    const auto& axis = CsfTable::standard().samples().frequency_cpd;
+    EXPECT_TRUE(std::ranges::any_of(axis, [&](double cpd) { return std::abs(cpd / crossing - 1) < 1e-12; }));
+    EXPECT_EQ(axis.front(), 1.0 / 16);
+    EXPECT_EQ(axis.back(), 64);
+    EXPECT_THAT(CsfTable::standard().samples().source, HasSubstr("castle"));
+}
+
+TEST(CsfTable, MonotoneFormIsNowhereBelowTheModel) {
+    // One percent is what interpolation in luminance may lose.
+    const CsfTable& table = CsfTable::standard();
+    RandomPlaces random(2);
+    for (int i = 0; i < 50000; ++i) {
+        const Place p = random.next();
+        const double s = closed_form(CsfModel::castle, p);
+        if (!(s > 1)) continue;
+        ASSERT_GT(monotone(table, p), s * (1 - table_accuracy)) << p.cpd << " " << p.degrees << " " << p.cdm2;
+    }
+}
+
+TEST(CsfTable, MonotoneFormIsTightAboveThePeak) {
+    const CsfTable& table = CsfTable::standard();
+    RandomPlaces random(3);
+    for (int i = 0; i < 300; ++i) {
+        const Place p{std::exp2(random.uniform(-2, 5)), random.uniform(0, 40), std::pow(10, random.uniform(0, 2))};
+        double largest = 0; // over this and all higher frequencies, this and all lower luminances
+        for (double cdm2 = p.cdm2; cdm2 > 0.3 * p.cdm2; cdm2 *= 0.8) {
+            for (double cpd = p.cpd; cpd < 64; cpd *= 1.01) {
+                largest = std::max(largest, closed_form(CsfModel::castle, {cpd, p.degrees, cdm2}));
+            }
+        }
+        if (!(largest > 1)) continue;
+        EXPECT_NEAR(monotone(table, p) / largest, 1, table_accuracy);
+    }
+}
+
+TEST(CsfTable, InterpolatesLogarithmsLinearly) {
+    const CsfTable table = create(small_samples());
+    EXPECT_NEAR(interpolated(table, {2, 0, 1}), 8, 8 * rounding);
+    EXPECT_NEAR(interpolated(table, {1, 5, 1}), 16 / std::sqrt(10), 16 * rounding);
+    EXPECT_NEAR(interpolated(table, {1, 0, 10}), 32, 32 * rounding);
+    EXPECT_NEAR(interpolated(table, {2, 5, 10}), 16 / std::sqrt(10), 16 * rounding);
+}
+
+TEST(CsfTable, ClampsOutsideOfItsAxes) {
+    const CsfTable table = create(small_samples());
+    EXPECT_NEAR(interpolated(table, {0.1, -5, 0.01}), 16, 16 * rounding);
+    EXPECT_NEAR(interpolated(table, {100, 50, 1e9}), 0.4, rounding);
+    EXPECT_NEAR(interpolated(table, {0, infinity, infinity}), 6.4, 10 * rounding);
+    EXPECT_TRUE(std::isnan(interpolated(table, {not_a_number, 0, 1})));
+    EXPECT_TRUE(std::isnan(interpolated(table, {1, not_a_number, 1})));
+    EXPECT_TRUE(std::isnan(interpolated(table, {1, 0, not_a_number})));
+    EXPECT_TRUE(std::isnan(interpolated(table, {1, 0, -1})));
+    EXPECT_TRUE(std::isnan(monotone(table, {1, not_a_number, 1})));
+}
+
+TEST(CsfTable, MonotoneFormTakesTheLargestOfWhatIsHarderToSee) {
+    CsfSamples s = small_samples();
+    s.sensitivity = {4, 16, 1, 64, 16, 4, 1.6, 0.4, 2, 6.4, 1.6, 0.4};
+    const CsfTable table = create(s);
+    EXPECT_NEAR(monotone(table, {1, 0, 1}), 16, 16 * rounding);   // the peak, below the peak
+    EXPECT_NEAR(monotone(table, {16, 0, 1}), 2, float_rounding); // larger further out
+    EXPECT_NEAR(monotone(table, {1, 10, 1}), 2, float_rounding); // larger at a higher frequency
+    EXPECT_NEAR(monotone(table, {16, 10, 100}), 2, float_rounding); // larger in dimmer light
+    EXPECT_NEAR(table.peak_sensitivity(0.0_deg, 1.0_cdm2), 16, 16 * rounding);
+}
+
+TEST(CsfTable, MonotoneFormIsMonotone) {
+    const std::vector<CsfTable> tables = {CsfTable::standard(), noisy_table(4), noisy_table(5), noisy_table(6)};
+    RandomPlaces random(7);
+    for (const CsfTable& table : tables) {
+        for (int i = 0; i < 20000; ++i) {
+            const Place p = random.next();
+            const double s = monotone(table, p);
+            Place other = p;
+            other.cpd *= std::exp2(random.uniform(0, 3));
+            ASSERT_LE(monotone(table, other), s * (1 + rounding));
+            other = p;
+            other.degrees += random.uniform(0, 1) < 0.5 ? random.uniform(0, 0.1) : random.uniform(0, 60);
+            ASSERT_LE(monotone(table, other), s * (1 + rounding));
+            other = p;
+            other.cdm2 *= std::exp2(random.uniform(0, 4));
+            ASSERT_GE(monotone(table, other), s * (1 - rounding));
+            other = p;
+            other.cpd = std::min(p.cpd, table.samples().frequency_cpd.back()); // beyond it only one of them falls
+            ASSERT_GE(monotone(table, other), interpolated(table, other) * (1 - float_rounding));
+        }
+    }
+}
+
+TEST(CsfTable, HighestVisibleFrequencyIsMonotone) {
+    const std::vector<CsfTable> tables = {CsfTable::standard(), noisy_table(8), noisy_table(9)};
+    // Octaves: rounding of the sensitivity over the flattest slope that the tables are likely to have.
+    constexpr double slack = 1e-6;
+    RandomPlaces random(10);
+    const auto octaves = [](double cpd) { return std::log2(cpd); };
+    for (const CsfTable& table : tables) {
+        for (int i = 0; i < 20000; ++i) {
+            const Place p = random.next();
+            const double contrast = std::pow(10, random.uniform(-3, 1));
+            const double cpd = inverse(table, contrast, p.degrees, p.cdm2);
+            ASSERT_FALSE(std::isnan(cpd));
+            const double stronger = inverse(table, contrast * random.uniform(1.001, 2), p.degrees, p.cdm2);
+            const double further = inverse(table, contrast, p.degrees + random.uniform(0.01, 20), p.cdm2);
+            const double brighter = inverse(table, contrast, p.degrees, p.cdm2 * random.uniform(1.01, 20));
+            EXPECT_GE(octaves(stronger), octaves(cpd) - slack);
+            EXPECT_LE(octaves(further), octaves(cpd) + slack);
+            EXPECT_GE(octaves(brighter), octaves(cpd) - slack);
+        }
+    }
+}
+
+TEST(CsfTable, InverseUndoesTheForwardWay) {
+    const std::vector<CsfTable> tables = {CsfTable::standard(), CsfTable::from_model(CsfModel::stela), noisy_table(11)};
+    RandomPlaces random(12);
+    for (const CsfTable& table : tables) {
+        for (int i = 0; i < 20000; ++i) {
+            Place p = random.next();
+            p.degrees /= 2;
+            const double s = monotone(table, p);
+            if (!(s > 1e-3)) continue;
+            // A hair above the threshold, so that rounding cannot hide a whole plateau.
+            const double contrast = (1 + 1e-9) / s;
+            const double cpd = inverse(table, contrast, p.degrees, p.cdm2);
+            ASSERT_GE(cpd, p.cpd * (1 - 1e-9)) << "visible here, so visible at least up to here";
+            ASSERT_TRUE(std::isfinite(cpd));
+            ASSERT_NEAR(monotone(table, {cpd, p.degrees, p.cdm2}) * contrast, 1, 1e-8);
+            // Beyond it nothing is visible.
+            ASSERT_LT(monotone(table, {cpd * 1.01, p.degrees, p.cdm2}) * contrast, 1);
+        }
+    }
+}
+
+TEST(CsfTable, InverseOfASmallTableByHand) {
+    const CsfTable table = create(small_samples());
+    EXPECT_NEAR(inverse(table, 1, 0, 1), 16, 1e-9);
+    EXPECT_NEAR(inverse(table, 1 / 8.0, 0, 1), 2, 1e-9);
+    EXPECT_NEAR(inverse(table, 1 / 16.0, 0, 1), 1, 1e-9);
+    EXPECT_EQ(inverse(table, 1 / 16.1, 0, 1), 0);
+    EXPECT_NEAR(inverse(table, 1 / 8.0, 0, 10), 4, 1e-9);
+    // Past the last sample with the slope before it, 1/cpd; contrasts above 1 are allowed.
+    EXPECT_NEAR(inverse(table, 2, 0, 1), 32, 32 * float_rounding);
+    EXPECT_NEAR(monotone(table, {32, 0, 1}), 0.5, float_rounding);
+}
+
+TEST(CsfTable, PlateauGivesItsHighestFrequency) {
+    CsfSamples s = small_samples();
+    s.frequency_cpd = {1, 2, 4, 8};
+    s.eccentricity_deg = {0};
+    s.luminance_cdm2 = {100};
+    s.sensitivity = {64, 16, 16, 4};
+    EXPECT_NEAR(inverse(create(s), 1 / 16.0, 0, 100), 4, 1e-9);
+    s.sensitivity = {64, 16, 16, 16};
+    EXPECT_NEAR(inverse(create(s), 1 / 16.0, 0, 100), 8, 1e-9);
+    s.sensitivity = {4, 64, 16, 4}; // the rising branch is clamped to the peak
+    EXPECT_NEAR(inverse(create(s), 1 / 64.0, 0, 100), 2, 1e-9);
+    EXPECT_EQ(inverse(create(s), 1 / 65.0, 0, 100), 0);
+}
+
+TEST(CsfTable, FlatTableHidesNothingAboveItsLevel) {
+    CsfSamples s = small_samples();
+    std::ranges::fill(s.sensitivity, 8);
+    const CsfTable table = create(s);
+    EXPECT_EQ(inverse(table, 0.5, 0, 100), infinity);
+    EXPECT_EQ(inverse(table, 0.1, 0, 100), 0);
+    EXPECT_NEAR(inverse(table, 1 / 8.0, 0, 100), 16, 1e-9);
+}
+
+TEST(CsfTable, NothingThatIsNotANumberFolds) {
+    const CsfTable& table = CsfTable::standard();
+    EXPECT_EQ(inverse(table, not_a_number, 0, 100), infinity);
+    EXPECT_EQ(inverse(table, 0.5, not_a_number, 100), infinity);
+    EXPECT_EQ(inverse(table, 0.5, 0, not_a_number), infinity);
+    EXPECT_EQ(inverse(table, -0.5, 0, 100), infinity);
+    EXPECT_EQ(inverse(table, 0.5, 0, -1), infinity);
+    EXPECT_EQ(inverse(table, infinity, 0, 100), infinity);
+    EXPECT_EQ(inverse(table, 0, 0, 100), 0);
+    EXPECT_GT(inverse(table, 0.5, 0, 0), 0); // as at the lowest luminance of the table
+    EXPECT_EQ(inverse(table, 0.5, -3, 100), inverse(table, 0.5, 0, 100));
+    EXPECT_EQ(inverse(table, 0.5, infinity, 100), inverse(table, 0.5, 120, 100));
+}
+
+TEST(CsfTable, BatchesAgreeWithSingleQueries) {
+    RandomPlaces random(13);
+    for (const CsfTable& table : {CsfTable::standard(), noisy_table(14)}) {
+        for (const std::size_t count : {0u, 1u, 7u, 8u, 9u, 1000u}) {
+            std::vector<float> contrast, degrees, cdm2, result(count, -1);
+            for (std::size_t i = 0; i < count; ++i) {
+                const Place p = random.next();
+                contrast.push_back(static_cast<float>(std::pow(10, random.uniform(-3, 0.5))));
+                degrees.push_back(static_cast<float>(p.degrees));
+                cdm2.push_back(static_cast<float>(p.cdm2));
+            }
+            table.highest_visible_log2_frequency(contrast, degrees, cdm2, result);
+            for (std::size_t i = 0; i < count; ++i) {
+                const double cpd = inverse(table, contrast[i], degrees[i], cdm2[i]);
+                if (cpd == 0 || std::isinf(cpd)) {
+                    EXPECT_EQ(double(result[i]), std::log2(cpd));
+                } else {
+                    EXPECT_NEAR(result[i], std::log2(cpd), 1e-6 * std::max(1.0, std::abs(std::log2(cpd)))); // float
+                }
+            }
+        }
+    }
+}
+
+TEST(CsfTable, BatchesMayHoldBadValuesAnywhere) {
+    const CsfTable& table = CsfTable::standard();
+    constexpr float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
+    const std::vector<float> contrast = {nan, 0.5f, 0.5f, 0.0f, inf, -1.0f, 0.5f, 0.5f, 0.5f};
+    const std::vector<float> degrees = {0, nan, 0, 0, 0, 0, inf, -inf, 0};
+    const std::vector<float> cdm2 = {100, 100, nan, 100, 100, 100, 100, 100, -1};
+    std::vector<float> result(contrast.size(), 0);
+    table.highest_visible_log2_frequency(contrast, degrees, cdm2, result);
+    EXPECT_EQ(result[0], inf);
+    EXPECT_EQ(result[1], inf);
+    EXPECT_EQ(result[2], inf);
+    EXPECT_EQ(result[3], -inf);
+    EXPECT_EQ(result[4], inf);
+    EXPECT_EQ(result[5], inf);
+    EXPECT_EQ(result[6], -inf); // as at 120 degrees
+    EXPECT_NEAR(result[7], std::log2(inverse(table, 0.5, 0, 100)), 1e-5);
+    EXPECT_EQ(result[8], inf);
+}
+
+TEST(CsfTable, TakesOneEccentricityAndOneLuminance) {
+    CsfSamples s = small_samples();
+    s.eccentricity_deg = {0};
+    s.luminance_cdm2 = {100};
+    s.sensitivity = {64, 16, 4};
+    const CsfTable table = create(s);
+    EXPECT_NEAR(interpolated(table, {2, 70, 0.1}), 32, 32 * rounding);
+    EXPECT_NEAR(inverse(table, 1 / 32.0, 70, 0.1), 2, 1e-9);
+}
+
+TEST(CsfTable, FindsItsWayOnVeryUnevenAxes) {
+    // Clusters of samples far denser than the buckets of the search, between wide gaps.
+    CsfSamples s;
+    s.source = "uneven";
+    s.frequency_cpd = {1, 64};
+    for (const double start : {0.0, 3.0, 89.0}) {
+        for (int i = 0; i < 40; ++i) s.eccentricity_deg.push_back(start + 0.0002 * i);
+    }
+    s.luminance_cdm2 = {100};
+    for (std::size_t i = 0; i < s.eccentricity_deg.size(); ++i) {
+        s.sensitivity.push_back(std::exp2(-double(i)));
+        s.sensitivity.push_back(std::exp2(-double(i) - 6));
+    }
+    const CsfTable table = create(s);
+    for (std::size_t i = 0; i + 1 < s.eccentricity_deg.size(); ++i) {
+        for (const double share : {0.0, 0.25, 0.999}) {
+            const double degrees = std::lerp(s.eccentricity_deg[i], s.eccentricity_deg[i + 1], share);
+            EXPECT_NEAR(std::log2(interpolated(table, {1, degrees, 100})), -(double(i) + share), 1e-8);
+        }
+    }
+}
+
+TEST(CsfTable, RefusesBadSamplesAndNamesThem) {
+    struct Case {
+        const char* expected;
+        std::function<void(CsfSamples&)> spoil;
+    };
+    const Case cases[] = {
+        {"frequency_cpd needs two", [](CsfSamples& s) { s.frequency_cpd = {1}; }},
+        {"frequency_cpd needs two", [](CsfSamples& s) { s.frequency_cpd.clear(); }},
+        {"eccentricity_deg is empty", [](CsfSamples& s) { s.eccentricity_deg.clear(); }},
+        {"luminance_cdm2 is empty", [](CsfSamples& s) { s.luminance_cdm2.clear(); }},
+        {"frequency_cpd[0]", [](CsfSamples& s) { s.frequency_cpd[0] = 0; }},
+        {"frequency_cpd[0]", [](CsfSamples& s) { s.frequency_cpd[0] = -1; }},
+        {"frequency_cpd[1]", [](CsfSamples& s) { s.frequency_cpd[1] = not_a_number; }},
+        {"frequency_cpd[2]", [](CsfSamples& s) { s.frequency_cpd[2] = infinity; }},
+        {"frequency_cpd[2]", [](CsfSamples& s) { s.frequency_cpd[2] = 4; }},
+        {"frequency_cpd[1]", [](CsfSamples& s) { s.frequency_cpd[1] = std::nextafter(1.0, 2.0); }},
+        {"eccentricity_deg[1]", [](CsfSamples& s) { s.eccentricity_deg[1] = 0; }},
+        {"eccentricity_deg[1]", [](CsfSamples& s) { s.eccentricity_deg[1] = not_a_number; }},
+        {"eccentricity_deg[0]", [](CsfSamples& s) { s.eccentricity_deg[0] = -1; }},
+        {"eccentricity_deg[0]", [](CsfSamples& s) { s.eccentricity_deg[0] = 2; }},
+        {"luminance_cdm2[0]", [](CsfSamples& s) { s.luminance_cdm2[0] = 0; }},
+        {"luminance_cdm2[1]", [](CsfSamples& s) { s.luminance_cdm2[1] = 0.5; }},
+        {"2 x 2 x 3", [](CsfSamples& s) { s.sensitivity.pop_back(); }},
+        {"2 x 2 x 3", [](CsfSamples& s) { s.sensitivity.push_back(1); }},
+        {"2 x 2 x 3", [](CsfSamples& s) { s.sensitivity.clear(); }},
+        {"sensitivity[0][0][0]", [](CsfSamples& s) { s.sensitivity[0] = 0; }},
+        {"sensitivity[0][1][1]", [](CsfSamples& s) { s.sensitivity[4] = -1; }},
+        {"sensitivity[1][0][2]", [](CsfSamples& s) { s.sensitivity[8] = not_a_number; }},
+        {"sensitivity[1][1][2]", [](CsfSamples& s) { s.sensitivity[11] = infinity; }},
+    };
+    for (const Case& bad : cases) {
+        CsfSamples samples = small_samples();
+        bad.spoil(samples);
+        const auto table = CsfTable::create(samples);
+        ASSERT_FALSE(table) << bad.expected;
+        EXPECT_THAT(table.error().message, HasSubstr(bad.expected));
+        EXPECT_EQ(table.error().code, ErrorCode::invalid_argument);
+    }
+}
+
+} // namespace
+} // namespace unseen::perception

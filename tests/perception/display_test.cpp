@@ -1,0 +1,159 @@
+// The display model: geometry, photometry, transfer functions and what it refuses.
+#include <perception/display.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace unseen::perception {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr TransferFunction transfer_functions[] = {TransferFunction::srgb, TransferFunction::gamma,
+                                                   TransferFunction::linear};
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
+// Relative; a few operations in double.
+constexpr double rounding = 1e-14;
+
+TEST(Display, DefaultHasTheFieldOfThePaper) {
+    const Display display;
+    EXPECT_TRUE(validate(display));
+    EXPECT_NEAR(pixels_per_degree(display).value(), 34.3569, 5e-5); // published to 4 decimals
+    EXPECT_NEAR(physical_field(display, 512).value(), 14.8192, 5e-5); // 2 atan(256 * 0.254 / 500)
+    EXPECT_NEAR(physical_field(display, 1024).value(), 29.16, 5e-3);
+}
+
+TEST(Display, PixelsPerDegreeOfA4kScreen) {
+    Display display;
+    display.width_px = 3840;
+    display.pixel_pitch = Metres(0.7 / 3840);
+    display.distance = 0.7_m;
+    EXPECT_NEAR(pixels_per_degree(display).value(), 67.0206, 5e-5);
+}
+
+TEST(Display, PixelsPerDegreeCanBeSet) {
+    for (const double ppd : {0.1, 1.0, 34.36, 60.0, 500.0}) {
+        Display display;
+        display.distance = 1.7_m;
+        set_pixels_per_degree(display, PixelsPerDegree(ppd));
+        EXPECT_NEAR(pixels_per_degree(display).value(), ppd, 4 * rounding * ppd);
+        EXPECT_EQ(display.distance, 1.7_m);
+    }
+}
+
+TEST(Display, FieldGrowsLessThanThePixels) {
+    const Display display;
+    EXPECT_LT(physical_field(display, 1600).value(), 1600 * physical_field(display, 1).value());
+    EXPECT_LT(physical_field(display, 1000000), 180.0_deg);
+}
+
+TEST(Display, AmbientLightRaisesBlackAndWhiteAlike) {
+    Display display;
+    display.ambient = Lux(100);
+    display.reflectivity = 0.01;
+    EXPECT_NEAR(black_level(display).value(), 0.5 + 1 / M_PI, rounding);
+    EXPECT_NEAR(to_luminance(display, 0).value(), black_level(display).value(), rounding);
+    EXPECT_NEAR(to_luminance(display, 1).value(), 100 + 1 / M_PI, 100 * rounding);
+}
+
+TEST(Display, RelativeLuminanceMapsAffinelyAndBack) {
+    Display display;
+    display.ambient = Lux(250);
+    for (const double relative : {-0.5, 0.0, 0.18, 0.5, 1.0, 3.0}) {
+        EXPECT_NEAR(to_relative(display, to_luminance(display, relative)), relative, 10 * rounding);
+    }
+    const double low = to_luminance(display, 0.2).value(), high = to_luminance(display, 0.6).value();
+    EXPECT_NEAR(to_luminance(display, 0.4).value(), (low + high) / 2, 100 * rounding);
+}
+
+TEST(Display, SrgbCodesFollowTheStandard) {
+    const Display display;
+    EXPECT_EQ(decode(display, 0), 0);
+    EXPECT_DOUBLE_EQ(decode(display, 1), 1);
+    EXPECT_NEAR(decode(display, 0.5), 0.21404114, 5e-9);
+    EXPECT_NEAR(decode(display, 0.04), 0.04 / 12.92, rounding);
+    EXPECT_NEAR(encode(display, 0.18), 0.46135613, 5e-9);
+}
+
+TEST(Display, TransferFunctionsInvertAndRise) {
+    Display display;
+    for (const TransferFunction transfer : transfer_functions) {
+        display.transfer = transfer;
+        double before = -1;
+        for (int code = 0; code <= 1023; ++code) {
+            const double linear = decode(display, code / 1023.0);
+            EXPECT_GT(linear, before);
+            // The standard's two thresholds are rounded to 5 digits, which shows in the seventh decimal.
+            EXPECT_NEAR(encode(display, linear), code / 1023.0, 1e-7);
+            before = linear;
+        }
+    }
+}
+
+TEST(Display, GammaIsAPower) {
+    Display display;
+    display.transfer = TransferFunction::gamma;
+    display.gamma = 2.4;
+    EXPECT_DOUBLE_EQ(decode(display, 0.3), std::pow(0.3, 2.4));
+    display.transfer = TransferFunction::linear;
+    EXPECT_EQ(decode(display, 0.3), 0.3);
+}
+
+TEST(Display, TransferFunctionsKeepOrderBelowZero) {
+    Display display;
+    for (const TransferFunction transfer : transfer_functions) {
+        display.transfer = transfer;
+        EXPECT_DOUBLE_EQ(decode(display, -0.5), -decode(display, 0.5));
+        EXPECT_DOUBLE_EQ(encode(display, -0.5), -encode(display, 0.5));
+        EXPECT_TRUE(std::isnan(decode(display, not_a_number)));
+    }
+}
+
+TEST(Display, LuminanceWeightsSumToOne) {
+    EXPECT_NEAR(luminance_weights[0] + luminance_weights[1] + luminance_weights[2], 1, rounding);
+}
+
+struct BadDisplay {
+    const char* field;
+    void (*spoil)(Display&, double);
+    std::vector<double> values;
+};
+
+TEST(Display, ValidationNamesTheField) {
+    const BadDisplay cases[] = {
+        {"width_px", [](Display& d, double v) { d.width_px = int(v); }, {0, -1}},
+        {"height_px", [](Display& d, double v) { d.height_px = int(v); }, {0, -5}},
+        {"pixel_pitch",
+         [](Display& d, double v) { d.pixel_pitch = Metres(v); },
+         {0, -1, infinity, not_a_number, 1e-320}},
+        {"distance", [](Display& d, double v) { d.distance = Metres(v); }, {0, -1, infinity, not_a_number}},
+        {"peak", [](Display& d, double v) { d.peak = Luminance(v); }, {0, -1, 0.5, infinity, not_a_number}},
+        {"black", [](Display& d, double v) { d.black = Luminance(v); }, {0, -1, 100, 101, infinity, not_a_number}},
+        {"ambient", [](Display& d, double v) { d.ambient = Lux(v); }, {-1, infinity, not_a_number}},
+        {"reflectivity", [](Display& d, double v) { d.reflectivity = v; }, {-0.1, 1.1, infinity, not_a_number}},
+        {"gamma",
+         [](Display& d, double v) {
+             d.transfer = TransferFunction::gamma;
+             d.gamma = v;
+         },
+         {0, -2.2, infinity, not_a_number}},
+    };
+    for (const BadDisplay& bad : cases) {
+        for (const double value : bad.values) {
+            Display display;
+            bad.spoil(display, value);
+            const auto result = validate(display);
+            ASSERT_FALSE(result) << bad.field << " " << value;
+            EXPECT_EQ(result.error().code, ErrorCode::invalid_argument);
+            EXPECT_THAT(result.error().message, HasSubstr(bad.field)) << value;
+        }
+    }
+}
+
+} // namespace
+} // namespace unseen::perception
