@@ -133,6 +133,34 @@ Decision decide_by_budget(const VertexTree& tree, NodeTester& test, Index budget
     return decision;
 }
 
+// Sorts the triangles of an extracted mesh by their input triangle, so that the input's groups and materials are runs again.
+void group_by_range(const Cut& cut, Mesh& mesh) {
+    const VertexTree& tree = cut.tree();
+    const auto first = tree.first_triangle();
+    std::vector<std::pair<Index, Index>> order; // input triangle, triangle of the mesh
+    order.reserve(mesh.triangles.size());
+    for (NodeId node = 0; node < tree.interior_count(); ++node) {
+        if (!cut.is_unfolded(node)) continue;
+        for (Index t = first[node]; t < first[node + 1]; ++t)
+            order.emplace_back(tree.source_triangles()[t], static_cast<Index>(order.size()));
+    }
+    std::sort(order.begin(), order.end());
+    std::vector<Triangle> sorted(order.size());
+    for (std::size_t i = 0; i < order.size(); ++i) sorted[i] = mesh.triangles[order[i].second];
+    mesh.triangles = std::move(sorted);
+    for (const MeshRange& range : tree.ranges()) {
+        const auto place = [&](std::uint64_t source) {
+            const auto found = std::partition_point(order.begin(), order.end(),
+                                                    [&](const auto& entry) { return entry.first < source; });
+            return static_cast<std::uint64_t>(found - order.begin());
+        };
+        MeshRange left = range;
+        left.first_triangle = place(range.first_triangle);
+        left.triangle_count = place(range.first_triangle + range.triangle_count) - left.first_triangle;
+        if (left.triangle_count > 0) mesh.ranges.push_back(std::move(left));
+    }
+}
+
 } // namespace
 
 Cut::Cut(const VertexTree& tree)
@@ -235,6 +263,35 @@ AdjustStats Cut::adjust(FoldCriterion criterion, const AdjustOptions& options) {
     }
     stats.triangles = triangle_count_;
     return stats;
+}
+
+Mesh extract_mesh(const Cut& cut) {
+    const VertexTree& tree = cut.tree();
+    const auto indices = cut.indices();
+    Mesh mesh;
+    std::vector<Index> vertex_of_node(tree.node_count(), no_node);
+    std::vector<NodeId> used;
+    mesh.triangles.resize(cut.triangle_count());
+    for (std::size_t i = 0; i < indices.size(); ++i) {
+        Index& vertex = vertex_of_node[indices[i]];
+        if (vertex == no_node) {
+            vertex = static_cast<Index>(used.size());
+            used.push_back(indices[i]);
+        }
+        mesh.triangles[i / 3][i % 3] = vertex;
+    }
+    mesh.positions.reserve(used.size());
+    for (const NodeId node : used) mesh.positions.push_back(tree.origin() + glm::dvec3(tree.positions()[node]));
+    const auto gather = [&](auto values, auto& out) {
+        if (values.empty()) return;
+        out.reserve(used.size());
+        for (const NodeId node : used) out.push_back(values[node]);
+    };
+    gather(tree.normals(), mesh.normals);
+    gather(tree.colours(), mesh.colours);
+    gather(tree.uvs(), mesh.uvs);
+    if (!tree.ranges().empty()) group_by_range(cut, mesh);
+    return mesh;
 }
 
 std::span<const NodeId> Cut::indices() const {

@@ -134,6 +134,11 @@ private:
     std::shared_ptr<const Data> data_;
 };
 
+// Checks everything that the tree promises: that spheres, masks, slabs, intervals and displacements contain what they
+// should and nest, and that every triangle vanishes where it is said to. The error names the first offender.
+// Cost: leaves times depth.
+Result<void> verify(const VertexTree& tree);
+
 template <class F>
 void VertexTree::for_each_child(NodeId node, F&& f) const {
     const auto first = first_leaf(), end = leaf_end();

@@ -1,0 +1,139 @@
+// Checks everything that a vertex tree promises.
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include <glm/geometric.hpp>
+
+#include "vertex_tree_data.h"
+
+namespace unseen::vdtree {
+
+namespace {
+
+// Whether `inner` lies in `outer`. The difference of two floats is exact in double, squares and their sum lose a few units
+// in the last place: this much relative slack, far below the rounding outward of the radii, is not counted as a fault.
+constexpr double slack = 1e-14;
+
+bool contains(const Sphere& outer, glm::vec3 point, double radius) {
+    const glm::dvec3 d = glm::dvec3(point) - glm::dvec3(outer.centre);
+    return glm::length(d) + radius <= outer.radius * (1 + slack);
+}
+
+bool contains(LuminanceRange outer, LuminanceRange inner) { return outer.lo <= inner.lo && inner.hi <= outer.hi; }
+
+class Verifier {
+public:
+    explicit Verifier(const VertexTree& tree) : tree_(tree), g_(*tree.data().geometry), l_(tree.data().light) {}
+
+    Result<void> run() {
+        for (NodeId node = 0; node < tree_.interior_count(); ++node) {
+            check_vertices(node);
+            check_children(node);
+            if (!fault_.empty()) return Error{ErrorCode::malformed_data, "Node " + std::to_string(node) + ": " + fault_};
+        }
+        for (NodeId node = 0; node < tree_.interior_count(); ++node)
+            for (Index t = g_.first_triangle[node]; t < g_.first_triangle[node + 1]; ++t)
+                if (vanishing_node(g_.triangles[t]) != node)
+                    return Error{ErrorCode::malformed_data,
+                                 "Triangle " + std::to_string(t) + " does not vanish at node " + std::to_string(node) + "."};
+        for (std::size_t t = 0; t < g_.triangles.size(); ++t) {
+            check_rings(g_.triangles[t]);
+            if (!fault_.empty())
+                return Error{ErrorCode::malformed_data, "Triangle " + std::to_string(t) + ": " + fault_};
+        }
+        return {};
+    }
+
+private:
+    void expect(bool holds, const char* what) {
+        if (!holds && fault_.empty()) fault_ = what;
+    }
+
+    // What the node promises of its own proxy and of the leaves that are its children.
+    void check_vertices(NodeId node) {
+        const glm::vec3 proxy = g_.positions[node];
+        expect(contains(g_.support_spheres[node], proxy, 0), "the support's sphere does not contain the proxy.");
+        expect(contains(g_.ring_spheres[node], proxy, 0), "the ring's sphere does not contain the proxy.");
+        const float y = l_.luminance[node];
+        expect(contains(l_.support_range[node], {y, y}), "the support's luminance does not contain the proxy's.");
+        const Index measured = std::min<Index>(g_.leaf_end[node], g_.first_leaf[node] + most_leaves_measured);
+        for (Index leaf = g_.first_leaf[node]; leaf < measured; ++leaf) {
+            const glm::vec3 p = g_.positions[tree_.interior_count() + leaf];
+            expect(glm::distance(glm::dvec3(p), glm::dvec3(proxy)) <= g_.displacement[node] * (1 + slack),
+                   "a leaf moves farther than the displacement.");
+        }
+    }
+
+    void check_children(NodeId node) {
+        tree_.for_each_child(node, [&](NodeId child) {
+            if (tree_.is_leaf(child)) {
+                expect(contains(g_.support_spheres[node], g_.positions[child], 0),
+                       "the support's sphere does not contain a leaf.");
+                expect(contains(l_.support_range[node], {l_.luminance[child], l_.luminance[child]}),
+                       "the support's luminance does not contain a leaf's.");
+                return;
+            }
+            const Sphere &s = g_.support_spheres[child], &r = g_.ring_spheres[child];
+            expect(contains(g_.support_spheres[node], s.centre, s.radius), "a child's support sphere sticks out.");
+            expect(contains(g_.ring_spheres[node], r.centre, r.radius), "a child's ring sphere sticks out.");
+            expect(g_.masks[node].includes(g_.masks[child]), "a child's mask has other cells.");
+            expect(g_.slabs[node].includes(g_.slabs[child]), "a child's slabs stick out.");
+            expect((g_.flags[child] & ~g_.flags[node]) == 0, "a child has other flags.");
+            expect(g_.displacement[node] >= g_.displacement[child], "a child's displacement is larger.");
+            expect(l_.adaptation[node] >= l_.adaptation[child], "a child's adaptation luminance is higher.");
+            expect(contains(l_.support_range[node], l_.support_range[child]), "a child's support luminance sticks out.");
+            expect(contains(l_.ring_range[node], l_.ring_range[child]), "a child's ring luminance sticks out.");
+        });
+    }
+
+    // That the lowest node which moves a corner knows the whole triangle; nesting carries it to the nodes above.
+    void check_rings(const Triangle& t) {
+        const NodeId interior = tree_.interior_count();
+        const glm::dvec3 a = g_.positions[interior + t[0]], b = g_.positions[interior + t[1]],
+                         c = g_.positions[interior + t[2]];
+        const glm::dvec3 normal = glm::cross(b - a, c - a);
+        const int cell = normal_cell(normal);
+        for (const Index leaf : t) {
+            NodeId node = g_.parents[interior + leaf];
+            while (node != no_node && g_.support_spheres[node].radius == 0) node = g_.parents[node];
+            if (node == no_node) continue; // everything is at one point
+            expect(cell < 0 || g_.masks[node].contains(cell), "a normal is missing in the mask of a corner's parent.");
+            for (const Index corner : t) {
+                const float y = l_.luminance[interior + corner];
+                expect(contains(g_.ring_spheres[node], g_.positions[interior + corner], 0),
+                       "a corner is outside of the ring sphere of another corner's parent.");
+                expect(contains(l_.ring_range[node], {y, y}),
+                       "a corner's luminance is outside of the ring's of another corner's parent.");
+            }
+        }
+    }
+
+    NodeId vanishing_node(const Triangle& t) const {
+        const auto inside = [&](NodeId node) {
+            int corners = 0;
+            for (const Index leaf : t) corners += g_.first_leaf[node] <= leaf && leaf < g_.leaf_end[node];
+            return corners;
+        };
+        NodeId deepest = no_node;
+        for (const Index leaf : t) {
+            NodeId node = g_.parents[tree_.interior_count() + leaf];
+            while (inside(node) < 2) node = g_.parents[node];
+            if (deepest == no_node || node > deepest) deepest = node;
+        }
+        return deepest;
+    }
+
+    static constexpr Index most_leaves_measured = 4096;
+
+    const VertexTree& tree_;
+    const TreeGeometry& g_;
+    const TreeLuminance& l_;
+    std::string fault_;
+};
+
+} // namespace
+
+Result<void> verify(const VertexTree& tree) { return Verifier(tree).run(); }
+
+} // namespace unseen::vdtree
