@@ -10,8 +10,8 @@
 namespace unseen::render {
 namespace {
 
-// Near plane at least so far, as a share of the ball's radius: with the eye inside of the model, what is nearer is cut off.
-// Depth is float and reversed, so a near plane that is too near costs no precision.
+// Near plane at least so far, as a share of the ball's radius: with the eye inside of the model, what is nearer is cut
+// off. Depth is float and reversed, so a near plane that is too near costs no precision.
 constexpr double least_near = 1e-4;
 
 // The ball's bounds and the vertices are rounded to float: the near plane keeps this share away from them.

@@ -11,8 +11,8 @@
 namespace unseen::render {
 
 // The unit frame: vertices are uploaded as (p - centre) / unit, so that a mesh of any size and at any place fills about
-// the unit ball in float, where no product of coordinates overflows or vanishes. `unit` is a power of two: dividing by it
-// changes no mantissa.
+// the unit ball in float, where no product of coordinates overflows or vanishes. `unit` is a power of two: dividing by
+// it changes no mantissa.
 struct UnitFrame {
     glm::dvec3 centre = glm::dvec3(0); // relative to the tree's origin, mesh units
     double unit = 1;                   // mesh units per unit of the frame
@@ -27,8 +27,8 @@ struct Camera {
     bool eye_inside = false; // of the ball
 };
 
-// Precondition: valid view and placement. The eye is the origin in all that is added up, so that the precision is that of
-// the distance from the eye, not of the distance from the world's origin.
+// Precondition: valid view and placement. The eye is the origin in all that is added up, so that the precision is that
+// of the distance from the eye, not of the distance from the world's origin.
 Camera camera_for(const vdtree::View& view, const vdtree::Similarity& placement, glm::dvec3 origin,
                   const UnitFrame& frame);
 

@@ -99,8 +99,8 @@ std::vector<Candidate> candidates() {
     return all;
 }
 
-// Displays are the process's, shared with whoever else uses EGL: they are initialised, but never terminated, which would
-// pull the ground from under the others. Context and surface are ours.
+// Displays are the process's, shared with whoever else uses EGL: they are initialised, but never terminated, which
+// would pull the ground from under the others. Context and surface are ours.
 class EglPlatform final : public Platform {
 public:
     // The reason where there is none.

@@ -27,7 +27,8 @@ const char* flag_name(GLenum flag) {
     }
 }
 
-// Remarks on speed are no errors at any severity: NVIDIA's driver sends them at medium severity for reading back a frame.
+// Remarks on speed are no errors at any severity: NVIDIA's driver sends them at medium severity for reading back a
+// frame.
 bool is_error(GLenum type, GLenum severity) {
     if (type == GL_DEBUG_TYPE_ERROR)
         return true;
@@ -40,7 +41,9 @@ void APIENTRY receive(GLenum, GLenum type, GLuint, GLenum severity, GLsizei size
     if (!is_error(type, severity))
         return;
     try {
-        std::string_view message(text, size < 0 ? std::char_traits<char>::length(text) : static_cast<std::size_t>(size));
+        std::string_view message(text); // ends in 0, whatever `size` says
+        if (size >= 0)
+            message = {text, static_cast<std::size_t>(size)};
         while (!message.empty() && (message.back() == '\n' || message.back() == '\0'))
             message.remove_suffix(1);
         static_cast<ErrorLog*>(const_cast<void*>(log))->add(std::string(message));

@@ -40,7 +40,8 @@ Result<void> check(const DrawOptions& options) {
 
 Result<void> check(const vdtree::Similarity& placement) {
     if (!(placement.scale > 0) || !std::isfinite(placement.scale))
-        return invalid("The placement's scale must be positive and finite, not " + std::to_string(placement.scale) + ".");
+        return invalid("The placement's scale must be positive and finite, not " + std::to_string(placement.scale) +
+                       ".");
     if (!is_finite(placement.rotation) || !is_finite(placement.translation))
         return invalid("The placement's rotation and translation must be finite.");
     return {};
@@ -119,7 +120,10 @@ Result<Camera> Renderer::Impl::prepare(const vdtree::Cut& cut, const vdtree::Vie
     if (auto current = context->platform->make_current(); !current)
         return current.error();
     context->errors.begin();
-    drawer.set_triangles(cut.indices());
+    if (auto set = drawer.set_triangles(cut.indices()); !set) {
+        static_cast<void>(context->errors.take_new()); // the drawer's error says it better
+        return set.error();
+    }
     return camera;
 }
 

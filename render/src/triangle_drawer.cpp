@@ -168,17 +168,21 @@ Result<void> TriangleDrawer::upload(const VertexArrays& vertices) {
     return {};
 }
 
-void TriangleDrawer::set_triangles(std::span<const std::uint32_t> indices) {
-    index_count_ = indices.size();
-    if (indices.empty())
-        return;
-    if (indices.size_bytes() > index_capacity_) {
-        index_capacity_ = indices.size_bytes();
-        glNamedBufferData(indices_.id(), static_cast<GLsizeiptr>(index_capacity_), indices.data(), GL_STREAM_DRAW);
-        return;
+Result<void> TriangleDrawer::set_triangles(std::span<const std::uint32_t> indices) {
+    const std::uint64_t bytes = indices.size_bytes();
+    if (bytes > index_capacity_) {
+        index_count_ = index_capacity_ = 0;
+        glNamedBufferData(indices_.id(), static_cast<GLsizeiptr>(bytes), indices.data(), GL_STREAM_DRAW);
+        if (glGetError() == GL_OUT_OF_MEMORY)
+            return Error{ErrorCode::unsupported, "The graphics memory does not hold the cut's " +
+                                                     std::to_string(indices.size() / 3) + " triangles; fold more."};
+        index_capacity_ = bytes;
+    } else if (bytes > 0) {
+        glInvalidateBufferData(indices_.id()); // so that the driver need not wait for the last frame
+        glNamedBufferSubData(indices_.id(), 0, static_cast<GLsizeiptr>(bytes), indices.data());
     }
-    glInvalidateBufferData(indices_.id()); // so that the driver need not wait for the last frame
-    glNamedBufferSubData(indices_.id(), 0, static_cast<GLsizeiptr>(indices.size_bytes()), indices.data());
+    index_count_ = indices.size();
+    return {};
 }
 
 Result<std::span<const glm::vec4>> TriangleDrawer::draw(int width, int height,

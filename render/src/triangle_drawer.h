@@ -43,11 +43,12 @@ class TriangleDrawer {
 public:
     static Result<TriangleDrawer> create(const VertexArrays& vertices);
 
-    // The triangles of all draws until the next call; corners are vertex numbers. The memory is reused.
-    void set_triangles(std::span<const std::uint32_t> indices);
+    // The triangles of all draws until the next call; corners are vertex numbers. The memory is reused. Fails where it
+    // does not suffice; then there are no triangles.
+    Result<void> set_triangles(std::span<const std::uint32_t> indices);
 
-    // The mean over the matrices of the image that each gives: width x height pixels of linear RGB and relative luminance,
-    // row-major from the top left. The pixels belong to the drawer and stay until its next draw.
+    // The mean over the matrices of the image that each gives: width x height pixels of linear RGB and relative
+    // luminance, row-major from the top left. The pixels belong to the drawer and stay until its next draw.
     Result<std::span<const glm::vec4>> draw(int width, int height, std::span<const glm::mat4> clip_from_unit,
                                             const SurfaceStyle& style);
 

@@ -9,7 +9,8 @@
 namespace unseen::render {
 namespace {
 
-// Set by the first window. GLFW is the process's: another user of it may have windows too, so it is never terminated here.
+// Set by the first window. GLFW is the process's: another user of it may have windows too, so it is never terminated
+// here.
 bool glfw_started = false;
 
 constexpr int wanted_samples = 8; // a pixel; fewer, or none, are fine

@@ -46,8 +46,8 @@ TEST(NRooks, DependsOnTheSeedAlone) {
     EXPECT_NE(n_rooks(16, 1), n_rooks(16, 2));
 }
 
-// Images that are compared may have been made by different builds: the pattern of seed 1 is part of the format. The rows are
-// those of a Fisher-Yates shuffle driven by SplitMix64(1), worked out independently of this code.
+// Images that are compared may have been made by different builds: the pattern of seed 1 is part of the format. The
+// rows are those of a Fisher-Yates shuffle driven by SplitMix64(1), worked out independently of this code.
 TEST(NRooks, IsTheSameWithEveryCompiler) {
     const int rows[16] = {2, 11, 10, 6, 7, 13, 14, 0, 12, 5, 15, 9, 3, 8, 4, 1};
     const auto points = n_rooks(16, 1);

@@ -1,7 +1,7 @@
 // What is drawn, against known truth.
 //
-// Tolerances. Mesa's llvmpipe interpolates in float from coefficients set up per triangle, which costs up to about 1e-6 of the
-// value; rasterisers snap vertices to 1/256 pixel (GL asks for at least 1/16), which moves edges by up to that.
+// Tolerances. Mesa's llvmpipe interpolates in float from coefficients set up per triangle, which costs up to about 1e-6
+// of the value; rasterisers snap vertices to 1/256 pixel (GL asks for at least 1/16), which moves edges by up to that.
 #include "gl_test.h"
 #include "scenes.h"
 
@@ -46,7 +46,7 @@ protected:
             return {};
         }
         EXPECT_EQ(context().take_errors(), "");
-        EXPECT_EQ(frame->luminance.size(), static_cast<std::size_t>(view.width) * static_cast<std::size_t>(view.height));
+        EXPECT_EQ(frame->luminance.size(), static_cast<std::size_t>(view.width * view.height));
         EXPECT_EQ(frame->colour.size(), 3 * frame->luminance.size());
         return std::move(*frame);
     }
@@ -132,12 +132,12 @@ TEST_F(RendererTest, CoversPixelsByTheirShareOfARectangle) {
     };
     for (int row = 0; row < n; ++row)
         for (int column = 0; column < n; ++column) {
-            const double share = overlap(-1 + 2.0 * column / n, -1 + 2.0 * (column + 1) / n) *
-                                 overlap(1 - 2.0 * (row + 1) / n, 1 - 2.0 * row / n);
-            const bool corner = share > 0 && share < 1 && overlap(-1 + 2.0 * column / n, -1 + 2.0 * (column + 1) / n) < 1 &&
-                                overlap(1 - 2.0 * (row + 1) / n, 1 - 2.0 * row / n) < 1;
-            // Rooks divide rows and columns evenly, so straight edges are within one sample; a corner is a discrepancy of
-            // two dimensions, for which 16 rooks promise less.
+            const double across = overlap(-1 + 2.0 * column / n, -1 + 2.0 * (column + 1) / n);
+            const double down = overlap(1 - 2.0 * (row + 1) / n, 1 - 2.0 * row / n);
+            const double share = across * down;
+            const bool corner = share > 0 && across < 1 && down < 1;
+            // Rooks divide rows and columns evenly, so straight edges are within one sample; a corner is a discrepancy
+            // of two dimensions, for which 16 rooks promise less.
             const double tolerance = (corner ? 3 : 1) * sample_share + snapping_px;
             EXPECT_NEAR(at(frame, column, row), share, tolerance) << column << ", " << row;
         }

@@ -1,8 +1,10 @@
 // Small meshes and views of known truth for the renderer's tests.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <functional>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -119,8 +121,8 @@ private:
     }
 };
 
-// Looks along -z from (0, 0, 1) at a window whose plane z = 0 spans y from -1 to 1: pixel (column, row) of n x n is the square
-// from (-1 + 2 column / n, 1 - 2 row / n) on, to the right and down.
+// Looks along -z from (0, 0, 1) at a window whose plane z = 0 spans y from -1 to 1: pixel (column, row) of n x n is the
+// square from (-1 + 2 column / n, 1 - 2 row / n) on, to the right and down.
 inline vdtree::View frontal_view(int width, int height) {
     vdtree::View view;
     view.fov_y_degrees = 90;

@@ -6,7 +6,9 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <vector>
+#include <memory>
+#include <optional>
+#include <string>
 
 #define GL_GLEXT_PROTOTYPES 1
 #include <GL/glcorearb.h>

@@ -28,15 +28,16 @@ public:
     // (software rendering works). Fails with a clear error where there is neither.
     static Result<Context> headless();
 
-    // A window of GLFW's, sRGB-capable and multisampled where there is such a thing. On the main thread only; the caller
-    // polls events and swaps buffers. Fails where there is no display.
+    // A window of GLFW's, sRGB-capable and multisampled where there is such a thing. On the main thread only; the
+    // caller polls events and swaps buffers. Fails where there is no display.
     static Result<Context> window(const WindowOptions& options = {});
 
     Context(Context&&) noexcept;
     Context& operator=(Context&&) noexcept;
     ~Context();
 
-    // Makes the context current again after another one was. Cheap where it already is. Everything below does it itself.
+    // Makes the context current again after another one was. Cheap where it already is. Everything below does it
+    // itself.
     Result<void> make_current();
 
     std::string renderer_name() const; // GL_RENDERER

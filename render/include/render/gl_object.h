@@ -1,7 +1,7 @@
 // OpenGL objects that own their names: move-only, deleted with the last owner, labelled for debuggers.
 //
-// Everything here needs a current context, also to be destroyed. An object with id 0 owns nothing: a default-constructed
-// or moved-from one.
+// Everything here needs a current context, also to be destroyed. An object with id 0 owns nothing: a
+// default-constructed or moved-from one.
 #pragma once
 
 #include <string_view>

@@ -44,7 +44,8 @@ public:
     Renderer& operator=(Renderer&&) noexcept;
     ~Renderer();
 
-    // Draws off screen and reads back. Fails on an invalid view or when the GPU has too little memory, or on a GL error.
+    // Draws off screen and reads back. Fails on an invalid view or when the GPU has too little memory, or on a GL
+    // error.
     Result<Frame> draw(const vdtree::Cut& cut, const vdtree::View& view, const DrawOptions& options = {},
                        const vdtree::Similarity& placement = {});
 
