@@ -37,14 +37,12 @@ bool is_error(GLenum type, GLenum severity) {
     return severity == GL_DEBUG_SEVERITY_HIGH || severity == GL_DEBUG_SEVERITY_MEDIUM;
 }
 
-void APIENTRY receive(GLenum, GLenum type, GLuint, GLenum severity, GLsizei size, const GLchar* text, const void* log) {
+void APIENTRY receive(GLenum, GLenum type, GLuint, GLenum severity, GLsizei, const GLchar* text, const void* log) {
     if (!is_error(type, severity))
         return;
     try {
-        std::string_view message(text); // ends in 0, whatever `size` says
-        if (size >= 0)
-            message = {text, static_cast<std::size_t>(size)};
-        while (!message.empty() && (message.back() == '\n' || message.back() == '\0'))
+        std::string_view message(text); // GL ends it in 0
+        while (!message.empty() && message.back() == '\n')
             message.remove_suffix(1);
         static_cast<ErrorLog*>(const_cast<void*>(log))->add(std::string(message));
     } catch (const std::exception&) {
