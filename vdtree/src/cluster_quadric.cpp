@@ -3,16 +3,15 @@
 // Every vertex carries a quadric over (x, y, z, luminance): the squared distance from the planes that its triangles
 // span there (Garland and Heckbert 1998), plus, with small weights, the squared distance from the vertices themselves, which keeps
 // clusters compact and of like luminance where the planes do not care. Contraction runs in rounds: each cluster chooses its
-// best partner, pairs are contracted in ascending error unless one of the two is already taken, and the errors are computed
-// anew. That is nearest-neighbour agglomeration: the hierarchy differs little from strictly greedy order, but the work is
+// best partner, pairs that choose each other are contracted in ascending error, and the errors are computed anew. That is nearest-neighbour agglomeration: the hierarchy differs little from strictly greedy order, but the work is
 // linear a round, cache-friendly, and the tree is balanced.
 #include <vdtree/builder.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <numeric>
+#include <span>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -24,21 +23,20 @@ namespace unseen::vdtree {
 
 namespace {
 
-double tune(const char* name, double fallback) {
-    const char* v = std::getenv(name);
-    return v ? std::atof(v) : fallback;
-}
-
-// One unit of relative luminance counts as this share of the model's extent.
-double luminance_weight = tune("QW_LUM", 0.05);
+// One unit of relative luminance counts as this share of the model's extent. From 0.02 to 0.2 the bunny needs fewer and fewer
+// triangles at equal visibility; beyond, folds along contours suffer.
+constexpr double luminance_scale = 0.2;
 // Weight of the squared distance between a cluster's vertices and its proxy, against that from the planes.
-double compactness = tune("QW_COMPACT", 0.01);
+constexpr double compactness = 0.01;
 // Weight of the variance of luminance within a cluster, against the deviation from the interpolated luminance.
-double luminance_compactness = tune("QW_LUMCOMPACT", 0.1);
+constexpr double luminance_compactness = 0.1;
 // Weight of the planes that stand on boundary edges, against those of triangles.
 constexpr double boundary_weight = 4;
-// Pairs that no edge connects: the full squared distance counts.
-constexpr double gap_compactness = 1;
+// Across a gap that no edge bridges, the full squared distance counts: joining two parts moves both.
+constexpr double gap_weight = 1;
+// A round that contracts a smaller share of the clusters takes second-best pairs too: errors that grow along a chain
+// would otherwise contract one pair a round.
+constexpr std::size_t least_round_share = 16; // one in so many
 
 // A symmetric quadratic form over 4-space: E(x) = x'Ax - 2 b'x + c, and the weight (area) that went into it.
 struct Quadric {
@@ -130,11 +128,15 @@ private:
     void accumulate_boundaries(const std::vector<Pair>& sorted_uses);
     void connect_edges();
     void connect_lone_clusters();
-    void choose_partners();
-    bool contract_round();
     double contraction_error(Pair pair, glm::dvec4& place) const;
+    double gap_error(Pair pair) const;
+    void choose_partners();
+    std::vector<Index> ordered_choices() const;
+    void contract(Pair pair);
+    void contract_round();
+    void close_gaps(std::span<const Index> joined_with);
     glm::dvec4 lift(Index vertex) const {
-        return {(input_.mesh.positions[vertex] - centre_) * scale_, input_.luminance[vertex] * luminance_weight};
+        return {(input_.mesh.positions[vertex] - centre_) * scale_, input_.luminance[vertex] * luminance_scale};
     }
 
     const ClusterInput& input_;
@@ -149,7 +151,8 @@ private:
     std::vector<Quadric> quadrics_;
     std::vector<glm::dvec4> places_;   // position and luminance of its proxy
     std::vector<Index> best_;          // index of its best pair
-    std::vector<Pair> pairs_;          // sorted, unique
+    std::vector<Pair> pairs_;          // the edges, sorted and unique; then this round's pairs across gaps
+    std::size_t edge_count_ = 0;
     std::vector<double> errors_;       // by pair
     std::vector<Index> slot_of_vertex_;
 };
@@ -259,6 +262,7 @@ void QuadricClusterer::connect_edges() {
     tbb::parallel_sort(pairs_.begin(), pairs_.end());
     accumulate_boundaries(pairs_);
     pairs_.erase(std::unique(pairs_.begin(), pairs_.end()), pairs_.end());
+    edge_count_ = pairs_.size();
 }
 
 // Interleaves the lowest 21 bits of three coordinates in 0..1.
@@ -274,9 +278,10 @@ std::uint64_t morton(glm::dvec3 p) {
     return spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2;
 }
 
-// Clusters that no pair reaches get pairs with their neighbours along a Morton curve.
+// Clusters that no edge reaches get pairs with their neighbours along a Morton curve.
 void QuadricClusterer::connect_lone_clusters() {
     constexpr std::size_t neighbours = 3; // each way along the curve
+    pairs_.resize(edge_count_);
     std::vector<std::uint8_t> reached(cluster_.size(), 0);
     for (const Pair& p : pairs_) reached[p.a] = reached[p.b] = 1;
     if (std::find(reached.begin(), reached.end(), 0) == reached.end()) return;
@@ -289,8 +294,6 @@ void QuadricClusterer::connect_lone_clusters() {
             if (!reached[a] || !reached[b]) pairs_.push_back({std::min(a, b), std::max(a, b)});
         }
     }
-    std::sort(pairs_.begin(), pairs_.end());
-    pairs_.erase(std::unique(pairs_.begin(), pairs_.end()), pairs_.end());
 }
 
 double QuadricClusterer::contraction_error(Pair pair, glm::dvec4& place) const {
@@ -304,56 +307,74 @@ double QuadricClusterer::contraction_error(Pair pair, glm::dvec4& place) const {
     return q.error(place);
 }
 
+// Ward's measure: by how much the sum of squared distances from the clusters' middles grows.
+double QuadricClusterer::gap_error(Pair pair) const {
+    const double a = quadrics_[pair.a].weight, b = quadrics_[pair.b].weight;
+    if (!(a + b > 0)) return 0;
+    const glm::dvec3 d(places_[pair.a] - places_[pair.b]);
+    return gap_weight * (a * b / (a + b)) * glm::dot(d, d);
+}
+
 void QuadricClusterer::choose_partners() {
     errors_.resize(pairs_.size());
     tbb::parallel_for(std::size_t{0}, pairs_.size(), [&](std::size_t i) {
         glm::dvec4 place;
-        errors_[i] = contraction_error(pairs_[i], place);
+        errors_[i] = contraction_error(pairs_[i], place) + (i < edge_count_ ? 0 : gap_error(pairs_[i]));
     });
-    constexpr Index none = 0xffffffffu;
-    best_.assign(cluster_.size(), none);
+    best_.assign(cluster_.size(), no_node);
     for (Index i = 0; i < pairs_.size(); ++i)
         for (const Index slot : {pairs_[i].a, pairs_[i].b})
-            if (best_[slot] == none || errors_[i] < errors_[best_[slot]]) best_[slot] = i;
+            if (best_[slot] == no_node || errors_[i] < errors_[best_[slot]]) best_[slot] = i;
 }
 
-// Contracts each pair that is the best of one of its clusters, in ascending error, while both are free.
-bool QuadricClusterer::contract_round() {
-    choose_partners();
-    std::vector<Index> order;
-    for (Index slot = 0; slot < cluster_.size(); ++slot) {
-        const Index i = best_[slot];
-        const Pair& p = pairs_[i];
-        if (best_[p.a] == i && best_[p.b] == i && slot == p.b) continue; // named by both: once is enough
-        order.push_back(i);
-    }
+// The pairs that are the best of one of their clusters, in ascending error.
+std::vector<Index> QuadricClusterer::ordered_choices() const {
+    std::vector<Index> order(best_);
     std::sort(order.begin(), order.end(),
               [&](Index x, Index y) { return errors_[x] != errors_[y] ? errors_[x] < errors_[y] : x < y; });
     order.erase(std::unique(order.begin(), order.end()), order.end());
+    return order;
+}
 
-    static const double patience = tune("QW_PATIENCE", 1);
-    std::vector<std::uint8_t> taken(cluster_.size(), 0);
+// Joins b to a: a's slot holds the new cluster.
+void QuadricClusterer::contract(Pair pair) {
+    glm::dvec4 place;
+    contraction_error(pair, place);
+    const Index parent = static_cast<Index>(result_.parents.size());
+    result_.parents.push_back(parent);
+    result_.positions.push_back(glm::dvec3(place) / scale_ + centre_);
+    result_.parents[cluster_[pair.a]] = result_.parents[cluster_[pair.b]] = parent;
+    cluster_[pair.a] = parent;
+    quadrics_[pair.a] += quadrics_[pair.b];
+    places_[pair.a] = place;
+}
+
+// Contracts pairs that are the best of both their clusters, in ascending error.
+void QuadricClusterer::contract_round() {
+    choose_partners();
+    const std::vector<Index> order = ordered_choices();
     std::vector<Index> joined_with(cluster_.size());
     std::iota(joined_with.begin(), joined_with.end(), Index{0});
-    for (const Index i : order) {
-        const Pair p = pairs_[i];
-        if (taken[p.a] || taken[p.b]) continue;
-        const double other = std::min(errors_[best_[p.a]], errors_[best_[p.b]]);
-        if (errors_[i] > patience * other + 1e-300 && !(best_[p.a] == i && best_[p.b] == i)) continue;
-        taken[p.a] = taken[p.b] = 1;
-        glm::dvec4 place;
-        contraction_error(p, place);
-        const Index parent = static_cast<Index>(result_.parents.size());
-        result_.parents.push_back(parent);
-        result_.positions.push_back(glm::dvec3(place) / scale_ + centre_);
-        result_.parents[cluster_[p.a]] = result_.parents[cluster_[p.b]] = parent;
-        cluster_[p.a] = parent;
-        quadrics_[p.a] += quadrics_[p.b];
-        places_[p.a] = place;
-        joined_with[p.b] = p.a;
-    }
+    std::vector<std::uint8_t> taken(cluster_.size(), 0);
+    std::size_t contracted = 0;
+    const auto contract_all = [&](bool second_best) {
+        for (const Index i : order) {
+            const Pair p = pairs_[i];
+            const bool mutual = errors_[i] <= errors_[best_[p.a]] && errors_[i] <= errors_[best_[p.b]];
+            if (taken[p.a] || taken[p.b] || !(mutual || second_best)) continue;
+            taken[p.a] = taken[p.b] = 1;
+            contract(p);
+            joined_with[p.b] = p.a;
+            ++contracted;
+        }
+    };
+    contract_all(false);
+    if (contracted < cluster_.size() / least_round_share) contract_all(true);
+    close_gaps(joined_with);
+}
 
-    // Closes the gaps, keeping the order.
+// Renumbers the slots without those that were joined to others, and the edges with them.
+void QuadricClusterer::close_gaps(std::span<const Index> joined_with) {
     std::vector<Index> new_slot(cluster_.size());
     Index live = 0;
     for (Index s = 0; s < cluster_.size(); ++s) {
@@ -368,14 +389,14 @@ bool QuadricClusterer::contract_round() {
     quadrics_.resize(live);
     places_.resize(live);
     std::size_t kept = 0;
-    for (const Pair& p : pairs_) {
-        const Index a = new_slot[joined_with[p.a]], b = new_slot[joined_with[p.b]];
+    for (std::size_t i = 0; i < edge_count_; ++i) {
+        const Index a = new_slot[joined_with[pairs_[i].a]], b = new_slot[joined_with[pairs_[i].b]];
         if (a != b) pairs_[kept++] = {std::min(a, b), std::max(a, b)};
     }
     pairs_.resize(kept);
     tbb::parallel_sort(pairs_.begin(), pairs_.end());
     pairs_.erase(std::unique(pairs_.begin(), pairs_.end()), pairs_.end());
-    return true;
+    edge_count_ = pairs_.size();
 }
 
 Result<Clustering> QuadricClusterer::run() {
