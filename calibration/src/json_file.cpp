@@ -23,9 +23,12 @@ constexpr std::size_t largest_file = 64u << 20;
 // An object with three nested arrays is the deepest a profile gets.
 constexpr std::size_t deepest_nesting = 8;
 
+// As JSON writes it, so that a key with line breaks stays on one line; long ones are cut.
 std::string in_quotes(std::string_view text) {
-    std::string result("\"");
-    return result.append(text).append("\"");
+    constexpr std::size_t longest = 60;
+    std::string result = to_json(text.substr(0, longest));
+    if (text.size() > longest) result.append("...");
+    return result;
 }
 
 Error file_error(const std::filesystem::path& file, ErrorCode code, std::string_view problem) {
@@ -61,11 +64,12 @@ public:
     }
     bool parse_error(std::size_t position, const std::string&, const nlohmann::detail::exception& e) override {
         byte_ = position;
-        // Keep the library's diagnosis, without its tags and its own position: "[json.exception...] ...: diagnosis".
+        // The library's diagnosis without its tags and its position, "[json.exception...] ...: diagnosis", on one line.
         const std::string_view text = e.what();
         const std::size_t colon = text.find(": ");
         problem_ = "is no valid JSON: ";
-        for (const char c : text.substr(colon == text.npos ? 0 : colon + 2)) {
+        constexpr std::size_t longest = 200;
+        for (const char c : text.substr(colon == text.npos ? 0 : colon + 2, longest)) {
             if (c >= ' ' && c <= '~') problem_ += c;
         }
         return false;
@@ -105,7 +109,7 @@ Result<std::string> read_text(const std::filesystem::path& file) {
     return text;
 }
 
-// ":LINE:COLUMN" of a 1-based byte, columns in bytes.
+// ":LINE:COLUMN" of a 1-based byte, columns in bytes: where the parser stopped, the end of what it did not expect.
 std::string line_and_column(std::string_view text, std::size_t byte) {
     const std::string_view before = text.substr(0, byte > 0 ? byte - 1 : 0);
     const auto line = 1 + std::ranges::count(before, '\n');

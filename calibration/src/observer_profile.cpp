@@ -15,6 +15,7 @@ constexpr int format_version = 1;
 Result<std::vector<double>> read_axis(const JsonObject& object, const char* key) {
     const auto array = object.array(key);
     if (!array) return array.error();
+    if ((*array)->empty()) return object.key_error(key, "is empty");
     std::vector<double> values;
     if (auto ok = object.append_numbers(**array, key, std::nullopt, values); !ok) return ok.error();
     return values;

@@ -1,0 +1,170 @@
+// Sensitivity tables as JSON: exact round trips, and that bad files get one clear sentence.
+#include <calibration/observer_profile.h>
+
+#include <limits>
+
+#include <gmock/gmock.h>
+
+#include "profile_files.h"
+
+namespace unseen::calibration {
+namespace {
+
+using perception::CsfModel;
+using perception::CsfSamples;
+using perception::CsfTable;
+using testing::AllOf;
+using testing::HasSubstr;
+
+class ObserverProfile : public ProfileFiles {};
+
+const std::string small = R"({
+"format": "unseen-csf", "version": 1, "source": "measured by hand",
+"frequency_cpd": [1, 4, 16],
+"eccentricity_deg": [0, 10],
+"luminance_cdm2": [3, 100],
+"sensitivity": [
+[[60, 40, 5], [120, 80, 10]],
+[[30, 15, 0.5], [50, 25, 1.5]]
+]
+})";
+
+void expect_same(const CsfSamples& a, const CsfSamples& b) {
+    EXPECT_EQ(a.source, b.source);
+    EXPECT_EQ(a.frequency_cpd, b.frequency_cpd); // bit for bit
+    EXPECT_EQ(a.eccentricity_deg, b.eccentricity_deg);
+    EXPECT_EQ(a.luminance_cdm2, b.luminance_cdm2);
+    EXPECT_EQ(a.sensitivity, b.sensitivity);
+}
+
+TEST_F(ObserverProfile, ReadsASmallTable) {
+    const auto table = read_csf(write(small));
+    ASSERT_TRUE(table) << table.error().message;
+    const CsfSamples& s = table->samples();
+    EXPECT_EQ(s.source, "measured by hand");
+    EXPECT_EQ(s.frequency_cpd, (std::vector<double>{1, 4, 16}));
+    EXPECT_EQ(s.eccentricity_deg, (std::vector<double>{0, 10}));
+    EXPECT_EQ(s.luminance_cdm2, (std::vector<double>{3, 100}));
+    EXPECT_EQ(s.sensitivity, (std::vector<double>{60, 40, 5, 120, 80, 10, 30, 15, 0.5, 50, 25, 1.5}));
+}
+
+TEST_F(ObserverProfile, TheSourceIsOptional) {
+    const auto table = read_csf(write(replaced(small, ", \"source\": \"measured by hand\"", "")));
+    ASSERT_TRUE(table) << table.error().message;
+    EXPECT_EQ(table->samples().source, "");
+}
+
+TEST_F(ObserverProfile, RoundTripOfTheModelsIsExact) {
+    for (const CsfModel model : {CsfModel::castle, CsfModel::stela}) {
+        const CsfTable table = CsfTable::from_model(model);
+        const auto file = folder() / "model.json";
+        const auto written = write_csf(file, table);
+        ASSERT_TRUE(written) << written.error().message;
+        const auto back = read_csf(file);
+        ASSERT_TRUE(back) << back.error().message;
+        expect_same(back->samples(), table.samples());
+        using perception::Degrees, perception::Luminance;
+        EXPECT_EQ(back->highest_visible_frequency(0.1, Degrees(7), Luminance(33)),
+                  table.highest_visible_frequency(0.1, Degrees(7), Luminance(33)));
+    }
+    EXPECT_EQ(files_in_folder(), 1) << "no temporary file stays behind";
+}
+
+TEST_F(ObserverProfile, RoundTripOfOddNumbersIsExact) {
+    CsfSamples samples;
+    samples.source = "quotes \" and \\ and \n lines";
+    samples.frequency_cpd = {1e-300, 1.0 / 3, 1e300};
+    samples.eccentricity_deg = {0, 0.1 + 0.2};
+    samples.luminance_cdm2 = {std::numeric_limits<double>::denorm_min(), 0.1};
+    samples.sensitivity = {1e308, 2.0 / 3, 1e-308, 5e-324, 1e-300, 1, 2, 3, 4, 5, 6, 7};
+    const auto table = CsfTable::create(samples);
+    ASSERT_TRUE(table) << table.error().message;
+    const auto file = folder() / "odd.json";
+    ASSERT_TRUE(write_csf(file, *table));
+    const auto back = read_csf(file);
+    ASSERT_TRUE(back) << back.error().message;
+    expect_same(back->samples(), samples);
+}
+
+TEST_F(ObserverProfile, ErrorsNameTheFileAndThePlace) {
+    struct Case {
+        const char *from, *to, *expected;
+    };
+    const Case cases[] = {
+        {"\"unseen-csf\"", "\"unseen\"", "\"format\" must be \"unseen-csf\""},
+        {"\"format\": \"unseen-csf\", ", "", "\"format\""},
+        {"\"unseen-csf\"", "1", "\"format\" must be a string"},
+        {"\"version\": 1, ", "", "\"version\" is missing"},
+        {"\"version\": 1", "\"version\": 1.5", "version"},
+        {"\"version\": 1", "\"version\": \"1\"", "version"},
+        {"\"measured by hand\"", "7", "\"source\" must be a string"},
+        {"\"frequency_cpd\": [1, 4, 16],", "", "\"frequency_cpd\" is missing"},
+        {"[1, 4, 16]", "16", "\"frequency_cpd\" must be an array"},
+        {"[1, 4, 16]", "[]", "\"frequency_cpd\" is empty"},
+        {"[1, 4, 16]", "[1, 4]", "\"sensitivity[0][0]\" must have 2 values, but has 3"},
+        {"[1, 4, 16]", "[1, 4, 4]", "frequency_cpd[2]"},
+        {"[1, 4, 16]", "[0, 4, 16]", "frequency_cpd[0]"},
+        {"[1, 4, 16]", "[1, \"4\", 16]", "\"frequency_cpd[1]\" must be a number, but is \"4\""},
+        {"[1, 4, 16]", "[1, null, 16]", "\"frequency_cpd[1]\" must be a number"},
+        {"[1, 4, 16]", "[1, [4], 16]", "\"frequency_cpd[1]\" must be a number"},
+        {"[0, 10]", "[0, 10, 20]", "\"sensitivity\" must be an array of 3"},
+        {"[0, 10]", "[]", "\"eccentricity_deg\" is empty"},
+        {"[0, 10]", "[1, 10]", "eccentricity_deg[0]"},
+        {"[0, 10]", "[0, -10]", "eccentricity_deg[1]"},
+        {"[0, 10]", "{}", "\"eccentricity_deg\" must be an array"},
+        {"[3, 100]", "[3]", "\"sensitivity[0]\" must be an array of 1"},
+        {"[3, 100]", "[100, 3]", "luminance_cdm2[1]"},
+        {"[3, 100]", "[-3, 100]", "luminance_cdm2[0]"},
+        {"[30, 15, 0.5]", "[30, 15]", "\"sensitivity[1][0]\" must have 3 values, but has 2"},
+        {"[30, 15, 0.5]", "[30, 15, 0.5, 0.1]", "\"sensitivity[1][0]\" must have 3 values, but has 4"},
+        {"[30, 15, 0.5]", "[30, 0, 0.5]", "sensitivity[1][0][1]"},
+        {"[30, 15, 0.5]", "[30, -15, 0.5]", "sensitivity[1][0][1]"},
+        {"[30, 15, 0.5]", "[30, true, 0.5]", "sensitivity[1][0][1]"},
+        {"[30, 15, 0.5]", "30", "\"sensitivity[1][0]\" must be an array of numbers, but is 30"},
+        {"[[30, 15, 0.5], [50, 25, 1.5]]", "null", "\"sensitivity[1]\" must be an array of 2"},
+        {"0.5", "1e999", ":8:"},
+        {"0.5", "NaN", ":8:"},
+        {"0.5]", "0.5", ":10:"},
+        {"\"version\": 1", "\"version\": 1, \"observer\": \"me\"", "\"observer\" is unknown"},
+        {"\"version\": 1", "\"version\": 1, \"version\": 1", "\"version\" twice"},
+    };
+    for (const Case& bad : cases) {
+        const auto table = read_csf(write(replaced(small, bad.from, bad.to), "bad.json"));
+        ASSERT_FALSE(table) << bad.expected;
+        EXPECT_THAT(table.error().message, AllOf(HasSubstr("bad.json"), HasSubstr(bad.expected)));
+        EXPECT_THAT(table.error().message, testing::Not(HasSubstr("\n")));
+        EXPECT_EQ(table.error().code, ErrorCode::malformed_data);
+    }
+}
+
+TEST_F(ObserverProfile, NewerVersionsAreUnsupported) {
+    const auto table = read_csf(write(replaced(small, "\"version\": 1", "\"version\": 2")));
+    ASSERT_FALSE(table);
+    EXPECT_EQ(table.error().code, ErrorCode::unsupported);
+    EXPECT_THAT(table.error().message, HasSubstr("version"));
+}
+
+TEST_F(ObserverProfile, SurvivesMutatedFiles) {
+    int accepted = 0;
+    for_each_mutation(small, 5000, [&](const std::string& text) {
+        const auto table = read_csf(write(text));
+        if (table) {
+            ++accepted;
+            const auto cpd = table->highest_visible_frequency(0.1, perception::Degrees(3), perception::Luminance(10));
+            EXPECT_FALSE(std::isnan(cpd.value())) << text;
+        } else {
+            EXPECT_THAT(table.error().message, HasSubstr("profile.json"));
+        }
+    });
+    EXPECT_GT(accepted, 0);
+}
+
+TEST_F(ObserverProfile, WritingFailsWithoutLeavingAFile) {
+    const auto nowhere = write_csf(folder() / "no" / "folder.json", CsfTable::standard());
+    ASSERT_FALSE(nowhere);
+    EXPECT_EQ(nowhere.error().code, ErrorCode::io_failure);
+    EXPECT_EQ(files_in_folder(), 0);
+}
+
+} // namespace
+} // namespace unseen::calibration
