@@ -95,8 +95,8 @@ std::optional<Error> non_finite(const std::filesystem::path& file, const Image& 
 
 // ---- PNG ----------------------------------------------------------------------------------------------------------
 
-// libpng leaves by longjmp. So every object with a destructor lives out here, and `guarded` runs one step at a time, whose
-// own frame holds nothing to destroy.
+// libpng leaves by longjmp. So every object with a destructor lives out here, and `guarded` runs one step at a time,
+// whose own frame holds nothing to destroy.
 struct PngReader {
     const Bytes* bytes = nullptr;
     std::size_t position = 0;
@@ -359,8 +359,8 @@ Result<ImageFile> read_pfm(const std::filesystem::path& file, const Bytes& bytes
 }
 
 Bytes encode_pfm(const Image& image) {
-    const std::string header = std::string(image.channels == 3 ? "PF" : "Pf") + "\n" + std::to_string(image.width) + " " +
-                               std::to_string(image.height) + "\n-1.0\n";
+    const std::string header = std::string(image.channels == 3 ? "PF" : "Pf") + "\n" + std::to_string(image.width) +
+                               " " + std::to_string(image.height) + "\n-1.0\n";
     Bytes bytes(header.begin(), header.end());
     bytes.reserve(header.size() + 4 * image.values.size());
     const std::size_t row = image.index(0, 1, 0);
@@ -488,7 +488,8 @@ private:
             for (std::size_t i = 0; i < 4; ++i) box[i] = std::bit_cast<std::int32_t>(word(position + 4 * i));
             const std::int64_t width = box[2] - box[0] + 1, height = box[3] - box[1] + 1;
             if (width <= 0 || height <= 0) return malformed(file_, "the EXR data window is empty");
-            if (auto complaint = size_complaint(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height))) {
+            if (auto complaint =
+                    size_complaint(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height))) {
                 return malformed(file_, *complaint);
             }
             width_ = static_cast<std::uint64_t>(width);

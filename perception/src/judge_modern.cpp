@@ -2,7 +2,8 @@
 // by the contrast sensitivity at its frequency, masked by the reference, and pooled over the bands.
 //
 // What is our own in it, and why:
-// - A band's gain is below 1 (and below the gain for other frequencies). Contrasts are divided by the band's response to
+// - A band's gain is below 1 (and below the gain for other frequencies). Contrasts are divided by the band's response
+// to
 //   a grating of its nominal frequency, which follows from the kernel (`band_response`).
 // - Bands are an octave and more wide, and S changes within one: at 10 degrees it halves between 5.5 and 8 cpd. One
 //   number per band is then wrong by up to 5 dB between the nominal frequencies. So each band's contrast passes a
@@ -20,6 +21,8 @@
 
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
+
+#include "judge_input.h"
 
 namespace unseen::perception {
 namespace {
@@ -69,7 +72,8 @@ double reduced(int i, int n, Read in) {
     return tap0 * in(c) + tap1 * (in(mirrored(c - 1, n)) + in(mirrored(c + 1, n))) +
            tap2 * (in(mirrored(c - 2, n)) + in(mirrored(c + 2, n)));
 }
-// One axis of the expansion: pixel x between coarse samples at even positions; the coarse row ends with its last sample.
+// One axis of the expansion: pixel x between coarse samples at even positions; the coarse row ends with its last
+// sample.
 template <class Read>
 double expanded(int x, int coarse_n, Read in) {
     const int c = x / 2, next = std::min(c + 1, coarse_n - 1);
@@ -158,6 +162,7 @@ struct Range {
     double low = 0, high = 0;
 };
 
+// What the weights of all bands depend on.
 struct Conditions {
     CsfModel model = CsfModel::castle;
     double ppd = 0;
@@ -178,7 +183,10 @@ public:
           smooth_at_nominal_(smooth_response(angular_frequency(nominal_frequency(c.ppd, level), c.ppd, level))) {
         if (!is_base) gain_ = band_response(nominal_frequency(c.ppd, level), c.ppd, level);
         luminances_ = 2 + static_cast<int>((c.log10_luminance.high - origin_) / luminance_step);
-        eccentricities_ = c.largest_eccentricity > 0 ? 2 + static_cast<int>(c.largest_eccentricity / eccentricity_step) : 1;
+        eccentricities_ = 1;
+        if (c.largest_eccentricity > 0) {
+            eccentricities_ = 2 + static_cast<int>(c.largest_eccentricity / eccentricity_step);
+        }
         for (int e = 0; e < eccentricities_; ++e) {
             for (int l = 0; l < luminances_; ++l) {
                 nodes_.push_back(node(c, std::pow(10.0, origin_ + l * luminance_step), e * eccentricity_step));
@@ -221,8 +229,8 @@ private:
         const double nominal = nominal_frequency(c.ppd, level_);
         double s = closed_form(c.model, nominal, luminance, eccentricity);
         if (!is_base_) return {std::log(s), fit_tilt(c, luminance, eccentricity, s)};
-        // The base band holds every lower frequency too. S to the left of its peak falls, so where the pyramid is short (a
-        // small image) the band would be blind at its own frequency to what is plain at a lower one.
+        // The base band holds every lower frequency too. Where the pyramid is short (a small image), its own frequency
+        // lies right of the peak of S, and the band would be blind to what is plain at a lower frequency.
         for (double f = nominal / std::numbers::sqrt2; f >= lowest_frequency; f /= std::numbers::sqrt2) {
             s = std::max(s, closed_form(c.model, f, luminance, eccentricity));
         }
@@ -281,7 +289,7 @@ public:
         }
     }
     double largest() const { return largest_; }
-    // Degrees; coordinates of a pixel's top left corner's index, the pixel's centre is meant.
+    // Degrees, at the centre of the pixel of these indices.
     double at_pixel(double x, double y) const { return has_gaze_ ? angle(direction(x + 0.5, y + 0.5)) : 0; }
 
 private:
@@ -408,29 +416,12 @@ void spread(const Plane& band, int level, Plane& full, Merge merge) {
 
 // ---- arguments ----------------------------------------------------------------------------------------------------
 
-Error bad_argument(std::string message) { return {ErrorCode::invalid_argument, "judge: " + std::move(message)}; }
-
-Result<void> check(const Image& image, const char* which) {
-    const auto pixels =
-        static_cast<std::size_t>(std::max(image.width, 0)) * static_cast<std::size_t>(std::max(image.height, 0));
-    if (pixels == 0 || image.channels != 1 || image.values.size() != pixels) {
-        return bad_argument(std::string("the ") + which + " is not a luminance image (one channel, at least one pixel)");
-    }
-    for (std::size_t i = 0; i < pixels; ++i) {
-        if (!(image.values[i] >= 0) || !std::isfinite(image.values[i])) {
-            const auto w = static_cast<std::size_t>(image.width);
-            return bad_argument(std::string("luminance of the ") + which + " at pixel (" + std::to_string(i % w) + ", " +
-                                std::to_string(i / w) + ") is negative or not finite");
-        }
-    }
-    return {};
-}
-
 Result<void> check(const JudgeOptions& options) {
     if (auto ok = validate(options.display); !ok) return ok;
-    if (!(options.beta >= 1 && options.beta <= 20)) return bad_argument("beta must lie between 1 and 20");
+    if (!(options.beta >= 1 && options.beta <= 20))
+        return judge_argument_error("judge", "beta must lie between 1 and 20");
     if (options.gaze_px && !(std::isfinite(options.gaze_px->x) && std::isfinite(options.gaze_px->y))) {
-        return bad_argument("the gaze must be a finite position in pixels");
+        return judge_argument_error("judge", "the gaze must be a finite position in pixels");
     }
     return {};
 }
@@ -460,13 +451,7 @@ Image as_image(const Plane& plane) {
 
 Result<Judgement> judge_modern(const Image& reference, const Image& test, const JudgeOptions& options) {
     if (auto ok = check(options); !ok) return ok.error();
-    if (auto ok = check(reference, "reference"); !ok) return ok.error();
-    if (auto ok = check(test, "test"); !ok) return ok.error();
-    if (reference.width != test.width || reference.height != test.height) {
-        return bad_argument("the images differ in size: reference " + std::to_string(reference.width) + "x" +
-                            std::to_string(reference.height) + ", test " + std::to_string(test.width) + "x" +
-                            std::to_string(test.height));
-    }
+    if (auto ok = check_luminance_pair("judge", reference, test); !ok) return ok.error();
     const Eccentricity eccentricity(reference, options);
     const Conditions conditions = conditions_for(reference, options, eccentricity);
     const int base = base_level(reference, conditions.ppd);
@@ -493,7 +478,7 @@ Result<Judgement> judge_modern(const Image& reference, const Image& test, const 
 
 Result<Image> threshold_map_modern(const Image& reference, const JudgeOptions& options) {
     if (auto ok = check(options); !ok) return ok.error();
-    if (auto ok = check(reference, "reference"); !ok) return ok.error();
+    if (auto ok = check_luminance("judge", reference, "reference"); !ok) return ok.error();
     const Eccentricity eccentricity(reference, options);
     const Conditions conditions = conditions_for(reference, options, eccentricity);
     const int base = base_level(reference, conditions.ppd);

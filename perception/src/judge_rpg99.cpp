@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "judge_input.h"
+
 namespace unseen::perception {
 namespace {
 
@@ -36,8 +38,8 @@ double tvi(double luminance) {
     return std::pow(10.0, y);
 }
 
-// Barten 1989: 440 (1 + .7/L)^-.2 rho exp(-b rho) sqrt(1 + .06 exp(b rho)), with the exponentials joined under the root:
-// apart, their product is infinity times 0 in dim light at high frequencies.
+// Barten 1989: 440 (1 + .7/L)^-.2 rho exp(-b rho) sqrt(1 + .06 exp(b rho)), with the exponentials joined under the
+// root: apart, their product is infinity times 0 in dim light at high frequencies.
 class Barten1989 {
 public:
     explicit Barten1989(double luminance)
@@ -127,35 +129,10 @@ double elevation(const std::array<double, band_count>& contrast, const Bands& ba
     return std::clamp(weighted / std::max(sum, contrast_floor), 1.0, largest_elevation);
 }
 
-Error bad_argument(std::string message) { return {ErrorCode::invalid_argument, "rpg99: " + std::move(message)}; }
-
-Result<void> check(const Image& image, const char* which) {
-    const auto pixels = static_cast<std::size_t>(std::max(image.width, 0)) * static_cast<std::size_t>(std::max(image.height, 0));
-    if (pixels == 0 || image.channels != 1 || image.values.size() != pixels) {
-        return bad_argument(std::string("the ") + which + " is not a luminance image (one channel, at least one pixel)");
-    }
-    for (std::size_t i = 0; i < pixels; ++i) {
-        if (!(image.values[i] >= 0) || !std::isfinite(image.values[i])) {
-            const auto w = static_cast<std::size_t>(image.width);
-            return bad_argument(std::string("luminance of the ") + which + " at pixel (" + std::to_string(i % w) + ", " +
-                                std::to_string(i / w) + ") is negative or not finite");
-        }
-    }
-    return {};
-}
-
 Result<void> check(const Image& reference, const Image& test, const Rpg99Options& options) {
-    if (auto ok = check(reference, "reference"); !ok) return ok;
-    if (auto ok = check(test, "test"); !ok) return ok;
-    if (reference.width != test.width || reference.height != test.height) {
-        return bad_argument("the images differ in size: reference " + std::to_string(reference.width) + "x" +
-                            std::to_string(reference.height) + ", test " + std::to_string(test.width) + "x" +
-                            std::to_string(test.height));
-    }
-    if (!(options.field_degrees > 0 && options.field_degrees < 180)) {
-        return bad_argument("field_degrees must lie between 0 and 180");
-    }
-    return {};
+    if (auto ok = check_luminance_pair("rpg99", reference, test); !ok) return ok;
+    if (options.field_degrees > 0 && options.field_degrees < 180) return {};
+    return judge_argument_error("rpg99", "field_degrees must lie between 0 and 180");
 }
 
 struct ExactMap {
@@ -208,7 +185,7 @@ Result<Judgement> judge_rpg99(const Image& reference, const Image& test, const R
     judgement.pixels = map.threshold.size();
     Plane ratio(map.threshold.size());
     for (std::size_t p = 0; p < ratio.size(); ++p) {
-        const double difference = std::abs(static_cast<double>(reference.values[p]) - static_cast<double>(test.values[p]));
+        const double difference = std::abs(double{reference.values[p]} - double{test.values[p]});
         ratio[p] = difference / map.threshold[p];
         judgement.visible_pixels += !(difference <= map.threshold[p]);
         judgement.max_ratio = std::max(judgement.max_ratio, ratio[p]);

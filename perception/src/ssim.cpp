@@ -63,10 +63,11 @@ double similarity(const Moments& m) {
 
 Result<void> check(const Image& a, const Image& b) {
     if (a.width != b.width || a.height != b.height || a.channels != b.channels || a.values.size() != b.values.size()) {
-        return Error{ErrorCode::invalid_argument, "SSIM needs two images of one size and one channel count: the reference is " +
-                     std::to_string(a.width) + "x" + std::to_string(a.height) + "x" + std::to_string(a.channels) +
-                     ", the test " + std::to_string(b.width) + "x" + std::to_string(b.height) + "x" +
-                     std::to_string(b.channels)};
+        return Error{ErrorCode::invalid_argument,
+                     "SSIM needs two images of one size and one channel count: the reference is " +
+                         std::to_string(a.width) + "x" + std::to_string(a.height) + "x" + std::to_string(a.channels) +
+                         ", the test " + std::to_string(b.width) + "x" + std::to_string(b.height) + "x" +
+                         std::to_string(b.channels)};
     }
     if (a.width < window_size || a.height < window_size || (a.channels != 1 && a.channels != 3)) {
         return Error{ErrorCode::invalid_argument, "SSIM needs grey or RGB images of at least 11 x 11 pixels, not " +
@@ -80,7 +81,8 @@ Result<void> check(const Image& a, const Image& b) {
     }
     for (std::size_t i = 0; i < values; ++i) {
         if (!std::isfinite(a.values[i]) || !std::isfinite(b.values[i])) {
-            return Error{ErrorCode::invalid_argument, "SSIM: value " + std::to_string(i) + " of an image is not finite"};
+            return Error{ErrorCode::invalid_argument,
+                         "SSIM: value " + std::to_string(i) + " of an image is not finite"};
         }
     }
     return {};

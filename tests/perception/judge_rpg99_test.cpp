@@ -16,7 +16,8 @@ namespace unseen::perception {
 namespace {
 
 Image flat(int width, int height, float value) {
-    return {width, height, 1, std::vector<float>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), value)};
+    return {width, height, 1,
+            std::vector<float>(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), value)};
 }
 
 // A disc and a ramp under noise, in cd/m2. The golden table was made from it.
@@ -33,8 +34,8 @@ Image scene(std::uint32_t seed, float noise) {
     return image;
 }
 
-// tests/data/rpg99_scene.csv comes from this module after its maps of 16 other images had been compared with an independent
-// double-precision port (200 samples within 3e-6; failing pixels of 15 image pairs and two fields equal).
+// tests/data/rpg99_scene.csv comes from this module after it had been compared with an independent port in double
+// precision: 200 samples of threshold maps within 3e-6, and the same failing pixels for 15 image pairs at two fields.
 TEST(JudgeRpg99, KeepsItsVerifiedValues) {
     constexpr double tolerance = 1e-6; // maps are floats
     Rpg99Options options;

@@ -18,7 +18,8 @@ Image noisy_ramp(int width, int height, int channels, std::uint32_t seed, int am
         for (int x = 0; x < width; ++x) {
             for (int c = 0; c < channels; ++c) {
                 seed = seed * 1664525U + 1013904223U;
-                const int code = 60 + (3 * x + 2 * y + 20 * c) % 120 + static_cast<int>((seed >> 24) % static_cast<unsigned>(amplitude));
+                const int code = 60 + (3 * x + 2 * y + 20 * c) % 120 +
+                                 static_cast<int>((seed >> 24) % static_cast<unsigned>(amplitude));
                 image.values.push_back(static_cast<float>(code) / 255.0F);
             }
         }
