@@ -1,0 +1,32 @@
+// What a first program with Unseen looks like: a tetrahedron, folded as far as nobody can see it.
+#include <cstdio>
+
+#include <calibration/display_profile.h>
+#include <perception/criterion.h>
+#include <vdtree/builder.h>
+#include <vdtree/cut.h>
+#ifdef WITH_RENDER
+#include <render/renderer.h>
+#endif
+
+int main() {
+    using namespace unseen;
+    const std::vector<glm::dvec3> positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    const std::vector<vdtree::Triangle> triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+    const auto tree = vdtree::build_tree({positions, triangles});
+    if (!tree) return std::printf("%s\n", tree.error().message.c_str()), 1;
+
+    vdtree::View view;
+    view.eye = {0, 0, 2000};
+    perception::FoldTestOptions options;
+    view.fov_y_degrees = physical_field(options.display, view.height).value();
+    vdtree::Cut cut(*tree);
+    cut.unfold_all();
+    if (cut.triangle_count() != 4) return std::printf("the tetrahedron lost a face\n"), 1;
+    const auto stats = cut.adjust(perception::LuebkeHallenCriterion(*tree, view, options));
+    std::printf("%u of %u triangles, largest fold cost %g\n", stats.triangles, tree->triangle_count(),
+                static_cast<double>(stats.max_fold_cost));
+#ifdef WITH_RENDER
+    return render::n_rooks(16, 1).size() == 16 ? 0 : 1;
+#endif
+}
