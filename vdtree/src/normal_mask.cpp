@@ -111,8 +111,11 @@ void NormalSlabs::insert(glm::dvec3 n) noexcept {
                                       (n.x + n.y - n.z) * inverse_sqrt3};
     for (std::size_t i = 0; i < axis_count; ++i) {
         const double units = std::clamp(along[i], -1.0, 1.0) * slab_units;
-        lo[i] = std::min(lo[i], static_cast<std::int8_t>(std::floor(units - slab_margin)));
-        hi[i] = std::max(hi[i], static_cast<std::int8_t>(std::ceil(units + slab_margin)));
+        // The margin must not lead beyond the ends: 128 is no std::int8_t.
+        const double low = std::max(std::floor(units - slab_margin), -slab_units);
+        const double high = std::min(std::ceil(units + slab_margin), slab_units);
+        lo[i] = std::min(lo[i], static_cast<std::int8_t>(low));
+        hi[i] = std::max(hi[i], static_cast<std::int8_t>(high));
     }
 }
 
@@ -126,6 +129,7 @@ float largest_along(const NormalSlabs& slabs, glm::vec3 u) {
     };
     float least = slab(0, u.x) + slab(1, u.y) + slab(2, u.z);
     // The diagonals are named by the coordinate whose sign differs from the other two.
+    // Negative zero counts as positive everywhere here, so std::copysign() would not do.
     const bool x = u.x < 0, y = u.y < 0, z = u.z < 0;
     const std::size_t diagonal = x == y ? (y == z ? 3 : 6) : (x == z ? 5 : 4);
     const float sign = (diagonal == 4 ? y : x) ? -1.0f : 1.0f;
@@ -135,7 +139,7 @@ float largest_along(const NormalSlabs& slabs, glm::vec3 u) {
         float sum = slab(diagonal, sign * weight * static_cast<float>(1 / inverse_sqrt3));
         for (int other = 0; other < 3; ++other)
             if (other != replaced)
-                sum += slab(static_cast<std::size_t>(other), std::copysign(1.0f, u[other]) * (size[other] - weight));
+                sum += slab(static_cast<std::size_t>(other), (u[other] < 0 ? -1.0f : 1.0f) * (size[other] - weight));
         least = std::min(least, sum);
     }
     return least;
