@@ -1,0 +1,16 @@
+// The mesh that the benchmarks share: the file in UNSEEN_BENCH_MESH, or a bumpy sphere of 200,000 triangles.
+#pragma once
+
+#include <vdtree/mesh.h>
+#include <vdtree/vertex_tree.h>
+#include <vdtree/view.h>
+
+namespace unseen::bench {
+
+const vdtree::Mesh& mesh();
+const vdtree::VertexTree& tree(); // by the quadric clusterer, one thread
+
+// The model filling 90% of a 1024 x 1024 window on the default display, `degrees` around the vertical axis from +Z.
+vdtree::View orbit(double degrees);
+
+} // namespace unseen::bench
