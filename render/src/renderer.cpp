@@ -120,7 +120,11 @@ Result<Camera> Renderer::Impl::prepare(const vdtree::Cut& cut, const vdtree::Vie
     if (auto current = context->platform->make_current(); !current)
         return current.error();
     context->errors.begin();
-    if (auto set = drawer.set_triangles(cut.indices()); !set) {
+    Result<void> set;
+    cut.render([&](const vdtree::VertexTree&, std::span<const vdtree::NodeId> indices) {
+        set = drawer.set_triangles(indices);
+    });
+    if (!set) {
         static_cast<void>(context->errors.take_new()); // the drawer's error says it better
         return set.error();
     }

@@ -55,6 +55,7 @@ public:
     // The simplification: triangles over node numbers (positions()[index] is the vertex), oriented like the
     // input, no index twice in one triangle. Valid until the cut changes. Cost: the active triangles, if it changed.
     std::span<const NodeId> indices() const;
+    void render(RenderCallback callback) const { callback(*tree_, indices()); }
     Index triangle_count() const noexcept { return triangle_count_; }
 
 private:
