@@ -33,7 +33,7 @@ constexpr int max_json_depth = 256;
 constexpr std::size_t max_node_depth = 512;
 // Instancing multiplies a file, so what may come out is bounded: bytes for each byte read, and bytes in any case.
 constexpr std::uint64_t max_bytes_out_per_byte_in = 64;
-constexpr std::uint64_t min_bytes_out = std::uint64_t{64} << 20;
+constexpr std::uint64_t min_bytes_out = std::uint64_t{16} << 20;
 constexpr std::uint64_t bytes_per_vertex = sizeof(glm::dvec3) + sizeof(glm::vec3) + sizeof(glm::vec4) + sizeof(glm::vec2);
 constexpr std::uint64_t bytes_per_index = sizeof(Index) * 3; // in a strip an index makes a triangle
 // Integers above are not exact in JSON.

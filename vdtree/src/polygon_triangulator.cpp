@@ -132,8 +132,11 @@ bool PolygonTriangulator::is_ear(std::size_t at, int strictness) {
     if (strictness == convex) return true;
 
     tests_left_ -= static_cast<std::int64_t>(count);
-    for (std::size_t i = 2; i + 1 < count; ++i) {
-        const glm::dvec2 p = points_[ring_[(at + i) % count]];
+    const glm::dvec2 low(std::min({a.x, b.x, c.x}), std::min({a.y, b.y, c.y}));
+    const glm::dvec2 high(std::max({a.x, b.x, c.x}), std::max({a.y, b.y, c.y}));
+    for (const Index other : ring_) {
+        const glm::dvec2 p = points_[other];
+        if (p.x < low.x || p.x > high.x || p.y < low.y || p.y > high.y) continue;
         // Polygons with holes come as one ring with a doubled bridge: copies of the corners block nothing.
         if (p == a || p == b || p == c) continue;
         const double ab = cross(a, b, p);

@@ -39,7 +39,7 @@ private:
     void clip_ears();
     bool is_ear(std::size_t at, int strictness);
 
-    std::int64_t tests_left_ = 300'000'000; // point-in-triangle tests, about a second
+    std::int64_t tests_left_ = 100'000'000; // point-in-triangle tests, less than a second
     std::uint64_t fanned_concave_ = 0;
     std::vector<glm::dvec2> points_;        // projected, largest coordinate 1, counter-clockwise
     std::vector<Index> ring_;               // corners not yet cut off
