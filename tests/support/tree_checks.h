@@ -1,0 +1,213 @@
+// What must hold for any tree and any cut, recomputed from the definitions. Each check returns the first fault, or nothing.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <vdtree/cut.h>
+#include <vdtree/vertex_tree.h>
+
+namespace unseen::support {
+
+using vdtree::Cut;
+using vdtree::Index;
+using vdtree::MeshView;
+using vdtree::no_node;
+using vdtree::NodeId;
+using vdtree::Triangle;
+using vdtree::VertexTree;
+
+template <class T>
+bool same_bytes(std::span<const T> a, std::span<const T> b) {
+    return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size_bytes()) == 0);
+}
+
+// The first array in which two trees differ, bit for bit.
+inline std::string difference(const VertexTree& a, const VertexTree& b) {
+    if (!same_bytes(a.parents(), b.parents())) return "parents";
+    if (!same_bytes(a.first_leaf(), b.first_leaf())) return "first_leaf";
+    if (!same_bytes(a.leaf_end(), b.leaf_end())) return "leaf_end";
+    if (!same_bytes(a.subtree_end(), b.subtree_end())) return "subtree_end";
+    if (!same_bytes(a.first_triangle(), b.first_triangle())) return "first_triangle";
+    if (!same_bytes(a.triangles(), b.triangles())) return "triangles";
+    if (a.origin() != b.origin()) return "origin";
+    if (!same_bytes(a.positions(), b.positions())) return "positions";
+    if (!same_bytes(a.luminance(), b.luminance())) return "luminance";
+    if (!same_bytes(a.normals(), b.normals())) return "normals";
+    if (!same_bytes(a.colours(), b.colours())) return "colours";
+    if (!same_bytes(a.uvs(), b.uvs())) return "uvs";
+    if (!same_bytes(a.support_spheres(), b.support_spheres())) return "support_spheres";
+    if (!same_bytes(a.ring_spheres(), b.ring_spheres())) return "ring_spheres";
+    if (!same_bytes(a.masks(), b.masks())) return "masks";
+    if (!same_bytes(a.slabs(), b.slabs())) return "slabs";
+    if (!same_bytes(a.flags(), b.flags())) return "flags";
+    if (!same_bytes(a.support_luminance(), b.support_luminance())) return "support_luminance";
+    if (!same_bytes(a.ring_luminance(), b.ring_luminance())) return "ring_luminance";
+    if (!same_bytes(a.adaptation_luminance(), b.adaptation_luminance())) return "adaptation_luminance";
+    if (!same_bytes(a.displacement(), b.displacement())) return "displacement";
+    if (!same_bytes(a.source_vertices(), b.source_vertices())) return "source_vertices";
+    if (!same_bytes(a.source_triangles(), b.source_triangles())) return "source_triangles";
+    const auto same_range = [](const auto& r, const auto& s) {
+        return r.name == s.name && r.kind == s.kind && r.first_triangle == s.first_triangle &&
+               r.triangle_count == s.triangle_count;
+    };
+    if (!std::equal(a.ranges().begin(), a.ranges().end(), b.ranges().begin(), b.ranges().end(), same_range)) return "ranges";
+    if (a.dropped_triangles() != b.dropped_triangles()) return "dropped_triangles";
+    if (a.closedness() != b.closedness()) return "closedness";
+    const auto sphere_a = a.bounding_sphere(), sphere_b = b.bounding_sphere();
+    if (std::memcmp(&sphere_a, &sphere_b, sizeof sphere_a) != 0) return "bounding_sphere";
+    if (a.luminance_range().lo != b.luminance_range().lo || a.luminance_range().hi != b.luminance_range().hi)
+        return "luminance_range";
+    if (!(a.light() == b.light())) return "light";
+    if (a.is_prelit() != b.is_prelit()) return "is_prelit";
+    return {};
+}
+
+// Pre-order numbers, contiguous leaves and subtrees, children that tile their parent.
+inline std::string fault_in_structure(const VertexTree& tree) {
+    const NodeId interior = tree.interior_count();
+    if (tree.node_count() != interior + tree.leaf_count()) return "node_count";
+    if (tree.parents().size() != tree.node_count()) return "parents has another length";
+    if (tree.parents()[0] != no_node) return "the root has a parent";
+    if (tree.first_leaf()[0] != 0 || tree.leaf_end()[0] != tree.leaf_count()) return "the root lacks leaves";
+    if (tree.subtree_end()[0] != interior) return "the root lacks nodes";
+    std::vector<int> children(interior, 0);
+    for (NodeId node = 1; node < tree.node_count(); ++node) {
+        const NodeId parent = tree.parents()[node];
+        if (parent >= interior) return "node " + std::to_string(node) + " has no interior parent";
+        ++children[parent];
+        if (tree.is_leaf(node)) {
+            const Index leaf = node - interior;
+            if (leaf < tree.first_leaf()[parent] || leaf >= tree.leaf_end()[parent])
+                return "leaf " + std::to_string(leaf) + " is outside of its parent's leaves";
+            continue;
+        }
+        if (parent >= node) return "node " + std::to_string(node) + " comes before its parent";
+        if (node >= tree.subtree_end()[parent] || tree.subtree_end()[node] > tree.subtree_end()[parent])
+            return "node " + std::to_string(node) + " is outside of its parent's subtree";
+        if (tree.first_leaf()[node] < tree.first_leaf()[parent] || tree.leaf_end()[node] > tree.leaf_end()[parent])
+            return "node " + std::to_string(node) + " has leaves outside of its parent's";
+    }
+    for (NodeId node = 0; node < interior; ++node) {
+        if (children[node] < 2) return "node " + std::to_string(node) + " has fewer than two children";
+        int visited = 0;
+        Index next_leaf = tree.first_leaf()[node];
+        bool ordered = true;
+        tree.for_each_child(node, [&](NodeId child) {
+            ++visited;
+            const bool leaf = tree.is_leaf(child);
+            ordered &= tree.parents()[child] == node;
+            ordered &= (leaf ? child - interior : tree.first_leaf()[child]) == next_leaf;
+            next_leaf = leaf ? next_leaf + 1 : tree.leaf_end()[child];
+        });
+        if (!ordered || visited != children[node] || next_leaf != tree.leaf_end()[node])
+            return "the children of node " + std::to_string(node) + " do not tile its leaves";
+    }
+    if (tree.first_triangle().size() != interior + std::size_t{1} || tree.first_triangle()[0] != 0 ||
+        tree.first_triangle()[interior] != tree.triangle_count())
+        return "first_triangle";
+    return {};
+}
+
+// Half a unit in the last place of a float as large as the largest coordinate relative to the origin; the origin is chosen such
+// that this is below twice the mesh's extent.
+inline double position_tolerance(const MeshView& mesh, glm::dvec3 origin, int axis) {
+    double largest = 0;
+    for (const glm::dvec3& p : mesh.positions) largest = std::max(largest, std::abs(p[axis] - origin[axis]));
+    const float f = static_cast<float>(largest);
+    return 0.5 * (static_cast<double>(std::nextafter(f, std::numeric_limits<float>::infinity())) - static_cast<double>(f));
+}
+
+// That a fully unfolded cut is the input: the same triangles over the same vertices in the same orientation, each once, but for
+// those that use a vertex twice; and the same positions, exactly where the input is in floats.
+inline std::string fault_when_unfolded(const VertexTree& tree, const MeshView& mesh) {
+    const NodeId interior = tree.interior_count();
+    if (tree.leaf_count() != mesh.positions.size()) return "not every vertex is a leaf";
+    std::vector<std::uint8_t> seen(mesh.positions.size(), 0);
+    for (const Index v : tree.source_vertices()) {
+        if (v >= seen.size() || seen[v]) return "source_vertices is no permutation";
+        seen[v] = 1;
+    }
+    bool floats = true;
+    for (const glm::dvec3& p : mesh.positions) floats &= glm::dvec3(glm::vec3(p)) == p;
+    glm::dvec3 tolerance(0);
+    for (int axis = 0; axis < 3 && !floats; ++axis) tolerance[axis] = position_tolerance(mesh, tree.origin(), axis);
+    for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf) {
+        const glm::dvec3 p = mesh.positions[tree.source_vertices()[leaf]];
+        const glm::dvec3 q = tree.origin() + glm::dvec3(tree.positions()[interior + leaf]);
+        for (int axis = 0; axis < 3; ++axis) {
+            // The sum of origin and position is rounded to a double.
+            const double rounding = floats ? 0 : std::abs(p[axis]) * std::numeric_limits<double>::epsilon();
+            if (!(std::abs(p[axis] - q[axis]) <= tolerance[axis] + rounding))
+                return "vertex " + std::to_string(tree.source_vertices()[leaf]) + " has moved";
+        }
+    }
+
+    Cut cut(tree);
+    cut.unfold_all();
+    std::uint64_t dropped = 0;
+    for (const Triangle& t : mesh.triangles) dropped += t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
+    if (tree.dropped_triangles() != dropped) return "the dropped triangles are miscounted";
+    if (cut.triangle_count() + dropped != mesh.triangles.size()) return "triangles are missing";
+    const auto indices = cut.indices();
+    if (indices.size() != std::size_t{3} * cut.triangle_count()) return "the index buffer has another length";
+    std::vector<std::uint8_t> drawn(mesh.triangles.size(), 0);
+    for (std::size_t t = 0; t < indices.size() / 3; ++t) {
+        const Index source = tree.source_triangles()[t];
+        if (source >= drawn.size() || drawn[source]) return "an input triangle is drawn twice";
+        drawn[source] = 1;
+        for (std::size_t k = 0; k < 3; ++k) {
+            const NodeId node = indices[3 * t + k];
+            if (!tree.is_leaf(node)) return "a proxy is left";
+            if (tree.source_vertices()[node - interior] != mesh.triangles[source][k])
+                return "triangle " + std::to_string(source) + " has other corners";
+        }
+    }
+    return {};
+}
+
+// The cut's definition: unfolded nodes are closed upward; the active nodes form an antichain that covers every leaf; a triangle
+// is drawn iff its corners stand for three different active nodes; nothing is missed and nothing drawn twice.
+inline std::string fault_in_cut(const Cut& cut) {
+    const VertexTree& tree = cut.tree();
+    const NodeId interior = tree.interior_count();
+    std::vector<NodeId> active_above(tree.node_count(), no_node); // the active node at or above
+    for (NodeId node = 0; node < tree.node_count(); ++node) {
+        const NodeId parent = tree.parents()[node];
+        const bool unfolded = cut.is_unfolded(node);
+        if (tree.is_leaf(node) && unfolded) return "a leaf is unfolded";
+        if (unfolded && parent != no_node && !cut.is_unfolded(parent))
+            return "node " + std::to_string(node) + " is unfolded under a folded one";
+        const NodeId above = parent == no_node ? no_node : active_above[parent];
+        active_above[node] = above != no_node ? above : unfolded ? no_node : node;
+        if (cut.is_active(node) != (active_above[node] == node))
+            return "node " + std::to_string(node) + " is wrongly active or inactive";
+    }
+    for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf) {
+        if (active_above[interior + leaf] == no_node) return "leaf " + std::to_string(leaf) + " is not covered";
+        if (cut.proxy_of_leaf(leaf) != active_above[interior + leaf])
+            return "leaf " + std::to_string(leaf) + " has another proxy";
+    }
+    std::vector<Triangle> expected, drawn;
+    for (const Triangle& t : tree.triangles()) {
+        const Triangle now = {active_above[interior + t[0]], active_above[interior + t[1]], active_above[interior + t[2]]};
+        if (now[0] != now[1] && now[1] != now[2] && now[2] != now[0]) expected.push_back(now);
+    }
+    const auto indices = cut.indices();
+    if (indices.size() != std::size_t{3} * cut.triangle_count()) return "the index buffer has another length";
+    for (std::size_t i = 0; i < indices.size(); i += 3) drawn.push_back({indices[i], indices[i + 1], indices[i + 2]});
+    if (drawn != expected) { // both in the order of the tree's triangles; equality as sets tells what is wrong
+        std::sort(drawn.begin(), drawn.end());
+        std::sort(expected.begin(), expected.end());
+        return drawn == expected ? "the triangles are in another order" : "other triangles are drawn";
+    }
+    return {};
+}
+
+} // namespace unseen::support

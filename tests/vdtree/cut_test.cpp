@@ -1,0 +1,550 @@
+// Cuts: what must hold after anything that can be done to them, and that adjust() gives what it promises.
+#include <vdtree/cut.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include <vdtree/builder.h>
+
+#include "shapes.h"
+#include "tree_checks.h"
+
+namespace unseen::vdtree {
+namespace {
+
+using shapes::random_unit;
+using support::fault_in_cut;
+
+VertexTree built(const Mesh& mesh, ClustererKind kind = ClustererKind::quadric) {
+    Result<VertexTree> tree = build_tree(mesh.view(), {.clusterer = kind});
+    if (!tree) throw std::runtime_error(tree.error().message);
+    return std::move(*tree);
+}
+
+struct State {
+    std::vector<bool> unfolded;
+    std::vector<NodeId> proxies, indices;
+    Index triangles;
+    bool operator==(const State&) const = default;
+};
+
+State state_of(const Cut& cut) {
+    State s;
+    for (NodeId node = 0; node < cut.tree().interior_count(); ++node) s.unfolded.push_back(cut.is_unfolded(node));
+    for (Index leaf = 0; leaf < cut.tree().leaf_count(); ++leaf) s.proxies.push_back(cut.proxy_of_leaf(leaf));
+    s.indices.assign(cut.indices().begin(), cut.indices().end());
+    s.triangles = cut.triangle_count();
+    return s;
+}
+
+NodeId random_node(std::mt19937_64& random, NodeId end) { return static_cast<NodeId>(random() % end); }
+
+bool can_fold(const Cut& cut, NodeId node) {
+    if (!cut.is_unfolded(node)) return false;
+    bool children_folded = true;
+    cut.tree().for_each_child(node, [&](NodeId child) { children_folded &= !cut.is_unfolded(child); });
+    return children_folded;
+}
+
+// One random, permitted operation.
+void disturb(Cut& cut, std::mt19937_64& random) {
+    const VertexTree& tree = cut.tree();
+    const NodeId interior = random_node(random, tree.interior_count());
+    switch (random() % 8) {
+    case 0: cut.fold_subtree(interior); break;
+    case 1: cut.unfold_ancestors(random_node(random, tree.node_count())); break;
+    case 2:
+        if (random() % 20 == 0) cut.unfold_all();
+        break;
+    case 3:
+        if (random() % 20 == 0) cut.fold_all();
+        break;
+    case 4:
+        if (can_fold(cut, interior)) cut.fold(interior);
+        break;
+    default:
+        if (cut.is_active(interior)) cut.unfold(interior);
+        break;
+    }
+}
+
+// Random costs that do not fall from a node to its parent, with ties, zeros, unbounded ones and values of exactly 1.
+std::vector<float> random_costs(const VertexTree& tree, std::mt19937_64& random) {
+    std::vector<float> costs(tree.interior_count());
+    for (NodeId node = tree.interior_count(); node-- > 0;) {
+        const int kind = static_cast<int>(random() % 8);
+        float own = static_cast<float>(2 * random_unit(random));
+        if (kind == 0) own = 0;
+        if (kind == 1) own = 1;
+        if (kind == 2) own = 0.5f;
+        if (kind == 3 && random() % 8 == 0) own = unbounded_cost(static_cast<float>(random_unit(random)));
+        costs[node] = std::max(costs[node], own);
+        if (node > 0) costs[tree.parents()[node]] = std::max(costs[tree.parents()[node]], costs[node]);
+    }
+    return costs;
+}
+
+auto look_up(const std::vector<float>& costs) {
+    return [&costs](const VertexTree&, std::span<const NodeId> nodes, std::span<float> out) {
+        for (std::size_t i = 0; i < nodes.size(); ++i) out[i] = costs[nodes[i]];
+    };
+}
+
+// ---- operations
+
+TEST(Cut, StartsWhollyFolded) {
+    const VertexTree tree = built(shapes::torus(12, 6));
+    const Cut cut(tree);
+    EXPECT_EQ(cut.triangle_count(), 0u);
+    EXPECT_TRUE(cut.indices().empty());
+    EXPECT_TRUE(cut.is_active(VertexTree::root()));
+    EXPECT_EQ(fault_in_cut(cut), "");
+}
+
+TEST(Cut, KeepsItsInvariantsUnderRandomOperations) {
+    std::mt19937_64 random(1);
+    for (const shapes::Named& named : shapes::all()) {
+        for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
+            SCOPED_TRACE(named.name + ", " + std::string(name(kind)));
+            const VertexTree tree = built(named.mesh, kind);
+            Cut cut(tree);
+            for (int step = 0; step < 150; ++step) {
+                disturb(cut, random);
+                ASSERT_EQ(fault_in_cut(cut), "") << "step " << step;
+            }
+        }
+    }
+}
+
+TEST(Cut, FoldThenUnfoldRestoresEveryBit) {
+    std::mt19937_64 random(2);
+    const VertexTree tree = built(shapes::unwelded(shapes::bumpy_sphere(2)));
+    Cut cut(tree);
+    int pairs = 0;
+    for (int step = 0; step < 3000; ++step) {
+        disturb(cut, random);
+        const NodeId node = random_node(random, tree.interior_count());
+        const State before = state_of(cut);
+        if (cut.is_active(node)) {
+            EXPECT_TRUE(cut.unfold(node));
+            EXPECT_TRUE(cut.fold(node));
+        } else if (can_fold(cut, node)) {
+            EXPECT_TRUE(cut.fold(node));
+            EXPECT_TRUE(cut.unfold(node));
+        } else {
+            continue;
+        }
+        ++pairs;
+        ASSERT_EQ(state_of(cut), before);
+    }
+    EXPECT_GT(pairs, 500);
+}
+
+TEST(Cut, OperationsTellWhetherTheyChangedAnything) {
+    const VertexTree tree = built(shapes::icosphere(1));
+    Cut cut(tree);
+    const NodeId root = VertexTree::root(), last_leaf = tree.node_count() - 1;
+    EXPECT_FALSE(cut.fold(root));
+    EXPECT_FALSE(cut.fold_subtree(root));
+    EXPECT_FALSE(cut.fold_subtree(last_leaf));
+    EXPECT_FALSE(cut.unfold_ancestors(root));
+    EXPECT_TRUE(cut.unfold(root));
+    EXPECT_FALSE(cut.unfold(root));
+    EXPECT_TRUE(cut.unfold_ancestors(last_leaf) || tree.parents()[last_leaf] == root);
+    EXPECT_TRUE(cut.is_active(last_leaf));
+    EXPECT_FALSE(cut.unfold_ancestors(last_leaf));
+    EXPECT_TRUE(cut.fold_subtree(root));
+    EXPECT_TRUE(cut.is_active(root));
+}
+
+TEST(Cut, UnfoldAncestorsUnfoldsNothingElse) {
+    const VertexTree tree = built(shapes::bumpy_sphere(2));
+    std::mt19937_64 random(3);
+    for (int round = 0; round < 100; ++round) {
+        Cut cut(tree);
+        const NodeId node = random_node(random, tree.node_count());
+        cut.unfold_ancestors(node);
+        EXPECT_TRUE(cut.is_active(node));
+        std::vector<bool> above(tree.interior_count(), false);
+        for (NodeId up = tree.parents()[node]; up != no_node; up = tree.parents()[up]) above[up] = true;
+        for (NodeId n = 0; n < tree.interior_count(); ++n) ASSERT_EQ(cut.is_unfolded(n), above[n]);
+    }
+}
+
+// ---- thresholds
+
+TEST(Adjust, FoldsWhereTheCostIsAtMostOne) {
+    std::mt19937_64 random(4);
+    for (const shapes::Named& named : shapes::all()) {
+        SCOPED_TRACE(named.name);
+        const VertexTree tree = built(named.mesh);
+        for (int round = 0; round < 10; ++round) {
+            const std::vector<float> costs = random_costs(tree, random);
+            const auto criterion = look_up(costs);
+            Cut cut(tree);
+            const AdjustStats stats = cut.adjust(criterion);
+            ASSERT_EQ(fault_in_cut(cut), "");
+            float largest = 0;
+            for (NodeId node = 0; node < tree.interior_count(); ++node) {
+                const NodeId parent = tree.parents()[node];
+                const bool reached = parent == no_node || cut.is_unfolded(parent);
+                ASSERT_EQ(cut.is_unfolded(node), reached && costs[node] > 1);
+                if (reached && costs[node] <= 1) largest = std::max(largest, costs[node]);
+            }
+            EXPECT_EQ(stats.max_fold_cost, largest);
+            EXPECT_EQ(stats.triangles, cut.triangle_count());
+            EXPECT_LE(stats.max_fold_cost, 1);
+        }
+    }
+}
+
+TEST(Adjust, TreatsNotANumberAsUnfold) {
+    const VertexTree tree = built(shapes::cube(3));
+    Cut cut(tree);
+    const auto nothing_known = [](const VertexTree&, std::span<const NodeId>, std::span<float> costs) {
+        for (float& cost : costs) cost = std::numeric_limits<float>::quiet_NaN();
+    };
+    AdjustStats stats = cut.adjust(nothing_known);
+    EXPECT_EQ(cut.triangle_count(), tree.triangle_count());
+    EXPECT_EQ(stats.max_fold_cost, 0);
+    // Under a budget too: they come first.
+    const auto half_known = [](const VertexTree&, std::span<const NodeId> nodes, std::span<float> costs) {
+        for (std::size_t i = 0; i < nodes.size(); ++i)
+            costs[i] = nodes[i] % 2 == 0 ? std::numeric_limits<float>::quiet_NaN() : 5.0f;
+    };
+    stats = cut.adjust(half_known, {.triangle_budget = tree.triangle_count() / 2});
+    EXPECT_LE(cut.triangle_count(), tree.triangle_count() / 2);
+    EXPECT_EQ(fault_in_cut(cut), "");
+    EXPECT_FALSE(std::isnan(stats.max_fold_cost));
+}
+
+TEST(Adjust, FoldsAtExactlyOneAndUnfoldsJustAbove) {
+    const VertexTree tree = built(shapes::icosphere(1));
+    Cut cut(tree);
+    const auto constant = [](float value) {
+        return [value](const VertexTree&, std::span<const NodeId>, std::span<float> costs) {
+            for (float& cost : costs) cost = value;
+        };
+    };
+    const AdjustStats folded = cut.adjust(constant(1.0f));
+    EXPECT_EQ(cut.triangle_count(), 0u);
+    EXPECT_EQ(folded.max_fold_cost, 1.0f);
+    EXPECT_EQ(folded.node_tests, 1u);
+    const AdjustStats unfolded = cut.adjust(constant(std::nextafter(1.0f, 2.0f)));
+    EXPECT_EQ(cut.triangle_count(), tree.triangle_count());
+    EXPECT_EQ(unfolded.max_fold_cost, 0);
+    EXPECT_EQ(unfolded.node_tests, tree.interior_count());
+    EXPECT_EQ(unfolded.unfolds, tree.interior_count());
+    EXPECT_EQ(unfolded.folds, 0u);
+    const AdjustStats again = cut.adjust(constant(0.0f));
+    EXPECT_EQ(again.folds, tree.interior_count());
+    EXPECT_EQ(again.unfolds, 0u);
+}
+
+TEST(Adjust, DoesNotDependOnTheStateBefore) {
+    std::mt19937_64 random(5);
+    const VertexTree tree = built(shapes::bumpy_sphere(3));
+    Cut kept(tree);
+    for (int round = 0; round < 60; ++round) {
+        for (int step = 0; step < 20; ++step) disturb(kept, random);
+        const State before = state_of(kept);
+        const std::vector<float> costs = random_costs(tree, random);
+        const auto criterion = look_up(costs);
+        AdjustOptions options;
+        if (round % 2) options.triangle_budget = static_cast<Index>(random() % (tree.triangle_count() + 100));
+        Cut fresh(tree);
+        const AdjustStats incremental = kept.adjust(criterion, options), scratch = fresh.adjust(criterion, options);
+        ASSERT_EQ(state_of(kept), state_of(fresh));
+        EXPECT_EQ(incremental.max_fold_cost, scratch.max_fold_cost);
+        EXPECT_EQ(incremental.triangles, scratch.triangles);
+        std::uint64_t folds = 0, unfolds = 0;
+        for (NodeId node = 0; node < tree.interior_count(); ++node) {
+            folds += before.unfolded[node] && !kept.is_unfolded(node);
+            unfolds += !before.unfolded[node] && kept.is_unfolded(node);
+        }
+        EXPECT_EQ(incremental.folds, folds);
+        EXPECT_EQ(incremental.unfolds, unfolds);
+    }
+}
+
+// ---- budgets
+
+TEST(Budget, NeverExceedsAndNeverWastes) {
+    std::mt19937_64 random(6);
+    for (const shapes::Named& named : shapes::all()) {
+        SCOPED_TRACE(named.name);
+        const VertexTree tree = built(named.mesh);
+        for (int round = 0; round < 12; ++round) {
+            const std::vector<float> costs = random_costs(tree, random);
+            const auto criterion = look_up(costs);
+            const Index budget = static_cast<Index>(random() % (tree.triangle_count() + 5));
+            Cut cut(tree);
+            const AdjustStats stats = cut.adjust(criterion, {.triangle_budget = budget});
+            ASSERT_EQ(fault_in_cut(cut), "");
+            ASSERT_LE(cut.triangle_count(), budget);
+            // The costliest folded node is 0, or does not fit.
+            float largest = 0;
+            for (NodeId node = 0; node < tree.interior_count(); ++node)
+                if (cut.is_active(node)) largest = std::max(largest, costs[node]);
+            ASSERT_EQ(stats.max_fold_cost, largest);
+            bool fits = false;
+            NodeId first = no_node;
+            for (NodeId node = 0; node < tree.interior_count() && first == no_node; ++node)
+                if (cut.is_active(node) && costs[node] == largest) first = node;
+            if (first != no_node)
+                fits = cut.triangle_count() + tree.first_triangle()[first + 1] - tree.first_triangle()[first] <= budget;
+            ASSERT_TRUE(largest == 0 || !fits);
+        }
+    }
+}
+
+// The least largest cost over all cuts within the budget, by trying every one.
+float least_largest_cost(const VertexTree& tree, const std::vector<float>& costs, Index budget) {
+    float least = std::numeric_limits<float>::infinity();
+    const NodeId n = tree.interior_count();
+    for (std::uint32_t unfolded = 0; unfolded < (1u << n); ++unfolded) {
+        const auto is_unfolded = [&](NodeId node) { return (unfolded >> node) & 1; };
+        bool closed = true;
+        Index triangles = 0;
+        float largest = 0;
+        for (NodeId node = 0; node < n; ++node) {
+            const NodeId parent = tree.parents()[node];
+            const bool reached = parent == no_node || is_unfolded(parent);
+            closed &= reached || !is_unfolded(node);
+            if (is_unfolded(node)) triangles += tree.first_triangle()[node + 1] - tree.first_triangle()[node];
+            else if (reached) largest = std::max(largest, costs[node]);
+        }
+        if (closed && triangles <= budget) least = std::min(least, largest);
+    }
+    return least;
+}
+
+TEST(Budget, GivesTheLeastLargestCostOfAllCuts) {
+    std::mt19937_64 random(7);
+    int compared = 0;
+    for (unsigned seed = 0; seed < 30; ++seed) {
+        const VertexTree tree =
+            built(shapes::random_soup(11, 18, seed), seed % 2 ? ClustererKind::quadric : ClustererKind::octree);
+        if (tree.interior_count() > 12) continue;
+        for (int round = 0; round < 10; ++round) {
+            const std::vector<float> costs = random_costs(tree, random);
+            const auto criterion = look_up(costs);
+            const Index budget = static_cast<Index>(random() % 20);
+            Cut cut(tree);
+            const AdjustStats stats = cut.adjust(criterion, {.triangle_budget = budget});
+            ASSERT_EQ(stats.max_fold_cost, least_largest_cost(tree, costs, budget)) << "seed " << seed;
+            ++compared;
+        }
+    }
+    EXPECT_GT(compared, 100);
+}
+
+TEST(Budget, BreaksTiesByNodeNumber) {
+    const VertexTree tree = built(shapes::grid(6));
+    const std::vector<float> costs(tree.interior_count(), 2.0f);
+    const auto criterion = look_up(costs);
+    Cut cut(tree);
+    cut.adjust(criterion, {.triangle_budget = tree.triangle_count() / 2});
+    // All cost the same, so the nodes are unfolded in the order of their numbers, up to the first that does not fit.
+    bool ended = false;
+    Index triangles = 0;
+    for (NodeId node = 0; node < tree.interior_count(); ++node) {
+        triangles += tree.first_triangle()[node + 1] - tree.first_triangle()[node];
+        ended |= triangles > tree.triangle_count() / 2;
+        ASSERT_EQ(cut.is_unfolded(node), !ended) << "node " << node;
+    }
+    EXPECT_TRUE(ended);
+}
+
+TEST(Budget, TakesZeroAndMoreThanThereIs) {
+    const VertexTree tree = built(shapes::torus(10, 6));
+    const std::vector<float> costs(tree.interior_count(), 3.0f);
+    const auto criterion = look_up(costs);
+    Cut cut(tree);
+    cut.unfold_all();
+    EXPECT_EQ(cut.adjust(criterion, {.triangle_budget = 0}).triangles, 0u);
+    EXPECT_EQ(fault_in_cut(cut), "");
+    for (const Index budget : {tree.triangle_count(), tree.triangle_count() + 1, std::numeric_limits<Index>::max()}) {
+        const AdjustStats stats = cut.adjust(criterion, {.triangle_budget = budget});
+        EXPECT_EQ(stats.triangles, tree.triangle_count());
+        EXPECT_EQ(stats.max_fold_cost, 0);
+    }
+}
+
+TEST(Budget, LeavesFoldsThatCostNothing) {
+    const VertexTree tree = built(shapes::torus(10, 6));
+    const std::vector<float> costs(tree.interior_count(), 0.0f);
+    const auto criterion = look_up(costs);
+    Cut cut(tree);
+    EXPECT_EQ(cut.adjust(criterion, {.triangle_budget = tree.triangle_count()}).triangles, 0u);
+}
+
+TEST(Budget, OrdersUnboundedCostsAmongThemselves) {
+    const VertexTree tree = built(shapes::bumpy_sphere(1));
+    // All unbounded, ordered by the number of leaves.
+    std::vector<float> costs(tree.interior_count());
+    for (NodeId node = 0; node < tree.interior_count(); ++node)
+        costs[node] = unbounded_cost(static_cast<float>(tree.leaf_end()[node] - tree.first_leaf()[node]));
+    const auto criterion = look_up(costs);
+    Cut cut(tree);
+    const AdjustStats stats = cut.adjust(criterion, {.triangle_budget = tree.triangle_count() / 2});
+    EXPECT_TRUE(is_unbounded(stats.max_fold_cost));
+    float least_unfolded = std::numeric_limits<float>::infinity();
+    for (NodeId node = 0; node < tree.interior_count(); ++node)
+        if (cut.is_unfolded(node)) least_unfolded = std::min(least_unfolded, costs[node]);
+    EXPECT_GE(least_unfolded, stats.max_fold_cost);
+    EXPECT_GT(cut.triangle_count(), 0u);
+}
+
+// ---- visibility
+
+TEST(Visibility, FoldsWhatIsOutAtNoCost) {
+    const VertexTree tree = built(shapes::bumpy_sphere(3));
+    const std::vector<float> costs(tree.interior_count(), 7.0f);
+    const auto criterion = look_up(costs);
+    std::uint64_t asked = 0;
+    const auto counting = [&](const VertexTree& t, std::span<const NodeId> nodes, std::span<float> out) {
+        for (const NodeId node : nodes) EXPECT_LE(t.ring_spheres()[node].centre.x - t.ring_spheres()[node].radius, 0.1f);
+        asked += nodes.size();
+        criterion(t, nodes, out);
+    };
+    // What lies wholly beyond x = 0.1 cannot be seen.
+    const auto left_half = [](const VertexTree& t, std::span<const NodeId> nodes, std::span<Visibility> seen) {
+        for (std::size_t i = 0; i < nodes.size(); ++i) {
+            const Sphere s = t.ring_spheres()[nodes[i]];
+            seen[i] = s.centre.x - s.radius > 0.1f ? Visibility::out
+                      : s.centre.x + s.radius < 0.1f ? Visibility::wholly_in : Visibility::partly;
+        }
+    };
+    Cut cut(tree);
+    const AdjustStats stats = cut.adjust(counting, {.visibility = left_half});
+    EXPECT_EQ(fault_in_cut(cut), "");
+    EXPECT_EQ(stats.node_tests, asked);
+    EXPECT_EQ(stats.max_fold_cost, 0); // the folded ones cannot be seen
+    EXPECT_LT(cut.triangle_count(), tree.triangle_count());
+    Index checked = 0;
+    for (NodeId node = 0; node < tree.interior_count(); ++node) {
+        const Sphere s = tree.ring_spheres()[node];
+        const NodeId parent = tree.parents()[node];
+        const bool out = s.centre.x - s.radius > 0.1f;
+        if (parent == no_node || cut.is_unfolded(parent)) {
+            ASSERT_EQ(cut.is_unfolded(node), !out);
+            checked += out;
+        }
+    }
+    EXPECT_GT(checked, 10u);
+
+    Cut with_budget(tree);
+    with_budget.adjust(criterion, {.visibility = left_half, .triangle_budget = tree.triangle_count()});
+    EXPECT_EQ(state_of(with_budget), state_of(cut));
+}
+
+TEST(Visibility, AsksInBatchesOfLevels) {
+    const VertexTree tree = built(shapes::bumpy_sphere(4));
+    std::size_t calls = 0, largest = 0;
+    const auto criterion = [&](const VertexTree&, std::span<const NodeId> nodes, std::span<float> costs) {
+        ASSERT_EQ(nodes.size(), costs.size());
+        ++calls;
+        largest = std::max(largest, nodes.size());
+        for (float& cost : costs) cost = 2;
+    };
+    Cut cut(tree);
+    cut.adjust(criterion);
+    EXPECT_GT(largest, 100u); // many nodes a call
+    EXPECT_LT(calls, tree.interior_count() / 4);
+}
+
+// ---- several cuts, extraction
+
+TEST(Cuts, ShareOneTreeBetweenThreads) {
+    const VertexTree tree = built(shapes::bumpy_sphere(3));
+    std::vector<State> states(4);
+    const auto work = [&](std::size_t thread) {
+        std::mt19937_64 random(100 + thread % 2);
+        Cut cut(tree);
+        for (int round = 0; round < 20; ++round) {
+            const std::vector<float> costs = random_costs(tree, random);
+            const auto criterion = look_up(costs);
+            AdjustOptions options;
+            if (round % 2) options.triangle_budget = 500;
+            cut.adjust(criterion, options);
+            states[thread] = state_of(cut);
+        }
+    };
+    {
+        std::vector<std::jthread> threads;
+        for (std::size_t thread = 0; thread < states.size(); ++thread) threads.emplace_back(work, thread);
+    }
+    EXPECT_EQ(states[0], states[2]); // the same random numbers
+    EXPECT_EQ(states[1], states[3]);
+}
+
+TEST(ExtractMesh, GivesTheVerticesInUseInDoublePrecision) {
+    const Mesh mesh = shapes::in_floats(shapes::with_attributes(shapes::placed(shapes::bumpy_sphere(2), 30, {5e5, 5e6, 100})));
+    const VertexTree tree = built(mesh);
+    Cut cut(tree);
+    cut.unfold_all();
+    const Mesh whole = extract_mesh(cut);
+    ASSERT_TRUE(validate(whole.view()));
+    EXPECT_EQ(whole.positions.size(), mesh.positions.size());
+    ASSERT_EQ(whole.triangles.size(), mesh.triangles.size());
+    // Sorted by input triangle, for there are ranges: every corner is the same vertex with the same attributes.
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+        for (std::size_t k = 0; k < 3; ++k) {
+            const Index v = mesh.triangles[t][k], w = whole.triangles[t][k];
+            ASSERT_EQ(whole.positions[w], mesh.positions[v]);
+            ASSERT_EQ(whole.colours[w], mesh.colours[v]);
+            ASSERT_EQ(whole.uvs[w], mesh.uvs[v]);
+            ASSERT_LT(glm::distance(whole.normals[w], glm::normalize(mesh.normals[v])), 1e-6f);
+        }
+    }
+    ASSERT_EQ(whole.ranges.size(), mesh.ranges.size());
+    for (std::size_t r = 0; r < whole.ranges.size(); ++r) {
+        EXPECT_EQ(whole.ranges[r].name, mesh.ranges[r].name);
+        EXPECT_EQ(whole.ranges[r].first_triangle, mesh.ranges[r].first_triangle);
+        EXPECT_EQ(whole.ranges[r].triangle_count, mesh.ranges[r].triangle_count);
+    }
+}
+
+TEST(ExtractMesh, KeepsEveryTriangleInItsRange) {
+    std::mt19937_64 random(8);
+    const Mesh mesh = shapes::with_degenerate_triangles(shapes::with_attributes(shapes::bumpy_sphere(2)));
+    const VertexTree tree = built(mesh);
+    Cut cut(tree);
+    for (int round = 0; round < 20; ++round) {
+        for (int step = 0; step < 10; ++step) disturb(cut, random);
+        const Mesh part = extract_mesh(cut);
+        ASSERT_TRUE(validate(part.view()));
+        ASSERT_EQ(part.triangles.size(), cut.triangle_count());
+        for (const MeshRange& range : tree.ranges()) {
+            std::uint64_t expected = 0;
+            for (NodeId node = 0; node < tree.interior_count(); ++node)
+                for (Index t = tree.first_triangle()[node]; cut.is_unfolded(node) && t < tree.first_triangle()[node + 1]; ++t)
+                    expected += tree.source_triangles()[t] >= range.first_triangle &&
+                                tree.source_triangles()[t] < range.first_triangle + range.triangle_count;
+            std::uint64_t found = 0;
+            for (const MeshRange& r : part.ranges)
+                if (r.name == range.name && r.kind == range.kind) found += r.triangle_count;
+            ASSERT_EQ(found, expected) << range.name;
+        }
+    }
+}
+
+TEST(ExtractMesh, IsEmptyForAFoldedCut) {
+    const VertexTree tree = built(shapes::with_attributes(shapes::cube(2)));
+    const Mesh nothing = extract_mesh(Cut(tree));
+    EXPECT_TRUE(nothing.positions.empty() && nothing.triangles.empty() && nothing.ranges.empty());
+}
+
+} // namespace
+} // namespace unseen::vdtree
