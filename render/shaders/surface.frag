@@ -11,6 +11,16 @@ layout(location = 1) in vec3 corner_weights;
 
 layout(location = 0) out vec4 pixel; // linear RGB; relative luminance in a
 
+// The least and the largest shade of any vertex. Interpolation in triangles seen edge-on extrapolates, to anything and
+// even to NaN.
+layout(location = 1) uniform vec4 lowest_shade;
+layout(location = 2) uniform vec4 highest_shade;
+
+vec4 bounded(vec4 shade) {
+    shade = mix(lowest_shade, shade, greaterThanEqual(shade, lowest_shade)); // false for NaN
+    return mix(highest_shade, shade, lessThanEqual(shade, highest_shade));
+}
+
 #ifdef WIREFRAME
 const float half_line = 0.5;             // pixels, on each side of an edge
 const float half_line_of_height = 0.15;  // lines get thinner where triangles are so small that lines would cover them
@@ -50,7 +60,7 @@ vec3 srgb_encoded(vec3 linear) {
 #endif
 
 void main() {
-    vec4 result = surface_shade;
+    vec4 result = bounded(surface_shade);
 #ifdef WIREFRAME
     result = mix(result, line_shade(result), line_coverage());
 #endif

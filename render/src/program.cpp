@@ -112,6 +112,10 @@ void Program::set(int location, float value) const {
     glProgramUniform1f(id(), location, value);
 }
 
+void Program::set(int location, const glm::vec4& value) const {
+    glProgramUniform4fv(id(), location, 1, glm::value_ptr(value));
+}
+
 void Program::set(int location, const glm::mat4& value) const {
     glProgramUniformMatrix4fv(id(), location, 1, GL_FALSE, glm::value_ptr(value));
 }

@@ -24,7 +24,12 @@ static_assert(sizeof(Vertex) == 28, "the vertex layout below counts on it");
 constexpr std::size_t upload_batch = 1u << 16;              // vertices; bounds the memory that uploading takes
 constexpr std::uint64_t most_indices_a_call = 3ull << 28;    // a multiple of 3 that fits GLsizei
 
-enum UniformLocation { clip_from_unit_location = 0, background_location = 0 };
+enum UniformLocation {
+    clip_from_unit_location = 0,
+    lowest_shade_location = 1,
+    highest_shade_location = 2,
+    background_location = 0,
+};
 
 // The colour scaled to the luminance; grey where it has none.
 glm::vec3 shaded_colour(glm::vec4 colour, float luminance) {
@@ -162,6 +167,10 @@ Result<void> TriangleDrawer::upload(const VertexArrays& vertices) {
         batch.clear();
         for (std::size_t i = first; i < std::min(count, first + upload_batch); ++i)
             batch.push_back(vertex_at(vertices, i));
+        for (const Vertex& vertex : batch) {
+            lowest_shade_ = glm::min(lowest_shade_, vertex.shade);
+            highest_shade_ = glm::max(highest_shade_, vertex.shade);
+        }
         glNamedBufferSubData(vertices_.id(), static_cast<GLintptr>(first * sizeof(Vertex)),
                              static_cast<GLsizeiptr>(batch.size() * sizeof(Vertex)), batch.data());
     }
@@ -283,6 +292,8 @@ void TriangleDrawer::draw_surface(const Program& program, const glm::mat4& clip_
         return;
     set_surface_state(style.cull);
     program.set(clip_from_unit_location, clip_from_unit);
+    program.set(lowest_shade_location, lowest_shade_);
+    program.set(highest_shade_location, highest_shade_);
     program.use();
     glBindVertexArray(surface_arrays_.id());
     for (std::uint64_t first = 0; first < index_count_; first += most_indices_a_call) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -69,6 +70,8 @@ private:
     Buffer indices_;
     VertexArray surface_arrays_;
     VertexArray no_arrays_; // for the full-screen triangle, which comes from nowhere
+    glm::vec4 lowest_shade_ = glm::vec4(std::numeric_limits<float>::max()); // of all vertices
+    glm::vec4 highest_shade_ = glm::vec4(std::numeric_limits<float>::lowest());
     std::uint64_t index_capacity_ = 0; // bytes
     std::uint64_t index_count_ = 0;
     std::array<std::optional<Program>, 12> programs_; // 3 targets x shading x wireframe, made when first used

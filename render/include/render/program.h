@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include <glm/mat4x4.hpp>
+#include <glm/vec4.hpp>
 
 #include <render/gl_object.h>
 #include <vdtree/result.h>
@@ -31,6 +32,7 @@ public:
 
     // A location that the program does not use is an error of the caller, which the debug output reports.
     void set(int location, float value) const;
+    void set(int location, const glm::vec4& value) const;
     void set(int location, const glm::mat4& value) const;
 
 private:
