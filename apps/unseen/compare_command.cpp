@@ -1,0 +1,218 @@
+// unseen compare: which pixels of a test image differ visibly from a reference.
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <memory>
+
+#include <glm/common.hpp>
+
+#include <perception/image.h>
+#include <perception/judge.h>
+
+#include "command.h"
+#include "report.h"
+#include "scene.h"
+#include "terminal.h"
+
+namespace unseen::app {
+namespace {
+
+using perception::Image;
+using perception::ImageFile;
+using perception::Judgement;
+
+constexpr const char* perceptualdiff = "perceptualdiff";
+
+enum class Model { modern, rpg99 };
+
+struct CompareArguments {
+    std::string reference, test, map, threshold_map, json, profile, model_name = "modern";
+    Model model = Model::modern;
+    DisplayOptions display;
+    std::optional<glm::dvec2> gaze_px;
+    std::optional<double> field_degrees;
+    std::optional<std::uint64_t> fail_above;
+};
+
+struct Pair {
+    ImageFile reference, test;
+
+    bool has_codes() const { return !reference.is_absolute && !test.is_absolute; }
+};
+
+Result<Pair> read_pair(const CompareArguments& a) {
+    auto reference = perception::read_image(a.reference);
+    if (!reference) return reference.error();
+    auto test = perception::read_image(a.test);
+    if (!test) return test.error();
+    const Image& r = reference->image;
+    const Image& t = test->image;
+    if (r.width != t.width || r.height != t.height) {
+        const auto size = [](const Image& i) { return std::to_string(i.width) + "x" + std::to_string(i.height); };
+        return Error{ErrorCode::malformed_data, "'" + a.reference + "' is " + size(r) + " pixels large and '" + a.test +
+                                                    "' " + size(t) + ": only images of one size can be compared."};
+    }
+    return Pair{std::move(*reference), std::move(*test)};
+}
+
+// Judges and, where it is wanted, maps.
+struct Verdict {
+    Judgement judgement;
+    std::optional<Image> threshold_map;
+};
+
+Result<Verdict> judge_modern(const CompareArguments& a, const Pair& pair, const perception::Display& display) {
+    const Image reference = perception::to_luminance(pair.reference, display);
+    const Image test = perception::to_luminance(pair.test, display);
+    perception::JudgeOptions options;
+    options.display = display;
+    options.gaze_px = a.gaze_px;
+    auto judgement = perception::judge_modern(reference, test, options);
+    if (!judgement) return judgement.error();
+    Verdict verdict{std::move(*judgement), {}};
+    if (!a.threshold_map.empty()) {
+        auto map = perception::threshold_map_modern(reference, options);
+        if (!map) return map.error();
+        verdict.threshold_map = std::move(*map);
+    }
+    return verdict;
+}
+
+Result<Verdict> judge_rpg99(const CompareArguments& a, const Pair& pair, const perception::Display& display) {
+    const bool as_the_program = a.profile == perceptualdiff;
+    const auto luminance = [&](const ImageFile& file) {
+        return as_the_program ? perception::perceptualdiff_luminance(file.image, display.peak.value())
+                              : perception::to_luminance(file, display);
+    };
+    const Image reference = luminance(pair.reference), test = luminance(pair.test);
+    perception::Rpg99Options options;
+    options.field_degrees =
+        a.field_degrees.value_or(perception::physical_field(display, reference.width).value());
+    options.peak_cdm2 = display.peak.value();
+    options.masked_by_both = as_the_program;
+    auto judgement = perception::judge_rpg99(reference, test, options);
+    if (!judgement) return judgement.error();
+    Verdict verdict{std::move(*judgement), {}};
+    if (!a.threshold_map.empty()) {
+        auto map = perception::rpg99_map(reference, test, options);
+        if (!map) return map.error();
+        verdict.threshold_map = std::move(map->threshold);
+    }
+    return verdict;
+}
+
+// Defined for 8-bit code values; NaN for float images and for images smaller than its window.
+double ssim_of(const Pair& pair) {
+    if (!pair.has_codes()) return std::numeric_limits<double>::quiet_NaN();
+    const auto ssim = perception::ssim(pair.reference.image, pair.test.image);
+    return ssim ? *ssim : std::numeric_limits<double>::quiet_NaN();
+}
+
+// Invisible differences in blues, visible ones from yellow (just so) to red (8 times that and more).
+Image false_colours(const Image& visibility) {
+    constexpr glm::vec3 none{0.02f, 0.02f, 0.08f}, almost{0.25f, 0.5f, 0.9f}, just{1.0f, 0.95f, 0.2f}, far{0.85f, 0.0f, 0.0f};
+    constexpr float octaves_to_red = 3;
+    Image map{visibility.width, visibility.height, 3, {}};
+    map.values.reserve(3 * visibility.values.size());
+    for (const float v : visibility.values) {
+        const bool is_visible = !(v < 1);
+        const float share = is_visible ? std::log2(v) / octaves_to_red : v;
+        const float bounded = share < 1 ? share : 1; // also for NaN
+        const glm::vec3 colour = is_visible ? glm::mix(just, far, bounded) : glm::mix(none, almost, bounded);
+        map.values.insert(map.values.end(), {colour.r, colour.g, colour.b});
+    }
+    return map;
+}
+
+Result<void> write_maps(const CompareArguments& a, const Verdict& verdict) {
+    if (!a.map.empty()) {
+        if (auto ok = perception::write_image(a.map, false_colours(verdict.judgement.visibility)); !ok) return ok;
+    }
+    if (!verdict.threshold_map) return {};
+    auto ok = perception::write_image(a.threshold_map, *verdict.threshold_map);
+    std::error_code ignored;
+    if (!ok && !a.map.empty()) std::filesystem::remove(a.map, ignored); // a failed run leaves nothing behind
+    return ok;
+}
+
+Result<int> run(const CompareArguments& a) {
+    auto report = JsonReport::open(a.json);
+    if (!report) return report.error();
+    const auto display = make_display(a.display);
+    if (!display) return display.error();
+    const auto pair = read_pair(a);
+    if (!pair) return pair.error();
+    const auto verdict = a.model == Model::modern ? judge_modern(a, *pair, *display) : judge_rpg99(a, *pair, *display);
+    if (!verdict) return verdict.error();
+
+    const Judgement& judgement = verdict->judgement;
+    const double ssim = ssim_of(*pair);
+    const Json json = {{"visible_pixels", judgement.visible_pixels},
+                       {"pixels", judgement.pixels},
+                       {"max_ratio", number_or_null(judgement.max_ratio)},
+                       {"ssim", number_or_null(ssim)}};
+    if (auto ok = report->prepare(json); !ok) return ok.error();
+    if (auto ok = write_maps(a, *verdict); !ok) return ok.error();
+    if (auto ok = report->publish(); !ok) return ok.error();
+    if (!report->is_on_stdout()) {
+        const double share = 100.0 * static_cast<double>(judgement.visible_pixels) / static_cast<double>(judgement.pixels);
+        print_table({{"visible pixels", grouped(judgement.visible_pixels) + " of " + grouped(judgement.pixels) + " (" +
+                                            rounded(share, 3) + "%)"},
+                     {"largest ratio", rounded(judgement.max_ratio, 4)},
+                     {"SSIM", rounded(ssim, 6)}});
+    }
+    return a.fail_above && judgement.visible_pixels > *a.fail_above ? exit_failed : exit_done;
+}
+
+void check(CompareArguments& a) {
+    // The profile's name works in place of a display's file, too.
+    if (a.display.file == perceptualdiff) {
+        a.display.file.clear();
+        a.profile = perceptualdiff;
+    }
+    a.model = a.model_name == "rpg99" ? Model::rpg99 : Model::modern;
+    if (a.model == Model::modern && !a.profile.empty()) refuse("--profile perceptualdiff needs --model rpg99.");
+    if (a.model == Model::modern && a.field_degrees) refuse("--field needs --model rpg99; modern takes the display's.");
+    if (a.model == Model::rpg99 && a.gaze_px) refuse("--gaze needs --model modern: rpg99 knows no eccentricity.");
+    if (!a.display.csf_file.empty()) refuse("--csf does not apply: the judges use models of their own.");
+}
+
+} // namespace
+
+Command compare_command(CLI::App& app) {
+    auto a = std::make_shared<CompareArguments>();
+    CLI::App* verb = app.add_subcommand("compare", "Count the pixels that differ visibly");
+    verb->add_option("REF", a->reference, "The reference: PNG (as the display shows it), PFM or EXR (cd/m2)")->required();
+    verb->add_option("TEST", a->test, "The image to judge")->required();
+    verb->add_option("--model", a->model_name, "modern (default) or rpg99 (of 1999, blind to fine detail)")
+        ->type_name("NAME")
+        ->check(CLI::IsMember({"modern", "rpg99"}).description(""));
+    verb->add_option("--profile", a->profile,
+                     "With rpg99: perceptualdiff, which does all as that program does (gamma 2.2, AdobeRGB, black 0)")
+        ->type_name("NAME")
+        ->check(CLI::IsMember({perceptualdiff}).description(""));
+    verb->add_option_function<double>("--field", [o = a.get()](const double& v) { o->field_degrees = v; },
+                                      "With rpg99: the image's horizontal field (default: as shown on the display)")
+        ->type_name("DEGREES")
+        ->check(within(1e-3, 179.9));
+    add_gaze_option(*verb, a->gaze_px);
+    verb->add_option("--map", a->map, "The differences: blue where invisible, yellow to red where visible")
+        ->type_name("OUT.png")
+        ->check(ending_in({".png"}));
+    verb->add_option("--threshold-map", a->threshold_map, "The least visible luminance step, in cd/m2")
+        ->type_name("OUT.pfm")
+        ->check(ending_in({".pfm", ".exr"}));
+    verb->add_option_function<std::uint64_t>("--fail-above", [o = a.get()](const std::uint64_t& n) { o->fail_above = n; },
+                                             "Exit status 1 where more pixels than N differ visibly")
+        ->type_name("N")
+        ->check(not_negative());
+    verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
+    add_display_options(*verb, a->display);
+    verb->callback([o = a.get()] { check(*o); });
+    verb->footer("Examples:\n  unseen compare full.pfm simplified.pfm --gaze 1603 512 --fail-above 0\n"
+                 "  unseen compare a.png b.png --map map.png --json -\n"
+                 "  unseen compare a.png b.png --model rpg99 --profile perceptualdiff --field 45");
+    return {verb, [a] { return run(*a); }};
+}
+
+} // namespace unseen::app

@@ -1,0 +1,307 @@
+// unseen csf: contrast sensitivity for one stimulus, for a table of them, or as a plot.
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <sstream>
+
+#include <calibration/observer_profile.h>
+#include <perception/csf.h>
+#include <perception/image.h>
+
+#include "command.h"
+#include "options.h"
+#include "plot.h"
+#include "terminal.h"
+
+namespace unseen::app {
+namespace {
+
+using namespace perception;
+
+// What the options, or a row of the CSV file, say about a stimulus.
+struct StimulusOptions {
+    std::optional<double> frequency, luminance, eccentricity, temporal, area;
+    std::optional<VisualField> field;
+};
+
+struct CsfArguments {
+    std::string model_name = "castle", csv, plot, csf_file, save;
+    bool by_table = false;
+    StimulusOptions stimulus;
+};
+
+std::optional<VisualField> field_of(const std::string& name) {
+    if (name == "nasal") return VisualField::nasal;
+    if (name == "temporal") return VisualField::temporal;
+    if (name == "worst") return VisualField::worst;
+    return std::nullopt;
+}
+
+Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
+
+// Sensitivity by a model's closed form or by a table.
+class Observer {
+public:
+    static Result<Observer> create(const CsfArguments& a) {
+        Observer observer;
+        auto model = csf_model(a.model_name);
+        if (!model) return model.error();
+        observer.model_ = *model;
+        if (!a.csf_file.empty()) {
+            auto table = calibration::read_csf(a.csf_file);
+            if (!table) return table.error();
+            observer.table_ = std::move(*table);
+        } else if (a.by_table) {
+            observer.table_ = CsfTable::from_model(*model);
+        }
+        return observer;
+    }
+
+    bool is_table() const { return table_.has_value(); }
+    const CsfTable& table() const { return *table_; }
+    std::string name() const { return table_ ? "table: " + table_->samples().source : std::string(perception::name(model_)); }
+
+    Result<double> operator()(const StimulusOptions& s) const {
+        if (!s.frequency) return invalid("--frequency is missing.");
+        if (!s.luminance) return invalid("--luminance is missing.");
+        if (table_ && (s.temporal || s.area || s.field))
+            return invalid("a table holds static patches of 1.5 cycles radius in the worst field: "
+                           "leave temporal, area and field away.");
+        Stimulus stimulus;
+        stimulus.frequency = CyclesPerDegree(*s.frequency);
+        stimulus.luminance = Luminance(*s.luminance);
+        stimulus.eccentricity = Degrees(s.eccentricity.value_or(0));
+        stimulus.temporal = Hertz(s.temporal.value_or(0));
+        stimulus.area = s.area ? SquareDegrees(*s.area) : patch_area(stimulus.frequency);
+        stimulus.field = s.field.value_or(VisualField::worst);
+        const double value = table_ ? table_->sensitivity(stimulus.frequency, stimulus.eccentricity, stimulus.luminance)
+                                    : sensitivity(model_, stimulus);
+        if (!std::isfinite(value))
+            return invalid("no sensitivity: frequency, luminance and area must be above 0, eccentricity and temporal "
+                           "frequency 0 or more, and none of them extreme.");
+        return value;
+    }
+
+private:
+    Observer() = default;
+    CsfModel model_ = CsfModel::castle;
+    std::optional<CsfTable> table_;
+};
+
+// ---- CSV ----------------------------------------------------------------------------------------------------------
+
+std::vector<std::string> split(const std::string& line) {
+    std::vector<std::string> cells;
+    std::stringstream stream(line);
+    for (std::string cell; std::getline(stream, cell, ',');) {
+        const std::size_t first = cell.find_first_not_of(" \t"), last = cell.find_last_not_of(" \t");
+        cells.push_back(first == std::string::npos ? "" : cell.substr(first, last - first + 1));
+    }
+    if (line.ends_with(',')) cells.emplace_back();
+    return cells;
+}
+
+std::optional<double> number_in(const std::string& cell) {
+    double value = 0;
+    const char* begin = cell.data() + (cell.starts_with('+') ? 1 : 0);
+    const auto [end, code] = std::from_chars(begin, cell.data() + cell.size(), value);
+    if (code != std::errc() || end != cell.data() + cell.size() || !std::isfinite(value)) return std::nullopt;
+    return value;
+}
+
+// Puts a cell into the stimulus; columns of other names are none of ours. Empty cells count as missing.
+Result<void> read_cell(const std::string& column, const std::string& cell, StimulusOptions& stimulus) {
+    if (cell.empty()) return {};
+    if (column == "field") {
+        stimulus.field = field_of(cell);
+        if (!stimulus.field) return invalid("field must be nasal, temporal or worst, not '" + cell + "'.");
+        return {};
+    }
+    std::optional<double>* value = column == "frequency"      ? &stimulus.frequency
+                                   : column == "luminance"    ? &stimulus.luminance
+                                   : column == "eccentricity" ? &stimulus.eccentricity
+                                   : column == "temporal"     ? &stimulus.temporal
+                                   : column == "area"         ? &stimulus.area
+                                                              : nullptr;
+    if (!value) return {};
+    *value = number_in(cell);
+    if (!*value) return invalid(column + " must be a finite number, not '" + cell + "'.");
+    return {};
+}
+
+// The rows with `sensitivity` appended, 17 digits so that nothing is lost; comments and empty lines as they are.
+Result<std::string> evaluate_csv(std::istream& in, const std::string& name, const CsfArguments& a,
+                                 const Observer& observer) {
+    std::string out;
+    std::vector<std::string> columns;
+    std::uint64_t line_number = 0;
+    const auto complain = [&](const std::string& what) {
+        return Error{ErrorCode::malformed_data, name + ": line " + std::to_string(line_number) + ": " + what};
+    };
+    for (std::string line; std::getline(in, line);) {
+        ++line_number;
+        if (line.ends_with('\r')) line.pop_back();
+        if (line.empty() || line.starts_with('#')) {
+            out += line + "\n";
+            continue;
+        }
+        const std::vector<std::string> cells = split(line);
+        if (columns.empty()) {
+            columns = cells;
+            out += line + ",sensitivity\n";
+            continue;
+        }
+        if (cells.size() != columns.size())
+            return complain(std::to_string(cells.size()) + " cells under " + std::to_string(columns.size()) + " columns.");
+        StimulusOptions stimulus = a.stimulus;
+        for (std::size_t i = 0; i < cells.size(); ++i)
+            if (auto ok = read_cell(columns[i], cells[i], stimulus); !ok) return complain(ok.error().message);
+        const auto value = observer(stimulus);
+        if (!value) return complain(value.error().message);
+        std::array<char, 40> text;
+        std::snprintf(text.data(), text.size(), "%.17g", *value);
+        out += line + "," + text.data() + "\n";
+    }
+    if (in.bad()) return complain("it cannot be read to its end.");
+    if (columns.empty()) return complain("there is no line with the names of the columns.");
+    return out;
+}
+
+Result<int> run_csv(const CsfArguments& a, const Observer& observer) {
+    std::ifstream file;
+    if (a.csv != "-") {
+        file.open(a.csv, std::ios::binary);
+        if (!file) return Error{ErrorCode::io_failure, "Cannot read '" + a.csv + "': check the name."};
+    }
+    const auto table = evaluate_csv(a.csv == "-" ? std::cin : file, a.csv == "-" ? "stdin" : a.csv, a, observer);
+    if (!table) return table.error();
+    std::fwrite(table->data(), 1, table->size(), stdout);
+    return exit_done;
+}
+
+// ---- plot ---------------------------------------------------------------------------------------------------------
+
+constexpr std::array<double, 4> plotted_luminances = {0.1, 1, 10, 100};  // cd/m2
+constexpr std::array<double, 3> plotted_eccentricities = {0, 10, 30};    // degrees
+constexpr std::array<glm::vec3, 4> luminance_colours = {glm::vec3(0.35f, 0.25f, 0.6f), glm::vec3(0.1f, 0.45f, 0.75f),
+                                                        glm::vec3(0.1f, 0.6f, 0.3f), glm::vec3(0.85f, 0.45f, 0.05f)};
+constexpr glm::vec3 paper{1.0f};
+constexpr double lowest_frequency = 1.0 / 16, highest_frequency = 64; // cpd
+constexpr int steps_per_octave = 16;
+
+Result<Curve> curve_of(const Observer& observer, StimulusOptions stimulus, glm::vec3 colour) {
+    Curve curve;
+    curve.colour = colour;
+    curve.label = shortest(*stimulus.luminance) + " cd/m2, " + shortest(*stimulus.eccentricity) + " deg";
+    const int steps = static_cast<int>(std::log2(highest_frequency / lowest_frequency)) * steps_per_octave;
+    for (int i = 0; i <= steps; ++i) {
+        stimulus.frequency = lowest_frequency * std::exp2(static_cast<double>(i) / steps_per_octave);
+        const auto value = observer(stimulus);
+        if (!value) return value.error();
+        curve.points.emplace_back(*stimulus.frequency, *value);
+    }
+    return curve;
+}
+
+Result<int> run_plot(const CsfArguments& a, const Observer& observer) {
+    LogLogPlot plot;
+    plot.title = "Contrast sensitivity (" + observer.name() + ")";
+    plot.x_label = "spatial frequency, cycles per degree";
+    plot.y_label = "sensitivity, 1 / threshold contrast";
+    plot.x_range = {lowest_frequency, highest_frequency};
+    plot.y_range = {1, 1000};
+    for (std::size_t l = 0; l < plotted_luminances.size(); ++l) {
+        if (a.stimulus.luminance && l > 0) break;
+        for (std::size_t e = 0; e < plotted_eccentricities.size(); ++e) {
+            if (a.stimulus.eccentricity && e > 0) break;
+            StimulusOptions stimulus = a.stimulus;
+            stimulus.luminance = a.stimulus.luminance.value_or(plotted_luminances[l]);
+            stimulus.eccentricity = a.stimulus.eccentricity.value_or(plotted_eccentricities[e]);
+            // Paler and dashed with eccentricity.
+            const float paleness = 0.3f * static_cast<float>(e);
+            auto curve = curve_of(observer, stimulus, luminance_colours[l] + (paper - luminance_colours[l]) * paleness);
+            if (!curve) return curve.error();
+            curve->dashed = e > 0;
+            plot.curves.push_back(std::move(*curve));
+        }
+    }
+    if (auto ok = perception::write_image(a.plot, draw(plot)); !ok) return ok.error();
+    return exit_done;
+}
+
+// -------------------------------------------------------------------------------------------------------------------
+
+Result<int> run(const CsfArguments& a) {
+    const auto observer = Observer::create(a);
+    if (!observer) return observer.error();
+    if (!a.save.empty()) {
+        if (auto ok = calibration::write_csf(a.save, observer->table()); !ok) return ok.error();
+        return exit_done;
+    }
+    if (!a.csv.empty()) return run_csv(a, *observer);
+    if (!a.plot.empty()) return run_plot(a, *observer);
+    const auto value = (*observer)(a.stimulus);
+    if (!value) return value.error();
+    std::printf("%.17g\n", *value);
+    return exit_done;
+}
+
+void check(const CsfArguments& a) {
+    const int outputs = !a.csv.empty() + !a.plot.empty() + !a.save.empty();
+    if (outputs > 1) refuse("--csv, --plot and --save-table exclude each other: give one of them.");
+    const bool is_table = a.by_table || !a.csf_file.empty();
+    if (is_table && (a.stimulus.temporal || a.stimulus.area || a.stimulus.field))
+        refuse("--table and --csf hold static patches of 1.5 cycles radius in the worst field: "
+               "leave --temporal, --area and --field away.");
+    if (!a.save.empty() && !is_table) refuse("--save-table needs --table or --csf.");
+    if (a.by_table && !a.csf_file.empty()) refuse("--table and --csf exclude each other: give one of them.");
+    if (outputs > 0) return;
+    if (!a.stimulus.frequency) refuse("--frequency is required, or else --csv, --plot or --save-table.");
+    if (!a.stimulus.luminance) refuse("--luminance is required, or else --csv, --plot or --save-table.");
+}
+
+} // namespace
+
+Command csf_command(CLI::App& app) {
+    auto a = std::make_shared<CsfArguments>();
+    StimulusOptions* s = &a->stimulus;
+    CLI::App* verb = app.add_subcommand("csf", "Contrast sensitivity: 1 / the least visible contrast of a grating patch");
+    verb->add_option("--model", a->model_name, "castle (castleCSF, achromatic; default) or stela (stelaCSF)")
+        ->type_name("NAME")
+        ->check(CLI::IsMember({"castle", "stela"}).description(""));
+    const auto number = [verb](const char* name, std::optional<double>& value, const CLI::Validator& validator,
+                               const char* unit, const char* text) {
+        verb->add_option_function<double>(name, [&value](const double& v) { value = v; }, text)
+            ->type_name(unit)
+            ->check(validator);
+    };
+    number("--frequency", s->frequency, positive(), "CPD", "Spatial frequency");
+    number("--luminance", s->luminance, positive(), "CDM2", "Adaptation luminance");
+    number("--eccentricity", s->eccentricity, not_negative(), "DEG", "From the point of gaze (default: 0)");
+    number("--temporal", s->temporal, not_negative(), "HZ", "Temporal frequency (default: 0)");
+    number("--area", s->area, positive(), "DEG2", "Area of the patch (default: pi (1.5 / frequency)^2)");
+    verb->add_option_function<std::string>("--field", [s](const std::string& name) { s->field = field_of(name); },
+                                           "Side of the visual field: nasal, temporal, or the worst of them (default)")
+        ->type_name("NAME")
+        ->check(CLI::IsMember({"nasal", "temporal", "worst"}).description(""));
+    verb->add_option("--csv", a->csv, "Rows of stimuli, columns named like these options; adds 'sensitivity' to stdout")
+        ->type_name("FILE|-");
+    verb->add_option("--plot", a->plot, "Curves over frequency")->type_name("OUT.png")->check(ending_in({".png"}));
+    verb->add_flag("--table", a->by_table, "Through the interpolated table that fold tests use, not the closed form");
+    verb->add_option("--csf", a->csf_file, "Through a viewer's table")->type_name("FILE.json");
+    verb->add_option("--save-table", a->save, "With --table or --csf: write the table")
+        ->type_name("OUT.json")
+        ->check(ending_in({".json"}));
+    verb->callback([o = a.get()] { check(*o); });
+    verb->footer("Examples:\n  unseen csf --frequency 4 --luminance 100\n"
+                 "  unseen csf --csv stimuli.csv --model stela > with-sensitivity.csv\n  unseen csf --plot csf.png\n"
+                 "  unseen csf --table --save-table standard.json");
+    return {verb, [a] { return run(*a); }};
+}
+
+} // namespace unseen::app

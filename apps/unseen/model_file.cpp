@@ -1,0 +1,38 @@
+#include "model_file.h"
+
+#include "progress_bar.h"
+#include "terminal.h"
+
+namespace unseen::app {
+
+Result<vdtree::ReadResult> read_mesh_file(const std::filesystem::path& file, const vdtree::ReadOptions& options) {
+    ProgressBar bar("reading " + file.filename().string());
+    vdtree::ReadOptions shown = options;
+    shown.progress = bar;
+    auto read = vdtree::read_mesh(file, shown);
+    if (!read) return read;
+    for (const std::string& warning : read->warnings) print_warning(file.string() + ": " + warning);
+    return read;
+}
+
+Result<vdtree::VertexTree> build_tree_of(vdtree::ReadResult&& read, vdtree::BuildOptions options) {
+    // The builder counts the triangles it drops. Those that the reader dropped before go back, at the end, where they
+    // move no other, so that the tree knows of all of them.
+    read.mesh.triangles.resize(read.mesh.triangles.size() + read.dropped_triangles, vdtree::Triangle{0, 0, 0});
+    ProgressBar bar("building");
+    options.progress = bar;
+    return vdtree::build_tree(read.mesh.view(), options);
+}
+
+Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file) {
+    if (vdtree::is_tree_file(file)) {
+        ProgressBar bar("reading " + file.filename().string());
+        return vdtree::read_tree(file, bar);
+    }
+    auto read = read_mesh_file(file);
+    if (!read) return read.error();
+    print_note(file.string() + " is a mesh: its tree is built now; 'unseen build' does it once and for all.");
+    return build_tree_of(std::move(*read), {});
+}
+
+} // namespace unseen::app

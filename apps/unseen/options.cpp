@@ -1,0 +1,218 @@
+#include "options.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <memory>
+
+#include <perception/criterion.h>
+
+#include "terminal.h"
+
+namespace unseen::app {
+namespace {
+
+constexpr int largest_window_px = 32768; // a side, as vdtree::validate has it
+
+std::optional<double> parse_number(std::string_view text) {
+    if (text.starts_with('+')) text.remove_prefix(1);
+    double value = 0;
+    const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (code != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+    return value;
+}
+
+// A validator that passes numbers which `accepts`, and says `requirement` about others.
+template <class Accepts>
+CLI::Validator number_that(const std::string& requirement, Accepts accepts) {
+    return CLI::Validator(
+        [requirement, accepts](std::string& text) {
+            const auto value = parse_number(text);
+            if (value && accepts(*value)) return std::string();
+            return "must be " + requirement + ", not '" + text + "'";
+        },
+        "");
+}
+
+// An option of three numbers that remembers whether it was given.
+CLI::Option* add_vector(CLI::App& verb, const std::string& name, std::optional<glm::dvec3>& value,
+                        const std::string& text) {
+    return verb
+        .add_option_function<std::array<double, 3>>(
+            name, [&value](const std::array<double, 3>& v) { value = glm::dvec3(v[0], v[1], v[2]); }, text)
+        ->type_name("X Y Z")
+        ->check(finite());
+}
+
+CLI::Option* add_number(CLI::App& verb, const std::string& name, std::optional<double>& value,
+                        const CLI::Validator& validator, const std::string& unit, const std::string& text) {
+    return verb.add_option_function<double>(name, [&value](const double& v) { value = v; }, text)
+        ->type_name(unit)
+        ->check(validator);
+}
+
+// "1024x768".
+std::string parse_size(const std::string& text, int& width, int& height) {
+    const std::size_t x = text.find('x');
+    const auto side = [](std::string_view digits, int& value) {
+        const auto [end, code] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+        return code == std::errc() && end == digits.data() + digits.size() && value >= 1 && value <= largest_window_px;
+    };
+    if (x != std::string::npos && side(std::string_view(text).substr(0, x), width) &&
+        side(std::string_view(text).substr(x + 1), height))
+        return {};
+    return "must be WIDTHxHEIGHT with 1 to " + std::to_string(largest_window_px) + " pixels a side, not '" + text + "'";
+}
+
+void check(const ViewOptions& view) {
+    const bool by_direction = view.direction || view.fill;
+    if (view.eye && by_direction) refuse("--eye and --direction (or --fill) exclude each other: give one of them.");
+    if (view.target && !view.eye) refuse("--target needs --eye; without an eye the whole model is framed.");
+    if (view.direction && *view.direction == glm::dvec3(0)) refuse("--direction must not be 0 0 0.");
+    if (view.light && *view.light == glm::dvec3(0)) refuse("--light must not be 0 0 0.");
+    if (view.up && *view.up == glm::dvec3(0)) refuse("--up must not be 0 0 0.");
+    if (view.eye && view.target && *view.eye == *view.target) refuse("--eye and --target are the same point.");
+}
+
+std::vector<std::string> fold_test_list() {
+    return {std::begin(perception::fold_test_names), std::end(perception::fold_test_names)};
+}
+
+FoldTest fold_test(const std::string& name) {
+    if (name == perception::fold_test_names[1]) return FoldTest::extent;
+    return name == perception::fold_test_names[2] ? FoldTest::displacement : FoldTest::luebke_hallen;
+}
+
+void check(const WhatOptions& what) {
+    const bool is_perceptual = what.test == FoldTest::luebke_hallen;
+    if (what.mode == Mode::pixels && is_perceptual)
+        refuse("--pixels needs --fold-test extent or displacement: luebke-hallen knows no pixels.");
+    if (what.mode == Mode::imperceptible && !is_perceptual)
+        refuse("--fold-test " + what.fold_test + " cannot tell what is imperceptible: add --triangles N or --pixels E.");
+}
+
+} // namespace
+
+void refuse(const std::string& message) { throw CLI::ValidationError(message, CLI::ExitCodes::ValidationError); }
+
+CLI::Validator finite() {
+    return number_that("a finite number", [](double) { return true; });
+}
+CLI::Validator positive() {
+    return number_that("a finite number above 0", [](double v) { return v > 0; });
+}
+CLI::Validator not_negative() {
+    return number_that("a finite number of 0 or more", [](double v) { return v >= 0; });
+}
+CLI::Validator within(double low, double high) {
+    return number_that("a number from " + shortest(low) + " to " + shortest(high),
+                       [low, high](double v) { return v >= low && v <= high; });
+}
+
+CLI::Validator ending_in(std::vector<std::string> endings) {
+    std::string list;
+    for (const std::string& ending : endings) list += (list.empty() ? "" : " or ") + ending;
+    return CLI::Validator(
+        [endings, list](std::string& text) {
+            std::string ending = std::filesystem::path(text).extension().string();
+            std::transform(ending.begin(), ending.end(), ending.begin(),
+                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+            if (std::find(endings.begin(), endings.end(), ending) != endings.end()) return std::string();
+            return "must end in " + list + ", not '" + text + "'";
+        },
+        "");
+}
+
+void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px) {
+    verb.add_option_function<std::array<double, 2>>(
+            "--gaze", [&gaze_px](const std::array<double, 2>& v) { gaze_px = glm::dvec2(v[0], v[1]); },
+            "Where the viewer looks, in pixels from the top left; may lie outside of the window "
+            "(default: nowhere known, so everything is seen as sharply as at the fovea)")
+        ->type_name("X Y")
+        ->check(finite());
+}
+
+CLI::Option* add_triangles_option(CLI::App& verb, std::uint32_t& triangles, const std::string& text) {
+    // The parser's own conversion of unsigned numbers takes "-1" and wraps it.
+    return verb
+        .add_option_function<std::string>(
+            "--triangles",
+            [&triangles](const std::string& digits) {
+                std::uint64_t value = 0;
+                const auto [end, code] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+                if (code != std::errc() || end != digits.data() + digits.size() || value == 0)
+                    refuse("--triangles: must be a whole number of 1 or more, not '" + digits + "'");
+                triangles = static_cast<std::uint32_t>(
+                    std::min<std::uint64_t>(value, std::numeric_limits<std::uint32_t>::max()));
+            },
+            text)
+        ->type_name("N");
+}
+
+void add_view_options(CLI::App& verb, ViewOptions& o) {
+    CLI::App& group = *verb.add_option_group("VIEW", "Where from (world units are metres; see --unit)");
+    add_vector(group, "--eye", o.eye, "The eye");
+    add_vector(group, "--target", o.target, "What it looks at (default: the model's centre)");
+    add_vector(group, "--up", o.up, "Up in the picture (default: 0 1 0)");
+    add_vector(group, "--direction", o.direction, "Instead of --eye: from the model towards the eye (default: 0 0 1)");
+    add_number(group, "--fill", o.fill, within(1e-6, 1e6), "F",
+               "With --direction: the share of the window's height that the bounding sphere takes (default: 0.9)");
+    add_number(group, "--fov", o.fov_degrees, within(1e-3, 179.9), "DEGREES",
+               "Vertical field of view (default: the field that the window fills on the display)");
+    group
+        .add_option_function<std::string>(
+            "--size",
+            [&o](const std::string& text) {
+                if (const auto complaint = parse_size(text, o.width, o.height); !complaint.empty())
+                    refuse("--size: " + complaint);
+            },
+            "The window in pixels (default: 1024x1024)")
+        ->type_name("WxH");
+    add_vector(group, "--light", o.light, "Direction towards the light (default: 0.4 0.7 0.6; colours come pre-lit)");
+    add_number(group, "--ambient", o.ambient, within(0, 1), "A", "Share of light from everywhere, 0..1 (default: 0.2)");
+    add_number(group, "--background", o.background_cdm2, not_negative(), "CDM2", "Background luminance (default: 20)");
+    group.add_option("--unit", o.unit_metres, "Metres a mesh unit (default: 1)")->type_name("METRES")->check(positive());
+    group.callback([&o] { check(o); });
+}
+
+void add_display_options(CLI::App& verb, DisplayOptions& o) {
+    CLI::App& group = *verb.add_option_group("DISPLAY", "On what display (default: 20 inch, 1600x1200, at 0.5 m)");
+    group.add_option("--display", o.file, "A display profile")->type_name("FILE.json");
+    add_number(group, "--ppd", o.pixels_per_degree, positive(), "N", "Pixels per degree at the display's centre");
+    add_number(group, "--distance", o.distance_m, positive(), "METRES", "From the eye to the screen");
+    add_number(group, "--peak", o.peak_cdm2, positive(), "CDM2", "Luminance of white");
+    add_number(group, "--black", o.black_cdm2, positive(), "CDM2", "Luminance of black");
+    group.add_option("--csf", o.csf_file, "A viewer's contrast sensitivity table (default: castleCSF)")
+        ->type_name("FILE.json");
+}
+
+void add_what_options(CLI::App& verb, WhatOptions& o) {
+    CLI::App& group = *verb.add_option_group("WHAT", "Which simplification (default: --imperceptible)");
+    const auto counted = [](std::int64_t) {}; // the options themselves know whether they were given
+    CLI::Option* full = group.add_flag_function("--full", counted, "The input, whole");
+    CLI::Option* imperceptible = group.add_flag_function("--imperceptible", counted, "Fold what nobody can see on this display");
+    CLI::Option* triangles = add_triangles_option(group, o.triangles, "At most N triangles, as inconspicuous as can be");
+    CLI::Option* pixels = group.add_option("--pixels", o.pixels, "Fold what is smaller than E pixels, seen or not")
+                              ->type_name("E")
+                              ->check(positive());
+    std::string& name = o.fold_test;
+    CLI::Option* test = group.add_option("--fold-test", name)->type_name("NAME")->check(CLI::IsMember(fold_test_list()));
+    test->description("luebke-hallen (perceptual; default), extent or displacement (in pixels; of --pixels: extent)");
+    add_gaze_option(group, o.gaze_px);
+    group.callback([=, &o] {
+        const std::size_t given = full->count() + imperceptible->count() + triangles->count() + pixels->count();
+        if (given > 1) refuse("--full, --imperceptible, --triangles and --pixels exclude each other: give one of them.");
+        if (*full) o.mode = Mode::full;
+        if (*triangles) o.mode = Mode::budget;
+        if (*pixels) o.mode = Mode::pixels;
+        if (*pixels) o.test = FoldTest::extent;
+        if (*test) o.test = fold_test(o.fold_test);
+        check(o);
+    });
+}
+
+} // namespace unseen::app

@@ -1,0 +1,66 @@
+// The options that several verbs share: where from, on what display, and what.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+namespace unseen::app {
+
+// VIEW. What is not given follows from the model and the display, see scene.h.
+struct ViewOptions {
+    std::optional<glm::dvec3> eye, target, up;  // world units
+    std::optional<glm::dvec3> direction;        // from the model towards the eye
+    std::optional<double> fill;                 // share of the window's height
+    std::optional<double> fov_degrees;          // vertical
+    int width = 1024, height = 1024;            // pixels
+    std::optional<glm::dvec3> light;            // towards it
+    std::optional<double> ambient;              // 0..1
+    std::optional<double> background_cdm2;
+    double unit_metres = 1;                     // world units a mesh unit
+};
+
+// DISPLAY.
+struct DisplayOptions {
+    std::string file;
+    std::optional<double> pixels_per_degree, distance_m, peak_cdm2, black_cdm2;
+    std::string csf_file;
+};
+
+enum class Mode { full, imperceptible, budget, pixels };
+enum class FoldTest { luebke_hallen, extent, displacement };
+
+// WHAT.
+struct WhatOptions {
+    Mode mode = Mode::imperceptible;
+    FoldTest test = FoldTest::luebke_hallen;
+    std::string fold_test = "luebke-hallen"; // as it was given
+    std::uint32_t triangles = 0;          // of Mode::budget
+    double pixels = 0;                    // of Mode::pixels
+    std::optional<glm::dvec2> gaze_px;
+};
+
+// Each adds a group of options to a verb. The structs must outlive the parser. Impossible values and combinations end
+// the parse with an error that names the option.
+void add_view_options(CLI::App& verb, ViewOptions& options);
+void add_display_options(CLI::App& verb, DisplayOptions& options);
+void add_what_options(CLI::App& verb, WhatOptions& options);
+void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px);
+CLI::Option* add_triangles_option(CLI::App& verb, std::uint32_t& triangles, const std::string& text);
+
+// Validators. All of them refuse NaN and infinities.
+CLI::Validator finite();
+CLI::Validator positive();
+CLI::Validator not_negative();
+CLI::Validator within(double low, double high);
+// The file name ends in one of these (lower case, with the point); upper case is fine in the name.
+CLI::Validator ending_in(std::vector<std::string> endings);
+
+// Ends the parse: exit status 2.
+[[noreturn]] void refuse(const std::string& message);
+
+} // namespace unseen::app

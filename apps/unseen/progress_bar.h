@@ -1,0 +1,29 @@
+// A progress bar on stderr, for people only.
+#pragma once
+
+#include <chrono>
+#include <string>
+
+#include <vdtree/function_ref.h>
+
+namespace unseen::app {
+
+// Draws itself on stderr where that is a terminal, and is silent otherwise. Gone when it is destroyed. Hand it over as a
+// Progress callback; it never cancels.
+class ProgressBar {
+public:
+    explicit ProgressBar(std::string title);
+    ProgressBar(const ProgressBar&) = delete;
+    ProgressBar& operator=(const ProgressBar&) = delete;
+    ~ProgressBar();
+
+    bool operator()(double share_done, const char* stage);
+
+private:
+    std::string title_;
+    bool is_shown_;
+    bool is_drawn_ = false;
+    std::chrono::steady_clock::time_point next_draw_;
+};
+
+} // namespace unseen::app

@@ -1,0 +1,48 @@
+#include "report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace unseen::app {
+
+Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Result<JsonReport> JsonReport::open(const std::string& name) {
+    JsonReport report;
+    report.on_stdout_ = name == "-";
+    if (name.empty() || report.on_stdout_) return report;
+    auto file = OutputFile::create(name);
+    if (!file) return file.error();
+    report.file_ = std::move(*file);
+    return report;
+}
+
+Result<void> JsonReport::prepare(const Json& json) {
+    // File names may hold bytes that are no UTF-8.
+    text_ = json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+    return file_ ? file_->write(text_) : Result<void>();
+}
+
+Result<void> JsonReport::publish() {
+    if (on_stdout_) std::fputs(text_.c_str(), stdout);
+    return file_ ? file_->commit() : Result<void>();
+}
+
+void print_table(const std::vector<std::vector<std::string>>& rows) {
+    std::vector<std::size_t> widths;
+    for (const auto& row : rows) {
+        widths.resize(std::max(widths.size(), row.size()));
+        for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
+    }
+    for (const auto& row : rows) {
+        std::string line;
+        for (std::size_t i = 0; i < row.size(); ++i) {
+            const std::string padding(widths[i] - row[i].size(), ' ');
+            line += (i > 0 ? "  " : "") + (i == 0 ? row[i] + padding : padding + row[i]);
+        }
+        std::printf("%s\n", line.c_str());
+    }
+}
+
+} // namespace unseen::app

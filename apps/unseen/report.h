@@ -1,0 +1,41 @@
+// What a verb found out: JSON for programs, a table for people.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include <output_file.h>
+#include <vdtree/result.h>
+
+namespace unseen::app {
+
+using Json = nlohmann::ordered_json;
+
+// Infinite and undefined numbers are null: JSON has neither.
+Json number_or_null(double value);
+
+// Where --json goes: nowhere (no name), stdout ("-"), or a file that appears when the report is published. Opened before the
+// work, so that a name that cannot be written fails at once.
+class JsonReport {
+public:
+    static Result<JsonReport> open(const std::string& name);
+
+    bool is_on_stdout() const noexcept { return on_stdout_; }
+    // Two steps, so that nothing can fail any more between writing the results and saying so.
+    Result<void> prepare(const Json& json);
+    Result<void> publish();
+
+private:
+    JsonReport() = default;
+    bool on_stdout_ = false;
+    std::optional<OutputFile> file_;
+    std::string text_;
+};
+
+// Columns of text, the first to the left and the others to the right, for stdout.
+void print_table(const std::vector<std::vector<std::string>>& rows);
+
+} // namespace unseen::app

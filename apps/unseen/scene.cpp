@@ -1,0 +1,119 @@
+#include "scene.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/geometric.hpp>
+
+#include <calibration/display_profile.h>
+#include <calibration/observer_profile.h>
+
+#include "model_file.h"
+#include "terminal.h"
+
+namespace unseen::app {
+namespace {
+
+constexpr double default_fill = 0.9;
+constexpr double default_background_cdm2 = 20;
+constexpr double point_radius = 1e-3; // world units: what is framed where all vertices coincide
+
+Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
+
+// By default 20 cd/m2, or the nearest that the display can show; what was asked for must be possible.
+Result<float> relative_background(const perception::Display& display, std::optional<double> asked_cdm2) {
+    const double wanted_cdm2 = asked_cdm2.value_or(default_background_cdm2);
+    const double relative = perception::to_relative(display, perception::Luminance(wanted_cdm2));
+    // Asking for the black or white that the display reports must work in spite of rounding.
+    constexpr double rounding = 1e-9;
+    if (asked_cdm2 && !(relative >= -rounding && relative <= 1 + rounding)) {
+        return invalid("--background " + shortest(wanted_cdm2) + " cd/m2 is not between the display's black (" +
+                       shortest(perception::black_level(display).value()) + ") and white (" +
+                       shortest(perception::to_luminance(display, 1).value()) + ").");
+    }
+    return static_cast<float>(std::clamp(relative, 0.0, 1.0));
+}
+
+// Scaled first, so that neither tiny nor huge directions under- or overflow when squared.
+glm::vec3 unit_vector(glm::dvec3 v) {
+    const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+    return glm::vec3(glm::normalize(v / largest));
+}
+
+void light(Scene& scene, const ViewOptions& options) {
+    if (!options.light && !options.ambient) return;
+    vdtree::Light light = scene.tree.light();
+    if (options.light) light.direction = unit_vector(*options.light);
+    if (options.ambient) light.ambient = static_cast<float>(*options.ambient);
+    if (light == scene.tree.light() && !scene.tree.is_prelit()) return;
+    scene.tree = scene.tree.relit(light);
+    scene.is_relit = true;
+}
+
+vdtree::View make_view(const Scene& scene, const ViewOptions& options) {
+    vdtree::View view;
+    view.width = options.width;
+    view.height = options.height;
+    view.fov_y_degrees =
+        options.fov_degrees.value_or(perception::physical_field(scene.display, options.height).value());
+    const PlacedSphere sphere = placed_sphere(scene.tree, scene.placement);
+    if (options.eye) {
+        view.eye = *options.eye;
+        view.target = options.target.value_or(sphere.centre);
+    } else {
+        view = vdtree::frame_sphere(sphere.centre, sphere.radius > 0 ? sphere.radius : point_radius,
+                                    options.direction.value_or(glm::dvec3(0, 0, 1)), options.fill.value_or(default_fill),
+                                    view);
+    }
+    if (options.up) view.up = *options.up;
+    return view;
+}
+
+} // namespace
+
+Result<perception::Display> make_display(const DisplayOptions& options) {
+    perception::Display display;
+    if (!options.file.empty()) {
+        auto read = calibration::read_display(options.file);
+        if (!read) return read.error();
+        display = *read;
+    }
+    // The distance first: pixels per degree hold at a distance.
+    if (options.distance_m) display.distance = perception::Metres(*options.distance_m);
+    if (options.pixels_per_degree)
+        perception::set_pixels_per_degree(display, perception::PixelsPerDegree(*options.pixels_per_degree));
+    if (options.peak_cdm2) display.peak = perception::Luminance(*options.peak_cdm2);
+    if (options.black_cdm2) display.black = perception::Luminance(*options.black_cdm2);
+    if (auto valid = perception::validate(display); !valid) return valid.error();
+    return display;
+}
+
+PlacedSphere placed_sphere(const vdtree::VertexTree& tree, const vdtree::Similarity& placement) {
+    const vdtree::Sphere sphere = tree.bounding_sphere();
+    return {placement.to_world(tree.origin() + glm::dvec3(sphere.centre)), placement.scale * sphere.radius};
+}
+
+Result<Scene> load_scene(const std::filesystem::path& model, const ViewOptions& view, const DisplayOptions& display) {
+    // What is quickly read and checked comes first.
+    auto shown_on = make_display(display);
+    if (!shown_on) return shown_on.error();
+    auto background = relative_background(*shown_on, view.background_cdm2);
+    if (!background) return background.error();
+    std::optional<perception::CsfTable> csf;
+    if (!display.csf_file.empty()) {
+        auto read = calibration::read_csf(display.csf_file);
+        if (!read) return read.error();
+        csf = std::move(*read);
+    }
+    auto tree = load_tree(model);
+    if (!tree) return tree.error();
+
+    Scene scene{std::move(*tree), {}, *shown_on, std::move(csf), {}, *background, false};
+    scene.placement.scale = view.unit_metres;
+    light(scene, view);
+    scene.view = make_view(scene, view);
+    if (auto valid = vdtree::validate(scene.view); !valid) return valid.error();
+    return scene;
+}
+
+} // namespace unseen::app

@@ -1,0 +1,42 @@
+// Everything that is settled before a cut is made: the model under its light, the display, and the view.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include <perception/csf.h>
+#include <perception/display.h>
+#include <vdtree/vertex_tree.h>
+#include <vdtree/view.h>
+
+#include "options.h"
+
+namespace unseen::app {
+
+struct Scene {
+    vdtree::VertexTree tree;
+    vdtree::Similarity placement;
+    perception::Display display;
+    std::optional<perception::CsfTable> csf; // empty: the standard table
+    vdtree::View view;
+    float background = 0;                    // relative luminance
+    bool is_relit = false;                   // the light is not the one that the tree was built for
+
+    const perception::CsfTable& csf_table() const { return csf ? *csf : perception::CsfTable::standard(); }
+};
+
+// The display that the options describe; ranges are checked.
+Result<perception::Display> make_display(const DisplayOptions& options);
+
+// Fails on a file that cannot be read, and on options that contradict the model or the display.
+Result<Scene> load_scene(const std::filesystem::path& model, const ViewOptions& view, const DisplayOptions& display);
+
+// The model's bounding sphere in the world.
+struct PlacedSphere {
+    glm::dvec3 centre;
+    double radius;
+};
+PlacedSphere placed_sphere(const vdtree::VertexTree& tree, const vdtree::Similarity& placement);
+
+} // namespace unseen::app

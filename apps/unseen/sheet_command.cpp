@@ -1,0 +1,243 @@
+// unseen sheet: what the four kinds of cuts of a model look like, side by side, and how visible they are.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+
+#include <perception/image.h>
+#include <perception/judge.h>
+#include <render/renderer.h>
+
+#include "canvas.h"
+#include "command.h"
+#include "frame_image.h"
+#include "report.h"
+#include "simplification.h"
+#include "terminal.h"
+
+namespace unseen::app {
+namespace {
+
+struct SheetArguments {
+    std::string model, out, json;
+    ViewOptions view;
+    DisplayOptions display;
+    std::uint32_t triangles = 0;           // 0: a quarter of the model's
+    std::optional<glm::dvec2> gaze_px;     // default: default_gaze
+    int samples = 16;
+    int cell_px = 480;
+};
+
+constexpr double default_gaze_degrees = 29; // to the right of the window's centre: well in the periphery
+constexpr std::uint32_t default_budget_share = 4;
+
+// One column of the sheet.
+struct Column {
+    std::string name;
+    WhatOptions what;
+    Simplification simplification;
+    double draw_ms = 0;
+    perception::Image luminance;           // cd/m2, of the whole window
+    perception::Image picture, wireframe;  // code values, of a cell's size
+    std::optional<perception::Judgement> judgement; // against the full model; none for that itself
+};
+
+glm::dvec2 default_gaze(const Scene& scene) {
+    const double tangent = std::tan(perception::to_radians(perception::Degrees(default_gaze_degrees)).value());
+    const double offset_px = tangent * (scene.display.distance / scene.display.pixel_pitch);
+    return {scene.view.width * 0.5 + offset_px, scene.view.height * 0.5};
+}
+
+std::vector<Column> wishes(const Scene& scene, const SheetArguments& a) {
+    std::vector<Column> columns(4);
+    columns[0].name = "full";
+    columns[0].what.mode = Mode::full;
+    columns[1].name = "imperceptible";
+    columns[2].name = "budget";
+    columns[2].what.mode = Mode::budget;
+    columns[2].what.triangles =
+        a.triangles ? a.triangles : std::max(1U, scene.tree.triangle_count() / default_budget_share);
+    columns[3].name = "gaze-directed";
+    columns[3].what.gaze_px = a.gaze_px.value_or(default_gaze(scene));
+    return columns;
+}
+
+// The same camera in a window that fits a cell. Pixels are coarser there, so nothing is measured in it.
+vdtree::View small_view(const vdtree::View& view, int cell_px) {
+    vdtree::View small = view;
+    const double shrink = std::min(1.0, static_cast<double>(cell_px) / std::max(view.width, view.height));
+    small.width = std::max(1, static_cast<int>(std::lround(view.width * shrink)));
+    small.height = std::max(1, static_cast<int>(std::lround(view.height * shrink)));
+    return small;
+}
+
+Result<void> draw_pictures(Column& column, const vdtree::Cut& cut, const Scene& scene, const SheetArguments& a,
+                           render::Renderer& renderer) {
+    render::DrawOptions options;
+    options.samples = a.samples;
+    options.background = scene.background;
+    const auto whole = renderer.draw(cut, scene.view, options, scene.placement);
+    if (!whole) return whole.error();
+    column.draw_ms = whole->draw_ms;
+    column.luminance = luminance_image(*whole, scene.display);
+
+    const vdtree::View small = small_view(scene.view, a.cell_px);
+    const auto shaded = renderer.draw(cut, small, options, scene.placement);
+    if (!shaded) return shaded.error();
+    column.picture = code_image(*shaded, scene.display);
+    options.wireframe = true;
+    const auto wired = renderer.draw(cut, small, options, scene.placement);
+    if (!wired) return wired.error();
+    column.wireframe = code_image(*wired, scene.display);
+    return {};
+}
+
+Result<void> judge(Column& column, const Column& full, const Scene& scene) {
+    perception::JudgeOptions options;
+    options.display = scene.display;
+    options.gaze_px = column.what.gaze_px;
+    auto judgement = perception::judge_modern(full.luminance, column.luminance, options);
+    if (!judgement) return judgement.error();
+    column.judgement = std::move(*judgement);
+    return {};
+}
+
+Result<std::vector<Column>> make_columns(const Scene& scene, const SheetArguments& a, render::Context& context) {
+    auto renderer = render::Renderer::create(context, scene.tree);
+    if (!renderer) return renderer.error();
+    std::vector<Column> columns = wishes(scene, a);
+    for (Column& column : columns) {
+        vdtree::Cut cut(scene.tree);
+        column.simplification = simplify(cut, scene, column.what, Purpose::picture);
+        if (auto ok = draw_pictures(column, cut, scene, a, *renderer); !ok) return ok.error();
+        if (&column == &columns.front()) continue;
+        if (auto ok = judge(column, columns.front(), scene); !ok) return ok.error();
+    }
+    return columns;
+}
+
+double visible_pixels(const Column& column) {
+    return column.judgement ? static_cast<double>(column.judgement->visible_pixels)
+                            : std::numeric_limits<double>::quiet_NaN();
+}
+
+std::string effects_that_ran(const Simplification& simplification) {
+    std::string list;
+    for (const Effect& effect : simplification.effects)
+        if (effect.on) list += (list.empty() ? "" : ", ") + effect.name;
+    return list;
+}
+
+std::string metres(double value) { return rounded(value, 3) + (std::isfinite(value) ? " m" : ""); }
+
+// ---- the picture --------------------------------------------------------------------------------------------------
+
+perception::Image compose(const std::vector<Column>& columns, const Scene& scene, const std::string& model) {
+    constexpr int gap = 12, text_scale = 2, line_height = 20; // pixels
+    constexpr glm::vec3 paper{0.12f}, ink{0.95f}, weak{0.7f};
+    const int width = columns.front().picture.width, height = columns.front().picture.height;
+    // Two lines of text above each pair of pictures must fit.
+    const int cell_width = std::max(width, Canvas::text_width(std::string(30, 'x'), text_scale));
+    const int count = static_cast<int>(columns.size());
+    const int header = 2 * gap + line_height, captions = 2 * line_height + gap;
+    Canvas canvas(gap + count * (cell_width + gap), header + captions + 2 * (height + gap), paper);
+
+    const std::string title = std::filesystem::path(model).filename().string() + "   " + std::to_string(scene.view.width) +
+                              "x" + std::to_string(scene.view.height) + " pixels, " +
+                              rounded(perception::pixels_per_degree(scene.display).value(), 4) + " per degree, seen from " +
+                              rounded(scene.display.distance.value(), 3) + " m";
+    canvas.text(gap, gap, title, ink, text_scale);
+    for (int i = 0; i < count; ++i) {
+        const Column& column = columns[static_cast<std::size_t>(i)];
+        const int left = gap + i * (cell_width + gap);
+        const Simplification& s = column.simplification;
+        canvas.text(left, header, column.name + ": " + grouped(s.stats.triangles) + " tri.", ink, text_scale);
+        if (column.judgement) {
+            canvas.text(left, header + line_height,
+                        grouped(column.judgement->visible_pixels) + " px visible; from " + metres(s.imperceptible_from_m) + " none",
+                        weak, text_scale);
+        }
+        canvas.picture(left, header + captions, column.picture);
+        canvas.picture(left, header + captions + height + gap, column.wireframe);
+    }
+    return canvas.image();
+}
+
+// ---- the report ---------------------------------------------------------------------------------------------------
+
+Json to_json(const std::vector<Column>& columns) {
+    Json cuts = Json::array();
+    for (const Column& column : columns) {
+        Json cut = {{"name", column.name}};
+        cut.update(to_json(column.simplification, column.draw_ms));
+        cut["visible_pixels"] = number_or_null(visible_pixels(column));
+        cut["pixels"] = column.luminance.values.size();
+        cut["max_ratio"] = column.judgement ? number_or_null(column.judgement->max_ratio) : Json(nullptr);
+        if (column.judgement) cut["visible_pixels"] = column.judgement->visible_pixels;
+        cuts.push_back(std::move(cut));
+    }
+    return {{"cuts", cuts}};
+}
+
+void print(const std::vector<Column>& columns) {
+    std::vector<std::vector<std::string>> rows = {
+        {"cut", "triangles", "nodes tested", "adapt ms", "draw ms", "visible px", "imperceptible from"}};
+    for (const Column& column : columns) {
+        const Simplification& s = column.simplification;
+        rows.push_back({column.name, grouped(s.stats.triangles), grouped(s.stats.node_tests), rounded(s.adapt_ms, 3),
+                        rounded(column.draw_ms, 3),
+                        column.judgement ? grouped(column.judgement->visible_pixels) : "reference",
+                        metres(s.imperceptible_from_m)});
+    }
+    print_table(rows);
+    std::printf("effects that ran\n");
+    for (const Column& column : columns)
+        std::printf("  %s: %s\n", column.name.c_str(), effects_that_ran(column.simplification).c_str());
+}
+
+Result<int> run(const SheetArguments& a) {
+    auto report = JsonReport::open(a.json);
+    if (!report) return report.error();
+    const auto scene = load_scene(a.model, a.view, a.display);
+    if (!scene) return scene.error();
+    auto context = render::Context::headless();
+    if (!context) return context.error();
+    const auto columns = make_columns(*scene, a, *context);
+    if (!columns) return columns.error();
+
+    if (auto ok = report->prepare(to_json(*columns)); !ok) return ok.error();
+    if (auto ok = perception::write_image(a.out, compose(*columns, *scene, a.model)); !ok) return ok.error();
+    if (auto ok = report->publish(); !ok) return ok.error();
+    if (!report->is_on_stdout()) print(*columns);
+    return exit_done;
+}
+
+} // namespace
+
+Command sheet_command(CLI::App& app) {
+    auto a = std::make_shared<SheetArguments>();
+    CLI::App* verb = app.add_subcommand("sheet", "Draw and judge the full, imperceptible, budget and gaze-directed cuts");
+    verb->add_option("TREE", a->model, "A tree, or a mesh")->required()->type_name("TREE.vdt|MESH");
+    verb->add_option("-o,--output", a->out, "The contact sheet, wireframes below")
+        ->type_name("SHEET.png")
+        ->required()
+        ->check(ending_in({".png"}));
+    add_triangles_option(*verb, a->triangles, "The budget (default: a quarter of the triangles)");
+    add_gaze_option(*verb, a->gaze_px);
+    verb->get_option("--gaze")->description("Gaze of the gaze-directed cut, in pixels from the top left; may lie outside "
+                                            "(default: 29 degrees to the right of the window's centre)");
+    verb->add_option("--samples", a->samples, "Samples a pixel, 1 to 256 (default: 16)")
+        ->type_name("N")
+        ->check(within(1, 256));
+    verb->add_option("--cell", a->cell_px, "The longer side of a picture on the sheet (default: 480)")
+        ->type_name("PIXELS")
+        ->check(within(16, 4096));
+    verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
+    add_view_options(*verb, a->view);
+    add_display_options(*verb, a->display);
+    verb->footer("Examples:\n  unseen sheet bunny.vdt -o bunny.png\n"
+                 "  unseen sheet bunny.vdt -o bunny.png --direction 1 1 1 --triangles 10000 --gaze 0 512");
+    return {verb, [a] { return run(*a); }};
+}
+
+} // namespace unseen::app

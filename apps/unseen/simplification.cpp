@@ -1,0 +1,215 @@
+#include "simplification.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include <glm/geometric.hpp>
+
+#include <perception/criterion.h>
+
+#include "terminal.h"
+
+namespace unseen::app {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double undefined = std::numeric_limits<double>::quiet_NaN();
+// The default field is the physical one, computed by way of degrees: rounding is no magnification.
+constexpr double same_field_degrees = 1e-7;
+
+double milliseconds_since(Clock::time_point start) {
+    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+bool is_perceptual(const WhatOptions& what) { return what.mode != Mode::full && what.test == FoldTest::luebke_hallen; }
+
+// What silhouettes can be seen against.
+perception::SceneLuminance scene_luminance(const Scene& scene) {
+    const vdtree::LuminanceRange range = scene.tree.luminance_range();
+    return {std::min(range.lo, scene.background), std::max(range.hi, scene.background)};
+}
+
+vdtree::AdjustStats adjust(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
+    if (what.mode == Mode::full) {
+        cut.unfold_all();
+        vdtree::AdjustStats stats;
+        stats.triangles = cut.triangle_count();
+        return stats;
+    }
+    const vdtree::FrustumVisibility visibility(scene.tree, scene.view, scene.placement);
+    vdtree::AdjustOptions options;
+    if (purpose == Purpose::picture) options.visibility = visibility;
+    if (what.mode == Mode::budget) options.triangle_budget = what.triangles;
+
+    // A budget goes by the order of the costs alone, for which any tolerance will do.
+    const double tolerance_px = what.mode == Mode::pixels ? what.pixels : 1;
+    switch (what.test) {
+    case FoldTest::extent:
+        return cut.adjust(vdtree::ExtentCriterion(scene.tree, scene.view, tolerance_px, scene.placement), options);
+    case FoldTest::displacement:
+        return cut.adjust(vdtree::DisplacementCriterion(scene.tree, scene.view, tolerance_px, scene.placement), options);
+    case FoldTest::luebke_hallen: break;
+    }
+    perception::FoldTestOptions test;
+    test.display = scene.display;
+    test.scene = scene_luminance(scene);
+    test.gaze_px = what.gaze_px;
+    test.csf = &scene.csf_table();
+    return cut.adjust(perception::LuebkeHallenCriterion(scene.tree, scene.view, test, scene.placement), options);
+}
+
+// Cost is v*/v for the perceptual test alone; the others count pixels.
+double imperceptible_from(const Scene& scene, const WhatOptions& what, const vdtree::AdjustStats& stats) {
+    if (what.mode == Mode::full) return 0;
+    if (!is_perceptual(what)) return undefined;
+    if (vdtree::is_unbounded(stats.max_fold_cost)) return infinity;
+    return scene.display.distance.value() * static_cast<double>(stats.max_fold_cost);
+}
+
+std::string name_of(FoldTest test) {
+    return std::string(perception::fold_test_names[static_cast<std::size_t>(test)]);
+}
+
+Effect fold_test_effect(const WhatOptions& what) {
+    if (what.mode == Mode::full) return {"fold test", false, "nothing is folded in the full model"};
+    if (what.test == FoldTest::luebke_hallen)
+        return {"fold test", true, "luebke-hallen: the worst grating of each fold against the contrast sensitivity"};
+    return {"fold test", true, name_of(what.test) + ": pixels on the screen, whether they can be seen or not"};
+}
+
+Effect gaze_effect(const WhatOptions& what) {
+    if (what.mode == Mode::full) return {"gaze", false, "nothing is folded in the full model"};
+    if (!is_perceptual(what)) return {"gaze", false, "the fold test " + name_of(what.test) + " does not use it"};
+    if (!what.gaze_px) return {"gaze", false, "no gaze is given, so everything counts as looked at"};
+    return {"gaze", true, "the viewer looks at pixel " + rounded(what.gaze_px->x, 6) + ", " +
+                              rounded(what.gaze_px->y, 6) + ", and sees less sharply elsewhere"};
+}
+
+Effect silhouette_effect(const Scene& scene, const WhatOptions& what) {
+    if (!is_perceptual(what)) return {"silhouettes", false, "only the perceptual fold test knows them"};
+    const perception::SceneLuminance range = scene_luminance(scene);
+    const auto cdm2 = [&](float relative) {
+        return rounded(perception::to_luminance(scene.display, static_cast<double>(relative)).value(), 3);
+    };
+    return {"silhouettes", true, "folds on outlines are tested against " + cdm2(range.darkest) + " to " +
+                                     cdm2(range.brightest) + " cd/m2, the whole scene with its background"};
+}
+
+Effect csf_effect(const Scene& scene, const WhatOptions& what) {
+    if (!is_perceptual(what)) return {"csf table", false, "only the perceptual fold test looks sensitivity up"};
+    return {"csf table", scene.csf.has_value(),
+            scene.csf ? "the viewer's own: " + scene.csf->samples().source : "the standard observer is used, castleCSF"};
+}
+
+Effect prelit_effect(const Scene& scene) {
+    if (scene.tree.is_prelit()) return {"pre-lit colours", true, "the mesh's colours are taken as lit"};
+    return {"pre-lit colours", false,
+            scene.tree.colours().empty() ? "the mesh has no colours" : "--light or --ambient lights the colours"};
+}
+
+Effect light_effect(const Scene& scene) {
+    if (scene.is_relit)
+        return {"light", true, "luminance and its bounds were computed again for another light than the tree's"};
+    return {"light", false, scene.tree.is_prelit() ? "the colours are pre-lit" : "the light that the tree was built for"};
+}
+
+Effect frustum_effect(const WhatOptions& what, Purpose purpose) {
+    if (what.mode == Mode::full) return {"frustum culling", false, "nothing is folded in the full model"};
+    if (purpose == Purpose::mesh) return {"frustum culling", false, "the mesh may be looked at from elsewhere"};
+    return {"frustum culling", true, "what lies outside of the window is folded"};
+}
+
+Effect culling_effect(const Scene& scene, Purpose purpose) {
+    const PlacedSphere sphere = placed_sphere(scene.tree, scene.placement);
+    const bool is_open = scene.tree.closedness() == vdtree::Closedness::open;
+    const bool is_outside = glm::length(scene.view.eye - sphere.centre) > sphere.radius;
+    if (purpose == Purpose::mesh) return {"back-face culling", false, "nothing is drawn"};
+    if (is_open) return {"back-face culling", false, "the surface is open, so both sides are drawn"};
+    if (!is_outside) return {"back-face culling", false, "the eye is in the model, so both sides are drawn"};
+    return {"back-face culling", true,
+            scene.tree.closedness() == vdtree::Closedness::closed_outward
+                ? "the surface is closed, so its inner side cannot be seen"
+                : "the surface is closed but inside out, so it is turned"};
+}
+
+Effect magnification_effect(const Scene& scene, const WhatOptions& what) {
+    const double physical = perception::physical_field(scene.display, scene.view.height).value();
+    const std::string fields =
+        rounded(scene.view.fov_y_degrees, 4) + " degrees, the window fills " + rounded(physical, 4);
+    if (std::abs(scene.view.fov_y_degrees - physical) <= same_field_degrees)
+        return {"magnification", false, "the camera's field is the one that the window fills on the display"};
+    if (!is_perceptual(what)) return {"magnification", false, "pixels do not depend on it (camera " + fields + ")"};
+    return {"magnification", true, "the camera's field is " + fields + ": angles are those on the screen"};
+}
+
+Effect distance_effect(const WhatOptions& what, const Simplification& result) {
+    const std::string name = "imperceptible distance";
+    if (what.mode == Mode::full) return {name, true, "nothing is folded, so it holds from any distance"};
+    if (!is_perceptual(what)) return {name, false, "costs of the fold test " + name_of(what.test) + " are no distances"};
+    if (std::isinf(result.imperceptible_from_m))
+        return {name, false, "a fold around the eye or across its plane stays visible from everywhere"};
+    return {name, true, "the display's distance times the largest fold cost"};
+}
+
+} // namespace
+
+Simplification simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
+    if (is_perceptual(what)) scene.csf_table(); // built once; not this cut's time
+    Simplification result;
+    result.source_triangles = scene.tree.triangle_count();
+    result.dropped = scene.tree.dropped_triangles();
+
+    const auto start = Clock::now();
+    result.stats = adjust(cut, scene, what, purpose);
+    result.adapt_ms = milliseconds_since(start);
+    const auto adapted = Clock::now();
+    static_cast<void>(cut.indices());
+    result.extract_ms = milliseconds_since(adapted);
+
+    result.imperceptible_from_m = imperceptible_from(scene, what, result.stats);
+    result.effects = {fold_test_effect(what),         gaze_effect(what),
+                      silhouette_effect(scene, what), csf_effect(scene, what),
+                      prelit_effect(scene),           light_effect(scene),
+                      frustum_effect(what, purpose),  culling_effect(scene, purpose),
+                      magnification_effect(scene, what), distance_effect(what, result)};
+    return result;
+}
+
+Json to_json(const Simplification& s, double draw_ms) {
+    Json effects = Json::array();
+    for (const Effect& effect : s.effects) effects.push_back({{"name", effect.name}, {"on", effect.on}, {"why", effect.why}});
+    const double cost = vdtree::is_unbounded(s.stats.max_fold_cost) ? infinity : static_cast<double>(s.stats.max_fold_cost);
+    return {{"source_triangles", s.source_triangles},
+            {"triangles", s.stats.triangles},
+            {"dropped", s.dropped},
+            {"node_tests", s.stats.node_tests},
+            {"adapt_ms", number_or_null(s.adapt_ms)},
+            {"extract_ms", number_or_null(s.extract_ms)},
+            {"draw_ms", number_or_null(draw_ms)},
+            {"imperceptible_from_m", number_or_null(s.imperceptible_from_m)},
+            {"max_fold_cost", number_or_null(cost)},
+            {"effects", effects}};
+}
+
+void print(const Simplification& s, double draw_ms) {
+    const double share = 100.0 * s.stats.triangles / static_cast<double>(s.source_triangles);
+    std::vector<std::vector<std::string>> rows = {
+        {"triangles", grouped(s.stats.triangles) + " of " + grouped(s.source_triangles) + " (" + rounded(share, 3) + "%)"},
+        {"dropped", grouped(s.dropped)},
+        {"nodes tested", grouped(s.stats.node_tests)},
+        {"adapted in", rounded(s.adapt_ms, 3) + " ms"},
+        {"extracted in", rounded(s.extract_ms, 3) + " ms"}};
+    if (!std::isnan(draw_ms)) rows.push_back({"drawn in", rounded(draw_ms, 3) + " ms"});
+    const std::string metres = std::isfinite(s.imperceptible_from_m) ? " m" : "";
+    rows.push_back({"imperceptible from", rounded(s.imperceptible_from_m, 3) + metres});
+    print_table(rows);
+    std::printf("effects\n");
+    for (const Effect& effect : s.effects)
+        std::printf("  %-3s  %s: %s\n", effect.on ? "on" : "off", effect.name.c_str(), effect.why.c_str());
+}
+
+} // namespace unseen::app

@@ -1,0 +1,73 @@
+// unseen simplify: a cut of a tree as a mesh of its own.
+#include <chrono>
+#include <filesystem>
+#include <limits>
+#include <memory>
+
+#include <vdtree/mesh_io.h>
+
+#include "command.h"
+#include "report.h"
+#include "simplification.h"
+#include "terminal.h"
+
+namespace unseen::app {
+namespace {
+
+struct SimplifyArguments {
+    std::string model, out, json;
+    ViewOptions view;
+    DisplayOptions display;
+    WhatOptions what;
+};
+
+constexpr double nothing_drawn = std::numeric_limits<double>::quiet_NaN();
+
+Result<int> run(const SimplifyArguments& a) {
+    std::error_code unknown;
+    if (std::filesystem::equivalent(a.model, a.out, unknown))
+        return Error{ErrorCode::invalid_argument, "'" + a.out + "' is the model itself: give the result another name."};
+    auto report = JsonReport::open(a.json);
+    if (!report) return report.error();
+    const auto scene = load_scene(a.model, a.view, a.display);
+    if (!scene) return scene.error();
+
+    vdtree::Cut cut(scene->tree);
+    Simplification result = simplify(cut, *scene, a.what, Purpose::mesh);
+    const auto start = std::chrono::steady_clock::now();
+    const vdtree::Mesh mesh = vdtree::extract_mesh(cut);
+    result.extract_ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    if (mesh.triangles.empty()) {
+        return Error{ErrorCode::invalid_argument,
+                     "No triangle is left, for the model is too small in this view or the budget too low: "
+                     "move nearer or allow more triangles."};
+    }
+
+    if (auto ok = report->prepare(to_json(result, nothing_drawn)); !ok) return ok.error();
+    if (auto ok = vdtree::write_mesh(a.out, mesh.view()); !ok) return ok.error();
+    if (auto ok = report->publish(); !ok) return ok.error();
+    if (!report->is_on_stdout()) print(result, nothing_drawn);
+    return exit_done;
+}
+
+} // namespace
+
+Command simplify_command(CLI::App& app) {
+    auto a = std::make_shared<SimplifyArguments>();
+    CLI::App* verb = app.add_subcommand("simplify", "Write a simplified mesh for a view");
+    verb->add_option("TREE", a->model, "A tree, or a mesh")->required()->type_name("TREE.vdt|MESH");
+    verb->add_option("-o,--output", a->out, "The mesh")
+        ->type_name("OUT.ply|.obj|.glb")
+        ->required()
+        ->check(ending_in({".ply", ".obj", ".glb"}));
+    verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
+    add_view_options(*verb, a->view);
+    add_display_options(*verb, a->display);
+    add_what_options(*verb, a->what);
+    verb->footer("Examples:\n  unseen simplify bunny.vdt -o seen-from-the-right.ply --direction 1 0 0\n"
+                 "  unseen simplify bunny.vdt -o small.obj --triangles 5000 --json report.json\n"
+                 "  unseen simplify bunny.vdt -o rough.glb --pixels 4 --fold-test displacement");
+    return {verb, [a] { return run(*a); }};
+}
+
+} // namespace unseen::app

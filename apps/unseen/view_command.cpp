@@ -1,0 +1,53 @@
+// unseen view: a window in which the cut follows the eye.
+#include <map>
+#include <memory>
+
+#include "command.h"
+#include "options.h"
+#include "viewer.h"
+
+namespace unseen::app {
+namespace {
+
+struct ViewArguments {
+    std::string model;
+    ViewOptions view;
+    DisplayOptions display;
+    ViewerOptions viewer;
+};
+
+Result<int> run(ViewArguments& a) {
+    auto scene = load_scene(a.model, a.view, a.display);
+    if (!scene) return scene.error();
+    a.viewer.has_fixed_field = a.view.fov_degrees.has_value();
+    if (auto ended = run_viewer(*scene, a.viewer); !ended) return ended.error();
+    return exit_done;
+}
+
+} // namespace
+
+Command view_command(CLI::App& app) {
+    auto a = std::make_shared<ViewArguments>();
+    CLI::App* verb = app.add_subcommand("view", "Look at a model in a window");
+    verb->add_option("TREE", a->model, "A tree, or a mesh")->required()->type_name("TREE.vdt|MESH");
+    verb->add_flag("--wireframe", a->viewer.draw.wireframe, "Begin with the triangles' edges");
+    const std::map<std::string, render::Shading> shadings = {{"smooth", render::Shading::smooth},
+                                                             {"flat", render::Shading::flat}};
+    verb->add_option("--shading", a->viewer.draw.shading, "smooth (default) or flat")
+        ->type_name("NAME")
+        ->transform(CLI::CheckedTransformer(shadings).description(""));
+    verb->add_option("--screenshot", a->viewer.screenshot, "Write a picture when the viewer ends")
+        ->type_name("OUT.png")
+        ->check(ending_in({".png"}));
+    verb->add_option("--frames", a->viewer.frames, "End after so many frames, for scripts")
+        ->type_name("N")
+        ->check(within(1, 1e6));
+    add_view_options(*verb, a->view);
+    add_display_options(*verb, a->display);
+    add_what_options(*verb, a->viewer.what);
+    verb->footer(std::string(viewer_help) + "\nExamples:\n  unseen view bunny.vdt\n"
+                                            "  unseen view bunny.vdt --triangles 5000 --wireframe");
+    return {verb, [a] { return run(*a); }};
+}
+
+} // namespace unseen::app

@@ -1,0 +1,27 @@
+// The interactive viewer: a window in which a model is orbited while its cut follows.
+#pragma once
+
+#include <string>
+
+#include <render/context.h>
+#include <render/renderer.h>
+
+#include "scene.h"
+
+namespace unseen::app {
+
+struct ViewerOptions {
+    WhatOptions what;             // to begin with
+    bool has_fixed_field = false; // the camera's field was asked for; else it follows the window's height
+    render::DrawOptions draw;
+    std::string screenshot;       // written when the viewer ends
+    int frames = 0;               // ends after so many; 0: when the user wants to
+};
+
+// The keys, for people.
+extern const char* const viewer_help;
+
+// Opens a window of the scene's size and runs until it is closed. On the main thread only. Fails where there is no display.
+Result<void> run_viewer(Scene& scene, const ViewerOptions& options);
+
+} // namespace unseen::app
