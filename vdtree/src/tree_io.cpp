@@ -283,6 +283,7 @@ private:
     Result<void> check_counts(const TreeGeometry& g, const TreeLuminance& l) const;
     Result<void> check_structure(const TreeGeometry& g) const;
     Result<void> check_values(const TreeGeometry& g, const TreeLuminance& l) const;
+    Result<void> check_sources(const TreeGeometry& g) const;
 
     const std::filesystem::path& file_;
     const Progress& progress_;
@@ -294,9 +295,11 @@ private:
 
 Result<void> Reader::read_table() {
     std::error_code error;
-    in_.open(file_, std::ios::binary);
+    // Not opened before: a pipe would wait for its writer.
+    if (std::filesystem::is_regular_file(file_, error)) in_.open(file_, std::ios::binary);
+    if (!in_.is_open()) return Error{ErrorCode::io_failure, "Cannot open " + file_.string() + "; does it exist?"};
     file_bytes_ = std::filesystem::file_size(file_, error);
-    if (!in_ || error) return Error{ErrorCode::io_failure, "Cannot open " + file_.string() + "; does it exist?"};
+    if (error) return Error{ErrorCode::io_failure, "Cannot tell the size of " + file_.string() + "."};
     Header h;
     if (!in_.read(reinterpret_cast<char*>(&h), sizeof h)) return fail("The file ends within its header.");
     if (h.magic != magic) return fail("This is no vertex tree (.vdt).");
@@ -478,8 +481,24 @@ Result<void> Reader::check_values(const TreeGeometry& g, const TreeLuminance& l)
     for (const auto* ranges : {&l.support_range, &l.ring_range})
         for (const LuminanceRange& r : *ranges)
             if (!(in_unit(r.lo) && in_unit(r.hi) && r.lo <= r.hi)) return fail("A luminance range lies outside of 0..1.");
+    for (const float y : l.adaptation)
+        if (!in_unit(y)) return fail("An adaptation luminance lies outside of 0..1.");
+    for (const float moved : g.displacement)
+        if (!(moved >= 0)) return fail("A displacement is negative.");
+    return {};
+}
+
+// What refers to the mesh that the tree was built from: its users index their own arrays with these numbers.
+Result<void> Reader::check_sources(const TreeGeometry& g) const {
+    if (g.dropped_triangles > no_node) return fail("Section facts has a value out of range.");
+    const std::uint64_t triangles = g.triangles.size() + g.dropped_triangles;
+    for (const Index v : g.source_vertices)
+        if (v >= g.source_vertices.size()) return fail("A source vertex is out of range.");
     for (const Index t : g.source_triangles)
-        if (t == no_node) return fail("A source triangle is out of range.");
+        if (t >= triangles) return fail("A source triangle is out of range.");
+    for (const MeshRange& r : g.ranges)
+        if (r.first_triangle > triangles || r.triangle_count > triangles - r.first_triangle)
+            return fail("Range '" + r.name + "' ends after the last triangle.");
     return {};
 }
 
@@ -522,12 +541,13 @@ Result<VertexTree> Reader::read() {
     l.range = {f.luminance_range[0], f.luminance_range[1]};
     const double sum = g.origin.x + g.origin.y + g.origin.z;
     const bool facts_finite = std::isfinite(sum) && all_finite(std::vector<Sphere>{g.bounding_sphere}) &&
-                              all_finite(std::vector<Light>{l.light}) && l.range.lo >= 0 && l.range.hi <= 1 &&
+                              all_finite(std::vector<Light>{l.light}) && l.range.lo >= 0 && l.range.lo <= l.range.hi && l.range.hi <= 1 &&
                               g.bounding_sphere.radius >= 0;
     if (!facts_finite) return fail("Section facts has a value out of range.");
     if (const auto r = check_counts(g, l); !r) return r.error();
     if (const auto r = check_structure(g); !r) return r.error();
     if (const auto r = check_values(g, l); !r) return r.error();
+    if (const auto r = check_sources(g); !r) return r.error();
     data->geometry = std::move(geometry);
     return VertexTree(std::move(data));
 }
@@ -560,6 +580,8 @@ Result<VertexTree> read_tree(const std::filesystem::path& file, const Progress& 
 }
 
 bool is_tree_file(const std::filesystem::path& file) {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(file, error)) return false; // a pipe would wait for its writer
     std::ifstream in(file, std::ios::binary);
     std::array<char, 8> start{};
     return in.read(start.data(), start.size()) && start == magic;

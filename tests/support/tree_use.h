@@ -1,0 +1,32 @@
+// Does with a tree whatever the library can do with one. For trees from files that nobody vouches for: nothing may crash, hang or
+// read out of bounds, though the picture may be nonsense.
+#pragma once
+
+#include <vdtree/criteria.h>
+#include <vdtree/cut.h>
+#include <vdtree/vertex_tree.h>
+
+namespace unseen::support {
+
+// Returns whether every mesh that came out was valid.
+inline bool use_everything(const vdtree::VertexTree& tree) {
+    using namespace vdtree;
+    (void)verify(tree).has_value();
+    bool valid = true;
+    Cut cut(tree);
+    const auto extract = [&] { valid &= validate(extract_mesh(cut).view()).has_value(); };
+    cut.unfold_all();
+    extract();
+    const View view{.eye = {1, 2, 3}};
+    const ExtentCriterion extent(tree, view, 20);
+    const DisplacementCriterion displacement(tree, view, 2);
+    const FrustumVisibility frustum(tree, view);
+    cut.adjust(extent, {.visibility = frustum});
+    extract();
+    cut.adjust(displacement, {.triangle_budget = tree.triangle_count() / 2});
+    extract();
+    const VertexTree relit = tree.relit({.direction = {0, 0, 1}});
+    return valid && relit.node_count() == tree.node_count();
+}
+
+} // namespace unseen::support

@@ -1,0 +1,450 @@
+// Tree files: what is written is read again; what is damaged, cut short or lying is refused.
+#include <vdtree/tree_io.h>
+
+#include <csignal>
+#include <filesystem>
+#include <functional>
+#include <iterator>
+#include <limits>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <vdtree/builder.h>
+#include <vdtree/cut.h>
+
+#include "shapes.h"
+#include "temp_folder.h"
+#include "tree_checks.h"
+#include "tree_file.h"
+#include "tree_use.h"
+
+namespace unseen::vdtree {
+namespace {
+
+using support::TempFolder;
+using support::TreeFile;
+using testing::HasSubstr;
+
+VertexTree built(const Mesh& mesh) {
+    Result<VertexTree> tree = build_tree(mesh.view());
+    if (!tree) throw std::runtime_error(tree.error().message);
+    return std::move(*tree);
+}
+
+class TreeIo : public testing::Test {
+protected:
+    std::string bytes_of(const VertexTree& tree) {
+        const auto written = write_tree(file_, tree);
+        EXPECT_TRUE(written) << written.error().message;
+        return support::read_bytes(file_);
+    }
+    Result<VertexTree> read_bytes(std::string_view bytes) {
+        support::write_bytes(file_, bytes);
+        return read_tree(file_);
+    }
+    void expect_refused(std::string_view bytes, const std::string& reason) {
+        const auto tree = read_bytes(bytes);
+        ASSERT_FALSE(tree) << "expected: " << reason;
+        EXPECT_THAT(tree.error().message, HasSubstr(reason));
+        EXPECT_THAT(tree.error().message, HasSubstr(file_.filename().string()));
+    }
+
+    TempFolder folder_;
+    std::filesystem::path file_ = folder_ / "tree.vdt";
+};
+
+// ---- round trips
+
+TEST_F(TreeIo, ReadsWhatWasWritten) {
+    for (const shapes::Named& named : shapes::all()) {
+        SCOPED_TRACE(named.name);
+        const VertexTree tree = built(named.mesh);
+        ASSERT_TRUE(write_tree(file_, tree));
+        const auto again = read_tree(file_);
+        ASSERT_TRUE(again) << again.error().message;
+        EXPECT_EQ(support::difference(tree, *again), "");
+        EXPECT_TRUE(is_tree_file(file_));
+    }
+    EXPECT_EQ(folder_.file_count(), 1u); // no temporary files are left
+}
+
+TEST_F(TreeIo, KeepsAnotherLight) {
+    const VertexTree tree = built(shapes::bumpy_sphere(2)).relit({.direction = {1, 0, 0}, .ambient = 0.5f});
+    ASSERT_TRUE(write_tree(file_, tree));
+    const auto again = read_tree(file_);
+    ASSERT_TRUE(again);
+    EXPECT_EQ(support::difference(tree, *again), "");
+}
+
+TEST_F(TreeIo, TakesSectionsOfSeveralPages) {
+    const VertexTree tree = built(shapes::bumpy_sphere(6)); // 41k vertices: masks alone are about 2 MB
+    std::string bytes = bytes_of(tree);
+    const auto again = read_tree(file_);
+    ASSERT_TRUE(again) << again.error().message;
+    EXPECT_EQ(support::difference(tree, *again), "");
+    // Damage to the second page of the masks is found there.
+    const auto parsed = TreeFile::parse(bytes);
+    for (std::size_t i = 0; i < parsed.sections.size(); ++i) {
+        if (parsed.sections[i].name != "masks") continue;
+        ASSERT_GT(parsed.sections[i].data.size(), TreeFile::page_bytes + 5);
+        const auto offset = support::load<std::uint64_t>(bytes, TreeFile::header_bytes + i * TreeFile::entry_bytes + TreeFile::offset_at);
+        bytes[offset + TreeFile::page_bytes + 5] ^= 1;
+    }
+    expect_refused(bytes, "Page 1 of section masks is damaged");
+}
+
+TEST_F(TreeIo, WritesTheDocumentedFormat) {
+    // Written a second time by this test's own code, from the description of the format.
+    for (const Mesh& mesh : {shapes::cube(2), shapes::with_attributes(shapes::torus(8, 5))}) {
+        const std::string bytes = bytes_of(built(mesh));
+        EXPECT_EQ(TreeFile::parse(bytes).bytes(), bytes);
+    }
+}
+
+TEST_F(TreeIo, WritesTheSameBytesEveryTime) {
+    const VertexTree tree = built(shapes::with_attributes(shapes::cube(2)));
+    EXPECT_EQ(bytes_of(tree), bytes_of(tree));
+}
+
+TEST_F(TreeIo, IgnoresSectionsThatItDoesNotKnow) {
+    const VertexTree tree = built(shapes::cube(2));
+    TreeFile file = TreeFile::parse(bytes_of(tree));
+    file.sections.insert(file.sections.begin() + 3, {"from_the_future", 3, 1, "abcdef"});
+    const auto again = read_bytes(file.bytes());
+    ASSERT_TRUE(again) << again.error().message;
+    EXPECT_EQ(support::difference(tree, *again), "");
+}
+
+// ---- damage
+
+TEST_F(TreeIo, RefusesEveryTruncation) {
+    const std::string bytes = bytes_of(built(shapes::single_triangle()));
+    for (std::size_t length = 0; length < bytes.size(); ++length) {
+        const auto tree = read_bytes(std::string_view(bytes).substr(0, length));
+        ASSERT_FALSE(tree) << "cut at byte " << length;
+        ASSERT_FALSE(tree.error().message.empty());
+    }
+    expect_refused(bytes + '\0', "instead of");
+}
+
+TEST_F(TreeIo, FindsEveryFlippedBit) {
+    const VertexTree tree = built(shapes::with_attributes(shapes::cube(1)));
+    const std::string bytes = bytes_of(tree);
+    const std::size_t table_bits = 8 * (TreeFile::header_bytes + TreeFile::parse(bytes).sections.size() * TreeFile::entry_bytes);
+    std::mt19937_64 random(1);
+    int refused = 0;
+    for (std::size_t round = 0; round < 5000; ++round) {
+        const std::size_t bit = round % 2 ? random() % table_bits : random() % (bytes.size() * 8);
+        std::string damaged = bytes;
+        damaged[bit / 8] = static_cast<char>(damaged[bit / 8] ^ (1 << (bit % 8)));
+        const auto again = read_bytes(damaged);
+        // Only a bit between two sections may go unnoticed.
+        ASSERT_EQ(again ? support::difference(tree, *again) : "", "") << "bit " << bit;
+        refused += !again;
+    }
+    EXPECT_GT(refused, 4500);
+}
+
+TEST_F(TreeIo, SaysWhatIsWrongWithTheHeader) {
+    const std::string good = bytes_of(built(shapes::cube(1)));
+    expect_refused("", "ends within its header");
+    expect_refused("solid cube", "ends within its header");
+    expect_refused(std::string(200, 'x'), "no vertex tree");
+    EXPECT_FALSE(is_tree_file(file_));
+
+    std::string bad = good;
+    support::store(bad, TreeFile::version_at, std::uint32_t{2});
+    TreeFile::seal(bad);
+    expect_refused(bad, "version 2");
+    EXPECT_EQ(read_bytes(bad).error().code, ErrorCode::unsupported);
+
+    bad = good;
+    bad[TreeFile::file_bytes_at] ^= 1;
+    expect_refused(bad, "header is damaged");
+    TreeFile::seal(bad);
+    expect_refused(bad, "instead of");
+}
+
+TEST_F(TreeIo, RefusesTablesThatDoNotFit) {
+    const std::string good = bytes_of(built(shapes::cube(1)));
+    const std::uint64_t large[] = {good.size(), 1ull << 32, 1ull << 61, 1ull << 63, ~0ull, ~0ull - 7};
+    for (const std::uint64_t value : large) {
+        for (const std::size_t at : {TreeFile::page_count_at, TreeFile::file_bytes_at}) {
+            if (at == TreeFile::file_bytes_at && value == good.size()) continue;
+            std::string bad = good;
+            support::store(bad, at, value);
+            TreeFile::seal(bad);
+            ASSERT_FALSE(read_bytes(bad)) << at << ": " << value;
+        }
+        for (std::size_t section = 0; section < TreeFile::parse(good).sections.size(); ++section) {
+            for (const std::size_t at : {TreeFile::count_at, TreeFile::offset_at}) {
+                std::string bad = good;
+                support::store(bad, TreeFile::header_bytes + section * TreeFile::entry_bytes + at, value);
+                TreeFile::seal(bad);
+                const auto tree = read_bytes(bad);
+                // A section without elements may stand at the file's end.
+                ASSERT_TRUE(!tree || (at == TreeFile::offset_at && value == good.size())) << section << ": " << value;
+            }
+        }
+    }
+    for (const std::uint32_t count : {0u, 1u, 23u, 65u, 1u << 31, ~0u}) {
+        std::string bad = good;
+        support::store(bad, TreeFile::section_count_at, count);
+        TreeFile::seal(bad);
+        ASSERT_FALSE(read_bytes(bad)) << count;
+    }
+    for (const std::uint32_t size : {0u, 3u, 1u << 31, ~0u}) {
+        std::string bad = good;
+        support::store(bad, TreeFile::header_bytes + TreeFile::element_bytes_at, size);
+        TreeFile::seal(bad);
+        ASSERT_FALSE(read_bytes(bad)) << size;
+    }
+}
+
+// ---- files that lie: every checksum is right, the values are not
+
+struct Lie {
+    const char* what;
+    std::function<void(TreeFile&)> tell;
+};
+
+std::vector<Lie> lies() {
+    constexpr float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
+    const auto set = [](const char* section, std::size_t i, auto value) {
+        return [=](TreeFile& file) { file[section].set(i, value); };
+    };
+    const auto drop_last = [](const char* section) {
+        return [=](TreeFile& file) {
+            auto& s = file[section];
+            s.data.resize(s.data.size() - s.element_bytes);
+        };
+    };
+    std::vector<Lie> all = {
+        {"the root has a parent", set("parents", 0, 1u)},
+        {"a node is its own parent", set("parents", 1, 1u)},
+        {"a parent comes later", set("parents", 1, 2u)},
+        {"a parent is out of range", set("parents", 2, 0x7fffffffu)},
+        {"a leaf has no parent", [](TreeFile& f) { f["parents"].set(f["first_leaf"].count() + 1, 0xffffffffu); }},
+        {"a leaf's parent is a leaf",
+         [](TreeFile& f) { f["parents"].set(f["first_leaf"].count() + 1, static_cast<std::uint32_t>(f["first_leaf"].count())); }},
+        {"the root lacks a leaf", set("first_leaf", 0, 1u)},
+        {"a node begins beyond the leaves", set("first_leaf", 1, 0xfffffffeu)},
+        {"a node ends beyond the leaves", set("leaf_end", 1, 0xfffffffeu)},
+        {"a node ends before it begins", set("leaf_end", 1, 0u)},
+        {"leaves overlap", [](TreeFile& f) { f["leaf_end"].set(1, f["leaf_end"].get<std::uint32_t>(1) + 1); }},
+        {"a node lacks a leaf", [](TreeFile& f) { f["leaf_end"].set(1, f["leaf_end"].get<std::uint32_t>(1) - 1); }},
+        {"a subtree is empty", set("subtree_end", 1, 1u)},
+        {"a subtree ends before it begins", set("subtree_end", 1, 0u)},
+        {"a subtree is endless", set("subtree_end", 1, 0xffffffffu)},
+        {"the tree ends early", [](TreeFile& f) { f["subtree_end"].set(0, f["subtree_end"].get<std::uint32_t>(0) - 1); }},
+        {"triangles do not begin at 0", set("first_triangle", 0, 1u)},
+        {"triangle ranges overlap", set("first_triangle", 1, 0x7fffffffu)},
+        {"triangles are not covered",
+         [](TreeFile& f) { f["first_triangle"].set(f["first_triangle"].count() - 1, 1u); }},
+        {"a corner is no leaf", set("triangles", 4, 0xffffffu)},
+        {"a corner is just beyond the leaves",
+         [](TreeFile& f) { f["triangles"].set(0, static_cast<std::uint32_t>(f["source_vertices"].count())); }},
+        {"a corner comes twice", [](TreeFile& f) { f["triangles"].set(1, f["triangles"].get<std::uint32_t>(0)); }},
+        {"a source vertex is out of range", set("source_vertices", 0, 0x7fffffffu)},
+        {"a source triangle is out of range", set("source_triangles", 0, 0x7fffffffu)},
+        {"an infinite position", set("positions", 3, inf)},
+        {"a position that is no number", set("positions", 3, nan)},
+        {"a normal that is no number", set("normals", 3, nan)},
+        {"a colour that is no number", set("colours", 1, nan)},
+        {"an infinite UV", set("uvs", 1, inf)},
+        {"a sphere without a centre", set("support_spheres", 0, nan)},
+        {"a sphere of negative radius", set("support_spheres", 3, -1.0f)},
+        {"a ring sphere of negative radius", set("ring_spheres", 3, -1.0f)},
+        {"a ring sphere of infinite radius", set("ring_spheres", 3, inf)},
+        {"a displacement that is no number", set("displacement", 0, nan)},
+        {"a negative displacement", set("displacement", 0, -1.0f)},
+        {"a luminance above 1", set("luminance", 0, 1.5f)},
+        {"a luminance that is no number", set("luminance", 0, nan)},
+        {"a luminance range in reverse", [](TreeFile& f) { f["support_range"].set(0, 0.9f), f["support_range"].set(1, 0.1f); }},
+        {"a negative ring luminance", set("ring_range", 0, -0.5f)},
+        {"an adaptation luminance that is no number", set("adaptation", 0, nan)},
+        {"a negative adaptation luminance", set("adaptation", 0, -1.0f)},
+        {"an adaptation luminance above 1", set("adaptation", 0, 2.0f)},
+        {"the facts: an origin that is no number", [](TreeFile& f) { f["facts"].set(1, std::numeric_limits<double>::quiet_NaN()); }},
+        {"the facts: a bounding sphere of negative radius", set("facts", 9, -1.0f)},
+        {"the facts: a light that is no number", set("facts", 10, nan)},
+        {"the facts: a luminance that is no number", set("facts", 14, nan)},
+        {"the facts: luminances in reverse", [](TreeFile& f) { f["facts"].set(14, 0.9f), f["facts"].set(15, 0.1f); }},
+        {"the facts: no closedness", set("facts", 18, 3u)},
+        {"the facts: twice", [](TreeFile& f) { f["facts"].data += f["facts"].data; }},
+        {"the facts: none", [](TreeFile& f) { f["facts"].data.clear(); }},
+        {"a range of an unknown kind", set("ranges", 0, std::uint64_t{9})},
+        {"a range with an endless name", set("ranges", 1, ~std::uint64_t{0})},
+        {"a range that begins beyond the triangles", set("ranges", 2, std::uint64_t{1} << 40)},
+        {"a range that ends beyond the triangles", set("ranges", 3, std::uint64_t{1} << 40)},
+        {"a range whose end wraps around", [](TreeFile& f) { f["ranges"].set(2, std::uint64_t{5}), f["ranges"].set(3, ~std::uint64_t{0} - 3); }},
+        {"a range that is cut short", [](TreeFile& f) { f["ranges"].data.pop_back(); }},
+        {"no triangle", [](TreeFile& f) { f["triangles"].data.clear(), f["source_triangles"].data.clear(); }},
+        {"no interior node", [](TreeFile& f) {
+             for (const char* name : {"first_leaf", "leaf_end", "subtree_end", "support_spheres", "ring_spheres", "masks", "slabs",
+                                      "flags", "displacement", "support_range", "ring_range", "adaptation"})
+                 f[name].data.clear();
+             f["first_triangle"].data.resize(4);
+         }},
+        {"nothing at all", [](TreeFile& f) { f.sections.clear(); }},
+    };
+    for (const char* section : {"parents", "positions", "normals", "colours", "uvs", "luminance", "first_leaf", "leaf_end",
+                                "subtree_end", "first_triangle", "support_spheres", "ring_spheres", "masks", "slabs", "flags",
+                                "displacement", "support_range", "ring_range", "adaptation", "triangles", "source_triangles",
+                                "source_vertices"})
+        all.push_back({section, drop_last(section)});
+    return all;
+}
+
+TEST_F(TreeIo, RefusesLies) {
+    const std::string honest = bytes_of(built(shapes::with_attributes(shapes::cube(2))));
+    for (const Lie& lie : lies()) {
+        TreeFile file = TreeFile::parse(honest);
+        lie.tell(file);
+        const auto tree = read_bytes(file.bytes());
+        EXPECT_FALSE(tree) << lie.what;
+        if (!tree) {
+            EXPECT_EQ(tree.error().code, ErrorCode::malformed_data) << lie.what;
+            EXPECT_THAT(tree.error().message, HasSubstr("tree.vdt")) << lie.what;
+        }
+    }
+}
+
+TEST_F(TreeIo, MissesNoSection) {
+    const TreeFile honest = TreeFile::parse(bytes_of(built(shapes::cube(1))));
+    for (std::size_t i = 0; i < honest.sections.size(); ++i) {
+        TreeFile file = honest;
+        const std::string name = file.sections[i].name;
+        file.sections.erase(file.sections.begin() + static_cast<std::ptrdiff_t>(i));
+        expect_refused(file.bytes(), name);
+    }
+}
+
+// Random values in random places, all checksums right: an error, or a tree with which everything can be done.
+TEST_F(TreeIo, SurvivesRandomLies) {
+    const std::string honest = bytes_of(built(shapes::with_attributes(shapes::cube(2))));
+    std::mt19937_64 random(2);
+    int accepted = 0;
+    for (int round = 0; round < 3000; ++round) {
+        TreeFile file = TreeFile::parse(honest);
+        for (std::uint64_t lie = 0; lie <= random() % 3; ++lie) {
+            TreeFile::Section& s = file.sections[random() % file.sections.size()];
+            const std::uint32_t interesting[] = {0, 1, 2, 7, 0x7f800000, 0x7fc00000, 0x7f7fffff, 0x80000000, 0xffffffff,
+                                                 static_cast<std::uint32_t>(random())};
+            if (s.data.size() >= 4) s.set(random() % (s.data.size() / 4), interesting[random() % std::size(interesting)]);
+        }
+        const auto tree = read_bytes(file.bytes());
+        if (!tree) continue;
+        ++accepted;
+        ASSERT_TRUE(support::use_everything(*tree)) << "round " << round;
+    }
+    EXPECT_GT(accepted, 100); // masks, slabs and small changes of values
+}
+
+TEST_F(TreeIo, UsesNoMoreMemoryThanTheFileIsWorth) {
+    // A table in which every section claims the whole file: at most so often its size.
+    const std::string good = bytes_of(built(shapes::cube(1)));
+    std::string bad = good;
+    const std::size_t sections = TreeFile::parse(good).sections.size();
+    for (std::size_t i = 0; i < sections; ++i) {
+        const std::size_t entry = TreeFile::header_bytes + i * TreeFile::entry_bytes;
+        support::store(bad, entry + TreeFile::offset_at, std::uint64_t{0});
+        support::store(bad, entry + TreeFile::count_at,
+                       std::uint64_t{bad.size() / support::load<std::uint32_t>(bad, entry + TreeFile::element_bytes_at)});
+    }
+    TreeFile::seal(bad);
+    EXPECT_FALSE(read_bytes(bad));
+}
+
+// ---- the file system
+
+TEST_F(TreeIo, ReportsMissingFilesAndFolders) {
+    const auto missing = read_tree(folder_ / "nothing.vdt");
+    ASSERT_FALSE(missing);
+    EXPECT_EQ(missing.error().code, ErrorCode::io_failure);
+    EXPECT_THAT(missing.error().message, HasSubstr("nothing.vdt"));
+    EXPECT_FALSE(read_tree(folder_.path()));
+    EXPECT_FALSE(is_tree_file(folder_ / "nothing.vdt"));
+    EXPECT_FALSE(is_tree_file(folder_.path()));
+
+    const VertexTree tree = built(shapes::cube(1));
+    const auto nowhere = write_tree(folder_ / "no" / "such" / "tree.vdt", tree);
+    ASSERT_FALSE(nowhere);
+    EXPECT_THAT(nowhere.error().message, HasSubstr("tree.vdt"));
+    EXPECT_FALSE(write_tree(folder_.path(), tree));
+    EXPECT_EQ(folder_.file_count(), 0u);
+}
+
+TEST_F(TreeIo, DoesNotWaitForPipes) {
+    const auto pipe = folder_ / "pipe.vdt";
+    ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+    EXPECT_FALSE(read_tree(pipe)); // would wait for a writer for ever
+    EXPECT_FALSE(is_tree_file(pipe));
+}
+
+TEST_F(TreeIo, LeavesNothingInAFolderThatCannotBeWritten) {
+    if (::geteuid() == 0) GTEST_SKIP() << "root may write everywhere";
+    std::filesystem::permissions(folder_.path(), std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
+    EXPECT_FALSE(write_tree(file_, built(shapes::cube(1))));
+    EXPECT_EQ(folder_.file_count(), 0u);
+}
+
+TEST_F(TreeIo, KeepsTheOldFileWhenTheDiskIsFull) {
+    const VertexTree tree = built(shapes::bumpy_sphere(3));
+    support::write_bytes(file_, "old");
+    rlimit before{};
+    ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+    const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+    rlimit small = before;
+    small.rlim_cur = 10'000;
+    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+    const auto written = write_tree(file_, tree);
+    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before), 0);
+    std::signal(SIGXFSZ, handler);
+    EXPECT_FALSE(written);
+    EXPECT_EQ(support::read_bytes(file_), "old");
+    EXPECT_EQ(folder_.file_count(), 1u);
+}
+
+TEST_F(TreeIo, CanBeCancelledAtAnyTime) {
+    const VertexTree tree = built(shapes::cube(2));
+    support::write_bytes(file_, "old");
+    bool cancelled = true;
+    for (int calls = 0; cancelled; ++calls) {
+        int left = calls;
+        const auto stop = [&](double share, const char*) {
+            EXPECT_GE(share, 0);
+            EXPECT_LE(share, 1);
+            return left-- > 0;
+        };
+        const auto written = write_tree(file_, tree, stop);
+        cancelled = !written;
+        if (!cancelled) break;
+        ASSERT_EQ(written.error().code, ErrorCode::cancelled);
+        ASSERT_EQ(support::read_bytes(file_), "old");
+        ASSERT_EQ(folder_.file_count(), 1u);
+        ASSERT_LT(calls, 1000);
+    }
+    cancelled = true;
+    for (int calls = 0; cancelled; ++calls) {
+        int left = calls;
+        const auto stop = [&](double, const char*) { return left-- > 0; };
+        const auto read = read_tree(file_, stop);
+        cancelled = !read;
+        ASSERT_TRUE(read || read.error().code == ErrorCode::cancelled);
+        ASSERT_LT(calls, 1000);
+    }
+}
+
+} // namespace
+} // namespace unseen::vdtree
