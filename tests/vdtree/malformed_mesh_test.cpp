@@ -395,6 +395,30 @@ TEST(MalformedMesh, GltfInstancesMayNotMultiplyWithoutLimit) {
     EXPECT_THAT(error_of(file, "a.glb"), HasSubstr("multiply"));
 }
 
+TEST(MalformedMesh, GltfEmptyPrimitivesMayNotMultiplyEither) {
+    // 10,000 nodes that show one mesh of 10,000 primitives without triangles: nothing to store, but time to spend.
+    std::string primitives, nodes, list;
+    for (int i = 0; i < 10000; ++i) {
+        primitives += R"({"mode":0,"attributes":{}},)";
+        nodes += R"({"mesh":0},)";
+        list += std::to_string(i) + ",";
+    }
+    std::string json = mesh_files::gltf_triangle_json("[" + nodes + R"({"mesh":0}])");
+    json = replaced(json, R"("nodes":[0])", R"("nodes":[)" + list + "10000]");
+    json = replaced(json, R"("primitives":[)", R"("primitives":[)" + primitives);
+    EXPECT_THAT(error_of(mesh_files::glb(json, mesh_files::gltf_triangle_data()), "a.glb"), HasSubstr("multiply"));
+}
+
+TEST(MalformedMesh, GltfJsonMayNotHaveMillionsOfNodes) {
+    std::string nodes;
+    for (int i = 0; i < (1 << 20) + 1; ++i) nodes += "{},";
+    EXPECT_THAT(error_of(glb_with(R"([{"mesh":0}])", "[" + nodes + "{}]"), "a.glb"), HasSubstr("nodes, more than"));
+    std::string values = "0";
+    for (int i = 0; i < 9'000'000; ++i) values += ",0";
+    EXPECT_THAT(error_of(glb_with(R"("scene":0)", R"("scene":0,"extras":[)" + values + "]"), "a.glb"),
+                HasSubstr("too many values"));
+}
+
 TEST(MalformedMesh, GltfZerosAreNotFree) {
     const std::string sparse = R"("componentType":5126,"count":2000000000,"type":"VEC3","sparse":{"count":1,)"
                                R"("indices":{"bufferView":1,"componentType":5123},"values":{"bufferView":0}})";

@@ -31,10 +31,14 @@ namespace {
 // Deeper JSON and node trees are found in attacks, not in scenes.
 constexpr int max_json_depth = 256;
 constexpr std::size_t max_node_depth = 512;
+// Three bytes of JSON become a few hundred in memory, so their number is bounded, at more than scenes are made of.
+constexpr std::size_t max_json_values = std::size_t{1} << 23;
+constexpr std::size_t max_array_elements = std::size_t{1} << 20; // nodes, meshes, accessors, ...
 // Instancing multiplies a file, so what may come out is bounded: bytes for each byte read, and bytes in any case.
 constexpr std::uint64_t max_bytes_out_per_byte_in = 64;
 constexpr std::uint64_t min_bytes_out = std::uint64_t{16} << 20;
 constexpr std::uint64_t bytes_per_vertex = sizeof(glm::dvec3) + sizeof(glm::vec3) + sizeof(glm::vec4) + sizeof(glm::vec2);
+constexpr std::uint64_t bytes_per_visit = 64; // of a primitive: takes time even where it is empty
 constexpr std::uint64_t bytes_per_index = sizeof(Index) * 3; // in a strip an index makes a triangle
 // Integers above are not exact in JSON.
 constexpr std::int64_t max_size = std::int64_t{1} << 53;
@@ -101,9 +105,10 @@ Container split_glb(std::string_view bytes) {
 
 // ---- the document, cut down ----
 
-// Recursive code behind the parser must not run out of stack.
-void check_depth(std::string_view text) {
+// Recursive code behind the parser must not run out of stack, nor its structures of memory.
+void check_structure(std::string_view text) {
     int depth = 0;
+    std::size_t values = 0;
     bool in_string = false;
     for (std::size_t i = 0; i < text.size(); ++i) {
         const char c = text[i];
@@ -117,11 +122,14 @@ void check_depth(std::string_view text) {
         } else if (c == '}' || c == ']') {
             --depth;
         }
+        if (!in_string && (c == '{' || c == '[' || c == ',') && ++values > max_json_values) {
+            fail("byte " + std::to_string(i) + ": the JSON has too many values; split the scene.");
+        }
     }
 }
 
 json parse_json(std::string_view text) {
-    check_depth(text);
+    check_structure(text);
     try {
         json document = json::parse(text.begin(), text.end());
         if (!document.is_object()) fail("its JSON is no object; it is no glTF file.");
@@ -209,6 +217,10 @@ private:
     template <class Copy>
     void copy_array(const char* key, const char* what, Copy&& copy) {
         const json& array = array_of(document_, key);
+        if (array.size() > max_array_elements) {
+            fail("it has " + std::to_string(array.size()) + " " + key + ", more than the " +
+                 std::to_string(max_array_elements) + " that are read; split the scene.");
+        }
         json& out = reduced_[key] = json::array();
         for (std::size_t i = 0; i < array.size(); ++i) {
             where_ = numbered(what, i);
@@ -728,29 +740,21 @@ private:
     }
 
     struct Visit {
-        int node;
+        std::size_t node;
         std::size_t depth;
         glm::dmat4 parent;
     };
 
     bool add_tree(int root) {
         reached_.resize(model_.nodes.size());
-        std::vector<Visit> stack{{root, 0, glm::dmat4(1.0)}};
+        std::vector<Visit> stack;
+        push(stack, root, 0, glm::dmat4(1.0));
         while (!stack.empty()) {
             const Visit visit = stack.back();
             stack.pop_back();
             if (!source_.keep_going(source_.bytes.size() / 2, "reading glTF")) return false;
-            const auto index = static_cast<std::size_t>(visit.node);
-            const std::string where = numbered("node", index);
-            if (index >= model_.nodes.size()) {
-                fail(where + " is used, but there are " + std::to_string(model_.nodes.size()) + "; correct the JSON.");
-            }
-            // A second visit means a cycle or two parents; glTF allows neither.
-            if (reached_[index]) fail(where + " is reached twice, but the nodes must form trees; correct the JSON.");
-            reached_[index] = true;
-            if (visit.depth > max_node_depth) fail(where + " is nested too deeply; flatten the scene.");
-
-            const tinygltf::Node& node = model_.nodes[index];
+            const tinygltf::Node& node = model_.nodes[visit.node];
+            const std::string where = numbered("node", visit.node);
             const glm::dmat4 world = visit.parent * local_matrix(node, where);
             if (node.mesh >= 0) {
                 if (static_cast<std::size_t>(node.mesh) >= model_.meshes.size()) {
@@ -761,10 +765,23 @@ private:
             }
             // Reversed, so that children come off the stack in their order.
             for (auto child = node.children.rbegin(); child != node.children.rend(); ++child) {
-                stack.push_back({*child, visit.depth + 1, world});
+                push(stack, *child, visit.depth + 1, world);
             }
         }
         return true;
+    }
+
+    void push(std::vector<Visit>& stack, int node, std::size_t depth, const glm::dmat4& parent) {
+        const auto index = static_cast<std::size_t>(node);
+        const std::string where = numbered("node", index);
+        if (index >= model_.nodes.size()) {
+            fail(where + " is used, but there are " + std::to_string(model_.nodes.size()) + "; correct the JSON.");
+        }
+        // A second visit means a cycle or two parents; glTF allows neither.
+        if (reached_[index]) fail(where + " is reached twice, but the nodes must form trees; correct the JSON.");
+        reached_[index] = true;
+        if (depth > max_node_depth) fail(where + " is nested too deeply; flatten the scene.");
+        stack.push_back({index, depth, parent});
     }
 
     // Accessors of a primitive's vertices. Primitives of one mesh with the same ones share their vertices.
@@ -773,6 +790,7 @@ private:
     void add_mesh(const tinygltf::Mesh& mesh, const Placement& placement) {
         std::map<VertexSource, Index> first_vertices;
         for (const tinygltf::Primitive& primitive : mesh.primitives) {
+            spend(1, bytes_per_visit);
             const bool has_triangles = primitive.mode == TINYGLTF_MODE_TRIANGLES ||
                                        primitive.mode == TINYGLTF_MODE_TRIANGLE_STRIP ||
                                        primitive.mode == TINYGLTF_MODE_TRIANGLE_FAN;
