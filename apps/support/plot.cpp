@@ -13,6 +13,7 @@ namespace {
 constexpr glm::vec3 paper{1.0f}, ink{0.1f}, faint{0.88f}, grid{0.75f};
 constexpr int margin_left = 76, margin_right = 24, margin_top = 46, margin_bottom = 60; // pixels
 constexpr int text_scale = 2;
+constexpr int legend_sample = 34, legend_padding = 12; // pixels
 constexpr double curve_width = 2;      // pixels
 constexpr double dash_px = 8, gap_px = 6;
 
@@ -21,13 +22,20 @@ std::string number(double value) {
     return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
 }
 
+int legend_width(const std::vector<Curve>& curves) {
+    int widest = 0;
+    for (const Curve& curve : curves) widest = std::max(widest, Canvas::text_width(curve.label, text_scale));
+    return widest + legend_sample + 2 * legend_padding;
+}
+
 // Where values lie in the picture.
 class Axes {
 public:
     explicit Axes(const LogLogPlot& plot)
         : low_(std::log10(plot.x_range.x), std::log10(plot.y_range.x)),
           high_(std::log10(plot.x_range.y), std::log10(plot.y_range.y)),
-          left_(margin_left), top_(margin_top), right_(plot.width - margin_right), bottom_(plot.height - margin_bottom) {}
+          left_(margin_left), top_(margin_top), right_(plot.width - legend_width(plot.curves) - margin_right),
+          bottom_(plot.height - margin_bottom) {}
 
     glm::dvec2 place(glm::dvec2 value) const {
         const glm::dvec2 share = (glm::dvec2(std::log10(value.x), std::log10(value.y)) - low_) / (high_ - low_);
@@ -108,19 +116,15 @@ void draw_curve(Canvas& canvas, const Curve& curve, const Axes& axes) {
 }
 
 void draw_legend(Canvas& canvas, const std::vector<Curve>& curves, const Axes& axes) {
-    constexpr int row = 20, sample = 34, padding = 8; // pixels
-    int widest = 0;
-    for (const Curve& curve : curves) widest = std::max(widest, Canvas::text_width(curve.label, text_scale));
-    const int width = widest + sample + 3 * padding, height = static_cast<int>(curves.size()) * row + padding;
-    const int left = axes.right() - width - padding, top = axes.top() + padding;
-    canvas.fill(left, top, width, height, paper);
+    constexpr int row = 20; // pixels
+    const int left = axes.right() + legend_padding;
     for (std::size_t i = 0; i < curves.size(); ++i) {
-        const int y = top + padding + static_cast<int>(i) * row;
-        const glm::dvec2 from(left + padding, y + 7), to(left + padding + sample, y + 7);
+        const int y = axes.top() + static_cast<int>(i) * row;
+        const glm::dvec2 from(left, y + 7), to(left + legend_sample, y + 7);
         double phase = 0;
         if (curves[i].dashed) draw_dashed(canvas, from, to, curves[i].colour, phase);
         else canvas.line(from, to, curves[i].colour, curve_width);
-        canvas.text(left + sample + 2 * padding, y, curves[i].label, ink, text_scale);
+        canvas.text(left + legend_sample + legend_padding, y, curves[i].label, ink, text_scale);
     }
 }
 

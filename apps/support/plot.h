@@ -23,10 +23,10 @@ struct LogLogPlot {
     glm::dvec2 x_range = {0.1, 100};   // positive, ascending
     glm::dvec2 y_range = {1, 1000};
     std::vector<Curve> curves;
-    int width = 960, height = 640;     // pixels
+    int width = 1200, height = 680;     // pixels
 };
 
-// With a grid at 1, 2, 5 of every decade, labels and a legend.
+// With a grid at 1, 2, 5 of every decade, labels, and a legend to the right.
 perception::Image draw(const LogLogPlot& plot);
 
 } // namespace unseen::app

@@ -224,6 +224,8 @@ private:
     }
 
     Result<void> save_picture(const std::string& file) {
+        // Keys that came since the last frame count.
+        static_cast<void>(simplify(cut_, scene_, what_, Purpose::picture));
         const auto frame = renderer_.draw(cut_, scene_.view, draw_, scene_.placement);
         if (!frame) return frame.error();
         return perception::write_image(file, code_image(*frame, scene_.display));

@@ -1,0 +1,358 @@
+// The verbs that need no GPU, and what all verbs have in common: exit status, errors, files.
+#include "run_command.h"
+
+namespace {
+
+using namespace unseen::app::testing;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::Ge;
+using ::testing::HasSubstr;
+using ::testing::Le;
+
+class UsageTest : public CommandTest {};
+class BuildTest : public CommandTest {};
+class InfoTest : public CommandTest {};
+class SimplifyTest : public CommandTest {
+protected:
+    void SetUp() override {
+        CommandTest::SetUp();
+        build_ball();
+    }
+    Json simplify(std::vector<std::string> more, const std::string& out = "out.ply") {
+        std::vector<std::string> words = {"simplify", "ball.vdt", "-o", out, "--json", "-"};
+        words.insert(words.end(), more.begin(), more.end());
+        const Outcome outcome = run(words);
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        const Json report = outcome.json();
+        expect_cut_report(report);
+        return report;
+    }
+    Json info(const std::string& file) {
+        const Outcome outcome = run({"info", file, "--json"});
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        return outcome.json();
+    }
+};
+
+TEST_F(UsageTest, EveryVerbHasHelpWithExamples) {
+    const Outcome top = run({"--help"});
+    EXPECT_EQ(top.status, 0);
+    for (const std::string verb : {"build", "info", "simplify", "compare", "csf"}) {
+        EXPECT_THAT(top.out, HasSubstr("\n  " + verb + " ")) << top.out;
+        const Outcome help = run({verb, "--help"});
+        EXPECT_EQ(help.status, 0) << verb << help.err;
+        EXPECT_THAT(help.out, AllOf(HasSubstr("Examples:"), HasSubstr("unseen " + verb))) << verb;
+        EXPECT_EQ(help.err, "");
+    }
+}
+
+TEST_F(UsageTest, SaysItsVersion) {
+    const Outcome version = run({"--version"});
+    EXPECT_EQ(version.status, 0);
+    EXPECT_THAT(version.out, ::testing::MatchesRegex("unseen [0-9]+\\.[0-9]+\\.[0-9]+\n"));
+}
+
+TEST_F(UsageTest, WrongUsageIsStatusTwoAndLeavesNothing) {
+    write_ball("ball.obj");
+    const std::vector<std::vector<std::string>> wrong = {
+        {},
+        {"frobnicate"},
+        {"--frobnicate"},
+        {"build"},
+        {"build", "ball.obj"},
+        {"build", "ball.obj", "-o", "ball.ply"},
+        {"build", "ball.obj", "-o", "ball.vdt", "--clusterer", "kmeans"},
+        {"build", "ball.obj", "-o", "ball.vdt", "--threads", "0"},
+        {"build", "ball.obj", "-o", "ball.vdt", "--threads", "-1"},
+        {"build", "ball.obj", "-o", "ball.vdt", "extra"},
+        {"info"},
+        {"info", "ball.obj", "--frobnicate"},
+        {"simplify", "ball.obj", "-o", "out.stl"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--eye", "1", "2"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--eye", "nan", "0", "0"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--eye", "1", "inf", "0"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--eye", "1e999", "0", "0"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--eye", "0", "0", "5", "--direction", "0", "0", "1"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--eye", "0", "0", "5", "--target", "0", "0", "5"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--target", "0", "0", "5"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--direction", "0", "0", "0"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--fill", "0"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--fov", "180"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--size", "0x100"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--size", "100"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--size", "100000x100"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--ambient", "1.5"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--unit", "0"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--ppd", "-30"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--distance", "nan"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--triangles", "-1"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--triangles", "0"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--triangles", "1.5"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--pixels", "0"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--full", "--triangles", "5"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--pixels", "1", "--fold-test", "luebke-hallen"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--fold-test", "extent"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--fold-test", "guess"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--gaze", "1"},
+        {"compare", "a.png"},
+        {"compare", "a.png", "b.png", "--model", "rpg99", "--gaze", "1", "1"},
+        {"compare", "a.png", "b.png", "--profile", "perceptualdiff"},
+        {"csf", "--frequency", "4"},
+        {"csf", "--frequency", "0", "--luminance", "1"},
+    };
+    for (const auto& words : wrong) {
+        const Outcome outcome = run(words);
+        const std::string shown = ::testing::PrintToString(words) + "\n" + outcome.err;
+        EXPECT_EQ(outcome.status, 2) << shown;
+        EXPECT_EQ(outcome.out, "") << shown;
+        EXPECT_EQ(outcome.err.rfind("unseen: ", 0), 0U) << shown;
+        EXPECT_THAT(files(), ElementsAre("ball.obj")) << shown;
+    }
+}
+
+TEST_F(UsageTest, TakesNegativeNumbersWithoutLeadingZero) {
+    write_ball("ball.obj", 6, 8);
+    const Outcome outcome =
+        run({"simplify", "ball.obj", "-o", "o.ply", "--eye", "-4", "-.5", "-1e0", "--gaze", "-.5", "-30", "--full"});
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+}
+
+TEST_F(UsageTest, BadInputIsStatusOneWithOneSentenceAndLeavesNothing) {
+    build_ball();
+    const std::string tree = read_text(path("ball.vdt"));
+    write_text(path("empty.ply"), "");
+    write_text(path("noise.vdt"), "this is no tree");
+    write_text(path("cut.vdt"), tree.substr(0, tree.size() / 2));
+    std::string flipped = tree;
+    flipped[flipped.size() / 2] = static_cast<char>(flipped[flipped.size() / 2] ^ 0x10);
+    write_text(path("flipped.vdt"), flipped);
+    write_text(path("nan.obj"), "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n");
+    write_text(path("range.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n");
+    write_text(path("points.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\n");
+    write_text(path("lines.obj"), "v 0 0 0\nv 1 0 0\nf 1 2 2\n");
+    write_text(path("display.json"), "{\"width_px\": -5}");
+    const auto before = files();
+    const std::vector<std::vector<std::string>> bad = {
+        {"build", "missing.ply", "-o", "o.vdt"},
+        {"build", "empty.ply", "-o", "o.vdt"},
+        {"build", "nan.obj", "-o", "o.vdt"},
+        {"build", "range.obj", "-o", "o.vdt"},
+        {"build", "points.obj", "-o", "o.vdt"},
+        {"build", "lines.obj", "-o", "o.vdt"},
+        {"build", "ball.vdt", "-o", "o.vdt"},
+        {"build", "ball.obj", "-o", "missing/o.vdt"},
+        {"build", ".", "-o", "o.vdt"},
+        {"info", "missing.vdt"},
+        {"info", "noise.vdt"},
+        {"info", "cut.vdt"},
+        {"info", "flipped.vdt", "--verify"},
+        {"info", "empty.ply", "--json"},
+        {"simplify", "cut.vdt", "-o", "o.ply"},
+        {"simplify", "flipped.vdt", "-o", "o.ply", "--json", "o.json"},
+        {"simplify", "ball.vdt", "-o", "missing/o.ply", "--json", "o.json"},
+        {"simplify", "ball.vdt", "-o", "o.ply", "--json", "missing/o.json"},
+        {"simplify", "ball.vdt", "-o", "o.ply", "--display", "display.json"},
+        {"simplify", "ball.vdt", "-o", "o.ply", "--csf", "display.json"},
+        {"simplify", "ball.vdt", "-o", "o.ply", "--peak", "0.1"},
+        {"simplify", "ball.vdt", "-o", "o.ply", "--background", "1000"},
+        {"simplify", "ball.vdt", "-o", "o.ply", "--direction", "0", "0", "1", "--up", "0", "0", "2"},
+        {"compare", "missing.png", "ball.obj"},
+        {"compare", "ball.obj", "ball.obj", "--json", "o.json", "--map", "o.png"},
+        {"csf", "--csv", "missing.csv"},
+    };
+    for (const auto& words : bad) {
+        const Outcome outcome = run(words);
+        const std::string shown = ::testing::PrintToString(words) + "\n" + outcome.err;
+        EXPECT_EQ(outcome.status, 1) << shown;
+        EXPECT_EQ(outcome.out, "") << shown;
+        EXPECT_THAT(outcome.err, IsAnErrorForPeople()) << shown;
+        EXPECT_EQ(files(), before) << shown;
+    }
+}
+
+TEST_F(UsageTest, DoesNotOverwriteItsInput) {
+    build_ball();
+    const std::string tree = read_text(path("ball.vdt")), mesh = read_text(path("ball.obj"));
+    EXPECT_EQ(run({"simplify", "ball.obj", "-o", "./ball.obj"}).status, 1);
+    EXPECT_EQ(run({"build", "ball.vdt", "-o", "ball.vdt"}).status, 1);
+    EXPECT_EQ(read_text(path("ball.obj")), mesh);
+    EXPECT_TRUE(read_text(path("ball.vdt")) == tree);
+}
+
+TEST_F(BuildTest, ReportsATreeWithEitherClusterer) {
+    write_ball("ball.obj");
+    for (const std::string clusterer : {"quadric", "octree"}) {
+        const Outcome built = run({"build", "ball.obj", "-o", "t.vdt", "--clusterer", clusterer, "--json", "-"});
+        ASSERT_EQ(built.status, 0) << built.err;
+        EXPECT_EQ(built.err, "") << "quiet in pipes";
+        const Json report = built.json();
+        EXPECT_EQ(report["vertices"], ball_vertices);
+        EXPECT_EQ(report["triangles"], ball_triangles);
+        EXPECT_EQ(report["dropped"], 0);
+        EXPECT_GT(report["nodes"], ball_vertices);
+        EXPECT_GT(report["bytes"], 0);
+        const Outcome verified = run({"info", "t.vdt", "--verify", "--json"});
+        EXPECT_EQ(verified.status, 0) << verified.err;
+        EXPECT_EQ(verified.json()["closed"], true);
+    }
+}
+
+TEST_F(BuildTest, TheTreeDoesNotDependOnTheThreads) {
+    write_ball("ball.obj");
+    ASSERT_EQ(run({"build", "ball.obj", "-o", "one.vdt", "--threads", "1"}).status, 0);
+    ASSERT_EQ(run({"build", "ball.obj", "-o", "two.vdt", "--threads", "2"}).status, 0);
+    EXPECT_TRUE(read_text(path("one.vdt")) == read_text(path("two.vdt")));
+}
+
+TEST_F(BuildTest, RemembersDroppedTriangles) {
+    write_text(path("m.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 1 2\nf 3 2 3\n");
+    ASSERT_EQ(run({"build", "m.obj", "-o", "m.vdt"}).status, 0);
+    for (const std::string file : {"m.obj", "m.vdt"}) {
+        const Json info = run({"info", file, "--json"}).json();
+        EXPECT_EQ(info["triangles"], 1) << file;
+        EXPECT_EQ(info["dropped"], 2) << file;
+    }
+    const Json report = run({"simplify", "m.vdt", "-o", "o.ply", "--full", "--json", "-"}).json();
+    EXPECT_EQ(report["source_triangles"], 1);
+    EXPECT_EQ(report["dropped"], 2);
+}
+
+TEST_F(InfoTest, HasTheStableKeys) {
+    build_ball();
+    for (const std::string file : {"ball.obj", "ball.vdt"}) {
+        const Outcome outcome = run({"info", file, "--json"});
+        ASSERT_EQ(outcome.status, 0) << outcome.err;
+        const Json info = outcome.json();
+        EXPECT_EQ(info["vertices"], ball_vertices);
+        EXPECT_EQ(info["triangles"], ball_triangles);
+        EXPECT_TRUE(info["dropped"].is_number_unsigned());
+        EXPECT_TRUE(info["bytes"].is_number_unsigned());
+        EXPECT_EQ(info["nodes"].is_null(), file == "ball.obj");
+        const Outcome table = run({"info", file});
+        EXPECT_EQ(table.status, 0);
+        EXPECT_THAT(table.out, HasSubstr("triangles"));
+    }
+}
+
+TEST_F(SimplifyTest, TheMeshHasTheReportedTriangles) {
+    for (const std::string out : {"out.ply", "out.obj", "out.glb"}) {
+        const Json report = simplify({"--triangles", "300"}, out);
+        EXPECT_EQ(report["source_triangles"], ball_triangles);
+        EXPECT_EQ(report["dropped"], 0);
+        EXPECT_THAT(report["triangles"].get<int>(), AllOf(Ge(250), Le(300)));
+        EXPECT_GT(report["node_tests"], 0);
+        EXPECT_TRUE(report["draw_ms"].is_null());
+        EXPECT_EQ(info(out)["triangles"], report["triangles"]) << out;
+    }
+}
+
+TEST_F(SimplifyTest, FullIsTheInput) {
+    const Json report = simplify({"--full"});
+    EXPECT_EQ(report["triangles"], ball_triangles);
+    EXPECT_EQ(report["max_fold_cost"], 0.0);
+    EXPECT_EQ(report["imperceptible_from_m"], 0.0);
+    const Json mesh = info("out.ply");
+    EXPECT_EQ(mesh["triangles"], ball_triangles);
+    EXPECT_EQ(mesh["vertices"], ball_vertices);
+}
+
+TEST_F(SimplifyTest, TheImperceptibleDistanceIsTheDisplaysTimesTheCost) {
+    const Json near = simplify({"--triangles", "300", "--distance", "0.5", "--ppd", "34"});
+    ASSERT_TRUE(near["max_fold_cost"].is_number());
+    EXPECT_GT(near["max_fold_cost"], 1);
+    EXPECT_NEAR(near["imperceptible_from_m"].get<double>(), 0.5 * near["max_fold_cost"].get<double>(), 1e-9);
+    EXPECT_EQ(effect_named(near, "imperceptible distance")["on"], true);
+    // Twice as far away with as many pixels a degree, the picture is the same.
+    const Json far = simplify({"--triangles", "300", "--distance", "1", "--ppd", "34"});
+    EXPECT_NEAR(far["imperceptible_from_m"].get<double>(), 2 * near["imperceptible_from_m"].get<double>(), 1e-6);
+    EXPECT_EQ(far["triangles"], near["triangles"]);
+}
+
+TEST_F(SimplifyTest, ImperceptibleCutsKeepMoreNearTheGaze) {
+    const Json anywhere = simplify({});
+    EXPECT_EQ(effect_named(anywhere, "gaze")["on"], false);
+    EXPECT_TRUE(anywhere["max_fold_cost"] <= 1);
+    const Json beside = simplify({"--gaze", "3000", "512"});
+    EXPECT_EQ(effect_named(beside, "gaze")["on"], true);
+    EXPECT_LT(beside["triangles"], anywhere["triangles"]);
+}
+
+TEST_F(SimplifyTest, PixelTestsKnowNoDistance) {
+    int last = 0;
+    for (const std::string test : {"extent", "displacement"}) {
+        const Json report = simplify({"--pixels", "20", "--fold-test", test});
+        EXPECT_TRUE(report["imperceptible_from_m"].is_null());
+        EXPECT_TRUE(report["max_fold_cost"].get<double>() <= 1);
+        EXPECT_EQ(effect_named(report, "imperceptible distance")["on"], false);
+        EXPECT_THAT(effect_named(report, "imperceptible distance")["why"], HasSubstr(test));
+        EXPECT_NE(report["triangles"], last);
+        last = report["triangles"];
+    }
+    EXPECT_EQ(simplify({"--pixels", "20"})["triangles"], simplify({"--pixels", "20", "--fold-test", "extent"})["triangles"]);
+    EXPECT_GT(simplify({"--pixels", "5"})["triangles"], simplify({"--pixels", "50"})["triangles"]);
+}
+
+TEST_F(SimplifyTest, UnboundedCostsAreNull) {
+    // With the eye at a vertex, the folds above that vertex can be seen from any distance; ten triangles do not do
+    // without them.
+    const Json report = simplify({"--eye", "0", "1", "0", "--up", "1", "0", "0", "--triangles", "10"});
+    EXPECT_TRUE(report["max_fold_cost"].is_null());
+    EXPECT_TRUE(report["imperceptible_from_m"].is_null());
+}
+
+TEST_F(SimplifyTest, TheUnitScalesTheWorldAndTheFrameWithIt) {
+    const Json metres = simplify({"--triangles", "300"});
+    const Json millimetres = simplify({"--triangles", "300", "--unit", "0.001"});
+    EXPECT_EQ(metres["triangles"], millimetres["triangles"]);
+    EXPECT_NEAR(metres["max_fold_cost"].get<double>(), millimetres["max_fold_cost"].get<double>(),
+                1e-5 * metres["max_fold_cost"].get<double>());
+    // An eye of its own does not scale: a smaller ball needs fewer triangles.
+    const Json large = simplify({"--eye", "0", "0", "9", "--pixels", "10"});
+    const Json small = simplify({"--eye", "0", "0", "9", "--pixels", "10", "--unit", "0.1"});
+    EXPECT_GT(large["triangles"], small["triangles"]);
+}
+
+TEST_F(SimplifyTest, SaysWhichEffectsRan) {
+    const Json plain = simplify({});
+    EXPECT_EQ(effect_named(plain, "light")["on"], false);
+    EXPECT_EQ(effect_named(plain, "frustum culling")["on"], false);
+    EXPECT_EQ(effect_named(plain, "magnification")["on"], false);
+    EXPECT_EQ(effect_named(plain, "silhouettes")["on"], true);
+    EXPECT_EQ(effect_named(plain, "csf table")["on"], false);
+    const Json changed = simplify({"--light", "1", "0", "0", "--ambient", "0.5", "--fov", "5"});
+    EXPECT_EQ(effect_named(changed, "light")["on"], true);
+    EXPECT_EQ(effect_named(changed, "magnification")["on"], true);
+}
+
+TEST_F(SimplifyTest, ReportsToAFileBesideTheTable) {
+    const Outcome outcome = run({"simplify", "ball.vdt", "-o", "o.ply", "--json", "o.json"});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_THAT(outcome.out, HasSubstr("triangles"));
+    expect_cut_report(Json::parse(read_text(path("o.json"))));
+    EXPECT_THAT(files(), ElementsAre("ball.obj", "ball.vdt", "o.json", "o.ply"));
+}
+
+TEST_F(SimplifyTest, TakesMeshesToo) {
+    const Outcome outcome = run({"simplify", "ball.obj", "-o", "o.ply", "--triangles", "300", "--json", "-"});
+    ASSERT_EQ(outcome.status, 0);
+    EXPECT_THAT(outcome.err, AllOf(HasSubstr("note"), HasSubstr("unseen build")));
+    EXPECT_EQ(outcome.json()["triangles"], simplify({"--triangles", "300"})["triangles"]);
+}
+
+TEST_F(SimplifyTest, ReadsDisplaysAndViewers) {
+    write_text(path("far.json"), R"({"width_px": 1920, "height_px": 1080, "diagonal_m": 0.6, "viewing_distance_m": 3,
+                                     "peak_cdm2": 100, "black_cdm2": 0.5})");
+    ASSERT_EQ(run({"csf", "--table", "--model", "stela", "--save-table", "stela.json"}).status, 0);
+    EXPECT_LT(simplify({"--display", "far.json"})["triangles"], simplify({"--distance", "0.3"})["triangles"]);
+    EXPECT_EQ(effect_named(simplify({"--csf", "stela.json"}), "csf table")["on"], true);
+}
+
+TEST_F(SimplifyTest, ASingleTriangleIsValid) {
+    write_text(path("one.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    const Outcome outcome = run({"simplify", "one.obj", "-o", "one.ply", "--full", "--json", "-"});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_EQ(outcome.json()["triangles"], 1);
+}
+
+} // namespace

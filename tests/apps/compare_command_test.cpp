@@ -1,0 +1,145 @@
+// unseen compare: counts, maps, and the two judges.
+#include "run_command.h"
+
+#include <perception/image.h>
+
+namespace {
+
+using namespace unseen::app::testing;
+using unseen::perception::Image;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::UnorderedElementsAre;
+
+class CompareTest : public CommandTest {
+protected:
+    // A disc of two degrees on grey, in the middle of a field of four.
+    Image disc(float inside, float outside) const {
+        Image image{128, 128, 1, {}};
+        for (int y = 0; y < 128; ++y)
+            for (int x = 0; x < 128; ++x)
+                image.values.push_back(std::hypot(x - 63.5, y - 63.5) < 34 ? inside : outside);
+        return image;
+    }
+    void write(const std::string& name, const Image& image) const {
+        const auto written = unseen::perception::write_image(path(name), image);
+        ASSERT_TRUE(written) << written.error().message;
+    }
+    Json compare(std::vector<std::string> words) const {
+        words.insert(words.begin(), "compare");
+        words.insert(words.end(), {"--json", "-"});
+        const Outcome outcome = run(words);
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        const Json report = outcome.json();
+        EXPECT_THAT(keys(report), UnorderedElementsAre("visible_pixels", "pixels", "max_ratio", "ssim"));
+        EXPECT_TRUE(report["visible_pixels"].is_number_unsigned()) << report;
+        EXPECT_EQ(report["pixels"], 128 * 128) << report;
+        return report;
+    }
+};
+
+TEST_F(CompareTest, IdenticalImagesShowNothing) {
+    write("a.pfm", disc(30, 20));
+    write("a.exr", disc(30, 20));
+    write("a.png", disc(0.6f, 0.5f));
+    for (const std::string model : {"modern", "rpg99"}) {
+        for (const std::string name : {"a.pfm", "a.exr", "a.png"}) {
+            const Json report = compare({name, name, "--model", model});
+            EXPECT_EQ(report["visible_pixels"], 0) << name << model;
+            EXPECT_EQ(report["max_ratio"], 0.0) << name << model;
+            if (name == "a.png") {
+                EXPECT_NEAR(report["ssim"].get<double>(), 1, 1e-12);
+            } else {
+                EXPECT_TRUE(report["ssim"].is_null()) << name;
+            }
+        }
+    }
+}
+
+TEST_F(CompareTest, ATenPercentStepIsVisible) {
+    write("a.pfm", disc(20, 20));
+    write("b.pfm", disc(22, 20));
+    const Json report = compare({"a.pfm", "b.pfm"});
+    EXPECT_GT(report["visible_pixels"], 100);
+    EXPECT_GT(report["max_ratio"], 1.0);
+}
+
+TEST_F(CompareTest, ItIsLessVisibleAside) {
+    write("a.pfm", disc(20, 20));
+    write("b.pfm", disc(22, 20));
+    const Json beside = compare({"a.pfm", "b.pfm", "--gaze", "-2000", "64"});
+    EXPECT_LT(beside["max_ratio"], compare({"a.pfm", "b.pfm"})["max_ratio"]);
+}
+
+TEST_F(CompareTest, PngIsDecodedByTheDisplay) {
+    // 0.5 on a display of 100 over 0.5 cd/m2 with sRGB is 21.4 % of the span, and code 128 of 255 a little more.
+    write("a.png", disc(0.5f, 0.5f));
+    write("b.pfm", disc(21.977f, 21.977f));
+    EXPECT_EQ(compare({"a.png", "b.pfm"})["visible_pixels"], 0);
+    EXPECT_LT(compare({"a.png", "b.pfm"})["max_ratio"], 0.1);
+    EXPECT_GT(compare({"a.png", "b.pfm", "--peak", "200"})["max_ratio"], 1.0);
+    EXPECT_TRUE(compare({"a.png", "b.pfm"})["ssim"].is_null());
+}
+
+TEST_F(CompareTest, FailsAboveALimit) {
+    write("a.pfm", disc(20, 20));
+    write("b.pfm", disc(30, 20));
+    const auto visible = compare({"a.pfm", "b.pfm"})["visible_pixels"].get<int>();
+    ASSERT_GT(visible, 0);
+    EXPECT_EQ(run({"compare", "a.pfm", "b.pfm", "--fail-above", std::to_string(visible)}).status, 0);
+    EXPECT_EQ(run({"compare", "a.pfm", "b.pfm", "--fail-above", std::to_string(visible - 1)}).status, 1);
+    EXPECT_EQ(run({"compare", "a.pfm", "a.pfm", "--fail-above", "0"}).status, 0);
+}
+
+TEST_F(CompareTest, WritesMaps) {
+    write("a.pfm", disc(20, 20));
+    write("b.pfm", disc(40, 20));
+    for (const std::string model : {"modern", "rpg99"}) {
+        compare({"a.pfm", "b.pfm", "--model", model, "--map", "map.png", "--threshold-map", "t.pfm"});
+        const auto map = unseen::perception::read_image(path("map.png"));
+        ASSERT_TRUE(map) << map.error().message;
+        EXPECT_EQ(map->image.width, 128);
+        EXPECT_EQ(map->image.channels, 3);
+        // Red or yellow in the disc's rim, where the difference is seen; blue or black in the far corner.
+        const Image& image = map->image;
+        EXPECT_GT(image.at(64 + 33, 64, 0), image.at(64 + 33, 64, 2)) << model;
+        const auto thresholds = unseen::perception::read_image(path("t.pfm"));
+        ASSERT_TRUE(thresholds) << thresholds.error().message;
+        EXPECT_TRUE(thresholds->is_absolute);
+        for (const float threshold : thresholds->image.values) ASSERT_GT(threshold, 0.0f) << model;
+        fs::remove(path("map.png"));
+        fs::remove(path("t.pfm"));
+    }
+}
+
+TEST_F(CompareTest, AMapThatCannotBeWrittenLeavesNoOtherFile) {
+    write("a.pfm", disc(20, 20));
+    const auto before = files();
+    const Outcome outcome = run({"compare", "a.pfm", "a.pfm", "--map", "map.png", "--threshold-map", "missing/t.pfm",
+                                 "--json", "o.json"});
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_THAT(outcome.err, IsAnErrorForPeople());
+    EXPECT_EQ(files(), before);
+}
+
+TEST_F(CompareTest, SizesMustMatch) {
+    write("a.pfm", disc(20, 20));
+    write("b.pfm", Image{2, 1, 1, {1, 2}});
+    const Outcome outcome = run({"compare", "a.pfm", "b.pfm"});
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_THAT(outcome.err, IsAnErrorForPeople());
+    EXPECT_THAT(outcome.err, ::testing::AllOf(HasSubstr("128x128"), HasSubstr("2x1")));
+}
+
+TEST_F(CompareTest, PerceptualDiffHasNoBlackLevel) {
+    // Black against code 3: 0.0057 cd/m2 by gamma 2.2 over black 0; the default display adds 0.5 to both.
+    write("a.png", disc(0, 0));
+    write("b.png", disc(3.0f / 255, 0));
+    const Json program = compare({"a.png", "b.png", "--model", "rpg99", "--profile", "perceptualdiff"});
+    const Json display = compare({"a.png", "b.png", "--model", "rpg99"});
+    EXPECT_GT(program["visible_pixels"], 0);
+    EXPECT_LT(display["max_ratio"], program["max_ratio"]);
+    EXPECT_EQ(compare({"a.png", "b.png", "--model", "rpg99", "--display", "perceptualdiff"}), program);
+}
+
+} // namespace

@@ -1,0 +1,186 @@
+// Runs the command `unseen` as a user does, in a folder of the test's own.
+#pragma once
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <fcntl.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+extern char** environ;
+
+namespace unseen::app::testing {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+inline std::string read_text(const fs::path& file) {
+    std::ifstream stream(file, std::ios::binary);
+    std::stringstream text;
+    text << stream.rdbuf();
+    return text.str();
+}
+
+inline void write_text(const fs::path& file, const std::string& text) {
+    std::ofstream(file, std::ios::binary) << text;
+}
+
+// Waits for a process; its exit status, or minus the signal that ended it.
+inline int wait_for(pid_t process) {
+    int status = 0;
+    if (waitpid(process, &status, 0) != process) return -1000;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+}
+
+struct Outcome {
+    int status = 0;
+    std::string out, err;
+
+    Json json() const { return Json::parse(out, nullptr, false); }
+};
+
+// A fixture with an empty folder, where the command runs.
+class CommandTest : public ::testing::Test {
+protected:
+    void SetUp() override {
+        std::string name = (fs::temp_directory_path() / "unseen-test-XXXXXX").string();
+        ASSERT_NE(mkdtemp(name.data()), nullptr);
+        folder_ = name;
+    }
+    void TearDown() override {
+        std::error_code ignored;
+        fs::remove_all(folder_, ignored);
+    }
+
+    const fs::path& folder() const { return folder_; }
+    fs::path path(const std::string& name) const { return folder_ / name; }
+
+    pid_t start(const std::vector<std::string>& arguments, const fs::path& out, const fs::path& err,
+                const std::string& input = {}) const {
+        write_text(out.string() + ".in", input);
+        std::vector<std::string> words = {UNSEEN_COMMAND};
+        words.insert(words.end(), arguments.begin(), arguments.end());
+        std::vector<char*> argv;
+        for (std::string& word : words) argv.push_back(word.data());
+        argv.push_back(nullptr);
+        posix_spawn_file_actions_t actions;
+        posix_spawn_file_actions_init(&actions);
+        posix_spawn_file_actions_addopen(&actions, 0, (out.string() + ".in").c_str(), O_RDONLY, 0);
+        posix_spawn_file_actions_addopen(&actions, 1, out.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+        posix_spawn_file_actions_addopen(&actions, 2, err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+        posix_spawn_file_actions_addchdir_np(&actions, folder_.c_str());
+        pid_t process = -1;
+        const int failed = posix_spawn(&process, UNSEEN_COMMAND, &actions, nullptr, argv.data(), environ);
+        posix_spawn_file_actions_destroy(&actions);
+        return failed ? -1 : process;
+    }
+
+    Outcome run(const std::vector<std::string>& arguments, const std::string& input = {}) const {
+        // Beside the folder, so that its content is the command's alone.
+        const fs::path out = folder_.string() + ".out", err = folder_.string() + ".err";
+        const pid_t process = start(arguments, out, err, input);
+        EXPECT_GT(process, 0) << UNSEEN_COMMAND;
+        Outcome outcome;
+        outcome.status = wait_for(process);
+        outcome.out = read_text(out);
+        outcome.err = read_text(err);
+        for (const fs::path& file : {out, err, fs::path(out.string() + ".in")}) fs::remove(file);
+        return outcome;
+    }
+
+    std::set<std::string> files() const {
+        std::set<std::string> names;
+        for (const auto& entry : fs::directory_iterator(folder_)) names.insert(entry.path().filename().string());
+        return names;
+    }
+
+    // A bumpy closed ball of 2 * rings * sectors - 2 * sectors triangles, about a unit large.
+    fs::path write_ball(const std::string& name, int rings = 24, int sectors = 32) const {
+        std::ostringstream obj;
+        const double pi = std::numbers::pi;
+        obj << "v 0 1 0\nv 0 -1 0\n";
+        for (int r = 1; r < rings; ++r) {
+            for (int s = 0; s < sectors; ++s) {
+                const double polar = pi * r / rings, turn = 2 * pi * s / sectors;
+                const double radius = 1 + 0.05 * std::sin(5 * turn) * std::sin(4 * polar);
+                obj << "v " << radius * std::sin(polar) * std::sin(turn) << ' ' << radius * std::cos(polar) << ' '
+                    << radius * std::sin(polar) * std::cos(turn) << '\n';
+            }
+        }
+        const auto vertex = [&](int r, int s) { return 3 + (r - 1) * sectors + s % sectors; };
+        for (int s = 0; s < sectors; ++s) {
+            obj << "f 1 " << vertex(1, s) << ' ' << vertex(1, s + 1) << '\n';
+            obj << "f 2 " << vertex(rings - 1, s + 1) << ' ' << vertex(rings - 1, s) << '\n';
+            for (int r = 1; r + 1 < rings; ++r) {
+                obj << "f " << vertex(r, s) << ' ' << vertex(r + 1, s) << ' ' << vertex(r + 1, s + 1) << '\n';
+                obj << "f " << vertex(r, s) << ' ' << vertex(r + 1, s + 1) << ' ' << vertex(r, s + 1) << '\n';
+            }
+        }
+        write_text(path(name), obj.str());
+        return path(name);
+    }
+    static constexpr int ball_triangles = 2 * 32 * 23;
+    static constexpr int ball_vertices = 2 + 32 * 23;
+
+    // The ball's tree, as ball.vdt.
+    void build_ball() const {
+        write_ball("ball.obj");
+        const Outcome built = run({"build", "ball.obj", "-o", "ball.vdt", "--threads", "1"});
+        ASSERT_EQ(built.status, 0) << built.err;
+    }
+
+private:
+    fs::path folder_;
+};
+
+// One sentence for people, on stderr.
+MATCHER(IsAnErrorForPeople, "one sentence that begins with 'unseen: '") {
+    return arg.rfind("unseen: ", 0) == 0 && std::count(arg.begin(), arg.end(), '\n') == 1;
+}
+
+inline std::set<std::string> keys(const Json& object) {
+    std::set<std::string> names;
+    for (const auto& item : object.items()) names.insert(item.key());
+    return names;
+}
+
+// The keys that simplify and render report, with their types.
+inline void expect_cut_report(const Json& report) {
+    ASSERT_TRUE(report.is_object()) << report;
+    EXPECT_THAT(keys(report), ::testing::UnorderedElementsAre(
+                                  "source_triangles", "triangles", "dropped", "node_tests", "adapt_ms", "extract_ms",
+                                  "draw_ms", "imperceptible_from_m", "max_fold_cost", "effects"));
+    for (const char* key : {"source_triangles", "triangles", "dropped", "node_tests"})
+        EXPECT_TRUE(report[key].is_number_unsigned()) << key << ": " << report[key];
+    for (const char* key : {"adapt_ms", "extract_ms"})
+        EXPECT_TRUE(report[key].is_number_float() && report[key] >= 0) << key << ": " << report[key];
+    for (const char* key : {"draw_ms", "imperceptible_from_m", "max_fold_cost"})
+        EXPECT_TRUE(report[key].is_number() || report[key].is_null()) << key << ": " << report[key];
+    ASSERT_TRUE(report["effects"].is_array());
+    for (const Json& effect : report["effects"]) {
+        EXPECT_THAT(keys(effect), ::testing::UnorderedElementsAre("name", "on", "why"));
+        EXPECT_TRUE(effect["name"].is_string() && effect["on"].is_boolean() && effect["why"].is_string()) << effect;
+        EXPECT_FALSE(effect["why"].get<std::string>().empty()) << effect;
+    }
+}
+
+inline Json effect_named(const Json& report, const std::string& name) {
+    for (const Json& effect : report["effects"])
+        if (effect["name"] == name) return effect;
+    return {};
+}
+
+} // namespace unseen::app::testing

@@ -1,0 +1,247 @@
+// unseen view under X, driven by synthetic events: what the window's title says follows the keys and the mouse.
+#include "run_command.h"
+#include "virtual_display.h"
+
+#include <chrono>
+#include <csignal>
+#include <memory>
+#include <thread>
+
+#include <perception/image.h>
+
+#include <X11/Xlib.h>
+#include <X11/Xutil.h>
+#include <X11/keysym.h>
+
+namespace {
+
+using namespace unseen::app::testing;
+using unseen::render::testing::VirtualDisplay;
+using ::testing::HasSubstr;
+
+constexpr std::chrono::seconds patience{60}; // software rendering on a busy machine
+constexpr std::chrono::milliseconds pause{20};
+
+// The viewer's process and window, seen from another client.
+class RemoteWindow {
+public:
+    explicit RemoteWindow(Display* display) : display_(display) {}
+
+    bool find() {
+        const auto end = std::chrono::steady_clock::now() + patience;
+        while (std::chrono::steady_clock::now() < end) {
+            window_ = search(DefaultRootWindow(display_));
+            if (window_) return true;
+            std::this_thread::sleep_for(pause);
+        }
+        return false;
+    }
+
+    std::string title() const { return title_of(window_); }
+
+    // Waits until the title contains a text; the last title if it never does.
+    std::string title_with(const std::string& text) const {
+        const auto end = std::chrono::steady_clock::now() + patience;
+        std::string last;
+        while (std::chrono::steady_clock::now() < end) {
+            last = title();
+            if (last.find(text) != std::string::npos) return last;
+            std::this_thread::sleep_for(pause);
+        }
+        return last;
+    }
+
+    void press(KeySym key, unsigned modifiers = 0) {
+        XEvent event{};
+        event.xkey.keycode = XKeysymToKeycode(display_, key);
+        event.xkey.state = modifiers;
+        for (const int type : {KeyPress, KeyRelease}) {
+            fill(event.xkey, type);
+            send(event, type == KeyPress ? KeyPressMask : KeyReleaseMask);
+        }
+    }
+
+    void move_to(int x, int y, unsigned held = 0) {
+        XEvent event{};
+        fill(event.xmotion, MotionNotify);
+        event.xmotion.x = x;
+        event.xmotion.y = y;
+        event.xmotion.state = held;
+        send(event, PointerMotionMask);
+    }
+
+    void button(unsigned number, bool is_down, int x, int y) {
+        XEvent event{};
+        fill(event.xbutton, is_down ? ButtonPress : ButtonRelease);
+        event.xbutton.button = number;
+        event.xbutton.x = x;
+        event.xbutton.y = y;
+        send(event, is_down ? ButtonPressMask : ButtonReleaseMask);
+    }
+
+private:
+    std::string title_of(Window window) const {
+        char* text = nullptr;
+        std::string title;
+        if (XFetchName(display_, window, &text) && text) title = text;
+        if (text) XFree(text);
+        return title;
+    }
+
+    Window search(Window window) const {
+        if (title_of(window).rfind("Unseen", 0) == 0) return window;
+        Window root = 0, parent = 0, found = 0;
+        Window* children = nullptr;
+        unsigned count = 0;
+        if (!XQueryTree(display_, window, &root, &parent, &children, &count)) return 0;
+        for (unsigned i = 0; i < count && !found; ++i) found = search(children[i]);
+        if (children) XFree(children);
+        return found;
+    }
+
+    template <class Event>
+    void fill(Event& event, int type) {
+        event.type = type;
+        event.display = display_;
+        event.window = window_;
+        event.root = DefaultRootWindow(display_);
+        event.same_screen = True;
+        event.time = ++time_;
+    }
+
+    void send(XEvent& event, long mask) {
+        XSendEvent(display_, window_, True, mask, &event);
+        XFlush(display_);
+    }
+
+    Display* display_;
+    Window window_ = 0;
+    Time time_ = 1;
+};
+
+class ViewCommandTest : public CommandTest {
+protected:
+    void SetUp() override {
+        CommandTest::SetUp();
+        screen_ = std::make_unique<VirtualDisplay>();
+        if (!screen_->reason().empty()) GTEST_SKIP() << "no display: " << screen_->reason();
+        display_ = XOpenDisplay(nullptr);
+        if (!display_) GTEST_SKIP() << "the display does not answer";
+        build_ball();
+    }
+    void TearDown() override {
+        if (process_ > 0) {
+            kill(process_, SIGKILL);
+            wait_for(process_);
+        }
+        if (display_) XCloseDisplay(display_);
+        if (screen_ && screen_->reason().empty()) unsetenv("DISPLAY"); // the next test has a screen of its own
+        screen_.reset();
+        CommandTest::TearDown();
+    }
+
+    // False, with the reason, where no window with OpenGL can be opened.
+    bool open(std::vector<std::string> more) {
+        std::vector<std::string> words = {"view", "ball.vdt", "--size", "200x160"};
+        words.insert(words.end(), more.begin(), more.end());
+        process_ = start(words, path("out.txt"), path("err.txt"));
+        window_ = std::make_unique<RemoteWindow>(display_);
+        return process_ > 0 && window_->find();
+    }
+    int ended() {
+        const int status = wait_for(process_);
+        process_ = -1;
+        return status;
+    }
+    // "... budget of 368: ..." -> 368
+    static int budget_in(const std::string& title) {
+        const std::size_t at = title.find("budget of ");
+        return at == std::string::npos ? -1 : std::atoi(title.c_str() + at + 10);
+    }
+
+    RemoteWindow& window() { return *window_; }
+    std::string errors() const { return read_text(path("err.txt")); }
+
+private:
+    std::unique_ptr<VirtualDisplay> screen_;
+    Display* display_ = nullptr;
+    std::unique_ptr<RemoteWindow> window_;
+    pid_t process_ = -1;
+};
+
+TEST_F(ViewCommandTest, FollowsKeysAndMouse) {
+    if (!open({"--screenshot", "last.png"})) GTEST_SKIP() << "no window: " << errors();
+    EXPECT_THAT(window().title_with("imperceptible"), HasSubstr("triangles"));
+
+    window().press(XK_1);
+    EXPECT_THAT(window().title_with("full"), HasSubstr("1,472 of 1,472"));
+
+    window().press(XK_3);
+    const int budget = budget_in(window().title_with("budget"));
+    EXPECT_EQ(budget, ball_triangles / 4);
+    window().press(XK_minus);
+    EXPECT_EQ(budget_in(window().title_with("budget of 294")), 294); // 368 / 1.25
+    window().press(XK_plus, ShiftMask);
+    EXPECT_EQ(budget_in(window().title_with("budget of 368")), 368);
+
+    window().press(XK_4);
+    window().move_to(190, 80);
+    EXPECT_THAT(window().title_with("gaze-directed"), HasSubstr("luebke-hallen"));
+
+    window().press(XK_w);
+    window().press(XK_f);
+    window().press(XK_s);
+    window().press(XK_h);
+    window().press(XK_q);
+    EXPECT_EQ(ended(), 0) << errors();
+    EXPECT_THAT(read_text(path("out.txt")), HasSubstr("wireframe")) << "the help";
+    EXPECT_THAT(errors(), HasSubstr("wrote 'unseen-"));
+    const auto last = unseen::perception::read_image(path("last.png"));
+    ASSERT_TRUE(last) << last.error().message;
+    EXPECT_EQ(last->image.width, 200);
+    int pictures = 0;
+    for (const std::string& name : files()) pictures += name.ends_with(".png");
+    EXPECT_EQ(pictures, 2);
+}
+
+TEST_F(ViewCommandTest, DraggingTurnsAndTheWheelZooms) {
+    if (!open({"--triangles", "200", "--screenshot", "moved.png"})) GTEST_SKIP() << "no window: " << errors();
+    window().title_with("budget");
+    window().button(Button1, true, 100, 80);
+    window().move_to(160, 110, Button1Mask);
+    window().button(Button1, false, 160, 110);
+    for (int notch = 0; notch < 5; ++notch) {
+        window().button(Button4, true, 160, 110);
+        window().button(Button4, false, 160, 110);
+    }
+    window().press(XK_Escape);
+    ASSERT_EQ(ended(), 0) << errors();
+
+    ASSERT_TRUE(open({"--triangles", "200", "--screenshot", "still.png", "--frames", "2"}));
+    ASSERT_EQ(ended(), 0) << errors();
+    const auto moved = unseen::perception::read_image(path("moved.png"));
+    const auto still = unseen::perception::read_image(path("still.png"));
+    ASSERT_TRUE(moved && still);
+    // Nearer: the ball covers more of the window, so less of it is background.
+    const auto background = [](const unseen::perception::Image& image) {
+        const float corner = image.at(0, 0);
+        return std::count(image.values.begin(), image.values.end(), corner);
+    };
+    EXPECT_LT(background(moved->image), background(still->image) * 9 / 10);
+}
+
+TEST_F(ViewCommandTest, ResetGoesBackToTheFirstView) {
+    if (!open({"--screenshot", "reset.png", "--triangles", "200"})) GTEST_SKIP() << "no window: " << errors();
+    window().title_with("budget");
+    window().button(Button1, true, 100, 80);
+    window().move_to(160, 110, Button1Mask);
+    window().button(Button1, false, 160, 110);
+    window().press(XK_r);
+    window().press(XK_q);
+    ASSERT_EQ(ended(), 0) << errors();
+    ASSERT_TRUE(open({"--triangles", "200", "--screenshot", "still.png", "--frames", "1"}));
+    ASSERT_EQ(ended(), 0) << errors();
+    EXPECT_TRUE(read_text(path("reset.png")) == read_text(path("still.png"))); // not EQ, which would print them
+}
+
+} // namespace
