@@ -1,5 +1,6 @@
 #include <vdtree/criteria.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -76,7 +77,9 @@ void DisplacementCriterion::operator()(const VertexTree& tree, std::span<const N
         const NodeId node = nodes[i];
         const double nearest = distance_to(spheres[node], eye_) - spheres[node].radius;
         if (displacement[node] == 0) costs[i] = 0;
-        else if (nearest > 0) costs[i] = static_cast<float>(std::atan(displacement[node] / nearest) * scale_);
+        // Two points that are at least so far away and at most so far apart are seen under this angle at most.
+        else if (nearest > 0)
+            costs[i] = static_cast<float>(2 * std::asin(std::min(1.0, displacement[node] / (2 * nearest))) * scale_);
         else costs[i] = unbounded_cost(0);
     }
 }

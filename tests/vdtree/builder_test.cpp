@@ -1,0 +1,860 @@
+// Built trees: that they are what they should be, by brute force, for every awkward mesh and both clusterers.
+#include <vdtree/builder.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <random>
+#include <set>
+#include <span>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include <glm/geometric.hpp>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <vdtree/cut.h>
+
+#include "exact.h"
+#include "shapes.h"
+#include "tree_checks.h"
+
+namespace unseen::vdtree {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+// The direction of a normal is computed in double from float positions, here and there by other formulas.
+constexpr double direction_rounding = 1e-7;
+// Luminance goes through a few float operations.
+constexpr float luminance_rounding = 1e-6f;
+
+struct Case {
+    std::string shape;
+    ClustererKind kind;
+};
+
+const std::map<std::string, Mesh>& meshes() {
+    static const std::map<std::string, Mesh> all = [] {
+        std::map<std::string, Mesh> by_name;
+        for (shapes::Named& named : shapes::all()) by_name.emplace(named.name, std::move(named.mesh));
+        return by_name;
+    }();
+    return all;
+}
+
+std::vector<Case> cases() {
+    std::vector<Case> all;
+    for (const auto& [shape, mesh] : meshes())
+        for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) all.push_back({shape, kind});
+    return all;
+}
+
+// ---- the region of a node, from the definitions
+
+class Regions {
+public:
+    Regions(const VertexTree& tree, const Mesh& mesh) : tree_(tree), around_(tree.leaf_count()), weld_(tree.leaf_count()) {
+        for (Index t = 0; t < tree.triangle_count(); ++t)
+            for (const Index leaf : tree.triangles()[t]) around_[leaf].push_back(t);
+        std::map<std::tuple<double, double, double>, Index> first;
+        for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf) {
+            const glm::dvec3 p = mesh.positions[tree.source_vertices()[leaf]];
+            weld_[leaf] = first.try_emplace({p.x, p.y, p.z}, leaf).first->second;
+        }
+        around_place_.resize(tree.leaf_count());
+        for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf)
+            around_place_[weld_[leaf]].insert(around_[leaf].begin(), around_[leaf].end());
+        find_irregular_places();
+    }
+
+    glm::dvec3 position(NodeId node) const { return glm::dvec3(tree_.positions()[node]); }
+    NodeId node_of(Index leaf) const { return tree_.interior_count() + leaf; }
+    std::set<Index> triangles_around(NodeId node) const {
+        std::set<Index> found;
+        for (Index leaf = tree_.first_leaf()[node]; leaf < tree_.leaf_end()[node]; ++leaf)
+            found.insert(around_[leaf].begin(), around_[leaf].end());
+        return found;
+    }
+    std::set<Index> ring_leaves(NodeId node) const {
+        std::set<Index> found;
+        for (const Index t : triangles_around(node)) found.insert(tree_.triangles()[t].begin(), tree_.triangles()[t].end());
+        return found;
+    }
+    // Triangles that touch a place in the ring: the ring dilated by one more.
+    std::set<Index> dilated_triangles(NodeId node) const {
+        std::set<Index> found;
+        for (const Index leaf : ring_leaves(node)) {
+            const auto& here = around_place_[weld_[leaf]];
+            found.insert(here.begin(), here.end());
+        }
+        return found;
+    }
+    bool ring_is_irregular(NodeId node) const {
+        const auto leaves = ring_leaves(node);
+        return std::any_of(leaves.begin(), leaves.end(), [&](Index leaf) { return irregular_places_.contains(weld_[leaf]); });
+    }
+    // What lies at one point moves nothing and shows nothing when it folds.
+    bool is_coincident(NodeId node) const { return tree_.support_spheres()[node].radius == 0; }
+
+private:
+    void find_irregular_places() {
+        std::map<std::pair<Index, Index>, std::vector<bool>> uses; // by edge: whether it is run from low to high
+        for (const Triangle& t : tree_.triangles()) {
+            const Triangle w = {weld_[t[0]], weld_[t[1]], weld_[t[2]]};
+            if (w[0] == w[1] || w[1] == w[2] || w[2] == w[0]) continue;
+            for (std::size_t k = 0; k < 3; ++k)
+                uses[std::minmax(w[k], w[(k + 1) % 3])].push_back(w[k] < w[(k + 1) % 3]);
+        }
+        for (const auto& [edge, runs] : uses)
+            if (runs.size() != 2 || runs[0] == runs[1]) irregular_places_.insert({edge.first, edge.second});
+    }
+
+    const VertexTree& tree_;
+    std::vector<std::vector<Index>> around_;
+    std::vector<Index> weld_;
+    std::vector<std::set<Index>> around_place_;
+    std::set<Index> irregular_places_;
+};
+
+glm::dvec3 normal_of(glm::dvec3 a, glm::dvec3 b, glm::dvec3 c) {
+    const glm::dvec3 n = glm::cross(b - a, c - a);
+    const double largest = std::max({std::abs(n.x), std::abs(n.y), std::abs(n.z)});
+    return largest > 0 ? glm::normalize(n / largest) : glm::dvec3(0);
+}
+
+// Whether a mask and slabs know a direction; on the border of two cells either will do.
+bool knows(const VertexTree& tree, NodeId node, glm::dvec3 n) {
+    if (n == glm::dvec3(0)) return true;
+    bool in_mask = false;
+    for (int axis = -1; axis < 6; ++axis) {
+        glm::dvec3 near = n;
+        if (axis >= 0) near[axis / 2] += axis % 2 ? direction_rounding : -direction_rounding;
+        in_mask |= tree.masks()[node].contains(normal_cell(near));
+    }
+    const double s = 1 / std::sqrt(3.0);
+    const double along[] = {n.x, n.y, n.z, (n.x + n.y + n.z) * s, (-n.x + n.y + n.z) * s, (n.x - n.y + n.z) * s, (n.x + n.y - n.z) * s};
+    bool in_slabs = true;
+    for (std::size_t i = 0; i < NormalSlabs::axis_count; ++i)
+        in_slabs &= tree.slabs()[node].lo[i] / 127.0 <= along[i] + direction_rounding &&
+                    along[i] - direction_rounding <= tree.slabs()[node].hi[i] / 127.0;
+    return in_mask && in_slabs;
+}
+
+class BuiltTree : public testing::TestWithParam<Case> {
+protected:
+    const Mesh& mesh() const { return meshes().at(GetParam().shape); }
+    Result<VertexTree> build() const { return build_tree(mesh().view(), {.clusterer = GetParam().kind}); }
+};
+
+INSTANTIATE_TEST_SUITE_P(All, BuiltTree, testing::ValuesIn(cases()), [](const auto& param_info) {
+    return param_info.param.shape + "_" + std::string(name(param_info.param.kind));
+});
+
+TEST_P(BuiltTree, IsVerified) {
+    const auto tree = build();
+    ASSERT_TRUE(tree) << tree.error().message;
+    const auto verified = verify(*tree);
+    EXPECT_TRUE(verified) << verified.error().message;
+}
+
+TEST_P(BuiltTree, IsNumberedDepthFirst) {
+    const auto tree = build();
+    ASSERT_TRUE(tree);
+    EXPECT_EQ(support::fault_in_structure(*tree), "");
+    EXPECT_GT(tree->byte_size(), tree->node_count() * sizeof(glm::vec3));
+}
+
+TEST_P(BuiltTree, GivesBackTheInputWhenUnfolded) {
+    const auto tree = build();
+    ASSERT_TRUE(tree);
+    EXPECT_EQ(support::fault_when_unfolded(*tree, mesh().view()), "");
+    const Mesh floats = shapes::in_floats(mesh());
+    const auto from_floats = build_tree(floats.view(), {.clusterer = GetParam().kind});
+    ASSERT_TRUE(from_floats);
+    EXPECT_EQ(support::fault_when_unfolded(*from_floats, floats.view()), "");
+}
+
+TEST_P(BuiltTree, LosesEachTriangleWhereTwoCornersFirstMerge) {
+    const auto tree = build();
+    ASSERT_TRUE(tree);
+    for (NodeId node = 0; node < tree->interior_count(); ++node) {
+        for (Index t = tree->first_triangle()[node]; t < tree->first_triangle()[node + 1]; ++t) {
+            const auto supported = [&](NodeId n) {
+                int corners = 0;
+                for (const Index leaf : tree->triangles()[t])
+                    corners += tree->first_leaf()[n] <= leaf && leaf < tree->leaf_end()[n];
+                return corners;
+            };
+            ASSERT_GE(supported(node), 2) << "triangle " << t;
+            tree->for_each_child(node, [&](NodeId child) {
+                if (!tree->is_leaf(child)) { ASSERT_LT(supported(child), 2) << "triangle " << t; }
+            });
+        }
+    }
+}
+
+TEST_P(BuiltTree, HasSpheresThatContainTheirRegionsExactly) {
+    const auto tree = build();
+    ASSERT_TRUE(tree);
+    const Regions regions(*tree, mesh());
+    for (NodeId node = 0; node < tree->interior_count(); ++node) {
+        const Sphere support = tree->support_spheres()[node], ring = tree->ring_spheres()[node];
+        for (NodeId below = node; below < tree->subtree_end()[node]; ++below) {
+            ASSERT_TRUE(support::contains(support, tree->positions()[below])) << "node " << node << ", proxy " << below;
+            ASSERT_TRUE(support::contains(ring, tree->positions()[below])) << "node " << node << ", proxy " << below;
+            const Sphere s = tree->support_spheres()[below], r = tree->ring_spheres()[below];
+            ASSERT_TRUE(support::contains(support, s.centre, s.radius)) << "node " << node << ", node " << below;
+            ASSERT_TRUE(support::contains(ring, r.centre, r.radius)) << "node " << node << ", node " << below;
+        }
+        for (Index leaf = tree->first_leaf()[node]; leaf < tree->leaf_end()[node]; ++leaf)
+            ASSERT_TRUE(support::contains(support, tree->positions()[regions.node_of(leaf)])) << "node " << node;
+        for (const Index leaf : regions.ring_leaves(node))
+            ASSERT_TRUE(support::contains(ring, tree->positions()[regions.node_of(leaf)])) << "node " << node;
+    }
+    for (const Triangle& t : tree->triangles())
+        for (const Index leaf : t)
+            ASSERT_TRUE(support::contains(tree->bounding_sphere(), tree->positions()[regions.node_of(leaf)]));
+}
+
+TEST_P(BuiltTree, KnowsTheNormalsOfTheDilatedRing) {
+    const auto tree = build();
+    ASSERT_TRUE(tree);
+    const Regions regions(*tree, mesh());
+    for (NodeId node = 0; node < tree->interior_count(); ++node) {
+        if (regions.is_coincident(node)) {
+            EXPECT_TRUE(tree->masks()[node].empty());
+            continue;
+        }
+        for (const Index t : regions.dilated_triangles(node)) {
+            const Triangle& corners = tree->triangles()[t];
+            const glm::dvec3 n = normal_of(regions.position(regions.node_of(corners[0])), regions.position(regions.node_of(corners[1])),
+                                           regions.position(regions.node_of(corners[2])));
+            ASSERT_TRUE(knows(*tree, node, n)) << "node " << node << ", triangle " << t;
+        }
+    }
+}
+
+// Replays the contractions in the order in which the clusterer made them. After each, the triangles around the new cluster have
+// the normals that a viewer sees when the node folds.
+TEST_P(BuiltTree, KnowsTheNormalsAfterEachFold) {
+    if (GetParam().shape == "unreferenced" || GetParam().shape == "one_unreferenced") GTEST_SKIP() << "cluster numbers differ";
+    Clustering clustering;
+    const auto remember = [&](const ClusterInput& input) {
+        Result<Clustering> made = GetParam().kind == ClustererKind::octree ? cluster_octree(input) : cluster_quadric(input);
+        if (made) clustering = *made;
+        return made;
+    };
+    const auto tree = build_tree(mesh().view(), remember);
+    ASSERT_TRUE(tree) << tree.error().message;
+    const std::size_t vertices = mesh().positions.size(), clusters = clustering.parents.size();
+    std::vector<Index> leaf_of_vertex(vertices);
+    for (Index leaf = 0; leaf < vertices; ++leaf) leaf_of_vertex[tree->source_vertices()[leaf]] = leaf;
+
+    // Nodes are known by their leaves.
+    std::map<std::pair<Index, Index>, NodeId> node_by_leaves;
+    for (NodeId node = 0; node < tree->interior_count(); ++node)
+        node_by_leaves[{tree->first_leaf()[node], tree->leaf_end()[node]}] = node;
+    std::vector<std::set<Index>> leaves(clusters);
+    for (Index v = 0; v < vertices; ++v) leaves[v] = {leaf_of_vertex[v]};
+    for (std::size_t c = 0; c + 1 < clusters; ++c) leaves[clustering.parents[c]].insert(leaves[c].begin(), leaves[c].end());
+    const auto node_of = [&](Index cluster) {
+        if (cluster < vertices) return tree->interior_count() + leaf_of_vertex[cluster];
+        return node_by_leaves.at({*leaves[cluster].begin(), *leaves[cluster].rbegin() + 1});
+    };
+
+    std::vector<Index> live(vertices); // by vertex: the cluster that it is in now
+    std::iota(live.begin(), live.end(), Index{0});
+    std::map<Index, std::vector<Index>> merged;
+    for (Index c = 0; c + 1 < clusters; ++c) merged[clustering.parents[c]].push_back(c);
+    for (Index c = static_cast<Index>(vertices); c < clusters; ++c) {
+        for (Index& v : live)
+            if (std::find(merged[c].begin(), merged[c].end(), v) != merged[c].end()) v = c;
+        const NodeId node = node_of(c);
+        if (tree->support_spheres()[node].radius == 0) continue;
+        for (const Triangle& t : mesh().triangles) {
+            const Index now[3] = {live[t[0]], live[t[1]], live[t[2]]};
+            if (now[0] != c && now[1] != c && now[2] != c) continue;
+            if (now[0] == now[1] || now[1] == now[2] || now[2] == now[0]) continue;
+            glm::dvec3 p[3];
+            for (int k = 0; k < 3; ++k) p[k] = glm::dvec3(tree->positions()[node_of(now[k])]);
+            ASSERT_TRUE(knows(*tree, node, normal_of(p[0], p[1], p[2]))) << "node " << node;
+        }
+    }
+}
+
+TEST_P(BuiltTree, FlagsRingsWithIrregularEdges) {
+    const auto tree = build();
+    ASSERT_TRUE(tree);
+    const Regions regions(*tree, mesh());
+    for (NodeId node = 0; node < tree->interior_count(); ++node) {
+        if (regions.is_coincident(node)) continue;
+        ASSERT_EQ((tree->flags()[node] & irregular_ring) != 0, regions.ring_is_irregular(node)) << "node " << node;
+    }
+}
+
+TEST_P(BuiltTree, BoundsLuminance) {
+    const auto tree = build();
+    ASSERT_TRUE(tree);
+    const Regions regions(*tree, mesh());
+    for (NodeId node = tree->interior_count(); node-- > 0;) {
+        const auto y = tree->luminance();
+        float low = 1, high = 0;
+        const auto take = [&](NodeId n) {
+            low = std::min(low, y[n]);
+            high = std::max(high, y[n]);
+        };
+        for (NodeId below = node; below < tree->subtree_end()[node]; ++below) take(below);
+        for (Index leaf = tree->first_leaf()[node]; leaf < tree->leaf_end()[node]; ++leaf) take(regions.node_of(leaf));
+        const LuminanceRange support = tree->support_luminance()[node], ring = tree->ring_luminance()[node];
+        ASSERT_EQ(support.lo, low) << "node " << node;
+        ASSERT_EQ(support.hi, high) << "node " << node;
+        const float spread = high - low;
+        for (const Index leaf : regions.ring_leaves(node)) take(regions.node_of(leaf));
+        if (regions.is_coincident(node)) {
+            // Nothing moves: the ring's contrast is that of the attributes which merge, and 0 where they are equal.
+            ASSERT_LE(ring.hi - ring.lo, spread + luminance_rounding);
+            if (spread == 0) { ASSERT_EQ(ring.hi, ring.lo); }
+        } else {
+            ASSERT_EQ(ring.lo, low) << "node " << node;
+            ASSERT_EQ(ring.hi, high) << "node " << node;
+        }
+        float adaptation = 0.5f * (ring.lo + ring.hi);
+        tree->for_each_child(node, [&](NodeId child) {
+            if (!tree->is_leaf(child)) adaptation = std::max(adaptation, tree->adaptation_luminance()[child]);
+        });
+        ASSERT_EQ(tree->adaptation_luminance()[node], adaptation) << "node " << node;
+    }
+    float low = 1, high = 0;
+    for (const Triangle& t : tree->triangles()) {
+        for (const Index leaf : t) {
+            low = std::min(low, tree->luminance()[regions.node_of(leaf)]);
+            high = std::max(high, tree->luminance()[regions.node_of(leaf)]);
+        }
+    }
+    EXPECT_EQ(tree->luminance_range().lo, low);
+    EXPECT_EQ(tree->luminance_range().hi, high);
+}
+
+TEST_P(BuiltTree, MeasuresDisplacement) {
+    const auto tree = build();
+    ASSERT_TRUE(tree);
+    for (NodeId node = tree->interior_count(); node-- > 0;) {
+        double largest = 0;
+        const glm::dvec3 proxy(tree->positions()[node]);
+        for (Index leaf = tree->first_leaf()[node]; leaf < tree->leaf_end()[node]; ++leaf)
+            largest = std::max(largest, glm::distance(proxy, glm::dvec3(tree->positions()[tree->interior_count() + leaf])));
+        double with_children = largest;
+        tree->for_each_child(node, [&](NodeId child) {
+            if (!tree->is_leaf(child)) with_children = std::max(with_children, static_cast<double>(tree->displacement()[child]));
+        });
+        ASSERT_GE(tree->displacement()[node], largest) << "node " << node;
+        ASSERT_LE(tree->displacement()[node], std::nextafter(static_cast<float>(with_children) * (1 + 1e-7f), 1e38f)) << "node " << node;
+    }
+}
+
+TEST_P(BuiltTree, MergesCoincidentVerticesAtNoCost) {
+    const auto tree = build();
+    ASSERT_TRUE(tree);
+    std::map<std::tuple<double, double, double>, std::vector<Index>> places;
+    for (Index leaf = 0; leaf < tree->leaf_count(); ++leaf) {
+        const glm::dvec3 p = mesh().positions[tree->source_vertices()[leaf]];
+        places[{p.x, p.y, p.z}].push_back(leaf);
+    }
+    for (const auto& [place, leaves] : places) {
+        if (leaves.size() < 2 || GetParam().shape == "all_coincident") continue;
+        // Some node supports these leaves and no others.
+        NodeId node = tree->parents()[tree->interior_count() + leaves.front()];
+        while (tree->leaf_end()[node] <= leaves.back()) node = tree->parents()[node];
+        ASSERT_EQ(tree->first_leaf()[node], leaves.front());
+        ASSERT_EQ(tree->leaf_end()[node], leaves.back() + 1);
+        ASSERT_EQ(tree->leaf_end()[node] - tree->first_leaf()[node], leaves.size());
+        EXPECT_EQ(tree->support_spheres()[node].radius, 0);
+        EXPECT_EQ(tree->displacement()[node], 0);
+    }
+}
+
+TEST_P(BuiltTree, DoesNotDependOnThreads) {
+    const auto one = build_tree(mesh().view(), {.clusterer = GetParam().kind, .threads = 1});
+    ASSERT_TRUE(one);
+    for (const int threads : {2, 8, 0}) {
+        const auto several = build_tree(mesh().view(), {.clusterer = GetParam().kind, .threads = threads});
+        ASSERT_TRUE(several);
+        EXPECT_EQ(support::difference(*one, *several), "") << threads << " threads";
+    }
+}
+
+TEST(BuildTree, DoesNotDependOnThreadsWhereThereIsWorkForAll) {
+    for (const Mesh& mesh : {shapes::bumpy_sphere(5), shapes::unwelded(shapes::bumpy_sphere(4))}) {
+        for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
+            const auto one = build_tree(mesh.view(), {.clusterer = kind, .threads = 1});
+            ASSERT_TRUE(one);
+            for (const int threads : {2, 8}) {
+                const auto several = build_tree(mesh.view(), {.clusterer = kind, .threads = threads});
+                ASSERT_TRUE(several);
+                EXPECT_EQ(support::difference(*one, *several), "") << name(kind) << ", " << threads << " threads";
+            }
+            EXPECT_TRUE(verify(*one));
+        }
+    }
+}
+
+// ---- literal meshes with hand-made clusterings
+
+// A clusterer that says what it was told to say.
+auto fixed(const Clustering& clustering) {
+    return [&clustering](const ClusterInput&) { return Result<Clustering>(clustering); };
+}
+
+std::vector<Triangle> triangles_of(const Cut& cut) {
+    std::vector<Triangle> out;
+    const auto indices = cut.indices();
+    for (std::size_t i = 0; i < indices.size(); i += 3) out.push_back({indices[i], indices[i + 1], indices[i + 2]});
+    return out;
+}
+
+template <class T>
+std::vector<T> copy(std::span<const T> values) { return {values.begin(), values.end()}; }
+
+TEST(LiteralTree, QuadOfTwoTriangles) {
+    //  3---2      4 = {0, 1}, 5 = {2, 3}, 6 = {4, 5}
+    //  | / |
+    //  0---1
+    Mesh quad;
+    quad.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+    quad.triangles = {{0, 1, 2}, {0, 2, 3}};
+    const Clustering clustering{{4, 4, 5, 5, 6, 6, 6}, {{0.5, 0, 0}, {0.5, 1, 0}, {0.5, 0.5, 0}}};
+    const auto tree = build_tree(quad.view(), fixed(clustering));
+    ASSERT_TRUE(tree) << tree.error().message;
+    //        0            nodes 0 to 2, leaves 3 to 6
+    //      /   \.
+    //     1     2
+    //    / \   / \.
+    //   3   4 5   6
+    EXPECT_EQ(tree->interior_count(), 3u);
+    EXPECT_THAT(copy(tree->parents()), ElementsAre(no_node, 0, 0, 1, 1, 2, 2));
+    EXPECT_THAT(copy(tree->first_leaf()), ElementsAre(0, 0, 2));
+    EXPECT_THAT(copy(tree->leaf_end()), ElementsAre(4, 2, 4));
+    EXPECT_THAT(copy(tree->subtree_end()), ElementsAre(3, 2, 3));
+    EXPECT_THAT(copy(tree->source_vertices()), ElementsAre(0, 1, 2, 3));
+    // Triangle 0 has 0 and 1 in common with node 1; triangle 1 has 2 and 3 in common with node 2.
+    EXPECT_THAT(copy(tree->first_triangle()), ElementsAre(0, 0, 1, 2));
+    EXPECT_THAT(copy(tree->source_triangles()), ElementsAre(0, 1));
+    EXPECT_EQ(tree->positions()[0], glm::vec3(0.5, 0.5, 0));
+    EXPECT_EQ(tree->positions()[1], glm::vec3(0.5, 0, 0));
+    EXPECT_EQ(tree->positions()[2], glm::vec3(0.5, 1, 0));
+    EXPECT_FLOAT_EQ(tree->displacement()[1], 0.5f); // rounded outward
+    EXPECT_NEAR(tree->displacement()[0], std::sqrt(0.5), 1e-6);
+    EXPECT_NEAR(tree->support_spheres()[1].radius, 0.5, 1e-6);
+    EXPECT_NEAR(tree->ring_spheres()[1].radius, std::sqrt(0.5), 1e-6);
+
+    Cut cut(*tree);
+    cut.unfold_all();
+    EXPECT_THAT(triangles_of(cut), ElementsAre(Triangle{3, 4, 5}, Triangle{3, 5, 6}));
+    cut.fold(1);
+    EXPECT_THAT(triangles_of(cut), ElementsAre(Triangle{1, 5, 6}));
+    cut.fold(2); // an edge is left, and an edge has no triangle
+    EXPECT_THAT(triangles_of(cut), ElementsAre());
+    cut.unfold(1); // 3 4 2: the triangle at the bottom, with the proxy of the top
+    EXPECT_THAT(triangles_of(cut), ElementsAre(Triangle{3, 4, 2}));
+    cut.fold(1), cut.fold(0);
+    EXPECT_THAT(triangles_of(cut), ElementsAre());
+}
+
+TEST(LiteralTree, Fan) {
+    //     3---2          6 = {2, 3}
+    //    / \ / \.        7 = {4, 6}
+    //   4---0---1        8 = {5, 7}
+    //    \ /             9 = {0, 1, 8}
+    //     5
+    Mesh fan;
+    fan.positions = {{0, 0, 0}, {2, 0, 0}, {1, 2, 0}, {-1, 2, 0}, {-2, 0, 0}, {-1, -2, 0}};
+    fan.triangles = {{0, 1, 2}, {0, 2, 3}, {0, 3, 4}, {0, 4, 5}};
+    const Clustering clustering{{9, 9, 6, 6, 7, 8, 7, 8, 9, 9}, {}};
+    const auto tree = build_tree(fan.view(), fixed(clustering));
+    ASSERT_TRUE(tree) << tree.error().message;
+    // Leaves in depth-first order: 0 1 (5 (4 (2 3))).
+    EXPECT_EQ(tree->interior_count(), 4u);
+    EXPECT_THAT(copy(tree->source_vertices()), ElementsAre(0, 1, 5, 4, 2, 3));
+    EXPECT_THAT(copy(tree->first_leaf()), ElementsAre(0, 2, 3, 4));
+    EXPECT_THAT(copy(tree->leaf_end()), ElementsAre(6, 6, 6, 6));
+    EXPECT_THAT(copy(tree->parents()), ElementsAre(no_node, 0, 1, 2, 0, 0, 1, 2, 3, 3));
+    EXPECT_THAT(copy(tree->first_triangle()), ElementsAre(0, 1, 2, 3, 4));
+    EXPECT_THAT(copy(tree->source_triangles()), ElementsAre(0, 3, 2, 1));
+
+    Cut cut(*tree);
+    cut.unfold_all();
+    EXPECT_THAT(triangles_of(cut), ElementsAre(Triangle{4, 5, 8}, Triangle{4, 7, 6}, Triangle{4, 9, 7}, Triangle{4, 8, 9}));
+    cut.fold(3);
+    EXPECT_THAT(triangles_of(cut), ElementsAre(Triangle{4, 5, 3}, Triangle{4, 7, 6}, Triangle{4, 3, 7}));
+    cut.fold(2);
+    EXPECT_THAT(triangles_of(cut), ElementsAre(Triangle{4, 5, 2}, Triangle{4, 2, 6}));
+    cut.fold(1);
+    EXPECT_THAT(triangles_of(cut), ElementsAre(Triangle{4, 5, 1}));
+    cut.unfold(1);
+    EXPECT_THAT(triangles_of(cut), ElementsAre(Triangle{4, 5, 2}, Triangle{4, 2, 6}));
+}
+
+TEST(LiteralTree, ClustersWithOneChildAreThatChild) {
+    const Mesh mesh = shapes::single_triangle();
+    // 3 = {0, 1}, 4 = {3}, 5 = {2}, 6 = {4, 5}, 7 = {6}
+    const Clustering clustering{{3, 3, 5, 4, 6, 6, 7, 7}, {}};
+    const auto tree = build_tree(mesh.view(), fixed(clustering));
+    ASSERT_TRUE(tree) << tree.error().message;
+    EXPECT_EQ(tree->interior_count(), 2u);
+    EXPECT_EQ(support::fault_in_structure(*tree), "");
+    EXPECT_EQ(support::fault_when_unfolded(*tree, mesh.view()), "");
+    EXPECT_TRUE(verify(*tree));
+}
+
+TEST(LiteralTree, OneClusterForAll) {
+    const Mesh mesh = shapes::cube(2);
+    const Index n = static_cast<Index>(mesh.positions.size());
+    const Clustering clustering{std::vector<Index>(n + 1, n), {}};
+    const auto tree = build_tree(mesh.view(), fixed(clustering));
+    ASSERT_TRUE(tree);
+    EXPECT_EQ(tree->interior_count(), 1u);
+    EXPECT_EQ(support::fault_when_unfolded(*tree, mesh.view()), "");
+    EXPECT_TRUE(verify(*tree));
+}
+
+// ---- clusterings of users
+
+TEST(UserClustering, MayBeAsDeepAsItHasVertices) {
+    const Mesh mesh = shapes::grid(141); // 20164 vertices
+    const Index n = static_cast<Index>(mesh.positions.size());
+    for (const bool shuffled : {false, true}) {
+        // Each vertex joins the cluster of all those before it.
+        std::vector<Index> order(n);
+        std::iota(order.begin(), order.end(), Index{0});
+        std::mt19937_64 random(1);
+        if (shuffled) for (Index i = n; i > 1; --i) std::swap(order[i - 1], order[random() % i]);
+        Clustering chain;
+        chain.parents.resize(2 * n - 1);
+        chain.parents[order[0]] = n;
+        for (Index i = 1; i < n; ++i) chain.parents[order[i]] = n + i - 1;
+        for (Index c = n; c + 1 < 2 * n - 1; ++c) chain.parents[c] = c + 1;
+        chain.parents.back() = 2 * n - 2;
+        const auto begin = std::chrono::steady_clock::now();
+        const auto tree = build_tree(mesh.view(), fixed(chain));
+        const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
+        ASSERT_TRUE(tree) << tree.error().message;
+        EXPECT_EQ(tree->interior_count(), n - 1);
+        EXPECT_LT(took.count(), 30) << "seconds; some with optimisation, and room for sanitizers";
+        RecordProperty(shuffled ? "seconds_shuffled" : "seconds", std::to_string(took.count()));
+        EXPECT_EQ(support::fault_when_unfolded(*tree, mesh.view()), "");
+        if (!shuffled) {
+            const auto verified = verify(*tree);
+            EXPECT_TRUE(verified) << verified.error().message;
+        }
+        Cut cut(*tree);
+        cut.unfold_ancestors(tree->node_count() - 1);
+        cut.fold_all();
+        EXPECT_EQ(cut.triangle_count(), 0u);
+    }
+}
+
+TEST(UserClustering, IsCheckedBeforeUse) {
+    const Mesh mesh = shapes::tetrahedron(); // 4 vertices
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    const std::vector<std::pair<const char*, Clustering>> invalid = {
+        {"nothing", {}},
+        {"too few", {{1, 2, 3, 3}, {}}},
+        {"no parent", {{4, 4, 4, no_node, 4}, {}}},
+        {"a parent out of range", {{4, 4, 4, 5, 4}, {}}},
+        {"a vertex for a parent", {{1, 4, 4, 4, 4}, {}}},
+        {"its own parent", {{4, 4, 5, 5, 4, 5}, {}}},
+        {"a parent made before", {{5, 5, 6, 6, 6, 4, 6}, {}}},
+        {"a cluster without children", {{5, 5, 5, 5, 5, 5}, {}}},
+        {"a root without children", {{4, 4, 4, 4, 4, 5}, {}}},
+        {"too few proxies", {{4, 4, 5, 5, 5, 5}, {{0, 0, 0}}}},
+        {"too many proxies", {{4, 4, 4, 4, 4}, {{0, 0, 0}, {0, 0, 0}}}},
+        {"a proxy that is nowhere", {{4, 4, 4, 4, 4}, {{0, nan, 0}}}},
+        {"a proxy at infinity", {{4, 4, 4, 4, 4}, {{0, std::numeric_limits<double>::infinity(), 0}}}},
+        {"a proxy beyond floats", {{4, 4, 4, 4, 4}, {{0, 1e200, 0}}}},
+    };
+    for (const auto& [what, clustering] : invalid) {
+        const auto tree = build_tree(mesh.view(), fixed(clustering));
+        EXPECT_FALSE(tree) << what;
+        if (!tree) { EXPECT_EQ(tree.error().code, ErrorCode::invalid_argument) << what; }
+    }
+}
+
+TEST(UserClustering, MayFail) {
+    const auto failing = [](const ClusterInput&) { return Result<Clustering>(Error{ErrorCode::unsupported, "no clusters today"}); };
+    const auto tree = build_tree(shapes::cube(1).view(), failing);
+    ASSERT_FALSE(tree);
+    EXPECT_EQ(tree.error().message, "no clusters today");
+}
+
+TEST(UserClustering, IsGivenLuminanceNormalsAreasAndCoincidence) {
+    Mesh mesh = shapes::unwelded(shapes::cube(1));
+    const auto look = [&](const ClusterInput& input) {
+        EXPECT_EQ(input.mesh.positions.size(), 36u);
+        EXPECT_EQ(input.luminance.size(), 36u);
+        double area = 0;
+        for (const double a : input.areas) area += a;
+        EXPECT_NEAR(area, 24, 1e-9);
+        for (Index v = 0; v < 36; ++v) {
+            EXPECT_LE(input.coincident[v], v);
+            EXPECT_EQ(mesh.positions[input.coincident[v]], mesh.positions[v]);
+            EXPECT_GT(glm::dot(glm::dvec3(input.normals[v]), mesh.positions[v]), 0.5); // outward, over all faces of the corner
+            EXPECT_NEAR(glm::length(input.normals[v]), 1, 1e-6);
+            const float lit = std::max(0.0f, glm::dot(input.normals[v], Light{}.direction));
+            EXPECT_NEAR(input.luminance[v], 0.8f * (0.2f + 0.8f * lit), luminance_rounding);
+        }
+        return cluster_octree(input);
+    };
+    EXPECT_TRUE(build_tree(mesh.view(), look));
+}
+
+// ---- input
+
+TEST(BuildTree, CountsTheTrianglesItDrops) {
+    const Mesh mesh = shapes::with_degenerate_triangles(shapes::cube(2));
+    const auto tree = build_tree(mesh.view());
+    ASSERT_TRUE(tree);
+    EXPECT_EQ(tree->dropped_triangles(), 16u);
+    EXPECT_EQ(tree->triangle_count(), 48u);
+}
+
+TEST(BuildTree, RefusesWhatItCannotBuildOn) {
+    const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+    const auto expect_refused = [](const Mesh& mesh, const char* what) {
+        for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
+            const auto tree = build_tree(mesh.view(), {.clusterer = kind});
+            EXPECT_FALSE(tree) << what;
+            if (!tree) { EXPECT_FALSE(tree.error().message.empty()); }
+        }
+    };
+    expect_refused({}, "an empty mesh");
+    Mesh mesh = shapes::cube(1);
+    mesh.triangles.clear();
+    expect_refused(mesh, "no triangles");
+    mesh.triangles = {{0, 1, 1}, {2, 2, 2}};
+    expect_refused(mesh, "only triangles that use a vertex twice");
+    mesh = shapes::cube(1);
+    mesh.triangles[3][1] = 8;
+    expect_refused(mesh, "an index out of range");
+    for (const double bad : {nan, inf, -inf}) {
+        mesh = shapes::cube(1);
+        mesh.positions[5].y = bad;
+        expect_refused(mesh, "a position that is not finite");
+    }
+    mesh = shapes::with_attributes(shapes::cube(1));
+    mesh.colours.pop_back();
+    expect_refused(mesh, "a missing colour");
+    EXPECT_FALSE(build_tree(shapes::cube(1).view(), {.threads = -1}));
+}
+
+// A tree's positions are floats: what they cannot hold is refused, not turned into infinity.
+TEST(BuildTree, RefusesCoordinatesBeyondFloats) {
+    for (const double scale : {1e39, 1e150, 1e300}) {
+        for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
+            const auto tree = build_tree(shapes::placed(shapes::cube(1), scale).view(), {.clusterer = kind});
+            EXPECT_FALSE(tree) << scale;
+        }
+    }
+}
+
+// Colours and UVs that are no numbers would make luminances that are none.
+TEST(BuildTree, RefusesOrRepairsAttributesThatAreNotFinite) {
+    const float nan = std::numeric_limits<float>::quiet_NaN(), inf = std::numeric_limits<float>::infinity();
+    for (const float bad : {nan, inf, -inf}) {
+        for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
+            for (const bool colour : {true, false}) {
+                Mesh mesh = shapes::with_attributes(shapes::bumpy_sphere(2));
+                for (std::size_t v = 0; v < mesh.positions.size(); v += 5)
+                    (colour ? mesh.colours[v].g : mesh.uvs[v].x) = bad;
+                const auto tree = build_tree(mesh.view(), {.clusterer = kind});
+                if (!tree) continue;
+                for (const float y : tree->luminance()) ASSERT_TRUE(y >= 0 && y <= 1);
+                for (const glm::vec4& c : tree->colours()) ASSERT_TRUE(std::isfinite(c.r + c.g + c.b + c.a));
+                for (const glm::vec2& uv : tree->uvs()) ASSERT_TRUE(std::isfinite(uv.x + uv.y));
+                EXPECT_TRUE(verify(*tree));
+            }
+        }
+    }
+}
+
+TEST(BuildTree, ComputesNormalsThatAreMissing) {
+    Mesh mesh = shapes::with_attributes(shapes::icosphere(2));
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    mesh.normals[3] = {nan, 0, 0};
+    mesh.normals[7] = {0, 0, 0};
+    const auto tree = build_tree(mesh.view());
+    ASSERT_TRUE(tree);
+    for (Index leaf = 0; leaf < tree->leaf_count(); ++leaf) {
+        const Index v = tree->source_vertices()[leaf];
+        const glm::vec3 n = tree->normals()[tree->interior_count() + leaf];
+        EXPECT_NEAR(glm::length(n), 1, 1e-5);
+        if (v == 3 || v == 7) { EXPECT_GT(glm::dot(glm::dvec3(n), mesh.positions[v]), 0.99); }
+        else { EXPECT_GT(glm::dot(n, glm::normalize(mesh.normals[v])), 0.9999f); }
+    }
+}
+
+TEST(BuildTree, FindsOutWhetherTheSurfaceIsClosed) {
+    Mesh one_turned = shapes::icosphere(1);
+    std::swap(one_turned.triangles[7][0], one_turned.triangles[7][1]);
+    Mesh one_missing = shapes::icosphere(1);
+    one_missing.triangles.pop_back();
+    const std::vector<std::tuple<const char*, Mesh, Closedness>> expected = {
+        {"icosphere", shapes::icosphere(1), Closedness::closed_outward},
+        {"tetrahedron", shapes::tetrahedron(), Closedness::closed_outward},
+        {"inside out", shapes::inside_out(shapes::icosphere(1)), Closedness::closed_inward},
+        {"inside-out torus", shapes::inside_out(shapes::torus(9, 6)), Closedness::closed_inward},
+        {"unwelded", shapes::unwelded(shapes::torus(9, 6)), Closedness::closed_outward},
+        {"two parts", shapes::two_parts(), Closedness::closed_outward},
+        {"far away", shapes::placed(shapes::icosphere(2), 1, {5e5, 5e6, 0}), Closedness::closed_outward},
+        {"tiny", shapes::placed(shapes::icosphere(1), 1e-19), Closedness::closed_outward},
+        {"huge", shapes::placed(shapes::inside_out(shapes::icosphere(1)), 1e30), Closedness::closed_inward},
+        {"grid", shapes::grid(3), Closedness::open},
+        {"Moebius strip", shapes::moebius_strip(12), Closedness::open},
+        {"fan", shapes::non_manifold_fan(4), Closedness::open},
+        {"one triangle turned", one_turned, Closedness::open},
+        {"one triangle missing", one_missing, Closedness::open},
+        {"nothing but a point", shapes::all_coincident(4), Closedness::open},
+    };
+    for (const auto& [what, mesh, closedness] : expected) {
+        const auto tree = build_tree(mesh.view());
+        ASSERT_TRUE(tree) << what;
+        EXPECT_EQ(tree->closedness(), closedness) << what;
+    }
+}
+
+TEST(BuildTree, TurnsTheNormalsOfInsideOutSurfaces) {
+    const Mesh mesh = shapes::inside_out(shapes::icosphere(2));
+    const auto tree = build_tree(mesh.view());
+    ASSERT_TRUE(tree);
+    for (Index leaf = 0; leaf < tree->leaf_count(); ++leaf) {
+        const NodeId node = tree->interior_count() + leaf;
+        EXPECT_GT(glm::dot(tree->normals()[node], tree->positions()[node]), 0.9f);
+    }
+}
+
+TEST(BuildTree, MergesAcrossASeamAtTheCostOfItsColours) {
+    for (const bool colours_differ : {false, true}) {
+        for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
+            const auto tree = build_tree(shapes::seam(colours_differ).view(), {.clusterer = kind});
+            ASSERT_TRUE(tree);
+            EXPECT_TRUE(tree->is_prelit());
+            int merges = 0;
+            for (NodeId node = 0; node < tree->interior_count(); ++node) {
+                if (tree->support_spheres()[node].radius > 0) continue;
+                ++merges;
+                const LuminanceRange ring = tree->ring_luminance()[node];
+                EXPECT_NEAR(ring.hi - ring.lo, colours_differ ? 0.5f : 0.0f, luminance_rounding);
+                if (!colours_differ) { EXPECT_EQ(ring.hi, ring.lo); }
+            }
+            EXPECT_EQ(merges, 2);
+        }
+    }
+}
+
+TEST(BuildTree, KeepsThePrecisionOfNorthings) {
+    // Metres of UTM: a float has a step of 0.5 m at 5e6, the tree's one of micrometres.
+    const Mesh mesh = shapes::placed(shapes::bumpy_sphere(3), 20, {4.5e5, 5.4e6, 300});
+    const auto tree = build_tree(mesh.view());
+    ASSERT_TRUE(tree);
+    for (Index leaf = 0; leaf < tree->leaf_count(); ++leaf) {
+        const glm::dvec3 p = tree->origin() + glm::dvec3(tree->positions()[tree->interior_count() + leaf]);
+        ASSERT_LT(glm::distance(p, mesh.positions[tree->source_vertices()[leaf]]), 5e-6);
+    }
+}
+
+// ---- light
+
+TEST(Relit, EqualsATreeBuiltWithThatLight) {
+    const Light light{.direction = glm::normalize(glm::vec3(-1, 0.2f, 0.5f)), .ambient = 0.4f};
+    for (const char* shape : {"bumpy_sphere", "unwelded_sphere", "flat_grid", "unreferenced", "tiny", "huge", "moebius_strip"}) {
+        const Mesh& mesh = meshes().at(shape);
+        const auto tree = build_tree(mesh.view(), {.clusterer = ClustererKind::octree}); // does not look at luminance
+        const auto expected = build_tree(mesh.view(), {.clusterer = ClustererKind::octree, .light = light});
+        ASSERT_TRUE(tree && expected);
+        EXPECT_EQ(support::difference(tree->relit(light), *expected), "") << shape;
+        EXPECT_EQ(support::difference(tree->relit(light).relit(tree->light()), *tree), "") << shape;
+    }
+    const auto quadric = build_tree(meshes().at("bumpy_sphere").view());
+    ASSERT_TRUE(quadric);
+    EXPECT_TRUE(verify(quadric->relit(light)));
+}
+
+TEST(Relit, ShadesColoursByTheLight) {
+    const Mesh mesh = shapes::with_attributes(shapes::icosphere(2));
+    const auto tree = build_tree(mesh.view());
+    ASSERT_TRUE(tree);
+    EXPECT_TRUE(tree->is_prelit());
+    const Light light{.direction = {0, 0, 1}, .ambient = 0.3f};
+    const VertexTree lit = tree->relit(light);
+    EXPECT_FALSE(lit.is_prelit());
+    EXPECT_TRUE(verify(lit));
+    for (Index leaf = 0; leaf < tree->leaf_count(); ++leaf) {
+        const Index v = tree->source_vertices()[leaf];
+        const NodeId node = tree->interior_count() + leaf;
+        const glm::vec4 c = mesh.colours[v];
+        const float albedo = 0.2126f * c.r + 0.7152f * c.g + 0.0722f * c.b;
+        EXPECT_NEAR(tree->luminance()[node], albedo, luminance_rounding);
+        const float cosine = std::max(0.0f, glm::normalize(mesh.normals[v]).z);
+        EXPECT_NEAR(lit.luminance()[node], albedo * (0.3f + 0.7f * cosine), luminance_rounding);
+    }
+}
+
+// A light that would make luminances beyond 0..1, or none at all, is not taken.
+TEST(BuildTree, RefusesImpossibleLights) {
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    const Mesh mesh = shapes::icosphere(1);
+    const std::vector<std::pair<const char*, Light>> lights = {
+        {"no direction", {.direction = {nan, 0, 0}, .ambient = 0.2f}},
+        {"no ambient share", {.direction = {0, 0, 1}, .ambient = nan}},
+        {"too much ambient", {.direction = {0, 0, 1}, .ambient = 2}},
+        {"negative ambient", {.direction = {0, 0, 1}, .ambient = -1}},
+    };
+    for (const auto& [what, light] : lights) EXPECT_FALSE(build_tree(mesh.view(), {.light = light})) << what;
+    // A direction of another length counts by its direction alone, or is refused.
+    const auto long_direction = build_tree(mesh.view(), {.light = {.direction = {0, 0, 9}, .ambient = 0}});
+    if (!long_direction) return;
+    for (const float y : long_direction->luminance()) ASSERT_TRUE(y >= 0 && y <= 1);
+}
+
+// ---- progress
+
+TEST(BuildTree, CanBeCancelledAtAnyTime) {
+    const Mesh mesh = shapes::bumpy_sphere(3);
+    for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
+        bool cancelled = true;
+        for (int calls = 0; cancelled; ++calls) {
+            ASSERT_LT(calls, 1000);
+            int left = calls;
+            const auto stop = [&](double share, const char* stage) {
+                EXPECT_TRUE(share >= 0 && share <= 1) << share;
+                EXPECT_NE(stage, nullptr);
+                return left-- > 0;
+            };
+            const auto tree = build_tree(mesh.view(), {.clusterer = kind, .progress = stop});
+            cancelled = !tree;
+            if (cancelled) { ASSERT_EQ(tree.error().code, ErrorCode::cancelled); }
+            else { EXPECT_GE(calls, 4); }
+        }
+    }
+}
+
+TEST(BuildTree, ReportsProgressThatGrows) {
+    double last = 0;
+    const auto watch = [&](double share, const char*) {
+        EXPECT_GE(share, last);
+        last = share;
+        return true;
+    };
+    ASSERT_TRUE(build_tree(shapes::bumpy_sphere(4).view(), {.progress = watch}));
+    EXPECT_EQ(last, 1);
+}
+
+} // namespace
+} // namespace unseen::vdtree

@@ -1,0 +1,424 @@
+// The geometric criteria and the frustum, against brute force, up the tree, and under similarity transforms.
+#include <vdtree/criteria.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <stdexcept>
+#include <vector>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include <vdtree/builder.h>
+#include <vdtree/cut.h>
+
+#include "shapes.h"
+
+namespace unseen::vdtree {
+namespace {
+
+using shapes::random_between;
+using shapes::random_direction;
+using shapes::random_unit;
+
+// Of a cost: it is a float made from doubles.
+constexpr double cost_rounding = 1e-6;
+
+VertexTree built(const Mesh& mesh, ClustererKind kind = ClustererKind::quadric) {
+    Result<VertexTree> tree = build_tree(mesh.view(), {.clusterer = kind});
+    if (!tree) throw std::runtime_error(tree.error().message);
+    return std::move(*tree);
+}
+
+std::vector<NodeId> all_nodes(const VertexTree& tree) {
+    std::vector<NodeId> nodes(tree.interior_count());
+    for (NodeId node = 0; node < nodes.size(); ++node) nodes[node] = node;
+    return nodes;
+}
+
+template <class Criterion>
+std::vector<float> costs_of(const VertexTree& tree, const Criterion& criterion) {
+    std::vector<float> costs(tree.interior_count());
+    criterion(tree, all_nodes(tree), costs);
+    return costs;
+}
+
+std::vector<Visibility> seen_of(const VertexTree& tree, const FrustumVisibility& frustum) {
+    std::vector<Visibility> seen(tree.interior_count());
+    frustum(tree, all_nodes(tree), seen);
+    return seen;
+}
+
+// From inside the model to far away.
+View random_view(std::mt19937_64& random, const VertexTree& tree) {
+    const Sphere ball = tree.bounding_sphere();
+    const glm::dvec3 centre = tree.origin() + glm::dvec3(ball.centre);
+    View view;
+    view.eye = centre + std::pow(10.0, random_between(random, -1, 2)) * static_cast<double>(ball.radius) * random_direction(random);
+    view.target = centre + 0.5 * static_cast<double>(ball.radius) * random_direction(random);
+    view.up = random_direction(random);
+    view.fov_y_degrees = random_between(random, 5, 140);
+    view.width = 1 + static_cast<int>(random() % 2000);
+    view.height = 1 + static_cast<int>(random() % 2000);
+    return validate(view) ? view : random_view(random, tree);
+}
+
+Similarity random_similarity(std::mt19937_64& random) {
+    Similarity s;
+    s.scale = std::pow(10.0, random_between(random, -4, 4));
+    s.rotation = glm::angleAxis(random_between(random, -3, 3), random_direction(random));
+    s.translation = 3.0 * random_direction(random);
+    return s;
+}
+
+View moved(const View& view, const Similarity& s) {
+    View out = view;
+    out.eye = s.to_world(view.eye);
+    out.target = s.to_world(view.target);
+    out.up = s.rotation * view.up;
+    return out;
+}
+
+const std::vector<shapes::Named>& meshes() {
+    static const std::vector<shapes::Named> all = {
+        {"bumpy sphere", shapes::bumpy_sphere(3)},
+        {"spiky star", shapes::spiky_star(2)},
+        {"unwelded torus", shapes::unwelded(shapes::torus(12, 7))},
+        {"soup", shapes::random_soup(100, 300, 3)},
+        {"northing", shapes::placed(shapes::bumpy_sphere(2), 30, {5e5, 5e6, 100})},
+        {"tiny", shapes::placed(shapes::bumpy_sphere(2), 1e-19)},
+        {"huge", shapes::placed(shapes::bumpy_sphere(2), 1e30)},
+        {"seam", shapes::seam(true)},
+    };
+    return all;
+}
+
+TEST(PixelsPerRadian, IsThatOfTheWindowsCentre) {
+    // 90 degrees over 1000 pixels: half the height at distance 1 is 1.
+    EXPECT_NEAR(pixels_per_radian({.fov_y_degrees = 90, .height = 1000}), 500, 1e-9);
+    // A small object at the centre: its height in pixels, projected by hand.
+    const View view{.eye = {0, 0, 10}, .fov_y_degrees = 37, .height = 768};
+    const double half = 1e-4, tan_y = std::tan(37 * std::numbers::pi / 360);
+    const double pixels = 2 * half / 10 / tan_y * 768 / 2;
+    EXPECT_NEAR(pixels_per_radian(view) * 2 * half / 10, pixels, 1e-9 * pixels);
+}
+
+TEST(EyeInTree, UndoesThePlacementAndTheOrigin) {
+    std::mt19937_64 random(1);
+    const VertexTree tree = built(shapes::placed(shapes::icosphere(1), 3, {5e5, 5e6, 7}));
+    for (int round = 0; round < 100; ++round) {
+        const Similarity s = random_similarity(random);
+        const glm::dvec3 p = tree.origin() + 5.0 * random_direction(random);
+        const View view{.eye = s.to_world(p)};
+        // The northing costs seven of a double's sixteen digits.
+        EXPECT_LT(glm::distance(eye_in_tree(tree, view, s), p - tree.origin()), 1e-8);
+    }
+}
+
+// ---- node extent
+
+TEST(Extent, IsTheSizeOfTheProjectedSphere) {
+    std::mt19937_64 random(2);
+    const VertexTree tree = built(shapes::bumpy_sphere(2));
+    for (int round = 0; round < 20; ++round) {
+        View view = random_view(random, tree);
+        const double tolerance = random_between(random, 0.5, 20);
+        const auto costs = costs_of(tree, ExtentCriterion(tree, view, tolerance));
+        for (NodeId node = 0; node < tree.interior_count(); node += 7) {
+            const Sphere s = tree.support_spheres()[node];
+            const glm::dvec3 centre = tree.origin() + glm::dvec3(s.centre), to_centre = centre - view.eye;
+            if (glm::length(to_centre) <= s.radius) {
+                EXPECT_TRUE(is_unbounded(costs[node]));
+                continue;
+            }
+            if (s.radius == 0) continue;
+            // The widest angle from the centre's direction to a point of the sphere, by walking a great circle through it.
+            const glm::dvec3 back = -glm::normalize(to_centre), side = glm::normalize(glm::cross(back, random_direction(random)));
+            double widest = 0;
+            for (int i = 0; i < 20'000; ++i) {
+                const double a = std::numbers::pi * i / 20'000;
+                const glm::dvec3 p = to_centre + static_cast<double>(s.radius) * (std::cos(a) * back + std::sin(a) * side);
+                widest = std::max(widest, std::atan2(glm::length(glm::cross(p, back)), -glm::dot(p, back)));
+            }
+            const double pixels = 2 * widest * pixels_per_radian(view);
+            ASSERT_NEAR(costs[node] * tolerance, pixels, 1e-4 * pixels);
+        }
+    }
+}
+
+TEST(Extent, IsZeroForAPoint) {
+    const VertexTree tree = built(shapes::seam(false));
+    const auto costs = costs_of(tree, ExtentCriterion(tree, {.eye = {0, 0, 5}}, 1));
+    int points = 0;
+    for (NodeId node = 0; node < tree.interior_count(); ++node) {
+        if (tree.support_spheres()[node].radius > 0) continue;
+        EXPECT_EQ(costs[node], 0);
+        ++points;
+    }
+    EXPECT_EQ(points, 2);
+}
+
+// ---- displacement
+
+TEST(Displacement, IsNotExceededByAnyVertex) {
+    std::mt19937_64 random(3);
+    for (const shapes::Named& named : meshes()) {
+        SCOPED_TRACE(named.name);
+        const VertexTree tree = built(named.mesh);
+        for (int round = 0; round < 20; ++round) {
+            const View view = random_view(random, tree);
+            const double tolerance = random_between(random, 0.2, 5);
+            const auto costs = costs_of(tree, DisplacementCriterion(tree, view, tolerance));
+            const glm::dvec3 eye = eye_in_tree(tree, view, {});
+            for (NodeId node = 0; node < tree.interior_count(); ++node) {
+                const glm::dvec3 to = glm::normalize(glm::dvec3(tree.positions()[node]) - eye);
+                double widest = 0;
+                for (Index leaf = tree.first_leaf()[node]; leaf < tree.leaf_end()[node]; ++leaf) {
+                    const glm::dvec3 from = glm::normalize(glm::dvec3(tree.positions()[tree.interior_count() + leaf]) - eye);
+                    widest = std::max(widest, 2 * std::asin(std::min(1.0, glm::distance(from, to) / 2)));
+                }
+                const double pixels = widest * pixels_per_radian(view);
+                ASSERT_GE(costs[node] * tolerance * (1 + cost_rounding) + 1e-9, pixels) << "node " << node;
+            }
+        }
+    }
+}
+
+TEST(Displacement, IsNotExceededByTheEye) {
+    // From close by, a movement across the line of sight fills more than a right angle:
+    //
+    //   eye .     A proxy at A; the vertex B moves all the way across. C makes the sphere that of radius 1.
+    //     A---B
+    //     \   /
+    //       C       The other two vertices are far below.
+    Mesh mesh;
+    const double h = std::sqrt(0.5);
+    mesh.positions = {{-h, 0, h}, {h, 0, h}, {0, 0, -1}, {0, 0, -9}, {1, 0, -9}};
+    mesh.triangles = {{0, 1, 3}, {2, 3, 4}};
+    const auto cluster = [](const ClusterInput& input) {
+        const auto& p = input.mesh.positions;
+        return Result<Clustering>(Clustering{{5, 5, 5, 6, 6, 6, 6}, {p[0], p[3]}});
+    };
+    const auto tree = build_tree(mesh.view(), cluster);
+    ASSERT_TRUE(tree) << tree.error().message;
+    const View view{.eye = {0, 0, 1.1}};
+    const auto costs = costs_of(*tree, DisplacementCriterion(*tree, view, 1));
+    const double angle = 2 * std::atan(h / (1.1 - h)); // between A and B
+    EXPECT_GT(angle, std::numbers::pi / 2);
+    EXPECT_FALSE(is_unbounded(costs[1]));
+    EXPECT_GE(costs[1], angle * pixels_per_radian(view));
+}
+
+TEST(Displacement, IsTheMovementSeenFromTheNearestPoint) {
+    std::mt19937_64 random(4);
+    const VertexTree tree = built(shapes::bumpy_sphere(2));
+    View view{.eye = {0, 0, 50}}; // far away, where angles are small
+    const auto costs = costs_of(tree, DisplacementCriterion(tree, view, 2));
+    for (NodeId node = 0; node < tree.interior_count(); ++node) {
+        const Sphere s = tree.support_spheres()[node];
+        const double nearest = glm::distance(view.eye, tree.origin() + glm::dvec3(s.centre)) - s.radius;
+        const double pixels = tree.displacement()[node] / nearest * pixels_per_radian(view);
+        EXPECT_NEAR(costs[node] * 2, pixels, 1e-3 * pixels);
+    }
+}
+
+TEST(Displacement, IsZeroWhereNothingMovesAndUnboundedInside) {
+    const VertexTree tree = built(shapes::seam(true));
+    const auto outside = costs_of(tree, DisplacementCriterion(tree, {.eye = {0, 0, 5}}, 1));
+    const glm::dvec3 middle = tree.origin() + glm::dvec3(tree.support_spheres()[0].centre);
+    const auto inside = costs_of(tree, DisplacementCriterion(tree, {.eye = middle}, 1));
+    EXPECT_TRUE(is_unbounded(inside[0]));
+    EXPECT_FALSE(is_unbounded(outside[0]));
+    for (NodeId node = 0; node < tree.interior_count(); ++node) {
+        if (tree.displacement()[node] > 0) continue;
+        EXPECT_EQ(outside[node], 0);
+        EXPECT_EQ(inside[node], 0);
+    }
+}
+
+// ---- both
+
+TEST(Criteria, DoNotFallFromANodeToItsParent) {
+    std::mt19937_64 random(5);
+    for (const shapes::Named& named : meshes()) {
+        for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
+            SCOPED_TRACE(named.name + ", " + std::string(name(kind)));
+            const VertexTree tree = built(named.mesh, kind);
+            for (int round = 0; round < 200; ++round) {
+                const View view = random_view(random, tree);
+                const auto extent = costs_of(tree, ExtentCriterion(tree, view, 3));
+                const auto displacement = costs_of(tree, DisplacementCriterion(tree, view, 3));
+                for (NodeId node = 1; node < tree.interior_count(); ++node) {
+                    const NodeId parent = tree.parents()[node];
+                    ASSERT_GE(extent[parent], extent[node]) << "node " << node << ", round " << round;
+                    ASSERT_GE(displacement[parent], displacement[node]) << "node " << node << ", round " << round;
+                }
+            }
+        }
+    }
+}
+
+TEST(Criteria, DoNotFallForEyesOnTheSpheres) {
+    std::mt19937_64 random(6);
+    const VertexTree tree = built(shapes::bumpy_sphere(3));
+    for (int round = 0; round < 500; ++round) {
+        // As near to a sphere as a double comes, on either side.
+        const Sphere s = tree.support_spheres()[random() % tree.interior_count()];
+        const double nearly = 1 + 1e-7 * random_between(random, -1, 1);
+        const View view{.eye = tree.origin() + glm::dvec3(s.centre) + nearly * s.radius * random_direction(random), .target = {9, 9, 9}};
+        const auto extent = costs_of(tree, ExtentCriterion(tree, view, 3));
+        const auto displacement = costs_of(tree, DisplacementCriterion(tree, view, 3));
+        for (NodeId node = 1; node < tree.interior_count(); ++node) {
+            ASSERT_GE(extent[tree.parents()[node]], extent[node]) << "node " << node << ", round " << round;
+            ASSERT_GE(displacement[tree.parents()[node]], displacement[node]) << "node " << node << ", round " << round;
+        }
+    }
+}
+
+TEST(Criteria, AreNumbersForTiniestAndHugestMeshes) {
+    std::mt19937_64 random(7);
+    for (const shapes::Named& named : meshes()) {
+        const VertexTree tree = built(named.mesh);
+        for (int round = 0; round < 50; ++round) {
+            const View view = random_view(random, tree);
+            for (const float cost : costs_of(tree, ExtentCriterion(tree, view, 3))) ASSERT_TRUE(cost >= 0) << named.name;
+            for (const float cost : costs_of(tree, DisplacementCriterion(tree, view, 3))) ASSERT_TRUE(cost >= 0) << named.name;
+        }
+    }
+}
+
+TEST(Criteria, StayTheSameWhenEyeAndTreeMoveTogether) {
+    std::mt19937_64 random(8);
+    for (const shapes::Named& named : {meshes()[0], meshes()[1], meshes()[5], meshes()[6]}) {
+        SCOPED_TRACE(named.name);
+        const VertexTree tree = built(named.mesh);
+        for (int round = 0; round < 40; ++round) {
+            const View view = random_view(random, tree);
+            Similarity s = random_similarity(random);
+            s.translation *= s.scale * tree.bounding_sphere().radius; // beside the model, whatever its size
+            const View there = moved(view, s);
+            const auto compare = [&](const std::vector<float>& a, const std::vector<float>& b) {
+                for (std::size_t i = 0; i < a.size(); ++i) {
+                    if (is_unbounded(a[i]) || is_unbounded(b[i])) continue; // an eye on a sphere may fall to either side
+                    ASSERT_NEAR(a[i], b[i], 1e-4 * a[i] + 1e-6) << "node " << i;
+                }
+            };
+            compare(costs_of(tree, ExtentCriterion(tree, view, 2)), costs_of(tree, ExtentCriterion(tree, there, 2, s)));
+            compare(costs_of(tree, DisplacementCriterion(tree, view, 2)), costs_of(tree, DisplacementCriterion(tree, there, 2, s)));
+            const auto here = seen_of(tree, FrustumVisibility(tree, view)), elsewhere = seen_of(tree, FrustumVisibility(tree, there, s));
+            int different = 0;
+            for (std::size_t i = 0; i < here.size(); ++i) different += here[i] != elsewhere[i];
+            ASSERT_LE(different, 1); // a sphere that touches a plane may fall to either side
+        }
+    }
+}
+
+TEST(Criteria, HalveWithTwiceTheTolerance) {
+    const VertexTree tree = built(shapes::bumpy_sphere(2));
+    const View view{.eye = {0, 2, 5}};
+    const auto one = costs_of(tree, ExtentCriterion(tree, view, 1)), two = costs_of(tree, ExtentCriterion(tree, view, 2));
+    for (std::size_t i = 0; i < one.size(); ++i) EXPECT_NEAR(one[i], 2 * two[i], 1e-5 * one[i]);
+}
+
+TEST(UnboundedCosts, AreOrderedAndUnbounded) {
+    EXPECT_TRUE(is_unbounded(unbounded_cost(0)));
+    EXPECT_LT(unbounded_cost(0), unbounded_cost(1));
+    EXPECT_LT(unbounded_cost(1), unbounded_cost(1000));
+    EXPECT_TRUE(is_unbounded(std::numeric_limits<float>::infinity()));
+    EXPECT_TRUE(is_unbounded(std::numeric_limits<float>::quiet_NaN()));
+    EXPECT_FALSE(is_unbounded(1e20f));
+}
+
+// ---- the frustum
+
+// Whether a point (relative to the tree's origin) is in front of the eye and within the window. The window's planes are moved
+// outward by `play` of the point's distance from the eye.
+bool in_window(const VertexTree& tree, const View& view, glm::dvec3 p, double play) {
+    const CameraFrame f = camera_frame(view);
+    const glm::dvec3 d = tree.origin() + p - view.eye;
+    const double depth = -glm::dot(d, f.back), tan_y = std::tan(view.fov_y_degrees * std::numbers::pi / 360);
+    const double tan_x = tan_y * view.width / view.height;
+    const double slack = play * glm::length(d);
+    return depth > -slack && std::abs(glm::dot(d, f.right)) < depth * tan_x + slack * std::hypot(1, tan_x) &&
+           std::abs(glm::dot(d, f.up)) < depth * tan_y + slack * std::hypot(1, tan_y);
+}
+
+TEST(Frustum, AgreesWithPointsOfTheSpheres) {
+    std::mt19937_64 random(9);
+    int counts[3] = {0, 0, 0};
+    for (const shapes::Named& named : meshes()) {
+        SCOPED_TRACE(named.name);
+        const VertexTree tree = built(named.mesh);
+        for (int round = 0; round < 30; ++round) {
+            const View view = random_view(random, tree);
+            const auto seen = seen_of(tree, FrustumVisibility(tree, view));
+            for (NodeId node = 0; node < tree.interior_count(); ++node) {
+                ++counts[static_cast<int>(seen[node])];
+                const Sphere s = tree.ring_spheres()[node];
+                for (int i = 0; i < 10; ++i) {
+                    const glm::dvec3 p = glm::dvec3(s.centre) + s.radius * (i == 0 ? 0.0 : 1.0) * random_direction(random);
+                    if (seen[node] == Visibility::out) { ASSERT_FALSE(in_window(tree, view, p, -1e-9)) << "node " << node; }
+                    if (seen[node] == Visibility::wholly_in) { ASSERT_TRUE(in_window(tree, view, p, 1e-9)) << "node " << node; }
+                }
+            }
+        }
+    }
+    for (const int count : counts) EXPECT_GT(count, 1000); // all three happen
+}
+
+TEST(Frustum, IsTightForSmallSpheres) {
+    std::mt19937_64 random(10);
+    const VertexTree tree = built(shapes::bumpy_sphere(4));
+    int out = 0, in = 0;
+    for (int round = 0; round < 60; ++round) {
+        View view = random_view(random, tree);
+        if (round % 2) view.target += 3.0 * random_direction(random); // past the model
+        const auto seen = seen_of(tree, FrustumVisibility(tree, view));
+        for (NodeId node = 0; node < tree.interior_count(); ++node) {
+            // A sphere that is small, as seen from the eye, and whose centre is far from the window's edges, is decided.
+            const Sphere s = tree.ring_spheres()[node];
+            const double distance = glm::distance(tree.origin() + glm::dvec3(s.centre), view.eye);
+            if (distance < 1e-6 || s.radius > 0.02 * distance) continue;
+            if (in_window(tree, view, glm::dvec3(s.centre), -0.05)) {
+                ASSERT_EQ(seen[node], Visibility::wholly_in);
+                ++in;
+            } else if (!in_window(tree, view, glm::dvec3(s.centre), 0.05)) {
+                ASSERT_EQ(seen[node], Visibility::out);
+                ++out;
+            }
+        }
+    }
+    EXPECT_GT(in, 100);
+    EXPECT_GT(out, 100);
+}
+
+TEST(Frustum, NestsUpTheTree) {
+    std::mt19937_64 random(11);
+    for (const shapes::Named& named : meshes()) {
+        const VertexTree tree = built(named.mesh);
+        for (int round = 0; round < 100; ++round) {
+            const auto seen = seen_of(tree, FrustumVisibility(tree, random_view(random, tree)));
+            for (NodeId node = 1; node < tree.interior_count(); ++node) {
+                const Visibility above = seen[tree.parents()[node]];
+                if (above != Visibility::partly) { ASSERT_EQ(seen[node], above) << named.name << ", node " << node; }
+            }
+        }
+    }
+}
+
+TEST(Frustum, FoldsWhatIsBehindTheEye) {
+    const VertexTree tree = built(shapes::bumpy_sphere(3));
+    const View view{.eye = {0, 0, 5}, .target = {0, 0, 9}};
+    Cut cut(tree);
+    const ExtentCriterion extent(tree, view, 1e-3);
+    const FrustumVisibility frustum(tree, view);
+    cut.unfold_all();
+    EXPECT_EQ(cut.adjust(extent, {.visibility = frustum}).triangles, 0u);
+    EXPECT_GT(cut.adjust(extent).triangles, 0u);
+}
+
+} // namespace
+} // namespace unseen::vdtree

@@ -1,0 +1,162 @@
+// Views: the camera's frame, framing a sphere, and what is no view.
+#include <vdtree/view.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include "shapes.h"
+
+namespace unseen::vdtree {
+namespace {
+
+using shapes::random_between;
+using shapes::random_direction;
+
+constexpr double rounding = 1e-12; // of unit vectors after a few operations in double
+
+TEST(View, HasAValidDefault) { EXPECT_TRUE(validate(View{})); }
+
+TEST(View, RefusesWhatIsNone) {
+    const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+    const std::vector<std::pair<const char*, std::function<void(View&)>>> faults = {
+        {"eye at the target", [](View& v) { v.eye = v.target; }},
+        {"eye nowhere", [=](View& v) { v.eye.x = nan; }},
+        {"eye at infinity", [=](View& v) { v.eye.z = inf; }},
+        {"target nowhere", [=](View& v) { v.target.y = nan; }},
+        {"up nowhere", [=](View& v) { v.up.y = nan; }},
+        {"up at infinity", [=](View& v) { v.up.y = -inf; }},
+        {"no up", [](View& v) { v.up = glm::dvec3(0); }},
+        {"up along the line of sight", [](View& v) { v.up = {0, 0, -3}; }},
+        {"up nearly along the line of sight", [](View& v) { v.up = {0, 1e-9, 1}; }},
+        {"no field", [](View& v) { v.fov_y_degrees = 0; }},
+        {"negative field", [](View& v) { v.fov_y_degrees = -30; }},
+        {"field of a half-space", [](View& v) { v.fov_y_degrees = 180; }},
+        {"field that is no number", [=](View& v) { v.fov_y_degrees = nan; }},
+        {"no width", [](View& v) { v.width = 0; }},
+        {"no height", [](View& v) { v.height = 0; }},
+        {"negative width", [](View& v) { v.width = -1024; }},
+        {"width beyond all windows", [](View& v) { v.width = 32769; }},
+        {"height beyond all windows", [](View& v) { v.height = std::numeric_limits<int>::max(); }},
+        {"a distance beyond doubles", [](View& v) { v.eye.x = 1.7e308, v.target.x = -1.7e308; }},
+    };
+    for (const auto& [what, spoil] : faults) {
+        View view;
+        spoil(view);
+        const auto valid = validate(view);
+        ASSERT_FALSE(valid) << what;
+        EXPECT_EQ(valid.error().code, ErrorCode::invalid_argument);
+        EXPECT_FALSE(valid.error().message.empty());
+    }
+}
+
+TEST(View, TakesExtremesThatAreFine) {
+    for (const double scale : {1e-200, 1e-19, 1e30, 1e150}) EXPECT_TRUE(validate({.eye = {0, 0, scale}, .up = {0, scale, 0}})) << scale;
+    EXPECT_TRUE(validate({.fov_y_degrees = 179.9}));
+    EXPECT_TRUE(validate({.fov_y_degrees = 1e-3}));
+    EXPECT_TRUE(validate({.width = 1, .height = 32768}));
+    EXPECT_TRUE(validate({.eye = {0, 0, 1}, .up = {0, 1e-3, 1}}));
+}
+
+TEST(CameraFrame, IsOrthonormalAndRightHanded) {
+    std::mt19937_64 random(1);
+    for (int round = 0; round < 10'000; ++round) {
+        const double scale = std::pow(10.0, random_between(random, -100, 100));
+        const View view{.eye = scale * random_direction(random), .target = scale * random_direction(random),
+                        .up = std::pow(10.0, random_between(random, -100, 100)) * random_direction(random)};
+        if (!validate(view)) continue;
+        const CameraFrame f = camera_frame(view);
+        for (const glm::dvec3 axis : {f.right, f.up, f.back}) ASSERT_NEAR(glm::length(axis), 1, rounding);
+        ASSERT_NEAR(glm::dot(f.right, f.up), 0, rounding);
+        ASSERT_NEAR(glm::dot(f.up, f.back), 0, rounding);
+        ASSERT_NEAR(glm::dot(f.back, f.right), 0, rounding);
+        ASSERT_NEAR(glm::dot(glm::cross(f.right, f.up), f.back), 1, rounding);
+        ASSERT_GT(glm::dot(f.back, glm::normalize((view.eye - view.target) / scale)), 1 - rounding);
+        ASSERT_GT(glm::dot(f.up, view.up), 0);
+    }
+}
+
+TEST(CameraFrame, LooksDownMinusZByDefault) {
+    const CameraFrame f = camera_frame({});
+    EXPECT_EQ(f.right, glm::dvec3(1, 0, 0));
+    EXPECT_EQ(f.up, glm::dvec3(0, 1, 0));
+    EXPECT_EQ(f.back, glm::dvec3(0, 0, 1));
+}
+
+// The largest height above the middle of the window, as a share of half its height, of points of the sphere.
+double outline_share(const View& view, glm::dvec3 centre, double radius) {
+    const CameraFrame f = camera_frame(view);
+    const double tan_y = std::tan(view.fov_y_degrees * std::numbers::pi / 360);
+    double highest = 0;
+    constexpr int samples = 200'000;
+    for (int i = 0; i < samples; ++i) { // in the plane of the eye, the centre and up
+        const double a = 2 * std::numbers::pi * i / samples;
+        const glm::dvec3 p = centre + radius * (std::cos(a) * f.up + std::sin(a) * f.back) - view.eye;
+        highest = std::max(highest, glm::dot(p, f.up) / -glm::dot(p, f.back) / tan_y);
+    }
+    return highest;
+}
+
+TEST(FrameSphere, GivesTheOutlineTheShareAskedFor) {
+    std::mt19937_64 random(2);
+    for (int round = 0; round < 30; ++round) {
+        const double fill = random_between(random, 0.05, 1.2), radius = std::pow(10.0, random_between(random, -3, 3));
+        const View window{.fov_y_degrees = random_between(random, 5, 120), .width = 640, .height = 480};
+        const glm::dvec3 centre = 10 * radius * random_direction(random), direction = 7.0 * random_direction(random);
+        const View view = frame_sphere(centre, radius, direction, fill, window);
+        ASSERT_TRUE(validate(view));
+        EXPECT_EQ(view.target, centre);
+        EXPECT_EQ(view.width, 640);
+        EXPECT_EQ(view.height, 480);
+        EXPECT_EQ(view.fov_y_degrees, window.fov_y_degrees);
+        EXPECT_GT(glm::dot(glm::normalize(view.eye - centre), glm::normalize(direction)), 1 - rounding);
+        EXPECT_NEAR(outline_share(view, centre, radius), fill, 1e-6 * fill);
+    }
+}
+
+TEST(FrameSphere, LooksAlongEveryAxis) {
+    for (int axis = 0; axis < 3; ++axis) {
+        for (const double sign : {-1.0, 1.0}) {
+            glm::dvec3 direction(0);
+            direction[axis] = sign;
+            const View view = frame_sphere({1, 2, 3}, 1, direction, 0.9, {});
+            EXPECT_TRUE(validate(view)) << axis << ' ' << sign;
+            EXPECT_NEAR(outline_share(view, {1, 2, 3}, 1), 0.9, 1e-6);
+        }
+    }
+}
+
+TEST(FrameSphere, MakesNoValidViewOfImpossibleWishes) {
+    const View window;
+    EXPECT_FALSE(validate(frame_sphere({0, 0, 0}, 1, {0, 0, 0}, 0.9, window))); // no direction
+    EXPECT_FALSE(validate(frame_sphere({0, 0, 0}, 1, {0, 0, 1}, 0, window)));   // from infinitely far away
+    EXPECT_FALSE(validate(frame_sphere({0, 0, 0}, 0, {0, 0, 1}, 0.9, window))); // a point fills nothing
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_FALSE(validate(frame_sphere({0, 0, 0}, 1, {0, nan, 1}, 0.9, window)));
+    EXPECT_FALSE(validate(frame_sphere({0, 0, 0}, 1, {0, 0, 1}, nan, window)));
+}
+
+TEST(Similarity, GoesToTheWorldAndBack) {
+    std::mt19937_64 random(3);
+    for (int round = 0; round < 1000; ++round) {
+        Similarity s;
+        s.scale = std::pow(10.0, random_between(random, -6, 6));
+        s.rotation = glm::angleAxis(random_between(random, -3, 3), random_direction(random));
+        s.translation = s.scale * 5.0 * random_direction(random);
+        const glm::dvec3 p = random_direction(random), q = random_direction(random);
+        EXPECT_LT(glm::distance(s.to_mesh(s.to_world(p)), p), rounding);
+        EXPECT_NEAR(glm::distance(s.to_world(p), s.to_world(q)) / s.scale, glm::distance(p, q), rounding);
+        EXPECT_LT(glm::distance(s.direction_to_mesh(s.rotation * p), p), rounding);
+    }
+}
+
+} // namespace
+} // namespace unseen::vdtree
