@@ -1,5 +1,6 @@
-// Containment in (practically) exact arithmetic: with 113 bits of mantissa, differences, squares and sums of numbers that came
-// as floats or doubles lose nothing that an outward rounding in float or double would not cover many times over.
+// Containment in (practically) exact arithmetic: with 113 bits of mantissa, differences, squares and sums of numbers
+// that came as floats or doubles lose nothing that an outward rounding in float or double would not cover many times
+// over.
 #pragma once
 
 #include <glm/vec3.hpp>

@@ -66,7 +66,8 @@ inline Mesh cube(int n = 1) {
                         p[(axis + 2) % 3] = j + dj;
                         return vertex(p);
                     };
-                    Triangle a = {corner(0, 0), corner(1, 0), corner(1, 1)}, b = {corner(0, 0), corner(1, 1), corner(0, 1)};
+                    Triangle a = {corner(0, 0), corner(1, 0), corner(1, 1)},
+                             b = {corner(0, 0), corner(1, 1), corner(0, 1)};
                     if (!far) std::swap(a[1], a[2]), std::swap(b[1], b[2]);
                     m.triangles.push_back(a);
                     m.triangles.push_back(b);
@@ -81,11 +82,11 @@ inline Mesh cube(int n = 1) {
 inline Mesh icosphere(int level) {
     const double t = std::numbers::phi;
     Mesh m;
-    m.positions = {{-1, t, 0}, {1, t, 0}, {-1, -t, 0}, {1, -t, 0}, {0, -1, t}, {0, 1, t},
-                   {0, -1, -t}, {0, 1, -t}, {t, 0, -1}, {t, 0, 1}, {-t, 0, -1}, {-t, 0, 1}};
-    m.triangles = {{0, 11, 5}, {0, 5, 1}, {0, 1, 7}, {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
-                   {11, 10, 2}, {10, 7, 6}, {7, 1, 8}, {3, 9, 4}, {3, 4, 2}, {3, 2, 6}, {3, 6, 8},
-                   {3, 8, 9}, {4, 9, 5}, {2, 4, 11}, {6, 2, 10}, {8, 6, 7}, {9, 8, 1}};
+    m.positions = {{-1, t, 0},  {1, t, 0},  {-1, -t, 0}, {1, -t, 0}, {0, -1, t},  {0, 1, t},
+                   {0, -1, -t}, {0, 1, -t}, {t, 0, -1},  {t, 0, 1},  {-t, 0, -1}, {-t, 0, 1}};
+    m.triangles = {{0, 11, 5},  {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
+                   {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
+                   {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
     for (glm::dvec3& p : m.positions) p = glm::normalize(p);
     for (; level > 0; --level) {
         std::map<std::pair<Index, Index>, Index> middles;
@@ -273,7 +274,8 @@ inline Mesh with_attributes(Mesh m, unsigned seed = 3) {
         m.uvs.emplace_back(unit() * 3 - 1, unit());
     }
     const auto n = m.triangles.size();
-    m.ranges = {{"body", MeshRange::Kind::group, 0, n}, {"red", MeshRange::Kind::material, 0, n / 3},
+    m.ranges = {{"body", MeshRange::Kind::group, 0, n},
+                {"red", MeshRange::Kind::material, 0, n / 3},
                 {"blue", MeshRange::Kind::material, n / 3, n - n / 3}};
     return m;
 }
@@ -316,7 +318,8 @@ inline Mesh seam(bool colours_differ) {
     Mesh m;
     m.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {1, 0, 0}, {2, 0, 0}, {2, 1, 0}, {1, 1, 0}};
     m.triangles = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
-    for (std::size_t v = 0; v < 8; ++v) m.colours.push_back(glm::vec4(glm::vec3(v < 4 || !colours_differ ? 0.25f : 0.75f), 1));
+    for (std::size_t v = 0; v < 8; ++v)
+        m.colours.push_back(glm::vec4(glm::vec3(v < 4 || !colours_differ ? 0.25f : 0.75f), 1));
     return m;
 }
 

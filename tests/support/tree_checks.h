@@ -1,4 +1,5 @@
-// What must hold for any tree and any cut, recomputed from the definitions. Each check returns the first fault, or nothing.
+// What must hold for any tree and any cut, recomputed from the definitions. Each check returns the first fault, or
+// nothing.
 #pragma once
 
 #include <algorithm>
@@ -57,7 +58,8 @@ inline std::string difference(const VertexTree& a, const VertexTree& b) {
         return r.name == s.name && r.kind == s.kind && r.first_triangle == s.first_triangle &&
                r.triangle_count == s.triangle_count;
     };
-    if (!std::equal(a.ranges().begin(), a.ranges().end(), b.ranges().begin(), b.ranges().end(), same_range)) return "ranges";
+    if (!std::equal(a.ranges().begin(), a.ranges().end(), b.ranges().begin(), b.ranges().end(), same_range))
+        return "ranges";
     if (a.dropped_triangles() != b.dropped_triangles()) return "dropped_triangles";
     if (a.closedness() != b.closedness()) return "closedness";
     const auto sphere_a = a.bounding_sphere(), sphere_b = b.bounding_sphere();
@@ -115,17 +117,18 @@ inline std::string fault_in_structure(const VertexTree& tree) {
     return {};
 }
 
-// Half a unit in the last place of a float as large as the largest coordinate relative to the origin; the origin is chosen such
-// that this is below twice the mesh's extent.
+// Half a unit in the last place of a float as large as the largest coordinate relative to the origin; the origin is
+// chosen such that this is below twice the mesh's extent.
 inline double position_tolerance(const MeshView& mesh, glm::dvec3 origin, int axis) {
     double largest = 0;
     for (const glm::dvec3& p : mesh.positions) largest = std::max(largest, std::abs(p[axis] - origin[axis]));
     const float f = static_cast<float>(largest);
-    return 0.5 * (static_cast<double>(std::nextafter(f, std::numeric_limits<float>::infinity())) - static_cast<double>(f));
+    return 0.5 *
+           (static_cast<double>(std::nextafter(f, std::numeric_limits<float>::infinity())) - static_cast<double>(f));
 }
 
-// That a fully unfolded cut is the input: the same triangles over the same vertices in the same orientation, each once, but for
-// those that use a vertex twice; and the same positions, exactly where the input is in floats.
+// That a fully unfolded cut is the input: the same triangles over the same vertices in the same orientation, each
+// once, but for those that use a vertex twice; and the same positions, exactly where the input is in floats.
 inline std::string fault_when_unfolded(const VertexTree& tree, const MeshView& mesh) {
     const NodeId interior = tree.interior_count();
     if (tree.leaf_count() != mesh.positions.size()) return "not every vertex is a leaf";
@@ -172,8 +175,9 @@ inline std::string fault_when_unfolded(const VertexTree& tree, const MeshView& m
     return {};
 }
 
-// The cut's definition: unfolded nodes are closed upward; the active nodes form an antichain that covers every leaf; a triangle
-// is drawn iff its corners stand for three different active nodes; nothing is missed and nothing drawn twice.
+// The cut's definition: unfolded nodes are closed upward; the active nodes form an antichain that covers every leaf;
+// a triangle is drawn iff its corners stand for three different active nodes; nothing is missed and nothing drawn
+// twice.
 inline std::string fault_in_cut(const Cut& cut) {
     const VertexTree& tree = cut.tree();
     const NodeId interior = tree.interior_count();
@@ -196,7 +200,8 @@ inline std::string fault_in_cut(const Cut& cut) {
     }
     std::vector<Triangle> expected, drawn;
     for (const Triangle& t : tree.triangles()) {
-        const Triangle now = {active_above[interior + t[0]], active_above[interior + t[1]], active_above[interior + t[2]]};
+        const Triangle now = {active_above[interior + t[0]], active_above[interior + t[1]],
+                              active_above[interior + t[2]]};
         if (now[0] != now[1] && now[1] != now[2] && now[2] != now[0]) expected.push_back(now);
     }
     const auto indices = cut.indices();

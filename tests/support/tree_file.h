@@ -1,5 +1,5 @@
-// Tree files (.vdt) taken apart and put together again with valid checksums, from docs/file-format.md and not from the writer's
-// code: for files that lie, and as a second opinion about the format. For little-endian hosts.
+// Tree files (.vdt) taken apart and put together again with valid checksums, from docs/file-format.md and not from
+// the writer's code: for files that lie, and as a second opinion about the format. For little-endian hosts.
 #pragma once
 
 #include <algorithm>
@@ -32,7 +32,8 @@ void store(std::string& bytes, std::size_t at, T value) {
 inline std::uint64_t xxh3(std::string_view bytes) { return XXH3_64bits(bytes.data(), bytes.size()); }
 
 struct TreeFile {
-    static constexpr std::size_t header_bytes = 48, entry_bytes = 48, page_bytes = 1 << 20, alignment = 64;
+    static constexpr std::size_t header_bytes = 48, entry_bytes = 48, page_bytes = 1 << 20, alignment = 64,
+                                 most_sections = 64;
     // Offsets in the header and in an entry of the section table.
     static constexpr std::size_t version_at = 8, section_count_at = 12, file_bytes_at = 16, page_count_at = 24,
                                  table_checksum_at = 32, header_checksum_at = 40;
@@ -44,9 +45,13 @@ struct TreeFile {
         std::string data;
 
         template <class T>
-        T get(std::size_t i) const { return load<T>(data, i * sizeof(T)); }
+        T get(std::size_t i) const {
+            return load<T>(data, i * sizeof(T));
+        }
         template <class T>
-        void set(std::size_t i, T value) { store(data, i * sizeof(T), value); }
+        void set(std::size_t i, T value) {
+            store(data, i * sizeof(T), value);
+        }
         std::uint64_t count() const { return data.size() / element_bytes; }
     };
     std::vector<Section> sections;
@@ -54,6 +59,7 @@ struct TreeFile {
     static TreeFile parse(std::string_view bytes) {
         TreeFile file;
         const auto count = load<std::uint32_t>(bytes, section_count_at);
+        if (count > most_sections) throw std::out_of_range("section count");
         for (std::uint32_t i = 0; i < count; ++i) {
             const std::size_t entry = header_bytes + i * entry_bytes;
             Section s;
@@ -61,6 +67,7 @@ struct TreeFile {
             s.name.resize(std::strlen(s.name.c_str()));
             s.element_bytes = load<std::uint32_t>(bytes, entry + element_bytes_at);
             s.component_bytes = load<std::uint32_t>(bytes, entry + component_bytes_at);
+            if (s.element_bytes == 0) throw std::out_of_range("element size");
             s.data = std::string(bytes.substr(load<std::uint64_t>(bytes, entry + offset_at),
                                               load<std::uint64_t>(bytes, entry + count_at) * s.element_bytes));
             file.sections.push_back(std::move(s));

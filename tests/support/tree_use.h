@@ -1,5 +1,5 @@
-// Does with a tree whatever the library can do with one. For trees from files that nobody vouches for: nothing may crash, hang or
-// read out of bounds, though the picture may be nonsense.
+// Does with a tree whatever the library can do with one. For trees from files that nobody vouches for: nothing may
+// crash, hang or read out of bounds, though the picture may be nonsense.
 #pragma once
 
 #include <vdtree/criteria.h>

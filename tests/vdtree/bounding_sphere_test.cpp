@@ -34,8 +34,8 @@ using Points = std::vector<glm::dvec3>;
 
 // Of the radius: distances in double round a few times.
 constexpr double rounding = 1e-14;
-// Of the radius: a smallest sphere is defined by up to four points through a linear system, which near-degenerate sets make
-// ill-conditioned; the radius, being a minimum, suffers only to second order.
+// Of the radius: a smallest sphere is defined by up to four points through a linear system, which near-degenerate
+// sets make ill-conditioned; the radius, being a minimum, suffers only to second order.
 constexpr double radius_tolerance = 1e-9;
 // What enclosing_sphere() promises.
 constexpr double promised_excess = 1e-4;
@@ -55,38 +55,57 @@ Points repeat(std::mt19937_64& random, int most, const std::function<glm::dvec3(
 std::vector<NamedPoints> point_sets() {
     const auto between = random_between;
     return {
-        {"in a cube", [=](auto& r) { return repeat(r, 60, [&](int) { return glm::dvec3(between(r, -1, 1), between(r, -1, 1), between(r, -1, 1)); }); }},
+        {"in a cube",
+         [=](auto& r) {
+             return repeat(r, 60,
+                           [&](int) { return glm::dvec3(between(r, -1, 1), between(r, -1, 1), between(r, -1, 1)); });
+         }},
         {"on a sphere", [=](auto& r) { return repeat(r, 60, [&](int) { return random_direction(r); }); }},
-        {"on a line", [=](auto& r) {
+        {"on a line",
+         [=](auto& r) {
              const glm::dvec3 d = random_direction(r);
              return repeat(r, 30, [&](int) { return d * between(r, -1, 1); });
          }},
-        {"on a line along an axis", [=](auto& r) { return repeat(r, 30, [&](int i) { return glm::dvec3(i * i, 0, 0); }); }},
-        {"in a plane", [=](auto& r) {
+        {"on a line along an axis",
+         [=](auto& r) { return repeat(r, 30, [&](int i) { return glm::dvec3(i * i, 0, 0); }); }},
+        {"in a plane",
+         [=](auto& r) {
              const glm::dvec3 d = random_direction(r), e = glm::normalize(glm::cross(d, random_direction(r)));
              return repeat(r, 40, [&](int) { return d * between(r, -1, 1) + e * between(r, -1, 1); });
          }},
-        {"on a circle", [=](auto& r) {
-             return repeat(r, 40, [&](int) { const double a = between(r, 0, 6.3); return glm::dvec3(std::cos(a), std::sin(a), 0.5); });
+        {"on a circle",
+         [=](auto& r) {
+             return repeat(r, 40, [&](int) {
+                 const double a = between(r, 0, 6.3);
+                 return glm::dvec3(std::cos(a), std::sin(a), 0.5);
+             });
          }},
-        {"at one place", [](auto& r) {
+        {"at one place",
+         [](auto& r) {
              const glm::dvec3 p = random_direction(r);
              return repeat(r, 20, [&](int) { return p; });
          }},
-        {"at two places", [](auto& r) {
+        {"at two places",
+         [](auto& r) {
              const glm::dvec3 p = random_direction(r), q = random_direction(r);
              return repeat(r, 20, [&](int i) { return i % 2 ? p : q; });
          }},
-        {"on a lattice", [](auto& r) {
-             return repeat(r, 64, [&](int) { return glm::dvec3(static_cast<double>(r() % 4), static_cast<double>(r() % 4), static_cast<double>(r() % 4)); });
+        {"on a lattice",
+         [](auto& r) {
+             return repeat(r, 64, [&](int) {
+                 return glm::dvec3(static_cast<double>(r() % 4), static_cast<double>(r() % 4),
+                                   static_cast<double>(r() % 4));
+             });
          }},
-        {"nearly in a plane", [=](auto& r) {
-             return repeat(r, 30, [&](int) { return glm::dvec3(between(r, -1, 1), between(r, -1, 1), between(r, -1e-9, 1e-9)); });
+        {"nearly in a plane",
+         [=](auto& r) {
+             return repeat(
+                 r, 30, [&](int) { return glm::dvec3(between(r, -1, 1), between(r, -1, 1), between(r, -1e-9, 1e-9)); });
          }},
-        {"far from the origin", [](auto& r) {
-             return repeat(r, 40, [&](int) { return glm::dvec3(5e5, 5e6, 100) + random_direction(r); });
-         }},
-        {"two tight clusters", [](auto& r) {
+        {"far from the origin",
+         [](auto& r) { return repeat(r, 40, [&](int) { return glm::dvec3(5e5, 5e6, 100) + random_direction(r); }); }},
+        {"two tight clusters",
+         [](auto& r) {
              return repeat(r, 30, [&](int i) { return glm::dvec3(i % 2, 0, 0) + 1e-7 * random_direction(r); });
          }},
     };
@@ -103,7 +122,8 @@ double exact_radius(const Points& points, const std::vector<DSphere>& spheres = 
     for (const DSphere& s : spheres)
         smallest.insert(Traits::Sphere(Point(s.centre.x, s.centre.y, s.centre.z), Number(s.radius)));
     const auto radius = smallest.radius(); // a + b sqrt(c)
-    return CGAL::to_double(radius.first) + CGAL::to_double(radius.second) * std::sqrt(CGAL::to_double(smallest.discriminant()));
+    return CGAL::to_double(radius.first) +
+           CGAL::to_double(radius.second) * std::sqrt(CGAL::to_double(smallest.discriminant()));
 }
 #endif
 
@@ -204,7 +224,8 @@ TEST(RoundOutward, ContainsTheSphereExactly) {
         const Sphere rounded = round_outward(sphere);
         ASSERT_TRUE(support::contains(rounded, sphere.centre, sphere.radius)) << "round " << round;
         // Not wasteful either: the centre's rounding and two steps of the radius.
-        const double most = (sphere.radius + glm::distance(glm::dvec3(rounded.centre), sphere.centre)) * (1 + 3e-7) + 3e-45;
+        const double most =
+            (sphere.radius + glm::distance(glm::dvec3(rounded.centre), sphere.centre)) * (1 + 3e-7) + 3e-45;
         ASSERT_LE(rounded.radius, most);
     }
 }

@@ -61,7 +61,8 @@ std::vector<Case> cases() {
 
 class Regions {
 public:
-    Regions(const VertexTree& tree, const Mesh& mesh) : tree_(tree), around_(tree.leaf_count()), weld_(tree.leaf_count()) {
+    Regions(const VertexTree& tree, const Mesh& mesh)
+        : tree_(tree), around_(tree.leaf_count()), weld_(tree.leaf_count()) {
         for (Index t = 0; t < tree.triangle_count(); ++t)
             for (const Index leaf : tree.triangles()[t]) around_[leaf].push_back(t);
         std::map<std::tuple<double, double, double>, Index> first;
@@ -85,7 +86,8 @@ public:
     }
     std::set<Index> ring_leaves(NodeId node) const {
         std::set<Index> found;
-        for (const Index t : triangles_around(node)) found.insert(tree_.triangles()[t].begin(), tree_.triangles()[t].end());
+        for (const Index t : triangles_around(node))
+            found.insert(tree_.triangles()[t].begin(), tree_.triangles()[t].end());
         return found;
     }
     // Triangles that touch a place in the ring: the ring dilated by one more.
@@ -99,7 +101,8 @@ public:
     }
     bool ring_is_irregular(NodeId node) const {
         const auto leaves = ring_leaves(node);
-        return std::any_of(leaves.begin(), leaves.end(), [&](Index leaf) { return irregular_places_.contains(weld_[leaf]); });
+        return std::any_of(leaves.begin(), leaves.end(),
+                           [&](Index leaf) { return irregular_places_.contains(weld_[leaf]); });
     }
     // What lies at one point moves nothing and shows nothing when it folds.
     bool is_coincident(NodeId node) const { return tree_.support_spheres()[node].radius == 0; }
@@ -140,7 +143,8 @@ bool knows(const VertexTree& tree, NodeId node, glm::dvec3 n) {
         in_mask |= tree.masks()[node].contains(normal_cell(near));
     }
     const double s = 1 / std::sqrt(3.0);
-    const double along[] = {n.x, n.y, n.z, (n.x + n.y + n.z) * s, (-n.x + n.y + n.z) * s, (n.x - n.y + n.z) * s, (n.x + n.y - n.z) * s};
+    const double along[] = {
+        n.x, n.y, n.z, (n.x + n.y + n.z) * s, (-n.x + n.y + n.z) * s, (n.x - n.y + n.z) * s, (n.x + n.y - n.z) * s};
     bool in_slabs = true;
     for (std::size_t i = 0; i < NormalSlabs::axis_count; ++i)
         in_slabs &= tree.slabs()[node].lo[i] / 127.0 <= along[i] + direction_rounding &&
@@ -195,7 +199,9 @@ TEST_P(BuiltTree, LosesEachTriangleWhereTwoCornersFirstMerge) {
             };
             ASSERT_GE(supported(node), 2) << "triangle " << t;
             tree->for_each_child(node, [&](NodeId child) {
-                if (!tree->is_leaf(child)) { ASSERT_LT(supported(child), 2) << "triangle " << t; }
+                if (!tree->is_leaf(child)) {
+                    ASSERT_LT(supported(child), 2) << "triangle " << t;
+                }
             });
         }
     }
@@ -235,20 +241,23 @@ TEST_P(BuiltTree, KnowsTheNormalsOfTheDilatedRing) {
         }
         for (const Index t : regions.dilated_triangles(node)) {
             const Triangle& corners = tree->triangles()[t];
-            const glm::dvec3 n = normal_of(regions.position(regions.node_of(corners[0])), regions.position(regions.node_of(corners[1])),
-                                           regions.position(regions.node_of(corners[2])));
+            const glm::dvec3 n =
+                normal_of(regions.position(regions.node_of(corners[0])), regions.position(regions.node_of(corners[1])),
+                          regions.position(regions.node_of(corners[2])));
             ASSERT_TRUE(knows(*tree, node, n)) << "node " << node << ", triangle " << t;
         }
     }
 }
 
-// Replays the contractions in the order in which the clusterer made them. After each, the triangles around the new cluster have
-// the normals that a viewer sees when the node folds.
+// Replays the contractions in the order in which the clusterer made them. After each, the triangles around the new
+// cluster have the normals that a viewer sees when the node folds.
 TEST_P(BuiltTree, KnowsTheNormalsAfterEachFold) {
-    if (GetParam().shape == "unreferenced" || GetParam().shape == "one_unreferenced") GTEST_SKIP() << "cluster numbers differ";
+    if (GetParam().shape == "unreferenced" || GetParam().shape == "one_unreferenced")
+        GTEST_SKIP() << "cluster numbers differ";
     Clustering clustering;
     const auto remember = [&](const ClusterInput& input) {
-        Result<Clustering> made = GetParam().kind == ClustererKind::octree ? cluster_octree(input) : cluster_quadric(input);
+        Result<Clustering> made =
+            GetParam().kind == ClustererKind::octree ? cluster_octree(input) : cluster_quadric(input);
         if (made) clustering = *made;
         return made;
     };
@@ -264,7 +273,8 @@ TEST_P(BuiltTree, KnowsTheNormalsAfterEachFold) {
         node_by_leaves[{tree->first_leaf()[node], tree->leaf_end()[node]}] = node;
     std::vector<std::set<Index>> leaves(clusters);
     for (Index v = 0; v < vertices; ++v) leaves[v] = {leaf_of_vertex[v]};
-    for (std::size_t c = 0; c + 1 < clusters; ++c) leaves[clustering.parents[c]].insert(leaves[c].begin(), leaves[c].end());
+    for (std::size_t c = 0; c + 1 < clusters; ++c)
+        leaves[clustering.parents[c]].insert(leaves[c].begin(), leaves[c].end());
     const auto node_of = [&](Index cluster) {
         if (cluster < vertices) return tree->interior_count() + leaf_of_vertex[cluster];
         return node_by_leaves.at({*leaves[cluster].begin(), *leaves[cluster].rbegin() + 1});
@@ -321,7 +331,9 @@ TEST_P(BuiltTree, BoundsLuminance) {
         if (regions.is_coincident(node)) {
             // Nothing moves: the ring's contrast is that of the attributes which merge, and 0 where they are equal.
             ASSERT_LE(ring.hi - ring.lo, spread + luminance_rounding);
-            if (spread == 0) { ASSERT_EQ(ring.hi, ring.lo); }
+            if (spread == 0) {
+                ASSERT_EQ(ring.hi, ring.lo);
+            }
         } else {
             ASSERT_EQ(ring.lo, low) << "node " << node;
             ASSERT_EQ(ring.hi, high) << "node " << node;
@@ -350,13 +362,16 @@ TEST_P(BuiltTree, MeasuresDisplacement) {
         double largest = 0;
         const glm::dvec3 proxy(tree->positions()[node]);
         for (Index leaf = tree->first_leaf()[node]; leaf < tree->leaf_end()[node]; ++leaf)
-            largest = std::max(largest, glm::distance(proxy, glm::dvec3(tree->positions()[tree->interior_count() + leaf])));
+            largest =
+                std::max(largest, glm::distance(proxy, glm::dvec3(tree->positions()[tree->interior_count() + leaf])));
         double with_children = largest;
         tree->for_each_child(node, [&](NodeId child) {
-            if (!tree->is_leaf(child)) with_children = std::max(with_children, static_cast<double>(tree->displacement()[child]));
+            if (!tree->is_leaf(child))
+                with_children = std::max(with_children, static_cast<double>(tree->displacement()[child]));
         });
         ASSERT_GE(tree->displacement()[node], largest) << "node " << node;
-        ASSERT_LE(tree->displacement()[node], std::nextafter(static_cast<float>(with_children) * (1 + 1e-7f), 1e38f)) << "node " << node;
+        ASSERT_LE(tree->displacement()[node], std::nextafter(static_cast<float>(with_children) * (1 + 1e-7f), 1e38f))
+            << "node " << node;
     }
 }
 
@@ -421,7 +436,9 @@ std::vector<Triangle> triangles_of(const Cut& cut) {
 }
 
 template <class T>
-std::vector<T> copy(std::span<const T> values) { return {values.begin(), values.end()}; }
+std::vector<T> copy(std::span<const T> values) {
+    return {values.begin(), values.end()};
+}
 
 TEST(LiteralTree, QuadOfTwoTriangles) {
     //  3---2      4 = {0, 1}, 5 = {2, 3}, 6 = {4, 5}
@@ -491,7 +508,8 @@ TEST(LiteralTree, Fan) {
 
     Cut cut(*tree);
     cut.unfold_all();
-    EXPECT_THAT(triangles_of(cut), ElementsAre(Triangle{4, 5, 8}, Triangle{4, 7, 6}, Triangle{4, 9, 7}, Triangle{4, 8, 9}));
+    EXPECT_THAT(triangles_of(cut),
+                ElementsAre(Triangle{4, 5, 8}, Triangle{4, 7, 6}, Triangle{4, 9, 7}, Triangle{4, 8, 9}));
     cut.fold(3);
     EXPECT_THAT(triangles_of(cut), ElementsAre(Triangle{4, 5, 3}, Triangle{4, 7, 6}, Triangle{4, 3, 7}));
     cut.fold(2);
@@ -535,7 +553,8 @@ TEST(UserClustering, MayBeAsDeepAsItHasVertices) {
         std::vector<Index> order(n);
         std::iota(order.begin(), order.end(), Index{0});
         std::mt19937_64 random(1);
-        if (shuffled) for (Index i = n; i > 1; --i) std::swap(order[i - 1], order[random() % i]);
+        if (shuffled)
+            for (Index i = n; i > 1; --i) std::swap(order[i - 1], order[random() % i]);
         Clustering chain;
         chain.parents.resize(2 * n - 1);
         chain.parents[order[0]] = n;
@@ -583,12 +602,16 @@ TEST(UserClustering, IsCheckedBeforeUse) {
     for (const auto& [what, clustering] : invalid) {
         const auto tree = build_tree(mesh.view(), fixed(clustering));
         EXPECT_FALSE(tree) << what;
-        if (!tree) { EXPECT_EQ(tree.error().code, ErrorCode::invalid_argument) << what; }
+        if (!tree) {
+            EXPECT_EQ(tree.error().code, ErrorCode::invalid_argument) << what;
+        }
     }
 }
 
 TEST(UserClustering, MayFail) {
-    const auto failing = [](const ClusterInput&) { return Result<Clustering>(Error{ErrorCode::unsupported, "no clusters today"}); };
+    const auto failing = [](const ClusterInput&) {
+        return Result<Clustering>(Error{ErrorCode::unsupported, "no clusters today"});
+    };
     const auto tree = build_tree(shapes::cube(1).view(), failing);
     ASSERT_FALSE(tree);
     EXPECT_EQ(tree.error().message, "no clusters today");
@@ -605,7 +628,8 @@ TEST(UserClustering, IsGivenLuminanceNormalsAreasAndCoincidence) {
         for (Index v = 0; v < 36; ++v) {
             EXPECT_LE(input.coincident[v], v);
             EXPECT_EQ(mesh.positions[input.coincident[v]], mesh.positions[v]);
-            EXPECT_GT(glm::dot(glm::dvec3(input.normals[v]), mesh.positions[v]), 0.5); // outward, over all faces of the corner
+            EXPECT_GT(glm::dot(glm::dvec3(input.normals[v]), mesh.positions[v]),
+                      0.5); // outward, over all faces of the corner
             EXPECT_NEAR(glm::length(input.normals[v]), 1, 1e-6);
             const float lit = std::max(0.0f, glm::dot(input.normals[v], Light{}.direction));
             EXPECT_NEAR(input.luminance[v], 0.8f * (0.2f + 0.8f * lit), luminance_rounding);
@@ -631,7 +655,9 @@ TEST(BuildTree, RefusesWhatItCannotBuildOn) {
         for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
             const auto tree = build_tree(mesh.view(), {.clusterer = kind});
             EXPECT_FALSE(tree) << what;
-            if (!tree) { EXPECT_FALSE(tree.error().message.empty()); }
+            if (!tree) {
+                EXPECT_FALSE(tree.error().message.empty());
+            }
         }
     };
     expect_refused({}, "an empty mesh");
@@ -695,8 +721,11 @@ TEST(BuildTree, ComputesNormalsThatAreMissing) {
         const Index v = tree->source_vertices()[leaf];
         const glm::vec3 n = tree->normals()[tree->interior_count() + leaf];
         EXPECT_NEAR(glm::length(n), 1, 1e-5);
-        if (v == 3 || v == 7) { EXPECT_GT(glm::dot(glm::dvec3(n), mesh.positions[v]), 0.99); }
-        else { EXPECT_GT(glm::dot(n, glm::normalize(mesh.normals[v])), 0.9999f); }
+        if (v == 3 || v == 7) {
+            EXPECT_GT(glm::dot(glm::dvec3(n), mesh.positions[v]), 0.99);
+        } else {
+            EXPECT_GT(glm::dot(n, glm::normalize(mesh.normals[v])), 0.9999f);
+        }
     }
 }
 
@@ -751,7 +780,9 @@ TEST(BuildTree, MergesAcrossASeamAtTheCostOfItsColours) {
                 ++merges;
                 const LuminanceRange ring = tree->ring_luminance()[node];
                 EXPECT_NEAR(ring.hi - ring.lo, colours_differ ? 0.5f : 0.0f, luminance_rounding);
-                if (!colours_differ) { EXPECT_EQ(ring.hi, ring.lo); }
+                if (!colours_differ) {
+                    EXPECT_EQ(ring.hi, ring.lo);
+                }
             }
             EXPECT_EQ(merges, 2);
         }
@@ -773,7 +804,8 @@ TEST(BuildTree, KeepsThePrecisionOfNorthings) {
 
 TEST(Relit, EqualsATreeBuiltWithThatLight) {
     const Light light{.direction = glm::normalize(glm::vec3(-1, 0.2f, 0.5f)), .ambient = 0.4f};
-    for (const char* shape : {"bumpy_sphere", "unwelded_sphere", "flat_grid", "unreferenced", "tiny", "huge", "moebius_strip"}) {
+    for (const char* shape :
+         {"bumpy_sphere", "unwelded_sphere", "flat_grid", "unreferenced", "tiny", "huge", "moebius_strip"}) {
         const Mesh& mesh = meshes().at(shape);
         const auto tree = build_tree(mesh.view(), {.clusterer = ClustererKind::octree}); // does not look at luminance
         const auto expected = build_tree(mesh.view(), {.clusterer = ClustererKind::octree, .light = light});
@@ -839,8 +871,11 @@ TEST(BuildTree, CanBeCancelledAtAnyTime) {
             };
             const auto tree = build_tree(mesh.view(), {.clusterer = kind, .progress = stop});
             cancelled = !tree;
-            if (cancelled) { ASSERT_EQ(tree.error().code, ErrorCode::cancelled); }
-            else { EXPECT_GE(calls, 4); }
+            if (cancelled) {
+                ASSERT_EQ(tree.error().code, ErrorCode::cancelled);
+            } else {
+                EXPECT_GE(calls, 4);
+            }
         }
     }
 }

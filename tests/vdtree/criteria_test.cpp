@@ -57,7 +57,8 @@ View random_view(std::mt19937_64& random, const VertexTree& tree) {
     const Sphere ball = tree.bounding_sphere();
     const glm::dvec3 centre = tree.origin() + glm::dvec3(ball.centre);
     View view;
-    view.eye = centre + std::pow(10.0, random_between(random, -1, 2)) * static_cast<double>(ball.radius) * random_direction(random);
+    view.eye = centre + std::pow(10.0, random_between(random, -1, 2)) * static_cast<double>(ball.radius) *
+                            random_direction(random);
     view.target = centre + 0.5 * static_cast<double>(ball.radius) * random_direction(random);
     view.up = random_direction(random);
     view.fov_y_degrees = random_between(random, 5, 140);
@@ -135,12 +136,15 @@ TEST(Extent, IsTheSizeOfTheProjectedSphere) {
                 continue;
             }
             if (s.radius == 0) continue;
-            // The widest angle from the centre's direction to a point of the sphere, by walking a great circle through it.
-            const glm::dvec3 back = -glm::normalize(to_centre), side = glm::normalize(glm::cross(back, random_direction(random)));
+            // The widest angle from the centre's direction to a point of the sphere, by walking a great circle
+            // through it.
+            const glm::dvec3 back = -glm::normalize(to_centre),
+                             side = glm::normalize(glm::cross(back, random_direction(random)));
             double widest = 0;
             for (int i = 0; i < 20'000; ++i) {
                 const double a = std::numbers::pi * i / 20'000;
-                const glm::dvec3 p = to_centre + static_cast<double>(s.radius) * (std::cos(a) * back + std::sin(a) * side);
+                const glm::dvec3 p =
+                    to_centre + static_cast<double>(s.radius) * (std::cos(a) * back + std::sin(a) * side);
                 widest = std::max(widest, std::atan2(glm::length(glm::cross(p, back)), -glm::dot(p, back)));
             }
             const double pixels = 2 * widest * pixels_per_radian(view);
@@ -177,7 +181,8 @@ TEST(Displacement, IsNotExceededByAnyVertex) {
                 const glm::dvec3 to = glm::normalize(glm::dvec3(tree.positions()[node]) - eye);
                 double widest = 0;
                 for (Index leaf = tree.first_leaf()[node]; leaf < tree.leaf_end()[node]; ++leaf) {
-                    const glm::dvec3 from = glm::normalize(glm::dvec3(tree.positions()[tree.interior_count() + leaf]) - eye);
+                    const glm::dvec3 from =
+                        glm::normalize(glm::dvec3(tree.positions()[tree.interior_count() + leaf]) - eye);
                     widest = std::max(widest, 2 * std::asin(std::min(1.0, glm::distance(from, to) / 2)));
                 }
                 const double pixels = widest * pixels_per_radian(view);
@@ -268,7 +273,8 @@ TEST(Criteria, DoNotFallForEyesOnTheSpheres) {
         // As near to a sphere as a double comes, on either side.
         const Sphere s = tree.support_spheres()[random() % tree.interior_count()];
         const double nearly = 1 + 1e-7 * random_between(random, -1, 1);
-        const View view{.eye = tree.origin() + glm::dvec3(s.centre) + nearly * s.radius * random_direction(random), .target = {9, 9, 9}};
+        const View view{.eye = tree.origin() + glm::dvec3(s.centre) + nearly * s.radius * random_direction(random),
+                        .target = {9, 9, 9}};
         const auto extent = costs_of(tree, ExtentCriterion(tree, view, 3));
         const auto displacement = costs_of(tree, DisplacementCriterion(tree, view, 3));
         for (NodeId node = 1; node < tree.interior_count(); ++node) {
@@ -284,8 +290,10 @@ TEST(Criteria, AreNumbersForTiniestAndHugestMeshes) {
         const VertexTree tree = built(named.mesh);
         for (int round = 0; round < 50; ++round) {
             const View view = random_view(random, tree);
-            for (const float cost : costs_of(tree, ExtentCriterion(tree, view, 3))) ASSERT_TRUE(cost >= 0) << named.name;
-            for (const float cost : costs_of(tree, DisplacementCriterion(tree, view, 3))) ASSERT_TRUE(cost >= 0) << named.name;
+            for (const float cost : costs_of(tree, ExtentCriterion(tree, view, 3)))
+                ASSERT_TRUE(cost >= 0) << named.name;
+            for (const float cost : costs_of(tree, DisplacementCriterion(tree, view, 3)))
+                ASSERT_TRUE(cost >= 0) << named.name;
         }
     }
 }
@@ -302,13 +310,16 @@ TEST(Criteria, StayTheSameWhenEyeAndTreeMoveTogether) {
             const View there = moved(view, s);
             const auto compare = [&](const std::vector<float>& a, const std::vector<float>& b) {
                 for (std::size_t i = 0; i < a.size(); ++i) {
-                    if (is_unbounded(a[i]) || is_unbounded(b[i])) continue; // an eye on a sphere may fall to either side
+                    if (is_unbounded(a[i]) || is_unbounded(b[i]))
+                        continue; // an eye on a sphere may fall to either side
                     ASSERT_NEAR(a[i], b[i], 1e-4 * a[i] + 1e-6) << "node " << i;
                 }
             };
             compare(costs_of(tree, ExtentCriterion(tree, view, 2)), costs_of(tree, ExtentCriterion(tree, there, 2, s)));
-            compare(costs_of(tree, DisplacementCriterion(tree, view, 2)), costs_of(tree, DisplacementCriterion(tree, there, 2, s)));
-            const auto here = seen_of(tree, FrustumVisibility(tree, view)), elsewhere = seen_of(tree, FrustumVisibility(tree, there, s));
+            compare(costs_of(tree, DisplacementCriterion(tree, view, 2)),
+                    costs_of(tree, DisplacementCriterion(tree, there, 2, s)));
+            const auto here = seen_of(tree, FrustumVisibility(tree, view)),
+                       elsewhere = seen_of(tree, FrustumVisibility(tree, there, s));
             int different = 0;
             for (std::size_t i = 0; i < here.size(); ++i) different += here[i] != elsewhere[i];
             ASSERT_LE(different, 1); // a sphere that touches a plane may fall to either side
@@ -319,7 +330,8 @@ TEST(Criteria, StayTheSameWhenEyeAndTreeMoveTogether) {
 TEST(Criteria, HalveWithTwiceTheTolerance) {
     const VertexTree tree = built(shapes::bumpy_sphere(2));
     const View view{.eye = {0, 2, 5}};
-    const auto one = costs_of(tree, ExtentCriterion(tree, view, 1)), two = costs_of(tree, ExtentCriterion(tree, view, 2));
+    const auto one = costs_of(tree, ExtentCriterion(tree, view, 1)),
+               two = costs_of(tree, ExtentCriterion(tree, view, 2));
     for (std::size_t i = 0; i < one.size(); ++i) EXPECT_NEAR(one[i], 2 * two[i], 1e-5 * one[i]);
 }
 
@@ -334,8 +346,8 @@ TEST(UnboundedCosts, AreOrderedAndUnbounded) {
 
 // ---- the frustum
 
-// Whether a point (relative to the tree's origin) is in front of the eye and within the window. The window's planes are moved
-// outward by `play` of the point's distance from the eye.
+// Whether a point (relative to the tree's origin) is in front of the eye and within the window. The window's planes
+// are moved outward by `play` of the point's distance from the eye.
 bool in_window(const VertexTree& tree, const View& view, glm::dvec3 p, double play) {
     const CameraFrame f = camera_frame(view);
     const glm::dvec3 d = tree.origin() + p - view.eye;
@@ -359,9 +371,14 @@ TEST(Frustum, AgreesWithPointsOfTheSpheres) {
                 ++counts[static_cast<int>(seen[node])];
                 const Sphere s = tree.ring_spheres()[node];
                 for (int i = 0; i < 10; ++i) {
-                    const glm::dvec3 p = glm::dvec3(s.centre) + s.radius * (i == 0 ? 0.0 : 1.0) * random_direction(random);
-                    if (seen[node] == Visibility::out) { ASSERT_FALSE(in_window(tree, view, p, -1e-9)) << "node " << node; }
-                    if (seen[node] == Visibility::wholly_in) { ASSERT_TRUE(in_window(tree, view, p, 1e-9)) << "node " << node; }
+                    const glm::dvec3 p =
+                        glm::dvec3(s.centre) + s.radius * (i == 0 ? 0.0 : 1.0) * random_direction(random);
+                    if (seen[node] == Visibility::out) {
+                        ASSERT_FALSE(in_window(tree, view, p, -1e-9)) << "node " << node;
+                    }
+                    if (seen[node] == Visibility::wholly_in) {
+                        ASSERT_TRUE(in_window(tree, view, p, 1e-9)) << "node " << node;
+                    }
                 }
             }
         }
@@ -378,7 +395,8 @@ TEST(Frustum, IsTightForSmallSpheres) {
         if (round % 2) view.target += 3.0 * random_direction(random); // past the model
         const auto seen = seen_of(tree, FrustumVisibility(tree, view));
         for (NodeId node = 0; node < tree.interior_count(); ++node) {
-            // A sphere that is small, as seen from the eye, and whose centre is far from the window's edges, is decided.
+            // A sphere that is small, as seen from the eye, and whose centre is far from the window's edges, is
+            // decided.
             const Sphere s = tree.ring_spheres()[node];
             const double distance = glm::distance(tree.origin() + glm::dvec3(s.centre), view.eye);
             if (distance < 1e-6 || s.radius > 0.02 * distance) continue;
@@ -403,7 +421,9 @@ TEST(Frustum, NestsUpTheTree) {
             const auto seen = seen_of(tree, FrustumVisibility(tree, random_view(random, tree)));
             for (NodeId node = 1; node < tree.interior_count(); ++node) {
                 const Visibility above = seen[tree.parents()[node]];
-                if (above != Visibility::partly) { ASSERT_EQ(seen[node], above) << named.name << ", node " << node; }
+                if (above != Visibility::partly) {
+                    ASSERT_EQ(seen[node], above) << named.name << ", node " << node;
+                }
             }
         }
     }

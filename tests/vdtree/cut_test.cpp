@@ -414,7 +414,8 @@ TEST(Visibility, FoldsWhatIsOutAtNoCost) {
     const auto criterion = look_up(costs);
     std::uint64_t asked = 0;
     const auto counting = [&](const VertexTree& t, std::span<const NodeId> nodes, std::span<float> out) {
-        for (const NodeId node : nodes) EXPECT_LE(t.ring_spheres()[node].centre.x - t.ring_spheres()[node].radius, 0.1f);
+        for (const NodeId node : nodes)
+            EXPECT_LE(t.ring_spheres()[node].centre.x - t.ring_spheres()[node].radius, 0.1f);
         asked += nodes.size();
         criterion(t, nodes, out);
     };
@@ -422,8 +423,9 @@ TEST(Visibility, FoldsWhatIsOutAtNoCost) {
     const auto left_half = [](const VertexTree& t, std::span<const NodeId> nodes, std::span<Visibility> seen) {
         for (std::size_t i = 0; i < nodes.size(); ++i) {
             const Sphere s = t.ring_spheres()[nodes[i]];
-            seen[i] = s.centre.x - s.radius > 0.1f ? Visibility::out
-                      : s.centre.x + s.radius < 0.1f ? Visibility::wholly_in : Visibility::partly;
+            seen[i] = s.centre.x - s.radius > 0.1f   ? Visibility::out
+                      : s.centre.x + s.radius < 0.1f ? Visibility::wholly_in
+                                                     : Visibility::partly;
         }
     };
     Cut cut(tree);
@@ -490,7 +492,8 @@ TEST(Cuts, ShareOneTreeBetweenThreads) {
 }
 
 TEST(ExtractMesh, GivesTheVerticesInUseInDoublePrecision) {
-    const Mesh mesh = shapes::in_floats(shapes::with_attributes(shapes::placed(shapes::bumpy_sphere(2), 30, {5e5, 5e6, 100})));
+    const Mesh mesh =
+        shapes::in_floats(shapes::with_attributes(shapes::placed(shapes::bumpy_sphere(2), 30, {5e5, 5e6, 100})));
     const VertexTree tree = built(mesh);
     Cut cut(tree);
     cut.unfold_all();
@@ -529,7 +532,8 @@ TEST(ExtractMesh, KeepsEveryTriangleInItsRange) {
         for (const MeshRange& range : tree.ranges()) {
             std::uint64_t expected = 0;
             for (NodeId node = 0; node < tree.interior_count(); ++node)
-                for (Index t = tree.first_triangle()[node]; cut.is_unfolded(node) && t < tree.first_triangle()[node + 1]; ++t)
+                for (Index t = tree.first_triangle()[node];
+                     cut.is_unfolded(node) && t < tree.first_triangle()[node + 1]; ++t)
                     expected += tree.source_triangles()[t] >= range.first_triangle &&
                                 tree.source_triangles()[t] < range.first_triangle + range.triangle_count;
             std::uint64_t found = 0;

@@ -154,8 +154,8 @@ TEST(NormalSlabs, UniteAndInclude) {
     EXPECT_FALSE(a.includes(both));
 }
 
-// How a triangle with the normal n at some point within `radius` of the centre can face the eye, exactly: n . (eye - p) over
-// the sphere has the range distance n.to_eye -+ radius.
+// How a triangle with the normal n at some point within `radius` of the centre can face the eye, exactly: n . (eye -
+// p) over the sphere has the range distance n.to_eye -+ radius.
 struct Facings {
     bool front = false, back = false;
     void add(glm::dvec3 n, glm::dvec3 to_eye, double distance, double radius) {
@@ -171,8 +171,8 @@ struct Situation {
     float distance, radius;
 };
 
-// Normals in a cap about a random middle, the sphere from far away up to the eye's own place. Every few rounds everything lies
-// along axes, where comparisons with zero and signs of zero matter.
+// Normals in a cap about a random middle, the sphere from far away up to the eye's own place. Every few rounds
+// everything lies along axes, where comparisons with zero and signs of zero matter.
 Situation random_situation(std::mt19937_64& random) {
     const auto axis = [&] {
         glm::dvec3 a(0);
@@ -208,8 +208,9 @@ TEST(Facing, NeverRulesOutWhatCanBeSeen) {
             slabs.insert(n);
             truth.add(n, glm::normalize(glm::dvec3(s.to_eye)), s.distance, s.radius);
         }
-        for (const Facing answer : {facing(mask, s.to_eye, s.distance, s.radius), facing(slabs, s.to_eye, s.distance, s.radius),
-                                    facing(slabs, mask, s.to_eye, s.distance, s.radius)}) {
+        for (const Facing answer :
+             {facing(mask, s.to_eye, s.distance, s.radius), facing(slabs, s.to_eye, s.distance, s.radius),
+              facing(slabs, mask, s.to_eye, s.distance, s.radius)}) {
             ASSERT_NE(answer, Facing::none);
             const glm::dvec3 n = s.normals[0];
             const bool wrong = (answer == Facing::front && truth.back) || (answer == Facing::back && truth.front);
@@ -235,8 +236,9 @@ TEST(Facing, HoldsForAnEyeOnAnAxis) {
 }
 
 TEST(Facing, DecidesForSmallCapsAwayFromTheContour) {
-    // A cell spans at most 1.41 * 90/8 degrees = 16 degrees; with 2 degrees of cap and 1 degree of sphere, a normal at more than
-    // 25 degrees from the contour must be decided. Slabs lose up to 1/127 an axis: the same margin holds.
+    // A cell spans at most 1.41 * 90/8 degrees = 16 degrees; with 2 degrees of cap and 1 degree of sphere, a normal
+    // at more than 25 degrees from the contour must be decided. Slabs lose up to 1/127 an axis: the same margin
+    // holds.
     std::mt19937_64 random(5);
     const double margin = std::sin(25 * std::numbers::pi / 180);
     int decided = 0;
@@ -280,7 +282,8 @@ TEST(Facing, IsMixedInsideAndNoneForNothing) {
     mask.insert(normal_cell({0, 0, 1}));
     slabs.insert({0, 0, 1});
     const float nan = std::numeric_limits<float>::quiet_NaN();
-    for (const auto& [distance, radius] : {std::pair{1.0f, 1.0f}, {0.5f, 1.0f}, {0.0f, 0.0f}, {nan, 1.0f}, {1.0f, nan}}) {
+    for (const auto& [distance, radius] :
+         {std::pair{1.0f, 1.0f}, {0.5f, 1.0f}, {0.0f, 0.0f}, {nan, 1.0f}, {1.0f, nan}}) {
         EXPECT_EQ(facing(mask, {0, 0, 1}, distance, radius), Facing::mixed);
         EXPECT_EQ(facing(slabs, {0, 0, 1}, distance, radius), Facing::mixed);
     }

@@ -97,7 +97,8 @@ TEST_F(TreeIo, TakesSectionsOfSeveralPages) {
     for (std::size_t i = 0; i < parsed.sections.size(); ++i) {
         if (parsed.sections[i].name != "masks") continue;
         ASSERT_GT(parsed.sections[i].data.size(), TreeFile::page_bytes + 5);
-        const auto offset = support::load<std::uint64_t>(bytes, TreeFile::header_bytes + i * TreeFile::entry_bytes + TreeFile::offset_at);
+        const auto offset = support::load<std::uint64_t>(bytes, TreeFile::header_bytes + i * TreeFile::entry_bytes +
+                                                                    TreeFile::offset_at);
         bytes[offset + TreeFile::page_bytes + 5] ^= 1;
     }
     expect_refused(bytes, "Page 1 of section masks is damaged");
@@ -140,7 +141,8 @@ TEST_F(TreeIo, RefusesEveryTruncation) {
 TEST_F(TreeIo, FindsEveryFlippedBit) {
     const VertexTree tree = built(shapes::with_attributes(shapes::cube(1)));
     const std::string bytes = bytes_of(tree);
-    const std::size_t table_bits = 8 * (TreeFile::header_bytes + TreeFile::parse(bytes).sections.size() * TreeFile::entry_bytes);
+    const std::size_t table_bits =
+        8 * (TreeFile::header_bytes + TreeFile::parse(bytes).sections.size() * TreeFile::entry_bytes);
     std::mt19937_64 random(1);
     int refused = 0;
     for (std::size_t round = 0; round < 5000; ++round) {
@@ -236,7 +238,9 @@ std::vector<Lie> lies() {
         {"a parent is out of range", set("parents", 2, 0x7fffffffu)},
         {"a leaf has no parent", [](TreeFile& f) { f["parents"].set(f["first_leaf"].count() + 1, 0xffffffffu); }},
         {"a leaf's parent is a leaf",
-         [](TreeFile& f) { f["parents"].set(f["first_leaf"].count() + 1, static_cast<std::uint32_t>(f["first_leaf"].count())); }},
+         [](TreeFile& f) {
+             f["parents"].set(f["first_leaf"].count() + 1, static_cast<std::uint32_t>(f["first_leaf"].count()));
+         }},
         {"the root lacks a leaf", set("first_leaf", 0, 1u)},
         {"a node begins beyond the leaves", set("first_leaf", 1, 0xfffffffeu)},
         {"a node ends beyond the leaves", set("leaf_end", 1, 0xfffffffeu)},
@@ -246,7 +250,8 @@ std::vector<Lie> lies() {
         {"a subtree is empty", set("subtree_end", 1, 1u)},
         {"a subtree ends before it begins", set("subtree_end", 1, 0u)},
         {"a subtree is endless", set("subtree_end", 1, 0xffffffffu)},
-        {"the tree ends early", [](TreeFile& f) { f["subtree_end"].set(0, f["subtree_end"].get<std::uint32_t>(0) - 1); }},
+        {"the tree ends early",
+         [](TreeFile& f) { f["subtree_end"].set(0, f["subtree_end"].get<std::uint32_t>(0) - 1); }},
         {"triangles do not begin at 0", set("first_triangle", 0, 1u)},
         {"triangle ranges overlap", set("first_triangle", 1, 0x7fffffffu)},
         {"triangles are not covered",
@@ -270,12 +275,14 @@ std::vector<Lie> lies() {
         {"a negative displacement", set("displacement", 0, -1.0f)},
         {"a luminance above 1", set("luminance", 0, 1.5f)},
         {"a luminance that is no number", set("luminance", 0, nan)},
-        {"a luminance range in reverse", [](TreeFile& f) { f["support_range"].set(0, 0.9f), f["support_range"].set(1, 0.1f); }},
+        {"a luminance range in reverse",
+         [](TreeFile& f) { f["support_range"].set(0, 0.9f), f["support_range"].set(1, 0.1f); }},
         {"a negative ring luminance", set("ring_range", 0, -0.5f)},
         {"an adaptation luminance that is no number", set("adaptation", 0, nan)},
         {"a negative adaptation luminance", set("adaptation", 0, -1.0f)},
         {"an adaptation luminance above 1", set("adaptation", 0, 2.0f)},
-        {"the facts: an origin that is no number", [](TreeFile& f) { f["facts"].set(1, std::numeric_limits<double>::quiet_NaN()); }},
+        {"the facts: an origin that is no number",
+         [](TreeFile& f) { f["facts"].set(1, std::numeric_limits<double>::quiet_NaN()); }},
         {"the facts: a bounding sphere of negative radius", set("facts", 9, -1.0f)},
         {"the facts: a light that is no number", set("facts", 10, nan)},
         {"the facts: a luminance that is no number", set("facts", 14, nan)},
@@ -287,21 +294,25 @@ std::vector<Lie> lies() {
         {"a range with an endless name", set("ranges", 1, ~std::uint64_t{0})},
         {"a range that begins beyond the triangles", set("ranges", 2, std::uint64_t{1} << 40)},
         {"a range that ends beyond the triangles", set("ranges", 3, std::uint64_t{1} << 40)},
-        {"a range whose end wraps around", [](TreeFile& f) { f["ranges"].set(2, std::uint64_t{5}), f["ranges"].set(3, ~std::uint64_t{0} - 3); }},
+        {"a range whose end wraps around",
+         [](TreeFile& f) { f["ranges"].set(2, std::uint64_t{5}), f["ranges"].set(3, ~std::uint64_t{0} - 3); }},
         {"a range that is cut short", [](TreeFile& f) { f["ranges"].data.pop_back(); }},
         {"no triangle", [](TreeFile& f) { f["triangles"].data.clear(), f["source_triangles"].data.clear(); }},
-        {"no interior node", [](TreeFile& f) {
-             for (const char* name : {"first_leaf", "leaf_end", "subtree_end", "support_spheres", "ring_spheres", "masks", "slabs",
-                                      "flags", "displacement", "support_range", "ring_range", "adaptation"})
+        {"no interior node",
+         [](TreeFile& f) {
+             for (const char* name :
+                  {"first_leaf", "leaf_end", "subtree_end", "support_spheres", "ring_spheres", "masks", "slabs",
+                   "flags", "displacement", "support_range", "ring_range", "adaptation"})
                  f[name].data.clear();
              f["first_triangle"].data.resize(4);
          }},
         {"nothing at all", [](TreeFile& f) { f.sections.clear(); }},
     };
-    for (const char* section : {"parents", "positions", "normals", "colours", "uvs", "luminance", "first_leaf", "leaf_end",
-                                "subtree_end", "first_triangle", "support_spheres", "ring_spheres", "masks", "slabs", "flags",
-                                "displacement", "support_range", "ring_range", "adaptation", "triangles", "source_triangles",
-                                "source_vertices"})
+    for (const char* section : {"parents",          "positions",      "normals",    "colours",     "uvs",
+                                "luminance",        "first_leaf",     "leaf_end",   "subtree_end", "first_triangle",
+                                "support_spheres",  "ring_spheres",   "masks",      "slabs",       "flags",
+                                "displacement",     "support_range",  "ring_range", "adaptation",  "triangles",
+                                "source_triangles", "source_vertices"})
         all.push_back({section, drop_last(section)});
     return all;
 }
@@ -339,9 +350,11 @@ TEST_F(TreeIo, SurvivesRandomLies) {
         TreeFile file = TreeFile::parse(honest);
         for (std::uint64_t lie = 0; lie <= random() % 3; ++lie) {
             TreeFile::Section& s = file.sections[random() % file.sections.size()];
-            const std::uint32_t interesting[] = {0, 1, 2, 7, 0x7f800000, 0x7fc00000, 0x7f7fffff, 0x80000000, 0xffffffff,
-                                                 static_cast<std::uint32_t>(random())};
-            if (s.data.size() >= 4) s.set(random() % (s.data.size() / 4), interesting[random() % std::size(interesting)]);
+            const std::uint32_t interesting[] = {
+                0,          1,          2,          7,          0x7f800000,
+                0x7fc00000, 0x7f7fffff, 0x80000000, 0xffffffff, static_cast<std::uint32_t>(random())};
+            if (s.data.size() >= 4)
+                s.set(random() % (s.data.size() / 4), interesting[random() % std::size(interesting)]);
         }
         const auto tree = read_bytes(file.bytes());
         if (!tree) continue;
@@ -359,8 +372,9 @@ TEST_F(TreeIo, UsesNoMoreMemoryThanTheFileIsWorth) {
     for (std::size_t i = 0; i < sections; ++i) {
         const std::size_t entry = TreeFile::header_bytes + i * TreeFile::entry_bytes;
         support::store(bad, entry + TreeFile::offset_at, std::uint64_t{0});
-        support::store(bad, entry + TreeFile::count_at,
-                       std::uint64_t{bad.size() / support::load<std::uint32_t>(bad, entry + TreeFile::element_bytes_at)});
+        support::store(
+            bad, entry + TreeFile::count_at,
+            std::uint64_t{bad.size() / support::load<std::uint32_t>(bad, entry + TreeFile::element_bytes_at)});
     }
     TreeFile::seal(bad);
     EXPECT_FALSE(read_bytes(bad));
@@ -394,7 +408,8 @@ TEST_F(TreeIo, DoesNotWaitForPipes) {
 
 TEST_F(TreeIo, LeavesNothingInAFolderThatCannotBeWritten) {
     if (::geteuid() == 0) GTEST_SKIP() << "root may write everywhere";
-    std::filesystem::permissions(folder_.path(), std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
+    std::filesystem::permissions(folder_.path(),
+                                 std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
     EXPECT_FALSE(write_tree(file_, built(shapes::cube(1))));
     EXPECT_EQ(folder_.file_count(), 0u);
 }

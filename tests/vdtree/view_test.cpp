@@ -35,8 +35,14 @@ TEST(View, RefusesWhatIsNone) {
         {"up nowhere", [=](View& v) { v.up.y = nan; }},
         {"up at infinity", [=](View& v) { v.up.y = -inf; }},
         {"no up", [](View& v) { v.up = glm::dvec3(0); }},
-        {"up along the line of sight", [](View& v) { v.up = {0, 0, -3}; }},
-        {"up nearly along the line of sight", [](View& v) { v.up = {0, 1e-9, 1}; }},
+        {"up along the line of sight",
+         [](View& v) {
+             v.up = {0, 0, -3};
+         }},
+        {"up nearly along the line of sight",
+         [](View& v) {
+             v.up = {0, 1e-9, 1};
+         }},
         {"no field", [](View& v) { v.fov_y_degrees = 0; }},
         {"negative field", [](View& v) { v.fov_y_degrees = -30; }},
         {"field of a half-space", [](View& v) { v.fov_y_degrees = 180; }},
@@ -59,7 +65,8 @@ TEST(View, RefusesWhatIsNone) {
 }
 
 TEST(View, TakesExtremesThatAreFine) {
-    for (const double scale : {1e-200, 1e-19, 1e30, 1e150}) EXPECT_TRUE(validate({.eye = {0, 0, scale}, .up = {0, scale, 0}})) << scale;
+    for (const double scale : {1e-200, 1e-19, 1e30, 1e150})
+        EXPECT_TRUE(validate({.eye = {0, 0, scale}, .up = {0, scale, 0}})) << scale;
     EXPECT_TRUE(validate({.fov_y_degrees = 179.9}));
     EXPECT_TRUE(validate({.fov_y_degrees = 1e-3}));
     EXPECT_TRUE(validate({.width = 1, .height = 32768}));
@@ -70,7 +77,8 @@ TEST(CameraFrame, IsOrthonormalAndRightHanded) {
     std::mt19937_64 random(1);
     for (int round = 0; round < 10'000; ++round) {
         const double scale = std::pow(10.0, random_between(random, -100, 100));
-        const View view{.eye = scale * random_direction(random), .target = scale * random_direction(random),
+        const View view{.eye = scale * random_direction(random),
+                        .target = scale * random_direction(random),
                         .up = std::pow(10.0, random_between(random, -100, 100)) * random_direction(random)};
         if (!validate(view)) continue;
         const CameraFrame f = camera_frame(view);

@@ -1,0 +1,68 @@
+// Fuzzes the reader of tree files with libFuzzer: any bytes must give an error, or a tree with which everything can
+// be done.
+//
+//   clang++ -std=c++20 -g -O1 -fsanitize=fuzzer,address,undefined -Ivdtree/include -Itests/support
+//       tests/fuzz/tree_fuzz.cpp vdtree/src/{atomic_file,criteria,cut,mesh,normal_mask,tree_io}.cpp
+//       vdtree/src/{verify,vertex_tree,view}.cpp
+//
+// Start it with a folder of small trees made by `unseen build`.
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <stdexcept>
+#include <string>
+
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <vdtree/tree_io.h>
+
+#include "tree_file.h"
+#include "tree_use.h"
+
+namespace {
+
+// A file that exists in memory only.
+class MemoryFile {
+public:
+    MemoryFile() : descriptor_(::memfd_create("tree", 0)) {
+        if (descriptor_ < 0) std::abort();
+    }
+    MemoryFile(const MemoryFile&) = delete;
+    MemoryFile& operator=(const MemoryFile&) = delete;
+    ~MemoryFile() { ::close(descriptor_); }
+
+    std::string path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
+    void hold(const std::string& bytes) {
+        const auto size = static_cast<ssize_t>(bytes.size());
+        if (::ftruncate(descriptor_, 0) != 0 || ::pwrite(descriptor_, bytes.data(), bytes.size(), 0) != size)
+            std::abort();
+    }
+
+private:
+    int descriptor_;
+};
+
+void read_and_use(const std::string& bytes) {
+    static MemoryFile file;
+    file.hold(bytes);
+    const auto tree = unseen::vdtree::read_tree(file.path());
+    if (tree ? !unseen::support::use_everything(*tree) : tree.error().message.empty()) std::abort();
+}
+
+} // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    std::string bytes(reinterpret_cast<const char*>(data), size);
+    read_and_use(bytes);
+    // Most changes end at a checksum. Once more with those of header and table made right ...
+    unseen::support::TreeFile::seal(bytes);
+    read_and_use(bytes);
+    // ... and with all of them, so that changed values come through to the checks behind.
+    try {
+        read_and_use(unseen::support::TreeFile::parse(bytes).bytes());
+    } catch (const std::out_of_range&) {
+        // The sections do not lie in the file.
+    }
+    return 0;
+}
