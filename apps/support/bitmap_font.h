@@ -9,8 +9,8 @@ inline constexpr int glyph_width = 5;
 inline constexpr int glyph_height = 7;
 inline constexpr int glyph_advance = 6; // from one character to the next
 
-// Rows from the top, each of glyph_width characters, '#' where there is ink. Characters outside of printable ASCII come out
-// as a question mark.
+// Rows from the top, each of glyph_width characters, '#' where there is ink. Characters outside of printable ASCII come
+// out as a question mark.
 std::string_view glyph(char character);
 
 } // namespace unseen::app

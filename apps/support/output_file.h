@@ -9,8 +9,8 @@
 
 namespace unseen::app {
 
-// A text that waits under a temporary name beside its target. Made before long work, it finds out early whether the folder
-// can be written to; commit() renames it, and without commit() it is removed. Move-only.
+// A text that waits under a temporary name beside its target. Made before long work, it finds out early whether the
+// folder can be written to; commit() renames it, and without commit() it is removed. Move-only.
 class OutputFile {
 public:
     // Fails where the folder cannot be written to and where the target is anything but a regular file.

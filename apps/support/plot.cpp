@@ -14,7 +14,7 @@ constexpr glm::vec3 paper{1.0f}, ink{0.1f}, faint{0.88f}, grid{0.75f};
 constexpr int margin_left = 76, margin_right = 24, margin_top = 46, margin_bottom = 60; // pixels
 constexpr int text_scale = 2;
 constexpr int legend_sample = 34, legend_padding = 12; // pixels
-constexpr double curve_width = 2;      // pixels
+constexpr double curve_width = 2;                      // pixels
 constexpr double dash_px = 8, gap_px = 6;
 
 std::string number(double value) {
@@ -33,9 +33,8 @@ class Axes {
 public:
     explicit Axes(const LogLogPlot& plot)
         : low_(std::log10(plot.x_range.x), std::log10(plot.y_range.x)),
-          high_(std::log10(plot.x_range.y), std::log10(plot.y_range.y)),
-          left_(margin_left), top_(margin_top), right_(plot.width - legend_width(plot.curves) - margin_right),
-          bottom_(plot.height - margin_bottom) {}
+          high_(std::log10(plot.x_range.y), std::log10(plot.y_range.y)), left_(margin_left), top_(margin_top),
+          right_(plot.width - legend_width(plot.curves) - margin_right), bottom_(plot.height - margin_bottom) {}
 
     glm::dvec2 place(glm::dvec2 value) const {
         const glm::dvec2 share = (glm::dvec2(std::log10(value.x), std::log10(value.y)) - low_) / (high_ - low_);
@@ -79,13 +78,15 @@ void draw_grid(Canvas& canvas, const LogLogPlot& plot, const Axes& axes) {
         const double at = axes.place({x, plot.y_range.x}).x;
         canvas.line({at, axes.top()}, {at, axes.bottom()}, is_decade(x) ? grid : faint);
         const std::string text = number(x);
-        canvas.text(static_cast<int>(at) - Canvas::text_width(text, text_scale) / 2, axes.bottom() + 8, text, ink, text_scale);
+        canvas.text(static_cast<int>(at) - Canvas::text_width(text, text_scale) / 2, axes.bottom() + 8, text, ink,
+                    text_scale);
     }
     for (const double y : ticks(plot.y_range)) {
         const double at = axes.place({plot.x_range.x, y}).y;
         canvas.line({axes.left(), at}, {axes.right(), at}, is_decade(y) ? grid : faint);
         const std::string text = number(y);
-        canvas.text(axes.left() - 6 - Canvas::text_width(text, text_scale), static_cast<int>(at) - 7, text, ink, text_scale);
+        canvas.text(axes.left() - 6 - Canvas::text_width(text, text_scale), static_cast<int>(at) - 7, text, ink,
+                    text_scale);
     }
     const glm::dvec2 a(axes.left(), axes.top()), b(axes.right(), axes.bottom());
     canvas.line(a, {b.x, a.y}, ink);

@@ -29,9 +29,9 @@ Result<void> write(const std::string& file, const vdtree::VertexTree& tree) {
 }
 
 Json to_json(const vdtree::VertexTree& tree, double seconds) {
-    return {{"vertices", tree.leaf_count()},  {"triangles", tree.triangle_count()},
+    return {{"vertices", tree.leaf_count()},       {"triangles", tree.triangle_count()},
             {"dropped", tree.dropped_triangles()}, {"nodes", tree.node_count()},
-            {"bytes", tree.byte_size()},      {"build_seconds", number_or_null(seconds)}};
+            {"bytes", tree.byte_size()},           {"build_seconds", number_or_null(seconds)}};
 }
 
 void print(const vdtree::VertexTree& tree, double seconds) {

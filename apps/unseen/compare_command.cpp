@@ -86,8 +86,7 @@ Result<Verdict> judge_rpg99(const CompareArguments& a, const Pair& pair, const p
     };
     const Image reference = luminance(pair.reference), test = luminance(pair.test);
     perception::Rpg99Options options;
-    options.field_degrees =
-        a.field_degrees.value_or(perception::physical_field(display, reference.width).value());
+    options.field_degrees = a.field_degrees.value_or(perception::physical_field(display, reference.width).value());
     options.peak_cdm2 = display.peak.value();
     options.masked_by_both = as_the_program;
     auto judgement = perception::judge_rpg99(reference, test, options);
@@ -110,7 +109,8 @@ double ssim_of(const Pair& pair) {
 
 // Invisible differences in blues, visible ones from yellow (just so) to red (8 times that and more).
 Image false_colours(const Image& visibility) {
-    constexpr glm::vec3 none{0.02f, 0.02f, 0.08f}, almost{0.25f, 0.5f, 0.9f}, just{1.0f, 0.95f, 0.2f}, far{0.85f, 0.0f, 0.0f};
+    constexpr glm::vec3 none{0.02f, 0.02f, 0.08f}, almost{0.25f, 0.5f, 0.9f}, just{1.0f, 0.95f, 0.2f},
+        far{0.85f, 0.0f, 0.0f};
     constexpr float octaves_to_red = 3;
     Image map{visibility.width, visibility.height, 3, {}};
     map.values.reserve(3 * visibility.values.size());
@@ -155,7 +155,8 @@ Result<int> run(const CompareArguments& a) {
     if (auto ok = write_maps(a, *verdict); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
     if (!report->is_on_stdout()) {
-        const double share = 100.0 * static_cast<double>(judgement.visible_pixels) / static_cast<double>(judgement.pixels);
+        const double share =
+            100.0 * static_cast<double>(judgement.visible_pixels) / static_cast<double>(judgement.pixels);
         print_table({{"visible pixels", grouped(judgement.visible_pixels) + " of " + grouped(judgement.pixels) + " (" +
                                             rounded(share, 3) + "%)"},
                      {"largest ratio", rounded(judgement.max_ratio, 4)},
@@ -182,7 +183,8 @@ void check(CompareArguments& a) {
 Command compare_command(CLI::App& app) {
     auto a = std::make_shared<CompareArguments>();
     CLI::App* verb = app.add_subcommand("compare", "Count the pixels that differ visibly");
-    verb->add_option("REF", a->reference, "The reference: PNG (as the display shows it), PFM or EXR (cd/m2)")->required();
+    verb->add_option("REF", a->reference, "The reference: PNG (as the display shows it), PFM or EXR (cd/m2)")
+        ->required();
     verb->add_option("TEST", a->test, "The image to judge")->required();
     verb->add_option("--model", a->model_name, "modern (default) or rpg99 (of 1999, blind to fine detail)")
         ->type_name("NAME")
@@ -191,8 +193,9 @@ Command compare_command(CLI::App& app) {
                      "With rpg99: perceptualdiff, which does all as that program does (gamma 2.2, AdobeRGB, black 0)")
         ->type_name("NAME")
         ->check(CLI::IsMember({perceptualdiff}).description(""));
-    verb->add_option_function<double>("--field", [o = a.get()](const double& v) { o->field_degrees = v; },
-                                      "With rpg99: the image's horizontal field (default: as shown on the display)")
+    verb->add_option_function<double>(
+            "--field", [o = a.get()](const double& v) { o->field_degrees = v; },
+            "With rpg99: the image's horizontal field (default: as shown on the display)")
         ->type_name("DEGREES")
         ->check(within(1e-3, 179.9));
     add_gaze_option(*verb, a->gaze_px);
@@ -202,8 +205,9 @@ Command compare_command(CLI::App& app) {
     verb->add_option("--threshold-map", a->threshold_map, "The least visible luminance step, in cd/m2")
         ->type_name("OUT.pfm")
         ->check(ending_in({".pfm", ".exr"}));
-    verb->add_option_function<std::uint64_t>("--fail-above", [o = a.get()](const std::uint64_t& n) { o->fail_above = n; },
-                                             "Exit status 1 where more pixels than N differ visibly")
+    verb->add_option_function<std::uint64_t>(
+            "--fail-above", [o = a.get()](const std::uint64_t& n) { o->fail_above = n; },
+            "Exit status 1 where more pixels than N differ visibly")
         ->type_name("N")
         ->check(not_negative());
     verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");

@@ -64,7 +64,9 @@ public:
 
     bool is_table() const { return table_.has_value(); }
     const CsfTable& table() const { return *table_; }
-    std::string name() const { return table_ ? "table: " + table_->samples().source : std::string(perception::name(model_)); }
+    std::string name() const {
+        return table_ ? "table: " + table_->samples().source : std::string(perception::name(model_));
+    }
 
     Result<double> operator()(const StimulusOptions& s) const {
         if (!s.frequency) return invalid("--frequency is missing.");
@@ -157,7 +159,8 @@ Result<std::string> evaluate_csv(std::istream& in, const std::string& name, cons
             continue;
         }
         if (cells.size() != columns.size())
-            return complain(std::to_string(cells.size()) + " cells under " + std::to_string(columns.size()) + " columns.");
+            return complain(std::to_string(cells.size()) + " cells under " + std::to_string(columns.size()) +
+                            " columns.");
         StimulusOptions stimulus = a.stimulus;
         for (std::size_t i = 0; i < cells.size(); ++i)
             if (auto ok = read_cell(columns[i], cells[i], stimulus); !ok) return complain(ok.error().message);
@@ -186,8 +189,8 @@ Result<int> run_csv(const CsfArguments& a, const Observer& observer) {
 
 // ---- plot ---------------------------------------------------------------------------------------------------------
 
-constexpr std::array<double, 4> plotted_luminances = {0.1, 1, 10, 100};  // cd/m2
-constexpr std::array<double, 3> plotted_eccentricities = {0, 10, 30};    // degrees
+constexpr std::array<double, 4> plotted_luminances = {0.1, 1, 10, 100}; // cd/m2
+constexpr std::array<double, 3> plotted_eccentricities = {0, 10, 30};   // degrees
 constexpr std::array<glm::vec3, 4> luminance_colours = {glm::vec3(0.35f, 0.25f, 0.6f), glm::vec3(0.1f, 0.45f, 0.75f),
                                                         glm::vec3(0.1f, 0.6f, 0.3f), glm::vec3(0.85f, 0.45f, 0.05f)};
 constexpr glm::vec3 paper{1.0f};
@@ -270,13 +273,15 @@ void check(const CsfArguments& a) {
 Command csf_command(CLI::App& app) {
     auto a = std::make_shared<CsfArguments>();
     StimulusOptions* s = &a->stimulus;
-    CLI::App* verb = app.add_subcommand("csf", "Contrast sensitivity: 1 / the least visible contrast of a grating patch");
+    CLI::App* verb =
+        app.add_subcommand("csf", "Contrast sensitivity: 1 / the least visible contrast of a grating patch");
     verb->add_option("--model", a->model_name, "castle (castleCSF, achromatic; default) or stela (stelaCSF)")
         ->type_name("NAME")
         ->check(CLI::IsMember({"castle", "stela"}).description(""));
     const auto number = [verb](const char* name, std::optional<double>& value, const CLI::Validator& validator,
                                const char* unit, const char* text) {
-        verb->add_option_function<double>(name, [&value](const double& v) { value = v; }, text)
+        verb->add_option_function<double>(
+                name, [&value](const double& v) { value = v; }, text)
             ->type_name(unit)
             ->check(validator);
     };
@@ -285,8 +290,9 @@ Command csf_command(CLI::App& app) {
     number("--eccentricity", s->eccentricity, not_negative(), "DEG", "From the point of gaze (default: 0)");
     number("--temporal", s->temporal, not_negative(), "HZ", "Temporal frequency (default: 0)");
     number("--area", s->area, positive(), "DEG2", "Area of the patch (default: pi (1.5 / frequency)^2)");
-    verb->add_option_function<std::string>("--field", [s](const std::string& name) { s->field = field_of(name); },
-                                           "Side of the visual field: nasal, temporal, or the worst of them (default)")
+    verb->add_option_function<std::string>(
+            "--field", [s](const std::string& name) { s->field = field_of(name); },
+            "Side of the visual field: nasal, temporal, or the worst of them (default)")
         ->type_name("NAME")
         ->check(CLI::IsMember({"nasal", "temporal", "worst"}).description(""));
     verb->add_option("--csv", a->csv, "Rows of stimuli, columns named like these options; adds 'sensitivity' to stdout")

@@ -18,7 +18,8 @@ perception::Image luminance_image(const render::Frame& frame, const perception::
     perception::Image image{frame.width, frame.height, 1, {}};
     image.values.reserve(frame.luminance.size());
     for (const float relative : frame.luminance)
-        image.values.push_back(static_cast<float>(perception::to_luminance(display, static_cast<double>(relative)).value()));
+        image.values.push_back(
+            static_cast<float>(perception::to_luminance(display, static_cast<double>(relative)).value()));
     return image;
 }
 

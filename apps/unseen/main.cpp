@@ -58,9 +58,9 @@ int main(int argc, char** argv) {
     app.set_version_flag("--version", "unseen " UNSEEN_VERSION);
     app.require_subcommand(1);
     try {
-        const std::vector<Command> commands = {build_command(app),   info_command(app),    simplify_command(app),
-                                               render_command(app),  sheet_command(app),   compare_command(app),
-                                               csf_command(app),     view_command(app)};
+        const std::vector<Command> commands = {build_command(app),  info_command(app),  simplify_command(app),
+                                               render_command(app), sheet_command(app), compare_command(app),
+                                               csf_command(app),    view_command(app)};
         app.parse(argc, argv);
         return run(commands);
     } catch (const CLI::ParseError& error) {

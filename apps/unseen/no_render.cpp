@@ -8,9 +8,9 @@ Command absent(CLI::App& app, const std::string& name) {
     CLI::App* verb = app.add_subcommand(name, "Not in this build: it was made without OpenGL");
     verb->allow_extras();
     return {verb, [name]() -> Result<int> {
-                return Error{ErrorCode::unsupported,
-                             "This build cannot '" + name + "', for it was made without OpenGL; "
-                             "configure it with -DUNSEEN_BUILD_RENDER=ON."};
+                return Error{ErrorCode::unsupported, "This build cannot '" + name +
+                                                         "', for it was made without OpenGL; "
+                                                         "configure it with -DUNSEEN_BUILD_RENDER=ON."};
             }};
 }
 

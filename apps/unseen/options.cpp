@@ -50,7 +50,9 @@ CLI::Option* add_vector(CLI::App& verb, const std::string& name, std::optional<g
 
 CLI::Option* add_number(CLI::App& verb, const std::string& name, std::optional<double>& value,
                         const CLI::Validator& validator, const std::string& unit, const std::string& text) {
-    return verb.add_option_function<double>(name, [&value](const double& v) { value = v; }, text)
+    return verb
+        .add_option_function<double>(
+            name, [&value](const double& v) { value = v; }, text)
         ->type_name(unit)
         ->check(validator);
 }
@@ -92,7 +94,8 @@ void check(const WhatOptions& what) {
     if (what.mode == Mode::pixels && is_perceptual)
         refuse("--pixels needs --fold-test extent or displacement: luebke-hallen knows no pixels.");
     if (what.mode == Mode::imperceptible && !is_perceptual)
-        refuse("--fold-test " + what.fold_test + " cannot tell what is imperceptible: add --triangles N or --pixels E.");
+        refuse("--fold-test " + what.fold_test +
+               " cannot tell what is imperceptible: add --triangles N or --pixels E.");
 }
 
 } // namespace
@@ -175,14 +178,16 @@ void add_view_options(CLI::App& verb, ViewOptions& o) {
     add_vector(group, "--light", o.light, "Direction towards the light (default: 0.4 0.7 0.6; colours come pre-lit)");
     add_number(group, "--ambient", o.ambient, within(0, 1), "A", "Share of light from everywhere, 0..1 (default: 0.2)");
     add_number(group, "--background", o.background_cdm2, not_negative(), "CDM2", "Background luminance (default: 20)");
-    group.add_option("--unit", o.unit_metres, "Metres a mesh unit (default: 1)")->type_name("METRES")->check(positive());
+    group.add_option("--unit", o.unit_metres, "Metres a mesh unit (default: 1)")
+        ->type_name("METRES")
+        ->check(positive());
     group.callback([&o] { check(o); });
 }
 
 void add_display_options(CLI::App& verb, DisplayOptions& o) {
     CLI::App& group = *verb.add_option_group("DISPLAY", "On what display (default: 20 inch, 1600x1200, at 0.5 m)");
     group.add_option("--display", o.file, "A display profile")->type_name("FILE.json");
-    add_number(group, "--ppd", o.pixels_per_degree, positive(), "N", "Pixels per degree at the display's centre");
+    add_number(group, "--ppd", o.pixels_per_degree, within(0.1, 1e5), "N", "Pixels per degree at the display's centre");
     add_number(group, "--distance", o.distance_m, positive(), "METRES", "From the eye to the screen");
     add_number(group, "--peak", o.peak_cdm2, positive(), "CDM2", "Luminance of white");
     add_number(group, "--black", o.black_cdm2, positive(), "CDM2", "Luminance of black");
@@ -194,18 +199,22 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
     CLI::App& group = *verb.add_option_group("WHAT", "Which simplification (default: --imperceptible)");
     const auto counted = [](std::int64_t) {}; // the options themselves know whether they were given
     CLI::Option* full = group.add_flag_function("--full", counted, "The input, whole");
-    CLI::Option* imperceptible = group.add_flag_function("--imperceptible", counted, "Fold what nobody can see on this display");
-    CLI::Option* triangles = add_triangles_option(group, o.triangles, "At most N triangles, as inconspicuous as can be");
+    CLI::Option* imperceptible =
+        group.add_flag_function("--imperceptible", counted, "Fold what nobody can see on this display");
+    CLI::Option* triangles =
+        add_triangles_option(group, o.triangles, "At most N triangles, as inconspicuous as can be");
     CLI::Option* pixels = group.add_option("--pixels", o.pixels, "Fold what is smaller than E pixels, seen or not")
                               ->type_name("E")
                               ->check(positive());
     std::string& name = o.fold_test;
-    CLI::Option* test = group.add_option("--fold-test", name)->type_name("NAME")->check(CLI::IsMember(fold_test_list()));
+    CLI::Option* test =
+        group.add_option("--fold-test", name)->type_name("NAME")->check(CLI::IsMember(fold_test_list()));
     test->description("luebke-hallen (perceptual; default), extent or displacement (in pixels; of --pixels: extent)");
     add_gaze_option(group, o.gaze_px);
     group.callback([=, &o] {
         const std::size_t given = full->count() + imperceptible->count() + triangles->count() + pixels->count();
-        if (given > 1) refuse("--full, --imperceptible, --triangles and --pixels exclude each other: give one of them.");
+        if (given > 1)
+            refuse("--full, --imperceptible, --triangles and --pixels exclude each other: give one of them.");
         if (*full) o.mode = Mode::full;
         if (*triangles) o.mode = Mode::budget;
         if (*pixels) o.mode = Mode::pixels;

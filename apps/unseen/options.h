@@ -13,15 +13,15 @@ namespace unseen::app {
 
 // VIEW. What is not given follows from the model and the display, see scene.h.
 struct ViewOptions {
-    std::optional<glm::dvec3> eye, target, up;  // world units
-    std::optional<glm::dvec3> direction;        // from the model towards the eye
-    std::optional<double> fill;                 // share of the window's height
-    std::optional<double> fov_degrees;          // vertical
-    int width = 1024, height = 1024;            // pixels
-    std::optional<glm::dvec3> light;            // towards it
-    std::optional<double> ambient;              // 0..1
+    std::optional<glm::dvec3> eye, target, up; // world units
+    std::optional<glm::dvec3> direction;       // from the model towards the eye
+    std::optional<double> fill;                // share of the window's height
+    std::optional<double> fov_degrees;         // vertical
+    int width = 1024, height = 1024;           // pixels
+    std::optional<glm::dvec3> light;           // towards it
+    std::optional<double> ambient;             // 0..1
     std::optional<double> background_cdm2;
-    double unit_metres = 1;                     // world units a mesh unit
+    double unit_metres = 1; // world units a mesh unit
 };
 
 // DISPLAY.
@@ -39,8 +39,8 @@ struct WhatOptions {
     Mode mode = Mode::imperceptible;
     FoldTest test = FoldTest::luebke_hallen;
     std::string fold_test = "luebke-hallen"; // as it was given
-    std::uint32_t triangles = 0;          // of Mode::budget
-    double pixels = 0;                    // of Mode::pixels
+    std::uint32_t triangles = 0;             // of Mode::budget
+    double pixels = 0;                       // of Mode::pixels
     std::optional<glm::dvec2> gaze_px;
 };
 

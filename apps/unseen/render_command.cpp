@@ -31,7 +31,8 @@ bool is_for_people(const std::string& file) {
 Result<int> run(const RenderArguments& a) {
     std::error_code unknown;
     if (std::filesystem::equivalent(a.model, a.out, unknown))
-        return Error{ErrorCode::invalid_argument, "'" + a.out + "' is the model itself: give the picture another name."};
+        return Error{ErrorCode::invalid_argument,
+                     "'" + a.out + "' is the model itself: give the picture another name."};
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     const auto scene = load_scene(a.model, a.view, a.display);

@@ -62,8 +62,8 @@ vdtree::View make_view(const Scene& scene, const ViewOptions& options) {
         view.target = options.target.value_or(sphere.centre);
     } else {
         view = vdtree::frame_sphere(sphere.centre, sphere.radius > 0 ? sphere.radius : point_radius,
-                                    options.direction.value_or(glm::dvec3(0, 0, 1)), options.fill.value_or(default_fill),
-                                    view);
+                                    options.direction.value_or(glm::dvec3(0, 0, 1)),
+                                    options.fill.value_or(default_fill), view);
     }
     if (options.up) view.up = *options.up;
     return view;

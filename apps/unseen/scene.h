@@ -20,8 +20,8 @@ struct Scene {
     perception::Display display;
     std::optional<perception::CsfTable> csf; // empty: the standard table
     vdtree::View view;
-    float background = 0;                    // relative luminance
-    bool is_relit = false;                   // the light is not the one that the tree was built for
+    float background = 0;  // relative luminance
+    bool is_relit = false; // the light is not the one that the tree was built for
 
     const perception::CsfTable& csf_table() const { return csf ? *csf : perception::CsfTable::standard(); }
 };

@@ -22,8 +22,8 @@ struct SheetArguments {
     std::string model, out, json;
     ViewOptions view;
     DisplayOptions display;
-    std::uint32_t triangles = 0;           // 0: a quarter of the model's
-    std::optional<glm::dvec2> gaze_px;     // default: default_gaze
+    std::uint32_t triangles = 0;       // 0: a quarter of the model's
+    std::optional<glm::dvec2> gaze_px; // default: default_gaze
     int samples = 16;
     int cell_px = 480;
 };
@@ -37,8 +37,8 @@ struct Column {
     WhatOptions what;
     Simplification simplification;
     double draw_ms = 0;
-    perception::Image luminance;           // cd/m2, of the whole window
-    perception::Image picture, wireframe;  // code values, of a cell's size
+    perception::Image luminance;                    // cd/m2, of the whole window
+    perception::Image picture, wireframe;           // code values, of a cell's size
     std::optional<perception::Judgement> judgement; // against the full model; none for that itself
 };
 
@@ -142,10 +142,10 @@ perception::Image compose(const std::vector<Column>& columns, const Scene& scene
     const int header = 2 * gap + line_height, captions = 2 * line_height + gap;
     Canvas canvas(gap + count * (cell_width + gap), header + captions + 2 * (height + gap), paper);
 
-    const std::string title = std::filesystem::path(model).filename().string() + "   " + std::to_string(scene.view.width) +
-                              "x" + std::to_string(scene.view.height) + " pixels, " +
-                              rounded(perception::pixels_per_degree(scene.display).value(), 4) + " per degree, seen from " +
-                              rounded(scene.display.distance.value(), 3) + " m";
+    const std::string title = std::filesystem::path(model).filename().string() + "   " +
+                              std::to_string(scene.view.width) + "x" + std::to_string(scene.view.height) + " pixels, " +
+                              rounded(perception::pixels_per_degree(scene.display).value(), 4) +
+                              " per degree, seen from " + rounded(scene.display.distance.value(), 3) + " m";
     canvas.text(gap, gap, title, ink, text_scale);
     for (int i = 0; i < count; ++i) {
         const Column& column = columns[static_cast<std::size_t>(i)];
@@ -154,7 +154,8 @@ perception::Image compose(const std::vector<Column>& columns, const Scene& scene
         canvas.text(left, header, column.name + ": " + grouped(s.stats.triangles) + " tri.", ink, text_scale);
         if (column.judgement) {
             canvas.text(left, header + line_height,
-                        grouped(column.judgement->visible_pixels) + " px visible; from " + metres(s.imperceptible_from_m) + " none",
+                        grouped(column.judgement->visible_pixels) + " px visible; from " +
+                            metres(s.imperceptible_from_m) + " none",
                         weak, text_scale);
         }
         canvas.picture(left, header + captions, column.picture);
@@ -216,7 +217,8 @@ Result<int> run(const SheetArguments& a) {
 
 Command sheet_command(CLI::App& app) {
     auto a = std::make_shared<SheetArguments>();
-    CLI::App* verb = app.add_subcommand("sheet", "Draw and judge the full, imperceptible, budget and gaze-directed cuts");
+    CLI::App* verb =
+        app.add_subcommand("sheet", "Draw and judge the full, imperceptible, budget and gaze-directed cuts");
     verb->add_option("TREE", a->model, "A tree, or a mesh")->required()->type_name("TREE.vdt|MESH");
     verb->add_option("-o,--output", a->out, "The contact sheet, wireframes below")
         ->type_name("SHEET.png")
@@ -224,8 +226,9 @@ Command sheet_command(CLI::App& app) {
         ->check(ending_in({".png"}));
     add_triangles_option(*verb, a->triangles, "The budget (default: a quarter of the triangles)");
     add_gaze_option(*verb, a->gaze_px);
-    verb->get_option("--gaze")->description("Gaze of the gaze-directed cut, in pixels from the top left; may lie outside "
-                                            "(default: 29 degrees to the right of the window's centre)");
+    verb->get_option("--gaze")->description(
+        "Gaze of the gaze-directed cut, in pixels from the top left; may lie outside "
+        "(default: 29 degrees to the right of the window's centre)");
     verb->add_option("--samples", a->samples, "Samples a pixel, 1 to 256 (default: 16)")
         ->type_name("N")
         ->check(within(1, 256));

@@ -51,7 +51,8 @@ vdtree::AdjustStats adjust(vdtree::Cut& cut, const Scene& scene, const WhatOptio
     case FoldTest::extent:
         return cut.adjust(vdtree::ExtentCriterion(scene.tree, scene.view, tolerance_px, scene.placement), options);
     case FoldTest::displacement:
-        return cut.adjust(vdtree::DisplacementCriterion(scene.tree, scene.view, tolerance_px, scene.placement), options);
+        return cut.adjust(vdtree::DisplacementCriterion(scene.tree, scene.view, tolerance_px, scene.placement),
+                          options);
     case FoldTest::luebke_hallen: break;
     }
     perception::FoldTestOptions test;
@@ -70,9 +71,7 @@ double imperceptible_from(const Scene& scene, const WhatOptions& what, const vdt
     return scene.display.distance.value() * static_cast<double>(stats.max_fold_cost);
 }
 
-std::string name_of(FoldTest test) {
-    return std::string(perception::fold_test_names[static_cast<std::size_t>(test)]);
-}
+std::string name_of(FoldTest test) { return std::string(perception::fold_test_names[static_cast<std::size_t>(test)]); }
 
 Effect fold_test_effect(const WhatOptions& what) {
     if (what.mode == Mode::full) return {"fold test", false, "nothing is folded in the full model"};
@@ -85,8 +84,9 @@ Effect gaze_effect(const WhatOptions& what) {
     if (what.mode == Mode::full) return {"gaze", false, "nothing is folded in the full model"};
     if (!is_perceptual(what)) return {"gaze", false, "the fold test " + name_of(what.test) + " does not use it"};
     if (!what.gaze_px) return {"gaze", false, "no gaze is given, so everything counts as looked at"};
-    return {"gaze", true, "the viewer looks at pixel " + rounded(what.gaze_px->x, 6) + ", " +
-                              rounded(what.gaze_px->y, 6) + ", and sees less sharply elsewhere"};
+    return {"gaze", true,
+            "the viewer looks at pixel " + rounded(what.gaze_px->x, 6) + ", " + rounded(what.gaze_px->y, 6) +
+                ", and sees less sharply elsewhere"};
 }
 
 Effect silhouette_effect(const Scene& scene, const WhatOptions& what) {
@@ -95,14 +95,16 @@ Effect silhouette_effect(const Scene& scene, const WhatOptions& what) {
     const auto cdm2 = [&](float relative) {
         return rounded(perception::to_luminance(scene.display, static_cast<double>(relative)).value(), 3);
     };
-    return {"silhouettes", true, "folds on outlines are tested against " + cdm2(range.darkest) + " to " +
-                                     cdm2(range.brightest) + " cd/m2, the whole scene with its background"};
+    return {"silhouettes", true,
+            "folds on outlines are tested against " + cdm2(range.darkest) + " to " + cdm2(range.brightest) +
+                " cd/m2, the whole scene with its background"};
 }
 
 Effect csf_effect(const Scene& scene, const WhatOptions& what) {
     if (!is_perceptual(what)) return {"csf table", false, "only the perceptual fold test looks sensitivity up"};
     return {"csf table", scene.csf.has_value(),
-            scene.csf ? "the viewer's own: " + scene.csf->samples().source : "the standard observer is used, castleCSF"};
+            scene.csf ? "the viewer's own: " + scene.csf->samples().source
+                      : "the standard observer is used, castleCSF"};
 }
 
 Effect prelit_effect(const Scene& scene) {
@@ -114,7 +116,8 @@ Effect prelit_effect(const Scene& scene) {
 Effect light_effect(const Scene& scene) {
     if (scene.is_relit)
         return {"light", true, "luminance and its bounds were computed again for another light than the tree's"};
-    return {"light", false, scene.tree.is_prelit() ? "the colours are pre-lit" : "the light that the tree was built for"};
+    return {"light", false,
+            scene.tree.is_prelit() ? "the colours are pre-lit" : "the light that the tree was built for"};
 }
 
 Effect frustum_effect(const WhatOptions& what, Purpose purpose) {
@@ -149,7 +152,8 @@ Effect magnification_effect(const Scene& scene, const WhatOptions& what) {
 Effect distance_effect(const WhatOptions& what, const Simplification& result) {
     const std::string name = "imperceptible distance";
     if (what.mode == Mode::full) return {name, true, "nothing is folded, so it holds from any distance"};
-    if (!is_perceptual(what)) return {name, false, "costs of the fold test " + name_of(what.test) + " are no distances"};
+    if (!is_perceptual(what))
+        return {name, false, "costs of the fold test " + name_of(what.test) + " are no distances"};
     if (std::isinf(result.imperceptible_from_m))
         return {name, false, "a fold around the eye or across its plane stays visible from everywhere"};
     return {name, true, "the display's distance times the largest fold cost"};
@@ -171,18 +175,25 @@ Simplification simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions&
     result.extract_ms = milliseconds_since(adapted);
 
     result.imperceptible_from_m = imperceptible_from(scene, what, result.stats);
-    result.effects = {fold_test_effect(what),         gaze_effect(what),
-                      silhouette_effect(scene, what), csf_effect(scene, what),
-                      prelit_effect(scene),           light_effect(scene),
-                      frustum_effect(what, purpose),  culling_effect(scene, purpose),
-                      magnification_effect(scene, what), distance_effect(what, result)};
+    result.effects = {fold_test_effect(what),
+                      gaze_effect(what),
+                      silhouette_effect(scene, what),
+                      csf_effect(scene, what),
+                      prelit_effect(scene),
+                      light_effect(scene),
+                      frustum_effect(what, purpose),
+                      culling_effect(scene, purpose),
+                      magnification_effect(scene, what),
+                      distance_effect(what, result)};
     return result;
 }
 
 Json to_json(const Simplification& s, double draw_ms) {
     Json effects = Json::array();
-    for (const Effect& effect : s.effects) effects.push_back({{"name", effect.name}, {"on", effect.on}, {"why", effect.why}});
-    const double cost = vdtree::is_unbounded(s.stats.max_fold_cost) ? infinity : static_cast<double>(s.stats.max_fold_cost);
+    for (const Effect& effect : s.effects)
+        effects.push_back({{"name", effect.name}, {"on", effect.on}, {"why", effect.why}});
+    const double cost =
+        vdtree::is_unbounded(s.stats.max_fold_cost) ? infinity : static_cast<double>(s.stats.max_fold_cost);
     return {{"source_triangles", s.source_triangles},
             {"triangles", s.stats.triangles},
             {"dropped", s.dropped},
@@ -198,7 +209,8 @@ Json to_json(const Simplification& s, double draw_ms) {
 void print(const Simplification& s, double draw_ms) {
     const double share = 100.0 * s.stats.triangles / static_cast<double>(s.source_triangles);
     std::vector<std::vector<std::string>> rows = {
-        {"triangles", grouped(s.stats.triangles) + " of " + grouped(s.source_triangles) + " (" + rounded(share, 3) + "%)"},
+        {"triangles",
+         grouped(s.stats.triangles) + " of " + grouped(s.source_triangles) + " (" + rounded(share, 3) + "%)"},
         {"dropped", grouped(s.dropped)},
         {"nodes tested", grouped(s.stats.node_tests)},
         {"adapted in", rounded(s.adapt_ms, 3) + " ms"},

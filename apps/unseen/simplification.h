@@ -22,9 +22,9 @@ struct Simplification {
     vdtree::Index source_triangles = 0;
     std::uint64_t dropped = 0;
     vdtree::AdjustStats stats;
-    double adapt_ms = 0;              // making the cut
-    double extract_ms = 0;            // its index buffer
-    double imperceptible_from_m = 0;  // infinite: from nowhere; NaN: the fold test does not know
+    double adapt_ms = 0;             // making the cut
+    double extract_ms = 0;           // its index buffer
+    double imperceptible_from_m = 0; // infinite: from nowhere; NaN: the fold test does not know
     std::vector<Effect> effects;
 };
 

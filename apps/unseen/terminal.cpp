@@ -9,8 +9,8 @@ namespace unseen::app {
 namespace {
 
 void print_to_stderr(std::string_view kind, std::string_view text) {
-    std::fprintf(stderr, "unseen: %.*s%.*s\n", static_cast<int>(kind.size()), kind.data(), static_cast<int>(text.size()),
-                 text.data());
+    std::fprintf(stderr, "unseen: %.*s%.*s\n", static_cast<int>(kind.size()), kind.data(),
+                 static_cast<int>(text.size()), text.data());
 }
 
 } // namespace

@@ -20,7 +20,8 @@
 
 namespace unseen::app {
 
-const char* const viewer_help = R"(Mouse: drag to turn the model, wheel to come nearer; in mode 4 you look at the pointer
+const char* const viewer_help =
+    R"(Mouse: drag to turn the model, wheel to come nearer; in mode 4 you look at the pointer
   1  full model          2  imperceptible       3  budget       4  gaze-directed
   +  a larger budget     -  a smaller one
   w  wireframe           f  flat or smooth      r  the first view again
@@ -31,12 +32,12 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double turn_per_window = 3.2;           // radians for a drag across the window's height
-constexpr double zoom_per_notch = 0.9;            // of the distance
+constexpr double turn_per_window = 3.2;                      // radians for a drag across the window's height
+constexpr double zoom_per_notch = 0.9;                       // of the distance
 constexpr double nearest_radii = 1e-3, farthest_radii = 1e4; // distance to the target, in radii of the model
-constexpr double steepest_cosine = 0.999;         // between line of sight and up: beyond, the picture would tumble
+constexpr double steepest_cosine = 0.999; // between line of sight and up: beyond, the picture would tumble
 constexpr double budget_step = 1.25;
-constexpr double idle_seconds = 0.25;             // a look at the window's state even without events
+constexpr double idle_seconds = 0.25; // a look at the window's state even without events
 
 double milliseconds_since(Clock::time_point start) {
     return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
@@ -111,7 +112,10 @@ private:
             follow_window_size();
             break;
         case 's': take_screenshot(); break;
-        case 'h': std::fputs(viewer_help, stdout); std::fflush(stdout); break;
+        case 'h':
+            std::fputs(viewer_help, stdout);
+            std::fflush(stdout);
+            break;
         case 'q': glfwSetWindowShouldClose(window_, GLFW_TRUE); break;
         default: break;
         }
@@ -127,7 +131,8 @@ private:
 
     void scale_budget(double factor) {
         const double wanted = std::round(budget_ * factor);
-        budget_ = static_cast<std::uint32_t>(std::clamp(wanted, 1.0, static_cast<double>(scene_.tree.triangle_count())));
+        budget_ =
+            static_cast<std::uint32_t>(std::clamp(wanted, 1.0, static_cast<double>(scene_.tree.triangle_count())));
         choose(Mode::budget);
     }
 

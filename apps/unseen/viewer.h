@@ -14,14 +14,15 @@ struct ViewerOptions {
     WhatOptions what;             // to begin with
     bool has_fixed_field = false; // the camera's field was asked for; else it follows the window's height
     render::DrawOptions draw;
-    std::string screenshot;       // written when the viewer ends
-    int frames = 0;               // ends after so many; 0: when the user wants to
+    std::string screenshot; // written when the viewer ends
+    int frames = 0;         // ends after so many; 0: when the user wants to
 };
 
 // The keys, for people.
 extern const char* const viewer_help;
 
-// Opens a window of the scene's size and runs until it is closed. On the main thread only. Fails where there is no display.
+// Opens a window of the scene's size and runs until it is closed. On the main thread only. Fails where there is no
+// display.
 Result<void> run_viewer(Scene& scene, const ViewerOptions& options);
 
 } // namespace unseen::app

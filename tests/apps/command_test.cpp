@@ -289,7 +289,8 @@ TEST_F(SimplifyTest, PixelTestsKnowNoDistance) {
         EXPECT_NE(report["triangles"], last);
         last = report["triangles"];
     }
-    EXPECT_EQ(simplify({"--pixels", "20"})["triangles"], simplify({"--pixels", "20", "--fold-test", "extent"})["triangles"]);
+    EXPECT_EQ(simplify({"--pixels", "20"})["triangles"],
+              simplify({"--pixels", "20", "--fold-test", "extent"})["triangles"]);
     EXPECT_GT(simplify({"--pixels", "5"})["triangles"], simplify({"--pixels", "50"})["triangles"]);
 }
 

@@ -6,10 +6,10 @@
 namespace {
 
 using namespace unseen::app::testing;
-using unseen::perception::Image;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::UnorderedElementsAre;
+using unseen::perception::Image;
 
 class CompareTest : public CommandTest {
 protected:
@@ -115,8 +115,8 @@ TEST_F(CompareTest, WritesMaps) {
 TEST_F(CompareTest, AMapThatCannotBeWrittenLeavesNoOtherFile) {
     write("a.pfm", disc(20, 20));
     const auto before = files();
-    const Outcome outcome = run({"compare", "a.pfm", "a.pfm", "--map", "map.png", "--threshold-map", "missing/t.pfm",
-                                 "--json", "o.json"});
+    const Outcome outcome =
+        run({"compare", "a.pfm", "a.pfm", "--map", "map.png", "--threshold-map", "missing/t.pfm", "--json", "o.json"});
     EXPECT_EQ(outcome.status, 1);
     EXPECT_THAT(outcome.err, IsAnErrorForPeople());
     EXPECT_EQ(files(), before);

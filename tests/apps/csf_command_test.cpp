@@ -20,8 +20,8 @@ protected:
 
 TEST_F(CsfCommandTest, GivesThePublishedModels) {
     // From the published implementations of castleCSF and stelaCSF, at 0.125 cpd, 0.1 cd/m2, area 0.1, nasal.
-    const std::vector<std::string> stimulus = {"--frequency", "0.125", "--luminance", "0.1", "--area", "0.1",
-                                               "--field", "nasal"};
+    const std::vector<std::string> stimulus = {"--frequency", "0.125", "--luminance", "0.1",
+                                               "--area",      "0.1",   "--field",     "nasal"};
     auto with_model = [&](const std::string& model) {
         auto words = stimulus;
         words.insert(words.end(), {"--model", model});

@@ -74,15 +74,10 @@ TEST_F(RenderCommandTest, TheImperceptibleCutShowsNoDifference) {
 TEST_F(RenderCommandTest, OptionsChangeThePicture) {
     render({}, "plain.png");
     const std::string plain = read_text(path("plain.png"));
-    const std::vector<std::vector<std::string>> changes = {{"--wireframe"},
-                                                           {"--shading", "flat"},
-                                                           {"--light", "-1", "0", "0"},
-                                                           {"--ambient", "0.9"},
-                                                           {"--background", "70"},
-                                                           {"--direction", "1", "0", "0"},
-                                                           {"--fill", "0.3"},
-                                                           {"--triangles", "60"},
-                                                           {"--samples", "1"}};
+    const std::vector<std::vector<std::string>> changes = {
+        {"--wireframe"},      {"--shading", "flat"},  {"--light", "-1", "0", "0"},
+        {"--ambient", "0.9"}, {"--background", "70"}, {"--direction", "1", "0", "0"},
+        {"--fill", "0.3"},    {"--triangles", "60"},  {"--samples", "1"}};
     for (const auto& change : changes) {
         render(change, "changed.png");
         EXPECT_FALSE(read_text(path("changed.png")) == plain) << ::testing::PrintToString(change);
@@ -104,13 +99,11 @@ TEST_F(RenderCommandTest, FillIsTheShareOfTheHeight) {
     EXPECT_GE(bottom + 1 - top, 74);
 }
 
-TEST_F(RenderCommandTest, AnEyeInsideIsValid) {
-    render({"--eye", "0", "0", "0.1"}, "inside.png");
-}
+TEST_F(RenderCommandTest, AnEyeInsideIsValid) { render({"--eye", "0", "0", "0.1"}, "inside.png"); }
 
 TEST_F(RenderCommandTest, TheSheetShowsAndJudgesFourCuts) {
-    const Outcome outcome = run({"sheet", "ball.vdt", "-o", "sheet.png", "--size", "256x256", "--samples", "4", "--cell",
-                                 "64", "--json", "sheet.json"});
+    const Outcome outcome = run({"sheet", "ball.vdt", "-o", "sheet.png", "--size", "256x256", "--samples", "4",
+                                 "--cell", "64", "--json", "sheet.json"});
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     EXPECT_THAT(outcome.out, HasSubstr("gaze-directed"));
     const auto sheet = read_image(path("sheet.png"));
@@ -133,15 +126,15 @@ TEST_F(RenderCommandTest, TheSheetShowsAndJudgesFourCuts) {
 
 TEST_F(RenderCommandTest, WrongUsageIsStatusTwo) {
     const auto before = files();
-    for (const std::vector<std::string>& words : std::vector<std::vector<std::string>>{
-             {"render", "ball.vdt", "-o", "out.gif"},
-             {"render", "ball.vdt", "-o", "out.png", "--samples", "257"},
-             {"render", "ball.vdt", "-o", "out.png", "--samples", "0"},
-             {"render", "ball.vdt", "-o", "out.png", "--shading", "toon"},
-             {"sheet", "ball.vdt", "-o", "out.png", "--cell", "0"},
-             {"sheet", "ball.vdt", "-o", "out.png", "--full"},
-             {"view", "ball.vdt", "--frames", "0"},
-             {"view", "ball.vdt", "--screenshot", "out.ply"}}) {
+    for (const std::vector<std::string>& words :
+         std::vector<std::vector<std::string>>{{"render", "ball.vdt", "-o", "out.gif"},
+                                               {"render", "ball.vdt", "-o", "out.png", "--samples", "257"},
+                                               {"render", "ball.vdt", "-o", "out.png", "--samples", "0"},
+                                               {"render", "ball.vdt", "-o", "out.png", "--shading", "toon"},
+                                               {"sheet", "ball.vdt", "-o", "out.png", "--cell", "0"},
+                                               {"sheet", "ball.vdt", "-o", "out.png", "--full"},
+                                               {"view", "ball.vdt", "--frames", "0"},
+                                               {"view", "ball.vdt", "--screenshot", "out.ply"}}) {
         const Outcome outcome = run(words);
         EXPECT_EQ(outcome.status, 2) << ::testing::PrintToString(words);
         EXPECT_EQ(outcome.err.rfind("unseen: ", 0), 0U) << outcome.err;

@@ -34,9 +34,7 @@ inline std::string read_text(const fs::path& file) {
     return text.str();
 }
 
-inline void write_text(const fs::path& file, const std::string& text) {
-    std::ofstream(file, std::ios::binary) << text;
-}
+inline void write_text(const fs::path& file, const std::string& text) { std::ofstream(file, std::ios::binary) << text; }
 
 // Waits for a process; its exit status, or minus the signal that ended it.
 inline int wait_for(pid_t process) {
@@ -160,9 +158,9 @@ inline std::set<std::string> keys(const Json& object) {
 // The keys that simplify and render report, with their types.
 inline void expect_cut_report(const Json& report) {
     ASSERT_TRUE(report.is_object()) << report;
-    EXPECT_THAT(keys(report), ::testing::UnorderedElementsAre(
-                                  "source_triangles", "triangles", "dropped", "node_tests", "adapt_ms", "extract_ms",
-                                  "draw_ms", "imperceptible_from_m", "max_fold_cost", "effects"));
+    EXPECT_THAT(keys(report), ::testing::UnorderedElementsAre("source_triangles", "triangles", "dropped", "node_tests",
+                                                              "adapt_ms", "extract_ms", "draw_ms",
+                                                              "imperceptible_from_m", "max_fold_cost", "effects"));
     for (const char* key : {"source_triangles", "triangles", "dropped", "node_tests"})
         EXPECT_TRUE(report[key].is_number_unsigned()) << key << ": " << report[key];
     for (const char* key : {"adapt_ms", "extract_ms"})

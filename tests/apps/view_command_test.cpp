@@ -16,8 +16,8 @@
 namespace {
 
 using namespace unseen::app::testing;
-using unseen::render::testing::VirtualDisplay;
 using ::testing::HasSubstr;
+using unseen::render::testing::VirtualDisplay;
 
 constexpr std::chrono::seconds patience{60}; // software rendering on a busy machine
 constexpr std::chrono::milliseconds pause{20};
