@@ -121,28 +121,52 @@ void NormalSlabs::insert(glm::dvec3 n) noexcept {
 
 namespace {
 
-// An upper bound of n . u over the slabs: for some ways to write u as a sum of axes, the sum of the axes' own bounds. The
-// ways: x, y, z; and the diagonal of u's octant in place of one of the three. The least of them is the tightest.
-float largest_along(const NormalSlabs& slabs, glm::vec3 u) {
-    const auto slab = [&](std::size_t axis, float weight) {
-        return std::max(weight * static_cast<float>(slabs.hi[axis]), weight * static_cast<float>(slabs.lo[axis]));
+// A slab as floats, in units of 1/127.
+struct Slab {
+    float lo, hi;
+    float largest(float weight) const { return std::max(weight * lo, weight * hi); }
+    float reach() const { return std::max(-lo, hi); } // the largest absolute coordinate
+};
+
+// Whether all directions in the slabs have n . u below -sine. Three independent slabs make a parallelepiped, whose largest
+// n . u is a sum; tried are the box of x, y and z, and those with a diagonal in place of one of the three.
+//
+// A parallelepiped reaches out of the unit sphere, to `reach`, so `sine` is multiplied by that: then a node that is not
+// ruled out has no ancestor that is (whose sphere contains its sphere, and whose slabs contain its slabs), for any
+// point x of the parallelepiped, x . (eye - centre) changes by at most reach * (radius of the ancestor - radius).
+// For the same reason every node tries the same parallelepipeds.
+bool all_below(const std::array<Slab, NormalSlabs::axis_count>& slabs, glm::vec3 u, float sine) {
+    const auto below = [sine](float largest, auto squared_reach) {
+        if (!(largest < -sine * static_cast<float>(slab_units))) return false; // reach is at least 1
+        return largest < -sine * std::sqrt(squared_reach()) - static_cast<float>(cell_margin * slab_units);
     };
-    float least = slab(0, u.x) + slab(1, u.y) + slab(2, u.z);
-    // The diagonals are named by the coordinate whose sign differs from the other two.
-    // Negative zero counts as positive everywhere here, so std::copysign() would not do.
-    const bool x = u.x < 0, y = u.y < 0, z = u.z < 0;
-    const std::size_t diagonal = x == y ? (y == z ? 3 : 6) : (x == z ? 5 : 4);
-    const float sign = (diagonal == 4 ? y : x) ? -1.0f : 1.0f;
-    const glm::vec3 size = glm::abs(u);
-    for (int replaced = 0; replaced < 3; ++replaced) {
-        const float weight = size[replaced];
-        float sum = slab(diagonal, sign * weight * static_cast<float>(1 / inverse_sqrt3));
-        for (int other = 0; other < 3; ++other)
-            if (other != replaced)
-                sum += slab(static_cast<std::size_t>(other), (u[other] < 0 ? -1.0f : 1.0f) * (size[other] - weight));
-        least = std::min(least, sum);
+    const float reach2[3] = {slabs[0].reach() * slabs[0].reach(), slabs[1].reach() * slabs[1].reach(),
+                             slabs[2].reach() * slabs[2].reach()};
+    const float along[3] = {slabs[0].largest(u.x), slabs[1].largest(u.y), slabs[2].largest(u.z)};
+    if (below(along[0] + along[1] + along[2], [&] { return reach2[0] + reach2[1] + reach2[2]; })) return true;
+    constexpr float sqrt3 = static_cast<float>(1 / inverse_sqrt3);
+    constexpr float signs[4][3] = {{1, 1, 1}, {-1, 1, 1}, {1, -1, 1}, {1, 1, -1}};
+    for (std::size_t d = 0; d < 4; ++d) {
+        const Slab& diagonal = slabs[3 + d];
+        for (int k = 0; k < 3; ++k) {
+            const int i = (k + 1) % 3, j = (k + 2) % 3;
+            const float sk = signs[d][k], si = signs[d][i], sj = signs[d][j];
+            // u = weight * diagonal + rest along i and j.
+            const float weight = u[k] * sk;
+            const Slab &a = slabs[static_cast<std::size_t>(i)], &b = slabs[static_cast<std::size_t>(j)];
+            const float largest =
+                diagonal.largest(weight * sqrt3) + a.largest(u[i] - weight * si) + b.largest(u[j] - weight * sj);
+            const auto squared_reach = [&] {
+                // The replaced coordinate: sk * (sqrt3 * diagonal - si * a - sj * b), as an interval.
+                const float high = sqrt3 * diagonal.hi + a.largest(-si) + b.largest(-sj);
+                const float low = sqrt3 * diagonal.lo - a.largest(si) - b.largest(sj);
+                const float r = std::max(-low, high);
+                return r * r + reach2[i] + reach2[j];
+            };
+            if (below(largest, squared_reach)) return true;
+        }
     }
-    return least;
+    return false;
 }
 
 } // namespace
@@ -150,9 +174,12 @@ float largest_along(const NormalSlabs& slabs, glm::vec3 u) {
 Facing facing(const NormalSlabs& slabs, glm::vec3 to_eye, float distance, float radius) noexcept {
     if (slabs.empty()) return Facing::none;
     if (!(distance > radius)) return Facing::mixed;
-    const float limit = (radius / distance + static_cast<float>(cell_margin)) * static_cast<float>(slab_units);
-    if (largest_along(slabs, to_eye) < -limit) return Facing::back;
-    return largest_along(slabs, -to_eye) < -limit ? Facing::front : Facing::mixed;
+    std::array<Slab, NormalSlabs::axis_count> wide;
+    for (std::size_t i = 0; i < wide.size(); ++i)
+        wide[i] = {static_cast<float>(slabs.lo[i]), static_cast<float>(slabs.hi[i])};
+    const float sine = radius / distance;
+    if (all_below(wide, -to_eye, sine)) return Facing::front;
+    return all_below(wide, to_eye, sine) ? Facing::back : Facing::mixed;
 }
 
 } // namespace unseen::vdtree
