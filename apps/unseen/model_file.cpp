@@ -16,11 +16,9 @@ Result<vdtree::ReadResult> read_mesh_file(const std::filesystem::path& file, con
 }
 
 Result<vdtree::VertexTree> build_tree_of(vdtree::ReadResult&& read, vdtree::BuildOptions options) {
-    // The builder counts the triangles it drops. Those that the reader dropped before go back, at the end, where they
-    // move no other, so that the tree knows of all of them.
-    read.mesh.triangles.resize(read.mesh.triangles.size() + read.dropped_triangles, vdtree::Triangle{0, 0, 0});
     ProgressBar bar("building");
     options.progress = bar;
+    options.dropped_before = read.dropped_triangles;
     return vdtree::build_tree(read.mesh.view(), options);
 }
 

@@ -243,7 +243,7 @@ Result<VertexTree> TreeBuilder::build(Clusterer clusterer) {
     bound_facing();
 
     g_->closedness = topology_.closedness;
-    g_->dropped_triangles = clean_.dropped;
+    g_->dropped_triangles = clean_.dropped + options_.dropped_before;
     g_->ranges.assign(source_.ranges.begin(), source_.ranges.end());
     auto data = std::make_shared<VertexTree::Data>();
     data->light = derive_luminance(*g_, options_.light, prelit);

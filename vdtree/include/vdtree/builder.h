@@ -48,6 +48,7 @@ struct BuildOptions {
     ClustererKind clusterer = ClustererKind::quadric;
     Light light = {};
     int threads = 0; // 0: as many as there are cores. The tree does not depend on it.
+    std::uint64_t dropped_before = 0; // triangles that a reader has dropped; counted with the tree's
     Progress progress = {};
 };
 
