@@ -323,7 +323,7 @@ Result<void> Reader::read_table() {
     if (checksum(bytes.data(), bytes.size()) != h.table_checksum) return fail("The section table is damaged.");
     sections_.resize(h.section_count);
     checksums_.resize(h.page_count);
-    std::memcpy(sections_.data(), bytes.data(), h.section_count * sizeof(Section));
+    if (h.section_count > 0) std::memcpy(sections_.data(), bytes.data(), h.section_count * sizeof(Section));
     if (h.page_count > 0)
         std::memcpy(checksums_.data(), bytes.data() + h.section_count * sizeof(Section), h.page_count * 8);
     if constexpr (std::endian::native == std::endian::big) {
