@@ -13,6 +13,7 @@
 
 #include "bounding_sphere.h"
 #include "surface.h"
+#include "unit_vector.h"
 #include "vertex_tree_data.h"
 
 namespace unseen::vdtree {
@@ -24,12 +25,6 @@ namespace {
 constexpr std::size_t most_border_triangles = 4096;
 // Displacements of clusters with more leaves than this are bounded through their children's for the same reason.
 constexpr Index most_measured_leaves = 4096;
-
-// Scaled by the largest component first: neither tiny nor huge vectors lose their direction.
-glm::dvec3 unit(glm::dvec3 v) {
-    const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
-    return largest > 0 && std::isfinite(largest) ? glm::normalize(v / largest) : glm::dvec3(0);
-}
 
 // What is known of a set of normals.
 struct Directions {

@@ -8,6 +8,8 @@
 #include <glm/geometric.hpp>
 #include <tbb/parallel_sort.h>
 
+#include "unit_vector.h"
+
 namespace unseen::vdtree {
 
 namespace {
@@ -20,12 +22,6 @@ glm::dvec3 area_vector(const MeshView& mesh, const Triangle& t) {
 bool has_length(glm::vec3 v) {
     const float sum = std::abs(v.x) + std::abs(v.y) + std::abs(v.z);
     return sum > 0 && std::isfinite(sum);
-}
-
-// Scaled by the largest component first: neither tiny nor huge vectors lose their direction.
-glm::dvec3 unit(glm::dvec3 v) {
-    const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
-    return largest > 0 && std::isfinite(largest) ? glm::normalize(v / largest) : glm::dvec3(0);
 }
 
 // A directed edge between welded vertices, sortable so that all uses of one undirected edge are neighbours.

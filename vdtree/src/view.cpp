@@ -5,17 +5,13 @@
 #include <numbers>
 #include <string>
 
+#include "unit_vector.h"
+
 namespace unseen::vdtree {
 
 namespace {
 
 bool is_finite(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
-
-// Scaled first, so that neither tiny nor huge vectors under- or overflow when squared.
-glm::dvec3 unit(glm::dvec3 v) {
-    const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
-    return largest > 0 ? glm::normalize(v / largest) : glm::dvec3(0);
-}
 
 // The least sine of the angle between `up` and the line of sight: below it the picture's roll is rounding noise.
 constexpr double least_up_sine = 1e-6;
