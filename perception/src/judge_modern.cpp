@@ -148,17 +148,6 @@ double nominal_frequency(double ppd, int level) {
 
 // ---- sensitivity by band ------------------------------------------------------------------------------------------
 
-double closed_form(CsfModel model, double freq_cpd, double luminance, double eccentricity) {
-    Stimulus stimulus;
-    stimulus.frequency = CyclesPerDegree(freq_cpd);
-    stimulus.luminance = Luminance(luminance);
-    stimulus.eccentricity = Degrees(eccentricity);
-    stimulus.area = patch_area(stimulus.frequency);
-    stimulus.field = VisualField::worst;
-    const double s = sensitivity(model, stimulus);
-    return s > sensitivity_floor ? s : sensitivity_floor;
-}
-
 struct Range {
     double low = 0, high = 0;
 };
@@ -166,11 +155,24 @@ struct Range {
 // What the weights of all bands depend on.
 struct Conditions {
     CsfModel model = CsfModel::castle;
+    const CsfTable* table = nullptr; // in the model's place
     double ppd = 0;
     double beta = 0;
     Range log10_luminance;
     double largest_eccentricity = 0; // degrees
 };
+
+double static_sensitivity(const Conditions& c, double freq_cpd, double luminance, double eccentricity) {
+    Stimulus stimulus;
+    stimulus.frequency = CyclesPerDegree(freq_cpd);
+    stimulus.luminance = Luminance(luminance);
+    stimulus.eccentricity = Degrees(eccentricity);
+    stimulus.area = patch_area(stimulus.frequency);
+    stimulus.field = VisualField::worst;
+    const double s = c.table ? c.table->sensitivity(stimulus.frequency, stimulus.eccentricity, stimulus.luminance)
+                             : sensitivity(c.model, stimulus);
+    return s > sensitivity_floor ? s : sensitivity_floor;
+}
 
 struct BandWeight {
     double sensitivity = 0, tilt = 0;
@@ -228,12 +230,12 @@ private:
 
     Node node(const Conditions& c, double luminance, double eccentricity) const {
         const double nominal = nominal_frequency(c.ppd, level_);
-        double s = closed_form(c.model, nominal, luminance, eccentricity);
+        double s = static_sensitivity(c, nominal, luminance, eccentricity);
         if (!is_base_) return {std::log(s), fit_tilt(c, luminance, eccentricity, s)};
         // The base band holds every lower frequency too. Where the pyramid is short (a small image), its own frequency
         // lies right of the peak of S, and the band would be blind to what is plain at a lower frequency.
         for (double f = nominal / std::numbers::sqrt2; f >= lowest_frequency; f /= std::numbers::sqrt2) {
-            s = std::max(s, closed_form(c.model, f, luminance, eccentricity));
+            s = std::max(s, static_sensitivity(c, f, luminance, eccentricity));
         }
         return {std::log(s), 0};
     }
@@ -246,7 +248,7 @@ private:
         double numerator = 0, denominator = 0;
         for (const double ratio : level_ == 0 ? first_band_fit_ratios : fit_ratios) {
             const double f = ratio * nominal;
-            const double wanted = share * closed_form(c.model, f, luminance, eccentricity) / nominal_s;
+            const double wanted = share * static_sensitivity(c, f, luminance, eccentricity) / nominal_s;
             const double answer = band_response(f, c.ppd, level_) / gain_ / wanted;
             const double slope =
                 answer * (smooth_response(angular_frequency(f, c.ppd, level_)) - smooth_at_nominal_);
@@ -433,7 +435,7 @@ double contrast_floor(const Display& display) { return std::max(black_level(disp
 Conditions conditions_for(const Image& reference, const JudgeOptions& options, const Eccentricity& eccentricity) {
     const auto [low, high] = std::minmax_element(reference.values.begin(), reference.values.end());
     const double floor_cdm2 = contrast_floor(options.display);
-    return {options.csf, pixels_per_degree(options.display).value(), options.beta,
+    return {options.csf, options.csf_table, pixels_per_degree(options.display).value(), options.beta,
             {std::log10(std::max(static_cast<double>(*low), floor_cdm2)),
              std::log10(std::max(static_cast<double>(*high), floor_cdm2))},
             eccentricity.largest()};

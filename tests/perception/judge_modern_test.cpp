@@ -224,6 +224,22 @@ JudgeOptions looking_beside_the_corner(double degrees, int side) {
     return options;
 }
 
+TEST(JudgeModern, TakesAViewersOwnTableInPlaceOfTheModel) {
+    const Image reference = noise(128, 20, 0.05, 3), test = noise(128, 20, 0.06, 4);
+    JudgeOptions options = looking_aside(10, 128);
+    const double by_model = judge_modern(reference, test, options)->max_ratio;
+    const CsfTable same = CsfTable::from_model(CsfModel::castle);
+    options.csf_table = &same;
+    EXPECT_NEAR(judge_modern(reference, test, options)->max_ratio / by_model, 1, 0.02); // the table's own error
+
+    CsfSamples dull = same.samples();
+    for (double& s : dull.sensitivity) s /= 4;
+    const auto dull_viewer = CsfTable::create(std::move(dull));
+    ASSERT_TRUE(dull_viewer);
+    options.csf_table = &*dull_viewer;
+    EXPECT_LT(judge_modern(reference, test, options)->max_ratio, 0.6 * by_model); // less masking makes up for some
+}
+
 TEST(ThresholdMapModern, OnFlatFieldsIsTheClosedForm) {
     constexpr double tolerance = 1e-3; // of the judge's tables
     constexpr int side = 1024;

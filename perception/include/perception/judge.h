@@ -15,6 +15,7 @@ struct JudgeOptions {
     Display display = {};
     std::optional<glm::dvec2> gaze_px = {};   // pixels from the top left, may lie outside; none: all foveal
     CsfModel csf = CsfModel::castle;
+    const CsfTable* csf_table = nullptr;      // a viewer's own sensitivity in the model's place; must outlive the call
     double beta = 3.5;                        // Minkowski exponent over the bands; V = 1 is 75% detection
 };
 
