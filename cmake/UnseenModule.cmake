@@ -13,7 +13,7 @@ function(unseen_add_library name)
     target_compile_features(${target} PUBLIC cxx_std_20)
     target_link_libraries(${target} PUBLIC ${arg_DEPENDS} PRIVATE ${arg_PRIVATE_DEPENDS})
     set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
-    unseen_set_warnings(${target})
+    unseen_set_compile_options(${target})
     if(UNSEEN_INSTALL)
         install(TARGETS ${target} EXPORT unseen_${name}_targets
             ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT ${name}
@@ -23,11 +23,13 @@ function(unseen_add_library name)
     endif()
 endfunction()
 
-function(unseen_set_warnings target)
+function(unseen_set_compile_options target)
     target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wconversion -Wshadow)
     if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
         # GCC 12 sees overlapping copies in literal + std::string (GCC bug 105651).
         target_compile_options(${target} PRIVATE -Wno-restrict)
+        # From -O2 on, its vectoriser of straight-line code forgets that dvec3(vec3(p)) rounds to float.
+        target_compile_options(${target} PRIVATE -fno-tree-slp-vectorize)
     endif()
 endfunction()
 

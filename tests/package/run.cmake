@@ -8,13 +8,13 @@ endfunction()
 
 file(REMOVE_RECURSE ${WORK_DIR}/prefix ${WORK_DIR}/build)
 run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${WORK_DIR}/prefix)
-run(${CMAKE_COMMAND} -S ${SOURCE_DIR} -B ${WORK_DIR}/build -DCMAKE_PREFIX_PATH=${WORK_DIR}/prefix
+run(${CMAKE_COMMAND} -G ${GENERATOR} -S ${SOURCE_DIR} -B ${WORK_DIR}/build -DCMAKE_PREFIX_PATH=${WORK_DIR}/prefix
     -DWITH_RENDER=${WITH_RENDER} -DCMAKE_BUILD_TYPE=Release)
 run(${CMAKE_COMMAND} --build ${WORK_DIR}/build)
 run(${WORK_DIR}/build/consumer)
 
 # A component that does not exist is reported, not ignored.
-execute_process(COMMAND ${CMAKE_COMMAND} -S ${SOURCE_DIR} -B ${WORK_DIR}/build-missing
+execute_process(COMMAND ${CMAKE_COMMAND} -G ${GENERATOR} -S ${SOURCE_DIR} -B ${WORK_DIR}/build-missing
     -DCMAKE_PREFIX_PATH=${WORK_DIR}/prefix -DEXTRA_COMPONENT=teleportation
     RESULT_VARIABLE result OUTPUT_QUIET ERROR_VARIABLE message)
 if(result EQUAL 0 OR NOT message MATCHES "teleportation")

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <optional>
 #include <string>
@@ -51,7 +52,13 @@ struct Directions {
     }
 };
 
-// Tells the caller how far the build is; remembers whether it asked to stop.
+// What of the whole build is done when clustering begins and ends.
+constexpr double clustering_begins = 0.1, clustering_ends = 0.7;
+
+// Positions beyond this, relative to the origin, leave no room for spheres around them in floats.
+constexpr double largest_coordinate = std::numeric_limits<float>::max() / 16;
+
+// Tells the caller how far the build is.
 class Reporter {
 public:
     explicit Reporter(Progress progress) : progress_(progress) {}
@@ -135,6 +142,11 @@ glm::dvec3 choose_origin(std::span<const glm::dvec3> positions) {
     return origin;
 }
 
+bool fits_floats(glm::dvec3 p) {
+    return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) <= largest_coordinate &&
+           std::isfinite(p.x + p.y + p.z);
+}
+
 Result<void> check(const Clustering& c, std::size_t vertices) {
     const auto invalid = [](const std::string& what) { return Error{ErrorCode::invalid_argument, what}; };
     if (c.parents.size() <= vertices)
@@ -150,11 +162,40 @@ Result<void> check(const Clustering& c, std::size_t vertices) {
             return invalid("Cluster " + std::to_string(i) + " has the parent " + std::to_string(c.parents[i]) +
                            "; a parent is a cluster with a higher number.");
     }
-    for (std::size_t i = 0; i < c.positions.size(); ++i) {
-        const glm::dvec3 p = c.positions[i];
-        if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
-            return invalid("The proxy of cluster " + std::to_string(vertices + i) + " is not finite.");
+    std::vector<std::uint8_t> has_child(c.parents.size(), 0);
+    for (std::size_t i = 0; i < root; ++i) has_child[c.parents[i]] = 1;
+    for (std::size_t i = vertices; i <= root; ++i)
+        if (!has_child[i]) return invalid("Cluster " + std::to_string(i) + " has no children.");
+    for (std::size_t i = 0; i < c.positions.size(); ++i)
+        if (!fits_floats(c.positions[i]))
+            return invalid("The proxy of cluster " + std::to_string(vertices + i) + " is not finite or too far away.");
+    return {};
+}
+
+Result<void> check(const Light& light) {
+    const float length = glm::length(light.direction);
+    constexpr float unit_slack = 1e-3f; // directions given with three digits
+    if (!(std::abs(length - 1) <= unit_slack) || !(light.ambient >= 0 && light.ambient <= 1))
+        return Error{ErrorCode::invalid_argument,
+                     "The light needs a direction of length 1 and an ambient share from 0 to 1."};
+    return {};
+}
+
+// What validate() lets pass, but the tree's floats do not.
+Result<void> check_attributes(const MeshView& mesh) {
+    const auto invalid = [](const char* what, std::size_t vertex) {
+        return Error{ErrorCode::malformed_data, std::string(what) + " of vertex " + std::to_string(vertex) + "."};
+    };
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v)
+        if (!fits_floats(mesh.positions[v])) return invalid("The position is too far away for floats:", v);
+    for (std::size_t v = 0; v < mesh.colours.size(); ++v) {
+        const glm::vec4 c = mesh.colours[v];
+        if (!std::isfinite(c.r) || !std::isfinite(c.g) || !std::isfinite(c.b) || !std::isfinite(c.a))
+            return invalid("A value is not finite in the colour", v);
     }
+    for (std::size_t v = 0; v < mesh.uvs.size(); ++v)
+        if (!std::isfinite(mesh.uvs[v].x) || !std::isfinite(mesh.uvs[v].y))
+            return invalid("A value is not finite in the texture coordinates", v);
     return {};
 }
 
@@ -222,12 +263,12 @@ Result<VertexTree> TreeBuilder::build(Clusterer clusterer) {
     const bool prelit = !mesh_.colours.empty();
     for (std::size_t v = 0; v < luminance.size(); ++v)
         luminance[v] = vertex_luminance(normals_[v], prelit ? &mesh_.colours[v] : nullptr, options_.light, prelit);
-    if (reporter_.cancelled(0.1, "clustering")) return cancelled_error();
+    if (reporter_.cancelled(clustering_begins, "clustering")) return cancelled_error();
     Result<Clustering> clustering = clusterer({mesh_, luminance, normals_, areas_, coincident_});
     if (!clustering) return clustering.error();
     if (const auto valid = check(*clustering, mesh_.positions.size()); !valid) return valid.error();
 
-    if (reporter_.cancelled(0.7, "ordering")) return cancelled_error();
+    if (reporter_.cancelled(clustering_ends, "ordering")) return cancelled_error();
     assign_nodes(*clustering);
     fill_vertices(*clustering);
     fold_in_build_order(*clustering);
@@ -652,6 +693,8 @@ std::string_view name(ClustererKind kind) { return kind == ClustererKind::quadri
 
 Result<VertexTree> build_tree(const MeshView& mesh, Clusterer clusterer, const BuildOptions& options) {
     if (const auto valid = validate(mesh); !valid) return valid.error();
+    if (const auto valid = check_attributes(mesh); !valid) return valid.error();
+    if (const auto valid = check(options.light); !valid) return valid.error();
     if (options.threads < 0) return Error{ErrorCode::invalid_argument, "The number of threads must be 0 or more."};
     std::optional<tbb::global_control> limit;
     if (options.threads > 0)
@@ -664,11 +707,15 @@ Result<VertexTree> build_tree(const MeshView& mesh, Clusterer clusterer, const B
 }
 
 Result<VertexTree> build_tree(const MeshView& mesh, const BuildOptions& options) {
+    const auto report = [&](double share, const char* stage) {
+        return options.progress(clustering_begins + share * (clustering_ends - clustering_begins), stage);
+    };
+    const Progress progress = options.progress ? Progress(report) : Progress();
     return build_tree(
         mesh,
         [&](const ClusterInput& input) {
-            return options.clusterer == ClustererKind::octree ? cluster_octree(input, options.progress)
-                                                              : cluster_quadric(input, options.progress);
+            return options.clusterer == ClustererKind::octree ? cluster_octree(input, progress)
+                                                              : cluster_quadric(input, progress);
         },
         options);
 }
