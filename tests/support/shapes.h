@@ -258,9 +258,19 @@ inline Mesh together(const Mesh& a, const Mesh& b) {
 
 inline Mesh two_parts() { return together(icosphere(2), placed(cube(3), 0.5, {4, 1, 0})); }
 
+// A double rounded to float and back. By way of memory: GCC 12 leaves the rounding out where it converts two numbers at
+// once, as in glm::dvec3(glm::vec3(p)).
+inline double rounded_to_float(double x) {
+    volatile float rounded = static_cast<float>(x);
+    return static_cast<double>(rounded);
+}
+inline glm::dvec3 rounded_to_float(glm::dvec3 p) {
+    return {rounded_to_float(p.x), rounded_to_float(p.y), rounded_to_float(p.z)};
+}
+
 // All positions rounded to float, as from a file of floats.
 inline Mesh in_floats(Mesh m) {
-    for (glm::dvec3& p : m.positions) p = glm::dvec3(glm::vec3(p));
+    for (glm::dvec3& p : m.positions) p = rounded_to_float(p);
     return m;
 }
 

@@ -14,6 +14,8 @@
 #include <vdtree/cut.h>
 #include <vdtree/vertex_tree.h>
 
+#include "shapes.h"
+
 namespace unseen::support {
 
 using vdtree::Cut;
@@ -138,7 +140,7 @@ inline std::string fault_when_unfolded(const VertexTree& tree, const MeshView& m
         seen[v] = 1;
     }
     bool floats = true;
-    for (const glm::dvec3& p : mesh.positions) floats &= glm::dvec3(glm::vec3(p)) == p;
+    for (const glm::dvec3& p : mesh.positions) floats &= shapes::rounded_to_float(p) == p;
     glm::dvec3 tolerance(0);
     for (int axis = 0; axis < 3 && !floats; ++axis) tolerance[axis] = position_tolerance(mesh, tree.origin(), axis);
     for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf) {

@@ -235,6 +235,45 @@ TEST(Facing, HoldsForAnEyeOnAnAxis) {
     EXPECT_EQ(facing(slabs, {-0.0f, -0.0f, -1}, 100, 1), Facing::front);
 }
 
+// A node's masks, slabs and sphere contain its children's. What the node rules out must be ruled out for them, or criteria
+// would fall up the tree.
+TEST(Facing, IsNoLessCertainForAPart) {
+    std::mt19937_64 random(6);
+    int decided = 0;
+    for (int round = 0; round < 300'000; ++round) {
+        const Situation s = random_situation(random);
+        NormalMask mask, part_mask;
+        NormalSlabs slabs, part_slabs;
+        const std::size_t part = 1 + random() % s.normals.size();
+        for (std::size_t i = 0; i < s.normals.size(); ++i) {
+            mask.insert(normal_cell(s.normals[i]));
+            slabs.insert(s.normals[i]);
+            if (i >= part) continue;
+            part_mask.insert(normal_cell(s.normals[i]));
+            part_slabs.insert(s.normals[i]);
+        }
+        // A sphere within the sphere, often touching it from within.
+        const double shift = s.radius * random_unit(random);
+        const double room = s.radius - shift;
+        const double part_radius = room * (random() % 2 ? 1 - 1e-6 : random_unit(random));
+        const glm::dvec3 eye = static_cast<double>(s.distance) * glm::normalize(glm::dvec3(s.to_eye));
+        const glm::dvec3 to_eye = eye - shift * random_direction(random);
+        const auto distance = static_cast<float>(glm::length(to_eye));
+        const auto direction = glm::vec3(glm::normalize(to_eye));
+        const auto compare = [&](Facing whole, Facing of_part) {
+            decided += whole != Facing::mixed;
+            return whole == Facing::mixed || of_part == whole;
+        };
+        ASSERT_TRUE(compare(facing(mask, s.to_eye, s.distance, s.radius),
+                            facing(part_mask, direction, distance, static_cast<float>(part_radius))))
+            << "mask, round " << round;
+        ASSERT_TRUE(compare(facing(slabs, s.to_eye, s.distance, s.radius),
+                            facing(part_slabs, direction, distance, static_cast<float>(part_radius))))
+            << "slabs, round " << round;
+    }
+    EXPECT_GT(decided, 100'000);
+}
+
 TEST(Facing, DecidesForSmallCapsAwayFromTheContour) {
     // A cell spans at most 1.41 * 90/8 degrees = 16 degrees; with 2 degrees of cap and 1 degree of sphere, a normal
     // at more than 25 degrees from the contour must be decided. Slabs lose up to 1/127 an axis: the same margin
