@@ -838,6 +838,20 @@ TEST(Relit, ShadesColoursByTheLight) {
     }
 }
 
+TEST(Relit, StaysWithinTheRangeOfLuminance) {
+    Mesh white = shapes::icosphere(2);
+    white.colours.assign(white.positions.size(), glm::vec4(1));
+    const auto tree = build_tree(white.view());
+    ASSERT_TRUE(tree);
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    for (const Light& light : {Light{{0, 0, 1.0009f}, 0}, Light{{0, 0, 9}, 0.5f}, Light{{nan, 0, 0}, 0.2f},
+                               Light{{0, 0, 1}, nan}, Light{{0, 0, 1}, -3}}) {
+        const VertexTree lit = tree->relit(light);
+        for (const float y : lit.luminance()) ASSERT_TRUE(y >= 0 && y <= 1);
+        for (const LuminanceRange& r : lit.ring_luminance()) ASSERT_TRUE(r.lo >= 0 && r.lo <= r.hi && r.hi <= 1);
+    }
+}
+
 // A light that would make luminances beyond 0..1, or none at all, is not taken.
 TEST(BuildTree, RefusesImpossibleLights) {
     const float nan = std::numeric_limits<float>::quiet_NaN();

@@ -41,7 +41,9 @@ float vertex_luminance(glm::vec3 normal, const glm::vec4* colour, const Light& l
         colour ? std::clamp(0.2126f * colour->r + 0.7152f * colour->g + 0.0722f * colour->b, 0.0f, 1.0f)
                : default_albedo;
     if (prelit) return albedo;
-    return albedo * (light.ambient + (1 - light.ambient) * std::max(0.0f, glm::dot(normal, light.direction)));
+    const float lit = light.ambient + (1 - light.ambient) * std::max(0.0f, glm::dot(normal, light.direction));
+    // Unit vectors in floats may be a little long; an impossible light must not lead out of 0..1 either.
+    return std::max(0.0f, std::min(1.0f, albedo * lit));
 }
 
 TreeLuminance derive_luminance(const TreeGeometry& g, const Light& light, bool prelit) {
