@@ -20,18 +20,8 @@ double pixels_per_radian(const View& view) {
     return view.height / (2 * std::tan(view.fov_y_degrees * std::numbers::pi / 360));
 }
 
-FrustumVisibility::FrustumVisibility(const VertexTree& tree, const View& view, const Similarity& placement) {
-    const CameraFrame frame = camera_frame(view);
-    const double tan_y = std::tan(view.fov_y_degrees * std::numbers::pi / 360);
-    const double tan_x = tan_y * view.width / view.height;
-    const glm::dvec3 inward[5] = {-frame.back, frame.right - tan_x * frame.back, -frame.right - tan_x * frame.back,
-                                  frame.up - tan_y * frame.back, -frame.up - tan_y * frame.back};
-    const glm::dvec3 eye = eye_in_tree(tree, view, placement);
-    for (int i = 0; i < 5; ++i) {
-        planes_[i].normal = glm::normalize(placement.direction_to_mesh(inward[i]));
-        planes_[i].offset = -glm::dot(planes_[i].normal, eye);
-    }
-}
+FrustumVisibility::FrustumVisibility(const VertexTree& tree, const View& view, const Similarity& placement)
+    : frustum_(frustum_of(tree, view, placement)) {}
 
 void FrustumVisibility::operator()(const VertexTree& tree, std::span<const NodeId> nodes,
                                    std::span<Visibility> seen) const {
@@ -39,7 +29,7 @@ void FrustumVisibility::operator()(const VertexTree& tree, std::span<const NodeI
     for (std::size_t i = 0; i < nodes.size(); ++i) {
         const Sphere& sphere = spheres[nodes[i]];
         Visibility result = Visibility::wholly_in;
-        for (const Plane& plane : planes_) {
+        for (const Plane& plane : frustum_.planes) {
             const double height = glm::dot(plane.normal, glm::dvec3(sphere.centre)) + plane.offset;
             if (height < -sphere.radius) {
                 result = Visibility::out;

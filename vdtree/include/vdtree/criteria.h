@@ -3,6 +3,7 @@
 
 #include <span>
 
+#include <vdtree/distance_criterion.h>
 #include <vdtree/function_ref.h>
 #include <vdtree/vertex_tree.h>
 #include <vdtree/view.h>
@@ -37,11 +38,7 @@ public:
     void operator()(const VertexTree& tree, std::span<const NodeId> nodes, std::span<Visibility> seen) const;
 
 private:
-    struct Plane {
-        glm::dvec3 normal; // unit, pointing inward
-        double offset;
-    };
-    Plane planes_[5];
+    Frustum frustum_;
 };
 
 // Projected size at the window's centre, in pixels, of an angle: pixels = angle * height / (2 tan(fov / 2)).

@@ -1,0 +1,93 @@
+// Fold criteria in distance form: fold where the eye is far enough away. What a cut needs to follow a moving eye at a cost
+// that goes with what changes.
+//
+// A node is unfolded while
+//     |eye - c| - R < D(node, silhouette, eccentricity) / threshold,      D = length * reach[class][eccentricity]
+// with c, R its ring's (or support's) sphere. `class` says how visible a fold of a given extent is; a node has one class for
+// when its ring faces the eye from one side, and another for when it is, or may be, a silhouette. Spheres and lengths nest and
+// classes grow up the tree, so D is at least its children's for equal arguments, and a parent's arguments are never
+// the better ones: a cut made by such tests is closed upward. How far the eye may move before a test can change follows from the
+// same numbers, so no node is tested before its time.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include <vdtree/result.h>
+#include <vdtree/vertex_tree.h>
+#include <vdtree/view.h>
+
+namespace unseen::vdtree {
+
+// Which row of the reach table a node uses.
+struct FoldClass {
+    std::uint16_t interior = 0;   // all of the ring faces the eye, or faces away
+    std::uint16_t silhouette = 0; // the ring is, or may be, an outline; also where it has an irregular edge
+};
+
+class DistanceCriterion {
+public:
+    enum class Spheres : std::uint8_t { ring, support };
+
+    struct Parts {
+        Spheres spheres = Spheres::ring;
+        std::vector<FoldClass> classes;   // by interior node; empty: class 0 for all, whatever they face
+        std::vector<float> lengths;       // by interior node, mesh units, 0 or more; empty: the spheres' radii
+        std::vector<float> reach;         // [class * eccentricity_bins + bin]: distance in lengths; not growing with the bin
+        std::size_t eccentricity_bins = 1;
+        double bin_degrees = 1;           // bin b holds b * bin_degrees up to the next; the last one everything beyond
+    };
+    // Reaches of folds that can be seen from nowhere, and from everywhere.
+    static constexpr float never_visible = -1;
+    static constexpr float always_visible = std::numeric_limits<float>::max();
+
+    // Fails where sizes do not fit the tree, a class has no row, a length or reach is NaN or a length is negative or infinite.
+    // A child whose reach exceeds its parent's is safe (it is folded with the parent), and an assertion in debug builds.
+    static Result<DistanceCriterion> create(const VertexTree& tree, Parts parts);
+
+    const Parts& parts() const noexcept { return parts_; }
+    bool uses_silhouettes() const noexcept { return uses_silhouettes_; }
+    bool uses_gaze() const noexcept { return parts_.eccentricity_bins > 1; }
+    std::uint64_t id() const noexcept { return id_; } // of these values; a copy shares it
+
+private:
+    explicit DistanceCriterion(Parts parts);
+
+    Parts parts_;
+    bool uses_silhouettes_ = false;
+    std::uint64_t id_;
+};
+
+// A half space: points with normal . x + offset >= 0, in the tree's frame.
+struct Plane {
+    glm::dvec3 normal = glm::dvec3(0); // unit, pointing inward
+    double offset = 0;                 // mesh units
+};
+
+// The convex region that a view, or the light of a shadow, shows.
+struct Frustum {
+    std::vector<Plane> planes;
+};
+
+// Of a perspective view: the eye's plane and the window's four sides; no far plane.
+Frustum frustum_of(const VertexTree& tree, const View& view, const Similarity& placement = {});
+
+// Where a cut is looked at from, in the tree's frame (relative to its origin, mesh units).
+struct Viewpoint {
+    glm::dvec3 eye = glm::dvec3(0);
+    std::optional<glm::dvec3> gaze = {}; // unit direction from the eye; none: everything counts as looked at
+    std::vector<Frustum> frusta = {};    // nodes outside all of them fold; none: everything counts as seen
+};
+
+// Node extent by one tolerance: the support's angular diameter, seen from its sphere's nearest point on, in pixels.
+Result<DistanceCriterion> extent_criterion(const VertexTree& tree, const View& view, double tolerance_pixels);
+
+// Vertex displacement by one tolerance: see DisplacementCriterion.
+Result<DistanceCriterion> displacement_criterion(const VertexTree& tree, const View& view, double tolerance_pixels);
+
+} // namespace unseen::vdtree

@@ -1,0 +1,121 @@
+#include <vdtree/distance_criterion.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cassert>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include <glm/geometric.hpp>
+
+#include <vdtree/criteria.h>
+
+namespace unseen::vdtree {
+
+namespace {
+
+std::uint64_t next_id() {
+    static std::atomic<std::uint64_t> last{0};
+    return ++last;
+}
+
+Error invalid(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
+
+// Whether no node's reach exceeds its parent's. Only for assertions: each node is looked at for every bin.
+[[maybe_unused]] bool is_monotone(const VertexTree& tree, const DistanceCriterion::Parts& p) {
+    const auto spheres = tree.support_spheres();
+    for (NodeId node = 1; node < tree.interior_count(); ++node) {
+        const NodeId parent = tree.parents()[node];
+        if (!p.lengths.empty() && p.lengths[node] > p.lengths[parent]) return false;
+        if (p.spheres == DistanceCriterion::Spheres::support && spheres[node].radius > spheres[parent].radius) return false;
+        if (p.classes.empty()) continue;
+        for (std::size_t bin = 0; bin < p.eccentricity_bins; ++bin) {
+            const auto reach = [&](std::uint16_t row) { return p.reach[row * p.eccentricity_bins + bin]; };
+            const FoldClass a = p.classes[node], b = p.classes[parent];
+            if (reach(a.interior) > reach(b.interior) || reach(a.silhouette) > reach(b.silhouette)) return false;
+        }
+    }
+    return true;
+}
+
+Result<void> check(const VertexTree& tree, const DistanceCriterion::Parts& p) {
+    const std::size_t nodes = tree.interior_count();
+    if (!p.classes.empty() && p.classes.size() != nodes)
+        return invalid("A criterion has " + std::to_string(p.classes.size()) + " classes for " + std::to_string(nodes) +
+                       " interior nodes.");
+    if (!p.lengths.empty() && p.lengths.size() != nodes)
+        return invalid("A criterion has " + std::to_string(p.lengths.size()) + " lengths for " + std::to_string(nodes) +
+                       " interior nodes.");
+    if (p.eccentricity_bins == 0 || p.reach.empty() || p.reach.size() % p.eccentricity_bins != 0)
+        return invalid("A criterion's table of " + std::to_string(p.reach.size()) + " reaches has no whole rows of " +
+                       std::to_string(p.eccentricity_bins) + " bins.");
+    if (!(p.bin_degrees > 0) || !std::isfinite(p.bin_degrees))
+        return invalid("The bins of eccentricity need a positive width.");
+    for (std::size_t i = 0; i < p.lengths.size(); ++i)
+        if (!(p.lengths[i] >= 0) || !std::isfinite(p.lengths[i]))
+            return invalid("The length of node " + std::to_string(i) + " must be 0 or more and finite.");
+    const std::size_t rows = p.reach.size() / p.eccentricity_bins;
+    for (std::size_t i = 0; i < p.classes.size(); ++i)
+        if (p.classes[i].interior >= rows || p.classes[i].silhouette >= rows)
+            return invalid("Node " + std::to_string(i) + " has a class beyond the " + std::to_string(rows) + " rows of the table.");
+    for (std::size_t i = 0; i < p.reach.size(); ++i) {
+        if (std::isnan(p.reach[i])) return invalid("Reach " + std::to_string(i) + " of a criterion is not a number.");
+        if (i % p.eccentricity_bins != 0 && p.reach[i] > p.reach[i - 1])
+            return invalid("Reach " + std::to_string(i) + " of a criterion grows with the eccentricity.");
+    }
+    return {};
+}
+
+double radians_of_pixels(const View& view, double pixels) { return pixels / pixels_per_radian(view); }
+
+} // namespace
+
+DistanceCriterion::DistanceCriterion(Parts parts) : parts_(std::move(parts)), id_(next_id()) {
+    uses_silhouettes_ = std::any_of(parts_.classes.begin(), parts_.classes.end(),
+                                    [](FoldClass c) { return c.interior != c.silhouette; });
+}
+
+Result<DistanceCriterion> DistanceCriterion::create(const VertexTree& tree, Parts parts) {
+    if (const auto valid = check(tree, parts); !valid) return valid.error();
+    for (float& reach : parts.reach) reach = std::clamp(reach, never_visible, always_visible);
+    assert(is_monotone(tree, parts));
+    return DistanceCriterion(std::move(parts));
+}
+
+Frustum frustum_of(const VertexTree& tree, const View& view, const Similarity& placement) {
+    const CameraFrame frame = camera_frame(view);
+    const double tan_y = std::tan(view.fov_y_degrees * std::numbers::pi / 360);
+    const double tan_x = tan_y * view.width / view.height;
+    const glm::dvec3 inward[] = {-frame.back, frame.right - tan_x * frame.back, -frame.right - tan_x * frame.back,
+                                 frame.up - tan_y * frame.back, -frame.up - tan_y * frame.back};
+    const glm::dvec3 eye = eye_in_tree(tree, view, placement);
+    Frustum frustum;
+    for (const glm::dvec3& direction : inward) {
+        const glm::dvec3 normal = glm::normalize(placement.direction_to_mesh(direction));
+        frustum.planes.push_back({normal, -glm::dot(normal, eye)});
+    }
+    return frustum;
+}
+
+Result<DistanceCriterion> extent_criterion(const VertexTree& tree, const View& view, double tolerance_pixels) {
+    if (!(tolerance_pixels > 0)) return invalid("The tolerance must be more than 0 pixels.");
+    DistanceCriterion::Parts parts;
+    parts.spheres = DistanceCriterion::Spheres::support;
+    const double half_angle = std::min(radians_of_pixels(view, tolerance_pixels), std::numbers::pi) / 2;
+    parts.reach = {static_cast<float>(1 / std::sin(half_angle) - 1)};
+    return DistanceCriterion::create(tree, std::move(parts));
+}
+
+Result<DistanceCriterion> displacement_criterion(const VertexTree& tree, const View& view, double tolerance_pixels) {
+    if (!(tolerance_pixels > 0)) return invalid("The tolerance must be more than 0 pixels.");
+    DistanceCriterion::Parts parts;
+    parts.spheres = DistanceCriterion::Spheres::support;
+    const auto displacement = tree.displacement();
+    parts.lengths.assign(displacement.begin(), displacement.end());
+    const double half_angle = std::min(radians_of_pixels(view, tolerance_pixels), std::numbers::pi) / 2;
+    parts.reach = {static_cast<float>(1 / (2 * std::sin(half_angle)))};
+    return DistanceCriterion::create(tree, std::move(parts));
+}
+
+} // namespace unseen::vdtree

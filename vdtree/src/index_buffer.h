@@ -1,0 +1,74 @@
+// The index buffer of a cut: gathered as a whole, or kept current by patches around what folds and unfolds.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <vdtree/vertex_tree.h>
+
+namespace unseen::vdtree {
+
+// One index that a patch wrote.
+struct IndexWrite {
+    Index place = 0;
+    NodeId value = 0;
+};
+
+// For patches, every vertex in use has a list of the corners that show it. A fold hands its children's corners to the proxy, an
+// unfold deals them out again, so its cost is the valence of what changes, whatever the tree's size; the lists' memory goes
+// with the triangles shown. A list is a block of power-of-two size in one pool.
+class IndexBuffer {
+public:
+    explicit IndexBuffer(const VertexTree& tree) : tree_(&tree) {}
+
+    std::span<const NodeId> indices() const noexcept { return indices_; }
+    bool can_patch() const noexcept { return has_lists_; }
+
+    // Everything anew, in the order of the triangles. `unfolded` has one bit a node, `proxies` one node a leaf.
+    void gather(std::span<const std::uint64_t> unfolded, std::span<const NodeId> proxies, Index triangles);
+    // Makes the lists for what was gathered from `unfolded`. Cost: a few times gather()'s. Buffers that are too large for them stay
+    // without (a vertex in 2^27 triangles, or more than some 10^9 corners).
+    void make_lists(std::span<const std::uint64_t> unfolded);
+    void drop_lists() noexcept { has_lists_ = false; }
+
+    // Precondition of all: can_patch(). Between begin_patch() and end_patch() the buffer may have holes.
+    void begin_patch() { writes_.clear(); }
+    // All children are active, and `children` are they.
+    void fold(NodeId node, std::span<const NodeId> children);
+    // `proxies` is current: the children stand for their leaves.
+    void unfold(NodeId node, std::span<const NodeId> children, std::span<const NodeId> proxies);
+    // Closes the holes with triangles from the end.
+    void end_patch();
+
+    // What the patches since begin_patch() wrote, in order; places may come twice, and lie beyond the end by now.
+    std::span<const IndexWrite> writes() const noexcept { return writes_; }
+    std::uint64_t byte_size() const noexcept;
+
+private:
+    using Block = std::uint32_t; // where a list starts in pool_
+    static constexpr Block no_block = 0xffffffffu;
+
+    void write(Index corner, NodeId node);
+    void append(NodeId node, Index corner);
+    void remove(NodeId node, Index corner);
+    void replace(NodeId node, Index corner, Index by);
+    std::span<Index> list(Block block);
+    Block allocate(unsigned log2_size);
+    void discard(Block block);
+    Index new_triangle();
+    bool is_hole(Index triangle) const { return indices_[std::size_t{3} * triangle] == no_node; }
+
+    const VertexTree* tree_;
+    std::vector<NodeId> indices_;
+    bool has_lists_ = false;
+    std::vector<Index> leaves_;          // by corner: the leaf whose proxy it shows; only with lists
+    std::vector<Block> block_of_node_;   // by node; only with lists
+    std::vector<std::uint32_t> pool_;    // a block: log2 of its size << 27 | corners in it, then the corners
+    std::vector<Block> free_blocks_[28]; // by log2 of the size
+    std::vector<Index> holes_;           // triangles without corners
+    std::vector<Index> scratch_, vanished_;
+    std::vector<IndexWrite> writes_;
+};
+
+} // namespace unseen::vdtree
