@@ -77,10 +77,7 @@ LuebkeHallenCriterion::LuebkeHallenCriterion(const vdtree::VertexTree& tree, con
 
 void LuebkeHallenCriterion::operator()(const vdtree::VertexTree& tree, std::span<const vdtree::NodeId> nodes,
                                        std::span<float> costs) const {
-    const auto spheres = tree.ring_spheres();
-    const auto masks = tree.masks();
-    const auto slabs = tree.slabs();
-    const auto flags = tree.flags();
+    const auto bounds = tree.bounds();
     const auto ranges = tree.ring_luminance();
     const auto adaptations = tree.adaptation_luminance();
     std::array<float, chunk> contrast, eccentricity, luminance, log2_frequency, extent;
@@ -89,7 +86,8 @@ void LuebkeHallenCriterion::operator()(const vdtree::VertexTree& tree, std::span
         const std::size_t count = std::min(chunk, nodes.size() - begin);
         for (std::size_t i = 0; i < count; ++i) {
             const vdtree::NodeId node = nodes[begin + i];
-            const vdtree::Sphere& sphere = spheres[node];
+            const vdtree::NodeBounds& around = bounds[node];
+            const vdtree::Sphere& sphere = around.ring;
             const glm::dvec3 to_centre = glm::dvec3(sphere.centre) - eye_;
             const double distance = glm::length(to_centre), radius = sphere.radius;
             const bool outside = distance > radius;
@@ -111,9 +109,9 @@ void LuebkeHallenCriterion::operator()(const vdtree::VertexTree& tree, std::span
 
             // Silhouettes may uncover anything in the scene.
             const bool silhouette =
-                (flags[node] & vdtree::irregular_ring) ||
-                vdtree::facing(slabs[node], masks[node], glm::vec3(-direction), static_cast<float>(distance),
-                               sphere.radius) == vdtree::Facing::mixed;
+                (around.flags & vdtree::irregular_ring) ||
+                vdtree::facing(around.slabs, [&] { return tree.mask(node); }, glm::vec3(-direction),
+                               static_cast<float>(distance), sphere.radius) == vdtree::Facing::mixed;
             vdtree::LuminanceRange range = ranges[node];
             float adaptation = adaptations[node];
             if (silhouette) {

@@ -152,7 +152,7 @@ Result<Renderer> Renderer::create(Context& context, const vdtree::VertexTree& tr
         return current.error();
     context.impl_->errors.begin();
     VertexArrays arrays{tree.positions(), tree.luminance(), tree.colours(), {}};
-    arrays.frame = unit_frame(tree.ring_spheres()[tree.root()]);
+    arrays.frame = unit_frame(tree.bounds()[tree.root()].ring);
     auto drawer = TriangleDrawer::create(arrays);
     if (!drawer) {
         static_cast<void>(context.impl_->errors.take_new()); // the drawer's error says it better

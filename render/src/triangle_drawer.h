@@ -26,7 +26,7 @@ enum class Cull { nothing, back, front };
 // The vertices as they lie in memory; all spans but `colours`, which may be empty, are equally long.
 struct VertexArrays {
     std::span<const glm::vec3> positions; // mesh units
-    std::span<const float> luminance;     // relative, linear
+    std::span<const vdtree::Unorm16> luminance; // relative, linear
     std::span<const glm::vec4> colours;   // linear; only their hue and saturation count
     UnitFrame frame;                      // that the positions are uploaded in
 };

@@ -101,14 +101,14 @@ TEST_F(LuebkeHallen, EqualsItsFormula) {
     const CsfTable& csf = CsfTable::standard();
     int finite = 0;
     for (NodeId n = 0; n < tree().interior_count(); ++n) {
-        const vdtree::Sphere s = tree().ring_spheres()[n];
+        const vdtree::Sphere s = tree().bounds()[n].ring;
         const glm::dvec3 to_eye = view.eye - tree().origin() - glm::dvec3(s.centre);
         const double d = glm::length(to_eye);
         if (d <= s.radius) continue;
         vdtree::LuminanceRange range = tree().ring_luminance()[n];
         double adaptation = tree().adaptation_luminance()[n];
         const bool silhouette =
-            facing(tree().slabs()[n], tree().masks()[n], glm::vec3(to_eye / d), static_cast<float>(d), s.radius) ==
+            facing(tree().bounds()[n].slabs, tree().mask(n), glm::vec3(to_eye / d), static_cast<float>(d), s.radius) ==
             vdtree::Facing::mixed;
         if (silhouette) {
             range = {std::min(range.lo, 0.1f), std::max(range.hi, 0.9f)};
@@ -161,7 +161,7 @@ TEST_F(LuebkeHallen, CostIsTheRatioOfViewingDistances) {
     int compared = 0;
     for (NodeId n = 0; n < tree().interior_count(); ++n) {
         const double pixel = 1 / pixels_per_degree(options.display).value();
-        const vdtree::Sphere s = tree().ring_spheres()[n];
+        const vdtree::Sphere s = tree().bounds()[n].ring;
         if (2 * std::asin(s.radius / far) * 180 / M_PI < 4 * pixel || near_costs[n] == 0) continue;
         EXPECT_NEAR(far_costs[n] / near_costs[n], 0.5, 0.01) << "node " << n;
         ++compared;
@@ -221,10 +221,10 @@ TEST(LuebkeHallenHoles, NodesBesideTheContourAreSilhouettes) {
             // Some corner of a triangle around the leaf lies on the contour: within the ring of every node above the leaf.
             if ((faces[t[0]] | faces[t[1]] | faces[t[2]]) != 3) continue;
             const NodeId parent = tree.parents()[interior + leaf];
-            const auto s = tree.ring_spheres()[parent];
+            const auto s = tree.bounds()[parent].ring;
             const glm::dvec3 to_eye = eye - tree.origin() - glm::dvec3(s.centre);
             const double d = glm::length(to_eye);
-            EXPECT_EQ(facing(tree.slabs()[parent], tree.masks()[parent], glm::vec3(to_eye / d), static_cast<float>(d),
+            EXPECT_EQ(facing(tree.bounds()[parent].slabs, tree.mask(parent), glm::vec3(to_eye / d), static_cast<float>(d),
                              s.radius),
                       vdtree::Facing::mixed);
             ++contour_rings;

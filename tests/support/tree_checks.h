@@ -46,10 +46,9 @@ inline std::string difference(const VertexTree& a, const VertexTree& b) {
     if (!same_bytes(a.colours(), b.colours())) return "colours";
     if (!same_bytes(a.uvs(), b.uvs())) return "uvs";
     if (!same_bytes(a.support_spheres(), b.support_spheres())) return "support_spheres";
-    if (!same_bytes(a.ring_spheres(), b.ring_spheres())) return "ring_spheres";
-    if (!same_bytes(a.masks(), b.masks())) return "masks";
-    if (!same_bytes(a.slabs(), b.slabs())) return "slabs";
-    if (!same_bytes(a.flags(), b.flags())) return "flags";
+    if (!same_bytes(a.bounds(), b.bounds())) return "bounds";
+    for (NodeId node = 0; node < a.interior_count(); ++node)
+        if (!(a.mask(node) == b.mask(node))) return "the mask of node " + std::to_string(node);
     if (!same_bytes(a.support_luminance(), b.support_luminance())) return "support_luminance";
     if (!same_bytes(a.ring_luminance(), b.ring_luminance())) return "ring_luminance";
     if (!same_bytes(a.adaptation_luminance(), b.adaptation_luminance())) return "adaptation_luminance";
@@ -162,19 +161,23 @@ inline std::string fault_when_unfolded(const VertexTree& tree, const MeshView& m
     if (cut.triangle_count() + dropped != mesh.triangles.size()) return "triangles are missing";
     const auto indices = cut.indices();
     if (indices.size() != std::size_t{3} * cut.triangle_count()) return "the index buffer has another length";
-    std::vector<std::uint8_t> drawn(mesh.triangles.size(), 0);
-    for (std::size_t t = 0; t < indices.size() / 3; ++t) {
-        const Index source = tree.source_triangles()[t];
-        if (source >= drawn.size() || drawn[source]) return "an input triangle is drawn twice";
-        drawn[source] = 1;
-        for (std::size_t k = 0; k < 3; ++k) {
-            const NodeId node = indices[3 * t + k];
-            if (!tree.is_leaf(node)) return "a proxy is left";
-            if (tree.source_vertices()[node - interior] != mesh.triangles[source][k])
-                return "triangle " + std::to_string(source) + " has other corners";
-        }
+    std::vector<Triangle> drawn, expected;
+    for (std::size_t i = 0; i < indices.size(); ++i) {
+        if (!tree.is_leaf(indices[i])) return "a proxy is left";
+        if (i % 3 == 0) drawn.emplace_back();
+        drawn.back()[i % 3] = tree.source_vertices()[indices[i] - interior];
     }
-    return {};
+    if (mesh.ranges.empty() != tree.source_triangles().empty()) return "source_triangles goes with the ranges";
+    for (std::size_t t = 0; t < tree.source_triangles().size(); ++t) {
+        const Index source = tree.source_triangles()[t];
+        if (source >= mesh.triangles.size()) return "a source triangle is out of range";
+        if (drawn[t] != mesh.triangles[source]) return "triangle " + std::to_string(source) + " has other corners";
+    }
+    for (const Triangle& t : mesh.triangles)
+        if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) expected.push_back(t);
+    std::sort(drawn.begin(), drawn.end());
+    std::sort(expected.begin(), expected.end());
+    return drawn == expected ? "" : "other triangles are drawn";
 }
 
 // The cut's definition: unfolded nodes are closed upward; the active nodes form an antichain that covers every leaf;

@@ -268,7 +268,7 @@ Tightness measure(const VertexTree& tree) {
         for (Index leaf = tree.first_leaf()[node]; leaf < tree.leaf_end()[node]; ++leaf)
             for (const Index t : around[leaf])
                 for (const Index corner : tree.triangles()[t]) add(interior + corner);
-        ratio(tree.ring_spheres()[node], result.ring, rings);
+        ratio(tree.bounds()[node].ring, result.ring, rings);
     }
     result.support /= supports;
     result.ring /= rings;

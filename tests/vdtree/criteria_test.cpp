@@ -369,7 +369,7 @@ TEST(Frustum, AgreesWithPointsOfTheSpheres) {
             const auto seen = seen_of(tree, FrustumVisibility(tree, view));
             for (NodeId node = 0; node < tree.interior_count(); ++node) {
                 ++counts[static_cast<int>(seen[node])];
-                const Sphere s = tree.ring_spheres()[node];
+                const Sphere s = tree.bounds()[node].ring;
                 for (int i = 0; i < 10; ++i) {
                     const glm::dvec3 p =
                         glm::dvec3(s.centre) + s.radius * (i == 0 ? 0.0 : 1.0) * random_direction(random);
@@ -397,7 +397,7 @@ TEST(Frustum, IsTightForSmallSpheres) {
         for (NodeId node = 0; node < tree.interior_count(); ++node) {
             // A sphere that is small, as seen from the eye, and whose centre is far from the window's edges, is
             // decided.
-            const Sphere s = tree.ring_spheres()[node];
+            const Sphere s = tree.bounds()[node].ring;
             const double distance = glm::distance(tree.origin() + glm::dvec3(s.centre), view.eye);
             if (distance < 1e-6 || s.radius > 0.02 * distance) continue;
             if (in_window(tree, view, glm::dvec3(s.centre), -0.05)) {

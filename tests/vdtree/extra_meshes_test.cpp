@@ -39,7 +39,7 @@ INSTANTIATE_TEST_SUITE_P(All, ExtraMesh, testing::ValuesIn(support::extra_meshes
 std::string fault_in_spheres(const VertexTree& tree) {
     std::string fault;
     for (NodeId node = 0; node < tree.interior_count(); ++node) {
-        const Sphere support = tree.support_spheres()[node], ring = tree.ring_spheres()[node];
+        const Sphere support = tree.support_spheres()[node], ring = tree.bounds()[node].ring;
         bool holds =
             support::contains(support, tree.positions()[node]) && support::contains(ring, tree.positions()[node]);
         tree.for_each_child(node, [&](NodeId child) {
@@ -48,7 +48,7 @@ std::string fault_in_spheres(const VertexTree& tree) {
                          support::contains(ring, tree.positions()[child]);
                 return;
             }
-            const Sphere s = tree.support_spheres()[child], r = tree.ring_spheres()[child];
+            const Sphere s = tree.support_spheres()[child], r = tree.bounds()[child].ring;
             holds &= support::contains(support, s.centre, s.radius) && support::contains(ring, r.centre, r.radius);
         });
         if (!holds) return "node " + std::to_string(node);

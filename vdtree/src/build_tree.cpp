@@ -14,8 +14,8 @@
 
 #include "bounding_sphere.h"
 #include "surface.h"
+#include "tree_draft.h"
 #include "unit_vector.h"
-#include "vertex_tree_data.h"
 
 namespace unseen::vdtree {
 
@@ -221,19 +221,19 @@ private:
     template <class Child, class Leaf>
     void for_each_child(NodeId node, Child&& on_child, Leaf&& on_leaf) const {
         NodeId child = node + 1;
-        for (Index leaf = g_->first_leaf[node]; leaf < g_->leaf_end[node];) {
-            if (child < g_->subtree_end[node] && g_->first_leaf[child] == leaf) {
+        for (Index leaf = draft_.first_leaf[node]; leaf < draft_.leaf_end[node];) {
+            if (child < draft_.subtree_end[node] && draft_.first_leaf[child] == leaf) {
                 on_child(child);
-                leaf = g_->leaf_end[child];
-                child = g_->subtree_end[child];
+                leaf = draft_.leaf_end[child];
+                child = draft_.subtree_end[child];
             } else {
                 on_leaf(leaf++);
             }
         }
     }
 
-    NodeId interior() const { return static_cast<NodeId>(g_->first_leaf.size()); }
-    glm::dvec3 position(NodeId node) const { return glm::dvec3(g_->positions[node]); }
+    NodeId interior() const { return static_cast<NodeId>(draft_.first_leaf.size()); }
+    glm::dvec3 position(NodeId node) const { return glm::dvec3(draft_.positions[node]); }
 
     const MeshView& source_;
     const MeshView& mesh_;
@@ -249,7 +249,7 @@ private:
     std::vector<NodeId> vanishing_node_;         // by clean triangle
     std::vector<Directions> folded_normals_;     // by interior node: normals of its border after the fold
     std::vector<Index> ring_start_, ring_items_; // by leaf: the triangles around it
-    std::shared_ptr<TreeGeometry> g_ = std::make_shared<TreeGeometry>();
+    TreeDraft draft_;
 };
 
 Result<VertexTree> TreeBuilder::build(Clusterer clusterer) {
@@ -278,12 +278,12 @@ Result<VertexTree> TreeBuilder::build(Clusterer clusterer) {
     bound_displacements();
     bound_facing();
 
-    g_->closedness = topology_.closedness;
-    g_->dropped_triangles = clean_.dropped + options_.dropped_before;
-    g_->ranges.assign(source_.ranges.begin(), source_.ranges.end());
+    draft_.closedness = topology_.closedness;
+    draft_.dropped_triangles = clean_.dropped + options_.dropped_before;
+    draft_.ranges.assign(source_.ranges.begin(), source_.ranges.end());
     auto data = std::make_shared<VertexTree::Data>();
-    data->light = derive_luminance(*g_, options_.light, prelit);
-    data->geometry = std::move(g_);
+    data->geometry = std::make_shared<const TreeGeometry>(pack(std::move(draft_)));
+    data->light = derive_luminance(*data->geometry, options_.light, prelit);
     if (reporter_.cancelled(1.0, "done")) return cancelled_error();
     return VertexTree(std::move(data));
 }
@@ -307,7 +307,7 @@ void TreeBuilder::assign_nodes(const Clustering& clustering) {
     leaf_order.reserve(vertices + lone);
     std::vector<NodeId> leaf_parents;
     leaf_parents.reserve(vertices + lone);
-    TreeGeometry& g = *g_;
+    TreeDraft& g = draft_;
     std::vector<NodeId> interior_parents;
     const auto open_node = [&](NodeId parent) {
         interior_parents.push_back(parent);
@@ -377,12 +377,12 @@ void TreeBuilder::assign_nodes(const Clustering& clustering) {
 
 // Positions and attributes of leaves, and of proxies as area-weighted means of their leaves (or the clusterer's position).
 void TreeBuilder::fill_vertices(const Clustering& clustering) {
-    TreeGeometry& g = *g_;
+    TreeDraft& g = draft_;
     const NodeId interior_nodes = interior();
     const std::size_t nodes = g.parents.size();
     g.origin = choose_origin(source_.positions);
     g.positions.resize(nodes);
-    g.normals.assign(nodes, glm::vec3(0));
+    g.exact_normals.assign(nodes, glm::vec3(0));
     if (!source_.colours.empty()) g.colours.resize(nodes);
     if (!source_.uvs.empty()) g.uvs.resize(nodes);
 
@@ -418,9 +418,9 @@ void TreeBuilder::fill_vertices(const Clustering& clustering) {
         Sum sum;
         const glm::dvec3 relative = source_.positions[v] - g.origin;
         g.positions[node] = glm::vec3(relative);
-        g.normals[node] = normal_of_source[v];
+        g.exact_normals[node] = normal_of_source[v];
         sum.position = w * relative;
-        sum.normal = w * glm::dvec3(g.normals[node]);
+        sum.normal = w * glm::dvec3(g.exact_normals[node]);
         if (!g.colours.empty()) sum.colour = w * glm::dvec4(g.colours[node] = source_.colours[v]);
         if (!g.uvs.empty()) sum.uv = w * glm::dvec2(g.uvs[node] = source_.uvs[v]);
         sum.weight = w;
@@ -430,7 +430,7 @@ void TreeBuilder::fill_vertices(const Clustering& clustering) {
         const Sum& sum = sums[node];
         g.positions[node] = glm::vec3(sum.position / sum.weight);
         const double length = glm::length(sum.normal);
-        if (length > 0) g.normals[node] = glm::vec3(sum.normal / length);
+        if (length > 0) g.exact_normals[node] = glm::vec3(sum.normal / length);
         if (!g.colours.empty()) g.colours[node] = glm::vec4(sum.colour / sum.weight);
         if (!g.uvs.empty()) g.uvs[node] = glm::vec2(sum.uv / sum.weight);
         if (g.parents[node] != no_node) add(sums[g.parents[node]], sum);
@@ -532,7 +532,7 @@ void TreeBuilder::fold_in_build_order(const Clustering& clustering) {
 
 // Sorts the triangles by the node at which they vanish; equal ones keep the input's order.
 void TreeBuilder::sort_triangles() {
-    TreeGeometry& g = *g_;
+    TreeDraft& g = draft_;
     const NodeId interior_nodes = interior();
     g.first_triangle.assign(interior_nodes + 1, 0);
     for (const NodeId node : vanishing_node_) ++g.first_triangle[node + 1];
@@ -560,7 +560,7 @@ void TreeBuilder::sort_triangles() {
 
 // Spheres bottom-up. Small nodes see the points themselves; every node contains its children's spheres.
 void TreeBuilder::bound_spheres() {
-    TreeGeometry& g = *g_;
+    TreeDraft& g = draft_;
     const NodeId interior_nodes = interior();
     g.support_spheres.resize(interior_nodes);
     g.ring_spheres.resize(interior_nodes);
@@ -603,7 +603,7 @@ void TreeBuilder::bound_spheres() {
 
 // The largest distance of a supported leaf from the proxy, and never less than a child's.
 void TreeBuilder::bound_displacements() {
-    TreeGeometry& g = *g_;
+    TreeDraft& g = draft_;
     const NodeId interior_nodes = interior();
     g.displacement.resize(interior_nodes);
     for (NodeId node = interior_nodes; node-- > 0;) {
@@ -633,7 +633,7 @@ void TreeBuilder::bound_displacements() {
 // Masks and slabs of the ring dilated by one more ring, with the folded normals united in, and flags of irregular rings.
 // The dilation runs over welded vertices: an unwelded crease is no end of the surface.
 void TreeBuilder::bound_facing() {
-    TreeGeometry& g = *g_;
+    TreeDraft& g = draft_;
     const NodeId interior_nodes = interior();
     const std::size_t leaves = g.source_vertices.size();
     // By leaf: a leaf that stands for its position, and whether an irregular edge ends there. Lone leaves: themselves.

@@ -25,9 +25,9 @@ FrustumVisibility::FrustumVisibility(const VertexTree& tree, const View& view, c
 
 void FrustumVisibility::operator()(const VertexTree& tree, std::span<const NodeId> nodes,
                                    std::span<Visibility> seen) const {
-    const auto spheres = tree.ring_spheres();
+    const auto bounds = tree.bounds();
     for (std::size_t i = 0; i < nodes.size(); ++i) {
-        const Sphere& sphere = spheres[nodes[i]];
+        const Sphere& sphere = bounds[nodes[i]].ring;
         Visibility result = Visibility::wholly_in;
         for (const Plane& plane : frustum_.planes) {
             const double height = glm::dot(plane.normal, glm::dvec3(sphere.centre)) + plane.offset;

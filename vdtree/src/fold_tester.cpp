@@ -139,9 +139,9 @@ bool FoldTester::is_outside(glm::vec3 to_centre, float radius, float& slack) con
 
 void FoldTester::test(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const {
     const DistanceCriterion::Parts& parts = criterion_.parts();
-    const std::span<const Sphere> spheres =
-        parts.spheres == DistanceCriterion::Spheres::ring ? tree_.ring_spheres() : tree_.support_spheres();
-    const auto ring_spheres = tree_.ring_spheres();
+    const auto bounds = tree_.bounds();
+    const auto support = tree_.support_spheres();
+    const bool by_support = parts.spheres == DistanceCriterion::Spheres::support;
     const bool has_classes = !parts.classes.empty(), has_lengths = !parts.lengths.empty();
     const bool has_frusta = !frusta_.empty(), has_silhouettes = criterion_.uses_silhouettes();
     std::array<Candidate, facing_lanes> candidates;
@@ -149,7 +149,7 @@ void FoldTester::test(std::span<const NodeId> nodes, std::span<Verdict> verdicts
 
     for (std::size_t i = 0; i < nodes.size(); ++i) {
         const NodeId node = nodes[i];
-        const Sphere& sphere = spheres[node];
+        const Sphere& sphere = by_support ? support[node] : bounds[node].ring;
         // The difference in double: far from the origin, and near the eye, floats would lose it.
         const glm::vec3 to_eye(eye_ - glm::dvec3(sphere.centre));
         const float distance = glm::length(to_eye), gap = distance - sphere.radius;
@@ -160,7 +160,7 @@ void FoldTester::test(std::span<const NodeId> nodes, std::span<Verdict> verdicts
 
         float inside_slack = infinity;
         if (has_frusta) {
-            const Sphere& ring = ring_spheres[node];
+            const Sphere& ring = bounds[node].ring;
             float slack;
             if (is_outside(glm::vec3(glm::dvec3(ring.centre) - eye_), ring.radius, slack)) {
                 verdict = {std::max(0.0f, slack - rounding), infinity, 0, false};
@@ -179,10 +179,10 @@ void FoldTester::test(std::span<const NodeId> nodes, std::span<Verdict> verdicts
         const bool facing_decides = cull_back_faces_ ? gap < silhouette : has_silhouettes && interior <= gap && gap < silhouette;
         if (facing_decides) {
             candidates[waiting++] = {i, node, to_eye, sphere.radius, distance, gap, length, eccentricity, inside_slack};
-            if (parts.spheres != DistanceCriterion::Spheres::ring) {
+            if (by_support) {
                 Candidate& candidate = candidates[waiting - 1];
-                candidate.to_eye = glm::vec3(eye_ - glm::dvec3(ring_spheres[node].centre));
-                candidate.radius = ring_spheres[node].radius;
+                candidate.to_eye = glm::vec3(eye_ - glm::dvec3(bounds[node].ring.centre));
+                candidate.radius = bounds[node].ring.radius;
                 candidate.distance = glm::length(candidate.to_eye);
             }
             if (waiting == facing_lanes) {
@@ -204,21 +204,20 @@ void FoldTester::test(std::span<const NodeId> nodes, std::span<Verdict> verdicts
 
 void FoldTester::test_facing(std::span<const Candidate> candidates, std::span<Verdict> verdicts) const {
     const DistanceCriterion::Parts& parts = criterion_.parts();
-    const auto slabs = tree_.slabs();
-    const auto flags = tree_.flags();
+    const auto bounds = tree_.bounds();
     FacingBatch batch;
     FacingGaps gaps;
     for (std::size_t lane = 0; lane < facing_lanes; ++lane) {
         const Candidate& c = candidates[std::min(lane, candidates.size() - 1)];
-        batch.set(lane, slabs[c.node], c.to_eye.x, c.to_eye.y, c.to_eye.z, c.radius);
+        batch.set(lane, bounds[c.node].slabs, c.to_eye.x, c.to_eye.y, c.to_eye.z, c.radius);
     }
     facing_gaps(batch, gaps);
     for (std::size_t lane = 0; lane < candidates.size(); ++lane) {
         const Candidate& c = candidates[lane];
         const FoldClass row = parts.classes.empty() ? FoldClass{} : parts.classes[c.node];
         float front = gaps.front[lane], back = gaps.back[lane];
-        if (flags[c.node] & irregular_ring) front = back = -infinity; // an outline from everywhere
-        else if (slabs[c.node].empty()) front = infinity, back = -infinity; // no triangle with an area
+        if (bounds[c.node].flags & irregular_ring) front = back = -infinity; // an outline from everywhere
+        else if (bounds[c.node].slabs.empty()) front = infinity, back = -infinity; // no triangle with an area
         const bool faces_away = cull_back_faces_ && back > 0;
         const bool is_silhouette = !(front > 0) && !(back > 0);
         const std::uint16_t used = is_silhouette ? row.silhouette : row.interior;
@@ -251,7 +250,7 @@ void FoldTester::test_facing(std::span<const Candidate> candidates, std::span<Ve
 Motion FoldTester::motion(const VertexTree& tree, const Viewpoint& from, const Viewpoint& to, double length_per_radian) {
     constexpr Motion jump{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
     if (from.gaze.has_value() != to.gaze.has_value() || from.frusta.size() != to.frusta.size()) return jump;
-    const Sphere& root = tree.ring_spheres()[VertexTree::root()]; // contains the centres of all spheres
+    const Sphere& root = tree.bounds()[VertexTree::root()].ring; // contains the centres of all spheres
     const glm::dvec3 centre(root.centre);
     const double radius = root.radius;
     const auto angle_between = [](glm::dvec3 a, glm::dvec3 b) {

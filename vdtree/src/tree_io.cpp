@@ -15,6 +15,7 @@
 #include <xxhash.h>
 
 #include "atomic_file.h"
+#include "mask_pool.h"
 #include "vertex_tree_data.h"
 
 namespace unseen::vdtree {
@@ -22,7 +23,7 @@ namespace unseen::vdtree {
 namespace {
 
 constexpr std::array<char, 8> magic = {'U', 'N', 'S', 'E', 'E', 'N', 'V', 'T'};
-constexpr std::uint32_t format_version = 1;
+constexpr std::uint32_t format_version = 2;
 constexpr std::uint64_t page_bytes = 1 << 20;
 constexpr std::uint32_t most_sections = 64;
 constexpr std::uint64_t section_alignment = 64; // bytes; a cache line, and what any mapped element needs
@@ -84,11 +85,10 @@ void for_each_array(Geometry& g, Luminance& l, F&& f) {
     f("leaf_end", g.leaf_end);
     f("subtree_end", g.subtree_end);
     f("first_triangle", g.first_triangle);
+    f("bounds", g.bounds);
     f("support_spheres", g.support_spheres);
-    f("ring_spheres", g.ring_spheres);
-    f("masks", g.masks);
-    f("slabs", g.slabs);
-    f("flags", g.flags);
+    f("mask_at", g.mask_at);
+    f("mask_records", g.mask_records);
     f("displacement", g.displacement);
     f("support_range", l.support_range);
     f("ring_range", l.ring_range);
@@ -101,9 +101,9 @@ void for_each_array(Geometry& g, Luminance& l, F&& f) {
 template <class T>
 constexpr std::uint32_t component_bytes() {
     if constexpr (std::is_arithmetic_v<T>) return sizeof(T);
-    else if constexpr (std::is_same_v<T, NormalMask>) return 8;
-    else if constexpr (std::is_same_v<T, NormalSlabs>) return 1;
-    else return 4; // vectors, spheres, ranges and triangles of 4-byte components
+    else if constexpr (std::is_same_v<T, Unorm16> || std::is_same_v<T, PackedRange> || std::is_same_v<T, PackedNormal>)
+        return 2;
+    else return 4; // vectors, spheres and triangles of 4-byte components; of NodeBounds, the sphere
 }
 
 // Ranges as text-like records: kind, length of the name, first triangle, count, name.
@@ -310,7 +310,9 @@ Result<void> Reader::read_table() {
     }
     if (h.version != format_version)
         return Error{ErrorCode::unsupported, file_.string() + ": version " + std::to_string(h.version) +
-                                                 " of the format is not known to this program; it reads version 1."};
+                                                 " of the format is not known to this program, which reads version " +
+                                                 std::to_string(format_version) +
+                                                 ". Build the tree again from its mesh."};
     if (h.header_checksum != sum) return fail("The header is damaged.");
     if (h.file_bytes != file_bytes_)
         return fail("The file has " + std::to_string(file_bytes_) + " bytes instead of " +
@@ -392,15 +394,14 @@ Result<void> Reader::check_counts(const TreeGeometry& g, const TreeLuminance& l)
         {g.subtree_end.size() == interior, "subtree_end"},
         {g.first_triangle.size() == interior + 1, "first_triangle"},
         {g.support_spheres.size() == interior, "support_spheres"},
-        {g.ring_spheres.size() == interior, "ring_spheres"},
-        {g.masks.size() == interior, "masks"},
-        {g.slabs.size() == interior, "slabs"},
-        {g.flags.size() == interior, "flags"},
+        {g.bounds.size() == interior, "bounds"},
+        {g.mask_at.size() == interior, "mask_at"},
+        {g.mask_records.size() > most_mask_bytes, "mask_records"},
         {g.displacement.size() == interior, "displacement"},
         {l.support_range.size() == interior, "support_range"},
         {l.ring_range.size() == interior, "ring_range"},
         {l.adaptation.size() == interior, "adaptation"},
-        {g.source_triangles.size() == triangles, "source_triangles"},
+        {g.source_triangles.size() == (g.ranges.empty() ? 0 : triangles), "source_triangles"},
         {g.source_vertices.size() == leaves, "source_vertices"}};
     for (const auto& [holds, name] : checks)
         if (const auto r = expect(holds, name); !r) return r;
@@ -464,25 +465,25 @@ bool all_finite(const std::vector<T>& values) {
 
 Result<void> Reader::check_values(const TreeGeometry& g, const TreeLuminance& l) const {
     const std::pair<bool, const char*> finite[] = {
-        {all_finite(g.positions), "positions"},           {all_finite(g.normals), "normals"},
-        {all_finite(g.colours), "colours"},               {all_finite(g.uvs), "uvs"},
-        {all_finite(g.support_spheres), "support_spheres"}, {all_finite(g.ring_spheres), "ring_spheres"},
-        {all_finite(g.displacement), "displacement"},     {all_finite(l.luminance), "luminance"},
-        {all_finite(l.support_range), "support_range"},   {all_finite(l.ring_range), "ring_range"},
-        {all_finite(l.adaptation), "adaptation"}};
+        {all_finite(g.positions), "positions"},
+        {all_finite(g.colours), "colours"},
+        {all_finite(g.uvs), "uvs"},
+        {all_finite(g.support_spheres), "support_spheres"},
+        {all_finite(g.displacement), "displacement"}};
     for (const auto& [holds, name] : finite)
         if (!holds) return fail("Section " + std::string(name) + " has a value that is not finite.");
-    for (const auto* spheres : {&g.support_spheres, &g.ring_spheres})
-        for (const Sphere& s : *spheres)
-            if (!(s.radius >= 0)) return fail("A bounding sphere has a negative radius.");
-    const auto in_unit = [](float y) { return y >= 0 && y <= 1; };
-    for (const float y : l.luminance)
-        if (!in_unit(y)) return fail("A luminance lies outside of 0..1.");
+    for (const NodeBounds& b : g.bounds) {
+        const glm::dvec3 centre = b.ring.centre;
+        if (!std::isfinite(centre.x + centre.y + centre.z + b.ring.radius)) return fail("Section bounds has a value that is not finite.");
+        if (!(b.ring.radius >= 0)) return fail("A bounding sphere has a negative radius.");
+    }
+    for (const Sphere& s : g.support_spheres)
+        if (!(s.radius >= 0)) return fail("A bounding sphere has a negative radius.");
+    for (const std::uint32_t at : g.mask_at)
+        if (at >= g.mask_records.size() - most_mask_bytes) return fail("A mask begins behind the last record.");
     for (const auto* ranges : {&l.support_range, &l.ring_range})
-        for (const LuminanceRange& r : *ranges)
-            if (!(in_unit(r.lo) && in_unit(r.hi) && r.lo <= r.hi)) return fail("A luminance range lies outside of 0..1.");
-    for (const float y : l.adaptation)
-        if (!in_unit(y)) return fail("An adaptation luminance lies outside of 0..1.");
+        for (const PackedRange& r : *ranges)
+            if (!(r.lo <= r.hi)) return fail("A luminance range ends before it begins.");
     for (const float moved : g.displacement)
         if (!(moved >= 0)) return fail("A displacement is negative.");
     return {};

@@ -20,7 +20,7 @@ bool contains(const Sphere& outer, glm::vec3 point, double radius) {
     return glm::length(d) + radius <= outer.radius * (1 + slack);
 }
 
-bool contains(LuminanceRange outer, LuminanceRange inner) { return outer.lo <= inner.lo && inner.hi <= outer.hi; }
+bool contains(PackedRange outer, PackedRange inner) { return outer.lo <= inner.lo && inner.hi <= outer.hi; }
 
 class Verifier {
 public:
@@ -54,8 +54,8 @@ private:
     void check_vertices(NodeId node) {
         const glm::vec3 proxy = g_.positions[node];
         expect(contains(g_.support_spheres[node], proxy, 0), "the support's sphere does not contain the proxy.");
-        expect(contains(g_.ring_spheres[node], proxy, 0), "the ring's sphere does not contain the proxy.");
-        const float y = l_.luminance[node];
+        expect(contains(g_.bounds[node].ring, proxy, 0), "the ring's sphere does not contain the proxy.");
+        const Unorm16 y = l_.luminance[node];
         expect(contains(l_.support_range[node], {y, y}), "the support's luminance does not contain the proxy's.");
         const Index measured = std::min<Index>(g_.leaf_end[node], g_.first_leaf[node] + most_leaves_measured);
         for (Index leaf = g_.first_leaf[node]; leaf < measured; ++leaf) {
@@ -74,12 +74,12 @@ private:
                        "the support's luminance does not contain a leaf's.");
                 return;
             }
-            const Sphere &s = g_.support_spheres[child], &r = g_.ring_spheres[child];
+            const Sphere &s = g_.support_spheres[child], &r = g_.bounds[child].ring;
             expect(contains(g_.support_spheres[node], s.centre, s.radius), "a child's support sphere sticks out.");
-            expect(contains(g_.ring_spheres[node], r.centre, r.radius), "a child's ring sphere sticks out.");
-            expect(g_.masks[node].includes(g_.masks[child]), "a child's mask has other cells.");
-            expect(g_.slabs[node].includes(g_.slabs[child]), "a child's slabs stick out.");
-            expect((g_.flags[child] & ~g_.flags[node]) == 0, "a child has other flags.");
+            expect(contains(g_.bounds[node].ring, r.centre, r.radius), "a child's ring sphere sticks out.");
+            expect(tree_.mask(node).includes(tree_.mask(child)), "a child's mask has other cells.");
+            expect(g_.bounds[node].slabs.includes(g_.bounds[child].slabs), "a child's slabs stick out.");
+            expect((g_.bounds[child].flags & ~g_.bounds[node].flags) == 0, "a child has other flags.");
             expect(g_.displacement[node] >= g_.displacement[child], "a child's displacement is larger.");
             expect(l_.adaptation[node] >= l_.adaptation[child], "a child's adaptation luminance is higher.");
             expect(contains(l_.support_range[node], l_.support_range[child]), "a child's support luminance sticks out.");
@@ -98,10 +98,10 @@ private:
             NodeId node = g_.parents[interior + leaf];
             while (node != no_node && g_.support_spheres[node].radius == 0) node = g_.parents[node];
             if (node == no_node) continue; // everything is at one point
-            expect(cell < 0 || g_.masks[node].contains(cell), "a normal is missing in the mask of a corner's parent.");
+            expect(cell < 0 || tree_.mask(node).contains(cell), "a normal is missing in the mask of a corner's parent.");
             for (const Index corner : t) {
-                const float y = l_.luminance[interior + corner];
-                expect(contains(g_.ring_spheres[node], g_.positions[interior + corner], 0),
+                const Unorm16 y = l_.luminance[interior + corner];
+                expect(contains(g_.bounds[node].ring, g_.positions[interior + corner], 0),
                        "a corner is outside of the ring sphere of another corner's parent.");
                 expect(contains(l_.ring_range[node], {y, y}),
                        "a corner's luminance is outside of the ring's of another corner's parent.");

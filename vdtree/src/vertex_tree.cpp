@@ -5,6 +5,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "mask_pool.h"
+
 namespace unseen::vdtree {
 
 namespace {
@@ -14,10 +16,19 @@ std::uint64_t bytes_of(const std::vector<T>& v) {
     return v.capacity() * sizeof(T);
 }
 
-constexpr LuminanceRange empty_range{1.0f, 0.0f};
+constexpr PackedRange empty_range{{Unorm16::largest}, {0}};
 
-LuminanceRange unite(LuminanceRange a, LuminanceRange b) { return {std::min(a.lo, b.lo), std::max(a.hi, b.hi)}; }
-LuminanceRange unite(LuminanceRange a, float y) { return unite(a, LuminanceRange{y, y}); }
+PackedRange unite(PackedRange a, PackedRange b) { return {std::min(a.lo, b.lo), std::max(a.hi, b.hi)}; }
+PackedRange unite(PackedRange a, Unorm16 y) { return unite(a, PackedRange{y, y}); }
+
+// Rounded up: eyes adapted to more light see no less.
+Unorm16 middle(PackedRange r) { return {static_cast<std::uint16_t>((r.lo.value + r.hi.value + 1) / 2)}; }
+
+// The range of the same length as `spread` that begins where `ring` does, within `ring`.
+PackedRange shortened(PackedRange ring, PackedRange spread) {
+    const int hi = ring.lo.value + (spread.hi.value - spread.lo.value);
+    return {ring.lo, {static_cast<std::uint16_t>(std::min<int>(ring.hi.value, hi))}};
+}
 
 // A third of the area of the triangles around each leaf, in double against overflow at extreme scales.
 std::vector<double> leaf_areas(const TreeGeometry& g, NodeId interior) {
@@ -55,18 +66,18 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const Light& light, bool p
     out.luminance.resize(std::size_t{interior} + leaves);
     out.support_range.resize(interior);
     out.ring_range.resize(interior);
-    out.adaptation.assign(interior, 0);
+    out.adaptation.resize(interior);
 
-    std::vector<LuminanceRange> leaf_ring(leaves);
+    std::vector<PackedRange> leaf_ring(leaves);
     for (Index leaf = 0; leaf < leaves; ++leaf) {
         const NodeId node = interior + leaf;
-        const float y =
-            vertex_luminance(g.normals[node], g.colours.empty() ? nullptr : &g.colours[node], light, prelit);
+        const auto y = Unorm16::nearest(
+            vertex_luminance(g.normals[node], g.colours.empty() ? nullptr : &g.colours[node], light, prelit));
         out.luminance[node] = y;
         leaf_ring[leaf] = {y, y};
     }
     for (const Triangle& t : g.triangles) {
-        LuminanceRange range = empty_range;
+        PackedRange range = empty_range;
         for (const Index leaf : t) range = unite(range, out.luminance[interior + leaf]);
         for (const Index leaf : t) leaf_ring[leaf] = unite(leaf_ring[leaf], range);
     }
@@ -78,7 +89,7 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const Light& light, bool p
     for (const double a : areas) largest = std::max(largest, a);
     const double scale = largest > 0 ? 1 / largest : 0;
     for (Index leaf = 0; leaf < leaves; ++leaf) {
-        const double area = areas[leaf] * scale, y = out.luminance[interior + leaf];
+        const double area = areas[leaf] * scale, y = out.luminance[interior + leaf].value;
         area_sum[leaf + 1] = area_sum[leaf] + area;
         weighted_sum[leaf + 1] = weighted_sum[leaf] + area * y;
         plain_sum[leaf + 1] = plain_sum[leaf] + y;
@@ -86,11 +97,11 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const Light& light, bool p
     // Below this share of the largest vertex area, per leaf, the difference of two running sums is rounding noise.
     constexpr double least_mean_area = 1e-9;
 
-    out.range = empty_range;
+    PackedRange corners = empty_range;
     for (NodeId node = interior; node-- > 0;) {
         const Index begin = g.first_leaf[node], end = g.leaf_end[node];
-        LuminanceRange support = empty_range, ring = empty_range;
-        float adaptation = 0;
+        PackedRange support = empty_range, ring = empty_range;
+        Unorm16 adaptation;
         // Interior children have higher numbers and are done.
         NodeId child = node + 1;
         for (Index leaf = begin; leaf < end;) {
@@ -113,21 +124,22 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const Light& light, bool p
         if (area > least_mean_area * (end - begin)) mean = (weighted_sum[end] - weighted_sum[begin]) / area;
         else mean = (plain_sum[end] - plain_sum[begin]) / (end - begin);
         // The mean lies within the leaves' range but for rounding.
-        const float y = std::clamp(static_cast<float>(mean), support.lo, support.hi);
+        const Unorm16 y = std::clamp(Unorm16::nearest(mean / Unorm16::largest), support.lo, support.hi);
         out.luminance[node] = y;
         support = unite(support, y);
         ring = unite(ring, y);
         if (is_coincident(g, node)) {
             // Nothing moves; a pixel of the ring changes by the spread of the coincident vertices at most. The
             // contrast of that is largest on the ring's darkest luminance.
-            ring.hi = std::min(ring.hi, ring.lo + (support.hi - support.lo));
+            ring = shortened(ring, support);
         }
         out.support_range[node] = support;
         out.ring_range[node] = ring;
-        out.adaptation[node] = std::max(adaptation, 0.5f * (ring.lo + ring.hi));
+        out.adaptation[node] = std::max(adaptation, middle(ring));
     }
     for (const Triangle& t : g.triangles)
-        for (const Index leaf : t) out.range = unite(out.range, out.luminance[interior + leaf]);
+        for (const Index leaf : t) corners = unite(corners, out.luminance[interior + leaf]);
+    out.range = corners;
     return out;
 }
 
@@ -150,19 +162,19 @@ std::span<const Triangle> VertexTree::triangles() const noexcept { return data_-
 
 glm::dvec3 VertexTree::origin() const noexcept { return data_->geometry->origin; }
 std::span<const glm::vec3> VertexTree::positions() const noexcept { return data_->geometry->positions; }
-std::span<const float> VertexTree::luminance() const noexcept { return data_->light.luminance; }
-std::span<const glm::vec3> VertexTree::normals() const noexcept { return data_->geometry->normals; }
+std::span<const Unorm16> VertexTree::luminance() const noexcept { return data_->light.luminance; }
+std::span<const PackedNormal> VertexTree::normals() const noexcept { return data_->geometry->normals; }
 std::span<const glm::vec4> VertexTree::colours() const noexcept { return data_->geometry->colours; }
 std::span<const glm::vec2> VertexTree::uvs() const noexcept { return data_->geometry->uvs; }
 
+std::span<const NodeBounds> VertexTree::bounds() const noexcept { return data_->geometry->bounds; }
+NormalMask VertexTree::mask(NodeId node) const noexcept {
+    return unpack_mask(data_->geometry->mask_records, data_->geometry->mask_at[node]);
+}
 std::span<const Sphere> VertexTree::support_spheres() const noexcept { return data_->geometry->support_spheres; }
-std::span<const Sphere> VertexTree::ring_spheres() const noexcept { return data_->geometry->ring_spheres; }
-std::span<const NormalMask> VertexTree::masks() const noexcept { return data_->geometry->masks; }
-std::span<const NormalSlabs> VertexTree::slabs() const noexcept { return data_->geometry->slabs; }
-std::span<const std::uint8_t> VertexTree::flags() const noexcept { return data_->geometry->flags; }
-std::span<const LuminanceRange> VertexTree::support_luminance() const noexcept { return data_->light.support_range; }
-std::span<const LuminanceRange> VertexTree::ring_luminance() const noexcept { return data_->light.ring_range; }
-std::span<const float> VertexTree::adaptation_luminance() const noexcept { return data_->light.adaptation; }
+std::span<const PackedRange> VertexTree::support_luminance() const noexcept { return data_->light.support_range; }
+std::span<const PackedRange> VertexTree::ring_luminance() const noexcept { return data_->light.ring_range; }
+std::span<const Unorm16> VertexTree::adaptation_luminance() const noexcept { return data_->light.adaptation; }
 std::span<const float> VertexTree::displacement() const noexcept { return data_->geometry->displacement; }
 
 std::span<const Index> VertexTree::source_vertices() const noexcept { return data_->geometry->source_vertices; }
@@ -188,7 +200,7 @@ std::uint64_t VertexTree::byte_size() const noexcept {
     const TreeLuminance& l = data_->light;
     return bytes_of(g.parents) + bytes_of(g.positions) + bytes_of(g.normals) + bytes_of(g.colours) + bytes_of(g.uvs) +
            bytes_of(g.first_leaf) + bytes_of(g.leaf_end) + bytes_of(g.subtree_end) + bytes_of(g.first_triangle) +
-           bytes_of(g.support_spheres) + bytes_of(g.ring_spheres) + bytes_of(g.masks) + bytes_of(g.slabs) + bytes_of(g.flags) +
+           bytes_of(g.bounds) + bytes_of(g.support_spheres) + bytes_of(g.mask_at) + bytes_of(g.mask_records) +
            bytes_of(g.displacement) + bytes_of(g.triangles) + bytes_of(g.source_triangles) +
            bytes_of(g.source_vertices) + bytes_of(g.ranges) + bytes_of(l.luminance) + bytes_of(l.support_range) +
            bytes_of(l.ring_range) + bytes_of(l.adaptation);

@@ -13,7 +13,7 @@ struct TreeGeometry {
     // By node: interior nodes, then leaves.
     std::vector<NodeId> parents;
     std::vector<glm::vec3> positions;
-    std::vector<glm::vec3> normals;
+    std::vector<PackedNormal> normals;
     std::vector<glm::vec4> colours;
     std::vector<glm::vec2> uvs;
 
@@ -21,15 +21,16 @@ struct TreeGeometry {
     std::vector<Index> first_leaf, leaf_end;
     std::vector<NodeId> subtree_end;
     std::vector<Index> first_triangle; // one longer
-    std::vector<Sphere> support_spheres, ring_spheres;
-    std::vector<NormalMask> masks;
-    std::vector<NormalSlabs> slabs;
-    std::vector<std::uint8_t> flags;
+    std::vector<NodeBounds> bounds;
+    std::vector<Sphere> support_spheres;
+    std::vector<std::uint32_t> mask_at; // into mask_records
     std::vector<float> displacement;
+
+    std::vector<std::uint8_t> mask_records; // see mask_pool.h
 
     // By triangle.
     std::vector<Triangle> triangles;
-    std::vector<Index> source_triangles;
+    std::vector<Index> source_triangles; // empty without ranges
 
     std::vector<Index> source_vertices; // by leaf
     std::vector<MeshRange> ranges;
@@ -43,10 +44,10 @@ struct TreeGeometry {
 struct TreeLuminance {
     Light light;
     bool prelit = false;
-    std::vector<float> luminance;                     // by node
-    std::vector<LuminanceRange> support_range;        // by interior node, and so on
-    std::vector<LuminanceRange> ring_range;
-    std::vector<float> adaptation;
+    std::vector<Unorm16> luminance;            // by node
+    std::vector<PackedRange> support_range;    // by interior node, and so on
+    std::vector<PackedRange> ring_range;
+    std::vector<Unorm16> adaptation;
     LuminanceRange range;
 };
 

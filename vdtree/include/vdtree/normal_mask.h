@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cstdint>
+#include <type_traits>
 
 #include <glm/vec3.hpp>
 
@@ -83,11 +84,14 @@ enum class Facing : std::uint8_t { none, front, back, mixed };
 Facing facing(const NormalMask& mask, glm::vec3 to_eye, float distance, float radius) noexcept;
 Facing facing(const NormalSlabs& slabs, glm::vec3 to_eye, float distance, float radius) noexcept;
 
-// Both hold, so what either rules out is ruled out: the slabs first.
-inline Facing facing(const NormalSlabs& slabs, const NormalMask& mask, glm::vec3 to_eye, float distance,
-                     float radius) noexcept {
+// Both hold, so what either rules out is ruled out: the slabs first. `mask` may be a function that gives the mask; it is called
+// only where the slabs do not decide.
+template <class Mask>
+Facing facing(const NormalSlabs& slabs, const Mask& mask, glm::vec3 to_eye, float distance, float radius) noexcept {
     const Facing by_slabs = facing(slabs, to_eye, distance, radius);
-    return by_slabs == Facing::mixed ? facing(mask, to_eye, distance, radius) : by_slabs;
+    if (by_slabs != Facing::mixed) return by_slabs;
+    if constexpr (std::is_same_v<Mask, NormalMask>) return facing(mask, to_eye, distance, radius);
+    else return facing(mask(), to_eye, distance, radius);
 }
 
 } // namespace unseen::vdtree

@@ -28,6 +28,7 @@
 
 #include <vdtree/mesh.h>
 #include <vdtree/normal_mask.h>
+#include <vdtree/packed.h>
 #include <vdtree/result.h>
 
 namespace unseen::vdtree {
@@ -45,6 +46,11 @@ struct LuminanceRange {
     float lo = 0;
     float hi = 0;
 };
+struct PackedRange {
+    Unorm16 lo, hi;
+    operator LuminanceRange() const noexcept { return {lo, hi}; }
+    bool operator==(const PackedRange&) const = default;
+};
 
 // One directional light and ambient light, for meshes whose luminance is not pre-lit by colours:
 // relative luminance = albedo * (ambient + (1 - ambient) * max(0, n.direction)).
@@ -60,6 +66,15 @@ inline constexpr float default_albedo = 0.8f;
 enum NodeFlags : std::uint8_t {
     irregular_ring = 1, // the ring has a boundary, non-manifold or inconsistently oriented edge
 };
+
+// What a fold test reads of an interior node, in one piece.
+struct alignas(32) NodeBounds {
+    Sphere ring;       // the ring, and the proxies of the subtree
+    NormalSlabs slabs; // of the same directions as the node's mask
+    std::uint8_t flags = 0; // NodeFlags
+    std::uint8_t spare = 0;
+};
+static_assert(sizeof(NodeBounds) == 32);
 
 class VertexTree {
 public:
@@ -92,27 +107,25 @@ public:
     // Proxy vertices, by node; a leaf's proxy is the input vertex. Attributes the mesh did not have are empty.
     glm::dvec3 origin() const noexcept;
     std::span<const glm::vec3> positions() const noexcept;
-    std::span<const float> luminance() const noexcept;    // under light(); never empty
-    std::span<const glm::vec3> normals() const noexcept;  // unit length or zero; never empty
-    std::span<const glm::vec4> colours() const noexcept;  // linear
+    std::span<const Unorm16> luminance() const noexcept;    // under light(); never empty
+    std::span<const PackedNormal> normals() const noexcept; // unit length or zero; never empty
+    std::span<const glm::vec4> colours() const noexcept;    // linear
     std::span<const glm::vec2> uvs() const noexcept;
 
     // Bounds, by interior node.
-    std::span<const Sphere> support_spheres() const noexcept;         // leaves and proxies of the subtree
-    std::span<const Sphere> ring_spheres() const noexcept;            // the ring, and the proxies of the subtree
-    std::span<const NormalMask> masks() const noexcept;               // facing of the ring dilated by one more ring
-    std::span<const NormalSlabs> slabs() const noexcept;              // of the same directions as the masks
-    std::span<const std::uint8_t> flags() const noexcept;             // NodeFlags
-    std::span<const LuminanceRange> support_luminance() const noexcept;
-    std::span<const LuminanceRange> ring_luminance() const noexcept;
-    std::span<const float> adaptation_luminance() const noexcept;     // middle of ring_luminance, saturated up the tree
-    std::span<const float> displacement() const noexcept;             // largest distance of a supported leaf from the proxy
+    std::span<const NodeBounds> bounds() const noexcept;
+    NormalMask mask(NodeId node) const noexcept;              // facing of the ring dilated by one more ring; unpacks it
+    std::span<const Sphere> support_spheres() const noexcept; // leaves and proxies of the subtree
+    std::span<const PackedRange> support_luminance() const noexcept;
+    std::span<const PackedRange> ring_luminance() const noexcept;
+    std::span<const Unorm16> adaptation_luminance() const noexcept; // middle of ring_luminance, saturated up the tree
+    std::span<const float> displacement() const noexcept; // largest distance of a supported leaf from the proxy
 
-    // The mesh. By leaf: the input vertex. By triangle: the input triangle's range (groups, materials); empty when
-    // the input had none.
+    // The mesh. By leaf: the input vertex. The input's ranges (groups, materials), over its triangles, and by triangle
+    // its number there; both empty when the input had none.
     std::span<const Index> source_vertices() const noexcept;
-    std::span<const Index> source_triangles() const noexcept; // by triangle: the input triangle
-    std::span<const MeshRange> ranges() const noexcept;       // over input triangles
+    std::span<const Index> source_triangles() const noexcept;
+    std::span<const MeshRange> ranges() const noexcept;
     std::uint64_t dropped_triangles() const noexcept;         // input triangles that used a vertex twice
     Closedness closedness() const noexcept;
     Sphere bounding_sphere() const noexcept; // of the triangles' corners
