@@ -25,6 +25,8 @@ endfunction()
 
 function(unseen_set_compile_options target)
     target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wconversion -Wshadow)
+    # Position-independent code must not keep a module's own functions from being inlined: nobody replaces them at load time.
+    target_compile_options(${target} PRIVATE -fno-semantic-interposition)
     if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
         # GCC 12 sees overlapping copies in literal + std::string (GCC bug 105651).
         target_compile_options(${target} PRIVATE -Wno-restrict)

@@ -3,7 +3,12 @@
 #include <algorithm>
 #include <bit>
 #include <cassert>
+#include <cmath>
 #include <queue>
+#include <string>
+
+#include "cut_follower.h"
+#include "index_buffer.h"
 
 namespace unseen::vdtree {
 
@@ -12,6 +17,10 @@ namespace {
 // Nodes are handed to the callbacks in batches of at most this many: enough to hide the call, little enough for the
 // first-level cache.
 constexpr std::size_t batch_size = 1024;
+
+// Patching the index buffer around one change costs about as much as gathering so many triangles.
+constexpr std::size_t triangles_per_patch = 40;
+std::size_t few_changes(Index triangles) { return std::max<std::size_t>(triangles / triangles_per_patch, 16); }
 
 bool test_bit(const std::vector<std::uint64_t>& bits, NodeId i) { return (bits[i >> 6] >> (i & 63)) & 1; }
 void set_bit(std::vector<std::uint64_t>& bits, NodeId i) { bits[i >> 6] |= std::uint64_t{1} << (i & 63); }
@@ -163,8 +172,20 @@ void group_by_range(const Cut& cut, Mesh& mesh) {
 
 } // namespace
 
+// The index buffer and what is known of it.
+struct Cut::Indices {
+    explicit Indices(const VertexTree& tree) : buffer(tree) {}
+    IndexBuffer buffer;
+    bool is_stale = true;
+    bool is_patched = false;      // writes are the whole difference to the buffer before the last change
+    bool few_changes_last = false;
+};
+
 Cut::Cut(const VertexTree& tree)
     : tree_(&tree), unfolded_((tree.interior_count() + 63) / 64), proxy_(tree.leaf_count(), VertexTree::root()) {}
+Cut::Cut(Cut&&) noexcept = default;
+Cut& Cut::operator=(Cut&&) noexcept = default;
+Cut::~Cut() = default;
 
 bool Cut::is_unfolded(NodeId node) const noexcept { return !tree_->is_leaf(node) && test_bit(unfolded_, node); }
 
@@ -177,13 +198,11 @@ bool Cut::is_active(NodeId node) const noexcept {
 void Cut::set_unfolded(NodeId node) {
     set_bit(unfolded_, node);
     triangle_count_ += tree_->first_triangle()[node + 1] - tree_->first_triangle()[node];
-    indices_stale_ = true;
 }
 
 void Cut::set_folded(NodeId node) {
     clear_bit(unfolded_, node);
     triangle_count_ -= tree_->first_triangle()[node + 1] - tree_->first_triangle()[node];
-    indices_stale_ = true;
 }
 
 // Makes the leaves of a node stand for the node itself.
@@ -195,11 +214,29 @@ void Cut::assign(NodeId node) {
     std::fill(proxy_.begin() + tree_->first_leaf()[node], proxy_.begin() + tree_->leaf_end()[node], node);
 }
 
+std::span<const NodeId> Cut::children_of(NodeId node) {
+    children_.clear();
+    tree_->for_each_child(node, [&](NodeId child) { children_.push_back(child); });
+    return children_;
+}
+
+// Somebody else than the follower changes the cut: what it knows, and the index buffer, are out of date.
+void Cut::make_stale() {
+    changes_.clear();
+    if (follower_) follower_->forget();
+    if (!indices_) return;
+    indices_->is_stale = true;
+    indices_->is_patched = false;
+    indices_->few_changes_last = false;
+    indices_->buffer.drop_lists();
+}
+
 bool Cut::unfold(NodeId node) {
     assert(!tree_->is_leaf(node) && (is_active(node) || is_unfolded(node)));
     if (test_bit(unfolded_, node)) return false;
+    make_stale();
     set_unfolded(node);
-    tree_->for_each_child(node, [&](NodeId child) { assign(child); });
+    for (const NodeId child : children_of(node)) assign(child);
     return true;
 }
 
@@ -207,6 +244,7 @@ bool Cut::fold(NodeId node) {
     assert(!tree_->is_leaf(node));
     if (!test_bit(unfolded_, node)) return false;
     tree_->for_each_child(node, [&]([[maybe_unused]] NodeId child) { assert(!is_unfolded(child)); });
+    make_stale();
     set_folded(node);
     assign(node);
     return true;
@@ -222,6 +260,7 @@ bool Cut::unfold_ancestors(NodeId node) {
 
 bool Cut::fold_subtree(NodeId node) {
     if (tree_->is_leaf(node) || !test_bit(unfolded_, node)) return false;
+    make_stale();
     for (NodeId below = node; below < tree_->subtree_end()[node]; ++below)
         if (test_bit(unfolded_, below)) set_folded(below);
     assign(node);
@@ -229,40 +268,199 @@ bool Cut::fold_subtree(NodeId node) {
 }
 
 void Cut::unfold_all() {
+    make_stale();
     for (NodeId node = 0; node < tree_->interior_count(); ++node) set_bit(unfolded_, node);
     for (Index leaf = 0; leaf < tree_->leaf_count(); ++leaf) proxy_[leaf] = tree_->interior_count() + leaf;
     triangle_count_ = tree_->triangle_count();
-    indices_stale_ = true;
 }
 
 void Cut::fold_all() { fold_subtree(VertexTree::root()); }
 
+// ---- changes in steps
+
+void Cut::begin_changes() {
+    changes_.clear();
+    if (!indices_) return;
+    indices_->is_patched = !indices_->is_stale && indices_->buffer.can_patch();
+    indices_->buffer.begin_patch();
+}
+
+// Gives up patching where gathering has become the cheaper way.
+bool Cut::is_patching() {
+    if (!indices_ || !indices_->is_patched) return false;
+    if (changes_.size() < few_changes(triangle_count_)) return true;
+    indices_->is_patched = false;
+    indices_->buffer.drop_lists();
+    return false;
+}
+
+void Cut::apply_unfold(NodeId node) {
+    set_unfolded(node);
+    changes_.push_back({node, false});
+    const auto children = children_of(node);
+    for (const NodeId child : children) assign(child);
+    if (is_patching()) indices_->buffer.unfold(node, children, proxy_);
+}
+
+void Cut::apply_fold(NodeId node) {
+    set_folded(node);
+    changes_.push_back({node, true});
+    if (is_patching()) indices_->buffer.fold(node, children_of(node));
+    assign(node);
+}
+
+void Cut::fold_below(NodeId node, FunctionRef<void(NodeId)> on_fold) {
+    const NodeId end = tree_->subtree_end()[node];
+    for (std::size_t word = (std::size_t{end} + 63) / 64; word-- > node / 64;) {
+        std::uint64_t bits = unfolded_[word];
+        if (word == node / 64) bits &= ~std::uint64_t{0} << (node & 63);
+        if (word == end / 64) bits &= (std::uint64_t{1} << (end & 63)) - 1;
+        while (bits) {
+            const int highest = 63 - std::countl_zero(bits);
+            bits &= ~(std::uint64_t{1} << highest);
+            const NodeId below = static_cast<NodeId>(word * 64 + static_cast<std::size_t>(highest));
+            apply_fold(below);
+            on_fold(below);
+        }
+    }
+}
+
+void Cut::end_changes(AdjustStats& stats) {
+    for (const FoldChange& change : changes_) ++(change.folded ? stats.folds : stats.unfolds);
+    stats.triangles = triangle_count_;
+    if (!indices_) return;
+    indices_->few_changes_last = changes_.size() < few_changes(triangle_count_);
+    if (indices_->is_patched) indices_->buffer.end_patch();
+    else if (!changes_.empty()) indices_->is_stale = true;
+    else indices_->is_patched = !indices_->is_stale; // by no writes at all
+}
+
+// ---- other cuts as wholes
+
+void Cut::change_to(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
+    std::size_t changes = 0;
+    for (std::size_t word = 0; word < unfolded_.size(); ++word)
+        changes += static_cast<std::size_t>(std::popcount(unfolded_[word] ^ unfolded[word]));
+    if (changes < few_changes(triangle_count_)) replay(unfolded, stats);
+    else become(std::move(unfolded), stats);
+}
+
+// Node numbers ascend from parents to children: unfolds run upward through them, so every node is active when its turn comes,
+// and folds run downward.
+void Cut::replay(std::span<const std::uint64_t> unfolded, AdjustStats& stats) {
+    begin_changes();
+    for (std::size_t word = 0; word < unfolded.size(); ++word)
+        for (std::uint64_t bits = unfolded[word] & ~unfolded_[word]; bits; bits &= bits - 1)
+            apply_unfold(static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))));
+    for (std::size_t word = unfolded.size(); word-- > 0;) {
+        for (std::uint64_t bits = unfolded_[word] & ~unfolded[word]; bits;) {
+            const int highest = 63 - std::countl_zero(bits);
+            apply_fold(static_cast<NodeId>(word * 64 + static_cast<std::size_t>(highest)));
+            bits &= ~(std::uint64_t{1} << highest);
+        }
+    }
+    end_changes(stats);
+}
+
+// Every proxy is written once, and only where it changes, however deep the new cut is.
+void Cut::become(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
+    changes_.clear();
+    const auto first = tree_->first_triangle();
+    triangle_count_ = 0;
+    for (std::size_t word = 0; word < unfolded.size(); ++word) {
+        for (std::uint64_t bits = unfolded[word]; bits; bits &= bits - 1) {
+            const NodeId node = static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
+            triangle_count_ += first[node + 1] - first[node];
+            const bool was_unfolded = test_bit(unfolded_, node);
+            if (!was_unfolded) changes_.push_back({node, false});
+            tree_->for_each_child(node, [&](NodeId child) {
+                const bool stays = was_unfolded && (tree_->is_leaf(child) || !test_bit(unfolded_, child));
+                if (!stays && (tree_->is_leaf(child) || !test_bit(unfolded, child))) assign(child);
+            });
+        }
+    }
+    const NodeId root = VertexTree::root();
+    if (!test_bit(unfolded, root) && test_bit(unfolded_, root)) assign(root);
+    for (std::size_t word = unfolded.size(); word-- > 0;) {
+        for (std::uint64_t bits = unfolded_[word] & ~unfolded[word]; bits;) {
+            const int highest = 63 - std::countl_zero(bits);
+            changes_.push_back({static_cast<NodeId>(word * 64 + static_cast<std::size_t>(highest)), true});
+            bits &= ~(std::uint64_t{1} << highest);
+        }
+    }
+    for (const FoldChange& change : changes_) ++(change.folded ? stats.folds : stats.unfolds);
+    stats.triangles = triangle_count_;
+    unfolded_ = std::move(unfolded);
+    if (!indices_ || changes_.empty()) return;
+    indices_->is_stale = true;
+    indices_->is_patched = false;
+    indices_->few_changes_last = changes_.size() < few_changes(triangle_count_);
+    indices_->buffer.drop_lists();
+}
+
 AdjustStats Cut::adjust(FoldCriterion criterion, const AdjustOptions& options) {
     NodeTester test(*tree_, criterion, options.visibility);
-    const Decision decision = options.triangle_budget ? decide_by_budget(*tree_, test, *options.triangle_budget)
-                                                      : decide_by_threshold(*tree_, test);
+    Decision decision = options.triangle_budget ? decide_by_budget(*tree_, test, *options.triangle_budget)
+                                                : decide_by_threshold(*tree_, test);
     AdjustStats stats;
     stats.node_tests = test.tests();
     stats.max_fold_cost = decision.max_fold_cost;
-
-    // Replays the difference. Node numbers ascend from parents to children: unfolds run upward through them, so every
-    // node is active when its turn comes, and folds run downward.
-    for (std::size_t word = 0; word < unfolded_.size(); ++word) {
-        for (std::uint64_t bits = decision.unfolded[word] & ~unfolded_[word]; bits; bits &= bits - 1) {
-            unfold(static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))));
-            ++stats.unfolds;
-        }
-    }
-    for (std::size_t word = unfolded_.size(); word-- > 0;) {
-        for (std::uint64_t bits = unfolded_[word] & ~decision.unfolded[word]; bits;) {
-            const int highest = 63 - std::countl_zero(bits);
-            fold(static_cast<NodeId>(word * 64 + static_cast<std::size_t>(highest)));
-            bits &= ~(std::uint64_t{1} << highest);
-            ++stats.folds;
-        }
-    }
-    stats.triangles = triangle_count_;
+    if (follower_) follower_->forget();
+    change_to(std::move(decision.unfolded), stats);
     return stats;
+}
+
+namespace {
+
+bool is_finite(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+// Far enough away that squares of distances still fit floats.
+constexpr double farthest_eye = 1e18; // mesh units
+
+Result<void> check(const Viewpoint& viewpoint) {
+    const auto invalid = [](const char* what) { return Error{ErrorCode::invalid_argument, what}; };
+    if (!is_finite(viewpoint.eye)) return invalid("The eye's position is not finite.");
+    if (!(glm::length(viewpoint.eye) <= farthest_eye)) return invalid("The eye is more than 1e18 mesh units away.");
+    constexpr double unit_slack = 1e-3; // directions given with three digits
+    if (viewpoint.gaze && !(std::abs(glm::length(*viewpoint.gaze) - 1) <= unit_slack))
+        return invalid("The gaze must be a direction of length 1.");
+    for (const Frustum& frustum : viewpoint.frusta)
+        for (const Plane& plane : frustum.planes)
+            if (!(std::abs(glm::length(plane.normal) - 1) <= unit_slack) || !std::isfinite(plane.offset))
+                return invalid("A frustum's plane needs a normal of length 1 and a finite offset.");
+    return {};
+}
+
+} // namespace
+
+Result<AdjustStats> Cut::follow(const DistanceCriterion& criterion, const Viewpoint& viewpoint, const FollowOptions& options) {
+    if (const auto valid = check(viewpoint); !valid) return valid.error();
+    if (!(options.threshold > 0) || !std::isfinite(options.threshold))
+        return Error{ErrorCode::invalid_argument, "The threshold must be more than 0 and finite."};
+    if (!follower_) follower_ = std::make_unique<CutFollower>(*tree_);
+    return follower_->follow(*this, criterion, viewpoint, options.cull_back_faces, options.threshold);
+}
+
+std::span<const NodeId> Cut::indices() const {
+    if (!indices_) indices_ = std::make_unique<Indices>(*tree_);
+    if (indices_->is_stale) {
+        indices_->buffer.gather(unfolded_, proxy_, triangle_count_);
+        indices_->is_stale = false;
+        // When little changed last, little will change next.
+        if (indices_->few_changes_last) indices_->buffer.make_lists(unfolded_);
+    }
+    return indices_->buffer.indices();
+}
+
+std::optional<std::span<const IndexWrite>> Cut::index_writes() const noexcept {
+    if (!indices_ || !indices_->is_patched) return std::nullopt;
+    return indices_->buffer.writes();
+}
+
+std::uint64_t Cut::byte_size() const noexcept {
+    return sizeof(std::uint64_t) * unfolded_.capacity() + sizeof(NodeId) * proxy_.capacity() +
+           sizeof(FoldChange) * changes_.capacity() + (follower_ ? follower_->byte_size() : 0) +
+           (indices_ ? indices_->buffer.byte_size() : 0);
 }
 
 Mesh extract_mesh(const Cut& cut) {
@@ -292,23 +490,6 @@ Mesh extract_mesh(const Cut& cut) {
     gather(tree.uvs(), mesh.uvs);
     if (!tree.ranges().empty()) group_by_range(cut, mesh);
     return mesh;
-}
-
-std::span<const NodeId> Cut::indices() const {
-    if (!indices_stale_) return indices_;
-    indices_.resize(std::size_t{3} * triangle_count_);
-    const auto first = tree_->first_triangle();
-    const auto triangles = tree_->triangles();
-    NodeId* out = indices_.data();
-    for (std::size_t word = 0; word < unfolded_.size(); ++word) {
-        for (std::uint64_t bits = unfolded_[word]; bits; bits &= bits - 1) {
-            const NodeId node = static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
-            for (Index t = first[node]; t < first[node + 1]; ++t)
-                for (const Index leaf : triangles[t]) *out++ = proxy_[leaf];
-        }
-    }
-    indices_stale_ = false;
-    return indices_;
 }
 
 } // namespace unseen::vdtree

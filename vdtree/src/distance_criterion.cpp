@@ -31,9 +31,12 @@ Error invalid(std::string message) { return {ErrorCode::invalid_argument, std::m
         if (p.spheres == DistanceCriterion::Spheres::support && spheres[node].radius > spheres[parent].radius) return false;
         if (p.classes.empty()) continue;
         for (std::size_t bin = 0; bin < p.eccentricity_bins; ++bin) {
-            const auto reach = [&](std::uint16_t row) { return p.reach[row * p.eccentricity_bins + bin]; };
+            const auto exceeds = [&](std::uint16_t row, std::uint16_t parents) {
+                const std::size_t a = row * p.eccentricity_bins + bin, b = parents * p.eccentricity_bins + bin;
+                return p.reach[a] > p.reach[b] || (!p.least_cost.empty() && p.least_cost[a] > p.least_cost[b]);
+            };
             const FoldClass a = p.classes[node], b = p.classes[parent];
-            if (reach(a.interior) > reach(b.interior) || reach(a.silhouette) > reach(b.silhouette)) return false;
+            if (exceeds(a.interior, b.interior) || exceeds(a.silhouette, b.silhouette)) return false;
         }
     }
     return true;
@@ -50,6 +53,11 @@ Result<void> check(const VertexTree& tree, const DistanceCriterion::Parts& p) {
     if (p.eccentricity_bins == 0 || p.reach.empty() || p.reach.size() % p.eccentricity_bins != 0)
         return invalid("A criterion's table of " + std::to_string(p.reach.size()) + " reaches has no whole rows of " +
                        std::to_string(p.eccentricity_bins) + " bins.");
+    if (!p.least_cost.empty() && p.least_cost.size() != p.reach.size())
+        return invalid("A criterion's table of least costs is not of the size of its reaches.");
+    for (std::size_t i = 0; i < p.least_cost.size(); ++i)
+        if (!(p.least_cost[i] >= 0) || (i % p.eccentricity_bins != 0 && p.least_cost[i] > p.least_cost[i - 1]))
+            return invalid("Least cost " + std::to_string(i) + " of a criterion is negative, not a number, or grows with the eccentricity.");
     if (!(p.bin_degrees > 0) || !std::isfinite(p.bin_degrees))
         return invalid("The bins of eccentricity need a positive width.");
     for (std::size_t i = 0; i < p.lengths.size(); ++i)

@@ -7,14 +7,11 @@
 
 #include <glm/geometric.hpp>
 
-#include "facing_gap.h"
-
 namespace unseen::vdtree {
 
 namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
-constexpr float pi = std::numbers::pi_v<float>;
 
 // Slacks are shortened by these, so that rounding in a later test cannot change a verdict before its time. Shares of the
 // distance to the eye: a dozen roundings of a float; the facing gap sums a few dozen products.
@@ -22,229 +19,228 @@ constexpr float position_rounding = 2e-6f;
 constexpr float facing_rounding = 2e-5f;
 // Radians: angles come from cosines in floats, which near 1 tell angles apart to about half of this.
 constexpr float angle_rounding = 1e-3f;
-// The eye moves by at most this share of its distance before a node with a gaze is tested again; see turn_of().
-constexpr float longest_path = 0.5f;
-
-// Abramowitz and Stegun 4.4.46; error below 2e-8 radians but for the cosine's own.
-float angle_of_cosine(float cosine) {
-    const float x = std::min(std::abs(cosine), 1.0f);
-    const float series =
-        1.5707963050f +
-        x * (-0.2145988016f +
-             x * (0.0889789874f +
-                  x * (-0.0501743046f +
-                       x * (0.0308918810f + x * (-0.0170881256f + x * (0.0066700901f - x * 0.0012624911f))))));
-    const float angle = std::sqrt(1 - x) * series;
-    return cosine < 0 ? pi - angle : angle;
-}
-float angle_of_sine(float sine) { return pi / 2 - angle_of_cosine(sine); }
+// With a gaze, a node is tested again after this share of its gap at the latest; see path_of().
+constexpr float longest_path = 0.125f;
+constexpr float shift_per_gap = 1.16f; // asin(x) / x / (1 - longest_path) for x up to longest_path / (1 - longest_path)
 
 } // namespace
 
-// A node whose verdict depends on what it faces.
-struct FoldTester::Candidate {
-    std::size_t place; // among the verdicts
+// One node: what was measured, and what the criterion says of it here.
+struct FoldTester::Lane {
     NodeId node;
-    glm::vec3 to_eye;          // from the ring's centre
-    float radius, distance;    // of the ring's sphere
-    float gap, length, eccentricity;
-    float inside_slack; // how far the frustum's planes are
+    FoldClass row;
+    float length, distance, radius, gap, eccentricity, height;
+    float interior, silhouette; // the distances within which it unfolds
 };
 
-FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterion, bool cull_back_faces)
-    : tree_(tree), criterion_(criterion), cull_back_faces_(cull_back_faces) {}
+FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterion, bool cull_back_faces, float threshold)
+    : tree_(tree), criterion_(criterion), cull_back_faces_(cull_back_faces), has_silhouettes_(criterion.uses_silhouettes()),
+      threshold_(threshold), bins_(criterion.parts().eccentricity_bins) {
+    const auto& reach = criterion.parts().reach;
+    const auto& least_cost = criterion.parts().least_cost;
+    reach_.resize(reach.size());
+    for (std::size_t i = 0; i < reach.size(); ++i) {
+        const bool always = reach[i] >= DistanceCriterion::always_visible || (!least_cost.empty() && least_cost[i] > threshold);
+        const bool never = reach[i] <= DistanceCriterion::never_visible;
+        reach_[i] = never ? -infinity : always ? infinity : reach[i] / threshold;
+    }
+}
 
-void FoldTester::look_from(const Viewpoint& viewpoint, float threshold, double length_per_radian) {
-    eye_ = viewpoint.eye;
-    has_gaze_ = viewpoint.gaze.has_value() && criterion_.uses_gaze();
-    if (has_gaze_) gaze_ = glm::vec3(*viewpoint.gaze);
-    inverse_threshold_ = 1 / threshold;
+void FoldTester::look_from(const Viewpoint& viewpoint, double length_per_radian) {
+    view_ = {};
+    for (int k = 0; k < 3; ++k) {
+        view_.eye_high[k] = static_cast<float>(viewpoint.eye[k]);
+        view_.eye_low[k] = static_cast<float>(viewpoint.eye[k] - static_cast<double>(view_.eye_high[k]));
+    }
+    view_.has_gaze = viewpoint.gaze.has_value() && criterion_.uses_gaze();
+    if (view_.has_gaze)
+        for (int k = 0; k < 3; ++k) view_.gaze[k] = static_cast<float>((*viewpoint.gaze)[k]);
+    for (const Frustum& frustum : viewpoint.frusta) {
+        view_.first_plane.push_back(view_.planes.size());
+        for (const Plane& plane : frustum.planes) {
+            const glm::vec3 n(plane.normal);
+            view_.planes.push_back({{n.x, n.y, n.z}, static_cast<float>(glm::dot(plane.normal, viewpoint.eye) + plane.offset)});
+        }
+    }
+    view_.first_plane.push_back(view_.planes.size());
     inverse_bin_ = static_cast<float>(180 / (std::numbers::pi * criterion_.parts().bin_degrees));
     turn_per_length_ = static_cast<float>(1 / length_per_radian);
-    frusta_.clear();
-    for (const Frustum& frustum : viewpoint.frusta) {
-        frusta_.emplace_back();
-        for (const Plane& plane : frustum.planes)
-            frusta_.back().push_back(
-                {glm::vec3(plane.normal), static_cast<float>(glm::dot(plane.normal, eye_) + plane.offset)});
-    }
+    last_bin_ = static_cast<float>(bins_ - 1);
 }
 
 float FoldTester::distance_of(std::uint16_t row, std::size_t bin, float length) const {
-    const float reach = criterion_.parts().reach[row * criterion_.parts().eccentricity_bins + bin];
-    if (reach >= DistanceCriterion::always_visible) return infinity;
-    if (reach <= DistanceCriterion::never_visible) return -infinity;
-    return length * reach * inverse_threshold_;
+    const float reach = reach_[row * bins_ + bin];
+    return std::abs(reach) < infinity ? length * reach : reach; // a length of 0 times infinity is no number
 }
 
 std::size_t FoldTester::bin_of(float eccentricity) const {
-    if (!has_gaze_ || !(eccentricity > 0)) return 0;
-    const float bin = eccentricity * inverse_bin_;
-    const std::size_t last = criterion_.parts().eccentricity_bins - 1;
-    return bin < static_cast<float>(last) ? static_cast<std::size_t>(bin) : last;
+    return static_cast<std::size_t>(std::clamp(eccentricity * inverse_bin_, 0.0f, last_bin_));
 }
 
-// By how much the eccentricity of a sphere's nearest point can change while the position clock advances by `path`: the gaze
-// turns by path / length_per_radian, and a point at least `gap` away shifts by asin(path / gap) < 1.05 path / gap for steps up
-// to half the gap, whose later ones start from half the gap.
-float FoldTester::turn_of(float path, float gap) const {
-    return path * (turn_per_length_ + 2.1f / gap) + angle_rounding;
+// The threshold at which the node, classed by `row` and unfolding within `reach`, would just fold.
+float FoldTester::cost_of(std::uint16_t row, const Lane& lane, float reach) const {
+    if (!(reach > 0)) return 0;
+    if (!(lane.gap > 0)) return infinity;
+    const DistanceCriterion::Parts& parts = criterion_.parts();
+    const std::size_t entry = row * bins_ + (view_.has_gaze ? bin_of(lane.eccentricity) : 0);
+    if (parts.reach[entry] >= DistanceCriterion::always_visible) return infinity;
+    const float by_distance = lane.length * parts.reach[entry] / lane.gap;
+    return parts.least_cost.empty() ? by_distance : std::max(by_distance, parts.least_cost[entry]);
 }
 
-// How far the clock may advance with the node still beyond the distance of its class.
-float FoldTester::folded_slack(std::uint16_t row, float length, float gap, float eccentricity) const {
-    const float here = gap - distance_of(row, bin_of(eccentricity), length);
-    if (!has_gaze_) return here;
-    float best = 0;
-    for (float path = std::min(here, longest_path * gap); path > 0 && best < path / 4; path /= 4) {
-        const float there = gap - distance_of(row, bin_of(eccentricity - turn_of(path, gap)), length);
-        best = std::max(best, std::min(path, there));
-        if (path < 0.01f * here) break;
+// How far the position clock may advance with the sphere's eccentricity changing by less than `turn`: meanwhile the gaze turns by
+// path / length_per_radian, and a point at least `gap` away shifts by asin(step / rest) for each step, the rest of the gap being
+// what longest_path leaves: less than shift_per_gap * path / gap in all.
+float FoldTester::path_of(float turn, float gap) const {
+    return std::min((turn - angle_rounding) / (turn_per_length_ + shift_per_gap / gap), longest_path * gap);
+}
+
+// How far the clock may advance with the node still beyond the distance of its class, `reach` here. Reaches grow towards the
+// gaze: the farther the bins that are looked at, the more turn they allow and the less path.
+float FoldTester::folded_slack(std::uint16_t row, const Lane& lane, float reach) const {
+    const float here = lane.gap - reach;
+    if (!view_.has_gaze) return here;
+    const std::size_t bin = bin_of(lane.eccentricity);
+    float best = 0, there = here;
+    for (std::size_t step = 0;; step = step == 0 ? 1 : 2 * step) {
+        const std::size_t nearest = bin - std::min(bin, step);
+        there = step == 0 ? here : lane.gap - distance_of(row, nearest, lane.length);
+        const float turn = nearest == 0 ? infinity : lane.eccentricity - static_cast<float>(nearest) / inverse_bin_;
+        best = std::max(best, std::min(there, path_of(turn, lane.gap)));
+        if (there <= best || nearest == 0) return best;
     }
-    return best;
 }
 
-// How far the clock may advance with the node still within the distance of its class.
-float FoldTester::unfolded_slack(std::uint16_t row, float length, float gap, float eccentricity) const {
-    const float here = distance_of(row, bin_of(eccentricity), length) - gap;
-    if (!has_gaze_) return here;
-    // Wherever the gaze goes.
-    float best = std::max(0.0f, distance_of(row, criterion_.parts().eccentricity_bins - 1, length) - gap);
-    if (!(gap > 0)) return best;
-    for (float path = std::min(here, longest_path * gap); path > 0 && best < path / 4; path /= 4) {
-        const float there = distance_of(row, bin_of(eccentricity + turn_of(path, gap)), length) - gap;
-        best = std::max(best, std::min(path, there));
-        if (path < 0.01f * here) break;
+// How far the clock may advance with the node still within it.
+float FoldTester::unfolded_slack(std::uint16_t row, const Lane& lane, float reach) const {
+    const float here = reach - lane.gap;
+    if (!view_.has_gaze) return here;
+    // Inside, or nearly, the eccentricity may be anything soon.
+    if (!(lane.gap > 0)) return std::max(0.0f, distance_of(row, bins_ - 1, lane.length) - lane.gap);
+    const std::size_t bin = bin_of(lane.eccentricity), last = bins_ - 1;
+    float best = 0, there = here;
+    for (std::size_t step = 0;; step = step == 0 ? 1 : 2 * step) {
+        const std::size_t farthest = std::min(bin + step, last);
+        there = step == 0 ? here : distance_of(row, farthest, lane.length) - lane.gap;
+        const float turn = farthest == last ? infinity : static_cast<float>(farthest + 1) / inverse_bin_ - lane.eccentricity;
+        best = std::max(best, std::min(there, path_of(turn, lane.gap)));
+        if (there <= best || farthest == last) return best;
     }
-    return best;
-}
-
-// Whether a sphere is outside all frusta, and how far the heights over their planes may change before that changes.
-bool FoldTester::is_outside(glm::vec3 to_centre, float radius, float& slack) const {
-    float outside_slack = infinity, inside_slack = -infinity;
-    bool outside_all = true;
-    for (const std::vector<FloatPlane>& frustum : frusta_) {
-        float lowest = infinity; // height of the sphere's top over the planes
-        for (const FloatPlane& plane : frustum)
-            lowest = std::min(lowest, glm::dot(plane.normal, to_centre) + plane.offset + radius);
-        if (lowest < 0) outside_slack = std::min(outside_slack, -lowest);
-        else {
-            outside_all = false;
-            inside_slack = std::max(inside_slack, lowest);
-        }
-    }
-    slack = outside_all ? outside_slack : inside_slack;
-    return outside_all;
 }
 
 void FoldTester::test(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const {
-    const DistanceCriterion::Parts& parts = criterion_.parts();
-    const auto bounds = tree_.bounds();
-    const auto support = tree_.support_spheres();
-    const bool by_support = parts.spheres == DistanceCriterion::Spheres::support;
-    const bool has_classes = !parts.classes.empty(), has_lengths = !parts.lengths.empty();
-    const bool has_frusta = !frusta_.empty(), has_silhouettes = criterion_.uses_silhouettes();
-    std::array<Candidate, facing_lanes> candidates;
-    std::size_t waiting = 0;
-
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
-        const NodeId node = nodes[i];
-        const Sphere& sphere = by_support ? support[node] : bounds[node].ring;
-        // The difference in double: far from the origin, and near the eye, floats would lose it.
-        const glm::vec3 to_eye(eye_ - glm::dvec3(sphere.centre));
-        const float distance = glm::length(to_eye), gap = distance - sphere.radius;
-        const float rounding = position_rounding * (distance + sphere.radius);
-        const FoldClass row = has_classes ? parts.classes[node] : FoldClass{};
-        const float length = has_lengths ? parts.lengths[node] : sphere.radius;
-        Verdict& verdict = verdicts[i];
-
-        float inside_slack = infinity;
-        if (has_frusta) {
-            const Sphere& ring = bounds[node].ring;
-            float slack;
-            if (is_outside(glm::vec3(glm::dvec3(ring.centre) - eye_), ring.radius, slack)) {
-                verdict = {std::max(0.0f, slack - rounding), infinity, 0, false};
-                continue;
-            }
-            inside_slack = slack;
-        }
-        float eccentricity = 0;
-        if (has_gaze_ && gap > 0) {
-            const float towards = -glm::dot(to_eye, gaze_) / distance;
-            eccentricity = std::max(0.0f, angle_of_cosine(towards) - angle_of_sine(sphere.radius / distance));
-        }
-        const std::size_t bin = bin_of(eccentricity);
-        const float interior = distance_of(row.interior, bin, length);
-        const float silhouette = has_silhouettes ? distance_of(row.silhouette, bin, length) : interior;
-        const bool facing_decides = cull_back_faces_ ? gap < silhouette : has_silhouettes && interior <= gap && gap < silhouette;
-        if (facing_decides) {
-            candidates[waiting++] = {i, node, to_eye, sphere.radius, distance, gap, length, eccentricity, inside_slack};
-            if (by_support) {
-                Candidate& candidate = candidates[waiting - 1];
-                candidate.to_eye = glm::vec3(eye_ - glm::dvec3(bounds[node].ring.centre));
-                candidate.radius = bounds[node].ring.radius;
-                candidate.distance = glm::length(candidate.to_eye);
-            }
-            if (waiting == facing_lanes) {
-                test_facing(candidates, verdicts);
-                waiting = 0;
-            }
-            continue;
-        }
-        // Costs are distances over the threshold's, times the threshold.
-        const float scale = 1 / (inverse_threshold_ * std::max(gap, 0.0f));
-        const bool unfolded = gap < interior;
-        const float slack = unfolded ? std::min(unfolded_slack(row.interior, length, gap, eccentricity), inside_slack)
-                                     : folded_slack(has_silhouettes ? row.silhouette : row.interior, length, gap, eccentricity);
-        const float reach = unfolded ? interior : silhouette;
-        verdict = {std::max(0.0f, slack - rounding), infinity, reach > 0 ? reach * scale : 0.0f, unfolded};
-    }
-    if (waiting > 0) test_facing(std::span(candidates).first(waiting), verdicts);
+    for (std::size_t first = 0; first < nodes.size(); first += kernel_lanes)
+        test_batch(nodes.subspan(first, std::min(kernel_lanes, nodes.size() - first)), verdicts.data() + first);
 }
 
-void FoldTester::test_facing(std::span<const Candidate> candidates, std::span<Verdict> verdicts) const {
-    const DistanceCriterion::Parts& parts = criterion_.parts();
-    const auto bounds = tree_.bounds();
-    FacingBatch batch;
-    FacingGaps gaps;
-    for (std::size_t lane = 0; lane < facing_lanes; ++lane) {
-        const Candidate& c = candidates[std::min(lane, candidates.size() - 1)];
-        batch.set(lane, bounds[c.node].slabs, c.to_eye.x, c.to_eye.y, c.to_eye.z, c.radius);
+void FoldTester::test_batch(std::span<const NodeId> nodes, Verdict* verdicts) const {
+    const NodeBounds* const bounds = tree_.bounds().data();
+    const Sphere* const support =
+        criterion_.parts().spheres == DistanceCriterion::Spheres::support ? tree_.support_spheres().data() : nullptr;
+    SphereBatch spheres;
+    for (std::size_t i = 0; i < kernel_lanes; ++i) {
+        const NodeId node = nodes[std::min(i, nodes.size() - 1)];
+        const Sphere& sphere = support ? support[node] : bounds[node].ring;
+        spheres.centre[0][i] = sphere.centre.x;
+        spheres.centre[1][i] = sphere.centre.y;
+        spheres.centre[2][i] = sphere.centre.z;
+        spheres.radius[i] = sphere.radius;
     }
-    facing_gaps(batch, gaps);
-    for (std::size_t lane = 0; lane < candidates.size(); ++lane) {
-        const Candidate& c = candidates[lane];
-        const FoldClass row = parts.classes.empty() ? FoldClass{} : parts.classes[c.node];
-        float front = gaps.front[lane], back = gaps.back[lane];
-        if (bounds[c.node].flags & irregular_ring) front = back = -infinity; // an outline from everywhere
-        else if (bounds[c.node].slabs.empty()) front = infinity, back = -infinity; // no triangle with an area
-        const bool faces_away = cull_back_faces_ && back > 0;
-        const bool is_silhouette = !(front > 0) && !(back > 0);
-        const std::uint16_t used = is_silhouette ? row.silhouette : row.interior;
-        const float reach = distance_of(used, bin_of(c.eccentricity), c.length);
-        const bool unfolded = !faces_away && c.gap < reach;
+    measure(view_, spheres);
 
-        Verdict verdict;
-        verdict.unfolded = unfolded;
-        if (faces_away) {
-            verdict.position_slack = infinity;
-            verdict.facing_slack = back;
-        } else if (unfolded) {
-            verdict.position_slack = std::min(unfolded_slack(used, c.length, c.gap, c.eccentricity), c.inside_slack);
-            verdict.facing_slack = is_silhouette ? std::min(-front, -back) : std::max(front, back);
-            // As an interior one it would be unfolded, too, unless it faces away.
-            if (c.gap < distance_of(row.interior, bin_of(c.eccentricity), c.length))
-                verdict.facing_slack = cull_back_faces_ ? -back : infinity;
-        } else {
-            verdict.position_slack = folded_slack(used, c.length, c.gap, c.eccentricity);
-            verdict.facing_slack = std::max(front, back);
+    FacingBatch facing;
+    std::size_t asked = 0;
+    std::array<std::uint8_t, kernel_lanes> asker;
+    std::array<Lane, kernel_lanes> lanes;
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+        const NodeId node = nodes[i];
+        const Lane& lane = lanes[i] = lane_of(node, spheres, i);
+        const bool facing_decides = lane.height >= 0 && lane.gap < lane.silhouette &&
+                                    (cull_back_faces_ || (has_silhouettes_ && !(lane.gap < lane.interior)));
+        if (!facing_decides) {
+            verdicts[i] = judge_by_distance(lane);
+            continue;
         }
-        verdict.position_slack = std::max(0.0f, verdict.position_slack - position_rounding * (c.distance + c.radius));
-        verdict.facing_slack = std::max(0.0f, verdict.facing_slack - facing_rounding * c.distance);
-        const float scale = 1 / (inverse_threshold_ * std::max(c.gap, 0.0f));
-        verdict.cost = faces_away || !(reach > 0) ? 0.0f : reach * scale;
-        verdicts[c.place] = verdict;
+        const Sphere& ring = bounds[node].ring;
+        if (support) { // another sphere than the one measured
+            const auto towards = [&](int k) { return (view_.eye_high[k] - ring.centre[k]) + view_.eye_low[k]; };
+            facing.set(asked, bounds[node].slabs, towards(0), towards(1), towards(2), ring.radius);
+        } else {
+            facing.set(asked, bounds[node].slabs, spheres.to_eye[0][i], spheres.to_eye[1][i], spheres.to_eye[2][i], ring.radius);
+        }
+        asker[asked++] = static_cast<std::uint8_t>(i);
     }
+    if (asked == 0) return;
+    for (std::size_t unused = asked; unused < kernel_lanes; ++unused) facing.set(unused, NormalSlabs{}, 0, 0, 0, 0);
+    FacingGaps gaps;
+    facing_gaps(facing, gaps);
+    for (std::size_t k = 0; k < asked; ++k) {
+        const Lane& lane = lanes[asker[k]];
+        const NodeBounds& around = bounds[lane.node];
+        float front = gaps.front[k], back = gaps.back[k];
+        if (around.flags & irregular_ring) front = back = -infinity;       // an outline from everywhere
+        else if (around.slabs.empty()) front = infinity, back = -infinity; // no triangle with an area
+        verdicts[asker[k]] = judge(lane, front, back);
+    }
+}
+
+FoldTester::Lane FoldTester::lane_of(NodeId node, const SphereBatch& spheres, std::size_t i) const {
+    const DistanceCriterion::Parts& parts = criterion_.parts();
+    Lane lane;
+    lane.node = node;
+    lane.row = parts.classes.empty() ? FoldClass{} : parts.classes[node];
+    lane.distance = spheres.distance[i];
+    lane.radius = spheres.radius[i];
+    lane.length = parts.lengths.empty() ? lane.radius : parts.lengths[node];
+    lane.gap = spheres.gap[i];
+    lane.eccentricity = spheres.eccentricity[i];
+    lane.height = spheres.height[i];
+    const std::size_t bin = view_.has_gaze ? bin_of(lane.eccentricity) : 0;
+    lane.interior = distance_of(lane.row.interior, bin, lane.length);
+    lane.silhouette = has_silhouettes_ ? distance_of(lane.row.silhouette, bin, lane.length) : lane.interior;
+    return lane;
+}
+
+// Where facing makes no difference.
+Verdict FoldTester::judge_by_distance(const Lane& lane) const {
+    const float rounding = position_rounding * (lane.distance + lane.radius);
+    if (lane.height < 0) return {infinity, std::max(0.0f, -lane.height - rounding), 0, false};
+    const bool unfolded = lane.gap < lane.interior;
+    const float reach = unfolded ? lane.interior : lane.silhouette;
+    const std::uint16_t row = unfolded || !has_silhouettes_ ? lane.row.interior : lane.row.silhouette;
+    const float slack = unfolded ? unfolded_slack(row, lane, reach) : folded_slack(row, lane, reach);
+    const float height_slack = unfolded ? std::max(0.0f, lane.height - rounding) : infinity;
+    return {std::max(0.0f, slack - rounding), height_slack, cost_of(row, lane, reach), unfolded};
+}
+
+Verdict FoldTester::judge(const Lane& lane, float front, float back) const {
+    const bool faces_away = cull_back_faces_ && back > 0;
+    const bool is_silhouette = !(front > 0) && !(back > 0);
+    const std::uint16_t row = is_silhouette ? lane.row.silhouette : lane.row.interior;
+    const float reach = is_silhouette ? lane.silhouette : lane.interior;
+    Verdict verdict;
+    verdict.unfolded = !faces_away && lane.gap < reach;
+    if (faces_away) {
+        verdict.position_slack = infinity;
+        verdict.facing_slack = back;
+    } else if (verdict.unfolded) {
+        // Within the interior's distance nothing but facing away folds it.
+        if (lane.gap < lane.interior) {
+            verdict.position_slack = unfolded_slack(lane.row.interior, lane, lane.interior);
+            verdict.facing_slack = cull_back_faces_ ? -back : infinity;
+        } else {
+            verdict.position_slack = unfolded_slack(row, lane, reach);
+            verdict.facing_slack = std::min(-front, -back);
+        }
+        verdict.facing_slack = std::min(verdict.facing_slack, lane.height);
+    } else {
+        verdict.position_slack = folded_slack(row, lane, reach);
+        verdict.facing_slack = std::max(front, back);
+    }
+    verdict.position_slack = std::max(0.0f, verdict.position_slack - position_rounding * (lane.distance + lane.radius));
+    verdict.facing_slack = std::max(0.0f, verdict.facing_slack - facing_rounding * lane.distance);
+    verdict.cost = faces_away ? 0 : cost_of(row, lane, reach);
+    return verdict;
 }
 
 Motion FoldTester::motion(const VertexTree& tree, const Viewpoint& from, const Viewpoint& to, double length_per_radian) {
@@ -286,7 +282,7 @@ Motion FoldTester::motion(const VertexTree& tree, const Viewpoint& from, const V
         for (std::size_t p = 0; p < before.size(); ++p) {
             const glm::dvec3 turn = after[p].normal - before[p].normal;
             const double change = std::abs(glm::dot(turn, centre) + after[p].offset - before[p].offset) + glm::length(turn) * radius;
-            motion.position = std::max(motion.position, change);
+            motion.facing = std::max(motion.facing, change);
         }
     }
     // Rounding of all this in double, far below what the slacks leave for floats; a comparison with NaN must not stand still.

@@ -5,15 +5,9 @@
 #include <span>
 #include <vector>
 
-#include <vdtree/vertex_tree.h>
+#include <vdtree/cut.h>
 
 namespace unseen::vdtree {
-
-// One index that a patch wrote.
-struct IndexWrite {
-    Index place = 0;
-    NodeId value = 0;
-};
 
 // For patches, every vertex in use has a list of the corners that show it. A fold hands its children's corners to the proxy, an
 // unfold deals them out again, so its cost is the valence of what changes, whatever the tree's size; the lists' memory goes

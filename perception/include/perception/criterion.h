@@ -9,6 +9,7 @@
 #include <perception/csf.h>
 #include <perception/display.h>
 #include <vdtree/criteria.h>
+#include <vdtree/distance_criterion.h>
 
 namespace unseen::perception {
 
@@ -52,6 +53,18 @@ private:
     double black_ = 0, span_ = 1; // cd/m2 = black + span * relative
     SceneLuminance scene_;
 };
+
+// The same test in distance form, for cuts that follow a view: it depends on the field, the window and the options, not on where the
+// eye or the gaze are (but on whether there is a gaze). Contrast and luminance are rounded up to classes of a twelfth of
+// an octave and of a sixteenth of the display's range, eccentricity down to half degrees, and the magnification is the window's
+// largest, so folds cost at least what they do above; a cut keeps a few per cent more triangles. Facing is told by the slabs
+// alone. Cost: 10 ns a node, and 90 ns for every class in use and eccentricity.
+Result<vdtree::DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTree& tree, const vdtree::View& view,
+                                                          const FoldTestOptions& options);
+
+// Where the eye and the gaze are in the tree's frame. With the view's frustum if `window_only`: what lies outside folds.
+vdtree::Viewpoint viewpoint_of(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options,
+                               const vdtree::Similarity& placement = {}, bool window_only = true);
 
 // The names that --fold-test takes.
 inline constexpr std::string_view fold_test_names[] = {"luebke-hallen", "extent", "displacement"};

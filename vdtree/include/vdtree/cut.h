@@ -5,14 +5,18 @@
 // node supports, form an antichain that covers every leaf. A triangle is active iff the node at which it vanishes is unfolded.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include <vdtree/criteria.h>
+#include <vdtree/distance_criterion.h>
 #include <vdtree/vertex_tree.h>
 
 namespace unseen::vdtree {
+
+class CutFollower;
 
 struct AdjustOptions {
     VisibilityTest visibility = {};                  // default: everything can be seen
@@ -27,11 +31,34 @@ struct AdjustStats {
     float max_fold_cost = 0;      // the largest cost among the folded nodes that can be seen; 0 without folds
 };
 
+struct FollowOptions {
+    // Nodes unfold where their cost is above this. 1: nobody sees a fold; 2: nobody would from twice the distance.
+    float threshold = 1;
+    // Nodes whose ring faces away fold at no cost. Only for surfaces that are closed and consistently oriented, drawn with back
+    // faces culled, and seen from outside.
+    bool cull_back_faces = false;
+};
+
+// One step of what changed a cut.
+struct FoldChange {
+    NodeId node = 0;
+    bool folded = false;
+};
+
+// One index that changed.
+struct IndexWrite {
+    Index place = 0;
+    NodeId value = 0;
+};
+
 // Not thread-safe; several cuts over one tree may be used from several threads.
 class Cut {
 public:
     // Starts wholly folded: no triangle. The tree must outlive the cut.
     explicit Cut(const VertexTree& tree);
+    Cut(Cut&&) noexcept;
+    Cut& operator=(Cut&&) noexcept;
+    ~Cut();
 
     const VertexTree& tree() const noexcept { return *tree_; }
     bool is_unfolded(NodeId node) const noexcept;
@@ -52,23 +79,57 @@ public:
     //   and the cost is above 0; among all cuts within the budget this one has the least largest cost.
     AdjustStats adjust(FoldCriterion criterion, const AdjustOptions& options = {});
 
+    // Makes the cut that a criterion in distance form asks for, from where the last call left it: unfolds where the cost is above
+    // the threshold, top-down. The result does not depend on the state before; the cost does: it goes with what changes, and a view that
+    // stands still costs nothing. Another criterion, or a jump of the viewpoint, tests every node in use once.
+    // Fails, and changes nothing, where the viewpoint is not finite or the threshold not positive.
+    Result<AdjustStats> follow(const DistanceCriterion& criterion, const Viewpoint& viewpoint,
+                               const FollowOptions& options = {});
+
+    // What the last adjust() or follow() changed, in order: nodes are active when their turn comes.
+    std::span<const FoldChange> changes() const noexcept { return changes_; }
+
     // The simplification: triangles over node numbers (positions()[index] is the vertex), oriented like the
-    // input, no index twice in one triangle. Valid until the cut changes. Cost: the active triangles, if it changed.
+    // input, no index twice in one triangle. Valid until the cut changes. Cost: what changed, or the active triangles if
+    // much did. The order of the triangles follows from the history of the cut.
     std::span<const NodeId> indices() const;
+    // What the last follow() changed of the index buffer that was current before it, for copies of it: writes in order (a place
+    // may come twice, or lie beyond the end by now). None: take the whole buffer.
+    std::optional<std::span<const IndexWrite>> index_writes() const noexcept;
     void render(RenderCallback callback) const { callback(*tree_, indices()); }
     Index triangle_count() const noexcept { return triangle_count_; }
 
+    std::uint64_t byte_size() const noexcept; // of the cut itself, with its index buffer; resident bytes
+
 private:
+    friend class CutFollower;
+
     void set_unfolded(NodeId node);
     void set_folded(NodeId node);
     void assign(NodeId node);
+    void make_stale();
+
+    // For those who change the cut in steps that are to be patched into the index buffer.
+    void begin_changes();
+    bool is_patching();
+    void apply_unfold(NodeId node);
+    void fold_below(NodeId node, FunctionRef<void(NodeId)> on_fold); // tells each node, descendants first
+    void apply_fold(NodeId node);
+    void end_changes(AdjustStats& stats);
+    void become(std::vector<std::uint64_t> unfolded, AdjustStats& stats);
+    void change_to(std::vector<std::uint64_t> unfolded, AdjustStats& stats);
+    void replay(std::span<const std::uint64_t> unfolded, AdjustStats& stats);
+    std::span<const NodeId> children_of(NodeId node);
 
     const VertexTree* tree_;
     std::vector<std::uint64_t> unfolded_;  // one bit per interior node
     std::vector<NodeId> proxy_;            // by leaf: the active node that stands for it
     Index triangle_count_ = 0;
-    mutable std::vector<NodeId> indices_;
-    mutable bool indices_stale_ = true;
+    std::vector<FoldChange> changes_;
+    std::vector<NodeId> children_;         // scratch
+    std::unique_ptr<CutFollower> follower_;
+    struct Indices;
+    mutable std::unique_ptr<Indices> indices_; // made when it is first asked for
 };
 
 // The cut as a mesh of its own: only the vertices in use, in double precision, with the tree's attributes.

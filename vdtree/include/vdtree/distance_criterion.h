@@ -3,7 +3,7 @@
 //
 // A node is unfolded while
 //     |eye - c| - R < D(node, silhouette, eccentricity) / threshold,      D = length * reach[class][eccentricity]
-// with c, R its ring's (or support's) sphere. `class` says how visible a fold of a given extent is; a node has one class for
+// (or while the class's least cost is above the threshold), with c, R its ring's (or support's) sphere. `class` says how visible a fold of a given extent is; a node has one class for
 // when its ring faces the eye from one side, and another for when it is, or may be, a silhouette. Spheres and lengths nest and
 // classes grow up the tree, so D is at least its children's for equal arguments, and a parent's arguments are never
 // the better ones: a cut made by such tests is closed upward. How far the eye may move before a test can change follows from the
@@ -39,6 +39,8 @@ public:
         std::vector<FoldClass> classes;   // by interior node; empty: class 0 for all, whatever they face
         std::vector<float> lengths;       // by interior node, mesh units, 0 or more; empty: the spheres' radii
         std::vector<float> reach;         // [class * eccentricity_bins + bin]: distance in lengths; not growing with the bin
+        std::vector<float> least_cost;    // of the same shape: no fold of this class costs less, from however far (drawn, it is at
+                                          // least a pixel); empty: 0 for all
         std::size_t eccentricity_bins = 1;
         double bin_degrees = 1;           // bin b holds b * bin_degrees up to the next; the last one everything beyond
     };

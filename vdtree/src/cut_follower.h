@@ -1,0 +1,71 @@
+// Keeps a cut at what a distance criterion asks for while the viewpoint moves, testing nodes only when their time has come.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <vdtree/cut.h>
+
+#include "fold_tester.h"
+
+namespace unseen::vdtree {
+
+// Live nodes, those whose parent is unfolded, and the root, have a slot with two deadlines, one on each of the tester's clocks. Slots
+// come in blocks of 64 with the earliest deadlines of all, so that a frame looks at a few hundred blocks, tests the
+// nodes that are due, and changes what they say; its cost goes with the motion and with the active triangles, not with the mesh.
+// All live nodes are tested when their verdict may have changed, also those with unfolded nodes below: what a cut becomes does not
+// depend on the way to it, nor on the criterion's being monotone.
+class CutFollower {
+public:
+    explicit CutFollower(const VertexTree& tree) : tree_(tree) {}
+
+    // Brings the cut to what the criterion asks for. `threshold`: the cost above which nodes unfold.
+    AdjustStats follow(Cut& cut, const DistanceCriterion& criterion, const Viewpoint& viewpoint, bool cull_back_faces,
+                       float threshold);
+    // The cut was changed by others.
+    void forget() noexcept { is_tracking_ = false; }
+    std::uint64_t byte_size() const noexcept;
+
+private:
+    using Slot = std::uint32_t;
+    static constexpr Slot no_slot = 0xffffffffu;
+    static constexpr std::size_t block_slots = 64;
+
+    void start_over(Cut& cut, const FoldTester& tester);
+    void step(Cut& cut, const FoldTester& tester);
+    void collect_due();
+    void collect_block(std::size_t block, std::int32_t position, std::int32_t facing);
+    void settle(Cut& cut, const FoldTester& tester);
+    void unfold_wave(Cut& cut, const FoldTester& tester);
+    void add_live(NodeId node);
+    void remove_children(NodeId node);
+    void set_deadlines(NodeId node, const Verdict& verdict);
+    void refresh_block(std::size_t block);
+    void restart_clocks();
+    std::int32_t deadline(double clock, float slack) const;
+
+    const VertexTree& tree_;
+    bool is_tracking_ = false;
+    std::uint64_t criterion_ = 0;
+    bool cull_back_faces_ = false;
+    float threshold_ = 1;
+    Viewpoint viewpoint_;
+    double length_per_radian_ = 1;
+    double position_clock_ = 0, facing_clock_ = 0;
+
+    // By slot. Deadlines are the bits of non-negative floats, which compare like the floats.
+    std::vector<NodeId> node_;
+    std::vector<std::int32_t> position_due_, facing_due_;
+    std::vector<std::int32_t> block_position_due_, block_facing_due_; // by block; not later than any of its slots'
+    std::vector<Slot> free_slots_;
+    std::vector<Slot> slot_of_node_; // by interior node
+
+    // Of one frame.
+    std::vector<NodeId> wave_, next_wave_, folding_, due_;
+    std::vector<Verdict> verdicts_;
+    std::vector<std::uint32_t> due_blocks_;
+    AdjustStats stats_;
+};
+
+} // namespace unseen::vdtree
