@@ -33,6 +33,7 @@ private:
     static constexpr std::size_t block_slots = 64;
 
     void start_over(Cut& cut, const FoldTester& tester);
+    void test_down(NodeId top, const FoldTester& tester, std::vector<std::uint64_t>& unfolded, std::vector<NodeId>* left);
     void step(Cut& cut, const FoldTester& tester);
     void collect_due();
     void collect_block(std::size_t block, std::int32_t position, std::int32_t facing);
