@@ -7,6 +7,7 @@
 #include <queue>
 #include <string>
 
+#include "budget.h"
 #include "cut_follower.h"
 #include "index_buffer.h"
 
@@ -431,14 +432,53 @@ Result<void> check(const Viewpoint& viewpoint) {
     return {};
 }
 
+Result<void> check(const FollowOptions& options) {
+    const auto invalid = [](const char* what) { return Error{ErrorCode::invalid_argument, what}; };
+    constexpr float most_hysteresis = 2;
+    if (!(options.threshold > 0) || !std::isfinite(options.threshold))
+        return invalid("The threshold must be more than 0 and finite.");
+    if (!(options.hysteresis >= 1 && options.hysteresis <= most_hysteresis))
+        return invalid("The hysteresis must be from 1 to 2.");
+    if (options.milliseconds && !(*options.milliseconds >= 0)) return invalid("The time limit must be 0 or more milliseconds.");
+    return {};
+}
+
 } // namespace
 
 Result<AdjustStats> Cut::follow(const DistanceCriterion& criterion, const Viewpoint& viewpoint, const FollowOptions& options) {
     if (const auto valid = check(viewpoint); !valid) return valid.error();
-    if (!(options.threshold > 0) || !std::isfinite(options.threshold))
-        return Error{ErrorCode::invalid_argument, "The threshold must be more than 0 and finite."};
+    if (const auto valid = check(options); !valid) return valid.error();
     if (!follower_) follower_ = std::make_unique<CutFollower>(*tree_);
-    return follower_->follow(*this, criterion, viewpoint, options.cull_back_faces, options.threshold);
+    return follower_->follow(*this, criterion, viewpoint, options);
+}
+
+Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objects, Index triangle_budget) {
+    std::vector<const VertexTree*> trees;
+    std::vector<std::unique_ptr<FoldTester>> testers;
+    std::vector<const FoldTester*> tests;
+    for (std::size_t i = 0; i < objects.size(); ++i) {
+        const SceneObject& object = objects[i];
+        if (const auto valid = check(object.viewpoint); !valid)
+            return Error{valid.error().code, "Object " + std::to_string(i) + ": " + valid.error().message};
+        for (std::size_t other = 0; other < i; ++other)
+            if (&objects[other].cut == &object.cut)
+                return Error{ErrorCode::invalid_argument, "Objects " + std::to_string(other) + " and " + std::to_string(i) +
+                                                              " share one cut; give each its own."};
+        trees.push_back(object.cut.tree_);
+        testers.push_back(std::make_unique<FoldTester>(*object.cut.tree_, object.criterion, object.cull_back_faces, 1.0f, false));
+        testers.back()->look_from(object.viewpoint, 1);
+        tests.push_back(testers.back().get());
+    }
+    BudgetDecision decision = decide_budget(trees, tests, {.triangles = triangle_budget});
+    std::vector<AdjustStats> stats(objects.size());
+    for (std::size_t i = 0; i < objects.size(); ++i) {
+        Cut& cut = objects[i].cut;
+        if (cut.follower_) cut.follower_->forget();
+        stats[i].node_tests = decision.node_tests;
+        stats[i].max_fold_cost = decision.max_seen_cost;
+        cut.change_to(std::move(decision.unfolded[i]), stats[i]);
+    }
+    return stats;
 }
 
 std::span<const NodeId> Cut::indices() const {

@@ -1,7 +1,9 @@
 // Keeps a cut at what a distance criterion asks for while the viewpoint moves, testing nodes only when their time has come.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -12,7 +14,7 @@
 namespace unseen::vdtree {
 
 // Live nodes, those whose parent is unfolded, and the root, have a slot with two deadlines, one on each of the tester's clocks. Slots
-// come in blocks of 64 with the earliest deadlines of all, so that a frame looks at a few hundred blocks, tests the
+// come in blocks of 16 with the earliest deadlines of all, so that a frame looks at a few hundred blocks, tests the
 // nodes that are due, and changes what they say; its cost goes with the motion and with the active triangles, not with the mesh.
 // All live nodes are tested when their verdict may have changed, also those with unfolded nodes below: what a cut becomes does not
 // depend on the way to it, nor on the criterion's being monotone.
@@ -20,9 +22,8 @@ class CutFollower {
 public:
     explicit CutFollower(const VertexTree& tree) : tree_(tree) {}
 
-    // Brings the cut to what the criterion asks for. `threshold`: the cost above which nodes unfold.
-    AdjustStats follow(Cut& cut, const DistanceCriterion& criterion, const Viewpoint& viewpoint, bool cull_back_faces,
-                       float threshold);
+    // Brings the cut to what the criterion and the options ask for.
+    AdjustStats follow(Cut& cut, const DistanceCriterion& criterion, const Viewpoint& viewpoint, const FollowOptions& options);
     // The cut was changed by others.
     void forget() noexcept { is_tracking_ = false; }
     std::uint64_t byte_size() const noexcept;
@@ -30,15 +31,28 @@ public:
 private:
     using Slot = std::uint32_t;
     static constexpr Slot no_slot = 0xffffffffu;
-    static constexpr std::size_t block_slots = 64;
+    static constexpr std::size_t block_slots = 16;
 
-    void start_over(Cut& cut, const FoldTester& tester);
-    void test_down(NodeId top, const FoldTester& tester, std::vector<std::uint64_t>& unfolded, std::vector<NodeId>* left);
-    void step(Cut& cut, const FoldTester& tester);
+    bool is_same_request(const DistanceCriterion& criterion, const FollowOptions& options) const;
+    void prepare(const DistanceCriterion& criterion, const FollowOptions& options);
+    void place_clocks(const Viewpoint& viewpoint);
+    void follow_threshold(Cut& cut, const Viewpoint& viewpoint, const Motion& motion);
+    void follow_budget(Cut& cut, const Viewpoint& viewpoint, const Motion& motion);
+    void keep_within_budget(Cut& cut);
+    void change_threshold(Cut& cut, float factor);
+    void start_with_budget(Cut& cut);
+    void start_over(Cut& cut);
+    void start_in_time(Cut& cut);
+    void forget_slots();
+    void make_all_due(const Cut& cut);
+    void test_down(NodeId top, std::vector<std::uint64_t>& unfolded, std::vector<NodeId>* left);
+    void step(Cut& cut);
+    bool is_out_of_time() const;
     void collect_due();
-    void collect_block(std::size_t block, std::int32_t position, std::int32_t facing);
-    void settle(Cut& cut, const FoldTester& tester);
-    void unfold_wave(Cut& cut, const FoldTester& tester);
+    void settle_due(Cut& cut);
+    void settle(Cut& cut);
+    void test_due(const Cut& cut, std::span<const NodeId> nodes);
+    void unfold_wave(Cut& cut);
     void add_live(NodeId node);
     void remove_children(NodeId node);
     void set_deadlines(NodeId node, const Verdict& verdict);
@@ -48,11 +62,16 @@ private:
 
     const VertexTree& tree_;
     bool is_tracking_ = false;
+    bool was_complete_ = true;
+    float max_fold_cost_ = 0;
     std::uint64_t criterion_ = 0;
-    bool cull_back_faces_ = false;
-    float threshold_ = 1;
+    FollowOptions options_;
+    std::optional<FoldTester> tester_;
+    float threshold_ = 1;          // with hysteresis it follows the budget
     Viewpoint viewpoint_;
     double length_per_radian_ = 1;
+    double farthest_ = 1;          // of the tree's points from the eye; no slack is longer
+    std::optional<std::chrono::steady_clock::time_point> time_limit_;
     double position_clock_ = 0, facing_clock_ = 0;
 
     // By slot. Deadlines are the bits of non-negative floats, which compare like the floats.

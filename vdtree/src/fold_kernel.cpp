@@ -16,6 +16,16 @@ namespace {
 
 constexpr float pi = std::numbers::pi_v<float>;
 constexpr float huge = 1e30f;
+constexpr float least_length = 1e-30f; // mesh units; stands for 0 where a division or an infinite reach would make no number of it
+// With a gaze, a node is tested again after this share of its gap at the latest; see find_slacks().
+constexpr float longest_path = 0.125f;
+constexpr float shift_per_gap = 1.16f; // asin(x) / x / (1 - longest_path) for x up to longest_path / (1 - longest_path)
+// Slacks are shortened by these, so that rounding in a later test cannot change a verdict before its time. Shares of the
+// distance to the eye: a dozen roundings of a float; the facing gap sums a few dozen products.
+constexpr float position_rounding = 2e-6f;
+constexpr float facing_rounding = 2e-5f;
+// Radians: angles come from cosines in floats, which near 1 tell angles apart to about half of this.
+constexpr float angle_rounding = 1e-3f;
 constexpr float slab_units = 127;                    // of NormalSlabs in 1
 constexpr float sqrt3 = 1.7320508075688772f;         // of the diagonals' coordinates
 constexpr float widest_reach = 1.25f;                // of the parallelepipeds tried
@@ -68,25 +78,71 @@ struct Lanes {
         return cosine < 0 ? pi - angle : angle;
     }
 
-    static UNSEEN_INLINE void measure(const KernelView& view, SphereBatch& batch, std::size_t first) {
+    static UNSEEN_INLINE Ints load(const std::int32_t* from) {
+        Ints v;
+        std::memcpy(&v, from, sizeof v);
+        return v;
+    }
+
+    static UNSEEN_INLINE Ints lane_bits() {
+        Ints bits;
+        std::int32_t values[width];
+        for (std::size_t lane = 0; lane < width; ++lane) values[lane] = std::int32_t{1} << lane;
+        std::memcpy(&bits, values, sizeof bits);
+        return bits;
+    }
+    // One bit a lane, the first lane's lowest.
+    static UNSEEN_INLINE std::uint32_t bits_of(const Ints& mask) {
+        const Ints bits = mask & lane_bits();
+        std::int32_t lanes[width], sum = 0;
+        std::memcpy(lanes, &bits, sizeof lanes);
+        for (const std::int32_t lane : lanes) sum |= lane;
+        return static_cast<std::uint32_t>(sum);
+    }
+    static UNSEEN_INLINE Ints mask_of(std::uint32_t bits, std::size_t first) {
+        return ((Ints{} + static_cast<std::int32_t>(bits >> first)) & lane_bits()) != 0;
+    }
+
+    // The distances of rows at bins. Lookups go lane by lane.
+    static UNSEEN_INLINE Floats distances(const KernelView& view, const Ints& rows, const Ints& bins, const Floats& lengths) {
+        const Ints entries = rows * view.bins + bins;
+        std::int32_t at[width];
+        std::memcpy(at, &entries, sizeof at);
+        float reach[width];
+        for (std::size_t lane = 0; lane < width; ++lane) reach[lane] = view.reach[static_cast<std::size_t>(at[lane])];
+        // A length of 0 times infinity is no number.
+        return max_of(lengths, all(least_length)) * view.inverse_threshold * load(reach);
+    }
+
+    static UNSEEN_INLINE void measure(const KernelView& view, FoldBatch& batch, std::size_t first) {
         Floats e[3];
         for (int k = 0; k < 3; ++k) {
             e[k] = (view.eye_high[k] - load(batch.centre[k] + first)) + view.eye_low[k];
             store(batch.to_eye[k] + first, e[k]);
         }
-        const Floats radius = load(batch.radius + first);
+        const Floats radius = load(batch.radius + first), length = load(batch.length + first);
         const Floats distance = root_of(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
         store(batch.distance + first, distance);
         store(batch.gap + first, distance - radius);
-        Floats eccentricity = all(0);
+        Ints bin = {};
         if (view.has_gaze) {
-            const Floats inverse = 1 / distance;
+            const Floats inverse = 1 / max_of(distance, all(least_length));
             const Floats towards = -(e[0] * view.gaze[0] + e[1] * view.gaze[1] + e[2] * view.gaze[2]) * inverse;
             const Floats half_angle = pi / 2 - angle_of_cosine(radius * inverse);
-            eccentricity = max_of(angle_of_cosine(towards) - half_angle, all(0));
+            Floats eccentricity = max_of(angle_of_cosine(towards) - half_angle, all(0));
             eccentricity = distance > radius ? eccentricity : all(0);
+            store(batch.eccentricity + first, eccentricity);
+            bin = __builtin_convertvector(min_of(eccentricity * view.bins_per_radian, all(static_cast<float>(view.bins - 1))), Ints);
+        } else {
+            store(batch.eccentricity + first, all(0));
         }
-        store(batch.eccentricity + first, eccentricity);
+        std::memcpy(batch.bin + first, &bin, sizeof bin);
+        const Floats gap = distance - radius;
+        const Floats interior = distances(view, load(batch.interior_row + first), bin, length);
+        const Floats silhouette = view.nobody ? interior : distances(view, load(batch.silhouette_row + first), bin, length);
+        store(batch.interior + first, interior);
+        store(batch.silhouette + first, silhouette);
+
         Floats best = all(view.planes.empty() ? huge : -huge);
         for (std::size_t f = 0; f + 1 < view.first_plane.size(); ++f) {
             Floats lowest = all(huge);
@@ -97,9 +153,85 @@ struct Lanes {
             best = max_of(best, lowest + radius);
         }
         store(batch.height + first, best);
+
+        const Ints is_inside = best >= 0, is_near = gap < interior;
+        Ints is_asked = is_inside & (view.everybody ? gap > 0 : gap < silhouette);
+        if (!view.near_ones_too && !view.everybody) is_asked &= ~is_near;
+        if (view.nobody) is_asked = Ints{};
+        batch.is_inside |= bits_of(is_inside) << first;
+        batch.is_near |= bits_of(is_near) << first;
+        batch.is_asked |= bits_of(is_asked) << first;
     }
-    static UNSEEN_INLINE void measure(const KernelView& view, SphereBatch& batch) {
+    static UNSEEN_INLINE void measure(const KernelView& view, FoldBatch& batch) {
+        batch.is_inside = batch.is_near = batch.is_asked = 0;
         for (std::size_t first = 0; first < kernel_lanes; first += width) measure(view, batch, first);
+    }
+
+    static UNSEEN_INLINE bool any(const Ints& mask) {
+        std::int32_t lanes[width], sum = 0;
+        std::memcpy(lanes, &mask, sizeof lanes);
+        for (const std::int32_t lane : lanes) sum |= lane;
+        return sum != 0;
+    }
+
+    // The farther the bins that are looked at, the more the gaze may turn, and the less path is left: the best of a few.
+    //
+    // While the clock advances by `path`, the gaze turns by path * turn_per_length, and a point at least `gap` away shifts by
+    // asin(step / rest) for each step, the rest of the gap being what longest_path leaves: less than shift_per_gap * path / gap
+    // in all.
+    static UNSEEN_INLINE void find_slacks(const KernelView& view, SlackBatch& batch, std::size_t first) {
+        const Floats gap = load(batch.gap + first), inward = load(batch.inward + first), length = load(batch.length + first);
+        const Floats eccentricity = load(batch.eccentricity + first);
+        const Ints row = load(batch.row + first), bin = load(batch.bin + first);
+        const Ints outward_bins = __builtin_convertvector(inward, Ints); // reaches shrink away from the gaze
+        const Floats degrees = all(1 / view.bins_per_radian);
+        const Floats turn_of_path = view.turn_per_length + shift_per_gap / max_of(gap, all(least_length));
+        const Ints last = Ints{} + (view.bins - 1);
+        Floats best = {};
+        for (std::int32_t step = 0; step < view.bins; step = step == 0 ? 1 : 2 * step) {
+            Ints reached = bin + outward_bins * step;
+            reached = reached < 0 ? Ints{} : reached;
+            reached = reached > last ? last : reached;
+            const Floats there = (distances(view, row, reached, length) - gap) * inward;
+            // Up to the far edge of the bin that was looked at; none beyond the last.
+            const Ints edge = reached + (inward > 0 ? Ints{} + 1 : Ints{});
+            Floats turn = (__builtin_convertvector(edge, Floats) * degrees - eccentricity) * inward;
+            turn = ((inward > 0) & (reached == last)) | ((inward < 0) & (reached == 0)) ? all(huge) : turn;
+            const Floats path = min_of((turn - angle_rounding) / turn_of_path, longest_path * gap);
+            best = max_of(best, min_of(there, path));
+            if (!any(there > best)) break;
+        }
+        // From inside, or nearly, the eccentricity may be anything soon.
+        const Floats anywhere = (distances(view, row, last, length) - gap) * inward;
+        best = (gap > 0) | (inward < 0) ? best : max_of(anywhere, all(0));
+        store(batch.slack + first, best);
+    }
+    static UNSEEN_INLINE void find_slacks(const KernelView& view, SlackBatch& batch) {
+        for (std::size_t first = 0; first < kernel_lanes; first += width) find_slacks(view, batch, first);
+    }
+
+    static UNSEEN_INLINE void finish_slacks(const KernelView& view, const FoldBatch& batch, Findings& findings, std::size_t first) {
+        const Ints unfolded = mask_of(findings.unfolded, first), silhouettes = mask_of(findings.silhouettes, first);
+        const Ints outside = ~mask_of(batch.is_inside, first), away = mask_of(findings.away, first);
+        const Floats gap = load(batch.gap + first), distance = load(batch.distance + first), height = load(batch.height + first);
+        const Floats inexact = (distance + load(batch.radius + first)) * position_rounding;
+        Floats position;
+        if (view.has_gaze) {
+            position = load(findings.position_slack + first);
+        } else {
+            const Floats reach = silhouettes ? load(batch.silhouette + first) : load(batch.interior + first);
+            position = unfolded ? reach - gap : gap - reach;
+        }
+        position = max_of(position - inexact, all(0));
+        position = outside | away ? all(huge) : position;
+        Floats facing = load(findings.facing_slack + first) - distance * facing_rounding;
+        facing = unfolded ? min_of(facing, height - inexact) : facing;
+        facing = outside ? -height - inexact : facing;
+        store(findings.position_slack + first, position);
+        store(findings.facing_slack + first, max_of(facing, all(0)));
+    }
+    static UNSEEN_INLINE void finish_slacks(const KernelView& view, const FoldBatch& batch, Findings& findings) {
+        for (std::size_t first = 0; first < kernel_lanes; first += width) finish_slacks(view, batch, findings, first);
     }
 
     struct Interval {
@@ -183,14 +315,20 @@ struct Lanes {
 
 #if defined(__x86_64__) && defined(__GNUC__)
 
-[[gnu::target("avx2")]] void measure_avx2(const KernelView& view, SphereBatch& batch) { Lanes<Eight>::measure(view, batch); }
+[[gnu::target("avx2")]] void measure_avx2(const KernelView& view, FoldBatch& batch) { Lanes<Eight>::measure(view, batch); }
+[[gnu::target("avx2")]] void find_slacks_avx2(const KernelView& view, SlackBatch& batch) { Lanes<Eight>::find_slacks(view, batch); }
+[[gnu::target("avx2")]] void finish_slacks_avx2(const KernelView& view, const FoldBatch& batch, Findings& findings) {
+    Lanes<Eight>::finish_slacks(view, batch, findings);
+}
 [[gnu::target("avx2")]] void facing_gaps_avx2(const FacingBatch& batch, FacingGaps& gaps) { Lanes<Eight>::run(batch, gaps); }
 const bool has_avx2 = __builtin_cpu_supports("avx2");
 
 #else
 
 constexpr bool has_avx2 = false;
-void measure_avx2(const KernelView&, SphereBatch&) {}
+void measure_avx2(const KernelView&, FoldBatch&) {}
+void find_slacks_avx2(const KernelView&, SlackBatch&) {}
+void finish_slacks_avx2(const KernelView&, const FoldBatch&, Findings&) {}
 void facing_gaps_avx2(const FacingBatch&, FacingGaps&) {}
 
 #endif
@@ -198,9 +336,19 @@ void facing_gaps_avx2(const FacingBatch&, FacingGaps&) {}
 } // namespace
 
 // Neither has fused operations, so both give the same bits.
-void measure(const KernelView& view, SphereBatch& batch) noexcept {
+void measure(const KernelView& view, FoldBatch& batch) noexcept {
     if (has_avx2) measure_avx2(view, batch);
     else Lanes<Four>::measure(view, batch);
+}
+
+void find_slacks(const KernelView& view, SlackBatch& batch) noexcept {
+    if (has_avx2) find_slacks_avx2(view, batch);
+    else Lanes<Four>::find_slacks(view, batch);
+}
+
+void finish_slacks(const KernelView& view, const FoldBatch& batch, Findings& findings) noexcept {
+    if (has_avx2) finish_slacks_avx2(view, batch, findings);
+    else Lanes<Four>::finish_slacks(view, batch, findings);
 }
 
 void facing_gaps(const FacingBatch& batch, FacingGaps& gaps) noexcept {

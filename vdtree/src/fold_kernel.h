@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <vdtree/normal_mask.h>
@@ -12,33 +13,71 @@ namespace unseen::vdtree {
 
 inline constexpr std::size_t kernel_lanes = 16;
 
-// What all nodes are measured from.
+// What all nodes are measured from, and by.
 struct KernelView {
     float eye_high[3], eye_low[3]; // the eye in two floats each: differences to it stay good near and far
     float gaze[3];                 // unit
     bool has_gaze = false;
-    // Planes of the frusta through the eye's frame: normal . (p - eye) + offset; those of frustum f are
+    // Planes of the frusta, relative to the eye: normal . (p - eye) + offset; those of frustum f are
     // [first_plane[f], first_plane[f + 1]).
     struct Plane {
         float normal[3], offset;
     };
     std::vector<Plane> planes;
     std::vector<std::size_t> first_plane;
+
+    std::span<const float> reach; // [row * bins + bin], in lengths; infinite: from everywhere; minus infinity: from nowhere
+    std::int32_t bins = 1;
+    float bins_per_radian = 0;
+    float inverse_threshold = 1;
+    float turn_per_length = 0;    // radians that the gaze may turn while the position clock advances by 1
+
+    // Whose facing has to be found out: nodes within their silhouette's distance but not the interior's, and ...
+    bool near_ones_too = false;   // ... nodes within the interior's, too, or
+    bool everybody = false;       // ... all that the eye is not inside of, or
+    bool nobody = false;          // ... none
 };
 
-// Sixteen spheres, and what is measured of them.
-struct SphereBatch {
+// Sixteen nodes.
+struct FoldBatch {
     alignas(64) float centre[3][kernel_lanes];
     alignas(64) float radius[kernel_lanes];
-    // Out:
-    alignas(64) float to_eye[3][kernel_lanes];      // from the centre
-    alignas(64) float distance[kernel_lanes];       // of the centre
-    alignas(64) float gap[kernel_lanes];            // of the sphere: distance - radius
-    alignas(64) float eccentricity[kernel_lanes];   // radians, of the sphere's nearest point to the gaze; 0 from inside, and without gaze
-    alignas(64) float height[kernel_lanes];         // of the sphere's top over the lowest plane of the best frustum; negative: outside
-                                                    // of all. Without frusta: huge
+    alignas(64) float length[kernel_lanes];
+    alignas(64) std::int32_t interior_row[kernel_lanes], silhouette_row[kernel_lanes];
+
+    // Out, by measure():
+    alignas(64) float to_eye[3][kernel_lanes]; // from the centre
+    alignas(64) float distance[kernel_lanes];  // of the centre
+    alignas(64) float gap[kernel_lanes];       // of the sphere: distance - radius
+    alignas(64) float eccentricity[kernel_lanes]; // radians, of the sphere's nearest point; 0 from inside, and without gaze
+    alignas(64) std::int32_t bin[kernel_lanes];
+    alignas(64) float height[kernel_lanes];    // of the sphere's top over the lowest plane of the best frustum; negative: outside
+                                               // of all; without frusta huge
+    alignas(64) float interior[kernel_lanes], silhouette[kernel_lanes]; // the distances within which the node unfolds
+    // A bit a lane: inside a frustum; within the interior's distance; facing has to be found out.
+    std::uint32_t is_inside = 0, is_near = 0, is_asked = 0;
 };
-void measure(const KernelView& view, SphereBatch& batch) noexcept;
+void measure(const KernelView& view, FoldBatch& batch) noexcept;
+
+// How far the position clock may advance with nodes still within, or beyond, the distance of a row.
+struct SlackBatch {
+    alignas(64) std::int32_t row[kernel_lanes];
+    alignas(64) std::int32_t bin[kernel_lanes];
+    alignas(64) float inward[kernel_lanes]; // 1: the node is within the distance, -1: beyond
+    alignas(64) float gap[kernel_lanes], eccentricity[kernel_lanes], length[kernel_lanes];
+    alignas(64) float slack[kernel_lanes];  // out; may be a little negative
+};
+void find_slacks(const KernelView& view, SlackBatch& batch) noexcept;
+
+// What is known of the lanes of a batch when all is found out; a bit a lane.
+struct Findings {
+    std::uint32_t unfolded = 0, silhouettes = 0;
+    std::uint32_t away = 0;                         // facing away; folded whatever the distance
+    alignas(64) float facing_slack[kernel_lanes];   // by facing alone
+    alignas(64) float position_slack[kernel_lanes]; // with a gaze, from find_slacks(); else out
+};
+// Brings both slacks of all lanes to what they are in all, 0 or more.
+void finish_slacks(const KernelView& view, const FoldBatch& batch, Findings& findings) noexcept;
 
 // Sixteen rings: their slabs, the vectors from the centres of their spheres to the eye, and the spheres' radii.
 struct FacingBatch {

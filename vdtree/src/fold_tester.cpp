@@ -1,6 +1,7 @@
 #include "fold_tester.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -13,41 +14,27 @@ namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
-// Slacks are shortened by these, so that rounding in a later test cannot change a verdict before its time. Shares of the
-// distance to the eye: a dozen roundings of a float; the facing gap sums a few dozen products.
-constexpr float position_rounding = 2e-6f;
-constexpr float facing_rounding = 2e-5f;
-// Radians: angles come from cosines in floats, which near 1 tell angles apart to about half of this.
-constexpr float angle_rounding = 1e-3f;
-// With a gaze, a node is tested again after this share of its gap at the latest; see path_of().
-constexpr float longest_path = 0.125f;
-constexpr float shift_per_gap = 1.16f; // asin(x) / x / (1 - longest_path) for x up to longest_path / (1 - longest_path)
-
 } // namespace
 
-// One node: what was measured, and what the criterion says of it here.
-struct FoldTester::Lane {
-    NodeId node;
-    FoldClass row;
-    float length, distance, radius, gap, eccentricity, height;
-    float interior, silhouette; // the distances within which it unfolds
-};
-
-FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterion, bool cull_back_faces, float threshold)
-    : tree_(tree), criterion_(criterion), cull_back_faces_(cull_back_faces), has_silhouettes_(criterion.uses_silhouettes()),
-      threshold_(threshold), bins_(criterion.parts().eccentricity_bins) {
-    const auto& reach = criterion.parts().reach;
-    const auto& least_cost = criterion.parts().least_cost;
-    reach_.resize(reach.size());
-    for (std::size_t i = 0; i < reach.size(); ++i) {
-        const bool always = reach[i] >= DistanceCriterion::always_visible || (!least_cost.empty() && least_cost[i] > threshold);
-        const bool never = reach[i] <= DistanceCriterion::never_visible;
-        reach_[i] = never ? -infinity : always ? infinity : reach[i] / threshold;
+FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterion, bool cull_back_faces, float threshold, bool least_costs)
+    : tree_(tree), criterion_(criterion), cull_back_faces_(cull_back_faces), has_silhouettes_(criterion.uses_silhouettes()) {
+    const DistanceCriterion::Parts& parts = criterion.parts();
+    const bool has_least_costs = least_costs && !parts.least_cost.empty();
+    reach_.resize(parts.reach.size());
+    for (std::size_t i = 0; i < reach_.size(); ++i) {
+        const bool always = parts.reach[i] >= DistanceCriterion::always_visible || (has_least_costs && parts.least_cost[i] > threshold);
+        const bool never = parts.reach[i] <= DistanceCriterion::never_visible;
+        reach_[i] = never ? -infinity : always ? infinity : parts.reach[i];
     }
+    view_.reach = reach_;
+    view_.bins = static_cast<std::int32_t>(parts.eccentricity_bins);
+    view_.bins_per_radian = static_cast<float>(180 / (std::numbers::pi * parts.bin_degrees));
+    view_.inverse_threshold = 1 / threshold;
+    view_.near_ones_too = cull_back_faces;
+    view_.nobody = !cull_back_faces && !has_silhouettes_;
 }
 
 void FoldTester::look_from(const Viewpoint& viewpoint, double length_per_radian) {
-    view_ = {};
     for (int k = 0; k < 3; ++k) {
         view_.eye_high[k] = static_cast<float>(viewpoint.eye[k]);
         view_.eye_low[k] = static_cast<float>(viewpoint.eye[k] - static_cast<double>(view_.eye_high[k]));
@@ -55,6 +42,8 @@ void FoldTester::look_from(const Viewpoint& viewpoint, double length_per_radian)
     view_.has_gaze = viewpoint.gaze.has_value() && criterion_.uses_gaze();
     if (view_.has_gaze)
         for (int k = 0; k < 3; ++k) view_.gaze[k] = static_cast<float>((*viewpoint.gaze)[k]);
+    view_.planes.clear();
+    view_.first_plane.clear();
     for (const Frustum& frustum : viewpoint.frusta) {
         view_.first_plane.push_back(view_.planes.size());
         for (const Plane& plane : frustum.planes) {
@@ -63,184 +52,139 @@ void FoldTester::look_from(const Viewpoint& viewpoint, double length_per_radian)
         }
     }
     view_.first_plane.push_back(view_.planes.size());
-    inverse_bin_ = static_cast<float>(180 / (std::numbers::pi * criterion_.parts().bin_degrees));
-    turn_per_length_ = static_cast<float>(1 / length_per_radian);
-    last_bin_ = static_cast<float>(bins_ - 1);
-}
-
-float FoldTester::distance_of(std::uint16_t row, std::size_t bin, float length) const {
-    const float reach = reach_[row * bins_ + bin];
-    return std::abs(reach) < infinity ? length * reach : reach; // a length of 0 times infinity is no number
-}
-
-std::size_t FoldTester::bin_of(float eccentricity) const {
-    return static_cast<std::size_t>(std::clamp(eccentricity * inverse_bin_, 0.0f, last_bin_));
-}
-
-// The threshold at which the node, classed by `row` and unfolding within `reach`, would just fold.
-float FoldTester::cost_of(std::uint16_t row, const Lane& lane, float reach) const {
-    if (!(reach > 0)) return 0;
-    if (!(lane.gap > 0)) return infinity;
-    const DistanceCriterion::Parts& parts = criterion_.parts();
-    const std::size_t entry = row * bins_ + (view_.has_gaze ? bin_of(lane.eccentricity) : 0);
-    if (parts.reach[entry] >= DistanceCriterion::always_visible) return infinity;
-    const float by_distance = lane.length * parts.reach[entry] / lane.gap;
-    return parts.least_cost.empty() ? by_distance : std::max(by_distance, parts.least_cost[entry]);
-}
-
-// How far the position clock may advance with the sphere's eccentricity changing by less than `turn`: meanwhile the gaze turns by
-// path / length_per_radian, and a point at least `gap` away shifts by asin(step / rest) for each step, the rest of the gap being
-// what longest_path leaves: less than shift_per_gap * path / gap in all.
-float FoldTester::path_of(float turn, float gap) const {
-    return std::min((turn - angle_rounding) / (turn_per_length_ + shift_per_gap / gap), longest_path * gap);
-}
-
-// How far the clock may advance with the node still beyond the distance of its class, `reach` here. Reaches grow towards the
-// gaze: the farther the bins that are looked at, the more turn they allow and the less path.
-float FoldTester::folded_slack(std::uint16_t row, const Lane& lane, float reach) const {
-    const float here = lane.gap - reach;
-    if (!view_.has_gaze) return here;
-    const std::size_t bin = bin_of(lane.eccentricity);
-    float best = 0, there = here;
-    for (std::size_t step = 0;; step = step == 0 ? 1 : 2 * step) {
-        const std::size_t nearest = bin - std::min(bin, step);
-        there = step == 0 ? here : lane.gap - distance_of(row, nearest, lane.length);
-        const float turn = nearest == 0 ? infinity : lane.eccentricity - static_cast<float>(nearest) / inverse_bin_;
-        best = std::max(best, std::min(there, path_of(turn, lane.gap)));
-        if (there <= best || nearest == 0) return best;
-    }
-}
-
-// How far the clock may advance with the node still within it.
-float FoldTester::unfolded_slack(std::uint16_t row, const Lane& lane, float reach) const {
-    const float here = reach - lane.gap;
-    if (!view_.has_gaze) return here;
-    // Inside, or nearly, the eccentricity may be anything soon.
-    if (!(lane.gap > 0)) return std::max(0.0f, distance_of(row, bins_ - 1, lane.length) - lane.gap);
-    const std::size_t bin = bin_of(lane.eccentricity), last = bins_ - 1;
-    float best = 0, there = here;
-    for (std::size_t step = 0;; step = step == 0 ? 1 : 2 * step) {
-        const std::size_t farthest = std::min(bin + step, last);
-        there = step == 0 ? here : distance_of(row, farthest, lane.length) - lane.gap;
-        const float turn = farthest == last ? infinity : static_cast<float>(farthest + 1) / inverse_bin_ - lane.eccentricity;
-        best = std::max(best, std::min(there, path_of(turn, lane.gap)));
-        if (there <= best || farthest == last) return best;
-    }
+    view_.turn_per_length = static_cast<float>(1 / length_per_radian);
+    costs_view_ = view_;
+    costs_view_.everybody = true;
 }
 
 void FoldTester::test(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const {
-    for (std::size_t first = 0; first < nodes.size(); first += kernel_lanes)
-        test_batch(nodes.subspan(first, std::min(kernel_lanes, nodes.size() - first)), verdicts.data() + first);
+    test(nodes, verdicts, false);
 }
 
-void FoldTester::test_batch(std::span<const NodeId> nodes, Verdict* verdicts) const {
-    const NodeBounds* const bounds = tree_.bounds().data();
-    const Sphere* const support =
-        criterion_.parts().spheres == DistanceCriterion::Spheres::support ? tree_.support_spheres().data() : nullptr;
-    SphereBatch spheres;
-    for (std::size_t i = 0; i < kernel_lanes; ++i) {
-        const NodeId node = nodes[std::min(i, nodes.size() - 1)];
-        const Sphere& sphere = support ? support[node] : bounds[node].ring;
-        spheres.centre[0][i] = sphere.centre.x;
-        spheres.centre[1][i] = sphere.centre.y;
-        spheres.centre[2][i] = sphere.centre.z;
-        spheres.radius[i] = sphere.radius;
-    }
-    measure(view_, spheres);
+void FoldTester::test_costs(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const { test(nodes, verdicts, true); }
 
-    FacingBatch facing;
-    std::size_t asked = 0;
-    std::array<std::uint8_t, kernel_lanes> asker;
-    std::array<Lane, kernel_lanes> lanes;
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
-        const NodeId node = nodes[i];
-        const Lane& lane = lanes[i] = lane_of(node, spheres, i);
-        const bool facing_decides = lane.height >= 0 && lane.gap < lane.silhouette &&
-                                    (cull_back_faces_ || (has_silhouettes_ && !(lane.gap < lane.interior)));
-        if (!facing_decides) {
-            verdicts[i] = judge_by_distance(lane);
-            continue;
-        }
-        const Sphere& ring = bounds[node].ring;
-        if (support) { // another sphere than the one measured
-            const auto towards = [&](int k) { return (view_.eye_high[k] - ring.centre[k]) + view_.eye_low[k]; };
-            facing.set(asked, bounds[node].slabs, towards(0), towards(1), towards(2), ring.radius);
-        } else {
-            facing.set(asked, bounds[node].slabs, spheres.to_eye[0][i], spheres.to_eye[1][i], spheres.to_eye[2][i], ring.radius);
-        }
-        asker[asked++] = static_cast<std::uint8_t>(i);
+void FoldTester::test(std::span<const NodeId> nodes, std::span<Verdict> verdicts, bool costs) const {
+    for (std::size_t first = 0; first < nodes.size(); first += kernel_lanes)
+        test_batch(nodes.subspan(first, std::min(kernel_lanes, nodes.size() - first)), verdicts.data() + first, costs);
+}
+
+// Unused lanes repeat the last node.
+void FoldTester::load(std::span<const NodeId> nodes, FoldBatch& batch) const {
+    const DistanceCriterion::Parts& parts = criterion_.parts();
+    const NodeBounds* const bounds = tree_.bounds().data();
+    const Sphere* const support = parts.spheres == DistanceCriterion::Spheres::support ? tree_.support_spheres().data() : nullptr;
+    const FoldClass* const classes = parts.classes.empty() ? nullptr : parts.classes.data();
+    const float* const lengths = parts.lengths.empty() ? nullptr : parts.lengths.data();
+    const std::size_t last = nodes.size() - 1;
+    for (std::size_t i = 0; i < kernel_lanes; ++i) {
+        const NodeId node = nodes[i < last ? i : last];
+        const Sphere& sphere = support ? support[node] : bounds[node].ring;
+        batch.centre[0][i] = sphere.centre.x;
+        batch.centre[1][i] = sphere.centre.y;
+        batch.centre[2][i] = sphere.centre.z;
+        batch.radius[i] = sphere.radius;
+        batch.length[i] = lengths ? lengths[node] : sphere.radius;
+        const FoldClass row = classes ? classes[node] : FoldClass{};
+        batch.interior_row[i] = row.interior;
+        batch.silhouette_row[i] = row.silhouette;
     }
-    if (asked == 0) return;
-    for (std::size_t unused = asked; unused < kernel_lanes; ++unused) facing.set(unused, NormalSlabs{}, 0, 0, 0, 0);
+}
+
+// With a gaze; without, the slack is what is left of the gap.
+void FoldTester::find_position_slacks(const FoldBatch& batch, Findings& findings) const {
+    SlackBatch asked;
+    for (std::size_t i = 0; i < kernel_lanes; ++i) {
+        asked.row[i] = (findings.silhouettes >> i) & 1 ? batch.silhouette_row[i] : batch.interior_row[i];
+        asked.inward[i] = (findings.unfolded >> i) & 1 ? 1.0f : -1.0f;
+    }
+    std::copy_n(batch.bin, kernel_lanes, asked.bin);
+    std::copy_n(batch.gap, kernel_lanes, asked.gap);
+    std::copy_n(batch.eccentricity, kernel_lanes, asked.eccentricity);
+    std::copy_n(batch.length, kernel_lanes, asked.length);
+    find_slacks(view_, asked);
+    std::copy_n(asked.slack, kernel_lanes, findings.position_slack);
+}
+
+// By their distances alone most nodes are settled; here are the others.
+void FoldTester::find_facings(std::span<const NodeId> nodes, const FoldBatch& batch, bool costs, Findings& findings) const {
+    const NodeBounds* const bounds = tree_.bounds().data();
+    const bool by_ring = criterion_.parts().spheres == DistanceCriterion::Spheres::ring;
+    FacingBatch facing;
+    std::array<std::uint8_t, kernel_lanes> lanes;
+    std::size_t count = 0;
+    for (std::uint32_t left = batch.is_asked; left; left &= left - 1) {
+        const auto i = static_cast<std::size_t>(std::countr_zero(left));
+        const NodeBounds& around = bounds[nodes[i]];
+        if (by_ring) {
+            facing.set(count, around.slabs, batch.to_eye[0][i], batch.to_eye[1][i], batch.to_eye[2][i], around.ring.radius);
+        } else { // another sphere than the one measured
+            const auto towards = [&](int k) { return (view_.eye_high[k] - around.ring.centre[k]) + view_.eye_low[k]; };
+            facing.set(count, around.slabs, towards(0), towards(1), towards(2), around.ring.radius);
+        }
+        lanes[count++] = static_cast<std::uint8_t>(i);
+    }
+    for (std::size_t k = count; k < kernel_lanes; ++k) facing.set(k, NormalSlabs{}, 0, 0, 0, 0);
     FacingGaps gaps;
     facing_gaps(facing, gaps);
-    for (std::size_t k = 0; k < asked; ++k) {
-        const Lane& lane = lanes[asker[k]];
-        const NodeBounds& around = bounds[lane.node];
+    for (std::size_t k = 0; k < count; ++k) {
+        const std::size_t i = lanes[k];
+        const std::uint32_t bit = 1u << i;
+        const NodeBounds& around = bounds[nodes[i]];
         float front = gaps.front[k], back = gaps.back[k];
         if (around.flags & irregular_ring) front = back = -infinity;       // an outline from everywhere
         else if (around.slabs.empty()) front = infinity, back = -infinity; // no triangle with an area
-        verdicts[asker[k]] = judge(lane, front, back);
-    }
-}
-
-FoldTester::Lane FoldTester::lane_of(NodeId node, const SphereBatch& spheres, std::size_t i) const {
-    const DistanceCriterion::Parts& parts = criterion_.parts();
-    Lane lane;
-    lane.node = node;
-    lane.row = parts.classes.empty() ? FoldClass{} : parts.classes[node];
-    lane.distance = spheres.distance[i];
-    lane.radius = spheres.radius[i];
-    lane.length = parts.lengths.empty() ? lane.radius : parts.lengths[node];
-    lane.gap = spheres.gap[i];
-    lane.eccentricity = spheres.eccentricity[i];
-    lane.height = spheres.height[i];
-    const std::size_t bin = view_.has_gaze ? bin_of(lane.eccentricity) : 0;
-    lane.interior = distance_of(lane.row.interior, bin, lane.length);
-    lane.silhouette = has_silhouettes_ ? distance_of(lane.row.silhouette, bin, lane.length) : lane.interior;
-    return lane;
-}
-
-// Where facing makes no difference.
-Verdict FoldTester::judge_by_distance(const Lane& lane) const {
-    const float rounding = position_rounding * (lane.distance + lane.radius);
-    if (lane.height < 0) return {infinity, std::max(0.0f, -lane.height - rounding), 0, false};
-    const bool unfolded = lane.gap < lane.interior;
-    const float reach = unfolded ? lane.interior : lane.silhouette;
-    const std::uint16_t row = unfolded || !has_silhouettes_ ? lane.row.interior : lane.row.silhouette;
-    const float slack = unfolded ? unfolded_slack(row, lane, reach) : folded_slack(row, lane, reach);
-    const float height_slack = unfolded ? std::max(0.0f, lane.height - rounding) : infinity;
-    return {std::max(0.0f, slack - rounding), height_slack, cost_of(row, lane, reach), unfolded};
-}
-
-Verdict FoldTester::judge(const Lane& lane, float front, float back) const {
-    const bool faces_away = cull_back_faces_ && back > 0;
-    const bool is_silhouette = !(front > 0) && !(back > 0);
-    const std::uint16_t row = is_silhouette ? lane.row.silhouette : lane.row.interior;
-    const float reach = is_silhouette ? lane.silhouette : lane.interior;
-    Verdict verdict;
-    verdict.unfolded = !faces_away && lane.gap < reach;
-    if (faces_away) {
-        verdict.position_slack = infinity;
-        verdict.facing_slack = back;
-    } else if (verdict.unfolded) {
-        // Within the interior's distance nothing but facing away folds it.
-        if (lane.gap < lane.interior) {
-            verdict.position_slack = unfolded_slack(lane.row.interior, lane, lane.interior);
-            verdict.facing_slack = cull_back_faces_ ? -back : infinity;
-        } else {
-            verdict.position_slack = unfolded_slack(row, lane, reach);
-            verdict.facing_slack = std::min(-front, -back);
+        const bool is_silhouette = !(front > 0) && !(back > 0), is_near = batch.is_near & bit;
+        if (cull_back_faces_ && back > 0) {
+            findings.away |= bit;
+            findings.unfolded &= ~bit;
+            findings.facing_slack[i] = back;
+            continue;
         }
-        verdict.facing_slack = std::min(verdict.facing_slack, lane.height);
-    } else {
-        verdict.position_slack = folded_slack(row, lane, reach);
-        verdict.facing_slack = std::max(front, back);
+        const bool unfolds = is_near || (is_silhouette && batch.gap[i] < batch.silhouette[i]);
+        findings.unfolded = unfolds ? findings.unfolded | bit : findings.unfolded & ~bit;
+        // Within the interior's distance nothing but facing away folds it.
+        const bool as_silhouette = is_silhouette && (costs || !is_near);
+        findings.silhouettes = as_silhouette ? findings.silhouettes | bit : findings.silhouettes & ~bit;
+        if (is_near) findings.facing_slack[i] = cull_back_faces_ ? -back : infinity;
+        else findings.facing_slack[i] = is_silhouette ? std::min(-front, -back) : std::max(front, back);
     }
-    verdict.position_slack = std::max(0.0f, verdict.position_slack - position_rounding * (lane.distance + lane.radius));
-    verdict.facing_slack = std::max(0.0f, verdict.facing_slack - facing_rounding * lane.distance);
-    verdict.cost = faces_away ? 0 : cost_of(row, lane, reach);
-    return verdict;
+}
+
+void FoldTester::test_batch(std::span<const NodeId> nodes, Verdict* verdicts, bool costs) const {
+    FoldBatch batch;
+    load(nodes, batch);
+    measure(costs ? costs_view_ : view_, batch);
+    batch.is_asked &= (1u << nodes.size()) - 1; // unused lanes are nobody's
+    Findings findings;
+    findings.unfolded = batch.is_inside & batch.is_near;
+    findings.silhouettes = ~batch.is_near;
+    std::fill_n(findings.facing_slack, kernel_lanes, infinity);
+    if (batch.is_asked) find_facings(nodes, batch, costs, findings);
+    if (view_.has_gaze) find_position_slacks(batch, findings);
+    finish_slacks(view_, batch, findings);
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+        verdicts[i].position_slack = findings.position_slack[i];
+        verdicts[i].facing_slack = findings.facing_slack[i];
+        verdicts[i].unfolded = (findings.unfolded >> i) & 1;
+    }
+    if (!costs) return;
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+        verdicts[i].cost = verdicts[i].seen_cost = 0;
+        const std::uint32_t bit = 1u << i;
+        if ((batch.is_inside & bit) && !(findings.away & bit)) set_costs(verdicts[i], batch, i, findings.silhouettes & bit);
+    }
+}
+
+// The thresholds at which the node would just fold.
+void FoldTester::set_costs(Verdict& verdict, const FoldBatch& batch, std::size_t lane, bool is_silhouette) const {
+    const DistanceCriterion::Parts& parts = criterion_.parts();
+    const std::int32_t row = is_silhouette ? batch.silhouette_row[lane] : batch.interior_row[lane];
+    const auto entry = static_cast<std::size_t>(row * view_.bins + batch.bin[lane]);
+    const float reach = parts.reach[entry], length = batch.length[lane] * reach, gap = batch.gap[lane];
+    if (!(reach >= 0) || (!(length > 0) && gap > 0)) return; // from nowhere, or from inside only
+    const bool always = reach >= DistanceCriterion::always_visible || !(gap > 0);
+    verdict.cost = always ? infinity : length / gap;
+    verdict.seen_cost = parts.least_cost.empty() ? verdict.cost : std::max(verdict.cost, parts.least_cost[entry]);
 }
 
 Motion FoldTester::motion(const VertexTree& tree, const Viewpoint& from, const Viewpoint& to, double length_per_radian) {

@@ -17,7 +17,8 @@ namespace unseen::vdtree {
 struct Verdict {
     float position_slack = 0;
     float facing_slack = 0;
-    float cost = 0; // D over the distance: folded where at most the threshold; unbounded where the eye is inside
+    float cost = 0;      // D over the distance, by which budgets go; infinite where the eye is inside
+    float seen_cost = 0; // not less than the class's least cost: folded where at most the threshold
     bool unfolded = false;
 };
 
@@ -29,8 +30,14 @@ struct Motion {
 
 class FoldTester {
 public:
-    // Nodes unfold where their cost exceeds `threshold`. Cost: the criterion's table.
-    FoldTester(const VertexTree& tree, const DistanceCriterion& criterion, bool cull_back_faces, float threshold);
+    // Nodes unfold where their seen cost exceeds `threshold`; without `least_costs`, where their cost does. Cost: a copy of the
+    // criterion's table.
+    FoldTester(const VertexTree& tree, const DistanceCriterion& criterion, bool cull_back_faces, float threshold, bool least_costs = true);
+    FoldTester(const FoldTester&) = delete;
+    FoldTester& operator=(const FoldTester&) = delete;
+
+    // Only without least costs.
+    void set_threshold(float threshold) noexcept { view_.inverse_threshold = costs_view_.inverse_threshold = 1 / threshold; }
 
     // `length_per_radian` is what a rotation of the gaze counts as on the
     // position clock; any positive value will do, and it must be the same for verdicts and motions.
@@ -38,31 +45,26 @@ public:
 
     // One verdict for each node. Cost: about ten nanoseconds a node.
     void test(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const;
+    // The same where costs count, not only what is above the threshold: what nodes face is always found out. (In the above, the
+    // costs of nodes that are far from the threshold may be those of another facing.)
+    void test_costs(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const;
 
     // From one viewpoint to another with as many frusta of as many planes; infinite where these differ.
     static Motion motion(const VertexTree& tree, const Viewpoint& from, const Viewpoint& to, double length_per_radian);
 
 private:
-    struct Lane; // one node of a batch
-
-    void test_batch(std::span<const NodeId> nodes, Verdict* verdicts) const;
-    Lane lane_of(NodeId node, const SphereBatch& spheres, std::size_t i) const;
-    Verdict judge(const Lane& lane, float front, float back) const;
-    Verdict judge_by_distance(const Lane& lane) const;
-    float cost_of(std::uint16_t row, const Lane& lane, float reach) const;
-    float distance_of(std::uint16_t row, std::size_t bin, float length) const;
-    std::size_t bin_of(float eccentricity) const;
-    float path_of(float turn, float gap) const;
-    float folded_slack(std::uint16_t row, const Lane& lane, float reach) const;
-    float unfolded_slack(std::uint16_t row, const Lane& lane, float reach) const;
+    void test(std::span<const NodeId> nodes, std::span<Verdict> verdicts, bool costs) const;
+    void load(std::span<const NodeId> nodes, FoldBatch& batch) const;
+    void test_batch(std::span<const NodeId> nodes, Verdict* verdicts, bool costs) const;
+    void find_facings(std::span<const NodeId> nodes, const FoldBatch& batch, bool costs, Findings& findings) const;
+    void find_position_slacks(const FoldBatch& batch, Findings& findings) const;
+    void set_costs(Verdict& verdict, const FoldBatch& batch, std::size_t lane, bool is_silhouette) const;
 
     const VertexTree& tree_;
     const DistanceCriterion& criterion_;
     bool cull_back_faces_, has_silhouettes_;
-    KernelView view_;
-    float threshold_ = 1, inverse_bin_ = 0, turn_per_length_ = 0, last_bin_ = 0;
-    std::vector<float> reach_; // of the criterion, at the threshold: infinite where the fold is seen from everywhere
-    std::size_t bins_ = 1;
+    std::vector<float> reach_; // of the criterion; infinite where the fold is seen from everywhere
+    KernelView view_, costs_view_;
 };
 
 } // namespace unseen::vdtree

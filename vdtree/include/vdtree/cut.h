@@ -17,6 +17,7 @@
 namespace unseen::vdtree {
 
 class CutFollower;
+struct SceneObject;
 
 struct AdjustOptions {
     VisibilityTest visibility = {};                  // default: everything can be seen
@@ -28,12 +29,27 @@ struct AdjustStats {
     std::uint64_t folds = 0;      // nodes that went from unfolded to folded, and the reverse
     std::uint64_t unfolds = 0;
     Index triangles = 0;
-    float max_fold_cost = 0;      // the largest cost among the folded nodes that can be seen; 0 without folds
+    float max_fold_cost = 0;      // the largest cost among the folded nodes that can be seen; 0 without folds. With
+                                  // hysteresis, and without a budget: not more than this
+    bool is_complete = true;      // false: the time limit has left something to do
 };
 
 struct FollowOptions {
     // Nodes unfold where their cost is above this. 1: nobody sees a fold; 2: nobody would from twice the distance.
+    // Not used with a triangle budget.
     float threshold = 1;
+
+    // Best effort: at most so many triangles. Unfolds in descending cost, ties by node number, down to cost 0.
+    std::optional<Index> triangle_budget = {};
+    bool fill_budget = false; // go on at cost 0 while triangles are left
+    // 1: the best cut within the budget, always: its largest fold cost is the least. More, up to 2: the largest fold cost may
+    // exceed the least by this factor; then a frame costs what changes, and slow motions do not flicker.
+    float hysteresis = 1;
+
+    // At most so long, as near as the clock and a batch of tests allow; what is left to do is done at the next calls, worst folds
+    // first. Results then depend on the machine's speed.
+    std::optional<double> milliseconds = {};
+
     // Nodes whose ring faces away fold at no cost. Only for surfaces that are closed and consistently oriented, drawn with back
     // faces culled, and seen from outside.
     bool cull_back_faces = false;
@@ -82,7 +98,7 @@ public:
     // Makes the cut that a criterion in distance form asks for, from where the last call left it: unfolds where the cost is above
     // the threshold, top-down. The result does not depend on the state before; the cost does: it goes with what changes, and a view that
     // stands still costs nothing. Another criterion, or a jump of the viewpoint, tests every node in use once.
-    // Fails, and changes nothing, where the viewpoint is not finite or the threshold not positive.
+    // Fails, and changes nothing, where the viewpoint is not finite or an option out of range.
     Result<AdjustStats> follow(const DistanceCriterion& criterion, const Viewpoint& viewpoint,
                                const FollowOptions& options = {});
 
@@ -116,6 +132,7 @@ private:
     void fold_below(NodeId node, FunctionRef<void(NodeId)> on_fold); // tells each node, descendants first
     void apply_fold(NodeId node);
     void end_changes(AdjustStats& stats);
+    friend Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objects, Index triangle_budget);
     void become(std::vector<std::uint64_t> unfolded, AdjustStats& stats);
     void change_to(std::vector<std::uint64_t> unfolded, AdjustStats& stats);
     void replay(std::span<const std::uint64_t> unfolded, AdjustStats& stats);
@@ -131,6 +148,19 @@ private:
     struct Indices;
     mutable std::unique_ptr<Indices> indices_; // made when it is first asked for
 };
+
+// One object of a scene that shares a budget.
+struct SceneObject {
+    Cut& cut;
+    const DistanceCriterion& criterion;
+    Viewpoint viewpoint;             // in the object's own frame
+    bool cull_back_faces = false;
+};
+
+// Makes the cuts of several objects the best within one number of triangles: unfolds in descending cost over all of them, ties by the
+// earlier object and then by node number, down to cost 0. Returns one entry an object; max_fold_cost is the scene's.
+// Fails, and changes nothing, where a viewpoint is not finite or a cut is named twice.
+Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objects, Index triangle_budget);
 
 // The cut as a mesh of its own: only the vertices in use, in double precision, with the tree's attributes.
 Mesh extract_mesh(const Cut& cut);

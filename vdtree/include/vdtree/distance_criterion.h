@@ -36,10 +36,10 @@ public:
 
     struct Parts {
         Spheres spheres = Spheres::ring;
-        std::vector<FoldClass> classes;   // by interior node; empty: class 0 for all, whatever they face
-        std::vector<float> lengths;       // by interior node, mesh units, 0 or more; empty: the spheres' radii
-        std::vector<float> reach;         // [class * eccentricity_bins + bin]: distance in lengths; not growing with the bin
-        std::vector<float> least_cost;    // of the same shape: no fold of this class costs less, from however far (drawn, it is at
+        std::vector<FoldClass> classes = {};   // by interior node; empty: class 0 for all, whatever they face
+        std::vector<float> lengths = {};       // by interior node, mesh units, 0 or more; empty: the spheres' radii
+        std::vector<float> reach = {};         // [class * eccentricity_bins + bin]: distance in lengths; not growing with the bin
+        std::vector<float> least_cost = {};    // of the same shape: no fold of this class costs less, from however far (drawn, it is at
                                           // least a pixel); empty: 0 for all
         std::size_t eccentricity_bins = 1;
         double bin_degrees = 1;           // bin b holds b * bin_degrees up to the next; the last one everything beyond

@@ -1,0 +1,546 @@
+// Cuts that follow a viewpoint: whatever the way, they are what the criterion asks for, and the index buffer is theirs.
+#include <vdtree/cut.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <random>
+#include <set>
+#include <thread>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#include <vdtree/builder.h>
+
+#include "fold_tester.h"
+#include "shapes.h"
+#include "tree_checks.h"
+
+namespace unseen::vdtree {
+namespace {
+
+using shapes::random_unit;
+
+// Frames a mesh class; the customer's figure, 10^4, is reached with the environment variable UNSEEN_FRAMES.
+int frame_count() {
+    const char* asked = std::getenv("UNSEEN_FRAMES");
+    return asked ? std::atoi(asked) : 400;
+}
+
+VertexTree built(const Mesh& mesh, ClustererKind kind = ClustererKind::quadric) {
+    Result<VertexTree> tree = build_tree(mesh.view(), {.clusterer = kind, .threads = 1});
+    if (!tree) throw std::runtime_error(tree.error().message);
+    return std::move(*tree);
+}
+
+// Many quads, each on its own, turned anyhow.
+Mesh leaves(int count) {
+    std::mt19937_64 random(5);
+    Mesh mesh;
+    for (int i = 0; i < count; ++i) {
+        const auto direction = [&] { return glm::normalize(glm::dvec3(random_unit(random), random_unit(random), random_unit(random)) - 0.5 + 1e-3); };
+        const glm::dvec3 centre(4 * random_unit(random), 4 * random_unit(random), 4 * random_unit(random));
+        const glm::dvec3 a = 0.1 * direction(), b = 0.1 * glm::normalize(glm::cross(a, direction()));
+        const Index first = static_cast<Index>(mesh.positions.size());
+        for (const glm::dvec3 corner : {centre - a - b, centre + a - b, centre + a + b, centre - a + b}) mesh.positions.push_back(corner);
+        mesh.triangles.push_back({first, first + 1, first + 2});
+        mesh.triangles.push_back({first, first + 2, first + 3});
+    }
+    return mesh;
+}
+
+struct MeshClass {
+    const char* name;
+    Mesh (*make)();
+};
+const MeshClass mesh_classes[] = {
+    {"organic", [] { return shapes::bumpy_sphere(4, 0.03); }},
+    {"foliage", [] { return leaves(600); }},
+    {"cad", [] { return shapes::together(shapes::cube(12), shapes::placed(shapes::torus(40, 16), 0.6, {1, 0.5, 0})); }},
+    {"soup", [] { return shapes::random_soup(500, 1500, 7); }},
+};
+
+// A criterion of everything that there is: silhouettes, eccentricity, rows that differ from node to node, monotone.
+DistanceCriterion rich_criterion(const VertexTree& tree, std::uint64_t seed, bool with_gaze) {
+    std::mt19937_64 random(seed);
+    constexpr std::size_t rows = 24;
+    DistanceCriterion::Parts parts;
+    parts.eccentricity_bins = with_gaze ? 40 : 1;
+    parts.bin_degrees = 1.5;
+    parts.classes.resize(tree.interior_count());
+    for (NodeId node = tree.interior_count(); node-- > 0;) {
+        FoldClass& own = parts.classes[node];
+        own.interior = std::max(own.interior, static_cast<std::uint16_t>(random() % 8));
+        own.silhouette = std::max<std::uint16_t>({own.silhouette, own.interior, static_cast<std::uint16_t>(8 + random() % 15)});
+        if (node == 0) break;
+        FoldClass& parent = parts.classes[tree.parents()[node]];
+        parent.interior = std::max(parent.interior, own.interior);
+        parent.silhouette = std::max(parent.silhouette, own.silhouette);
+    }
+    for (std::size_t row = 0; row < rows; ++row)
+        for (std::size_t bin = 0; bin < parts.eccentricity_bins; ++bin)
+            parts.reach.push_back(row == 0 ? DistanceCriterion::never_visible
+                                  : row == rows - 1 ? DistanceCriterion::always_visible
+                                                    : static_cast<float>(2.0 * static_cast<double>(row) * std::exp(-0.06 * static_cast<double>(bin))));
+    Result<DistanceCriterion> criterion = DistanceCriterion::create(tree, std::move(parts));
+    if (!criterion) throw std::runtime_error(criterion.error().message);
+    return std::move(*criterion);
+}
+
+glm::dvec3 random_direction(std::mt19937_64& random) {
+    glm::dvec3 d;
+    do d = 2.0 * glm::dvec3(random_unit(random), random_unit(random), random_unit(random)) - 1.0;
+    while (!(glm::length(d) > 0.1 && glm::length(d) < 1));
+    return glm::normalize(d);
+}
+
+// A path of small steps, turns of the gaze, stops, cuts to elsewhere, the inside of the model and far away.
+class Path {
+public:
+    Path(const VertexTree& tree, std::uint64_t seed, bool with_gaze, bool with_frustum)
+        : tree_(tree), random_(seed), with_gaze_(with_gaze), with_frustum_(with_frustum) {
+        const Sphere sphere = tree.bounding_sphere();
+        centre_ = glm::dvec3(sphere.centre);
+        radius_ = sphere.radius;
+        jump();
+    }
+
+    Viewpoint next() {
+        switch (random_() % 24) {
+        case 0: jump(); break;
+        case 1: gaze_ = random_direction(random_); break;
+        case 2: break; // stands still
+        case 3: velocity_ = random_direction(random_) * radius_ * std::pow(10.0, -1 - 3 * random_unit(random_)); break;
+        default: eye_ += velocity_; turn_ = glm::normalize(turn_ + 0.01 * velocity_ / radius_); break;
+        }
+        Viewpoint viewpoint{.eye = eye_};
+        if (with_gaze_) viewpoint.gaze = glm::normalize(gaze_ + 0.02 * turn_);
+        if (with_frustum_) {
+            View view;
+            view.eye = tree_.origin() + eye_;
+            view.target = tree_.origin() + centre_ + 0.3 * radius_ * turn_;
+            view.up = {0.1, 1, 0.05};
+            if (validate(view)) viewpoint.frusta.push_back(frustum_of(tree_, view));
+            else viewpoint.frusta.push_back({{Plane{{0, 0, 1}, 0}}});
+        }
+        return viewpoint;
+    }
+
+private:
+    void jump() {
+        eye_ = centre_ + random_direction(random_) * radius_ * std::pow(10.0, 2.5 * random_unit(random_) - 1);
+        velocity_ = random_direction(random_) * radius_ * 0.02;
+        gaze_ = glm::normalize(centre_ - eye_);
+    }
+
+    const VertexTree& tree_;
+    std::mt19937_64 random_;
+    bool with_gaze_, with_frustum_;
+    glm::dvec3 centre_, eye_{0}, velocity_{0}, gaze_{0, 0, 1}, turn_{0, 1, 0};
+    double radius_;
+};
+
+// Independent of the follower: top-down by single tests.
+std::vector<bool> from_scratch(const VertexTree& tree, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
+                               const FollowOptions& options) {
+    FoldTester tester(tree, criterion, options.cull_back_faces, options.threshold);
+    tester.look_from(viewpoint, 1);
+    std::vector<bool> unfolded(tree.interior_count(), false);
+    for (NodeId node = 0; node < tree.interior_count();) {
+        Verdict verdict;
+        tester.test({&node, 1}, {&verdict, 1});
+        unfolded[node] = verdict.unfolded;
+        node = verdict.unfolded ? node + 1 : tree.subtree_end()[node];
+    }
+    return unfolded;
+}
+
+std::vector<bool> state_of(const Cut& cut) {
+    std::vector<bool> unfolded;
+    for (NodeId node = 0; node < cut.tree().interior_count(); ++node) unfolded.push_back(cut.is_unfolded(node));
+    return unfolded;
+}
+
+using Triangles = std::multiset<std::array<NodeId, 3>>;
+Triangles triangles_of(std::span<const NodeId> indices) {
+    Triangles out;
+    for (std::size_t i = 0; i < indices.size(); i += 3) {
+        std::array<NodeId, 3> t{indices[i], indices[i + 1], indices[i + 2]};
+        std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+        out.insert(t);
+    }
+    return out;
+}
+
+// What the cut's definition says: triangles of unfolded nodes, by the proxies of their corners.
+Triangles gathered(const Cut& cut) {
+    const VertexTree& tree = cut.tree();
+    std::vector<NodeId> indices;
+    for (NodeId node = 0; node < tree.interior_count(); ++node)
+        if (cut.is_unfolded(node))
+            for (Index t = tree.first_triangle()[node]; t < tree.first_triangle()[node + 1]; ++t)
+                for (const Index leaf : tree.triangles()[t]) indices.push_back(cut.proxy_of_leaf(leaf));
+    return triangles_of(indices);
+}
+
+class Follow : public testing::TestWithParam<MeshClass> {};
+INSTANTIATE_TEST_SUITE_P(MeshClasses, Follow, testing::ValuesIn(mesh_classes),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+TEST_P(Follow, EqualsTheCutFromScratchOnRandomPaths) {
+    const VertexTree tree = built(GetParam().make());
+    std::uint64_t incremental_tests = 0, all_tests = 0;
+    for (const bool with_gaze : {false, true}) {
+        for (const bool with_frustum : {false, true}) {
+            const DistanceCriterion criterion = rich_criterion(tree, 3, with_gaze);
+            Path path(tree, 11, with_gaze, with_frustum);
+            Cut cut(tree);
+            FollowOptions options;
+            options.cull_back_faces = with_gaze && with_frustum && tree.closedness() != Closedness::open;
+            for (int frame = 0; frame < frame_count() / 4; ++frame) {
+                const Viewpoint viewpoint = path.next();
+                const auto stats = cut.follow(criterion, viewpoint, options);
+                ASSERT_TRUE(stats);
+                const std::vector<bool> expected = from_scratch(tree, criterion, viewpoint, options);
+                ASSERT_EQ(state_of(cut), expected) << "frame " << frame << (with_gaze ? ", gaze" : "") << (with_frustum ? ", frustum" : "");
+                ASSERT_EQ(support::fault_in_cut(cut), "") << "frame " << frame;
+                ASSERT_EQ(triangles_of(cut.indices()), gathered(cut)) << "frame " << frame;
+                incremental_tests += stats->node_tests;
+                all_tests += static_cast<std::uint64_t>(std::count(expected.begin(), expected.end(), true));
+            }
+        }
+    }
+    EXPECT_LT(incremental_tests, 4 * all_tests);
+}
+
+TEST_P(Follow, PatchesTheIndexBufferThatACopyKeepsUpWith) {
+    const VertexTree tree = built(GetParam().make());
+    const DistanceCriterion criterion = rich_criterion(tree, 4, false);
+    const Sphere sphere = tree.bounding_sphere();
+    Cut cut(tree);
+    std::vector<NodeId> copy;
+    int patched = 0, gathered_anew = 0;
+    for (int frame = 0; frame < 120; ++frame) {
+        const double angle = frame * 0.002, distance = sphere.radius * (6 + std::sin(frame * 0.05));
+        ASSERT_TRUE(cut.follow(criterion, {.eye = glm::dvec3(sphere.centre) + distance * glm::dvec3(std::sin(angle), 0.2, std::cos(angle))}));
+        const auto indices = cut.indices();
+        if (const auto writes = cut.index_writes()) {
+            ++patched;
+            for (const IndexWrite& write : *writes) {
+                if (write.place >= copy.size()) copy.resize(write.place + 1);
+                copy[write.place] = write.value;
+            }
+            copy.resize(indices.size());
+        } else {
+            ++gathered_anew;
+            copy.assign(indices.begin(), indices.end());
+        }
+        ASSERT_TRUE(std::ranges::equal(copy, indices)) << "frame " << frame;
+    }
+    EXPECT_GT(patched, gathered_anew);
+}
+
+TEST(FollowStill, CostsNothingAndChangesNothing) {
+    const VertexTree tree = built(shapes::bumpy_sphere(4));
+    const DistanceCriterion criterion = rich_criterion(tree, 5, true);
+    Cut cut(tree);
+    const Viewpoint viewpoint{.eye = {3, 1, 2}, .gaze = glm::normalize(glm::dvec3(-3, -1, -2))};
+    ASSERT_TRUE(cut.follow(criterion, viewpoint));
+    for (int frame = 0; frame < 5; ++frame) {
+        const auto stats = cut.follow(criterion, viewpoint);
+        ASSERT_TRUE(stats);
+        EXPECT_EQ(stats->node_tests, 0u);
+        EXPECT_EQ(stats->folds + stats->unfolds, 0u);
+        EXPECT_TRUE(cut.changes().empty());
+    }
+}
+
+TEST(FollowChanges, ReplayToTheSameCut) {
+    const VertexTree tree = built(shapes::torus(40, 20));
+    const DistanceCriterion criterion = rich_criterion(tree, 6, false);
+    Path path(tree, 12, false, true);
+    Cut cut(tree), replica(tree);
+    for (int frame = 0; frame < 200; ++frame) {
+        ASSERT_TRUE(cut.follow(criterion, path.next()));
+        for (const FoldChange& change : cut.changes()) ASSERT_TRUE(change.folded ? replica.fold(change.node) : replica.unfold(change.node));
+        ASSERT_EQ(state_of(cut), state_of(replica)) << "frame " << frame;
+    }
+}
+
+TEST(FollowAfterOthers, StartsOverFromWhateverTheCutIs) {
+    const VertexTree tree = built(shapes::torus(40, 20));
+    const DistanceCriterion criterion = rich_criterion(tree, 7, false);
+    const Viewpoint viewpoint{.eye = {6, 1, 2}};
+    Cut cut(tree), other(tree);
+    ASSERT_TRUE(other.follow(criterion, viewpoint));
+    ASSERT_TRUE(cut.follow(criterion, viewpoint));
+    cut.unfold_all();
+    ASSERT_TRUE(cut.follow(criterion, viewpoint));
+    EXPECT_EQ(state_of(cut), state_of(other));
+    cut.fold_subtree(tree.subtree_end()[1]);
+    ASSERT_TRUE(cut.follow(criterion, viewpoint));
+    EXPECT_EQ(state_of(cut), state_of(other));
+}
+
+// Every closed-upward set of nodes of a small tree, as bit patterns.
+std::vector<std::uint32_t> all_cuts(const VertexTree& tree) {
+    std::vector<std::uint32_t> cuts;
+    for (std::uint32_t bits = 0; bits < 1u << tree.interior_count(); ++bits) {
+        bool closed = true;
+        for (NodeId node = 1; node < tree.interior_count() && closed; ++node)
+            closed = !((bits >> node) & 1) || ((bits >> tree.parents()[node]) & 1);
+        if (closed) cuts.push_back(bits);
+    }
+    return cuts;
+}
+
+TEST(FollowBudget, HasTheLeastLargestCostOfAllCuts) {
+    for (const unsigned seed : {1u, 2u, 3u, 4u}) {
+        const VertexTree tree = built(shapes::random_soup(12, 14, seed));
+        ASSERT_LE(tree.interior_count(), 16u);
+        const DistanceCriterion criterion = rich_criterion(tree, seed, false);
+        const Viewpoint viewpoint{.eye = {2, 1.5, 3}};
+        FoldTester tester(tree, criterion, false, 1, false);
+        tester.look_from(viewpoint, 1);
+        std::vector<NodeId> nodes(tree.interior_count());
+        std::vector<Verdict> verdicts(nodes.size());
+        for (NodeId node = 0; node < nodes.size(); ++node) nodes[node] = node;
+        tester.test_costs(nodes, verdicts);
+        std::vector<float> cost(nodes.size());
+        for (NodeId node = 0; node < nodes.size(); ++node)
+            cost[node] = node == 0 ? verdicts[0].cost : std::min(verdicts[node].cost, cost[tree.parents()[node]]);
+        const auto triangles_and_cost = [&](auto is_unfolded) {
+            Index triangles = 0;
+            float largest = 0;
+            for (NodeId node = 0; node < tree.interior_count(); ++node) {
+                if (is_unfolded(node)) triangles += tree.first_triangle()[node + 1] - tree.first_triangle()[node];
+                else largest = std::max(largest, cost[node]);
+            }
+            return std::pair(triangles, largest);
+        };
+        const std::vector<std::uint32_t> cuts = all_cuts(tree);
+        for (Index budget = 0; budget <= tree.triangle_count(); ++budget) {
+            Cut cut(tree);
+            ASSERT_TRUE(cut.follow(criterion, viewpoint, {.triangle_budget = budget}));
+            const auto [triangles, largest] = triangles_and_cost([&](NodeId node) { return cut.is_unfolded(node); });
+            EXPECT_LE(triangles, budget);
+            for (const std::uint32_t bits : cuts) {
+                const auto [others, others_largest] = triangles_and_cost([&](NodeId node) { return (bits >> node) & 1; });
+                if (others > budget) continue;
+                ASSERT_LE(largest, others_largest) << "budget " << budget << ", seed " << seed;
+            }
+        }
+    }
+}
+
+TEST(FollowBudget, IsTheSameWhateverWasBefore) {
+    const VertexTree tree = built(shapes::bumpy_sphere(4, 0.03));
+    const DistanceCriterion criterion = rich_criterion(tree, 8, true);
+    Path path(tree, 13, true, true);
+    Cut cut(tree);
+    for (int frame = 0; frame < 60; ++frame) {
+        const Viewpoint viewpoint = path.next();
+        const FollowOptions options{.triangle_budget = static_cast<Index>(100 + 37 * (frame % 7))};
+        const auto stats = cut.follow(criterion, viewpoint, options);
+        ASSERT_TRUE(stats);
+        Cut fresh(tree);
+        ASSERT_TRUE(fresh.follow(criterion, viewpoint, options));
+        ASSERT_EQ(state_of(cut), state_of(fresh)) << "frame " << frame;
+        EXPECT_LE(stats->triangles, *options.triangle_budget);
+    }
+}
+
+TEST(FollowBudget, StopsAtCostZeroUnlessToldToFill) {
+    const VertexTree tree = built(shapes::bumpy_sphere(3));
+    DistanceCriterion::Parts parts;
+    parts.reach = {DistanceCriterion::never_visible};
+    const auto invisible = DistanceCriterion::create(tree, parts);
+    ASSERT_TRUE(invisible);
+    Cut cut(tree);
+    ASSERT_TRUE(cut.follow(*invisible, {.eye = {5, 0, 0}}, {.triangle_budget = 200}));
+    EXPECT_EQ(cut.triangle_count(), 0u);
+    ASSERT_TRUE(cut.follow(*invisible, {.eye = {5, 0, 0}}, {.triangle_budget = 200, .fill_budget = true}));
+    EXPECT_GT(cut.triangle_count(), 190u);
+    EXPECT_LE(cut.triangle_count(), 200u);
+}
+
+TEST(FollowBudget, WithHysteresisStaysWithinItsFactorAndDoesNotFlicker) {
+    const VertexTree tree = built(shapes::bumpy_sphere(5, 0.02));
+    const DistanceCriterion criterion = rich_criterion(tree, 9, false);
+    const Sphere sphere = tree.bounding_sphere();
+    constexpr Index budget = 4000;
+    constexpr float hysteresis = 1.1f;
+    Cut steady(tree), exact(tree);
+    std::map<NodeId, int> unfolded_at;
+    int flickers = 0, folds = 0;
+    for (int frame = 0; frame < 240; ++frame) {
+        const double angle = frame * 0.01;
+        const Viewpoint viewpoint{.eye = glm::dvec3(sphere.centre) + 4.0 * sphere.radius * glm::dvec3(std::sin(angle), 0.3, std::cos(angle))};
+        const auto with = steady.follow(criterion, viewpoint, {.triangle_budget = budget, .hysteresis = hysteresis});
+        const auto without = exact.follow(criterion, viewpoint, {.triangle_budget = budget});
+        ASSERT_TRUE(with && without);
+        ASSERT_LE(with->triangles, budget) << "frame " << frame;
+        ASSERT_LE(with->max_fold_cost, hysteresis * without->max_fold_cost * 1.0001f) << "frame " << frame;
+        for (const FoldChange& change : steady.changes()) {
+            if (!change.folded) {
+                unfolded_at[change.node] = frame;
+                continue;
+            }
+            ++folds;
+            const auto unfolded = unfolded_at.find(change.node);
+            flickers += unfolded != unfolded_at.end() && frame - unfolded->second <= 10;
+        }
+        ASSERT_EQ(triangles_of(steady.indices()), gathered(steady)) << "frame " << frame;
+    }
+    EXPECT_GT(folds, 100);
+    EXPECT_LT(flickers, folds / 20) << flickers << " of " << folds;
+}
+
+TEST(FollowInTime, FinishesLaterWhatTheTimeDidNotReach) {
+    const VertexTree tree = built(shapes::bumpy_sphere(5, 0.02));
+    const DistanceCriterion criterion = rich_criterion(tree, 10, false);
+    const Viewpoint viewpoint{.eye = {2, 1, 2}};
+    Cut whole(tree), hurried(tree);
+    ASSERT_TRUE(whole.follow(criterion, viewpoint));
+    auto stats = hurried.follow(criterion, viewpoint, {.milliseconds = 0.0});
+    ASSERT_TRUE(stats);
+    EXPECT_FALSE(stats->is_complete);
+    EXPECT_LT(hurried.triangle_count(), whole.triangle_count());
+    int calls = 0;
+    for (; !stats->is_complete && calls < 10000; ++calls) {
+        stats = hurried.follow(criterion, viewpoint, {.milliseconds = 0.05});
+        ASSERT_TRUE(stats);
+        ASSERT_EQ(support::fault_in_cut(hurried), "");
+    }
+    EXPECT_TRUE(stats->is_complete);
+    EXPECT_EQ(state_of(hurried), state_of(whole));
+}
+
+TEST(FollowScene, SharesABudgetAmongObjects) {
+    const VertexTree near_tree = built(shapes::bumpy_sphere(4, 0.03)), far_tree = built(shapes::torus(40, 20));
+    const DistanceCriterion near_criterion = rich_criterion(near_tree, 1, false), far_criterion = rich_criterion(far_tree, 2, false);
+    Cut near_cut(near_tree), far_cut(far_tree);
+    const SceneObject objects[] = {{near_cut, near_criterion, {.eye = {3, 0, 0}}}, {far_cut, far_criterion, {.eye = {0, 40, 9}}}};
+    const auto stats = follow_scene(objects, 2000);
+    ASSERT_TRUE(stats);
+    EXPECT_LE(near_cut.triangle_count() + far_cut.triangle_count(), 2000u);
+    EXPECT_GT(near_cut.triangle_count() + far_cut.triangle_count(), 1900u);
+    // The same threshold for both: neither alone would do better within its share.
+    Cut alone(near_tree);
+    const auto own = alone.follow(near_criterion, {.eye = {3, 0, 0}}, {.triangle_budget = near_cut.triangle_count()});
+    ASSERT_TRUE(own);
+    EXPECT_EQ(state_of(alone), state_of(near_cut));
+    const SceneObject twice[] = {{near_cut, near_criterion, {}}, {near_cut, near_criterion, {}}};
+    EXPECT_FALSE(follow_scene(twice, 10));
+}
+
+TEST(FollowFarAway, FoldsToNothing) {
+    const VertexTree tree = built(shapes::bumpy_sphere(4));
+    const auto criterion = extent_criterion(tree, View{}, 1);
+    ASSERT_TRUE(criterion);
+    Cut cut(tree);
+    ASSERT_TRUE(cut.follow(*criterion, {.eye = {3, 0, 0}}));
+    EXPECT_GT(cut.triangle_count(), 0u);
+    ASSERT_TRUE(cut.follow(*criterion, {.eye = {1e9, 0, 0}}));
+    EXPECT_EQ(cut.triangle_count(), 0u);
+}
+
+TEST(FollowBadInput, IsRefusedAndChangesNothing) {
+    const VertexTree tree = built(shapes::bumpy_sphere(3));
+    const DistanceCriterion criterion = rich_criterion(tree, 2, true);
+    Cut cut(tree);
+    ASSERT_TRUE(cut.follow(criterion, {.eye = {3, 0, 0}}));
+    const std::vector<bool> before = state_of(cut);
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+    EXPECT_FALSE(cut.follow(criterion, {.eye = {nan, 0, 0}}));
+    EXPECT_FALSE(cut.follow(criterion, {.eye = {0, infinity, 0}}));
+    EXPECT_FALSE(cut.follow(criterion, {.eye = {0, 1e30, 0}}));
+    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}, .gaze = glm::dvec3(0)}));
+    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}, .gaze = glm::dvec3(nan)}));
+    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}, .frusta = {{{Plane{{0, 0, nan}, 0}}}}}));
+    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}}, {.threshold = 0}));
+    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}}, {.threshold = std::nanf("")}));
+    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}}, {.hysteresis = 0.5f}));
+    EXPECT_FALSE(cut.follow(criterion, {.eye = {3, 0, 0}}, {.milliseconds = -1.0}));
+    EXPECT_EQ(state_of(cut), before);
+    EXPECT_TRUE(cut.follow(criterion, {.eye = {3, 0, 0}}));
+    EXPECT_EQ(state_of(cut), before);
+}
+
+TEST(FollowBadInput, CriteriaThatDoNotFitAreRefused) {
+    const VertexTree tree = built(shapes::bumpy_sphere(3));
+    using Parts = DistanceCriterion::Parts;
+    EXPECT_FALSE(DistanceCriterion::create(tree, Parts{}));
+    EXPECT_FALSE(DistanceCriterion::create(tree, Parts{.reach = {std::nanf("")}}));
+    EXPECT_FALSE(DistanceCriterion::create(tree, Parts{.lengths = {1, 2}, .reach = {1}}));
+    EXPECT_FALSE(DistanceCriterion::create(tree, Parts{.classes = std::vector<FoldClass>(tree.interior_count(), {7, 7}), .reach = {1}}));
+    EXPECT_FALSE(DistanceCriterion::create(tree, Parts{.lengths = std::vector<float>(tree.interior_count(), -1), .reach = {1}}));
+    EXPECT_FALSE(DistanceCriterion::create(tree, Parts{.reach = {1, 2}, .eccentricity_bins = 2}));
+    EXPECT_FALSE(extent_criterion(tree, View{}, 0));
+    EXPECT_FALSE(displacement_criterion(tree, View{}, std::nan("")));
+}
+
+TEST(FollowHardTrees, OneTriangleCoincidentVerticesAndEqualDistances) {
+    Mesh fan; // as deep as it has vertices under a clusterer that makes a chain
+    for (int i = 0; i < 400; ++i) fan.positions.push_back({std::cos(i * 0.015), std::sin(i * 0.015), 0.001 * i});
+    for (Index i = 1; i + 1 < 400; ++i) fan.triangles.push_back({0, i, i + 1});
+    const auto chain = [](const ClusterInput& input) -> Result<Clustering> {
+        Clustering c;
+        const Index n = static_cast<Index>(input.mesh.positions.size());
+        c.parents.resize(2 * n - 1);
+        c.parents[0] = n;
+        for (Index v = 1; v < n; ++v) c.parents[v] = n + v - 1;
+        for (Index k = n; k + 1 < 2 * n - 1; ++k) c.parents[k] = k + 1;
+        c.parents[2 * n - 2] = 2 * n - 2;
+        return c;
+    };
+    Result<VertexTree> deep = build_tree(fan.view(), chain);
+    ASSERT_TRUE(deep);
+    std::vector<VertexTree> trees;
+    trees.push_back(std::move(*deep));
+    trees.push_back(built(shapes::single_triangle()));
+    trees.push_back(built(shapes::all_coincident(3000)));
+    for (const VertexTree& tree : trees) {
+        DistanceCriterion::Parts parts;
+        parts.lengths.assign(tree.interior_count(), 0.5f); // all D equal
+        parts.reach = {2};
+        const auto criterion = DistanceCriterion::create(tree, parts);
+        ASSERT_TRUE(criterion);
+        Cut cut(tree);
+        for (int frame = 0; frame < 300; ++frame) {
+            const Viewpoint viewpoint{.eye = {1 + 0.01 * frame, 0.3, 0.2}};
+            ASSERT_TRUE(cut.follow(*criterion, viewpoint));
+            ASSERT_EQ(state_of(cut), from_scratch(tree, *criterion, viewpoint, {}));
+            ASSERT_EQ(triangles_of(cut.indices()), gathered(cut));
+        }
+        for (const Index budget : {Index{0}, Index{1}, tree.triangle_count(), tree.triangle_count() + 1000})
+            EXPECT_TRUE(cut.follow(*criterion, {.eye = {2, 0, 0}}, {.triangle_budget = budget}));
+    }
+}
+
+TEST(FollowThreads, SeveralCutsShareATree) {
+    const VertexTree tree = built(shapes::torus(40, 20));
+    const DistanceCriterion criterion = rich_criterion(tree, 3, true);
+    std::vector<std::vector<bool>> results(4);
+    std::vector<std::thread> threads;
+    for (std::size_t i = 0; i < results.size(); ++i) {
+        threads.emplace_back([&, i] {
+            Path path(tree, 21, true, true);
+            Cut cut(tree);
+            for (int frame = 0; frame < 100; ++frame) {
+                static_cast<void>(cut.follow(criterion, path.next()));
+                static_cast<void>(cut.indices());
+            }
+            results[i] = state_of(cut);
+        });
+    }
+    for (std::thread& thread : threads) thread.join();
+    for (const auto& result : results) EXPECT_EQ(result, results[0]);
+}
+
+} // namespace
+} // namespace unseen::vdtree
