@@ -1,10 +1,8 @@
 #include "bound_facing.h"
 
 #include <algorithm>
+#include <array>
 #include <limits>
-
-#include <glm/geometric.hpp>
-#include <tbb/blocked_range.h>
 
 namespace unseen::vdtree {
 
@@ -24,68 +22,107 @@ constexpr Index never = std::numeric_limits<Index>::max();
 // order of making that decides which corner moves next: nothing but the triangle's own ancestors has to be known.
 class Folds {
 public:
-    Folds(const BoundInput& input, const Ancestors& ancestors, std::span<Directions> seen)
-        : in_(input), ancestors_(ancestors), seen_(seen), border_(input.shape.interior(), 0) {}
+    Folds(const BoundInput& input, const Ancestors& ancestors)
+        : in_(input), ancestors_(ancestors), border_(input.shape.interior(), 0) {}
 
-    void follow(const Triangle& triangle) {
-        Corner corners[3];
-        for (std::size_t k = 0; k < 3; ++k) put(corners[k], in_.shape.node_of_leaf(triangle[k]));
+    // Calls see(node, a, b, c) for each such view from a node of the part, with the triangle's corners in order. Corners
+    // outside of the part are looked up when they are needed.
+    template <class See>
+    void follow(const Triangle& triangle, const TreePart& part, See&& see) {
+        const TreeShape& shape = in_.shape;
+        NodeId nodes[3], above[3];
+        Index next[3];   // when the corner moves to the node above; never: it is not followed
+        bool current[3]; // whether the corner is where `nodes` says until then
+        glm::vec3 at[3];
+        const auto put = [&](std::size_t k, NodeId node) {
+            nodes[k] = node;
+            at[k] = in_.positions[node];
+            above[k] = shape.parents[node];
+            current[k] = above[k] != no_node && in_.parts.owns(part, above[k]);
+            next[k] = current[k] ? shape.made[above[k]] : never;
+        };
+        for (std::size_t k = 0; k < 3; ++k) {
+            const NodeId leaf = shape.node_of_leaf(triangle[k]);
+            put(k, leaf);
+            if (current[k] || !in_.parts.is_top(0) || !in_.parts.owns(part, 0)) continue;
+            // Of the nodes above the other parts, the first is looked for.
+            above[k] = ancestors_.lowest(above[k], [&](NodeId node) { return in_.parts.is_top(node); });
+            next[k] = shape.made[above[k]];
+        }
         for (;;) {
-            Corner& moving = corners[next_of(corners)];
-            const Index now = moving.next;
-            if (now == never) return;
-            for (const Corner& other : corners)
-                if (&other != &moving && other.next == now) return; // two corners meet
-            put(moving, moving.above);
-            if (border_[moving.node] > most_border_triangles) {
+            const Index now = std::min(next[0], std::min(next[1], next[2]));
+            const bool moves[3] = {next[0] == now, next[1] == now, next[2] == now};
+            if (moves[0] + moves[1] + moves[2] != 1) return; // two corners meet, or none is followed
+            const std::size_t k = moves[1] + 2u * moves[2];
+            put(k, above[k]);
+            const NodeId node = nodes[k];
+            if (border_[node] > most_border_triangles) {
                 // It faces everywhere already, and so do the nodes above: what they see is of no interest any more.
-                moving.followed = false;
-                moving.next = never;
+                current[k] = false;
+                next[k] = never;
                 continue;
             }
-            for (Corner& other : corners)
-                if (!other.followed) move_to(other, ancestors_.highest_made_by(other.node, now));
-            if (corners[0].node == corners[1].node || corners[1].node == corners[2].node ||
-                corners[2].node == corners[0].node)
-                return;
-            ++border_[moving.node];
-            seen_[moving.node].insert(
-                glm::cross(corners[1].position - corners[0].position, corners[2].position - corners[0].position));
+            for (std::size_t other = 0; other < 3; ++other) {
+                if (current[other] || other == k) continue;
+                nodes[other] = ancestors_.highest_made_by(nodes[other], now);
+                at[other] = in_.positions[nodes[other]];
+            }
+            if (nodes[0] == nodes[1] || nodes[1] == nodes[2] || nodes[2] == nodes[0]) return;
+            ++border_[node];
+            see(node, at[0], at[1], at[2]);
         }
     }
 
-    // To be called when all triangles have been followed.
-    void finish(NodeId node) const {
-        if (border_[node] > most_border_triangles) seen_[node] = Directions::everything();
-    }
+    // Whether more triangles came by than were followed. To be asked when all have been.
+    bool too_many(NodeId node) const { return border_[node] > most_border_triangles; }
 
 private:
-    struct Corner {
-        NodeId node;
-        NodeId above;
-        Index next;  // when it moves there
-        bool followed = true;
-        glm::dvec3 position;
-    };
-
-    static std::size_t next_of(const Corner (&c)[3]) {
-        if (c[0].next <= c[1].next) return c[0].next <= c[2].next ? 0 : 2;
-        return c[1].next <= c[2].next ? 1 : 2;
-    }
-    void move_to(Corner& corner, NodeId node) const {
-        corner.node = node;
-        corner.position = in_.position(node);
-    }
-    void put(Corner& corner, NodeId node) const {
-        move_to(corner, node);
-        corner.above = in_.shape.parents[node];
-        corner.next = corner.above == no_node ? never : in_.shape.made[corner.above];
-    }
-
     const BoundInput& in_;
     const Ancestors& ancestors_;
-    std::span<Directions> seen_;
     std::vector<std::uint16_t> border_; // by node: triangles around it after its fold, up to one too many
+};
+
+// Adds the directions of triangles to nodes and to leaves, some at a time.
+class Views {
+public:
+    Views(std::span<Directions> nodes, std::span<Directions> leaves) : nodes_(nodes), leaves_(leaves) {}
+    ~Views() { flush(); }
+    Views(const Views&) = delete;
+    Views& operator=(const Views&) = delete;
+
+    // To one node, or to up to three leaves, `none` standing for those to leave out.
+    void add(NodeId node, glm::vec3 a, glm::vec3 b, glm::vec3 c) { push({true, {node, none, none}}, a, b, c); }
+    void add(const Triangle& leaves, glm::vec3 a, glm::vec3 b, glm::vec3 c) { push({false, leaves}, a, b, c); }
+
+    static constexpr Index none = never;
+
+private:
+    struct Target {
+        bool is_node;
+        Triangle which;
+    };
+    void push(const Target& target, glm::vec3 a, glm::vec3 b, glm::vec3 c) {
+        targets_[batch_.size()] = target;
+        batch_.push(a, b, c);
+        if (batch_.full()) flush();
+    }
+    void flush() {
+        const std::size_t count = batch_.size();
+        batch_.measure();
+        for (std::size_t i = 0; i < count; ++i) {
+            const Target& to = targets_[i];
+            if (to.is_node) {
+                batch_.insert(i, nodes_[to.which[0]]);
+            } else {
+                for (const Index leaf : to.which)
+                    if (leaf != none) batch_.insert(i, leaves_[leaf]);
+            }
+        }
+    }
+
+    std::span<Directions> nodes_, leaves_;
+    NormalBatch batch_;
+    std::array<Target, NormalBatch::capacity> targets_;
 };
 
 } // namespace
@@ -98,14 +135,16 @@ NodeFacing bound_facing(const BoundInput& input, std::span<const Triangle> trian
     facing.flags.assign(shape.interior(), 0);
 
     std::vector<Directions> around(shape.leaves()); // by leaf: the normals of the triangles there
-    Folds folds(input, ancestors, facing.directions);
-    input.parts.for_each_triangle(triangles, [&](Index t) {
-        const Triangle& corners = triangles[t];
-        const glm::dvec3 a = input.leaf_position(corners[0]);
-        Directions normal;
-        normal.insert(glm::cross(input.leaf_position(corners[1]) - a, input.leaf_position(corners[2]) - a));
-        for (const Index leaf : corners) around[leaf] |= normal;
-        folds.follow(corners);
+    Folds folds(input, ancestors);
+    input.parts.for_each_triangle([&](const TreePart& part) {
+        return [&, views = Views(facing.directions, around)](Index t) mutable {
+            const Triangle& corners = triangles[t];
+            const auto at = [&](std::size_t k) { return input.positions[shape.node_of_leaf(corners[k])]; };
+            const auto owned = [&](Index leaf) { return input.parts.owns_leaf(part, leaf) ? leaf : Views::none; };
+            views.add({owned(corners[0]), owned(corners[1]), owned(corners[2])}, at(0), at(1), at(2));
+            folds.follow(corners, part,
+                         [&](NodeId node, glm::vec3 a, glm::vec3 b, glm::vec3 c) { views.add(node, a, b, c); });
+        };
     });
     // The dilation runs over places: an unwelded crease is no end of the surface.
     for (Index leaf = 0; leaf < shape.leaves(); ++leaf)
@@ -120,7 +159,7 @@ NodeFacing bound_facing(const BoundInput& input, std::span<const Triangle> trian
                 seen = {};
                 return;
             }
-            folds.finish(node);
+            if (folds.too_many(node)) seen = Directions::everything();
             std::uint8_t flags = 0;
             const auto add_leaf = [&](Index leaf) {
                 const auto ring = input.rings.around(leaf);

@@ -202,7 +202,9 @@ private:
 Result<VertexTree> TreeBuilder::build(Clusterer clusterer) {
     if (reporter_.cancelled(0.0, "analysing")) return cancelled_error();
     prelit_ = !mesh_.colours.empty();
+    (void)reporter_.cancelled(0.8,"Tcoinc");
     coincident_ = find_coincident(mesh_.positions);
+    (void)reporter_.cancelled(0.8,"Tsurf");
     surface_ = analyse_surface(mesh_, coincident_);
     if (reporter_.cancelled(clustering_begins, "clustering")) return cancelled_error();
     {
@@ -210,6 +212,7 @@ Result<VertexTree> TreeBuilder::build(Clusterer clusterer) {
         if (!clustering) return clustering.error();
         if (reporter_.cancelled(clustering_ends, "ordering")) return cancelled_error();
         order(*clustering);
+    (void)reporter_.cancelled(0.8,"Tplace");
         place_vertices(*clustering);
     }
     if (reporter_.cancelled(0.8, "bounding")) return cancelled_error();
@@ -219,6 +222,7 @@ Result<VertexTree> TreeBuilder::build(Clusterer clusterer) {
     g_->dropped_triangles = clean_.dropped + options_.dropped_before;
     g_->ranges.assign(source_.ranges.begin(), source_.ranges.end());
     auto data = std::make_shared<VertexTree::Data>();
+    (void)reporter_.cancelled(0.8,"Tlight");
     data->light = derive_luminance(*g_, options_.light, prelit_);
     data->geometry = std::move(g_);
     if (reporter_.cancelled(1.0, "done")) return cancelled_error();
@@ -285,21 +289,30 @@ LeafPlaces TreeBuilder::find_places() const {
 
 void TreeBuilder::bound() {
     TreeShape& shape = nodes_.shape;
+    (void)reporter_.cancelled(0.8,"Tanc");
     const Ancestors ancestors(shape);
+    (void)reporter_.cancelled(0.8,"Ttri");
     TriangleOrder triangles = order_triangles(mesh_.triangles, nodes_, ancestors);
     if (!source_.ranges.empty()) {
         for (Index& t : triangles.sources) t = clean_.source_triangles[t];
         g_->source_triangles = std::move(triangles.sources);
     }
+    (void)reporter_.cancelled(0.8,"Tplaces");
     const LeafPlaces places = find_places();
-    const TreeParts parts = part_tree(shape, triangles.first_triangle, triangles.triangles);
+    const TreeParts parts(shape, triangles.first_triangle, triangles.triangles);
+    (void)reporter_.cancelled(0.8,"Trings");
     const LeafRings rings = find_rings(triangles.triangles, places, parts);
     const BoundInput input{shape, parts, rings, g_->positions};
 
+    (void)reporter_.cancelled(0.8,"Tspheres");
     NodeSpheres spheres = bound_spheres(input);
+    (void)reporter_.cancelled(0.8,"Tcorners");
     g_->bounding_sphere = bound_corners(input);
+    (void)reporter_.cancelled(0.8,"Tdisp");
     g_->displacement = bound_displacements(input, spheres.support);
+    (void)reporter_.cancelled(0.8,"Tfacing");
     NodeFacing facing = bound_facing(input, triangles.triangles, places, spheres.support, ancestors);
+    (void)reporter_.cancelled(0.8,"Tpack");
     g_->support_spheres = std::move(spheres.support);
     g_->bounds.resize(shape.interior());
     g_->mask_at.resize(shape.interior());

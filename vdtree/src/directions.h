@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include <glm/geometric.hpp>
+#include <glm/common.hpp>
 #include <glm/vec3.hpp>
 
 #include <vdtree/normal_mask.h>
@@ -17,7 +17,7 @@ namespace unseen::vdtree {
 inline constexpr double cell_borders[3] = {0.19891236737965800691, 0.41421356237309504880, 0.66817863791929891999};
 
 // Cell of a direction given its largest absolute component, which is positive and finite. Multiplications and comparisons
-// only: the same vector always has the same cell, whatever the compiler makes of it.
+// only: the same vector always has the same cell, whatever the compiler makes of it, and NormalBatch gives the same.
 inline int cell_of(glm::dvec3 v, double largest) noexcept {
     const glm::dvec3 size = glm::abs(v);
     const int axis = size.x >= size.y ? (size.x >= size.z ? 0 : 2) : (size.y >= size.z ? 1 : 2);
@@ -37,28 +37,13 @@ struct alignas(64) Directions {
     // By slab: 128 more than its upper end, then 128 more than its lower end's opposite; 0: nothing yet.
     std::array<std::uint8_t, 16> reach{};
 
-    // Takes the direction of a cross product of differences of floats: no overflow when squared. Zero says nothing.
-    void insert(glm::dvec3 normal) noexcept {
-        const double largest = std::max({std::abs(normal.x), std::abs(normal.y), std::abs(normal.z)});
-        if (!(largest > 0)) return;
-        mask.insert(cell_of(normal, largest));
-        const double scale = units / std::sqrt(glm::dot(normal, normal));
-        const float x = static_cast<float>(normal.x * scale), y = static_cast<float>(normal.y * scale),
-                    z = static_cast<float>(normal.z * scale);
-        constexpr float s = 0.57735026918962576f;
-        const float along[8] = {x, y, z, (x + y + z) * s, (y + z - x) * s, (x - y + z) * s, (x + y - z) * s, -units};
-        for (std::size_t i = 0; i < 8; ++i) {
-            // Whole units outward: what is cut off below the end of the scale.
-            const auto high = static_cast<std::uint8_t>(255 - static_cast<int>(units - margin - along[i]));
-            const auto low = static_cast<std::uint8_t>(255 - static_cast<int>(units - margin + along[i]));
-            reach[i] = std::max(reach[i], high);
-            reach[8 + i] = std::max(reach[8 + i], low);
-        }
-    }
     Directions& operator|=(const Directions& other) noexcept {
         mask |= other.mask;
-        for (std::size_t i = 0; i < reach.size(); ++i) reach[i] = std::max(reach[i], other.reach[i]);
+        widen(other.reach);
         return *this;
+    }
+    void widen(const std::array<std::uint8_t, 16>& other) noexcept {
+        for (std::size_t i = 0; i < reach.size(); ++i) reach[i] = std::max(reach[i], other[i]);
     }
     static Directions everything() noexcept {
         Directions all;
@@ -75,10 +60,39 @@ struct alignas(64) Directions {
         }
         return out;
     }
+};
+
+// Finds the directions of the normals of many triangles at once: several per instruction.
+class NormalBatch {
+public:
+    static constexpr std::size_t capacity = 64;
+
+    bool full() const noexcept { return count_ == capacity; }
+    std::size_t size() const noexcept { return count_; }
+    void push(glm::vec3 a, glm::vec3 b, glm::vec3 c) noexcept {
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto k = static_cast<std::size_t>(axis);
+            corners_[k][count_] = a[axis];
+            corners_[3 + k][count_] = b[axis];
+            corners_[6 + k][count_] = c[axis];
+        }
+        ++count_;
+    }
+
+    // Measures what was pushed and empties the batch; the results stay until the next call.
+    void measure() noexcept;
+    // Adds the direction of the i-th triangle; none if it has no area.
+    void insert(std::size_t i, Directions& to) const noexcept {
+        if (cells_[i] < 0) return;
+        to.mask.insert(cells_[i]);
+        to.widen(reach_[i]);
+    }
 
 private:
-    static constexpr float units = 127;   // of NormalSlabs in 1
-    static constexpr float margin = 1e-4f; // units; covers the rounding of unit vectors in floats
+    std::size_t count_ = 0;
+    alignas(64) float corners_[9][capacity];
+    alignas(64) int cells_[capacity];
+    alignas(64) std::array<std::uint8_t, 16> reach_[capacity];
 };
 
 } // namespace unseen::vdtree

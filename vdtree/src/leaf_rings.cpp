@@ -10,19 +10,25 @@ LeafRings find_rings(std::span<const Triangle> triangles, const LeafPlaces& plac
     const auto closed = [&](Index leaf) { return places.alone[leaf] && !places.irregular[leaf]; };
     LeafRings rings;
     rings.start.assign(leaves + 1, 0);
-    parts.for_each_triangle(triangles, [&](Index t) {
-        for (const Index leaf : triangles[t]) rings.start[leaf] += closed(leaf) ? 1 : 2;
+    parts.for_each_triangle([&](const TreePart& part) {
+        return [&](Index t) {
+            for (const Index leaf : triangles[t])
+                if (parts.owns_leaf(part, leaf)) rings.start[leaf] += closed(leaf) ? 1 : 2;
+        };
     });
     std::partial_sum(rings.start.begin(), rings.start.end(), rings.start.begin());
     rings.neighbours.resize(rings.start.back());
     // From the end of each leaf's range, which is its start when all are in.
-    parts.for_each_triangle(triangles, [&](Index t) {
-        const Triangle& corners = triangles[t];
-        for (std::size_t k = 0; k < 3; ++k) {
-            Index& end = rings.start[corners[k]];
-            rings.neighbours[--end] = corners[(k + 1) % 3];
-            if (!closed(corners[k])) rings.neighbours[--end] = corners[(k + 2) % 3];
-        }
+    parts.for_each_triangle([&](const TreePart& part) {
+        return [&](Index t) {
+            const Triangle& corners = triangles[t];
+            for (std::size_t k = 0; k < 3; ++k) {
+                if (!parts.owns_leaf(part, corners[k])) continue;
+                Index& end = rings.start[corners[k]];
+                rings.neighbours[--end] = corners[(k + 1) % 3];
+                if (!closed(corners[k])) rings.neighbours[--end] = corners[(k + 2) % 3];
+            }
+        };
     });
     return rings;
 }

@@ -12,49 +12,58 @@
 
 namespace unseen::vdtree {
 
-// A run of sibling subtrees.
+// What one task works on: a run of sibling subtrees, or the nodes above all of these and the leaves that are their children.
 struct TreePart {
-    NodeId begin, end;                  // nodes
-    Index first_leaf, leaf_end;
-    Index first_triangle, triangle_end; // those that vanish in the part; one corner may be elsewhere
-
-    bool holds(Index leaf) const { return leaf - first_leaf < leaf_end - first_leaf; }
+    NodeId begin, end;          // nodes; above the subtrees: all, of which it owns some
+    Index first_leaf, leaf_end; // likewise
+    Index first_triangle, triangle_end; // those that vanish in the subtrees; empty above them
+    std::vector<Index> crossing;        // others that have a corner here; above the subtrees: all that no part holds entirely
 };
 
-struct TreeParts {
-    std::vector<TreePart> parts;
-    std::vector<NodeId> top;      // the nodes in no part, ascending
-    std::vector<Index> crossing;  // the triangles that no part holds entirely, in a fixed order
+class TreeParts {
+public:
+    TreeParts(const TreeShape& shape, std::span<const Index> first_triangle, std::span<const Triangle> triangles);
 
-    // Calls work(part) for all parts, perhaps at the same time.
-    template <class Work>
-    void for_each(Work&& work) const {
-        tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) { work(parts[i]); });
+    bool is_top(NodeId node) const { return is_top_[node]; }
+    bool owns(const TreePart& part, NodeId node) const {
+        return &part == &top_ ? is_top_[node] : node - part.begin < part.end - part.begin;
+    }
+    bool owns_leaf(const TreePart& part, Index leaf) const {
+        return &part == &top_ ? is_top_[shape_.parents[shape_.node_of_leaf(leaf)]]
+                              : leaf - part.first_leaf < part.leaf_end - part.first_leaf;
     }
 
-    // Calls one of make_worker()'s workers for each node, children before parents.
+    // Calls one of make_worker()'s workers for each node, children before parents, for several parts at the same time.
     template <class MakeWorker>
     void bottom_up(MakeWorker&& make_worker) const {
-        for_each([&](const TreePart& part) {
+        tbb::parallel_for(std::size_t{0}, parts_.size(), [&](std::size_t i) {
             auto worker = make_worker();
-            for (NodeId node = part.end; node-- > part.begin;) worker(node);
+            for (NodeId node = parts_[i].end; node-- > parts_[i].begin;) worker(node);
         });
         auto worker = make_worker();
-        for (std::size_t i = top.size(); i-- > 0;) worker(top[i]);
+        for (std::size_t i = top_nodes_.size(); i-- > 0;) worker(top_nodes_[i]);
     }
 
-    // Calls work(t) for each triangle: for those that a part holds along with the other parts', then for the rest, one by one.
-    // So work may change what belongs to the corners and to the nodes above them up to where the triangle vanishes.
-    template <class Work>
-    void for_each_triangle(std::span<const Triangle> triangles, Work&& work) const {
-        for_each([&](const TreePart& part) {
-            for (Index t = part.first_triangle; t < part.triangle_end; ++t)
-                if (part.holds(triangles[t][0]) && part.holds(triangles[t][1]) && part.holds(triangles[t][2])) work(t);
-        });
-        for (const Index t : crossing) work(t);
+    // Calls make_worker(part)'s worker for each triangle that has a corner in the part, for several parts at the same time. Each
+    // changes only what its part owns; the order of a part's triangles is fixed.
+    template <class MakeWorker>
+    void for_each_triangle(MakeWorker&& make_worker) const {
+        const auto work = [&](const TreePart& part) {
+            auto&& worker = make_worker(part);
+            for (Index t = part.first_triangle; t < part.triangle_end; ++t) worker(t);
+            for (const Index t : part.crossing) worker(t);
+        };
+        tbb::parallel_for(std::size_t{0}, parts_.size() + 1, [&](std::size_t i) { work(i == 0 ? top_ : parts_[i - 1]); });
     }
+
+private:
+    void find_crossing(std::span<const Index> first_triangle, std::span<const Triangle> triangles);
+
+    const TreeShape& shape_;
+    std::vector<TreePart> parts_;  // ascending
+    TreePart top_;
+    std::vector<NodeId> top_nodes_; // ascending
+    std::vector<std::uint8_t> is_top_; // by interior node
 };
-
-TreeParts part_tree(const TreeShape& shape, std::span<const Index> first_triangle, std::span<const Triangle> triangles);
 
 } // namespace unseen::vdtree
