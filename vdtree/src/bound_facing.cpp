@@ -127,8 +127,8 @@ private:
 
 } // namespace
 
-NodeFacing bound_facing(const BoundInput& input, std::span<const Triangle> triangles,
-                        const LeafPlaces& places, std::span<const Sphere> support, const Ancestors& ancestors) {
+NodeFacing bound_facing(const BoundInput& input, std::span<const Triangle> triangles, const LeafPlaces& places,
+                        std::span<const Sphere> support, const Ancestors& ancestors) {
     const TreeShape& shape = input.shape;
     NodeFacing facing;
     facing.directions.resize(shape.interior());

@@ -18,7 +18,7 @@ struct NodeFacing {
     std::vector<std::uint8_t> flags;
 };
 
-NodeFacing bound_facing(const BoundInput& input, std::span<const Triangle> triangles,
-                        const LeafPlaces& places, std::span<const Sphere> support, const Ancestors& ancestors);
+NodeFacing bound_facing(const BoundInput& input, std::span<const Triangle> triangles, const LeafPlaces& places,
+                        std::span<const Sphere> support, const Ancestors& ancestors);
 
 } // namespace unseen::vdtree

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "bounding_sphere.h"
@@ -17,38 +18,57 @@ constexpr Index most_measured_leaves = 4096;
 // So many leaves are looked at one by one sooner than their nodes.
 constexpr Index few_leaves = 12;
 
-DSphere as_double(const Sphere& s) { return {glm::dvec3(s.centre), s.radius}; }
+// Of the radius: spheres that stick out by less do not move the centre any more. Less is not worth the time: what the spheres
+// of children add is more.
+constexpr double node_slack = 1e-3;
 
 // Bounds one node after another, children first. Leaves are seen as points, interior children as their spheres.
 class SphereWorker {
 public:
-    SphereWorker(const BoundInput& input, NodeSpheres& out) : in_(input), out_(out) {}
+    SphereWorker(const BoundInput& input, float scale, NodeSpheres& out)
+        : in_(input), out_(out), support_(scale), ring_(scale) {}
 
     void operator()(NodeId node) {
-        support_.clear(), ring_.clear(), inner_supports_.clear(), inner_rings_.clear();
+        support_.clear(), ring_.clear();
+        const glm::vec3 proxy = in_.positions[node];
+        support_.add(proxy);
+        ring_.add(proxy);
         in_.shape.for_each_child(
             node,
             [&](NodeId child) {
-                inner_supports_.push_back(as_double(out_.support[child]));
-                inner_rings_.push_back(as_double(out_.ring[child]));
+                support_.add(out_.support[child]);
+                ring_.add(out_.ring[child]);
             },
             [&](Index leaf) {
-                support_.push_back(in_.leaf_position(leaf));
-                ring_.push_back(support_.back());
-                for (const Index neighbour : in_.rings.around(leaf)) ring_.push_back(in_.leaf_position(neighbour));
+                const glm::vec3 p = in_.positions[in_.shape.node_of_leaf(leaf)];
+                support_.add(p);
+                ring_.add(p);
+                for (const Index neighbour : in_.rings.around(leaf))
+                    ring_.add(in_.positions[in_.shape.node_of_leaf(neighbour)]);
             });
-        support_.push_back(in_.position(node));
-        ring_.push_back(support_.back());
-        out_.support[node] = round_outward(enclosing_sphere(support_, inner_supports_));
-        out_.ring[node] = round_outward(enclosing_sphere(ring_, inner_rings_));
+        out_.support[node] = round_outward(support_.enclose(node_slack));
+        out_.ring[node] = round_outward(ring_.enclose(node_slack));
     }
 
 private:
     const BoundInput& in_;
     NodeSpheres& out_;
-    std::vector<glm::dvec3> support_, ring_;
-    std::vector<DSphere> inner_supports_, inner_rings_;
+    BallSet support_, ring_;
 };
+
+// A power of two that brings the positions' extent to between a half and 1.
+float unit_scale(std::span<const glm::vec3> positions) {
+    glm::vec3 low = positions[0], high = low;
+    for (const glm::vec3& p : positions) {
+        low = glm::min(low, p);
+        high = glm::max(high, p);
+    }
+    const glm::vec3 size = high - low;
+    const float extent = std::max({size.x, size.y, size.z});
+    if (!(extent > 0)) return 1;
+    constexpr int most = 120; // the scale itself must be a float
+    return std::ldexp(1.0f, std::clamp(-std::ilogb(extent) - 1, -most, most));
+}
 
 class DisplacementWorker {
 public:
@@ -60,7 +80,8 @@ public:
         farthest_ = 0;
         const TreeShape& shape = in_.shape;
         shape.for_each_child(
-            node, [&](NodeId child) { farthest_ = std::max(farthest_, static_cast<double>(out_[child])); }, [](Index) {});
+            node, [&](NodeId child) { farthest_ = std::max(farthest_, static_cast<double>(out_[child])); },
+            [](Index) {});
         if (shape.leaf_end[node] - shape.first_leaf[node] <= most_measured_leaves) {
             measure(node);
         } else {
@@ -72,9 +93,7 @@ public:
     }
 
 private:
-    void measure_leaf(Index leaf) {
-        farthest_ = std::max(farthest_, glm::distance(proxy_, in_.leaf_position(leaf)));
-    }
+    void measure_leaf(Index leaf) { farthest_ = std::max(farthest_, glm::distance(proxy_, in_.leaf_position(leaf))); }
 
     // No leaf under the node is farther from the proxy.
     double bound(NodeId node) const {
@@ -124,7 +143,8 @@ NodeSpheres bound_spheres(const BoundInput& input) {
     NodeSpheres spheres;
     spheres.support.resize(input.shape.interior());
     spheres.ring.resize(input.shape.interior());
-    input.parts.bottom_up([&] { return SphereWorker(input, spheres); });
+    const float scale = unit_scale(input.positions);
+    input.parts.bottom_up([&] { return SphereWorker(input, scale, spheres); });
     return spheres;
 }
 

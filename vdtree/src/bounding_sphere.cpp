@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include <glm/geometric.hpp>
@@ -73,7 +74,8 @@ public:
         std::array<glm::dvec3, 4> kept;
         int count = 0;
         for (int i = 0; i < 3; ++i)
-            if (best.with[static_cast<std::size_t>(i)] >= 0) kept[static_cast<std::size_t>(count++)] = at(best.with[static_cast<std::size_t>(i)]);
+            if (best.with[static_cast<std::size_t>(i)] >= 0)
+                kept[static_cast<std::size_t>(count++)] = at(best.with[static_cast<std::size_t>(i)]);
         kept[static_cast<std::size_t>(count++)] = p;
         points_ = kept;
         count_ = count;
@@ -124,6 +126,15 @@ private:
     DSphere sphere_;
 };
 
+struct Farthest {
+    DSphere ball;
+    double reach; // from the centre to the ball's far side
+};
+
+// Four numbers at a time (an extension that GCC and Clang share).
+using Floats = float __attribute__((vector_size(16)));
+using Ints = int __attribute__((vector_size(16)));
+
 // Points and balls as one list of balls, relative to the first.
 class Balls {
 public:
@@ -133,10 +144,6 @@ public:
     glm::dvec3 origin() const { return origin_; }
     DSphere first() const { return {glm::dvec3(0), points_.empty() ? spheres_[0].radius : 0}; }
 
-    struct Farthest {
-        DSphere ball;
-        double reach; // from the centre to the ball's far side
-    };
     Farthest farthest(glm::dvec3 from) const {
         const glm::dvec3 centre = from + origin_;
         double largest = -1;
@@ -164,10 +171,8 @@ private:
 
 // Grows a basis by what sticks out farthest until nothing does by more than `slack`, a share of the radius. For balls the
 // points of the basis are cutting planes: their smallest sphere is never larger than the one looked for.
-DSphere enclose(std::span<const glm::dvec3> points, std::span<const DSphere> spheres, double slack) {
-    while (!spheres.empty() && spheres.front().radius < 0) spheres = spheres.subspan(1);
-    if (points.empty() && spheres.empty()) return {};
-    const Balls balls(points, spheres);
+template <class AnyBalls>
+DSphere grow_basis(const AnyBalls& balls, double slack) {
     // A pair far apart is a good beginning.
     const DSphere one = balls.farthest(balls.first().centre).ball;
     const DSphere other = balls.farthest(one.centre).ball;
@@ -176,12 +181,20 @@ DSphere enclose(std::span<const glm::dvec3> points, std::span<const DSphere> sph
         const DSphere& sphere = basis.sphere();
         const auto [ball, reach] = balls.farthest(sphere.centre);
         if (reach <= sphere.radius * (1 + slack) || round == most_rounds)
-            return {sphere.centre + balls.origin(), std::max(sphere.radius, reach)};
+            return {sphere.centre, std::max(sphere.radius, reach)};
         const glm::dvec3 away = ball.centre - sphere.centre;
         const double length = glm::length(away);
         const glm::dvec3 direction = length > 0 ? away / length : glm::dvec3(1, 0, 0);
         basis.add(ball.centre + direction * ball.radius);
     }
+}
+
+DSphere enclose(std::span<const glm::dvec3> points, std::span<const DSphere> spheres, double slack) {
+    while (!spheres.empty() && spheres.front().radius < 0) spheres = spheres.subspan(1);
+    if (points.empty() && spheres.empty()) return {};
+    const Balls balls(points, spheres);
+    const DSphere sphere = grow_basis(balls, slack);
+    return {sphere.centre + balls.origin(), sphere.radius};
 }
 
 // A point's distance loses a few units in the last place.
@@ -195,6 +208,65 @@ DSphere smallest_sphere(std::span<const glm::dvec3> points) { return enclose(poi
 
 DSphere enclosing_sphere(std::span<const glm::dvec3> points, std::span<const DSphere> spheres) {
     return enclose(points, spheres, sphere_slack);
+}
+
+// The view of a BallSet that a basis grows in.
+class BallSet::Scaled {
+public:
+    explicit Scaled(const BallSet& set) : set_(set) {}
+
+    DSphere first() const { return {glm::dvec3(0), 0}; }
+    Farthest farthest(glm::dvec3 from) const {
+        const float x = static_cast<float>(from.x), y = static_cast<float>(from.y), z = static_cast<float>(from.z);
+        Floats largest = {-1, -1, -1, -1};
+        Ints where = {0, 0, 0, 0}, at = {0, 1, 2, 3};
+        for (std::size_t i = 0; i < set_.x_.size(); i += 4) {
+            const Floats dx = load(set_.x_, i) - x, dy = load(set_.y_, i) - y, dz = load(set_.z_, i) - z;
+            const Floats squared = dx * dx + dy * dy + dz * dz;
+            const Ints farther = squared > largest;
+            largest = farther ? squared : largest;
+            where = farther ? at : where;
+            at += 4;
+        }
+        int lane = 0;
+        for (int k = 1; k < 4; ++k)
+            if (largest[k] > largest[lane]) lane = k;
+        const auto i = static_cast<std::size_t>(where[lane]);
+        const glm::dvec3 point(set_.x_[i], set_.y_[i], set_.z_[i]);
+        Farthest out{{point, 0}, glm::distance(point, from)};
+        for (const DSphere& s : set_.scaled_spheres_) {
+            const double reach = glm::distance(s.centre, from) + s.radius;
+            if (reach > out.reach) out = {s, reach};
+        }
+        return out;
+    }
+
+private:
+    static Floats load(const std::vector<float>& v, std::size_t i) {
+        Floats out;
+        std::memcpy(&out, v.data() + i, sizeof out);
+        return out;
+    }
+    const BallSet& set_;
+};
+
+void BallSet::clear() {
+    points_.clear(), x_.clear(), y_.clear(), z_.clear(), spheres_.clear(), scaled_spheres_.clear();
+}
+
+DSphere BallSet::enclose(double slack) {
+    const glm::dvec3 origin(points_[0]);
+    const double scale = scale_;
+    for (const Sphere& s : spheres_)
+        scaled_spheres_.push_back({(glm::dvec3(s.centre) - origin) * scale, s.radius * scale});
+    while (x_.size() % 4 != 0) x_.push_back(0), y_.push_back(0), z_.push_back(0); // the first point again
+    const glm::dvec3 centre = grow_basis(Scaled(*this), slack).centre / scale + origin;
+    // Exactly what has to be contained, without the rounding of the way here.
+    double squared_reach = 0;
+    for (const glm::vec3& p : points_) squared_reach = std::max(squared_reach, squared(glm::dvec3(p) - centre));
+    double reach = std::sqrt(squared_reach);
+    for (const Sphere& s : spheres_) reach = std::max(reach, glm::distance(glm::dvec3(s.centre), centre) + s.radius);
+    return {centre, reach};
 }
 
 Sphere round_outward(const DSphere& sphere) {

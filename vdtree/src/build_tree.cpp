@@ -47,9 +47,9 @@ Error cancelled_error() { return {ErrorCode::cancelled, "Building the tree was c
 struct CleanMesh {
     Mesh storage; // used where something had to go
     MeshView view;
-    std::vector<Index> source_vertices;   // by clean vertex
-    std::vector<Index> unreferenced;      // source vertices
-    std::vector<Index> source_triangles;  // by clean triangle
+    std::vector<Index> source_vertices;  // by clean vertex
+    std::vector<Index> unreferenced;     // source vertices
+    std::vector<Index> source_triangles; // by clean triangle
     std::uint64_t dropped = 0;
 };
 
@@ -202,9 +202,7 @@ private:
 Result<VertexTree> TreeBuilder::build(Clusterer clusterer) {
     if (reporter_.cancelled(0.0, "analysing")) return cancelled_error();
     prelit_ = !mesh_.colours.empty();
-    (void)reporter_.cancelled(0.8,"Tcoinc");
     coincident_ = find_coincident(mesh_.positions);
-    (void)reporter_.cancelled(0.8,"Tsurf");
     surface_ = analyse_surface(mesh_, coincident_);
     if (reporter_.cancelled(clustering_begins, "clustering")) return cancelled_error();
     {
@@ -212,7 +210,6 @@ Result<VertexTree> TreeBuilder::build(Clusterer clusterer) {
         if (!clustering) return clustering.error();
         if (reporter_.cancelled(clustering_ends, "ordering")) return cancelled_error();
         order(*clustering);
-    (void)reporter_.cancelled(0.8,"Tplace");
         place_vertices(*clustering);
     }
     if (reporter_.cancelled(0.8, "bounding")) return cancelled_error();
@@ -222,7 +219,6 @@ Result<VertexTree> TreeBuilder::build(Clusterer clusterer) {
     g_->dropped_triangles = clean_.dropped + options_.dropped_before;
     g_->ranges.assign(source_.ranges.begin(), source_.ranges.end());
     auto data = std::make_shared<VertexTree::Data>();
-    (void)reporter_.cancelled(0.8,"Tlight");
     data->light = derive_luminance(*g_, options_.light, prelit_);
     data->geometry = std::move(g_);
     if (reporter_.cancelled(1.0, "done")) return cancelled_error();
@@ -232,7 +228,8 @@ Result<VertexTree> TreeBuilder::build(Clusterer clusterer) {
 Result<Clustering> TreeBuilder::cluster(Clusterer clusterer) {
     std::vector<float> luminance(mesh_.positions.size());
     tbb::parallel_for(std::size_t{0}, luminance.size(), [&](std::size_t v) {
-        luminance[v] = vertex_luminance(surface_.normals[v], prelit_ ? &mesh_.colours[v] : nullptr, options_.light, prelit_);
+        luminance[v] =
+            vertex_luminance(surface_.normals[v], prelit_ ? &mesh_.colours[v] : nullptr, options_.light, prelit_);
     });
     Result<Clustering> clustering = clusterer({mesh_, luminance, surface_.normals, surface_.areas, coincident_});
     if (clustering)
@@ -259,12 +256,14 @@ void TreeBuilder::place_vertices(const Clustering& clustering) {
         weights[nodes_.leaf_of_vertex[v]] = surface_.areas[v];
         normals[nodes_.leaf_of_vertex[v]] = surface_.normals[v];
     }
-    ProxyVertices proxies = place_proxies(nodes_.shape, {source_, g_->source_vertices, weights, normals, g_->origin});
+    const TreeParts parts(nodes_.shape);
+    ProxyVertices proxies =
+        place_proxies(nodes_.shape, parts, {source_, g_->source_vertices, weights, normals, g_->origin});
     for (std::size_t i = 0; i < clustering.positions.size(); ++i) {
         const NodeId node = nodes_.node_of_cluster[i];
         if (node != no_node) proxies.positions[node] = glm::vec3(clustering.positions[i] - g_->origin);
     }
-    keep_coincident_proxies(nodes_.shape, proxies.positions);
+    keep_coincident_proxies(nodes_.shape, parts, proxies.positions);
     g_->positions = std::move(proxies.positions);
     g_->normals = std::move(proxies.normals);
     g_->colours = std::move(proxies.colours);
@@ -289,30 +288,22 @@ LeafPlaces TreeBuilder::find_places() const {
 
 void TreeBuilder::bound() {
     TreeShape& shape = nodes_.shape;
-    (void)reporter_.cancelled(0.8,"Tanc");
     const Ancestors ancestors(shape);
-    (void)reporter_.cancelled(0.8,"Ttri");
     TriangleOrder triangles = order_triangles(mesh_.triangles, nodes_, ancestors);
     if (!source_.ranges.empty()) {
         for (Index& t : triangles.sources) t = clean_.source_triangles[t];
         g_->source_triangles = std::move(triangles.sources);
     }
-    (void)reporter_.cancelled(0.8,"Tplaces");
     const LeafPlaces places = find_places();
-    const TreeParts parts(shape, triangles.first_triangle, triangles.triangles);
-    (void)reporter_.cancelled(0.8,"Trings");
+    TreeParts parts(shape);
+    parts.assign_triangles(triangles.first_triangle, triangles.triangles);
     const LeafRings rings = find_rings(triangles.triangles, places, parts);
     const BoundInput input{shape, parts, rings, g_->positions};
 
-    (void)reporter_.cancelled(0.8,"Tspheres");
     NodeSpheres spheres = bound_spheres(input);
-    (void)reporter_.cancelled(0.8,"Tcorners");
     g_->bounding_sphere = bound_corners(input);
-    (void)reporter_.cancelled(0.8,"Tdisp");
     g_->displacement = bound_displacements(input, spheres.support);
-    (void)reporter_.cancelled(0.8,"Tfacing");
     NodeFacing facing = bound_facing(input, triangles.triangles, places, spheres.support, ancestors);
-    (void)reporter_.cancelled(0.8,"Tpack");
     g_->support_spheres = std::move(spheres.support);
     g_->bounds.resize(shape.interior());
     g_->mask_at.resize(shape.interior());

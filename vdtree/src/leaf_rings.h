@@ -12,9 +12,9 @@ namespace unseen::vdtree {
 
 // By leaf: the surface at its place.
 struct LeafPlaces {
-    std::vector<Index> weld;              // a leaf that stands for all at the same position
-    std::vector<std::uint8_t> irregular;  // whether an irregular edge ends there
-    std::vector<std::uint8_t> alone;      // whether no other vertex is at the position
+    std::vector<Index> weld;             // a leaf that stands for all at the same position
+    std::vector<std::uint8_t> irregular; // whether an irregular edge ends there
+    std::vector<std::uint8_t> alone;     // whether no other vertex is at the position
 };
 
 // By leaf: the leaves that it shares triangles with; once each where the surface is regular, else perhaps more often.

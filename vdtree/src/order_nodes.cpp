@@ -13,9 +13,9 @@ namespace {
 // What becomes of a cluster: counted on the way up, turned into places on the way down.
 struct ClusterPlace {
     Index children = 0;
-    Index leaves = 0;        // under it; then the end of those not yet given to its children
-    NodeId nodes = 0;        // in its subtree; then the end of those not yet given
-    NodeId node = no_node;   // its own, or that of the cluster that it is the only child of
+    Index leaves = 0;      // under it; then the end of those not yet given to its children
+    NodeId nodes = 0;      // in its subtree; then the end of those not yet given
+    NodeId node = no_node; // its own, or that of the cluster that it is the only child of
 };
 
 constexpr Index never = std::numeric_limits<Index>::max();
@@ -72,7 +72,8 @@ NodeOrder order_nodes(const Clustering& clustering, Index vertices, Index lone) 
     shape.made.resize(interior);
     order.leaf_of_vertex.resize(std::size_t{vertices} + lone);
     order.node_of_cluster.assign(clusters - vertices, no_node);
-    const auto open = [&](NodeId node, NodeId parent, Index first_leaf, Index leaf_end, NodeId subtree_end, Index made) {
+    const auto open = [&](NodeId node, NodeId parent, Index first_leaf, Index leaf_end, NodeId subtree_end,
+                          Index made) {
         shape.parents[node] = parent;
         shape.first_leaf[node] = first_leaf;
         shape.leaf_end[node] = leaf_end;

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "tree_shape.h"
+#include "tree_parts.h"
 
 namespace unseen::vdtree {
 
@@ -19,13 +19,14 @@ struct LeafVertices {
 // By node, leaves included.
 struct ProxyVertices {
     std::vector<glm::vec3> positions;
-    std::vector<PackedNormal> normals; // luminance is derived from these, so that other light gives what building with it would
+    std::vector<PackedNormal>
+        normals; // luminance is derived from these, so that other light gives what building with it would
     std::vector<glm::vec4> colours; // empty where the mesh has none; likewise the next
     std::vector<glm::vec2> uvs;
 };
-ProxyVertices place_proxies(const TreeShape& shape, const LeafVertices& leaves);
+ProxyVertices place_proxies(const TreeShape& shape, const TreeParts& parts, const LeafVertices& leaves);
 
 // Puts proxies of coincident leaves exactly where these are.
-void keep_coincident_proxies(const TreeShape& shape, std::span<glm::vec3> positions);
+void keep_coincident_proxies(const TreeShape& shape, const TreeParts& parts, std::span<glm::vec3> positions);
 
 } // namespace unseen::vdtree

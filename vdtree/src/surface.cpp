@@ -19,7 +19,8 @@ namespace unseen::vdtree {
 
 namespace {
 
-constexpr std::size_t grain = 4096; // vertices or triangles of a task; sums are added up by these, on any number of threads
+constexpr std::size_t grain =
+    4096; // vertices or triangles of a task; sums are added up by these, on any number of threads
 
 glm::dvec3 area_vector(const MeshView& mesh, const Triangle& t) {
     const glm::dvec3& a = mesh.positions[t[0]];
@@ -68,7 +69,8 @@ std::uint64_t hash(glm::dvec3 p) {
 // table in quadratic time; they are sorted instead.
 class CoincidenceFinder {
 public:
-    CoincidenceFinder(std::span<const glm::dvec3> positions, std::span<Index> first) : positions_(positions), first_(first) {}
+    CoincidenceFinder(std::span<const glm::dvec3> positions, std::span<Index> first)
+        : positions_(positions), first_(first) {}
 
     void find(std::span<const Index> vertices) {
         if (!by_table(vertices)) by_sorting(vertices);
@@ -130,7 +132,8 @@ Incidence find_incidence(const MeshView& mesh, std::span<const Index> coincident
     std::partial_sum(incidence.start.begin(), incidence.start.end(), incidence.start.begin());
     incidence.triangles.resize(mesh.triangles.size() * 3);
     for (std::size_t t = mesh.triangles.size(); t-- > 0;)
-        for (const Index v : mesh.triangles[t]) incidence.triangles[--incidence.start[coincident[v]]] = static_cast<Index>(t);
+        for (const Index v : mesh.triangles[t])
+            incidence.triangles[--incidence.start[coincident[v]]] = static_cast<Index>(t);
     return incidence;
 }
 
@@ -162,6 +165,7 @@ public:
 
     void operator()(std::size_t v) {
         following_.clear(), preceding_.clear();
+        const glm::dvec3 here = mesh_.positions[v];
         glm::dvec3 sum(0);
         for (const Index t : incidence_.around(v)) {
             const Triangle& corners = mesh_.triangles[t];
@@ -170,9 +174,10 @@ public:
             const std::size_t k = w[0] == v ? 0 : w[1] == v ? 1 : 2;
             following_.push_back(w[(k + 1) % 3]);
             preceding_.push_back(w[(k + 2) % 3]);
-            const glm::dvec3 area = area_vector(mesh_, corners);
+            const glm::dvec3 area =
+                glm::cross(mesh_.positions[corners[(k + 1) % 3]] - here, mesh_.positions[corners[(k + 2) % 3]] - here);
             sum += area;
-            surface_.areas[corners[k]] += glm::length(area) / 3;
+            surface_.areas[corners[k]] += glm::length(area) / 6;
         }
         surface_.irregular[v] = !is_regular(following_, preceding_);
         surface_.normals[v] = glm::vec3(unit(sum));

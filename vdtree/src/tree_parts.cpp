@@ -13,7 +13,7 @@ constexpr Index least_leaves = 1024; // of a part that is worth a task
 
 } // namespace
 
-TreeParts::TreeParts(const TreeShape& shape, std::span<const Index> first_triangle, std::span<const Triangle> triangles)
+TreeParts::TreeParts(const TreeShape& shape)
     : shape_(shape), top_{0, shape.interior(), 0, shape.leaves(), 0, 0, {}}, is_top_(shape.interior(), 0) {
     const Index most_leaves = std::max(shape.leaves() / most_parts, least_leaves);
     for (NodeId node = 0; node < shape.interior();) {
@@ -30,21 +30,21 @@ TreeParts::TreeParts(const TreeShape& shape, std::span<const Index> first_triang
             shape.parents[before->begin] == shape.parents[node] && leaf_end - before->first_leaf <= most_leaves) {
             before->end = end;
             before->leaf_end = leaf_end;
-            before->triangle_end = first_triangle[end];
         } else {
-            parts_.push_back({node, end, first_leaf, leaf_end, first_triangle[node], first_triangle[end], {}});
+            parts_.push_back({node, end, first_leaf, leaf_end, 0, 0, {}});
         }
         node = end;
     }
-    find_crossing(first_triangle, triangles);
 }
 
-void TreeParts::find_crossing(std::span<const Index> first_triangle, std::span<const Triangle> triangles) {
+void TreeParts::assign_triangles(std::span<const Index> first_triangle, std::span<const Triangle> triangles) {
     tbb::parallel_for(std::size_t{0}, parts_.size(), [&](std::size_t i) {
         TreePart& part = parts_[i];
+        part.first_triangle = first_triangle[part.begin];
+        part.triangle_end = first_triangle[part.end];
+        const auto elsewhere = [&](Index leaf) { return !owns_leaf(part, leaf); };
         for (Index t = part.first_triangle; t < part.triangle_end; ++t)
-            for (const Index leaf : triangles[t])
-                if (!owns_leaf(part, leaf)) part.crossing.push_back(t);
+            if (std::any_of(triangles[t].begin(), triangles[t].end(), elsewhere)) part.crossing.push_back(t);
     });
     for (TreePart& part : parts_) {
         top_.crossing.insert(top_.crossing.end(), part.crossing.begin(), part.crossing.end());

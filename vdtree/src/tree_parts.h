@@ -14,15 +14,18 @@ namespace unseen::vdtree {
 
 // What one task works on: a run of sibling subtrees, or the nodes above all of these and the leaves that are their children.
 struct TreePart {
-    NodeId begin, end;          // nodes; above the subtrees: all, of which it owns some
-    Index first_leaf, leaf_end; // likewise
+    NodeId begin, end;                  // nodes; above the subtrees: all, of which it owns some
+    Index first_leaf, leaf_end;         // likewise
     Index first_triangle, triangle_end; // those that vanish in the subtrees; empty above them
-    std::vector<Index> crossing;        // others that have a corner here; above the subtrees: all that no part holds entirely
+    std::vector<Index> crossing; // others that have a corner here; above the subtrees: all that no part holds entirely
 };
 
 class TreeParts {
 public:
-    TreeParts(const TreeShape& shape, std::span<const Index> first_triangle, std::span<const Triangle> triangles);
+    explicit TreeParts(const TreeShape& shape);
+
+    // To be called before for_each_triangle().
+    void assign_triangles(std::span<const Index> first_triangle, std::span<const Triangle> triangles);
 
     bool is_top(NodeId node) const { return is_top_[node]; }
     bool owns(const TreePart& part, NodeId node) const {
@@ -53,16 +56,15 @@ public:
             for (Index t = part.first_triangle; t < part.triangle_end; ++t) worker(t);
             for (const Index t : part.crossing) worker(t);
         };
-        tbb::parallel_for(std::size_t{0}, parts_.size() + 1, [&](std::size_t i) { work(i == 0 ? top_ : parts_[i - 1]); });
+        tbb::parallel_for(std::size_t{0}, parts_.size() + 1,
+                          [&](std::size_t i) { work(i == 0 ? top_ : parts_[i - 1]); });
     }
 
 private:
-    void find_crossing(std::span<const Index> first_triangle, std::span<const Triangle> triangles);
-
     const TreeShape& shape_;
-    std::vector<TreePart> parts_;  // ascending
+    std::vector<TreePart> parts_; // ascending
     TreePart top_;
-    std::vector<NodeId> top_nodes_; // ascending
+    std::vector<NodeId> top_nodes_;    // ascending
     std::vector<std::uint8_t> is_top_; // by interior node
 };
 

@@ -10,11 +10,11 @@ namespace unseen::vdtree {
 
 // Numbered as in <vdtree/vertex_tree.h>: interior nodes depth-first, then the leaves.
 struct TreeShape {
-    std::vector<NodeId> parents;     // by node
-    std::vector<Index> first_leaf;   // by interior node, and so on
+    std::vector<NodeId> parents;   // by node
+    std::vector<Index> first_leaf; // by interior node, and so on
     std::vector<Index> leaf_end;
     std::vector<NodeId> subtree_end;
-    std::vector<Index> made;         // when the clusterer made the node: its cluster's number, higher than its children's
+    std::vector<Index> made; // when the clusterer made the node: its cluster's number, higher than its children's
 
     NodeId interior() const { return static_cast<NodeId>(first_leaf.size()); }
     Index leaves() const { return static_cast<Index>(parents.size() - first_leaf.size()); }
