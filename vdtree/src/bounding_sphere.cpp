@@ -1,7 +1,9 @@
 #include "bounding_sphere.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include <glm/geometric.hpp>
@@ -10,115 +12,261 @@ namespace unseen::vdtree {
 
 namespace {
 
-// A point counts as contained up to this share of the radius, so that rounding does not make Welzl's recursion cycle.
+// A point counts as contained up to this share of the radius, so that rounding does not change the basis for ever.
 constexpr double containment_slack = 1e-12;
-// enclosing_sphere() stops when no sphere sticks out by more than this share of the radius ...
-constexpr double sphere_slack = 1e-4;
-// ... or after so many rounds; the radius is grown to the exact need in either case.
-constexpr int most_rounds = 24;
+// The growth of a basis is given up after so many rounds, far more than it takes; the radius is then what it has to be.
+constexpr int most_rounds = 64;
+// Of the product of lengths: points flatter than this have no circumsphere worth calling so.
+constexpr double least_flatness = 1e-14;
 
-bool contains(const DSphere& sphere, glm::dvec3 p) {
-    return sphere.radius >= 0 && glm::distance(sphere.centre, p) <= sphere.radius * (1 + containment_slack);
-}
+double squared(glm::dvec3 v) { return glm::dot(v, v); }
 
-// The smallest sphere with all of up to four points on its surface. Where they are (nearly) dependent, the last
-// point is left out: its sphere is then found through another boundary set.
-DSphere circumsphere(const glm::dvec3* p, int n) {
-    if (n == 0) return {};
-    if (n == 1) return {p[0], 0};
-    // Solve for the centre p0 + sum x_i d_i with |centre - p0| = |centre - p_i|: 2 (d_i . d_j) x = d_i . d_i.
-    double a[3][4];
-    const int m = n - 1;
-    glm::dvec3 d[3];
-    for (int i = 0; i < m; ++i) d[i] = p[i + 1] - p[0];
-    for (int i = 0; i < m; ++i) {
-        for (int j = 0; j < m; ++j) a[i][j] = 2 * glm::dot(d[i], d[j]);
-        a[i][m] = glm::dot(d[i], d[i]);
-    }
-    for (int k = 0; k < m; ++k) {
-        int pivot = k;
-        for (int i = k + 1; i < m; ++i)
-            if (std::abs(a[i][k]) > std::abs(a[pivot][k])) pivot = i;
-        std::swap_ranges(a[k], a[k] + 4, a[pivot]);
-        if (!(std::abs(a[k][k]) > 1e-14 * a[0][0])) return circumsphere(p, n - 1);
-        for (int i = 0; i < m; ++i) {
-            if (i == k) continue;
-            const double f = a[i][k] / a[k][k];
-            for (int j = k; j <= m; ++j) a[i][j] -= f * a[k][j];
+// Up to four points, and the smallest sphere around them, which they lie on.
+class Basis {
+public:
+    // The smallest sphere around two balls.
+    Basis(const DSphere& a, const DSphere& b) {
+        const glm::dvec3 apart = b.centre - a.centre;
+        const double distance = glm::length(apart);
+        if (distance + b.radius <= a.radius) {
+            sphere_ = a;
+            count_ = 0;
+        } else if (distance + a.radius <= b.radius) {
+            sphere_ = b;
+            count_ = 0;
+        } else {
+            const glm::dvec3 direction = apart / distance;
+            points_[0] = a.centre - direction * a.radius;
+            points_[1] = b.centre + direction * b.radius;
+            sphere_ = {(points_[0] + points_[1]) * 0.5, (distance + a.radius + b.radius) * 0.5};
+            count_ = 2;
         }
     }
-    glm::dvec3 offset(0);
-    for (int i = 0; i < m; ++i) offset += a[i][m] / a[i][i] * d[i];
-    return {p[0] + offset, glm::length(offset)};
+
+    const DSphere& sphere() const { return sphere_; }
+
+    // Makes the smallest sphere around the basis and a point outside of its sphere.
+    void add(glm::dvec3 p) {
+        if (count_ == 0) {
+            // The sphere is a single ball: the point opposite stands for it.
+            const glm::dvec3 away = p - sphere_.centre;
+            points_[0] = sphere_.centre - away * (sphere_.radius / glm::length(away));
+            count_ = 1;
+        }
+        Best best;
+        for (int i = 0; i < count_ && !best.found; ++i) {
+            const glm::dvec3 half = (at(i) - p) * 0.5;
+            consider(best, {p + half, glm::length(half)}, {i});
+        }
+        // A pair's sphere that contains the others is the smallest, but one of more points need not be.
+        if (!best.found) {
+            for (int i = 0; i < count_; ++i)
+                for (int j = i + 1; j < count_; ++j) consider(best, around(p, at(i), at(j)), {i, j});
+            for (int i = 0; i < count_; ++i)
+                for (int j = i + 1; j < count_; ++j)
+                    for (int k = j + 1; k < count_; ++k) consider(best, around(p, at(i), at(j), at(k)), {i, j, k});
+        }
+        if (!best.found) {
+            // Rounding has left nothing: keep the sphere in the place of its basis.
+            *this = Basis(sphere_, {p, 0});
+            return;
+        }
+        std::array<glm::dvec3, 4> kept;
+        int count = 0;
+        for (int i = 0; i < 3; ++i)
+            if (best.with[static_cast<std::size_t>(i)] >= 0)
+                kept[static_cast<std::size_t>(count++)] = at(best.with[static_cast<std::size_t>(i)]);
+        kept[static_cast<std::size_t>(count++)] = p;
+        points_ = kept;
+        count_ = count;
+        sphere_ = best.sphere;
+    }
+
+private:
+    struct Subset {
+        std::array<int, 3> with{-1, -1, -1};
+        Subset(std::initializer_list<int> which) { std::copy(which.begin(), which.end(), with.begin()); }
+    };
+    struct Best {
+        bool found = false;
+        DSphere sphere;
+        std::array<int, 3> with{-1, -1, -1};
+    };
+
+    glm::dvec3 at(int i) const { return points_[static_cast<std::size_t>(i)]; }
+
+    void consider(Best& best, const DSphere& sphere, const Subset& subset) const {
+        if (!(sphere.radius >= 0) || (best.found && sphere.radius >= best.sphere.radius)) return;
+        const double limit = sphere.radius * sphere.radius * (1 + 2 * containment_slack);
+        for (int i = 0; i < count_; ++i) {
+            if (i == subset.with[0] || i == subset.with[1] || i == subset.with[2]) continue;
+            if (!(squared(at(i) - sphere.centre) <= limit)) return;
+        }
+        best = {true, sphere, subset.with};
+    }
+
+    // The smallest spheres with three and with four points on them.
+    static DSphere around(glm::dvec3 p, glm::dvec3 q, glm::dvec3 r) {
+        const glm::dvec3 a = q - p, b = r - p, normal = glm::cross(a, b);
+        const double aa = squared(a), bb = squared(b), flat = squared(normal);
+        if (!(flat > least_flatness * aa * bb)) return {};
+        const glm::dvec3 offset = glm::cross(aa * b - bb * a, normal) / (2 * flat);
+        return {p + offset, glm::length(offset)};
+    }
+    static DSphere around(glm::dvec3 p, glm::dvec3 q, glm::dvec3 r, glm::dvec3 s) {
+        const glm::dvec3 a = q - p, b = r - p, c = s - p, bc = glm::cross(b, c);
+        const double aa = squared(a), bb = squared(b), cc = squared(c), volume = glm::dot(a, bc);
+        if (!(volume * volume > least_flatness * aa * bb * cc)) return {};
+        const glm::dvec3 offset = (aa * bc + bb * glm::cross(c, a) + cc * glm::cross(a, b)) / (2 * volume);
+        return {p + offset, glm::length(offset)};
+    }
+
+    std::array<glm::dvec3, 4> points_;
+    int count_;
+    DSphere sphere_;
+};
+
+struct Farthest {
+    DSphere ball;
+    double reach; // from the centre to the ball's far side
+};
+
+// Four numbers at a time (an extension that GCC and Clang share).
+using Floats = float __attribute__((vector_size(16)));
+using Ints = int __attribute__((vector_size(16)));
+
+// Points and balls as one list of balls, relative to the first.
+class Balls {
+public:
+    Balls(std::span<const glm::dvec3> points, std::span<const DSphere> spheres)
+        : points_(points), spheres_(spheres), origin_(points.empty() ? spheres[0].centre : points[0]) {}
+
+    glm::dvec3 origin() const { return origin_; }
+    DSphere first() const { return {glm::dvec3(0), points_.empty() ? spheres_[0].radius : 0}; }
+
+    Farthest farthest(glm::dvec3 from) const {
+        const glm::dvec3 centre = from + origin_;
+        double largest = -1;
+        const glm::dvec3* point = nullptr;
+        for (const glm::dvec3& p : points_) {
+            const double d = squared(p - centre);
+            if (d > largest) {
+                largest = d;
+                point = &p;
+            }
+        }
+        Farthest out{{point ? *point - origin_ : glm::dvec3(0), 0}, point ? std::sqrt(largest) : -1};
+        for (const DSphere& s : spheres_) {
+            const double reach = glm::distance(s.centre, centre) + s.radius;
+            if (s.radius >= 0 && reach > out.reach) out = {{s.centre - origin_, s.radius}, reach};
+        }
+        return out;
+    }
+
+private:
+    std::span<const glm::dvec3> points_;
+    std::span<const DSphere> spheres_;
+    glm::dvec3 origin_;
+};
+
+// Grows a basis by what sticks out farthest until nothing does by more than `slack`, a share of the radius. For balls the
+// points of the basis are cutting planes: their smallest sphere is never larger than the one looked for.
+template <class AnyBalls>
+DSphere grow_basis(const AnyBalls& balls, double slack) {
+    // A pair far apart is a good beginning.
+    const DSphere one = balls.farthest(balls.first().centre).ball;
+    const DSphere other = balls.farthest(one.centre).ball;
+    Basis basis(one, other);
+    for (int round = 0;; ++round) {
+        const DSphere& sphere = basis.sphere();
+        const auto [ball, reach] = balls.farthest(sphere.centre);
+        if (reach <= sphere.radius * (1 + slack) || round == most_rounds)
+            return {sphere.centre, std::max(sphere.radius, reach)};
+        const glm::dvec3 away = ball.centre - sphere.centre;
+        const double length = glm::length(away);
+        const glm::dvec3 direction = length > 0 ? away / length : glm::dvec3(1, 0, 0);
+        basis.add(ball.centre + direction * ball.radius);
+    }
 }
 
-DSphere welzl(std::span<glm::dvec3> points, std::size_t n, glm::dvec3* boundary, int on_boundary) {
-    DSphere sphere = circumsphere(boundary, on_boundary);
-    if (on_boundary == 4) return sphere;
-    for (std::size_t i = 0; i < n; ++i) {
-        if (contains(sphere, points[i])) continue;
-        boundary[on_boundary] = points[i];
-        sphere = welzl(points, i, boundary, on_boundary + 1);
-        std::rotate(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(i),
-                    points.begin() + static_cast<std::ptrdiff_t>(i) + 1);
-    }
-    return sphere;
+DSphere enclose(std::span<const glm::dvec3> points, std::span<const DSphere> spheres, double slack) {
+    while (!spheres.empty() && spheres.front().radius < 0) spheres = spheres.subspan(1);
+    if (points.empty() && spheres.empty()) return {};
+    const Balls balls(points, spheres);
+    const DSphere sphere = grow_basis(balls, slack);
+    return {sphere.centre + balls.origin(), sphere.radius};
 }
+
+// A point's distance loses a few units in the last place.
+constexpr double exact_slack = 1e-13;
+// What enclosing_sphere() may exceed the smallest radius by.
+constexpr double sphere_slack = 1e-4;
 
 } // namespace
 
-DSphere smallest_sphere(std::span<const glm::dvec3> points) {
-    if (points.empty()) return {};
-    // Relative to the first point and to the largest extent: precision does not depend on where the points are.
-    const glm::dvec3 origin = points[0];
-    double extent = 0;
-    for (const glm::dvec3& p : points) {
-        const glm::dvec3 d = glm::abs(p - origin);
-        extent = std::max({extent, d.x, d.y, d.z});
-    }
-    if (extent == 0) return {origin, 0};
-    static thread_local std::vector<glm::dvec3> scaled;
-    scaled.clear();
-    for (const glm::dvec3& p : points) scaled.push_back((p - origin) / extent);
-    glm::dvec3 boundary[4];
-    DSphere sphere = welzl(scaled, scaled.size(), boundary, 0);
-    sphere.centre = sphere.centre * extent + origin;
-    sphere.radius = 0;
-    for (const glm::dvec3& p : points) sphere.radius = std::max(sphere.radius, glm::distance(sphere.centre, p));
-    return sphere;
-}
+DSphere smallest_sphere(std::span<const glm::dvec3> points) { return enclose(points, {}, exact_slack); }
 
 DSphere enclosing_sphere(std::span<const glm::dvec3> points, std::span<const DSphere> spheres) {
-    // Cutting planes: a sphere that sticks out of the current answer adds its farthest point to the point set. The
-    // point sets' smallest spheres are lower bounds, so the last one is nearly the smallest.
-    std::vector<glm::dvec3> all(points.begin(), points.end());
-    for (const DSphere& s : spheres)
-        if (s.radius >= 0) all.push_back(s.centre);
-    DSphere result = smallest_sphere(all);
-    for (int round = 0; round < most_rounds; ++round) {
-        double reach = result.radius;
-        const DSphere* farthest = nullptr;
-        for (const DSphere& s : spheres) {
-            if (s.radius < 0) continue;
-            const double r = glm::distance(result.centre, s.centre) + s.radius;
-            if (r > reach) {
-                reach = r;
-                farthest = &s;
-            }
+    return enclose(points, spheres, sphere_slack);
+}
+
+// The view of a BallSet that a basis grows in.
+class BallSet::Scaled {
+public:
+    explicit Scaled(const BallSet& set) : set_(set) {}
+
+    DSphere first() const { return {glm::dvec3(0), 0}; }
+    Farthest farthest(glm::dvec3 from) const {
+        const float x = static_cast<float>(from.x), y = static_cast<float>(from.y), z = static_cast<float>(from.z);
+        Floats largest = {-1, -1, -1, -1};
+        Ints where = {0, 0, 0, 0}, at = {0, 1, 2, 3};
+        for (std::size_t i = 0; i < set_.x_.size(); i += 4) {
+            const Floats dx = load(set_.x_, i) - x, dy = load(set_.y_, i) - y, dz = load(set_.z_, i) - z;
+            const Floats squared = dx * dx + dy * dy + dz * dz;
+            const Ints farther = squared > largest;
+            largest = farther ? squared : largest;
+            where = farther ? at : where;
+            at += 4;
         }
-        const bool done = !farthest || reach <= result.radius * (1 + sphere_slack) || round + 1 == most_rounds;
-        if (done) {
-            result.radius = reach;
-            break;
+        int lane = 0;
+        for (int k = 1; k < 4; ++k)
+            if (largest[k] > largest[lane]) lane = k;
+        const auto i = static_cast<std::size_t>(where[lane]);
+        const glm::dvec3 point(set_.x_[i], set_.y_[i], set_.z_[i]);
+        Farthest out{{point, 0}, glm::distance(point, from)};
+        for (const DSphere& s : set_.scaled_spheres_) {
+            const double reach = glm::distance(s.centre, from) + s.radius;
+            if (reach > out.reach) out = {s, reach};
         }
-        const glm::dvec3 away = farthest->centre - result.centre;
-        const double length = glm::length(away);
-        const glm::dvec3 direction = length > 0 ? away / length : glm::dvec3(1, 0, 0);
-        all.push_back(farthest->centre + direction * farthest->radius);
-        if (!(length > 0)) all.push_back(farthest->centre - direction * farthest->radius);
-        result = smallest_sphere(all);
+        return out;
     }
-    return result;
+
+private:
+    static Floats load(const std::vector<float>& v, std::size_t i) {
+        Floats out;
+        std::memcpy(&out, v.data() + i, sizeof out);
+        return out;
+    }
+    const BallSet& set_;
+};
+
+void BallSet::clear() {
+    points_.clear(), x_.clear(), y_.clear(), z_.clear(), spheres_.clear(), scaled_spheres_.clear();
+}
+
+DSphere BallSet::enclose(double slack) {
+    const glm::dvec3 origin(points_[0]);
+    const double scale = scale_;
+    for (const Sphere& s : spheres_)
+        scaled_spheres_.push_back({(glm::dvec3(s.centre) - origin) * scale, s.radius * scale});
+    while (x_.size() % 4 != 0) x_.push_back(0), y_.push_back(0), z_.push_back(0); // the first point again
+    const glm::dvec3 centre = grow_basis(Scaled(*this), slack).centre / scale + origin;
+    // Exactly what has to be contained, without the rounding of the way here.
+    double squared_reach = 0;
+    for (const glm::vec3& p : points_) squared_reach = std::max(squared_reach, squared(glm::dvec3(p) - centre));
+    double reach = std::sqrt(squared_reach);
+    for (const Sphere& s : spheres_) reach = std::max(reach, glm::distance(glm::dvec3(s.centre), centre) + s.radius);
+    return {centre, reach};
 }
 
 Sphere round_outward(const DSphere& sphere) {

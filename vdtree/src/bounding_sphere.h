@@ -23,6 +23,37 @@ DSphere smallest_sphere(std::span<const glm::dvec3> points);
 // relative 1e-4 at most, and contains them all.
 DSphere enclosing_sphere(std::span<const glm::dvec3> points, std::span<const DSphere> spheres);
 
+// Points and spheres of one tree, to be enclosed again and again: keeps its memory, and looks for the farthest of several points
+// per instruction.
+class BallSet {
+public:
+    // `scale` brings the tree's extent to about 1, so that squares in floats neither overflow nor vanish.
+    explicit BallSet(float scale) : scale_(scale) {}
+
+    void clear();
+    void add(glm::vec3 point) {
+        const glm::vec3 p = (point - (points_.empty() ? point : points_[0])) * scale_;
+        points_.push_back(point);
+        x_.push_back(p.x);
+        y_.push_back(p.y);
+        z_.push_back(p.z);
+    }
+    void add(const Sphere& sphere) { spheres_.push_back(sphere); }
+
+    // Contains everything; the radius exceeds the smallest one by a relative `slack` at most, but for the rounding of
+    // positions relative to each other. There must be a point.
+    DSphere enclose(double slack);
+
+private:
+    class Scaled;
+
+    float scale_;
+    std::vector<glm::vec3> points_;
+    std::vector<float> x_, y_, z_; // relative to the first, scaled
+    std::vector<Sphere> spheres_;
+    std::vector<DSphere> scaled_spheres_;
+};
+
 // The sphere in floats, grown so that it contains the given one in exact arithmetic.
 Sphere round_outward(const DSphere& sphere);
 

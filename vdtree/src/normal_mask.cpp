@@ -7,6 +7,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "directions.h"
+
 namespace unseen::vdtree {
 
 namespace {
@@ -22,11 +24,6 @@ constexpr double slab_margin = 1e-4;                     // units; covers the ro
 
 // The cube coordinate -1..1 of the warped coordinate -1..1: equal steps are equal angles along the axis.
 double unwarp(double warped) { return std::tan(warped * (std::numbers::pi / 4)); }
-
-int cell_index(double cube_coordinate) {
-    const double warped = std::atan(cube_coordinate) * (4 / std::numbers::pi);
-    return std::clamp(static_cast<int>((warped + 1) * (cells_per_side / 2.0)), 0, cells_per_side - 1);
-}
 
 // The point of the cube's face `face` (axis * 2 + sign) with the coordinates u, v on the two other axes.
 glm::dvec3 on_face(int face, double u, double v) {
@@ -63,11 +60,7 @@ int normal_cell(glm::dvec3 normal) noexcept {
     const glm::dvec3 size = glm::abs(normal);
     const double largest = std::max({size.x, size.y, size.z});
     if (!(largest > 0) || !std::isfinite(size.x + size.y + size.z)) return -1;
-    const int axis = size.x >= size.y ? (size.x >= size.z ? 0 : 2) : (size.y >= size.z ? 1 : 2);
-    const int face = axis * 2 + (normal[axis] < 0 ? 1 : 0);
-    const int column = cell_index(normal[(axis + 1) % 3] / largest);
-    const int row = cell_index(normal[(axis + 2) % 3] / largest);
-    return face * 64 + row * cells_per_side + column;
+    return cell_of(normal, largest);
 }
 
 const std::array<NormalCell, normal_cell_count>& normal_cells() noexcept {

@@ -53,7 +53,7 @@ struct BuildOptions {
 };
 
 // Drops triangles that use a vertex twice (counted in the tree); fails where none is left, on non-finite positions and on
-// indices out of range. Memory: about 300 bytes a triangle while building.
+// indices out of range. Memory: about 220 bytes a triangle while building.
 Result<VertexTree> build_tree(const MeshView& mesh, const BuildOptions& options = {});
 Result<VertexTree> build_tree(const MeshView& mesh, Clusterer clusterer, const BuildOptions& options = {});
 

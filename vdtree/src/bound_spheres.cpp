@@ -1,0 +1,165 @@
+#include "bound_spheres.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "bounding_sphere.h"
+
+namespace unseen::vdtree {
+
+namespace {
+
+// Displacements of nodes with more leaves than this are bounded through their children's: looking for the farthest of very
+// many leaves again in each of their ancestors would cost the square of their number where trees are deep.
+constexpr Index most_measured_leaves = 4096;
+// So many leaves are looked at one by one sooner than their nodes.
+constexpr Index few_leaves = 12;
+
+// Of the radius: spheres that stick out by less do not move the centre any more. Less is not worth the time: what the spheres
+// of children add is more.
+constexpr double node_slack = 1e-3;
+
+// Bounds one node after another, children first. Leaves are seen as points, interior children as their spheres.
+class SphereWorker {
+public:
+    SphereWorker(const BoundInput& input, float scale, NodeSpheres& out)
+        : in_(input), out_(out), support_(scale), ring_(scale) {}
+
+    void operator()(NodeId node) {
+        support_.clear(), ring_.clear();
+        const glm::vec3 proxy = in_.positions[node];
+        support_.add(proxy);
+        ring_.add(proxy);
+        in_.shape.for_each_child(
+            node,
+            [&](NodeId child) {
+                support_.add(out_.support[child]);
+                ring_.add(out_.ring[child]);
+            },
+            [&](Index leaf) {
+                const glm::vec3 p = in_.positions[in_.shape.node_of_leaf(leaf)];
+                support_.add(p);
+                ring_.add(p);
+                for (const Index neighbour : in_.rings.around(leaf))
+                    ring_.add(in_.positions[in_.shape.node_of_leaf(neighbour)]);
+            });
+        out_.support[node] = round_outward(support_.enclose(node_slack));
+        out_.ring[node] = round_outward(ring_.enclose(node_slack));
+    }
+
+private:
+    const BoundInput& in_;
+    NodeSpheres& out_;
+    BallSet support_, ring_;
+};
+
+// A power of two that brings the positions' extent to between a half and 1.
+float unit_scale(std::span<const glm::vec3> positions) {
+    glm::vec3 low = positions[0], high = low;
+    for (const glm::vec3& p : positions) {
+        low = glm::min(low, p);
+        high = glm::max(high, p);
+    }
+    const glm::vec3 size = high - low;
+    const float extent = std::max({size.x, size.y, size.z});
+    if (!(extent > 0)) return 1;
+    constexpr int most = 120; // the scale itself must be a float
+    return std::ldexp(1.0f, std::clamp(-std::ilogb(extent) - 1, -most, most));
+}
+
+class DisplacementWorker {
+public:
+    DisplacementWorker(const BoundInput& input, std::span<const Sphere> support, std::span<float> out)
+        : in_(input), support_(support), out_(out) {}
+
+    void operator()(NodeId node) {
+        proxy_ = in_.position(node);
+        farthest_ = 0;
+        const TreeShape& shape = in_.shape;
+        shape.for_each_child(
+            node, [&](NodeId child) { farthest_ = std::max(farthest_, static_cast<double>(out_[child])); },
+            [](Index) {});
+        if (shape.leaf_end[node] - shape.first_leaf[node] <= most_measured_leaves) {
+            measure(node);
+        } else {
+            shape.for_each_child(
+                node, [&](NodeId child) { farthest_ = std::max(farthest_, bound(child)); },
+                [&](Index leaf) { measure_leaf(leaf); });
+        }
+        out_[node] = round_outward(DSphere{glm::dvec3(0), farthest_}).radius;
+    }
+
+private:
+    void measure_leaf(Index leaf) { farthest_ = std::max(farthest_, glm::distance(proxy_, in_.leaf_position(leaf))); }
+
+    // No leaf under the node is farther from the proxy.
+    double bound(NodeId node) const {
+        return std::min(glm::distance(proxy_, in_.position(node)) + out_[node],
+                        glm::distance(proxy_, glm::dvec3(support_[node].centre)) + support_[node].radius);
+    }
+
+    // Looks where a farther leaf may be, likely places first.
+    void measure(NodeId node) {
+        const TreeShape& shape = in_.shape;
+        if (shape.leaf_end[node] - shape.first_leaf[node] <= few_leaves) {
+            for (Index leaf = shape.first_leaf[node]; leaf < shape.leaf_end[node]; ++leaf) measure_leaf(leaf);
+            return;
+        }
+        NodeId likely = no_node;
+        double most = farthest_;
+        shape.for_each_child(
+            node,
+            [&](NodeId child) {
+                const double reach = bound(child);
+                if (reach > most) {
+                    most = reach;
+                    likely = child;
+                }
+            },
+            [&](Index leaf) { measure_leaf(leaf); });
+        if (likely == no_node) return;
+        measure(likely);
+        shape.for_each_child(
+            node,
+            [&](NodeId child) {
+                if (child != likely && bound(child) > farthest_) measure(child);
+            },
+            [](Index) {});
+    }
+
+    const BoundInput& in_;
+    std::span<const Sphere> support_;
+    std::span<float> out_;
+    glm::dvec3 proxy_;
+    double farthest_;
+};
+
+} // namespace
+
+NodeSpheres bound_spheres(const BoundInput& input) {
+    NodeSpheres spheres;
+    spheres.support.resize(input.shape.interior());
+    spheres.ring.resize(input.shape.interior());
+    const float scale = unit_scale(input.positions);
+    input.parts.bottom_up([&] { return SphereWorker(input, scale, spheres); });
+    return spheres;
+}
+
+Sphere bound_corners(const BoundInput& input) {
+    std::vector<glm::dvec3> corners;
+    corners.reserve(input.shape.leaves());
+    for (Index leaf = 0; leaf < input.shape.leaves(); ++leaf)
+        if (!input.rings.around(leaf).empty()) corners.push_back(input.leaf_position(leaf));
+    return round_outward(smallest_sphere(corners));
+}
+
+std::vector<float> bound_displacements(const BoundInput& input, std::span<const Sphere> support) {
+    std::vector<float> displacement(input.shape.interior());
+    input.parts.bottom_up([&] { return DisplacementWorker(input, support, displacement); });
+    return displacement;
+}
+
+} // namespace unseen::vdtree

@@ -1,0 +1,98 @@
+// A set of normals while a tree is being built: its mask, and its slabs in a form whose union is a maximum of bytes.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include <glm/common.hpp>
+#include <glm/vec3.hpp>
+
+#include <vdtree/normal_mask.h>
+
+namespace unseen::vdtree {
+
+// The borders between the cells of a cube's face lie at equal angles: tan(k pi / 16) for k = 1, 2, 3 and their opposites.
+inline constexpr double cell_borders[3] = {0.19891236737965800691, 0.41421356237309504880, 0.66817863791929891999};
+
+// Cell of a direction given its largest absolute component, which is positive and finite. Multiplications and comparisons
+// only: the same vector always has the same cell, whatever the compiler makes of it, and NormalBatch gives the same.
+inline int cell_of(glm::dvec3 v, double largest) noexcept {
+    const glm::dvec3 size = glm::abs(v);
+    const int axis = size.x >= size.y ? (size.x >= size.z ? 0 : 2) : (size.y >= size.z ? 1 : 2);
+    const double b0 = cell_borders[0] * largest, b1 = cell_borders[1] * largest, b2 = cell_borders[2] * largest;
+    const auto index = [&](double along) {
+        const double a = std::abs(along);
+        const int steps = (a >= b0) + (a >= b1) + (a >= b2);
+        return along < 0 ? 3 - steps : 4 + steps;
+    };
+    constexpr int next[3] = {1, 2, 0};
+    const int face = axis * 2 + (v[axis] < 0 ? 1 : 0);
+    return face * 64 + index(v[next[next[axis]]]) * 8 + index(v[next[axis]]);
+}
+
+struct alignas(64) Directions {
+    NormalMask mask;
+    // By slab: 128 more than its upper end, then 128 more than its lower end's opposite; 0: nothing yet.
+    std::array<std::uint8_t, 16> reach{};
+
+    Directions& operator|=(const Directions& other) noexcept {
+        mask |= other.mask;
+        widen(other.reach);
+        return *this;
+    }
+    void widen(const std::array<std::uint8_t, 16>& other) noexcept {
+        for (std::size_t i = 0; i < reach.size(); ++i) reach[i] = std::max(reach[i], other[i]);
+    }
+    static Directions everything() noexcept {
+        Directions all;
+        all.mask.faces.fill(~std::uint64_t{0});
+        all.reach.fill(255);
+        return all;
+    }
+    NormalSlabs slabs() const noexcept {
+        NormalSlabs out;
+        if (reach[0] == 0) return out;
+        for (std::size_t i = 0; i < NormalSlabs::axis_count; ++i) {
+            out.hi[i] = static_cast<std::int8_t>(reach[i] - 128);
+            out.lo[i] = static_cast<std::int8_t>(128 - reach[8 + i]);
+        }
+        return out;
+    }
+};
+
+// Finds the directions of the normals of many triangles at once: several per instruction.
+class NormalBatch {
+public:
+    static constexpr std::size_t capacity = 64;
+
+    bool full() const noexcept { return count_ == capacity; }
+    std::size_t size() const noexcept { return count_; }
+    void push(glm::vec3 a, glm::vec3 b, glm::vec3 c) noexcept {
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto k = static_cast<std::size_t>(axis);
+            corners_[k][count_] = a[axis];
+            corners_[3 + k][count_] = b[axis];
+            corners_[6 + k][count_] = c[axis];
+        }
+        ++count_;
+    }
+
+    // Measures what was pushed and empties the batch; the results stay until the next call.
+    void measure() noexcept;
+    // Adds the direction of the i-th triangle; none if it has no area.
+    void insert(std::size_t i, Directions& to) const noexcept {
+        if (cells_[i] < 0) return;
+        to.mask.insert(cells_[i]);
+        to.widen(reach_[i]);
+    }
+
+private:
+    std::size_t count_ = 0;
+    alignas(64) float corners_[9][capacity];
+    alignas(64) int cells_[capacity];
+    alignas(64) std::array<std::uint8_t, 16> reach_[capacity];
+};
+
+} // namespace unseen::vdtree

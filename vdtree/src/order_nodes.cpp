@@ -1,0 +1,153 @@
+#include "order_nodes.h"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+#include <tbb/parallel_for.h>
+
+namespace unseen::vdtree {
+
+namespace {
+
+// What becomes of a cluster: counted on the way up, turned into places on the way down.
+struct ClusterPlace {
+    Index children = 0;
+    Index leaves = 0;      // under it; then the end of those not yet given to its children
+    NodeId nodes = 0;      // in its subtree; then the end of those not yet given
+    NodeId node = no_node; // its own, or that of the cluster that it is the only child of
+};
+
+constexpr Index never = std::numeric_limits<Index>::max();
+
+} // namespace
+
+Ancestors::Ancestors(const TreeShape& shape) : shape_(shape), jump_(shape.interior()) {
+    // The jump from a node is as long as two jumps from its parent where these are equally long, else it leads to the parent.
+    std::vector<Index> depth(shape.interior(), 0);
+    for (NodeId node = 0; node < shape.interior(); ++node) {
+        const NodeId up = shape.parents[node];
+        if (up == no_node) {
+            jump_[node] = no_node;
+            continue;
+        }
+        depth[node] = depth[up] + 1;
+        const NodeId once = jump_[up], twice = once == no_node ? no_node : jump_[once];
+        const bool equal = twice != no_node && depth[up] - depth[once] == depth[once] - depth[twice];
+        jump_[node] = equal ? twice : up;
+    }
+}
+
+NodeOrder order_nodes(const Clustering& clustering, Index vertices, Index lone) {
+    const Index clusters = static_cast<Index>(clustering.parents.size()), root = clusters - 1;
+    const std::span<const Index> parents = clustering.parents;
+
+    // Up: children have lower numbers than their parents.
+    std::vector<ClusterPlace> places(clusters - vertices);
+    const auto place = [&](Index cluster) -> ClusterPlace& { return places[cluster - vertices]; };
+    for (Index v = 0; v < vertices; ++v) {
+        ClusterPlace& up = place(parents[v]);
+        ++up.children;
+        ++up.leaves;
+    }
+    for (Index c = vertices; c < clusters; ++c) {
+        ClusterPlace& here = place(c);
+        if (here.children > 1) ++here.nodes;
+        if (c == root) break;
+        ClusterPlace& up = place(parents[c]);
+        ++up.children;
+        up.leaves += here.leaves;
+        up.nodes += here.nodes;
+    }
+
+    NodeOrder order;
+    TreeShape& shape = order.shape;
+    const NodeId extra = lone > 1 ? 2 : lone; // the root above the clustering's, and the lone vertices' node
+    const NodeId interior = place(root).nodes + extra;
+    const NodeId top = lone > 0 ? 0 : no_node;
+    shape.parents.resize(std::size_t{interior} + vertices + lone);
+    shape.first_leaf.resize(interior);
+    shape.leaf_end.resize(interior);
+    shape.subtree_end.resize(interior);
+    shape.made.resize(interior);
+    order.leaf_of_vertex.resize(std::size_t{vertices} + lone);
+    order.node_of_cluster.assign(clusters - vertices, no_node);
+    const auto open = [&](NodeId node, NodeId parent, Index first_leaf, Index leaf_end, NodeId subtree_end,
+                          Index made) {
+        shape.parents[node] = parent;
+        shape.first_leaf[node] = first_leaf;
+        shape.leaf_end[node] = leaf_end;
+        shape.subtree_end[node] = subtree_end;
+        shape.made[node] = made;
+    };
+    const auto put_leaf = [&](Index vertex, Index leaf, NodeId parent) {
+        order.leaf_of_vertex[vertex] = leaf;
+        shape.parents[shape.node_of_leaf(leaf)] = parent;
+    };
+
+    // Down: the last child takes the last leaves and nodes of its parent.
+    for (Index c = root; c >= vertices; --c) {
+        ClusterPlace& here = place(c);
+        const NodeId parent = c == root ? top : place(parents[c]).node;
+        Index leaf_end = vertices;
+        NodeId node_end = interior - (lone > 1 ? 1 : 0);
+        if (c != root) {
+            ClusterPlace& up = place(parents[c]);
+            leaf_end = up.leaves;
+            node_end = up.nodes;
+            up.leaves -= here.leaves;
+            up.nodes -= here.nodes;
+        }
+        here.node = parent;
+        if (here.children > 1) {
+            here.node = order.node_of_cluster[c - vertices] = node_end - here.nodes;
+            open(here.node, parent, leaf_end - here.leaves, leaf_end, node_end, c);
+        }
+        here.leaves = leaf_end;
+        here.nodes = node_end;
+    }
+    for (Index v = vertices; v-- > 0;) {
+        ClusterPlace& up = place(parents[v]);
+        put_leaf(v, --up.leaves, up.node);
+    }
+    if (lone > 0) {
+        const NodeId group = lone > 1 ? interior - 1 : top;
+        open(top, no_node, 0, vertices + lone, interior, never);
+        if (group != top) open(group, top, vertices, vertices + lone, interior, never - 1);
+        for (Index i = 0; i < lone; ++i) put_leaf(vertices + i, vertices + i, group);
+    }
+    return order;
+}
+
+TriangleOrder order_triangles(std::span<const Triangle> triangles, const NodeOrder& nodes, const Ancestors& ancestors) {
+    const TreeShape& shape = nodes.shape;
+    TriangleOrder order;
+    std::vector<NodeId> vanishing(triangles.size());
+    tbb::parallel_for(std::size_t{0}, triangles.size(), [&](std::size_t t) {
+        Triangle leaves = {nodes.leaf_of_vertex[triangles[t][0]], nodes.leaf_of_vertex[triangles[t][1]],
+                           nodes.leaf_of_vertex[triangles[t][2]]};
+        // Of three leaves, the middle one merges first with another.
+        const auto [low, high] = std::minmax({leaves[0], leaves[1], leaves[2]});
+        const Index middle = leaves[0] ^ leaves[1] ^ leaves[2] ^ low ^ high;
+        vanishing[t] = ancestors.lowest(shape.parents[shape.node_of_leaf(middle)], [&](NodeId node) {
+            return shape.first_leaf[node] <= low || high < shape.leaf_end[node];
+        });
+    });
+    order.first_triangle.assign(shape.interior() + 1, 0);
+    for (const NodeId node : vanishing) ++order.first_triangle[node + 1];
+    std::partial_sum(order.first_triangle.begin(), order.first_triangle.end(), order.first_triangle.begin());
+    order.triangles.resize(triangles.size());
+    order.sources.resize(triangles.size());
+    // Each node's triangles are counted down from its end, the last triangle first.
+    for (std::size_t t = triangles.size(); t-- > 0;) {
+        const Index at = --order.first_triangle[vanishing[t] + 1];
+        for (std::size_t k = 0; k < 3; ++k) order.triangles[at][k] = nodes.leaf_of_vertex[triangles[t][k]];
+        order.sources[at] = static_cast<Index>(t);
+    }
+    // What was the end of a node is its beginning now, one place too high.
+    std::move(order.first_triangle.begin() + 1, order.first_triangle.end(), order.first_triangle.begin());
+    order.first_triangle.back() = static_cast<Index>(triangles.size());
+    return order;
+}
+
+} // namespace unseen::vdtree
