@@ -35,15 +35,17 @@ constexpr Index largest_part = 1 << 15;
 // next to nothing, many enough that those along the border of the part, which had fewer partners to choose from, are a small share.
 constexpr Index part_target = largest_part / 32;
 
-// One unit of relative luminance counts as this share of the model's extent. The best of 0.02, 0.05, 0.1 and 0.2 on the
-// bunny under the perceptual fold test; they differ by 0.3% of its triangles.
-constexpr double luminance_scale = 0.2;
+// One unit of relative luminance counts as this share of the model's extent. From 0.01 to 0.2, the triangles that the perceptual
+// fold test leaves of bunny and dragon differ by 0.5%; but with 0.2 the surface strays 1.3 to 1.7 times as far for its triangles,
+// for on a bumpy surface luminance then drowns the shape.
+constexpr double luminance_scale = 0.01;
 // A normal that turns by one radian, and a colour that goes from 0 to 1, count as these shares of the extent. Less than
 // luminance, which is what is seen of both in most lights.
-constexpr double normal_scale = 0.05;
-constexpr double colour_scale = 0.1;
-// A texture that slides by a length on the surface counts as this share of the length.
-constexpr double texture_scale = 0.25;
+constexpr double normal_scale = 0.0025;
+constexpr double colour_scale = 0.005;
+// A texture that slides by a length on the surface counts as this share of the length: what one sees of it depends on the
+// texture, and most of a displacement is seen whatever it is.
+constexpr double texture_scale = 0.1;
 // Attributes count as if they were within this many extents, so that stray values stay finite when squared.
 constexpr double largest_value = 1e3;
 
@@ -149,6 +151,7 @@ public:
 
     PartMesh make(std::size_t part) const;
     glm::dvec3 from_unit_box(glm::dvec3 p) const { return p / scale_ + centre_; }
+    float length_from_unit_box(float length) const { return static_cast<float>(length / scale_); }
 
 private:
     void measure();
@@ -349,12 +352,12 @@ private:
 struct MergeRecord {
     std::vector<Merge> merges;
     std::vector<glm::dvec3> places;
-    std::vector<float> errors;
+    std::vector<float> deviations;
     std::vector<Index> round_ends;
 };
 
 MergeRecord take_record(Contraction& c) {
-    return {std::move(c.merges), std::move(c.places), std::move(c.errors), std::move(c.round_ends)};
+    return {std::move(c.merges), std::move(c.places), std::move(c.deviations), std::move(c.round_ends)};
 }
 
 // The merges of all parts; first those of the parts themselves, then those of joined pairs of parts, and so on.
@@ -400,6 +403,7 @@ public:
         const std::size_t most = input_.mesh.positions.size() + numbering_.vertex_of_slot.size();
         result_.parents.reserve(most);
         result_.positions.reserve(most - input_.mesh.positions.size());
+        result_.deviations.reserve(most - input_.mesh.positions.size());
         join_coincident();
         for (Level& level : levels) {
             std::size_t rounds = 0;
@@ -422,7 +426,7 @@ private:
         for (Index s = 0; s < cluster_.size(); ++s) {
             cluster_[s] = numbering_.vertex_of_slot[s];
             if (first_member[s + 1] - first_member[s] == 1) continue;
-            const Index parent = push_cluster(input_.mesh.positions[cluster_[s]]);
+            const Index parent = push_cluster(input_.mesh.positions[cluster_[s]], 0);
             for (Index i = first_member[s]; i < first_member[s + 1]; ++i) result_.parents[numbering_.members[i]] = parent;
             cluster_[s] = parent;
         }
@@ -431,16 +435,18 @@ private:
     void write_round(const MergeRecord& record, std::size_t round) {
         for (Index i = round == 0 ? 0 : record.round_ends[round - 1]; i < record.round_ends[round]; ++i) {
             const Merge& merge = record.merges[i];
-            const Index parent = push_cluster(maker_.from_unit_box(record.places[i]));
+            const Index parent = push_cluster(maker_.from_unit_box(record.places[i]),
+                                              maker_.length_from_unit_box(record.deviations[i]));
             result_.parents[cluster_[merge.kept]] = result_.parents[cluster_[merge.joined]] = parent;
             cluster_[merge.kept] = parent;
         }
     }
 
-    Index push_cluster(glm::dvec3 position) {
+    Index push_cluster(glm::dvec3 position, float deviation) {
         const Index number = static_cast<Index>(result_.parents.size());
         result_.parents.push_back(number);
         result_.positions.push_back(position);
+        result_.deviations.push_back(deviation);
         return number;
     }
 

@@ -19,8 +19,10 @@ namespace unseen::vdtree {
 
 namespace {
 
-// Weight of the squared distance between a cluster's vertices and its proxy, against that from the planes.
-constexpr float compactness = 0.01f;
+// Weight of the squared distance between a cluster's vertices and its proxy, against that from the planes. Keeps clusters
+// compact where the planes do not care. With 0.01 bunny and dragon stray 7 to 11% farther for their triangles; with
+// 0.001 hardly less far than with this, but clusters grow long in flat areas.
+constexpr float compactness = 0.003f;
 // Weight of a channel's variance within a cluster, against the deviation from the interpolated value.
 constexpr float channel_compactness = 0.1f;
 // Weight of the planes that stand on boundary edges, against those of triangles.
@@ -69,6 +71,7 @@ private:
         live.places.assign(part_.positions.begin(), part_.positions.begin() + own_);
         live.quadrics.assign(own_ * stride_, 0);
         live.references.assign(own_ * channels_, 0);
+        live.deviations.assign(own_, 0);
         for (Index v = 0; v < part_.slot_of_vertex.size() && slot(v) < own_;) {
             Index end = v;
             float* reference = live.references.data() + slot(v) * channels_;
@@ -238,7 +241,7 @@ private:
             difference = std::max({difference, at0 * at0, at1 * at1});
         }
         // A step in the values as large as `whole_step` is held like a boundary, a smaller one less.
-        constexpr float whole_step = 0.05f; // unit-box length
+        constexpr float whole_step = 0.002f; // unit-box length
         const double share = std::min(1.0f, difference / (whole_step * whole_step));
         if (!(share > 0)) return;
         add_boundary(low, first.high, first.side, boundary_weight * share);
@@ -265,6 +268,7 @@ public:
         c_.merges.reserve(live_.size() - wanted);
         c_.places.reserve(live_.size() - wanted);
         c_.errors.reserve(live_.size() - wanted);
+        c_.deviations.reserve(live_.size() - wanted);
         while (live_.size() > wanted) {
             const std::size_t before = c_.merges.size(), clusters = live_.size();
             contract_round();
@@ -430,6 +434,7 @@ private:
         reorder(c_.merges);
         reorder(c_.places);
         reorder(c_.errors);
+        reorder(c_.deviations);
     }
 
     void contract_mutually_best() {
@@ -483,6 +488,9 @@ private:
         c_.merges.push_back({live_.names[p.a], live_.names[p.b]});
         c_.places.push_back(live_.places[p.a]);
         c_.errors.push_back(error);
+        const float deviation = std::sqrt(error / sum[quadric::weight]);
+        live_.deviations[p.a] = std::max({deviation, live_.deviations[p.a], live_.deviations[p.b]});
+        c_.deviations.push_back(live_.deviations[p.a]);
     }
 
     // Renumbers the clusters without those that were joined to others, and the edges with them.
@@ -495,6 +503,7 @@ private:
             if (kept != s) {
                 live_.names[kept] = live_.names[s];
                 live_.places[kept] = live_.places[s];
+                live_.deviations[kept] = live_.deviations[s];
                 std::copy_n(quadric_of(s), stride_, quadric_of(kept));
                 std::copy_n(live_.references.data() + s * channels_, channels_, live_.references.data() + kept * channels_);
             }
@@ -504,6 +513,7 @@ private:
             if (into_[s] != s) new_number_[s] = new_number_[into_[s]];
         live_.names.resize(kept);
         live_.places.resize(kept);
+        live_.deviations.resize(kept);
         live_.quadrics.resize(kept * stride_);
         live_.references.resize(kept * channels_);
         for (auto& edge : c_.outer_edges) edge.cluster = new_number_[edge.cluster];
@@ -555,6 +565,7 @@ void append(LiveClusters& to, const LiveClusters& from) {
     add(to.names, from.names);
     add(to.places, from.places);
     add(to.references, from.references);
+    add(to.deviations, from.deviations);
     add(to.quadrics, from.quadrics);
 }
 

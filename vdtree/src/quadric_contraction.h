@@ -38,6 +38,7 @@ struct LiveClusters {
     std::vector<Index> names;            // a slot in the cluster, under which merges know it
     std::vector<glm::dvec3> places;
     std::vector<float> references;       // by cluster and channel: what the quadric's channel values are relative to
+    std::vector<float> deviations;       // by cluster, see Contraction
     std::vector<float> quadrics;         // quadric_stride(channels) each, see quadric.h
     std::size_t size() const { return names.size(); }
 };
@@ -61,6 +62,7 @@ struct Contraction {
     std::vector<Merge> merges;
     std::vector<glm::dvec3> places;      // by merge
     std::vector<float> errors;           // by merge: quadric error of the new cluster, weight times unit-box length squared
+    std::vector<float> deviations;       // by merge: its square root over the weight, unit-box length; at least the parts'
     std::vector<Index> round_ends;       // by round: the number of merges up to its end
 
     LiveClusters live;
