@@ -1,14 +1,19 @@
 #include "spatial_order.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace unseen::vdtree {
 
 void sort_by_code(std::span<CodedIndex> items, std::span<CodedIndex> scratch) {
-    constexpr std::size_t worth_counting = 192; // below, insertion and merging beat counters for 256 digits
+    constexpr std::size_t worth_counting = 64; // below, insertion beats counters for 256 digits
     if (items.size() < worth_counting) {
-        std::stable_sort(items.begin(), items.end(),
-                         [](const CodedIndex& a, const CodedIndex& b) { return a.code < b.code; });
+        for (std::size_t i = 1; i < items.size(); ++i) {
+            const CodedIndex item = items[i];
+            std::size_t place = i;
+            for (; place > 0 && item.code < items[place - 1].code; --place) items[place] = items[place - 1];
+            items[place] = item;
+        }
         return;
     }
     std::uint64_t differing = 0;
