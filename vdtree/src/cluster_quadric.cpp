@@ -354,10 +354,12 @@ struct MergeRecord {
     std::vector<glm::dvec3> places;
     std::vector<float> deviations;
     std::vector<Index> round_ends;
+    std::vector<Contraction::Vanishing> vanishings;
 };
 
 MergeRecord take_record(Contraction& c) {
-    return {std::move(c.merges), std::move(c.places), std::move(c.deviations), std::move(c.round_ends)};
+    return {std::move(c.merges), std::move(c.places), std::move(c.deviations), std::move(c.round_ends),
+            std::move(c.vanishings)};
 }
 
 // The merges of all parts; first those of the parts themselves, then those of joined pairs of parts, and so on.
@@ -411,10 +413,12 @@ public:
             for (std::size_t round = 0; round < rounds; ++round)
                 for (const MergeRecord& record : level)
                     if (round < record.round_ends.size()) write_round(record, round);
+            for (const MergeRecord& record : level)
+                for (const auto& vanishing : record.vanishings)
+                    raise(made_by_joining_[vanishing.joined], maker_.length_from_unit_box(vanishing.deviation));
             level.clear();
         }
-        const Index root = static_cast<Index>(result_.parents.size() - 1);
-        result_.parents[root] = root;
+        for (Index c = 0; c < result_.deviations.size(); ++c) raise(result_.parents[vertices() + c], result_.deviations[c]);
         return std::move(result_);
     }
 
@@ -423,6 +427,7 @@ private:
     void join_coincident() {
         const auto& first_member = numbering_.first_member;
         cluster_.resize(numbering_.vertex_of_slot.size());
+        made_by_joining_.resize(cluster_.size());
         for (Index s = 0; s < cluster_.size(); ++s) {
             cluster_[s] = numbering_.vertex_of_slot[s];
             if (first_member[s + 1] - first_member[s] == 1) continue;
@@ -438,9 +443,15 @@ private:
             const Index parent = push_cluster(maker_.from_unit_box(record.places[i]),
                                               maker_.length_from_unit_box(record.deviations[i]));
             result_.parents[cluster_[merge.kept]] = result_.parents[cluster_[merge.joined]] = parent;
-            cluster_[merge.kept] = parent;
+            cluster_[merge.kept] = made_by_joining_[merge.joined] = parent;
         }
     }
+
+    void raise(Index cluster, float deviation) {
+        float& here = result_.deviations[cluster - vertices()];
+        here = std::max(here, deviation);
+    }
+    Index vertices() const { return static_cast<Index>(input_.mesh.positions.size()); }
 
     Index push_cluster(glm::dvec3 position, float deviation) {
         const Index number = static_cast<Index>(result_.parents.size());
@@ -454,7 +465,8 @@ private:
     const SpatialNumbering& numbering_;
     const PartMaker& maker_;
     Clustering result_;
-    std::vector<Index> cluster_; // by slot: the cluster that is known under its name
+    std::vector<Index> cluster_;         // by slot: the cluster that is known under its name
+    std::vector<Index> made_by_joining_; // by slot: the cluster that was made when the one of this name was joined to another
 };
 
 } // namespace

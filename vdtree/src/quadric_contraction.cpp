@@ -72,6 +72,8 @@ private:
         live.quadrics.assign(own_ * stride_, 0);
         live.references.assign(own_ * channels_, 0);
         live.deviations.assign(own_, 0);
+        live.made_by.assign(own_, no_merge);
+        live.vanishing.assign(own_, no_merge);
         for (Index v = 0; v < part_.slot_of_vertex.size() && slot(v) < own_;) {
             Index end = v;
             float* reference = live.references.data() + slot(v) * channels_;
@@ -441,7 +443,7 @@ private:
         for (Index s = 0; s < best_.size(); ++s) {
             if (best_[s] == none) continue;
             const ClusterPair p = c_.pairs[best_[s]];
-            if (p.a == s && best_[p.b] == best_[s]) contract(p, best_error_[s]);
+            if (p.a == s && best_[p.b] == best_[s]) contract(p, best_error_[s], best_[s] >= edges_);
         }
     }
 
@@ -452,7 +454,7 @@ private:
             if (best_[s] != none && !taken_[s]) order.emplace_back(best_error_[s], best_[s]);
         std::sort(order.begin(), order.end());
         for (const auto& [error, i] : order)
-            if (!taken_[c_.pairs[i].a] && !taken_[c_.pairs[i].b]) contract(c_.pairs[i], error);
+            if (!taken_[c_.pairs[i].a] && !taken_[c_.pairs[i].b]) contract(c_.pairs[i], error, i >= edges_);
     }
 
     // Clusters that want the same partner are contracted with each other: a hub would otherwise contract with one spoke a round.
@@ -465,14 +467,30 @@ private:
             if (rival == none) {
                 rival = s;
             } else {
-                contract({rival, s}, std::max(best_error_[rival], best_error_[s]));
+                contract({rival, s}, std::max(best_error_[rival], best_error_[s]), false);
                 rival = none;
             }
         }
     }
 
+    // Two clusters span no triangle, so a connected part's last triangles go with the merge before its last.
+    void note_vanishing(ClusterPair p, bool gap) {
+        Index &a = live_.vanishing[p.a], b = live_.vanishing[p.b];
+        if (gap) {
+            if (quadric_of(p.a)[quadric::weight] < quadric_of(p.b)[quadric::weight]) std::swap(a, b);
+            if (b != no_merge) c_.vanishings.push_back({b, glm::length(offset(p))});
+            if (a == no_merge) a = b;
+        } else {
+            const Index made_a = live_.made_by[p.a], made_b = live_.made_by[p.b];
+            const bool a_later = made_b == no_merge || (made_a != no_merge && live_.deviations[p.a] > live_.deviations[p.b]);
+            a = a_later ? made_a : made_b;
+        }
+        live_.made_by[p.a] = live_.names[p.b];
+    }
+
     // Joins b to a: a's slot holds the new cluster.
-    void contract(ClusterPair p, float error) {
+    void contract(ClusterPair p, float error, bool gap) {
+        note_vanishing(p, gap);
         taken_[p.a] = taken_[p.b] = 1;
         into_[p.b] = p.a;
         float sum[most_quadric_floats] = {}, difference[most_channels];
@@ -504,6 +522,8 @@ private:
                 live_.names[kept] = live_.names[s];
                 live_.places[kept] = live_.places[s];
                 live_.deviations[kept] = live_.deviations[s];
+                live_.made_by[kept] = live_.made_by[s];
+                live_.vanishing[kept] = live_.vanishing[s];
                 std::copy_n(quadric_of(s), stride_, quadric_of(kept));
                 std::copy_n(live_.references.data() + s * channels_, channels_, live_.references.data() + kept * channels_);
             }
@@ -514,6 +534,8 @@ private:
         live_.names.resize(kept);
         live_.places.resize(kept);
         live_.deviations.resize(kept);
+        live_.made_by.resize(kept);
+        live_.vanishing.resize(kept);
         live_.quadrics.resize(kept * stride_);
         live_.references.resize(kept * channels_);
         for (auto& edge : c_.outer_edges) edge.cluster = new_number_[edge.cluster];
@@ -566,6 +588,8 @@ void append(LiveClusters& to, const LiveClusters& from) {
     add(to.places, from.places);
     add(to.references, from.references);
     add(to.deviations, from.deviations);
+    add(to.made_by, from.made_by);
+    add(to.vanishing, from.vanishing);
     add(to.quadrics, from.quadrics);
 }
 

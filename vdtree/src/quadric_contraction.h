@@ -33,12 +33,18 @@ struct PartMesh {
     double area_scale = 1;               // from areas in the unit box to weights
 };
 
+inline constexpr Index no_merge = 0xffffffffu;
+
 // Clusters that are still to be contracted. They lie in spatial order.
 struct LiveClusters {
     std::vector<Index> names;            // a slot in the cluster, under which merges know it
     std::vector<glm::dvec3> places;
     std::vector<float> references;       // by cluster and channel: what the quadric's channel values are relative to
     std::vector<float> deviations;       // by cluster, see Contraction
+    // Merges, known by the cluster that they joined; no_merge where there is none. `made_by`: the one that made the cluster.
+    // `vanishing`: the one at which the last triangles of its connected part go, or, of several parts that were joined across
+    // gaps, of the part that is to stay longest.
+    std::vector<Index> made_by, vanishing;
     std::vector<float> quadrics;         // quadric_stride(channels) each, see quadric.h
     std::size_t size() const { return names.size(); }
 };
@@ -64,6 +70,13 @@ struct Contraction {
     std::vector<float> errors;           // by merge: quadric error of the new cluster, weight times unit-box length squared
     std::vector<float> deviations;       // by merge: its square root over the weight, unit-box length; at least the parts'
     std::vector<Index> round_ends;       // by round: the number of merges up to its end
+    // Where two parts of the surface were joined across a gap, the lighter one goes first: what it then strays is the width of
+    // the gap. So of many loose parts those that stay are spread out.
+    struct Vanishing {
+        Index joined;                    // the merge, here or in a part that was joined, known by the cluster that it joined
+        float deviation;                 // that the merge has at least; unit-box length
+    };
+    std::vector<Vanishing> vanishings;
 
     LiveClusters live;
     std::vector<ClusterPair> pairs;      // edges between live clusters, by a
