@@ -388,9 +388,13 @@ std::vector<Level> contract_all(const PartMaker& maker, std::size_t parts, Merge
                 }
             },
             tbb::simple_partitioner());
-        if (counter.stopped()) break;
+        if (counter.stopped()) return levels;
         current = std::move(next);
     }
+    // Without the last triangles nothing is left of the model: that strays as far as it is large.
+    constexpr float whole_extent = 1;
+    const Index last = current[0].live.vanishing[0];
+    if (last != no_merge) levels.back()[0].vanishings.push_back({last, whole_extent});
     return levels;
 }
 
