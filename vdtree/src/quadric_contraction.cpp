@@ -8,6 +8,7 @@
 #include <numeric>
 #include <span>
 #include <type_traits>
+#include <utility>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -36,6 +37,9 @@ constexpr double least_weight = 1e-6; // share of the largest vertex area
 constexpr std::size_t least_round_share = 16; // one in so many
 // Clusters that no edge reaches are paired with so many neighbours each way along a Morton curve.
 constexpr std::size_t curve_neighbours = 3;
+
+// Rounds in which a component that is released becomes a single vertex and is taken up by a neighbour.
+constexpr std::size_t rounds_to_absorb = 4;
 
 constexpr Index none = std::numeric_limits<Index>::max();
 
@@ -271,8 +275,10 @@ public:
         c_.places.reserve(live_.size() - wanted);
         c_.errors.reserve(live_.size() - wanted);
         c_.deviations.reserve(live_.size() - wanted);
-        while (live_.size() > wanted) {
+        find_components();
+        for (std::size_t round = 0; live_.size() > wanted; ++round) {
             const std::size_t before = c_.merges.size(), clusters = live_.size();
+            if (impatient_ || round % rounds_to_absorb == 1) release_components();
             contract_round();
             const std::size_t made = c_.merges.size() - before;
             // Clusters that wait for edges out of the range must not hold up the rest.
@@ -296,6 +302,123 @@ private:
     float* quadric_of(Index cluster) { return live_.quadrics.data() + cluster * stride_; }
     const float* quadric_of(Index cluster) const { return live_.quadrics.data() + cluster * stride_; }
     glm::vec3 offset(ClusterPair p) const { return glm::vec3(live_.places[p.b] - live_.places[p.a]); }
+
+    // ---- components
+
+    // What edges connect, as far as the range goes. A closed component that is down to three clusters, a last triangle, is held: they
+    // are not contracted until the component is released. Then it vanishes, and its one vertex that is left becomes
+    // part of what stays near it, which so grows to cover both.
+    struct Component {
+        Index parent;            // itself, or the one that it was joined to across a gap
+        Index clusters = 0;
+        bool open = false;       // has edges out of the range
+        bool released = false;
+        float gap = 0;           // how far it strays when it vanishes
+        glm::dvec3 middle{0};    // while some are to be released
+    };
+
+    Index component_of(Index cluster) {
+        Index c = component_[cluster];
+        while (components_[c].parent != c) c = components_[c].parent = components_[components_[c].parent].parent;
+        return component_[cluster] = c;
+    }
+    static bool is_held(const Component& c) { return c.clusters == 3 && !c.open && !c.released; }
+    static bool is_vertex(const Component& c) { return c.clusters == 1 && !c.open; }
+    bool is_held(Index cluster) { return is_held(components_[component_of(cluster)]); }
+
+    void find_components() {
+        const Index count = static_cast<Index>(live_.size());
+        component_.resize(count);
+        std::iota(component_.begin(), component_.end(), Index{0});
+        components_.resize(count);
+        for (Index i = 0; i < count; ++i) components_[i] = {.parent = i, .clusters = 1};
+        for (const ClusterPair& p : c_.pairs) unite(component_of(p.a), component_of(p.b));
+        for (const auto& edge : c_.outer_edges) components_[component_of(edge.cluster)].open = true;
+    }
+
+    Index unite(Index x, Index y) {
+        if (x == y) return x;
+        if (components_[x].clusters < components_[y].clusters) std::swap(x, y);
+        Component &to = components_[x], &from = components_[y];
+        from.parent = x;
+        to.clusters += from.clusters;
+        to.open |= from.open;
+        return x;
+    }
+
+    // Of two held components that are each other's nearest, one is released, and so is each that is near something larger.
+    void release_components() {
+        const Index count = static_cast<Index>(live_.size());
+        bool any = false;
+        for (Index s = 0; s < count && !any; ++s) any = is_held(s);
+        if (!any) return;
+        order_along_curve();
+        for (Component& c : components_) c.middle = glm::dvec3(0);
+        for (Index s = 0; s < count; ++s) {
+            Component& c = components_[component_of(s)];
+            c.middle += live_.places[s] / static_cast<double>(c.clusters);
+        }
+        nearest_.assign(components_.size(), {none, std::numeric_limits<float>::infinity()});
+        const auto propose = [&](Index from, Index to, float distance) {
+            const Component& partner = components_[to];
+            if (!is_held(components_[from]) || (partner.clusters < 3 && !partner.open) || partner.released) return;
+            // Ties go to the lower pair of numbers, for both.
+            Nearest& best = nearest_[from];
+            const auto key = [&](Index other) { return std::pair(std::min(from, other), std::max(from, other)); };
+            if (distance < best.distance || (distance == best.distance && best.component != none && key(to) < key(best.component)))
+                best = {to, distance};
+        };
+        for (std::size_t i = 0; i < curve_.size(); ++i) {
+            const Index a = component_of(curve_[i].index);
+            std::size_t found = 0;
+            for (std::size_t j = i + 1; j < curve_.size() && found < curve_neighbours; ++j) {
+                const Index b = component_of(curve_[j].index);
+                if (a == b) {
+                    if (!is_held(components_[a])) break; // inside a larger one
+                    continue;
+                }
+                ++found;
+                const auto middle = [&](std::size_t k, Index c) {
+                    return is_held(components_[c]) ? components_[c].middle : live_.places[curve_[k].index];
+                };
+                const float distance = static_cast<float>(glm::distance(middle(i, a), middle(j, b)));
+                propose(a, b, distance);
+                propose(b, a, distance);
+            }
+        }
+        bool released = false;
+        const auto release = [&](Index c, float gap) {
+            components_[c].released = released = true;
+            components_[c].gap = gap;
+        };
+        for (Index s = 0; s < count; ++s) {
+            const Index c = component_of(s), partner = nearest_[c].component;
+            if (!is_held(components_[c]) || partner == none) continue;
+            if (!is_held(components_[partner])) {
+                if (!components_[partner].released) release(c, nearest_[c].distance);
+            } else if (nearest_[partner].component == c) {
+                release(std::max(c, partner), nearest_[c].distance);
+            }
+        }
+        if (released || !impatient_) return;
+        // Nothing is near enough, or nothing else is left.
+        for (Index s = 0; s < count; ++s)
+            if (is_held(s)) return release(component_of(s), live_.deviations[s]);
+    }
+
+    // Whether a contraction now leaves a triangle where one is to stay.
+    bool is_allowed(ClusterPair p) {
+        const Component &a = components_[component_of(p.a)], &b = components_[component_of(p.b)];
+        if (&a == &b) return !is_held(a);
+        return (!is_held(a) || is_vertex(b)) && (!is_held(b) || is_vertex(a));
+    }
+
+    void note_components(ClusterPair p) {
+        const Index a = component_of(p.a), b = component_of(p.b);
+        if (a == b && components_[a].released && components_[a].clusters == 3)
+            c_.vanishings.push_back({live_.names[p.b], components_[a].gap});
+        --components_[unite(a, b)].clusters;
+    }
 
     // ---- errors
 
@@ -354,6 +477,7 @@ private:
             for (std::size_t l = 0; l < 4; ++l) four[l] = c_.pairs[std::min(i + l, count - 1)];
             Float4 errors = channels_ == 1 ? errors_of_four(four, 1) : errors_of_four(four, channels_);
             for (std::size_t l = 0; l < 4 && i + l < count; ++l) {
+                if (!is_allowed(four[l])) continue;
                 const float error = errors[l] + (gaps ? gap_error(four[l]) : 0);
                 for (const Index cluster : {four[l].a, four[l].b}) {
                     if (best_[cluster] != none && !(error < best_error_[cluster])) continue;
@@ -366,16 +490,7 @@ private:
 
     // ---- pairs across gaps
 
-    // Clusters that no edge reaches get pairs with their neighbours along a Morton curve. One with edges out of the range
-    // rather waits for these.
-    void connect_lone_clusters() {
-        lone_.assign(live_.size(), 0);
-        bool any = false;
-        for (Index s = 0; s < live_.size(); ++s) any |= (lone_[s] = best_[s] == none);
-        if (!any) return;
-        if (!impatient_)
-            for (const auto& edge : c_.outer_edges) lone_[edge.cluster] = 0;
-        if (std::find(lone_.begin(), lone_.end(), 1) == lone_.end()) return;
+    void order_along_curve() {
         glm::dvec3 low = live_.places[0], high = low;
         for (const glm::dvec3& p : live_.places) {
             low = glm::min(low, p);
@@ -387,6 +502,19 @@ private:
         curve_scratch_.resize(live_.size());
         for (Index s = 0; s < live_.size(); ++s) curve_[s] = {grid.code(live_.places[s]), s};
         sort_by_code(curve_, curve_scratch_);
+    }
+
+    // Clusters that no edge reaches get pairs with their neighbours along a Morton curve. One with edges out of the range
+    // rather waits for these.
+    void connect_lone_clusters() {
+        lone_.assign(live_.size(), 0);
+        bool any = false;
+        for (Index s = 0; s < live_.size(); ++s) any |= (lone_[s] = best_[s] == none);
+        if (!any) return;
+        if (!impatient_)
+            for (const auto& edge : c_.outer_edges) lone_[edge.cluster] = 0;
+        if (std::find(lone_.begin(), lone_.end(), 1) == lone_.end()) return;
+        order_along_curve();
         for (std::size_t i = 0; i < curve_.size(); ++i) {
             for (std::size_t j = i + 1; j < std::min(curve_.size(), i + 1 + curve_neighbours); ++j) {
                 const Index a = curve_[i].index, b = curve_[j].index;
@@ -443,7 +571,7 @@ private:
         for (Index s = 0; s < best_.size(); ++s) {
             if (best_[s] == none) continue;
             const ClusterPair p = c_.pairs[best_[s]];
-            if (p.a == s && best_[p.b] == best_[s]) contract(p, best_error_[s], best_[s] >= edges_);
+            if (p.a == s && best_[p.b] == best_[s] && is_allowed(p)) contract(p, best_error_[s], best_[s] >= edges_);
         }
     }
 
@@ -454,7 +582,7 @@ private:
             if (best_[s] != none && !taken_[s]) order.emplace_back(best_error_[s], best_[s]);
         std::sort(order.begin(), order.end());
         for (const auto& [error, i] : order)
-            if (!taken_[c_.pairs[i].a] && !taken_[c_.pairs[i].b]) contract(c_.pairs[i], error, i >= edges_);
+            if (!taken_[c_.pairs[i].a] && !taken_[c_.pairs[i].b] && is_allowed(c_.pairs[i])) contract(c_.pairs[i], error, i >= edges_);
     }
 
     // Clusters that want the same partner are contracted with each other: a hub would otherwise contract with one spoke a round.
@@ -466,7 +594,7 @@ private:
             Index& rival = waiting[p.a == s ? p.b : p.a];
             if (rival == none) {
                 rival = s;
-            } else {
+            } else if (is_allowed({rival, s})) {
                 contract({rival, s}, std::max(best_error_[rival], best_error_[s]), false);
                 rival = none;
             }
@@ -476,7 +604,9 @@ private:
     // Two clusters span no triangle, so a connected part's last triangles go with the merge before its last.
     void note_vanishing(ClusterPair p, bool gap) {
         Index &a = live_.vanishing[p.a], b = live_.vanishing[p.b];
-        if (gap) {
+        if (gap && is_held(p.a) != is_held(p.b)) {
+            a = none; // it is known already when they vanish
+        } else if (gap) {
             if (quadric_of(p.a)[quadric::weight] < quadric_of(p.b)[quadric::weight]) std::swap(a, b);
             if (b != no_merge) c_.vanishings.push_back({b, glm::length(offset(p))});
             if (a == no_merge) a = b;
@@ -491,6 +621,7 @@ private:
     // Joins b to a: a's slot holds the new cluster.
     void contract(ClusterPair p, float error, bool gap) {
         note_vanishing(p, gap);
+        note_components(p);
         taken_[p.a] = taken_[p.b] = 1;
         into_[p.b] = p.a;
         float sum[most_quadric_floats] = {}, difference[most_channels];
@@ -522,6 +653,7 @@ private:
                 live_.names[kept] = live_.names[s];
                 live_.places[kept] = live_.places[s];
                 live_.deviations[kept] = live_.deviations[s];
+                component_[kept] = component_[s];
                 live_.made_by[kept] = live_.made_by[s];
                 live_.vanishing[kept] = live_.vanishing[s];
                 std::copy_n(quadric_of(s), stride_, quadric_of(kept));
@@ -534,6 +666,7 @@ private:
         live_.names.resize(kept);
         live_.places.resize(kept);
         live_.deviations.resize(kept);
+        component_.resize(kept);
         live_.made_by.resize(kept);
         live_.vanishing.resize(kept);
         live_.quadrics.resize(kept * stride_);
@@ -572,7 +705,14 @@ private:
     Contraction& c_;
     LiveClusters& live_;
     std::size_t channels_, stride_;
+    struct Nearest {
+        Index component;
+        float distance;
+    };
     bool impatient_ = false;
+    std::vector<Index> component_;     // by cluster
+    std::vector<Component> components_;
+    std::vector<Nearest> nearest_;     // by component
     std::size_t edges_ = 0;            // of the pairs; what follows are this round's pairs across gaps
     std::vector<Index> best_;          // by cluster: its best pair
     std::vector<float> best_error_;
