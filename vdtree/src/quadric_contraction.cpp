@@ -477,7 +477,7 @@ private:
             for (std::size_t l = 0; l < 4; ++l) four[l] = c_.pairs[std::min(i + l, count - 1)];
             Float4 errors = channels_ == 1 ? errors_of_four(four, 1) : errors_of_four(four, channels_);
             for (std::size_t l = 0; l < 4 && i + l < count; ++l) {
-                if (!is_allowed(four[l])) continue;
+                if (gaps ? !is_allowed(four[l]) : held_[four[l].a] != 0) continue; // an edge is within one component
                 const float error = errors[l] + (gaps ? gap_error(four[l]) : 0);
                 for (const Index cluster : {four[l].a, four[l].b}) {
                     if (best_[cluster] != none && !(error < best_error_[cluster])) continue;
@@ -532,6 +532,8 @@ private:
         into_.resize(clusters);
         std::iota(into_.begin(), into_.end(), Index{0});
         taken_.assign(clusters, 0);
+        held_.resize(clusters);
+        for (Index s = 0; s < clusters; ++s) held_[s] = is_held(s);
         edges_ = c_.pairs.size();
         compete(0, false);
         connect_lone_clusters();
@@ -717,7 +719,7 @@ private:
     std::vector<Index> best_;          // by cluster: its best pair
     std::vector<float> best_error_;
     std::vector<Index> into_;          // by cluster: the one that it was joined to in this round, or itself
-    std::vector<std::uint8_t> taken_, lone_;
+    std::vector<std::uint8_t> taken_, lone_, held_;
     std::vector<Index> new_number_, start_, partners_, marks_;
     std::vector<CodedIndex> curve_, curve_scratch_, order_, order_scratch_;
 };

@@ -37,11 +37,14 @@ struct ClusterInput {
 using Clusterer = FunctionRef<Result<Clustering>(const ClusterInput&)>;
 
 // Octree over the bounding cube, subdivided until a cell holds one position; any soup; fast. Depth follows the data, not
-// a path code: cells that do not split their points are passed over, and coincident vertices share a node.
+// a path code: cells that do not split their points are passed over, and coincident vertices share a node. Parallel; the result
+// does not depend on the threads. Memory: 32 bytes a vertex.
 Result<Clustering> cluster_octree(const ClusterInput& input, const Progress& progress = {});
 
-// Contraction of vertex pairs in the order of their quadric error over position and luminance (Garland and Heckbert 1997, 1998),
-// with boundary terms and optimal proxies; pairs are the edges, and, for parts that no edge connects, near neighbours.
+// Contraction of vertex pairs in the order of their quadric error over position, luminance and the mesh's own attributes
+// (Garland and Heckbert 1997, 1998; Hoppe 1999), with boundary and seam terms and optimal proxies; pairs are the edges, and,
+// for parts that no edge connects, near neighbours. The vertices are parted by space, and the parts contracted in
+// parallel and then joined; the result depends on the mesh alone. Fills deviations. Memory: about 100 bytes a triangle.
 Result<Clustering> cluster_quadric(const ClusterInput& input, const Progress& progress = {});
 
 enum class ClustererKind { quadric, octree };
