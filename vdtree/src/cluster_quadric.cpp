@@ -1,163 +1,181 @@
-// Pair contraction by quadric error over position and luminance.
+// Pair contraction by quadric error over position, luminance and the mesh's own attributes (Garland and Heckbert 1997, 1998).
 //
-// Every vertex carries a quadric over (x, y, z, luminance): the squared distance from the planes that its triangles
-// span there (Garland and Heckbert 1998), plus, with small weights, the squared distance from the vertices themselves, which keeps
-// clusters compact and of like luminance where the planes do not care. Contraction runs in rounds: each cluster chooses its
-// best partner, pairs that choose each other are contracted in ascending error, and the errors are computed anew. That is nearest-neighbour agglomeration: the hierarchy differs little from strictly greedy order, but the work is
-// linear a round, cache-friendly, and the tree is balanced.
+// The welded vertices are parted by a kd-tree, each part is contracted by itself to a small share of its vertices, and the
+// parts are joined up the kd-tree while contraction goes on (see quadric_contraction.h). The parts depend on the mesh alone, so the
+// result does not depend on threads. Within a part, contraction runs in rounds: each cluster chooses its best partner, and
+// pairs that choose each other are contracted. That is nearest-neighbour agglomeration: the hierarchy differs little from
+// strictly greedy order, but the work is linear a round, cache-friendly, and the tree is balanced.
 #include <vdtree/builder.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
+#include <mutex>
 #include <numeric>
 #include <span>
+#include <thread>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <glm/vec4.hpp>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
+#include <tbb/parallel_invoke.h>
+
+#include "quadric.h"
+#include "quadric_contraction.h"
+#include "spatial_order.h"
 
 namespace unseen::vdtree {
 
 namespace {
 
-// One unit of relative luminance counts as this share of the model's extent. The best of 0.02, 0.05, 0.1 and 0.2 on the
-// bunny under the perceptual fold test; they differ by 0.3% of its triangles.
-constexpr double luminance_scale = 0.2;
-// Weight of the squared distance between a cluster's vertices and its proxy, against that from the planes.
-constexpr double compactness = 0.01;
-// Weight of the variance of luminance within a cluster, against the deviation from the interpolated luminance.
-constexpr double luminance_compactness = 0.1;
-// Weight of the planes that stand on boundary edges, against those of triangles.
-constexpr double boundary_weight = 4;
-// Across a gap that no edge bridges, the full squared distance counts: joining two parts moves both.
-constexpr double gap_weight = 1;
-// A round that contracts a smaller share of the clusters takes second-best pairs too: errors that grow along a chain
-// would otherwise contract one pair a round.
-constexpr std::size_t least_round_share = 16; // one in so many
+// A part has at most so many welded vertices. Its quadrics then fit a core's cache.
+constexpr Index largest_part = 1 << 15;
+// Parts, and joined parts, are contracted to at most so many clusters: one in 32 of a full part. Few enough that joining costs
+// next to nothing, many enough that those along the border of the part, which had fewer partners to choose from, are a small share.
+constexpr Index part_target = largest_part / 32;
 
-// A symmetric quadratic form over 4-space: E(x) = x'Ax - 2 b'x + c, and the weight (area) that went into it.
-struct Quadric {
-    // Upper triangle of A, row by row.
-    std::array<double, 10> a{};
-    glm::dvec4 b{0};
-    double c = 0;
-    double weight = 0;
+// One unit of relative luminance counts as this share of the model's extent. From 0.01 to 0.2, the triangles that the perceptual
+// fold test leaves of bunny and dragon differ by 0.5%; but with 0.2 the surface strays 1.3 to 1.7 times as far for its triangles,
+// for on a bumpy surface luminance then drowns the shape.
+constexpr double luminance_scale = 0.01;
+// A normal that turns by one radian, and a colour that goes from 0 to 1, count as these shares of the extent. Less than
+// luminance, which is what is seen of both in most lights.
+constexpr double normal_scale = 0.0025;
+constexpr double colour_scale = 0.005;
+// A texture that slides by a length on the surface counts as this share of the length: what one sees of it depends on the
+// texture, and most of a displacement is seen whatever it is.
+constexpr double texture_scale = 0.1;
+// Attributes count as if they were within this many extents, so that stray values stay finite when squared.
+constexpr double largest_value = 1e3;
 
-    void operator+=(const Quadric& o) {
-        for (std::size_t i = 0; i < a.size(); ++i) a[i] += o.a[i];
-        b += o.b;
-        c += o.c;
-        weight += o.weight;
-    }
-    glm::dvec4 times(glm::dvec4 x) const {
-        return {a[0] * x[0] + a[1] * x[1] + a[2] * x[2] + a[3] * x[3], a[1] * x[0] + a[4] * x[1] + a[5] * x[2] + a[6] * x[3],
-                a[2] * x[0] + a[5] * x[1] + a[7] * x[2] + a[8] * x[3], a[3] * x[0] + a[6] * x[1] + a[8] * x[2] + a[9] * x[3]};
-    }
-    double error(glm::dvec4 x) const { return std::max(0.0, glm::dot(x, times(x)) - 2 * glm::dot(b, x) + c); }
+// ---- numbering of the welded vertices by space
+
+// Where part i of so many begins.
+Index part_begin(std::size_t part, std::size_t parts, std::size_t slots) {
+    return static_cast<Index>(static_cast<std::uint64_t>(part) * slots / parts);
+}
+
+// Welded vertices ("slots") in an order in which every part is a range, and the mesh's vertices in the order of their slots.
+struct SpatialNumbering {
+    std::size_t parts = 1;             // a power of two
+    std::vector<Index> vertex_of_slot; // the first of its vertices
+    std::vector<Index> first_member;   // by slot, one longer: into `members`
+    std::vector<Index> members;        // vertices, by slot
+    std::vector<Index> place;          // by vertex: where it is in `members`
 };
 
-// Squared distance from the 2-plane through p spanned by the orthonormal e, f.
-void add_plane(Quadric& q, glm::dvec4 p, glm::dvec4 e, glm::dvec4 f, double weight) {
-    std::size_t k = 0;
-    for (int i = 0; i < 4; ++i)
-        for (int j = i; j < 4; ++j) q.a[k++] += weight * ((i == j ? 1.0 : 0.0) - e[i] * e[j] - f[i] * f[j]);
-    const glm::dvec4 normal_part = p - glm::dot(p, e) * e - glm::dot(p, f) * f;
-    q.b += weight * normal_part;
-    q.c += weight * glm::dot(p, normal_part);
-}
-
-// Squared distance from the hyperplane n.x = d.
-void add_hyperplane(Quadric& q, glm::dvec4 n, double d, double weight) {
-    std::size_t k = 0;
-    for (int i = 0; i < 4; ++i)
-        for (int j = i; j < 4; ++j) q.a[k++] += weight * n[i] * n[j];
-    q.b += weight * d * n;
-    q.c += weight * d * d;
-}
-
-// Squared distance from the point p, with a weight for position and one for luminance.
-void add_point(Quadric& q, glm::dvec4 p, double position_weight, double luminance_weight_here) {
-    const glm::dvec4 w(position_weight, position_weight, position_weight, luminance_weight_here);
-    q.a[0] += w[0], q.a[4] += w[1], q.a[7] += w[2], q.a[9] += w[3];
-    q.b += w * p;
-    q.c += glm::dot(w * p, p);
-}
-
-// The point of least error, by Cholesky; false where the form is too flat to tell.
-bool minimise(const Quadric& q, glm::dvec4& x) {
-    const double floor = 1e-12 * (q.a[0] + q.a[4] + q.a[7] + q.a[9]);
-    const auto& a = q.a;
-    if (!(a[0] > floor)) return false;
-    const double l00 = std::sqrt(a[0]), i0 = 1 / l00, l10 = a[1] * i0, l20 = a[2] * i0, l30 = a[3] * i0;
-    const double d1 = a[4] - l10 * l10;
-    if (!(d1 > floor)) return false;
-    const double l11 = std::sqrt(d1), i1 = 1 / l11, l21 = (a[5] - l20 * l10) * i1, l31 = (a[6] - l30 * l10) * i1;
-    const double d2 = a[7] - l20 * l20 - l21 * l21;
-    if (!(d2 > floor)) return false;
-    const double l22 = std::sqrt(d2), i2 = 1 / l22, l32 = (a[8] - l30 * l20 - l31 * l21) * i2;
-    const double d3 = a[9] - l30 * l30 - l31 * l31 - l32 * l32;
-    if (!(d3 > floor)) return false;
-    const double i3 = 1 / std::sqrt(d3);
-    const double y0 = q.b[0] * i0, y1 = (q.b[1] - l10 * y0) * i1, y2 = (q.b[2] - l20 * y0 - l21 * y1) * i2;
-    const double y3 = (q.b[3] - l30 * y0 - l31 * y1 - l32 * y2) * i3;
-    x[3] = y3 * i3;
-    x[2] = (y2 - l32 * x[3]) * i2;
-    x[1] = (y1 - l21 * x[2] - l31 * x[3]) * i1;
-    x[0] = (y0 - l10 * x[1] - l20 * x[2] - l30 * x[3]) * i0;
-    return true;
-}
-
-struct Pair {
-    Index a, b; // live cluster slots, a < b
-    bool operator<(const Pair& o) const { return a != o.a ? a < o.a : b < o.b; }
-    bool operator==(const Pair&) const = default;
-};
-
-class QuadricClusterer {
+class KdPartition {
 public:
-    QuadricClusterer(const ClusterInput& input, const Progress& progress) : input_(input), progress_(progress) {}
-    Result<Clustering> run();
+    KdPartition(std::span<const glm::dvec3> positions, std::span<Index> slots, std::size_t parts)
+        : positions_(positions), slots_(slots), keys_(slots.size()), scratch_(slots.size()), parts_(parts) {}
+
+    void run() { split(0, parts_); }
 
 private:
-    void make_units();
-    void merge_coincident();
-    void accumulate_quadrics();
-    void accumulate_boundaries(const std::vector<Pair>& sorted_uses);
-    void connect_edges();
-    void connect_lone_clusters();
-    double contraction_error(Pair pair, glm::dvec4& place) const;
-    double gap_error(Pair pair) const;
-    void choose_partners();
-    std::vector<Index> ordered_choices() const;
-    void contract(Pair pair);
-    void contract_round();
-    void close_gaps(std::span<const Index> joined_with);
-    glm::dvec4 lift(Index vertex) const {
-        return {(input_.mesh.positions[vertex] - centre_) * scale_, input_.luminance[vertex] * luminance_scale};
+    struct Box {
+        glm::dvec3 low, size;
+    };
+    Box box(Index begin, Index end) const {
+        glm::dvec3 low = positions_[slots_[begin]], high = low;
+        for (Index i = begin; i < end; ++i) {
+            low = glm::min(low, positions_[slots_[i]]);
+            high = glm::max(high, positions_[slots_[i]]);
+        }
+        return {low, high - low};
+    }
+
+    // Halves along the longest side of the bounding box, until there is one part; ties by vertex number.
+    void split(std::size_t first_part, std::size_t parts) {
+        const Index begin = part_begin(first_part, parts_, slots_.size());
+        const Index end = part_begin(first_part + parts, parts_, slots_.size());
+        const Box bounds = box(begin, end);
+        if (parts == 1) return sort_along_curve(begin, end, bounds);
+        const Index middle = part_begin(first_part + parts / 2, parts_, slots_.size());
+        const glm::dvec3 size = bounds.size;
+        const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+        // Doubles that are not negative compare like their bits.
+        for (Index i = begin; i < end; ++i)
+            keys_[i] = {std::bit_cast<std::uint64_t>(positions_[slots_[i]][axis] - bounds.low[axis] + 0.0), slots_[i]};
+        std::nth_element(keys_.begin() + begin, keys_.begin() + middle, keys_.begin() + end,
+                         [](const CodedIndex& a, const CodedIndex& b) {
+                             return a.code != b.code ? a.code < b.code : a.index < b.index;
+                         });
+        for (Index i = begin; i < end; ++i) slots_[i] = keys_[i].index;
+        tbb::parallel_invoke([&] { split(first_part, parts / 2); }, [&] { split(first_part + parts / 2, parts / 2); });
+    }
+
+    void sort_along_curve(Index begin, Index end, const Box& bounds) {
+        std::sort(slots_.begin() + begin, slots_.begin() + end); // what nth_element leaves is not for equal codes to show
+        const MortonGrid grid(bounds.low, std::max({bounds.size.x, bounds.size.y, bounds.size.z}));
+        for (Index i = begin; i < end; ++i) keys_[i] = {grid.code(positions_[slots_[i]]), slots_[i]};
+        sort_by_code(std::span(keys_).subspan(begin, end - begin), std::span(scratch_).subspan(begin, end - begin));
+        for (Index i = begin; i < end; ++i) slots_[i] = keys_[i].index;
+    }
+
+    std::span<const glm::dvec3> positions_;
+    std::span<Index> slots_;
+    std::vector<CodedIndex> keys_, scratch_;
+    std::size_t parts_;
+};
+
+SpatialNumbering number_by_space(std::span<const glm::dvec3> positions, std::span<const Index> coincident) {
+    SpatialNumbering n;
+    const Index vertices = static_cast<Index>(positions.size());
+    for (Index v = 0; v < vertices; ++v)
+        if (coincident[v] == v) n.vertex_of_slot.push_back(v);
+    const std::size_t slots = n.vertex_of_slot.size();
+    while (n.parts * largest_part < slots) n.parts *= 2;
+    KdPartition(positions, n.vertex_of_slot, n.parts).run();
+
+    n.first_member.assign(slots + 1, 0);
+    n.place.resize(vertices);
+    for (Index s = 0; s < slots; ++s) n.place[n.vertex_of_slot[s]] = s; // for now
+    for (Index v = 0; v < vertices; ++v) ++n.first_member[n.place[coincident[v]] + 1];
+    std::partial_sum(n.first_member.begin(), n.first_member.end(), n.first_member.begin());
+    n.members.resize(vertices);
+    std::vector<Index> next(n.first_member.begin(), n.first_member.end() - 1);
+    for (Index v = 0; v < vertices; ++v) n.members[next[n.place[coincident[v]]]++] = v;
+    for (Index i = 0; i < vertices; ++i) n.place[n.members[i]] = i;
+    return n;
+}
+
+// ---- what the parts are made from
+
+class PartMaker {
+public:
+    PartMaker(const ClusterInput& input, const SpatialNumbering& numbering) : input_(input), numbering_(numbering) {
+        measure();
+        list_triangles();
+    }
+
+    PartMesh make(std::size_t part) const;
+    glm::dvec3 from_unit_box(glm::dvec3 p) const { return p / scale_ + centre_; }
+    float length_from_unit_box(float length) const { return static_cast<float>(length / scale_); }
+
+private:
+    void measure();
+    double texture_density() const;
+    void list_triangles();
+    void push_channels(Index vertex, std::vector<float>& to) const;
+
+    std::size_t slots() const { return numbering_.vertex_of_slot.size(); }
+    Index first_place(std::size_t part) const {
+        return numbering_.first_member[part_begin(part, numbering_.parts, slots())];
     }
 
     const ClusterInput& input_;
-    Progress progress_;
-    Clustering result_;
+    const SpatialNumbering& numbering_;
     glm::dvec3 centre_{0};
     double scale_ = 1;      // mesh units to the unit box
-    double area_scale_ = 1; // areas to shares of the largest
-
-    // By live cluster slot.
-    std::vector<Index> cluster_;       // its number in the result
-    std::vector<Quadric> quadrics_;
-    std::vector<glm::dvec4> places_;   // position and luminance of its proxy
-    std::vector<Index> best_;          // index of its best pair
-    std::vector<Pair> pairs_;          // the edges, sorted and unique; then this round's pairs across gaps
-    std::size_t edge_count_ = 0;
-    std::vector<double> errors_;       // by pair
-    std::vector<Index> slot_of_vertex_;
+    double area_scale_ = 1; // areas in the unit box to shares of the largest
+    double texture_unit_ = 0;
+    bool has_normals_ = false;
+    std::vector<std::size_t> first_triangle_; // by part, one longer
+    std::vector<Index> triangles_;            // those that touch a vertex of the part, by part
 };
 
-void QuadricClusterer::make_units() {
+void PartMaker::measure() {
     glm::dvec3 low = input_.mesh.positions[0], high = low;
     for (const glm::dvec3& p : input_.mesh.positions) {
         low = glm::min(low, p);
@@ -165,259 +183,306 @@ void QuadricClusterer::make_units() {
     }
     const glm::dvec3 size = high - low;
     const double extent = std::max({size.x, size.y, size.z});
-    centre_ = (low + high) * 0.5;
-    scale_ = extent > 0 ? 1 / extent : 1;
+    centre_ = low + size * 0.5;
+    scale_ = extent > 0 && std::isfinite(1 / extent) ? 1 / extent : 1;
     double largest = 0;
     for (const double a : input_.areas) largest = std::max(largest, a);
-    area_scale_ = largest > 0 ? 1 / largest : 1;
+    largest *= scale_ * scale_;
+    area_scale_ = largest > 0 && std::isfinite(1 / largest) ? 1 / largest : 1;
+    has_normals_ = !input_.mesh.normals.empty();
+    texture_unit_ = texture_density() * texture_scale;
 }
 
-// Coincident vertices are joined first, whatever their attributes: above them, everything moves together, without cracks.
-void QuadricClusterer::merge_coincident() {
-    const Index n = static_cast<Index>(input_.mesh.positions.size());
-    result_.parents.resize(n);
-    std::iota(result_.parents.begin(), result_.parents.end(), Index{0});
-    std::vector<Index> members(n, 0);
-    for (Index v = 0; v < n; ++v) ++members[input_.coincident[v]];
-    slot_of_vertex_.resize(n);
-    for (Index v = 0; v < n; ++v) {
-        if (input_.coincident[v] != v) {
-            const Index slot = slot_of_vertex_[v] = slot_of_vertex_[input_.coincident[v]];
-            result_.parents[v] = cluster_[slot];
-            continue;
-        }
-        Index cluster = v;
-        if (members[v] > 1) {
-            cluster = static_cast<Index>(result_.parents.size());
-            result_.parents.push_back(cluster);
-            result_.positions.push_back(input_.mesh.positions[v]);
-            result_.parents[v] = cluster;
-        }
-        slot_of_vertex_[v] = static_cast<Index>(cluster_.size());
-        cluster_.push_back(cluster);
-    }
-    quadrics_.resize(cluster_.size());
-    places_.assign(cluster_.size(), glm::dvec4(0));
-    for (Index v = 0; v < n; ++v) places_[slot_of_vertex_[v]] += lift(v) / static_cast<double>(members[input_.coincident[v]]);
-}
-
-void QuadricClusterer::accumulate_quadrics() {
+// The length in the unit box that one unit of texture coordinates covers, on average; 0 without any.
+double PartMaker::texture_density() const {
+    if (input_.mesh.uvs.empty()) return 0;
+    double surface = 0, texture = 0;
     for (const Triangle& t : input_.mesh.triangles) {
-        const glm::dvec4 p = lift(t[0]);
-        glm::dvec4 e = lift(t[1]) - p, f = lift(t[2]) - p;
-        const double area =
-            glm::length(glm::cross(glm::dvec3(e), glm::dvec3(f))) / (2 * scale_ * scale_) * area_scale_ / 3;
-        const double e_length = glm::length(e);
-        if (!(e_length > 0)) continue;
-        e /= e_length;
-        f -= glm::dot(e, f) * e;
-        const double f_length = glm::length(f);
-        if (!(f_length > 0)) continue;
-        f /= f_length;
-        for (const Index v : t) {
-            Quadric& q = quadrics_[slot_of_vertex_[v]];
-            add_plane(q, p, e, f, area);
-            q.weight += area;
-        }
+        const auto p = [&](std::size_t k) { return input_.mesh.positions[t[k]] * scale_; };
+        const auto uv = [&](std::size_t k) { return glm::dvec2(input_.mesh.uvs[t[k]]); };
+        surface += glm::length(glm::cross(p(1) - p(0), p(2) - p(0)));
+        const glm::dvec2 e = uv(1) - uv(0), f = uv(2) - uv(0);
+        texture += std::abs(e.x * f.y - e.y * f.x);
     }
-    // Areas may be tiny or zero; every vertex keeps a little weight of its own, so that the form has a minimum.
-    constexpr double least_weight = 1e-6; // share of the largest vertex area
-    for (Index v = 0; v < input_.mesh.positions.size(); ++v) {
-        const double w = input_.areas[v] * area_scale_ + least_weight;
-        add_point(quadrics_[slot_of_vertex_[v]], lift(v), w * compactness, w * luminance_compactness);
+    const double density = std::sqrt(surface / texture);
+    return density > 0 && std::isfinite(density) ? density : 0;
+}
+
+void PartMaker::list_triangles() {
+    const std::size_t count = input_.mesh.triangles.size(), parts = numbering_.parts;
+    first_triangle_.assign(parts + 1, 0);
+    if (parts == 1) {
+        first_triangle_[1] = count;
+        triangles_.resize(count);
+        std::iota(triangles_.begin(), triangles_.end(), Index{0});
+        return;
     }
-}
-
-// An edge with one triangle holds the contour: a hyperplane through it, at a right angle to the triangle.
-void QuadricClusterer::accumulate_boundaries(const std::vector<Pair>& sorted_uses) {
-    const auto uses = [&](Pair pair) {
-        const auto range = std::equal_range(sorted_uses.begin(), sorted_uses.end(), pair);
-        return range.second - range.first;
-    };
-    for (const Triangle& t : input_.mesh.triangles) {
-        for (std::size_t k = 0; k < 3; ++k) {
-            const Index v = t[k], w = t[(k + 1) % 3];
-            const Index a = slot_of_vertex_[v], b = slot_of_vertex_[w];
-            if (a == b || uses({std::min(a, b), std::max(a, b)}) != 1) continue;
-            const glm::dvec3 p(lift(v)), edge = glm::dvec3(lift(w)) - p, side = glm::dvec3(lift(t[(k + 2) % 3])) - p;
-            const double squared = glm::dot(edge, edge);
-            const glm::dvec3 normal = side - edge * (glm::dot(side, edge) / squared);
-            const double length = glm::length(normal);
-            if (!(length > 0) || !(squared > 0)) continue;
-            const glm::dvec3 n = normal / length;
-            const double weight = boundary_weight * squared / (scale_ * scale_) * area_scale_;
-            for (const Index slot : {a, b}) add_hyperplane(quadrics_[slot], glm::dvec4(n, 0), glm::dot(n, p), weight);
-        }
-    }
-}
-
-void QuadricClusterer::connect_edges() {
-    pairs_.reserve(input_.mesh.triangles.size() * 3);
-    for (const Triangle& t : input_.mesh.triangles) {
-        for (std::size_t k = 0; k < 3; ++k) {
-            const Index a = slot_of_vertex_[t[k]], b = slot_of_vertex_[t[(k + 1) % 3]];
-            if (a != b) pairs_.push_back({std::min(a, b), std::max(a, b)});
-        }
-    }
-    tbb::parallel_sort(pairs_.begin(), pairs_.end());
-    accumulate_boundaries(pairs_);
-    pairs_.erase(std::unique(pairs_.begin(), pairs_.end()), pairs_.end());
-    edge_count_ = pairs_.size();
-}
-
-// Interleaves the lowest 21 bits of three coordinates in 0..1.
-std::uint64_t morton(glm::dvec3 p) {
-    const auto spread = [](double x) {
-        auto bits = static_cast<std::uint64_t>(std::clamp(x, 0.0, 1.0) * 2097151.0);
-        bits = (bits | bits << 32) & 0x1f00000000ffffull;
-        bits = (bits | bits << 16) & 0x1f0000ff0000ffull;
-        bits = (bits | bits << 8) & 0x100f00f00f00f00full;
-        bits = (bits | bits << 4) & 0x10c30c30c30c30c3ull;
-        return (bits | bits << 2) & 0x1249249249249249ull;
-    };
-    return spread(p.x) | spread(p.y) << 1 | spread(p.z) << 2;
-}
-
-// Clusters that no edge reaches get pairs with their neighbours along a Morton curve.
-void QuadricClusterer::connect_lone_clusters() {
-    constexpr std::size_t neighbours = 3; // each way along the curve
-    pairs_.resize(edge_count_);
-    std::vector<std::uint8_t> reached(cluster_.size(), 0);
-    for (const Pair& p : pairs_) reached[p.a] = reached[p.b] = 1;
-    if (std::find(reached.begin(), reached.end(), 0) == reached.end()) return;
-    std::vector<std::pair<std::uint64_t, Index>> curve(cluster_.size());
-    for (Index s = 0; s < cluster_.size(); ++s) curve[s] = {morton(glm::dvec3(places_[s]) + 0.5), s};
-    std::sort(curve.begin(), curve.end());
-    for (std::size_t i = 0; i < curve.size(); ++i) {
-        for (std::size_t j = i + 1; j < std::min(curve.size(), i + 1 + neighbours); ++j) {
-            const Index a = curve[i].second, b = curve[j].second;
-            if (!reached[a] || !reached[b]) pairs_.push_back({std::min(a, b), std::max(a, b)});
-        }
-    }
-}
-
-double QuadricClusterer::contraction_error(Pair pair, glm::dvec4& place) const {
-    Quadric q = quadrics_[pair.a];
-    q += quadrics_[pair.b];
-    const glm::dvec4 a = places_[pair.a], b = places_[pair.b];
-    const glm::dvec4 middle = (a + b) * 0.5;
-    // Where the form is nearly flat its minimum may be far away; then the middle is the better place.
-    if (!minimise(q, place) || !(glm::length(glm::dvec3(place - middle)) <= glm::length(glm::dvec3(a - b)) * 1.0))
-        place = middle;
-    return q.error(place);
-}
-
-// Ward's measure: by how much the sum of squared distances from the clusters' middles grows.
-double QuadricClusterer::gap_error(Pair pair) const {
-    const double a = quadrics_[pair.a].weight, b = quadrics_[pair.b].weight;
-    if (!(a + b > 0)) return 0;
-    const glm::dvec3 d(places_[pair.a] - places_[pair.b]);
-    return gap_weight * (a * b / (a + b)) * glm::dot(d, d);
-}
-
-void QuadricClusterer::choose_partners() {
-    errors_.resize(pairs_.size());
-    tbb::parallel_for(std::size_t{0}, pairs_.size(), [&](std::size_t i) {
-        glm::dvec4 place;
-        errors_[i] = contraction_error(pairs_[i], place) + (i < edge_count_ ? 0 : gap_error(pairs_[i]));
+    std::vector<Index> part_of(input_.mesh.positions.size());
+    tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t part) {
+        for (Index i = first_place(part); i < first_place(part + 1); ++i) part_of[numbering_.members[i]] = static_cast<Index>(part);
     });
-    best_.assign(cluster_.size(), no_node);
-    for (Index i = 0; i < pairs_.size(); ++i)
-        for (const Index slot : {pairs_[i].a, pairs_[i].b})
-            if (best_[slot] == no_node || errors_[i] < errors_[best_[slot]]) best_[slot] = i;
-}
-
-// The pairs that are the best of one of their clusters, in ascending error.
-std::vector<Index> QuadricClusterer::ordered_choices() const {
-    std::vector<Index> order(best_);
-    std::sort(order.begin(), order.end(),
-              [&](Index x, Index y) { return errors_[x] != errors_[y] ? errors_[x] < errors_[y] : x < y; });
-    order.erase(std::unique(order.begin(), order.end()), order.end());
-    return order;
-}
-
-// Joins b to a: a's slot holds the new cluster.
-void QuadricClusterer::contract(Pair pair) {
-    glm::dvec4 place;
-    contraction_error(pair, place);
-    const Index parent = static_cast<Index>(result_.parents.size());
-    result_.parents.push_back(parent);
-    result_.positions.push_back(glm::dvec3(place) / scale_ + centre_);
-    result_.parents[cluster_[pair.a]] = result_.parents[cluster_[pair.b]] = parent;
-    cluster_[pair.a] = parent;
-    quadrics_[pair.a] += quadrics_[pair.b];
-    places_[pair.a] = place;
-}
-
-// Contracts pairs that are the best of both their clusters, in ascending error.
-void QuadricClusterer::contract_round() {
-    choose_partners();
-    const std::vector<Index> order = ordered_choices();
-    std::vector<Index> joined_with(cluster_.size());
-    std::iota(joined_with.begin(), joined_with.end(), Index{0});
-    std::vector<std::uint8_t> taken(cluster_.size(), 0);
-    std::size_t contracted = 0;
-    const auto contract_all = [&](bool second_best) {
-        for (const Index i : order) {
-            const Pair p = pairs_[i];
-            const bool mutual = errors_[i] <= errors_[best_[p.a]] && errors_[i] <= errors_[best_[p.b]];
-            if (taken[p.a] || taken[p.b] || !(mutual || second_best)) continue;
-            taken[p.a] = taken[p.b] = 1;
-            contract(p);
-            joined_with[p.b] = p.a;
-            ++contracted;
+    // Chunk by chunk, so that each thread knows where its triangles go and their order is the mesh's.
+    constexpr std::size_t chunk_size = 1 << 16;
+    const std::size_t chunks = (count + chunk_size - 1) / chunk_size;
+    std::vector<std::size_t> next(chunks * parts, 0);
+    const auto for_each_use = [&](std::size_t chunk, auto&& f) {
+        for (std::size_t t = chunk * chunk_size; t < std::min(count, (chunk + 1) * chunk_size); ++t) {
+            const Triangle& tri = input_.mesh.triangles[t];
+            const Index a = part_of[tri[0]], b = part_of[tri[1]], c = part_of[tri[2]];
+            f(t, a);
+            if (b != a) f(t, b);
+            if (c != a && c != b) f(t, c);
         }
     };
-    contract_all(false);
-    if (contracted < cluster_.size() / least_round_share) contract_all(true);
-    close_gaps(joined_with);
+    tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
+        for_each_use(chunk, [&](std::size_t, Index part) { ++next[chunk * parts + part]; });
+    });
+    std::size_t sum = 0;
+    for (std::size_t part = 0; part < parts; ++part) {
+        first_triangle_[part] = sum;
+        for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
+            const std::size_t uses = next[chunk * parts + part];
+            next[chunk * parts + part] = sum;
+            sum += uses;
+        }
+    }
+    first_triangle_[parts] = sum;
+    triangles_.resize(sum);
+    tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
+        for_each_use(chunk, [&](std::size_t t, Index part) {
+            triangles_[next[chunk * parts + part]++] = static_cast<Index>(t);
+        });
+    });
 }
 
-// Renumbers the slots without those that were joined to others, and the edges with them.
-void QuadricClusterer::close_gaps(std::span<const Index> joined_with) {
-    std::vector<Index> new_slot(cluster_.size());
-    Index live = 0;
-    for (Index s = 0; s < cluster_.size(); ++s) {
-        if (joined_with[s] != s) continue;
-        new_slot[s] = live;
-        cluster_[live] = cluster_[s];
-        quadrics_[live] = quadrics_[s];
-        places_[live] = places_[s];
-        ++live;
-    }
-    cluster_.resize(live);
-    quadrics_.resize(live);
-    places_.resize(live);
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < edge_count_; ++i) {
-        const Index a = new_slot[joined_with[pairs_[i].a]], b = new_slot[joined_with[pairs_[i].b]];
-        if (a != b) pairs_[kept++] = {std::min(a, b), std::max(a, b)};
-    }
-    pairs_.resize(kept);
-    tbb::parallel_sort(pairs_.begin(), pairs_.end());
-    pairs_.erase(std::unique(pairs_.begin(), pairs_.end()), pairs_.end());
-    edge_count_ = pairs_.size();
+void PartMaker::push_channels(Index v, std::vector<float>& to) const {
+    const auto push = [&](double value) {
+        to.push_back(static_cast<float>(std::clamp(value, -largest_value, largest_value)));
+    };
+    push(input_.luminance[v] * luminance_scale);
+    if (has_normals_)
+        for (int k = 0; k < 3; ++k) push(input_.normals[v][k] * normal_scale);
+    if (texture_unit_ > 0)
+        for (int k = 0; k < 2; ++k) push(input_.mesh.uvs[v][k] * texture_unit_);
+    if (!input_.mesh.colours.empty())
+        for (int k = 0; k < 3; ++k) push(input_.mesh.colours[v][k] * colour_scale);
 }
 
-Result<Clustering> QuadricClusterer::run() {
-    make_units();
-    merge_coincident();
-    accumulate_quadrics();
-    connect_edges();
-    const double total = static_cast<double>(cluster_.size());
-    while (cluster_.size() > 1) {
-        if (progress_ && !progress_(1 - static_cast<double>(cluster_.size()) / total, "clustering"))
-            return Error{ErrorCode::cancelled, "Clustering was cancelled."};
-        connect_lone_clusters();
-        contract_round();
+PartMesh PartMaker::make(std::size_t part) const {
+    PartMesh out;
+    const Index first_slot = part_begin(part, numbering_.parts, slots()), end_slot = part_begin(part + 1, numbering_.parts, slots());
+    const Index first = numbering_.first_member[first_slot], end = numbering_.first_member[end_slot];
+    const auto is_own = [&](Index place) { return place >= first && place < end; };
+    const auto triangles = std::span(triangles_).subspan(first_triangle_[part], first_triangle_[part + 1] - first_triangle_[part]);
+
+    std::vector<Index> ghosts; // places of other parts' vertices, by slot
+    for (const Index t : triangles)
+        for (const Index v : input_.mesh.triangles[t])
+            if (!is_own(numbering_.place[v])) ghosts.push_back(numbering_.place[v]);
+    std::sort(ghosts.begin(), ghosts.end());
+    ghosts.erase(std::unique(ghosts.begin(), ghosts.end()), ghosts.end());
+
+    out.first_slot = first_slot;
+    out.own_slots = end_slot - first_slot;
+    out.area_scale = area_scale_;
+    out.channels = 1 + (has_normals_ ? 3 : 0) + (texture_unit_ > 0 ? 2 : 0) + (input_.mesh.colours.empty() ? 0 : 3);
+    const std::size_t vertices = end - first + ghosts.size();
+    out.channel_values.reserve(vertices * out.channels);
+    out.slot_of_vertex.reserve(vertices);
+    out.positions.reserve(out.own_slots + ghosts.size());
+    const auto push_position = [&](Index slot) {
+        out.positions.push_back((input_.mesh.positions[numbering_.vertex_of_slot[slot]] - centre_) * scale_);
+    };
+    for (Index s = first_slot; s < end_slot; ++s) {
+        push_position(s);
+        for (Index i = numbering_.first_member[s]; i < numbering_.first_member[s + 1]; ++i) {
+            out.slot_of_vertex.push_back(s - first_slot);
+            push_channels(numbering_.members[i], out.channel_values);
+        }
     }
-    return std::move(result_);
+    for (const Index place : ghosts) {
+        const Index slot = static_cast<Index>(std::upper_bound(numbering_.first_member.begin(), numbering_.first_member.end(), place) -
+                                              numbering_.first_member.begin() - 1);
+        if (out.ghost_slots.empty() || out.ghost_slots.back() != slot) {
+            out.ghost_slots.push_back(slot);
+            push_position(slot);
+        }
+        out.slot_of_vertex.push_back(static_cast<Index>(out.positions.size() - 1));
+        push_channels(numbering_.members[place], out.channel_values);
+    }
+    out.triangles.reserve(triangles.size());
+    for (const Index t : triangles) {
+        Triangle local = input_.mesh.triangles[t];
+        for (Index& v : local) {
+            const Index place = numbering_.place[v];
+            v = is_own(place) ? place - first
+                              : end - first + static_cast<Index>(std::lower_bound(ghosts.begin(), ghosts.end(), place) - ghosts.begin());
+        }
+        out.triangles.push_back(local);
+    }
+    return out;
 }
+
+// ---- the whole
+
+// Tells the caller how many merges are made, on the caller's own thread only, and everybody whether to stop.
+class MergeCounter {
+public:
+    MergeCounter(const Progress& progress, std::size_t merges_to_make)
+        : progress_(progress), all_(static_cast<double>(std::max<std::size_t>(merges_to_make, 1))) {}
+
+    bool add(std::size_t merges) {
+        done_ += merges;
+        if (progress_ && std::this_thread::get_id() == caller_ && !stopped_ &&
+            !progress_(std::min(1.0, static_cast<double>(done_) / all_), "clustering"))
+            stopped_ = true;
+        return !stopped_;
+    }
+    bool stopped() const { return stopped_; }
+
+private:
+    Progress progress_;
+    std::thread::id caller_ = std::this_thread::get_id();
+    double all_;
+    std::atomic<std::size_t> done_ = 0;
+    std::atomic<bool> stopped_ = false;
+};
+
+// What a contraction leaves when it has been joined into another.
+struct MergeRecord {
+    std::vector<Merge> merges;
+    std::vector<glm::dvec3> places;
+    std::vector<float> deviations;
+    std::vector<Index> round_ends;
+    std::vector<Contraction::Vanishing> vanishings;
+};
+
+MergeRecord take_record(Contraction& c) {
+    return {std::move(c.merges), std::move(c.places), std::move(c.deviations), std::move(c.round_ends),
+            std::move(c.vanishings)};
+}
+
+// The merges of all parts; first those of the parts themselves, then those of joined pairs of parts, and so on.
+using Level = std::vector<MergeRecord>;
+
+std::vector<Level> contract_all(const PartMaker& maker, std::size_t parts, MergeCounter& counter) {
+    const auto after_round = [&](std::size_t merges) { return counter.add(merges); };
+    std::vector<Level> levels;
+    std::vector<Contraction> current(parts);
+    for (std::size_t count = parts; count > 0; count /= 2) {
+        Level& level = levels.emplace_back(count);
+        const Index target = count == 1 ? 1 : part_target;
+        std::vector<Contraction> next(count);
+        tbb::parallel_for(
+            tbb::blocked_range<std::size_t>(0, count, 1),
+            [&](const tbb::blocked_range<std::size_t>& range) {
+                for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                    if (counter.stopped()) return;
+                    if (count == parts) {
+                        next[i] = contract_part(maker.make(i), target, after_round);
+                    } else {
+                        next[i] = join(current[2 * i], current[2 * i + 1], target, after_round);
+                        current[2 * i] = current[2 * i + 1] = {};
+                    }
+                    level[i] = take_record(next[i]);
+                }
+            },
+            tbb::simple_partitioner());
+        if (counter.stopped()) return levels;
+        current = std::move(next);
+    }
+    // Without the last triangles nothing is left of the model: that strays as far as it is large.
+    constexpr float whole_extent = 1;
+    const Index last = current[0].live.vanishing[0];
+    if (last != no_merge) levels.back()[0].vanishings.push_back({last, whole_extent});
+    return levels;
+}
+
+// Numbers the clusters: vertices, joined coincident vertices, then the merges round by round, all parts side by side.
+class ClusteringWriter {
+public:
+    ClusteringWriter(const ClusterInput& input, const SpatialNumbering& numbering, const PartMaker& maker)
+        : input_(input), numbering_(numbering), maker_(maker) {}
+
+    Clustering write(std::vector<Level>& levels) {
+        result_.parents.resize(input_.mesh.positions.size());
+        const std::size_t most = input_.mesh.positions.size() + numbering_.vertex_of_slot.size();
+        result_.parents.reserve(most);
+        result_.positions.reserve(most - input_.mesh.positions.size());
+        result_.deviations.reserve(most - input_.mesh.positions.size());
+        join_coincident();
+        for (Level& level : levels) {
+            std::size_t rounds = 0;
+            for (const MergeRecord& record : level) rounds = std::max(rounds, record.round_ends.size());
+            for (std::size_t round = 0; round < rounds; ++round)
+                for (const MergeRecord& record : level)
+                    if (round < record.round_ends.size()) write_round(record, round);
+            for (const MergeRecord& record : level)
+                for (const auto& vanishing : record.vanishings)
+                    raise(made_by_joining_[vanishing.joined], maker_.length_from_unit_box(vanishing.deviation));
+            level.clear();
+        }
+        for (Index c = 0; c < result_.deviations.size(); ++c) raise(result_.parents[vertices() + c], result_.deviations[c]);
+        return std::move(result_);
+    }
+
+private:
+    // Coincident vertices are joined first, whatever their attributes: above them, everything moves together, without cracks.
+    void join_coincident() {
+        const auto& first_member = numbering_.first_member;
+        cluster_.resize(numbering_.vertex_of_slot.size());
+        made_by_joining_.resize(cluster_.size());
+        for (Index s = 0; s < cluster_.size(); ++s) {
+            cluster_[s] = numbering_.vertex_of_slot[s];
+            if (first_member[s + 1] - first_member[s] == 1) continue;
+            const Index parent = push_cluster(input_.mesh.positions[cluster_[s]], 0);
+            for (Index i = first_member[s]; i < first_member[s + 1]; ++i) result_.parents[numbering_.members[i]] = parent;
+            cluster_[s] = parent;
+        }
+    }
+
+    void write_round(const MergeRecord& record, std::size_t round) {
+        for (Index i = round == 0 ? 0 : record.round_ends[round - 1]; i < record.round_ends[round]; ++i) {
+            const Merge& merge = record.merges[i];
+            const Index parent = push_cluster(maker_.from_unit_box(record.places[i]),
+                                              maker_.length_from_unit_box(record.deviations[i]));
+            result_.parents[cluster_[merge.kept]] = result_.parents[cluster_[merge.joined]] = parent;
+            cluster_[merge.kept] = made_by_joining_[merge.joined] = parent;
+        }
+    }
+
+    void raise(Index cluster, float deviation) {
+        float& here = result_.deviations[cluster - vertices()];
+        here = std::max(here, deviation);
+    }
+    Index vertices() const { return static_cast<Index>(input_.mesh.positions.size()); }
+
+    Index push_cluster(glm::dvec3 position, float deviation) {
+        const Index number = static_cast<Index>(result_.parents.size());
+        result_.parents.push_back(number);
+        result_.positions.push_back(position);
+        result_.deviations.push_back(deviation);
+        return number;
+    }
+
+    const ClusterInput& input_;
+    const SpatialNumbering& numbering_;
+    const PartMaker& maker_;
+    Clustering result_;
+    std::vector<Index> cluster_;         // by slot: the cluster that is known under its name
+    std::vector<Index> made_by_joining_; // by slot: the cluster that was made when the one of this name was joined to another
+};
 
 } // namespace
 
 Result<Clustering> cluster_quadric(const ClusterInput& input, const Progress& progress) {
-    return QuadricClusterer(input, progress).run();
+    const SpatialNumbering numbering = number_by_space(input.mesh.positions, input.coincident);
+    const PartMaker maker(input, numbering);
+    MergeCounter counter(progress, numbering.vertex_of_slot.size() - 1);
+    if (!counter.add(0)) return Error{ErrorCode::cancelled, "Clustering was cancelled."};
+    std::vector<Level> levels = contract_all(maker, numbering.parts, counter);
+    if (counter.stopped()) return Error{ErrorCode::cancelled, "Clustering was cancelled."};
+    return ClusteringWriter(input, numbering, maker).write(levels);
 }
 
 } // namespace unseen::vdtree

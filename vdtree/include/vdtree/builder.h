@@ -16,6 +16,9 @@ namespace unseen::vdtree {
 struct Clustering {
     std::vector<Index> parents;          // by cluster; the root's own number stands for "none"
     std::vector<glm::dvec3> positions;   // by cluster from n on: the proxy's position; empty: the area-weighted mean
+    // By cluster from n on: how far the surface that the proxy stands for strays from it, in mesh units, luminance and attributes
+    // counted in; at least as much as the children's. Simplifying by this keeps the most shape for the triangles. Empty: not known.
+    std::vector<float> deviations = {};
 };
 
 struct BuildOptions;
@@ -34,11 +37,14 @@ struct ClusterInput {
 using Clusterer = FunctionRef<Result<Clustering>(const ClusterInput&)>;
 
 // Octree over the bounding cube, subdivided until a cell holds one position; any soup; fast. Depth follows the data, not
-// a path code: cells that do not split their points are passed over, and coincident vertices share a node.
+// a path code: cells that do not split their points are passed over, and coincident vertices share a node. Parallel; the result
+// does not depend on the threads. Memory: 32 bytes a vertex.
 Result<Clustering> cluster_octree(const ClusterInput& input, const Progress& progress = {});
 
-// Contraction of vertex pairs in the order of their quadric error over position and luminance (Garland and Heckbert 1997, 1998),
-// with boundary terms and optimal proxies; pairs are the edges, and, for parts that no edge connects, near neighbours.
+// Contraction of vertex pairs in the order of their quadric error over position, luminance and the mesh's own attributes
+// (Garland and Heckbert 1997, 1998; Hoppe 1999), with boundary and seam terms and optimal proxies; pairs are the edges, and,
+// for parts that no edge connects, near neighbours. The vertices are parted by space, and the parts contracted in
+// parallel and then joined; the result depends on the mesh alone. Fills deviations. Memory: about 100 bytes a triangle.
 Result<Clustering> cluster_quadric(const ClusterInput& input, const Progress& progress = {});
 
 enum class ClustererKind { quadric, octree };

@@ -1,0 +1,328 @@
+// The clusterers by themselves, on meshes of several parts and on hard ones: hierarchies that are whole, that do not
+// depend on threads, in time that grows with the mesh, and that keep what the attributes show.
+#include <vdtree/builder.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <random>
+#include <thread>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "clustering_tools.h"
+#include "quadric_contraction.h"
+#include "shapes.h"
+
+namespace unseen::vdtree {
+namespace {
+
+using support::ClusteringTask;
+
+// The first fault in a hierarchy over so many vertices; empty where there is none.
+std::string fault(const Clustering& c, std::size_t vertices) {
+    if (c.parents.size() <= vertices) return "no clusters";
+    if (!c.positions.empty() && c.positions.size() != c.parents.size() - vertices) return "positions of another length";
+    const std::size_t root = c.parents.size() - 1;
+    if (c.parents[root] != root) return "the last cluster is not the root";
+    std::vector<Index> children(c.parents.size(), 0);
+    for (std::size_t i = 0; i < root; ++i) {
+        if (c.parents[i] <= i || c.parents[i] > root || c.parents[i] < vertices) return "parent of " + std::to_string(i);
+        ++children[c.parents[i]];
+    }
+    for (std::size_t i = vertices; i <= root; ++i)
+        if (children[i] < 2) return "cluster " + std::to_string(i) + " has " + std::to_string(children[i]) + " children";
+    for (const glm::dvec3& p : c.positions)
+        if (!std::isfinite(p.x + p.y + p.z)) return "a position is not finite";
+    for (std::size_t i = 0; i < c.deviations.size(); ++i) {
+        if (!(c.deviations[i] >= 0) || std::isinf(c.deviations[i])) return "deviation of " + std::to_string(vertices + i);
+        const std::size_t parent = c.parents[vertices + i];
+        if (c.deviations[parent - vertices] < c.deviations[i]) return "deviation falls above " + std::to_string(vertices + i);
+    }
+    return "";
+}
+
+std::size_t depth(const Clustering& c) {
+    std::vector<std::size_t> depths(c.parents.size(), 0);
+    for (std::size_t i = c.parents.size() - 1; i-- > 0;) depths[i] = depths[c.parents[i]] + 1;
+    return *std::max_element(depths.begin(), depths.end());
+}
+
+Clustering clustered(const ClusteringTask& task, ClustererKind kind, const Progress& progress = {}) {
+    Result<Clustering> made =
+        kind == ClustererKind::octree ? cluster_octree(task.input(), progress) : cluster_quadric(task.input(), progress);
+    EXPECT_TRUE(made);
+    return made ? std::move(*made) : Clustering{};
+}
+
+bool equal(const Clustering& a, const Clustering& b) {
+    return a.parents == b.parents && a.positions == b.positions && a.deviations == b.deviations;
+}
+
+// n triangles around one vertex that share no edge.
+Mesh star(Index n) {
+    Mesh m;
+    m.positions.emplace_back(0);
+    std::mt19937_64 random(5);
+    for (Index i = 0; i < n; ++i) {
+        const glm::dvec3 d = shapes::random_direction(random);
+        m.positions.push_back(d);
+        m.positions.push_back(d + 0.001 * shapes::random_direction(random));
+        m.triangles.push_back({0, 2 * i + 1, 2 * i + 2});
+    }
+    return m;
+}
+
+constexpr Index large = 60000; // vertices enough for several parts
+
+struct Hard {
+    const char* name;
+    std::function<Mesh()> make;
+};
+const Hard hard_meshes[] = {
+    {"sphere of several parts", [] { return shapes::bumpy_sphere(6); }},
+    {"flat grid", [] { return shapes::grid(280); }},
+    {"random soup, every edge across parts", [] { return shapes::random_soup(large, 2 * large, 7); }},
+    {"loose triangles", [] { return shapes::unwelded(shapes::bumpy_sphere(5)); }},
+    {"star", [] { return star(large / 2); }},
+    {"one position", [] { return shapes::all_coincident(large); }},
+    {"one far vertex", [] {
+         Mesh m = shapes::bumpy_sphere(6);
+         m.positions[0] = {1e15, 0, 0};
+         return m;
+     }},
+    {"scales over forty powers of ten", [] {
+         std::mt19937_64 random(11);
+         Mesh m;
+         for (Index i = 0; i < large; ++i)
+             m.positions.push_back(std::pow(10, shapes::random_between(random, -30, 10)) * shapes::random_direction(random));
+         for (Index i = 0; i + 2 < large; i += 3) m.triangles.push_back({i, i + 1, i + 2});
+         return m;
+     }},
+    {"no areas", [] {
+         Mesh m;
+         for (Index i = 0; i < large; ++i) m.positions.emplace_back(i, 0, 0);
+         for (Index i = 0; i + 2 < large; ++i) m.triangles.push_back({i, i + 1, i + 2});
+         return m;
+     }},
+};
+
+TEST(Clusterers, AreWholeAndFastOnHardMeshesWhateverTheThreads) {
+    for (const Hard& hard : hard_meshes) {
+        const Mesh mesh = hard.make();
+        const ClusteringTask task(mesh);
+        for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
+            SCOPED_TRACE(std::string(hard.name) + ", " + std::string(name(kind)));
+            Clustering first;
+            for (const std::size_t threads : {1u, 2u, 8u}) {
+                const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+                const auto begin = std::chrono::steady_clock::now();
+                Clustering made = clustered(task, kind);
+                const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+                // Minutes, were it quadratic; with sanitizers and neighbours it takes a few seconds.
+                EXPECT_LT(seconds.count(), 60);
+                if (threads == 1) {
+                    EXPECT_EQ(fault(made, mesh.positions.size()), "");
+                    EXPECT_LE(depth(made), 200u);
+                    first = std::move(made);
+                } else {
+                    EXPECT_TRUE(equal(first, made)) << threads << " threads";
+                }
+            }
+        }
+    }
+}
+
+TEST(Clusterers, ReportOnTheCallersThreadOnlyAndStopWhenToldTo) {
+    const Mesh mesh = shapes::bumpy_sphere(6);
+    const ClusteringTask task(mesh);
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 4);
+    for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
+        const std::thread::id caller = std::this_thread::get_id();
+        std::atomic<int> elsewhere = 0;
+        double last = 0;
+        int calls = 0, most_calls = 1 << 30;
+        const auto watch = [&](double share, const char*) {
+            if (std::this_thread::get_id() != caller) ++elsewhere;
+            EXPECT_GE(share, last);
+            EXPECT_LE(share, 1);
+            last = share;
+            return ++calls <= most_calls;
+        };
+        clustered(task, kind, watch);
+        EXPECT_EQ(elsewhere, 0);
+        EXPECT_GT(calls, 2);
+        most_calls = 2, calls = 0, last = 0;
+        const auto stopped =
+            kind == ClustererKind::octree ? cluster_octree(task.input(), watch) : cluster_quadric(task.input(), watch);
+        ASSERT_FALSE(stopped);
+        EXPECT_EQ(stopped.error().code, ErrorCode::cancelled);
+        EXPECT_EQ(calls, 3);
+    }
+}
+
+// A flat square whose right half has another colour, on a grid that the border does not favour.
+Mesh two_colours(int n) {
+    Mesh m = shapes::grid(n);
+    glm::dvec3 low = m.positions[0], high = low;
+    for (const glm::dvec3& p : m.positions) low = glm::min(low, p), high = glm::max(high, p);
+    const double border = low.x + 0.37 * (high.x - low.x);
+    for (const glm::dvec3& p : m.positions)
+        m.colours.push_back(p.x < border ? glm::vec4(0.8f, 0.2f, 0.2f, 1) : glm::vec4(0.1f, 0.6f, 0.9f, 1));
+    return m;
+}
+
+TEST(Quadric, FoldsWithinAColourBeforeAcrossColours) {
+    const Mesh mesh = two_colours(40);
+    const Clustering c = clustered(ClusteringTask(mesh), ClustererKind::quadric);
+    const Mesh simple = support::simplified_by_deviation(mesh, c, 400); // of 3200
+    std::vector<std::uint8_t> colours(c.parents.size(), 0);             // by cluster: which it holds
+    for (Index v = 0; v < mesh.positions.size(); ++v) colours[v] = mesh.colours[v].r > 0.5f ? 1 : 2;
+    for (std::size_t i = 0; i + 1 < colours.size(); ++i) colours[c.parents[i]] |= colours[i];
+    std::size_t used = 0, mixed = 0;
+    std::vector<std::uint8_t> seen(c.parents.size(), 0);
+    for (const Triangle& t : simple.triangles) {
+        for (const Index v : t) {
+            if (seen[v]++) continue;
+            ++used;
+            mixed += colours[v] == 3;
+        }
+    }
+    EXPECT_GT(used, 100u);
+    EXPECT_EQ(mixed, 0u);
+}
+
+TEST(Quadric, HoldsTheSeamOfATexture) {
+    // A flat square whose texture jumps along x = 0: two vertices at each position there.
+    Mesh mesh;
+    constexpr int n = 32;
+    const auto add_side = [&](int first, int last, float shift) {
+        const Index base = static_cast<Index>(mesh.positions.size()), columns = static_cast<Index>(last - first + 1);
+        for (int j = 0; j <= n; ++j) {
+            for (int i = first; i <= last; ++i) {
+                mesh.positions.emplace_back(i, j, 0);
+                mesh.uvs.emplace_back(shift + static_cast<float>(i) / n, static_cast<float>(j) / n);
+            }
+        }
+        for (Index j = 0; j < n; ++j) {
+            for (Index i = 0; i + 1 < columns; ++i) {
+                const Index a = base + j * columns + i;
+                mesh.triangles.push_back({a, a + 1, a + columns + 1});
+                mesh.triangles.push_back({a, a + columns + 1, a + columns});
+            }
+        }
+    };
+    add_side(-n / 2, 0, 0);
+    add_side(0, n / 2, 0.6f);
+    const Clustering c = clustered(ClusteringTask(mesh), ClustererKind::quadric);
+    const Mesh simple = support::simplified_by_deviation(mesh, c, 100); // of 2048
+    // Whatever holds a vertex of the seam lies on it still.
+    std::vector<std::uint8_t> holds_seam(c.parents.size(), 0);
+    for (Index v = 0; v < mesh.positions.size(); ++v) holds_seam[v] = mesh.positions[v].x == 0;
+    for (std::size_t i = 0; i + 1 < holds_seam.size(); ++i) holds_seam[c.parents[i]] |= holds_seam[i];
+    std::size_t on_seam = 0;
+    for (const Triangle& t : simple.triangles) {
+        for (const Index v : t) {
+            if (!holds_seam[v]) continue;
+            ++on_seam;
+            EXPECT_NEAR(simple.positions[v].x, 0, 0.05); // squares are 1 wide
+        }
+    }
+    EXPECT_GT(on_seam, 2u);
+}
+
+TEST(Quadric, KeepsLooseTrianglesThatAreSpreadOut) {
+    // Small triangles along a line, in pairs of close ones: half of them can go while one of each pair stays.
+    Mesh mesh;
+    constexpr Index pairs = 64;
+    for (Index i = 0; i < 2 * pairs; ++i) {
+        const double x = 10.0 * (i / 2) + (i % 2) * 1.5;
+        const Index first = static_cast<Index>(mesh.positions.size());
+        mesh.positions.emplace_back(x, 0, 0);
+        mesh.positions.emplace_back(x + 0.5, 0, 0);
+        mesh.positions.emplace_back(x, 0.5, 0);
+        mesh.triangles.push_back({first, first + 1, first + 2});
+    }
+    const Clustering c = clustered(ClusteringTask(mesh), ClustererKind::quadric);
+    const Mesh simple = support::folded(mesh, c, 3); // above the gaps within the pairs, below those between them
+    std::vector<int> left(pairs, 0);
+    for (const Triangle& t : simple.triangles) ++left[static_cast<std::size_t>(simple.positions[t[0]].x / 10)];
+    for (const int n : left) EXPECT_EQ(n, 1);
+}
+
+// ---- parts by themselves
+
+// Both halves of a strip of squares along x, as two parts.
+struct Strip {
+    PartMesh left, right;
+};
+Strip strip(Index columns) {
+    Strip s;
+    for (const bool is_right : {false, true}) {
+        PartMesh& part = is_right ? s.right : s.left;
+        const Index own = columns, ghosts = 2; // columns / 2 columns of two slots each, and the next one of the other side
+        part.first_slot = is_right ? columns : 0;
+        part.own_slots = own;
+        part.channels = 1;
+        const Index other = is_right ? columns - 2 : columns;
+        part.ghost_slots = {other, other + 1};
+        const auto push = [&](Index slot) {
+            part.positions.push_back(glm::dvec3(slot / 2, slot % 2, 0.1 * std::sin(slot / 2)) / static_cast<double>(columns));
+            part.slot_of_vertex.push_back(static_cast<Index>(part.positions.size() - 1));
+            part.channel_values.push_back(0);
+        };
+        for (Index i = 0; i < own; ++i) push(part.first_slot + i);
+        for (Index i = 0; i < ghosts; ++i) push(part.ghost_slots[i]);
+        const auto square = [&](Index a, Index b) { // columns that begin with local slots a and b
+            part.triangles.push_back({a, b, b + 1});
+            part.triangles.push_back({a, b + 1, a + 1});
+        };
+        for (Index i = 0; i + 2 < own; i += 2) square(i, i + 2);
+        is_right ? square(own, 0) : square(own - 2, own);
+        part.area_scale = columns * columns;
+    }
+    return s;
+}
+
+TEST(QuadricParts, KeepTheEdgesThatLeaveThemUntilTheyAreJoined) {
+    const Strip s = strip(16);
+    const auto go_on = [](std::size_t) { return true; };
+    const Contraction left = contract_part(s.left, 6, go_on), right = contract_part(s.right, 6, go_on);
+    EXPECT_LE(left.live.size(), 6u);
+    EXPECT_EQ(left.merges.size() + left.live.size(), 16u);
+    ASSERT_FALSE(left.outer_edges.empty());
+    for (const auto& edge : left.outer_edges) EXPECT_TRUE(edge.far_slot == 16 || edge.far_slot == 17);
+    ASSERT_EQ(left.border_slots.size(), 2u);
+    EXPECT_EQ(left.border_slots[0].slot, 14u);
+    EXPECT_EQ(left.border_slots[1].slot, 15u);
+
+    // Joined without any contraction, the edges between the two are pairs now.
+    const Contraction both = join(left, right, 100, go_on);
+    EXPECT_TRUE(both.merges.empty());
+    EXPECT_TRUE(both.outer_edges.empty());
+    EXPECT_EQ(both.live.size(), left.live.size() + right.live.size());
+    const auto shift = static_cast<Index>(left.live.size());
+    EXPECT_TRUE(std::any_of(both.pairs.begin(), both.pairs.end(),
+                            [&](const ClusterPair& p) { return p.a < shift && p.b >= shift; }));
+
+    const Contraction all = join(left, right, 1, go_on);
+    EXPECT_EQ(all.live.size(), 1u);
+    EXPECT_EQ(all.merges.size() + left.merges.size() + right.merges.size(), 31u);
+    EXPECT_EQ(all.round_ends.back(), all.merges.size());
+}
+
+TEST(QuadricParts, StopWhenToldTo) {
+    const Strip s = strip(64);
+    int rounds = 0;
+    const Contraction c = contract_part(s.left, 1, [&](std::size_t) { return ++rounds < 2; });
+    EXPECT_EQ(rounds, 2);
+    EXPECT_GT(c.live.size(), 1u);
+}
+
+} // namespace
+} // namespace unseen::vdtree
