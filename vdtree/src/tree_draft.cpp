@@ -46,10 +46,31 @@ TreeGeometry pack(TreeDraft&& draft) {
     pack_masks(draft);
     pack_bounds(draft);
     pack_normals(draft);
-    draft.first_leaf.shrink_to_fit(), draft.leaf_end.shrink_to_fit(), draft.subtree_end.shrink_to_fit();
-    draft.parents.shrink_to_fit();
     if (draft.ranges.empty()) release(draft.source_triangles);
-    return std::move(static_cast<TreeGeometry&>(draft));
+    TreeGeometry packed;
+    const auto take = [](auto& to, auto& from) {
+        from.shrink_to_fit();
+        to = std::move(from);
+    };
+    take(packed.parents, draft.parents);
+    take(packed.positions, draft.positions);
+    take(packed.normals, draft.normals);
+    take(packed.colours, draft.colours);
+    take(packed.uvs, draft.uvs);
+    take(packed.first_leaf, draft.first_leaf);
+    take(packed.leaf_end, draft.leaf_end);
+    take(packed.subtree_end, draft.subtree_end);
+    take(packed.first_triangle, draft.first_triangle);
+    take(packed.bounds, draft.bounds);
+    take(packed.support_spheres, draft.support_spheres);
+    take(packed.mask_at, draft.mask_at);
+    take(packed.displacement, draft.displacement);
+    take(packed.mask_records, draft.mask_records);
+    take(packed.triangles, draft.triangles);
+    take(packed.source_triangles, draft.source_triangles);
+    take(packed.source_vertices, draft.source_vertices);
+    static_cast<GeometryFacts&>(packed) = std::move(draft);
+    return packed;
 }
 
 } // namespace unseen::vdtree

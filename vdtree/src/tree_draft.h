@@ -7,7 +7,7 @@
 
 namespace unseen::vdtree {
 
-struct TreeDraft : TreeGeometry {
+struct TreeDraft : GeometryArrays<Vector>, GeometryFacts {
     std::vector<glm::vec3> exact_normals; // by node
     std::vector<Sphere> ring_spheres;     // by interior node, and so on
     std::vector<NormalMask> masks;
