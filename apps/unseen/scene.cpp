@@ -40,14 +40,17 @@ glm::vec3 unit_vector(glm::dvec3 v) {
     return glm::vec3(glm::normalize(v / largest));
 }
 
-void light(Scene& scene, const ViewOptions& options) {
-    if (!options.light && !options.ambient) return;
+Result<void> light(Scene& scene, const ViewOptions& options) {
+    if (!options.light && !options.ambient) return {};
     vdtree::Light light = scene.tree.light();
     if (options.light) light.direction = unit_vector(*options.light);
     if (options.ambient) light.ambient = static_cast<float>(*options.ambient);
-    if (light == scene.tree.light() && !scene.tree.is_prelit()) return;
-    scene.tree = scene.tree.relit(light);
+    if (light == scene.tree.light() && !scene.tree.is_prelit()) return {};
+    auto relit = scene.tree.relit(light);
+    if (!relit) return relit.error();
+    scene.tree = std::move(*relit);
     scene.is_relit = true;
+    return {};
 }
 
 vdtree::View make_view(const Scene& scene, const ViewOptions& options) {
@@ -110,7 +113,7 @@ Result<Scene> load_scene(const std::filesystem::path& model, const ViewOptions& 
 
     Scene scene{std::move(*tree), {}, *shown_on, std::move(csf), {}, *background, false};
     scene.placement.scale = view.unit_metres;
-    light(scene, view);
+    if (const auto lit = light(scene, view); !lit) return lit.error();
     scene.view = make_view(scene, view);
     if (auto valid = vdtree::validate(scene.view); !valid) return valid.error();
     return scene;

@@ -2,8 +2,8 @@
 // be done.
 //
 //   clang++ -std=c++20 -g -O1 -fsanitize=fuzzer,address,undefined -Ivdtree/include -Itests/support
-//       tests/fuzz/tree_fuzz.cpp vdtree/src/{atomic_file,criteria,cut,mesh,normal_mask,tree_io}.cpp
-//       vdtree/src/{verify,vertex_tree,view}.cpp
+//       tests/fuzz/tree_fuzz.cpp vdtree/src/{atomic_file,criteria,cut,distance_criterion,facing_gap,fold_tester}.cpp
+//       vdtree/src/{mapped_file,mask_pool,mesh,node_check,normal_mask,packed,tree_io,verify,vertex_tree,view}.cpp
 //
 // Start it with a folder of small trees made by `unseen build`.
 #include <cstddef>
@@ -46,8 +46,10 @@ private:
 void read_and_use(const std::string& bytes) {
     static MemoryFile file;
     file.hold(bytes);
-    const auto tree = unseen::vdtree::read_tree(file.path());
-    if (tree ? !unseen::support::use_everything(*tree) : tree.error().message.empty()) std::abort();
+    for (const bool mapped : {false, true}) {
+        const auto tree = mapped ? unseen::vdtree::map_tree(file.path()) : unseen::vdtree::read_tree(file.path());
+        if (tree ? !unseen::support::use_everything(*tree) : tree.error().message.empty()) std::abort();
+    }
 }
 
 } // namespace

@@ -81,7 +81,7 @@ TEST_F(LuebkeHallen, NeverCostsLessForAParentThanForItsChild) {
         if (trial % 2) options.gaze_px = glm::dvec2(512 + 1500 * uniform(random), 512 + 1500 * uniform(random));
         vdtree::Light light;
         light.direction = glm::vec3(glm::normalize(glm::dvec3(uniform(random), uniform(random), uniform(random))));
-        const VertexTree lit = tree().relit(light);
+        const VertexTree lit = *tree().relit(light);
         const std::vector<float> costs = costs_of(lit, LuebkeHallenCriterion(lit, view, options));
         for (NodeId n = 1; n < lit.interior_count(); ++n) {
             const NodeId parent = lit.parents()[n];

@@ -17,6 +17,13 @@ inline bool use_everything(const vdtree::VertexTree& tree) {
     const auto extract = [&] { valid &= validate(extract_mesh(cut).view()).has_value(); };
     cut.unfold_all();
     extract();
+    cut.fold_all();
+    for (NodeId node = 0; node < tree.node_count(); node += 1 + tree.node_count() / 16) {
+        cut.unfold_ancestors(node);
+        (void)cut.is_active(node);
+        if (!tree.is_leaf(node)) (void)tree.mask(node);
+    }
+    extract();
     const View view{.eye = {1, 2, 3}};
     const ExtentCriterion extent(tree, view, 20);
     const DisplacementCriterion displacement(tree, view, 2);
@@ -25,8 +32,8 @@ inline bool use_everything(const vdtree::VertexTree& tree) {
     extract();
     cut.adjust(displacement, {.triangle_budget = tree.triangle_count() / 2});
     extract();
-    const VertexTree relit = tree.relit({.direction = {0, 0, 1}});
-    return valid && relit.node_count() == tree.node_count();
+    const auto relit = tree.relit({.direction = {0, 0, 1}});
+    return valid && (relit ? relit->node_count() == tree.node_count() : !tree.check());
 }
 
 } // namespace unseen::support

@@ -73,13 +73,19 @@ TEST_F(TreeIo, ReadsWhatWasWritten) {
         const auto again = read_tree(file_);
         ASSERT_TRUE(again) << again.error().message;
         EXPECT_EQ(support::difference(tree, *again), "");
+        const auto mapped = map_tree(file_);
+        ASSERT_TRUE(mapped) << mapped.error().message;
+        EXPECT_EQ(support::difference(tree, *mapped), "");
+        EXPECT_TRUE(mapped->check());
+        EXPECT_EQ(mapped->first_damaged(), no_node);
+        EXPECT_EQ(mapped->byte_size(), again->byte_size());
         EXPECT_TRUE(is_tree_file(file_));
     }
     EXPECT_EQ(folder_.file_count(), 1u); // no temporary files are left
 }
 
 TEST_F(TreeIo, KeepsAnotherLight) {
-    const VertexTree tree = built(shapes::bumpy_sphere(2)).relit({.direction = {1, 0, 0}, .ambient = 0.5f});
+    const VertexTree tree = *built(shapes::bumpy_sphere(2)).relit({.direction = {1, 0, 0}, .ambient = 0.5f});
     ASSERT_TRUE(write_tree(file_, tree));
     const auto again = read_tree(file_);
     ASSERT_TRUE(again);
@@ -134,6 +140,7 @@ TEST_F(TreeIo, RefusesEveryTruncation) {
         const auto tree = read_bytes(std::string_view(bytes).substr(0, length));
         ASSERT_FALSE(tree) << "cut at byte " << length;
         ASSERT_FALSE(tree.error().message.empty());
+        ASSERT_FALSE(map_tree(file_)) << "cut at byte " << length;
     }
     expect_refused(bytes + '\0', "instead of");
 }
@@ -202,7 +209,8 @@ TEST_F(TreeIo, RefusesTablesThatDoNotFit) {
             }
         }
     }
-    for (const std::uint32_t count : {0u, 1u, 23u, 65u, 1u << 31, ~0u}) {
+    const auto sections = static_cast<std::uint32_t>(TreeFile::parse(good).sections.size());
+    for (const std::uint32_t count : {0u, 1u, sections - 1, sections + 1, 65u, 1u << 31, ~0u}) {
         std::string bad = good;
         support::store(bad, TreeFile::section_count_at, count);
         TreeFile::seal(bad);
@@ -328,6 +336,11 @@ TEST_F(TreeIo, RefusesLies) {
             EXPECT_EQ(tree.error().code, ErrorCode::malformed_data) << lie.what;
             EXPECT_THAT(tree.error().message, HasSubstr("tree.vdt")) << lie.what;
         }
+        // Mapped, it may be found when a cut comes there, or do no harm.
+        const auto mapped = map_tree(file_);
+        if (mapped) {
+            EXPECT_TRUE(support::use_everything(*mapped)) << lie.what;
+        }
     }
 }
 
@@ -345,7 +358,7 @@ TEST_F(TreeIo, MissesNoSection) {
 TEST_F(TreeIo, SurvivesRandomLies) {
     const std::string honest = bytes_of(built(shapes::with_attributes(shapes::cube(2))));
     std::mt19937_64 random(2);
-    int accepted = 0;
+    int accepted = 0, taken_mapped = 0, found_later = 0;
     for (int round = 0; round < 3000; ++round) {
         TreeFile file = TreeFile::parse(honest);
         for (std::uint64_t lie = 0; lie <= random() % 3; ++lie) {
@@ -357,10 +370,17 @@ TEST_F(TreeIo, SurvivesRandomLies) {
                 s.set(random() % (s.data.size() / 4), interesting[random() % std::size(interesting)]);
         }
         const auto tree = read_bytes(file.bytes());
+        if (const auto mapped = map_tree(file_); mapped) {
+            ASSERT_TRUE(support::use_everything(*mapped)) << "round " << round;
+            ++taken_mapped;
+            found_later += !mapped->check();
+        }
         if (!tree) continue;
         ++accepted;
         ASSERT_TRUE(support::use_everything(*tree)) << "round " << round;
     }
+    EXPECT_GT(taken_mapped, accepted);
+    EXPECT_GT(found_later, 100); // by the checks of nodes
     EXPECT_GT(accepted, 100); // normals, masks, slabs and small changes of values
 }
 
@@ -380,6 +400,98 @@ TEST_F(TreeIo, UsesNoMoreMemoryThanTheFileIsWorth) {
     EXPECT_FALSE(read_bytes(bad));
 }
 
+// ---- mapped files
+
+// The node at which the triangles of a tree are the most.
+NodeId node_with_triangles(const VertexTree& tree) {
+    NodeId best = 1;
+    for (NodeId node = 1; node < tree.interior_count(); ++node) {
+        const auto count = [&](NodeId n) { return tree.first_triangle()[n + 1] - tree.first_triangle()[n]; };
+        if (count(node) > count(best)) best = node;
+    }
+    return best;
+}
+
+TEST_F(TreeIo, LeavesDamagedNodesOfAMappedTreeFolded) {
+    const VertexTree tree = built(shapes::bumpy_sphere(3));
+    const NodeId damaged = node_with_triangles(tree);
+    const Index triangle = tree.first_triangle()[damaged], below = tree.first_triangle()[tree.subtree_end()[damaged]];
+    ASSERT_LT(triangle, tree.first_triangle()[damaged + 1]);
+    TreeFile file = TreeFile::parse(bytes_of(tree));
+    file["triangles"].set(3 * triangle, 0x7fffffffu);
+    support::write_bytes(file_, file.bytes());
+    EXPECT_FALSE(read_tree(file_));
+
+    const auto mapped = map_tree(file_);
+    ASSERT_TRUE(mapped) << mapped.error().message;
+    EXPECT_EQ(mapped->first_damaged(), no_node); // nobody has come there
+    Cut cut(*mapped);
+    cut.unfold_all();
+    EXPECT_FALSE(cut.is_unfolded(damaged));
+    EXPECT_TRUE(cut.is_active(damaged));
+    EXPECT_EQ(cut.triangle_count(), tree.triangle_count() - (below - triangle));
+    EXPECT_TRUE(validate(extract_mesh(cut).view()));
+    EXPECT_EQ(mapped->first_damaged(), damaged);
+
+    // The rest is as it was; a criterion that asks for everything gets as much.
+    Cut asked(*mapped);
+    const auto all = [](const VertexTree&, std::span<const NodeId>, std::span<float> costs) {
+        std::fill(costs.begin(), costs.end(), 2.0f);
+    };
+    EXPECT_EQ(asked.adjust(all).triangles, cut.triangle_count());
+    asked.fold_all();
+    EXPECT_EQ(asked.adjust(all, {.triangle_budget = tree.triangle_count()}).triangles, cut.triangle_count());
+    EXPECT_EQ(asked.adjust(all, {.triangle_budget = tree.triangle_count()}).max_fold_cost, 2.0f);
+
+    const auto sound = mapped->check();
+    ASSERT_FALSE(sound);
+    EXPECT_THAT(sound.error().message, HasSubstr("Node " + std::to_string(damaged)));
+    EXPECT_FALSE(verify(*mapped));
+    EXPECT_FALSE(mapped->relit({.direction = {1, 0, 0}}));
+}
+
+TEST_F(TreeIo, FollowsNoParentsIntoTheVoid) {
+    const VertexTree tree = built(shapes::bumpy_sphere(2));
+    const NodeId leaf = tree.node_count() - 1;
+    for (const std::uint32_t parent : {0xffffffffu, 0x7fffffffu, 0u, leaf}) {
+        TreeFile file = TreeFile::parse(bytes_of(tree));
+        file["parents"].set(leaf, parent);
+        support::write_bytes(file_, file.bytes());
+        const auto mapped = map_tree(file_);
+        ASSERT_TRUE(mapped);
+        Cut cut(*mapped);
+        EXPECT_FALSE(cut.is_active(leaf));
+        cut.unfold_ancestors(leaf);
+        EXPECT_FALSE(cut.is_active(leaf)); // the true parent is damaged
+        EXPECT_TRUE(cut.is_active(cut.proxy_of_leaf(leaf - tree.interior_count())));
+    }
+}
+
+TEST_F(TreeIo, KeepsAMappedTreeWhoseFileIsReplaced) {
+    const VertexTree tree = built(shapes::bumpy_sphere(4)), other = built(shapes::cube(2));
+    ASSERT_TRUE(write_tree(file_, tree));
+    const auto mapped = map_tree(file_);
+    ASSERT_TRUE(mapped);
+    ASSERT_TRUE(write_tree(file_, other)); // by renaming
+    EXPECT_EQ(support::difference(tree, *mapped), "");
+    auto relit = mapped->relit({.direction = {0, 0, 1}});
+    ASSERT_TRUE(relit);
+    std::filesystem::remove(file_);
+    EXPECT_TRUE(verify(*relit));
+}
+
+TEST_F(TreeIo, MapsNoSectionAcrossAnElement) {
+    // The offset of a section raised by one element, within the file: read, its checksum fails; mapped, it is misaligned.
+    std::string bytes = bytes_of(built(shapes::cube(2)));
+    const std::size_t at = TreeFile::header_bytes + TreeFile::offset_at;
+    support::store(bytes, at, support::load<std::uint64_t>(bytes, at) + 4);
+    TreeFile::seal(bytes);
+    support::write_bytes(file_, bytes);
+    const auto mapped = map_tree(file_);
+    ASSERT_FALSE(mapped);
+    EXPECT_THAT(mapped.error().message, HasSubstr("multiple of 64"));
+}
+
 // ---- the file system
 
 TEST_F(TreeIo, ReportsMissingFilesAndFolders) {
@@ -388,6 +500,8 @@ TEST_F(TreeIo, ReportsMissingFilesAndFolders) {
     EXPECT_EQ(missing.error().code, ErrorCode::io_failure);
     EXPECT_THAT(missing.error().message, HasSubstr("nothing.vdt"));
     EXPECT_FALSE(read_tree(folder_.path()));
+    EXPECT_FALSE(map_tree(folder_.path()));
+    EXPECT_FALSE(map_tree(folder_ / "nothing.vdt"));
     EXPECT_FALSE(is_tree_file(folder_ / "nothing.vdt"));
     EXPECT_FALSE(is_tree_file(folder_.path()));
 
@@ -403,6 +517,7 @@ TEST_F(TreeIo, DoesNotWaitForPipes) {
     const auto pipe = folder_ / "pipe.vdt";
     ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
     EXPECT_FALSE(read_tree(pipe)); // would wait for a writer for ever
+    EXPECT_FALSE(map_tree(pipe));
     EXPECT_FALSE(is_tree_file(pipe));
 }
 

@@ -81,7 +81,8 @@ private:
                 const Verdict& v = verdicts_[i];
                 const float cost = v.cost >= 0 ? v.cost : std::numeric_limits<float>::infinity();
                 const Entry entry{std::min(cost, above_[tree][i]), v.seen_cost, tree, nodes[i]};
-                if (limits_.only_unfolding ? v.unfolded : entry.cost > 0 || limits_.fill) f(entry);
+                const bool wanted = limits_.only_unfolding ? v.unfolded : entry.cost > 0 || limits_.fill;
+                if (wanted && trees_[tree]->is_sound(nodes[i])) f(entry);
                 else leave(entry);
             }
             nodes.clear();

@@ -240,10 +240,10 @@ Result<Clustering> TreeBuilder::cluster(Clusterer clusterer) {
 void TreeBuilder::order(const Clustering& clustering) {
     const Index vertices = static_cast<Index>(mesh_.positions.size());
     nodes_ = order_nodes(clustering, vertices, static_cast<Index>(clean_.unreferenced.size()));
-    g_->source_vertices.resize(nodes_.leaf_of_vertex.size());
+    std::vector<Index> source_vertices(nodes_.leaf_of_vertex.size());
     for (Index v = 0; v < nodes_.leaf_of_vertex.size(); ++v)
-        g_->source_vertices[nodes_.leaf_of_vertex[v]] =
-            v < vertices ? clean_.source_vertices[v] : clean_.unreferenced[v - vertices];
+        source_vertices[nodes_.leaf_of_vertex[v]] = v < vertices ? clean_.source_vertices[v] : clean_.unreferenced[v - vertices];
+    g_->source_vertices = std::move(source_vertices);
 }
 
 void TreeBuilder::place_vertices(const Clustering& clustering) {
@@ -305,16 +305,18 @@ void TreeBuilder::bound() {
     g_->displacement = bound_displacements(input, spheres.support);
     NodeFacing facing = bound_facing(input, triangles.triangles, places, spheres.support, ancestors);
     g_->support_spheres = std::move(spheres.support);
-    g_->bounds.resize(shape.interior());
-    g_->mask_at.resize(shape.interior());
+    std::vector<NodeBounds> bounds(shape.interior());
+    std::vector<std::uint32_t> mask_at(shape.interior());
     MaskPool pool;
     for (NodeId node = 0; node < shape.interior(); ++node) {
         const Directions& seen = facing.directions[node];
-        g_->bounds[node] = {spheres.ring[node], seen.slabs(), facing.flags[node], 0};
+        bounds[node] = {spheres.ring[node], seen.slabs(), facing.flags[node], 0};
         const std::uint32_t at = pool.add(seen.mask);
         // A parent, which has a lower number, includes its children: a full pool still gives true masks that nest.
-        g_->mask_at[node] = at != MaskPool::no_record ? at : g_->mask_at[shape.parents[node]];
+        mask_at[node] = at != MaskPool::no_record ? at : mask_at[shape.parents[node]];
     }
+    g_->bounds = std::move(bounds);
+    g_->mask_at = std::move(mask_at);
     g_->mask_records = pool.take();
     g_->parents = std::move(shape.parents);
     g_->first_leaf = std::move(shape.first_leaf);

@@ -88,7 +88,7 @@ Decision decide_by_threshold(const VertexTree& tree, NodeTester& test) {
         const auto costs = test(level);
         next.clear();
         for (std::size_t i = 0; i < level.size(); ++i) {
-            if (is_below_threshold(costs[i])) {
+            if (is_below_threshold(costs[i]) || !tree.is_sound(level[i])) {
                 decision.max_fold_cost = std::max(decision.max_fold_cost, costs[i]);
                 continue;
             }
@@ -126,8 +126,14 @@ Decision decide_by_budget(const VertexTree& tree, NodeTester& test, Index budget
     const NodeId root = VertexTree::root();
     add({&root, 1});
     std::uint64_t triangles = 0;
+    float damaged = 0; // the largest cost of a node that must stay folded
     while (!candidates.empty() && candidates.top().cost > 0) {
         const NodeId node = candidates.top().node;
+        if (!tree.is_sound(node)) {
+            damaged = std::max(damaged, candidates.top().cost);
+            candidates.pop();
+            continue;
+        }
         const std::uint64_t added = first[node + 1] - first[node];
         if (triangles + added > budget) break;
         candidates.pop();
@@ -139,7 +145,7 @@ Decision decide_by_budget(const VertexTree& tree, NodeTester& test, Index budget
         });
         add(children);
     }
-    decision.max_fold_cost = candidates.empty() ? 0 : candidates.top().cost;
+    decision.max_fold_cost = std::max(damaged, candidates.empty() ? 0 : candidates.top().cost);
     return decision;
 }
 
@@ -191,9 +197,9 @@ Cut::~Cut() = default;
 bool Cut::is_unfolded(NodeId node) const noexcept { return !tree_->is_leaf(node) && test_bit(unfolded_, node); }
 
 bool Cut::is_active(NodeId node) const noexcept {
-    if (is_unfolded(node)) return false;
-    const NodeId parent = tree_->parents()[node];
-    return parent == no_node || test_bit(unfolded_, parent);
+    // Not by its parent, which a damaged file may lie about.
+    const Index leaf = tree_->is_leaf(node) ? node - tree_->interior_count() : tree_->first_leaf()[node];
+    return leaf < tree_->leaf_count() && proxy_[leaf] == node;
 }
 
 void Cut::set_unfolded(NodeId node) {
@@ -234,7 +240,7 @@ void Cut::make_stale() {
 
 bool Cut::unfold(NodeId node) {
     assert(!tree_->is_leaf(node) && (is_active(node) || is_unfolded(node)));
-    if (test_bit(unfolded_, node)) return false;
+    if (test_bit(unfolded_, node) || !tree_->is_sound(node)) return false;
     make_stale();
     set_unfolded(node);
     for (const NodeId child : children_of(node)) assign(child);
@@ -252,11 +258,11 @@ bool Cut::fold(NodeId node) {
 }
 
 bool Cut::unfold_ancestors(NodeId node) {
-    std::vector<NodeId> folded;
-    for (NodeId up = tree_->parents()[node]; up != no_node && !test_bit(unfolded_, up); up = tree_->parents()[up])
-        folded.push_back(up);
-    for (auto up = folded.rbegin(); up != folded.rend(); ++up) unfold(*up);
-    return !folded.empty();
+    const Index leaf = tree_->is_leaf(node) ? node - tree_->interior_count() : tree_->first_leaf()[node];
+    bool changed = false;
+    // What stands for the node's first leaf is an ancestor as long as its number is lower.
+    while (leaf < tree_->leaf_count() && proxy_[leaf] < node && unfold(proxy_[leaf])) changed = true;
+    return changed;
 }
 
 bool Cut::fold_subtree(NodeId node) {
@@ -270,6 +276,11 @@ bool Cut::fold_subtree(NodeId node) {
 
 void Cut::unfold_all() {
     make_stale();
+    if (!tree_->check()) { // but for what is damaged
+        for (NodeId node = 0; node < tree_->interior_count(); ++node)
+            if (is_active(node)) unfold(node);
+        return;
+    }
     for (NodeId node = 0; node < tree_->interior_count(); ++node) set_bit(unfolded_, node);
     for (Index leaf = 0; leaf < tree_->leaf_count(); ++leaf) proxy_[leaf] = tree_->interior_count() + leaf;
     triangle_count_ = tree_->triangle_count();

@@ -284,7 +284,7 @@ void CutFollower::test_down(NodeId top, std::vector<std::uint64_t>& unfolded, st
             const NodeId node = wave_[i];
             add_live(node);
             set_deadlines(node, verdicts_[i]);
-            if (!verdicts_[i].unfolded) continue;
+            if (!verdicts_[i].unfolded || !tree_.is_sound(node)) continue;
             unfolded[node >> 6] |= std::uint64_t{1} << (node & 63);
             for (NodeId child = node + 1; child < subtree_end[node]; child = subtree_end[child])
                 (left && subtree_end[child] - child <= cached_nodes ? *left : next_wave_).push_back(child);
@@ -363,7 +363,7 @@ void CutFollower::test_due(const Cut& cut, std::span<const NodeId> nodes) {
         set_deadlines(node, verdicts_[i]);
         const bool was_unfolded = cut.is_unfolded(node);
         if (was_unfolded && !verdicts_[i].unfolded) folding_.push_back(node);
-        if (!was_unfolded && verdicts_[i].unfolded) wave_.push_back(node);
+        if (!was_unfolded && verdicts_[i].unfolded && tree_.is_sound(node)) wave_.push_back(node);
     }
 }
 
@@ -394,7 +394,7 @@ void CutFollower::unfold_wave(Cut& cut) {
         wave_.clear();
         for (std::size_t i = 0; i < next_wave_.size(); ++i) {
             set_deadlines(next_wave_[i], verdicts_[i]);
-            if (verdicts_[i].unfolded) wave_.push_back(next_wave_[i]);
+            if (verdicts_[i].unfolded && tree_.is_sound(next_wave_[i])) wave_.push_back(next_wave_[i]);
         }
     }
 }

@@ -15,7 +15,9 @@
 #include <xxhash.h>
 
 #include "atomic_file.h"
+#include "mapped_file.h"
 #include "mask_pool.h"
+#include "node_check.h"
 #include "vertex_tree_data.h"
 
 namespace unseen::vdtree {
@@ -72,6 +74,13 @@ void swap_components(std::byte* data, std::size_t bytes, std::size_t component) 
     for (std::size_t i = 0; i + component <= bytes; i += component) std::reverse(data + i, data + i + component);
 }
 
+// Turns a whole number of a section's elements into the other byte order.
+void swap_elements(std::byte* data, std::size_t bytes, const Section& s) {
+    if (s.element_bytes != sizeof(NodeBounds)) return swap_components(data, bytes, s.component_bytes);
+    for (std::size_t at = 0; at < bytes; at += sizeof(NodeBounds)) // all else in it are single bytes
+        swap_components(data + at, sizeof(Sphere), s.component_bytes);
+}
+
 // Walks every stored array of a tree, in file order: f(name, vector).
 template <class Geometry, class Luminance, class F>
 void for_each_array(Geometry& g, Luminance& l, F&& f) {
@@ -97,6 +106,8 @@ void for_each_array(Geometry& g, Luminance& l, F&& f) {
     f("source_triangles", g.source_triangles);
     f("source_vertices", g.source_vertices);
 }
+
+enum class OpenMode { read, map };
 
 template <class T>
 constexpr std::uint32_t component_bytes() {
@@ -215,7 +226,7 @@ private:
         const auto page = data_[section].subspan(at, std::min<std::size_t>(page_bytes, data_[section].size() - at));
         if constexpr (std::endian::native == std::endian::little) return page;
         swapped_.assign(page.begin(), page.end());
-        swap_components(swapped_.data(), swapped_.size(), sections_[section].component_bytes);
+        swap_elements(swapped_.data(), swapped_.size(), sections_[section]);
         return swapped_;
     }
 
@@ -268,7 +279,8 @@ private:
 
 class Reader {
 public:
-    Reader(const std::filesystem::path& file, const Progress& progress) : file_(file), progress_(progress) {}
+    Reader(const std::filesystem::path& file, OpenMode mode, const Progress& progress)
+        : file_(file), mode_(mode), progress_(progress) {}
 
     Result<VertexTree> read();
 
@@ -279,14 +291,21 @@ private:
     Result<void> read_table();
     const Section* find(std::string_view name) const;
     template <class T>
-    Result<void> read_section(std::string_view name, std::uint32_t component, std::vector<T>& out);
+    Result<void> read_section(std::string_view name, std::vector<T>& out);
+    template <class T>
+    Result<void> map_section(std::string_view name, Array<T>& out);
+    template <class T>
+    Result<void> open_section(std::string_view name, Array<T>& out);
+    Result<void> read_facts(TreeGeometry& g, TreeLuminance& l);
     Result<void> check_counts(const TreeGeometry& g, const TreeLuminance& l) const;
     Result<void> check_structure(const TreeGeometry& g) const;
     Result<void> check_values(const TreeGeometry& g, const TreeLuminance& l) const;
     Result<void> check_sources(const TreeGeometry& g) const;
 
     const std::filesystem::path& file_;
+    const OpenMode mode_;
     const Progress& progress_;
+    std::shared_ptr<const MappedFile> mapping_;
     std::ifstream in_;
     std::uint64_t file_bytes_ = 0;
     std::vector<Section> sections_;
@@ -353,7 +372,7 @@ const Section* Reader::find(std::string_view name) const {
 }
 
 template <class T>
-Result<void> Reader::read_section(std::string_view name, std::uint32_t component, std::vector<T>& out) {
+Result<void> Reader::read_section(std::string_view name, std::vector<T>& out) {
     const Section* section = find(name);
     if (!section) return fail("Section " + std::string(name) + " is missing.");
     if (section->element_bytes != sizeof(T)) return fail("Section " + std::string(name) + " has elements of another size.");
@@ -370,10 +389,34 @@ Result<void> Reader::read_section(std::string_view name, std::uint32_t component
             return fail("The file ends within section " + std::string(name) + "; it was cut short while it was read.");
         if (checksum(bytes + at, size) != checksums_[page])
             return fail("Page " + std::to_string(at / page_bytes) + " of section " + std::string(name) + " is damaged.");
-        if constexpr (std::endian::native == std::endian::big) swap_components(bytes + at, size, component);
+        if constexpr (std::endian::native == std::endian::big) swap_elements(bytes + at, size, *section);
     }
-    (void)component;
     return {};
+}
+
+template <class T>
+Result<void> Reader::map_section(std::string_view name, Array<T>& out) {
+    const Section* section = find(name);
+    if (!section) return fail("Section " + std::string(name) + " is missing.");
+    if (section->element_bytes != sizeof(T)) return fail("Section " + std::string(name) + " has elements of another size.");
+    if (section->offset % section_alignment != 0)
+        return fail("Section " + std::string(name) + " does not begin at a multiple of 64.");
+    // The mapping was made after the table was read: the file may have been replaced in between.
+    const auto bytes = mapping_->bytes();
+    const std::uint64_t size = section->count * section->element_bytes;
+    if (section->offset > bytes.size() || size > bytes.size() - section->offset)
+        return fail("Section " + std::string(name) + " does not fit in the file.");
+    out = Array<T>(std::span(reinterpret_cast<const T*>(bytes.data() + section->offset), section->count));
+    return {};
+}
+
+template <class T>
+Result<void> Reader::open_section(std::string_view name, Array<T>& out) {
+    if (mode_ == OpenMode::map) return map_section(name, out);
+    std::vector<T> values;
+    const auto r = read_section(name, values);
+    out = std::move(values);
+    return r;
 }
 
 Result<void> Reader::check_counts(const TreeGeometry& g, const TreeLuminance& l) const {
@@ -411,50 +454,15 @@ Result<void> Reader::check_counts(const TreeGeometry& g, const TreeLuminance& l)
 // That walking the tree stays within it: every interior node's children lie side by side and cover it.
 Result<void> Reader::check_structure(const TreeGeometry& g) const {
     const NodeId interior = static_cast<NodeId>(g.first_leaf.size());
-    const Index leaves = static_cast<Index>(g.parents.size() - interior);
-    const auto broken = [&](NodeId node) {
-        return fail("Node " + std::to_string(node) + " contradicts its neighbours in the tree.");
-    };
-    if (g.parents[0] != no_node || g.first_leaf[0] != 0 || g.leaf_end[0] != leaves || g.subtree_end[0] != interior)
-        return broken(0);
-    for (NodeId node = 0; node < interior; ++node) {
-        if (!(g.first_leaf[node] < g.leaf_end[node] && g.leaf_end[node] <= leaves && g.subtree_end[node] > node &&
-              g.subtree_end[node] <= interior))
-            return broken(node);
-    }
-    for (NodeId node = 0; node < interior; ++node) {
-        NodeId child = node + 1;
-        std::uint64_t children = 0;
-        for (Index leaf = g.first_leaf[node]; leaf < g.leaf_end[node]; ++children) {
-            if (child < g.subtree_end[node] && g.first_leaf[child] == leaf) {
-                if (g.parents[child] != node || g.leaf_end[child] > g.leaf_end[node] ||
-                    g.subtree_end[child] > g.subtree_end[node])
-                    return broken(child);
-                leaf = g.leaf_end[child];
-                child = g.subtree_end[child];
-            } else {
-                if (g.parents[interior + leaf] != node) return broken(interior + leaf);
-                ++leaf;
-            }
-        }
-        if (child != g.subtree_end[node] || children < 2) return broken(node);
-    }
-    if (g.first_triangle[0] != 0 || g.first_triangle[interior] != g.triangles.size())
-        return fail("The triangles' ranges do not cover the triangles.");
+    const auto broken = [&](NodeId node, const char* fault) { return fail("Node " + std::to_string(node) + " " + fault); };
+    if (const char* fault = fault_in_root(g)) return broken(0, fault);
     for (NodeId node = 0; node < interior; ++node)
-        if (g.first_triangle[node] > g.first_triangle[node + 1])
-            return fail("The triangles of node " + std::to_string(node) + " end before they begin.");
-    for (std::size_t t = 0; t < g.triangles.size(); ++t) {
-        const Triangle& tri = g.triangles[t];
-        if (tri[0] >= leaves || tri[1] >= leaves || tri[2] >= leaves || tri[0] == tri[1] || tri[1] == tri[2] ||
-            tri[2] == tri[0])
-            return fail("Triangle " + std::to_string(t) + " has a corner out of range or twice.");
-    }
+        if (const char* fault = fault_in_links(g, node)) return broken(node, fault);
     return {};
 }
 
 template <class T>
-bool all_finite(const std::vector<T>& values) {
+bool all_finite(const Array<T>& values) {
     static_assert(sizeof(T) % sizeof(float) == 0);
     const float* p = reinterpret_cast<const float*>(values.data());
     const std::size_t n = values.size() * sizeof(T) / sizeof(float);
@@ -493,36 +501,23 @@ Result<void> Reader::check_values(const TreeGeometry& g, const TreeLuminance& l)
 Result<void> Reader::check_sources(const TreeGeometry& g) const {
     if (g.dropped_triangles > no_node) return fail("Section facts has a value out of range.");
     const std::uint64_t triangles = g.triangles.size() + g.dropped_triangles;
-    for (const Index v : g.source_vertices)
-        if (v >= g.source_vertices.size()) return fail("A source vertex is out of range.");
-    for (const Index t : g.source_triangles)
-        if (t >= triangles) return fail("A source triangle is out of range.");
+    if (mode_ == OpenMode::read) {
+        for (const Index v : g.source_vertices)
+            if (v >= g.source_vertices.size()) return fail("A source vertex is out of range.");
+        for (const Index t : g.source_triangles)
+            if (t >= triangles) return fail("A source triangle is out of range.");
+    }
     for (const MeshRange& r : g.ranges)
         if (r.first_triangle > triangles || r.triangle_count > triangles - r.first_triangle)
             return fail("Range '" + r.name + "' ends after the last triangle.");
     return {};
 }
 
-Result<VertexTree> Reader::read() {
-    if (const auto r = read_table(); !r) return r.error();
-    auto geometry = std::make_shared<TreeGeometry>();
-    auto data = std::make_shared<VertexTree::Data>();
-    TreeGeometry& g = *geometry;
-    TreeLuminance& l = data->light;
-    Result<void> state;
-    std::size_t done = 0;
-    for_each_array(g, l, [&](std::string_view name, auto& values) {
-        if (!state) return;
-        using T = typename std::remove_reference_t<decltype(values)>::value_type;
-        if (progress_ && !progress_(static_cast<double>(done++) / static_cast<double>(sections_.size()), "reading"))
-            state = Error{ErrorCode::cancelled, "Reading " + file_.string() + " was cancelled."};
-        else state = read_section(name, component_bytes<T>(), values);
-    });
-    if (!state) return state.error();
+Result<void> Reader::read_facts(TreeGeometry& g, TreeLuminance& l) {
     std::vector<Facts> facts;
     std::vector<std::byte> ranges;
-    if (const auto r = read_section("facts", 1, facts); !r) return r.error();
-    if (const auto r = read_section("ranges", 1, ranges); !r) return r.error();
+    if (const auto r = read_section("facts", facts); !r) return r.error();
+    if (const auto r = read_section("ranges", ranges); !r) return r.error();
     if (facts.size() != 1) return fail("Section facts has the wrong length.");
     Facts& f = facts[0];
     if constexpr (std::endian::native == std::endian::big) {
@@ -541,13 +536,45 @@ Result<VertexTree> Reader::read() {
     l.prelit = f.prelit != 0;
     l.range = {f.luminance_range[0], f.luminance_range[1]};
     const double sum = g.origin.x + g.origin.y + g.origin.z;
-    const bool facts_finite = std::isfinite(sum) && all_finite(std::vector<Sphere>{g.bounding_sphere}) &&
-                              all_finite(std::vector<Light>{l.light}) && l.range.lo >= 0 && l.range.lo <= l.range.hi && l.range.hi <= 1 &&
-                              g.bounding_sphere.radius >= 0;
+    const bool facts_finite = std::isfinite(sum) && all_finite(Array(std::vector<Sphere>{g.bounding_sphere})) &&
+                              all_finite(Array(std::vector<Light>{l.light})) && l.range.lo >= 0 && l.range.lo <= l.range.hi &&
+                              l.range.hi <= 1 && g.bounding_sphere.radius >= 0;
     if (!facts_finite) return fail("Section facts has a value out of range.");
+    return {};
+}
+
+Result<VertexTree> Reader::read() {
+    if (const auto r = read_table(); !r) return r.error();
+    if (mode_ == OpenMode::map) {
+        auto mapping = MappedFile::open(file_);
+        if (!mapping) return mapping.error();
+        mapping_ = std::move(*mapping);
+    }
+    auto geometry = std::make_shared<TreeGeometry>();
+    auto data = std::make_shared<VertexTree::Data>();
+    TreeGeometry& g = *geometry;
+    TreeLuminance& l = data->light;
+    g.mapping = mapping_;
+    Result<void> state;
+    std::size_t done = 0;
+    for_each_array(g, l, [&](std::string_view name, auto& values) {
+        if (!state) return;
+        if (progress_ && !progress_(static_cast<double>(done++) / static_cast<double>(sections_.size()), "reading"))
+            state = Error{ErrorCode::cancelled, "Reading " + file_.string() + " was cancelled."};
+        else state = open_section(name, values);
+    });
+    if (!state) return state.error();
+    if (const auto r = read_facts(g, l); !r) return r.error();
     if (const auto r = check_counts(g, l); !r) return r.error();
-    if (const auto r = check_structure(g); !r) return r.error();
-    if (const auto r = check_values(g, l); !r) return r.error();
+    if (mode_ == OpenMode::map) {
+        data->checks = std::make_shared<NodeChecks>(g);
+        const char* fault = fault_in_root(g);
+        if (fault) return fail(std::string("Node 0 ") + fault);
+        if (!data->checks->is_sound(0)) return fail("Node 0 is damaged.");
+    } else {
+        if (const auto r = check_structure(g); !r) return r.error();
+        if (const auto r = check_values(g, l); !r) return r.error();
+    }
     if (const auto r = check_sources(g); !r) return r.error();
     data->geometry = std::move(geometry);
     return VertexTree(std::move(data));
@@ -577,7 +604,13 @@ Result<void> write_tree(const std::filesystem::path& file, const VertexTree& tre
 }
 
 Result<VertexTree> read_tree(const std::filesystem::path& file, const Progress& progress) {
-    return Reader(file, progress).read();
+    return Reader(file, OpenMode::read, progress).read();
+}
+
+Result<VertexTree> map_tree(const std::filesystem::path& file) {
+    // Mapped bytes stand as they are: hosts of the other byte order read the file.
+    constexpr OpenMode mode = std::endian::native == std::endian::little ? OpenMode::map : OpenMode::read;
+    return Reader(file, mode, {}).read();
 }
 
 bool is_tree_file(const std::filesystem::path& file) {

@@ -134,6 +134,9 @@ private:
 
 } // namespace
 
-Result<void> verify(const VertexTree& tree) { return Verifier(tree).run(); }
+Result<void> verify(const VertexTree& tree) {
+    if (const auto sound = tree.check(); !sound) return sound;
+    return Verifier(tree).run();
+}
 
 } // namespace unseen::vdtree

@@ -2,18 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include <glm/geometric.hpp>
 
 #include "mask_pool.h"
+#include "node_check.h"
 
 namespace unseen::vdtree {
 
 namespace {
 
 template <class T>
-std::uint64_t bytes_of(const std::vector<T>& v) {
-    return v.capacity() * sizeof(T);
+std::uint64_t bytes_of(const Array<T>& a) {
+    return a.bytes();
 }
 
 constexpr PackedRange empty_range{{Unorm16::largest}, {0}};
@@ -60,9 +62,7 @@ float vertex_luminance(glm::vec3 normal, const glm::vec4* colour, const Light& l
 TreeLuminance derive_luminance(const TreeGeometry& g, const Light& light, bool prelit) {
     const NodeId interior = static_cast<NodeId>(g.first_leaf.size());
     const Index leaves = g.leaf_end[0];
-    TreeLuminance out;
-    out.light = light;
-    out.prelit = prelit;
+    LuminanceArrays<Vector> out;
     out.luminance.resize(std::size_t{interior} + leaves);
     out.support_range.resize(interior);
     out.ring_range.resize(interior);
@@ -139,11 +139,13 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const Light& light, bool p
     }
     for (const Triangle& t : g.triangles)
         for (const Index leaf : t) corners = unite(corners, out.luminance[interior + leaf]);
-    out.range = corners;
-    return out;
+    TreeLuminance done{{std::move(out.luminance), std::move(out.support_range), std::move(out.ring_range),
+                        std::move(out.adaptation)},
+                       light, prelit, corners};
+    return done;
 }
 
-VertexTree::VertexTree(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
+VertexTree::VertexTree(std::shared_ptr<const Data> data) : data_(std::move(data)), checks_(data_->checks.get()) {}
 VertexTree::VertexTree(VertexTree&&) noexcept = default;
 VertexTree& VertexTree::operator=(VertexTree&&) noexcept = default;
 VertexTree::~VertexTree() = default;
@@ -188,9 +190,23 @@ LuminanceRange VertexTree::luminance_range() const noexcept { return data_->ligh
 const Light& VertexTree::light() const noexcept { return data_->light.light; }
 bool VertexTree::is_prelit() const noexcept { return data_->light.prelit; }
 
-VertexTree VertexTree::relit(const Light& light) const {
+bool VertexTree::looks_sound(NodeId node) const noexcept { return checks_->is_sound(node); }
+
+NodeId VertexTree::first_damaged() const noexcept { return checks_ ? checks_->first_damaged() : no_node; }
+
+Result<void> VertexTree::check() const {
+    for (NodeId node = 0; checks_ && node < interior_count(); ++node)
+        if (!checks_->is_sound(node))
+            return Error{ErrorCode::malformed_data, "Node " + std::to_string(node) +
+                                                        " of the mapped tree is damaged. Build the tree again from its mesh."};
+    return {};
+}
+
+Result<VertexTree> VertexTree::relit(const Light& light) const {
+    if (const auto sound = check(); !sound) return sound.error();
     auto data = std::make_shared<Data>();
     data->geometry = data_->geometry;
+    data->checks = data_->checks;
     data->light = derive_luminance(*data_->geometry, light, false);
     return VertexTree(std::move(data));
 }
@@ -202,7 +218,7 @@ std::uint64_t VertexTree::byte_size() const noexcept {
            bytes_of(g.first_leaf) + bytes_of(g.leaf_end) + bytes_of(g.subtree_end) + bytes_of(g.first_triangle) +
            bytes_of(g.bounds) + bytes_of(g.support_spheres) + bytes_of(g.mask_at) + bytes_of(g.mask_records) +
            bytes_of(g.displacement) + bytes_of(g.triangles) + bytes_of(g.source_triangles) +
-           bytes_of(g.source_vertices) + bytes_of(g.ranges) + bytes_of(l.luminance) + bytes_of(l.support_range) +
+           bytes_of(g.source_vertices) + g.ranges.capacity() * sizeof(MeshRange) + bytes_of(l.luminance) + bytes_of(l.support_range) +
            bytes_of(l.ring_range) + bytes_of(l.adaptation);
 }
 

@@ -6,33 +6,42 @@
 
 #include <vdtree/vertex_tree.h>
 
+#include "array.h"
+
 namespace unseen::vdtree {
 
-// What another light leaves as it is.
-struct TreeGeometry {
+template <class T>
+using Vector = std::vector<T>;
+
+// `Storage`: Vector while they are filled, Array when they are done.
+template <template <class> class Storage>
+struct GeometryArrays {
     // By node: interior nodes, then leaves.
-    std::vector<NodeId> parents;
-    std::vector<glm::vec3> positions;
-    std::vector<PackedNormal> normals;
-    std::vector<glm::vec4> colours;
-    std::vector<glm::vec2> uvs;
+    Storage<NodeId> parents;
+    Storage<glm::vec3> positions;
+    Storage<PackedNormal> normals;
+    Storage<glm::vec4> colours;
+    Storage<glm::vec2> uvs;
 
     // By interior node.
-    std::vector<Index> first_leaf, leaf_end;
-    std::vector<NodeId> subtree_end;
-    std::vector<Index> first_triangle; // one longer
-    std::vector<NodeBounds> bounds;
-    std::vector<Sphere> support_spheres;
-    std::vector<std::uint32_t> mask_at; // into mask_records
-    std::vector<float> displacement;
+    Storage<Index> first_leaf, leaf_end;
+    Storage<NodeId> subtree_end;
+    Storage<Index> first_triangle; // one longer
+    Storage<NodeBounds> bounds;
+    Storage<Sphere> support_spheres;
+    Storage<std::uint32_t> mask_at; // into mask_records
+    Storage<float> displacement;
 
-    std::vector<std::uint8_t> mask_records; // see mask_pool.h
+    Storage<std::uint8_t> mask_records; // see mask_pool.h
 
     // By triangle.
-    std::vector<Triangle> triangles;
-    std::vector<Index> source_triangles; // empty without ranges
+    Storage<Triangle> triangles;
+    Storage<Index> source_triangles; // empty without ranges
 
-    std::vector<Index> source_vertices; // by leaf
+    Storage<Index> source_vertices; // by leaf
+};
+
+struct GeometryFacts {
     std::vector<MeshRange> ranges;
     glm::dvec3 origin = glm::dvec3(0);
     Sphere bounding_sphere;
@@ -40,20 +49,33 @@ struct TreeGeometry {
     Closedness closedness = Closedness::open;
 };
 
+// What another light leaves as it is.
+struct TreeGeometry : GeometryArrays<Array>, GeometryFacts {
+    std::shared_ptr<const void> mapping; // the memory that arrays view
+};
+
+template <template <class> class Storage>
+struct LuminanceArrays {
+    Storage<Unorm16> luminance;         // by node
+    Storage<PackedRange> support_range; // by interior node, and so on
+    Storage<PackedRange> ring_range;
+    Storage<Unorm16> adaptation;
+};
+
 // What depends on the light.
-struct TreeLuminance {
+struct TreeLuminance : LuminanceArrays<Array> {
     Light light;
     bool prelit = false;
-    std::vector<Unorm16> luminance;            // by node
-    std::vector<PackedRange> support_range;    // by interior node, and so on
-    std::vector<PackedRange> ring_range;
-    std::vector<Unorm16> adaptation;
     LuminanceRange range;
 };
+
+// Which nodes of a mapped file have been looked at. For any number of threads.
+class NodeChecks;
 
 struct VertexTree::Data {
     std::shared_ptr<const TreeGeometry> geometry;
     TreeLuminance light;
+    std::shared_ptr<NodeChecks> checks; // none: everything has been checked or comes from the builder
 };
 
 // Luminance of every node and the bounds over support and ring, bottom-up. Cost: one pass over triangles and nodes.

@@ -33,6 +33,8 @@
 
 namespace unseen::vdtree {
 
+class NodeChecks;
+
 using NodeId = std::uint32_t;
 inline constexpr NodeId no_node = 0xffffffffu;
 
@@ -90,6 +92,14 @@ public:
     bool is_leaf(NodeId node) const noexcept { return node >= interior_count(); }
     static constexpr NodeId root() noexcept { return 0; }
 
+    // Whether an interior node can be unfolded: its links, its triangles, and the positions and bounds of its children are in
+    // order. Always, but for trees from map_tree, whose nodes are looked at when they are first asked about, from the root
+    // down; a damaged node must stay folded, and has no children for for_each_child. What is read of mapped nodes of which
+    // this has not been asked may be anything. Cost: one bit; the first time, the children and triangles.
+    bool is_sound(NodeId node) const noexcept { return !checks_ || looks_sound(node); }
+    NodeId first_damaged() const noexcept; // the first node for which is_sound was false, or no_node
+    Result<void> check() const;            // is_sound for all nodes; the error names one that is not
+
     // Structure. By node: the parent (no_node for the root). By interior node: the leaves supported,
     // [first_leaf, leaf_end), the end of its subtree among the interior nodes, and its triangles,
     // [first_triangle[n], first_triangle[n + 1]) (one longer than the nodes).
@@ -135,16 +145,20 @@ public:
     // triangles and the nodes. A pre-lit mesh (with colours) is shaded by its colours times the light.
     const Light& light() const noexcept;
     bool is_prelit() const noexcept; // luminance comes from the colours alone
-    VertexTree relit(const Light& light) const;
+    // Fails where check() does.
+    Result<VertexTree> relit(const Light& light) const;
 
-    std::uint64_t byte_size() const noexcept; // resident bytes
+    std::uint64_t byte_size() const noexcept; // of all arrays; those of a mapped tree are resident only where they were used
 
     struct Data; // the arrays, for the builder and the file reader
     explicit VertexTree(std::shared_ptr<const Data> data);
     const Data& data() const noexcept { return *data_; }
 
 private:
+    bool looks_sound(NodeId node) const noexcept;
+
     std::shared_ptr<const Data> data_;
+    NodeChecks* checks_ = nullptr; // of data_
 };
 
 // Checks everything that the tree promises: that spheres, masks, slabs, intervals and displacements contain what they
@@ -154,6 +168,7 @@ Result<void> verify(const VertexTree& tree);
 
 template <class F>
 void VertexTree::for_each_child(NodeId node, F&& f) const {
+    if (!is_sound(node)) return;
     const auto first = first_leaf(), end = leaf_end();
     const auto skip = subtree_end();
     NodeId child = node + 1;
