@@ -375,7 +375,7 @@ TEST(FollowBudget, WithHysteresisStaysWithinItsFactorAndDoesNotFlicker) {
     constexpr Index budget = 4000;
     constexpr float hysteresis = 1.1f;
     Cut steady(tree), exact(tree);
-    std::map<NodeId, int> unfolded_at;
+    std::map<NodeId, int> folded_at; // flicker: folds that are undone within ten frames
     int flickers = 0, folds = 0;
     for (int frame = 0; frame < 240; ++frame) {
         const double angle = frame * 0.01;
@@ -386,13 +386,13 @@ TEST(FollowBudget, WithHysteresisStaysWithinItsFactorAndDoesNotFlicker) {
         ASSERT_LE(with->triangles, budget) << "frame " << frame;
         ASSERT_LE(with->max_fold_cost, hysteresis * without->max_fold_cost * 1.0001f) << "frame " << frame;
         for (const FoldChange& change : steady.changes()) {
-            if (!change.folded) {
-                unfolded_at[change.node] = frame;
+            if (change.folded) {
+                folded_at[change.node] = frame;
+                ++folds;
                 continue;
             }
-            ++folds;
-            const auto unfolded = unfolded_at.find(change.node);
-            flickers += unfolded != unfolded_at.end() && frame - unfolded->second <= 10;
+            const auto folded = folded_at.find(change.node);
+            flickers += folded != folded_at.end() && frame - folded->second <= 10;
         }
         ASSERT_EQ(triangles_of(steady.indices()), gathered(steady)) << "frame " << frame;
     }

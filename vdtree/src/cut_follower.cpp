@@ -181,13 +181,18 @@ void CutFollower::start_with_budget(Cut& cut) {
     make_all_due(cut);
 }
 
+// Of the hysteresis, half (as a factor: its root) keeps nodes unfolded, and half of the rest keeps the threshold.
+float CutFollower::keeping_factor() const {
+    return options_.triangle_budget && options_.hysteresis > 1 ? std::sqrt(options_.hysteresis) : 1;
+}
+
 // Steps at the threshold there is, and moves it where the triangles have become too many, or so few that a better one
 // can be expected. Every change of the threshold by `factor` moves all distances by that factor: at most
 // (factor - 1) times twice the farthest point's distance for nodes whose slack was cut to that, as an advance of the clock.
 void CutFollower::keep_within_budget(Cut& cut) {
     const double budget = *options_.triangle_budget;
     // The number of triangles goes about with the inverse square of the threshold.
-    const double enough = budget / std::pow(1 + 0.5 * (static_cast<double>(options_.hysteresis) - 1), 2);
+    const double enough = budget / std::sqrt(static_cast<double>(options_.hysteresis));
     settle_due(cut);
     constexpr int most_rounds = 24;
     bool was_above = false;
@@ -355,6 +360,22 @@ void CutFollower::settle(Cut& cut) {
 }
 
 void CutFollower::test_due(const Cut& cut, std::span<const NodeId> nodes) {
+    const float keeping = keeping_factor();
+    if (keeping == 1) {
+        test_nodes(cut, nodes);
+        return;
+    }
+    // What is unfolded stays so down to a somewhat lower cost.
+    const auto is_unfolded = [&](NodeId node) { return cut.is_unfolded(node); };
+    kept_.assign(nodes.begin(), nodes.end());
+    const auto folded = std::stable_partition(kept_.begin(), kept_.end(), is_unfolded);
+    tester_->set_threshold(threshold_ / keeping);
+    test_nodes(cut, {kept_.begin(), folded});
+    tester_->set_threshold(threshold_);
+    test_nodes(cut, {folded, kept_.end()});
+}
+
+void CutFollower::test_nodes(const Cut& cut, std::span<const NodeId> nodes) {
     verdicts_.resize(nodes.size());
     tester_->test(nodes, verdicts_);
     stats_.node_tests += nodes.size();

@@ -52,6 +52,8 @@ private:
     void settle_due(Cut& cut);
     void settle(Cut& cut);
     void test_due(const Cut& cut, std::span<const NodeId> nodes);
+    void test_nodes(const Cut& cut, std::span<const NodeId> nodes);
+    float keeping_factor() const;
     void unfold_wave(Cut& cut);
     void add_live(NodeId node);
     void remove_children(NodeId node);
@@ -82,7 +84,7 @@ private:
     std::vector<Slot> slot_of_node_; // by interior node
 
     // Of one frame.
-    std::vector<NodeId> wave_, next_wave_, folding_, due_;
+    std::vector<NodeId> wave_, next_wave_, folding_, due_, kept_;
     std::vector<Verdict> verdicts_;
     std::vector<std::uint32_t> due_blocks_;
     AdjustStats stats_;
