@@ -378,6 +378,9 @@ void Cut::replay(std::span<const std::uint64_t> unfolded, AdjustStats& stats) {
 void Cut::become(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
     changes_.clear();
     const auto first = tree_->first_triangle();
+    const auto first_leaf = tree_->first_leaf(), leaf_end = tree_->leaf_end();
+    const auto subtree_end = tree_->subtree_end();
+    const NodeId interior = tree_->interior_count();
     triangle_count_ = 0;
     for (std::size_t word = 0; word < unfolded.size(); ++word) {
         for (std::uint64_t bits = unfolded[word]; bits; bits &= bits - 1) {
@@ -385,10 +388,20 @@ void Cut::become(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
             triangle_count_ += first[node + 1] - first[node];
             const bool was_unfolded = test_bit(unfolded_, node);
             if (!was_unfolded) changes_.push_back({node, false});
-            tree_->for_each_child(node, [&](NodeId child) {
-                const bool stays = was_unfolded && (tree_->is_leaf(child) || !test_bit(unfolded_, child));
-                if (!stays && (tree_->is_leaf(child) || !test_bit(unfolded, child))) assign(child);
-            });
+            // Children that are active now and were not: leaves of a node that was folded, and nodes that are folded now.
+            NodeId child = node + 1;
+            for (Index leaf = first_leaf[node]; leaf < leaf_end[node];) {
+                if (child < subtree_end[node] && first_leaf[child] == leaf) {
+                    const bool was_active = was_unfolded && !test_bit(unfolded_, child);
+                    if (!was_active && !test_bit(unfolded, child))
+                        std::fill(proxy_.begin() + leaf, proxy_.begin() + leaf_end[child], child);
+                    leaf = leaf_end[child];
+                    child = subtree_end[child];
+                } else {
+                    if (!was_unfolded) proxy_[leaf] = interior + leaf;
+                    ++leaf;
+                }
+            }
         }
     }
     const NodeId root = VertexTree::root();

@@ -65,16 +65,15 @@ std::int32_t least_of(const std::int32_t* values) {
 
 std::int32_t bits_of(float deadline) { return std::bit_cast<std::int32_t>(deadline); }
 
-} // namespace
-
-// The latest float that is not after clock + slack.
-std::int32_t CutFollower::deadline(double clock, float slack) const {
-    if (!(slack < std::numeric_limits<float>::max())) return never;
-    const double exact = clock + static_cast<double>(slack);
-    float rounded = static_cast<float>(exact);
-    if (static_cast<double>(rounded) > exact) rounded = std::nextafter(rounded, 0.0f);
-    return bits_of(rounded);
+// A float that is not after clock + slack, and but a unit or two in the last place before it.
+std::int32_t deadline(float clock, float slack) {
+    const float sum = clock + slack;
+    return sum < std::numeric_limits<float>::max() ? std::max(bits_of(sum) - 1, 0) : never;
 }
+
+float rounded_down(double clock) { return clock > 0 ? std::nextafter(static_cast<float>(clock), 0.0f) : 0.0f; }
+
+} // namespace
 
 bool CutFollower::is_same_request(const DistanceCriterion& criterion, const FollowOptions& options) const {
     return is_tracking_ && criterion.id() == criterion_ && options.cull_back_faces == options_.cull_back_faces &&
@@ -122,8 +121,8 @@ void CutFollower::place_clocks(const Viewpoint& viewpoint) {
     const double least = std::max(static_cast<double>(root.radius) * 1e-3, std::numeric_limits<double>::min());
     // Of a turn of the gaze as much is made as of twice the shift that the same turn would take: gazes mostly go with the view.
     length_per_radian_ = 2 * std::max(distance, least);
-    farthest_ = distance + static_cast<double>(root.radius);
-    position_clock_ = facing_clock_ = 0;
+    set_farthest(distance + static_cast<double>(root.radius));
+    set_clocks(0, 0);
     tester_->look_from(viewpoint, length_per_radian_);
 }
 
@@ -135,8 +134,7 @@ void CutFollower::follow_threshold(Cut& cut, const Viewpoint& viewpoint, const M
         return;
     }
     tester_->look_from(viewpoint, length_per_radian_);
-    position_clock_ += motion.position;
-    facing_clock_ += motion.facing;
+    set_clocks(position_clock_ + motion.position, facing_clock_ + motion.facing);
     step(cut);
 }
 
@@ -150,10 +148,9 @@ void CutFollower::follow_budget(Cut& cut, const Viewpoint& viewpoint, const Moti
         return;
     }
     const Sphere& root = tree_.bounds()[VertexTree::root()].ring;
-    farthest_ = glm::length(viewpoint.eye - glm::dvec3(root.centre)) + static_cast<double>(root.radius);
+    set_farthest(glm::length(viewpoint.eye - glm::dvec3(root.centre)) + static_cast<double>(root.radius));
     tester_->look_from(viewpoint, length_per_radian_);
-    position_clock_ += motion.position;
-    facing_clock_ += motion.facing;
+    set_clocks(position_clock_ + motion.position, facing_clock_ + motion.facing);
     cut.begin_changes();
     keep_within_budget(cut);
     cut.end_changes(stats_);
@@ -218,7 +215,7 @@ void CutFollower::change_threshold(Cut& cut, float factor) {
     threshold_ = std::max(threshold_ * factor, least_threshold);
     tester_->set_threshold(threshold_);
     const double share = factor > 1 ? factor - 1 : 1 / factor - 1;
-    position_clock_ += 2 * share * farthest_;
+    set_clocks(position_clock_ + 2 * share * farthest_, facing_clock_);
     settle_due(cut);
 }
 
@@ -268,8 +265,7 @@ void CutFollower::make_all_due(const Cut& cut) {
     const auto subtree_end = tree_.subtree_end();
     const Verdict due{};
     for (NodeId node = 0; node < tree_.interior_count(); node = cut.is_unfolded(node) ? node + 1 : subtree_end[node]) {
-        add_live(node);
-        set_deadlines(node, due);
+        set_deadlines(add_live(node), due);
     }
 }
 
@@ -287,8 +283,7 @@ void CutFollower::test_down(NodeId top, std::vector<std::uint64_t>& unfolded, st
         next_wave_.clear();
         for (std::size_t i = 0; i < wave_.size(); ++i) {
             const NodeId node = wave_[i];
-            add_live(node);
-            set_deadlines(node, verdicts_[i]);
+            set_deadlines(add_live(node), verdicts_[i]);
             if (!verdicts_[i].unfolded || !tree_.is_sound(node)) continue;
             unfolded[node >> 6] |= std::uint64_t{1} << (node & 63);
             for (NodeId child = node + 1; child < subtree_end[node]; child = subtree_end[child])
@@ -304,7 +299,7 @@ void CutFollower::step(Cut& cut) {
     collect_due();
     const std::size_t live = node_.size() - free_slots_.size();
     if (due_.size() > live / most_due && !time_limit_) {
-        position_clock_ = facing_clock_ = 0;
+        set_clocks(0, 0);
         start_over(cut);
         return;
     }
@@ -381,7 +376,7 @@ void CutFollower::test_nodes(const Cut& cut, std::span<const NodeId> nodes) {
     stats_.node_tests += nodes.size();
     for (std::size_t i = 0; i < nodes.size(); ++i) {
         const NodeId node = nodes[i];
-        set_deadlines(node, verdicts_[i]);
+        set_deadlines(slot_of_node_[node], verdicts_[i]);
         const bool was_unfolded = cut.is_unfolded(node);
         if (was_unfolded && !verdicts_[i].unfolded) folding_.push_back(node);
         if (!was_unfolded && verdicts_[i].unfolded && tree_.is_sound(node)) wave_.push_back(node);
@@ -400,7 +395,7 @@ void CutFollower::unfold_wave(Cut& cut) {
             if (slot_of_node_[node] == no_slot) continue; // an ancestor has folded
             if ((++unfolded % times_checked) == 0 && is_out_of_time()) stats_.is_complete = false;
             if (!stats_.is_complete) {
-                set_deadlines(node, Verdict{});
+                set_deadlines(slot_of_node_[node], Verdict{});
                 continue;
             }
             cut.apply_unfold(node);
@@ -414,7 +409,7 @@ void CutFollower::unfold_wave(Cut& cut) {
         stats_.node_tests += next_wave_.size();
         wave_.clear();
         for (std::size_t i = 0; i < next_wave_.size(); ++i) {
-            set_deadlines(next_wave_[i], verdicts_[i]);
+            set_deadlines(slot_of_node_[next_wave_[i]], verdicts_[i]);
             if (verdicts_[i].unfolded && tree_.is_sound(next_wave_[i])) wave_.push_back(next_wave_[i]);
         }
     }
@@ -422,7 +417,7 @@ void CutFollower::unfold_wave(Cut& cut) {
 
 // ---- slots
 
-void CutFollower::add_live(NodeId node) {
+CutFollower::Slot CutFollower::add_live(NodeId node) {
     Slot slot;
     if (free_slots_.empty()) {
         slot = static_cast<Slot>(node_.size());
@@ -439,6 +434,7 @@ void CutFollower::add_live(NodeId node) {
         node_[slot] = node;
     }
     slot_of_node_[node] = slot;
+    return slot;
 }
 
 void CutFollower::remove_children(NodeId node) {
@@ -451,13 +447,21 @@ void CutFollower::remove_children(NodeId node) {
     }
 }
 
-void CutFollower::set_deadlines(NodeId node, const Verdict& verdict) {
-    const Slot slot = slot_of_node_[node];
+void CutFollower::set_deadlines(Slot slot, const Verdict& verdict) {
     const std::size_t block = slot / block_slots;
-    position_due_[slot] = deadline(position_clock_, std::min(verdict.position_slack, static_cast<float>(farthest_)));
-    facing_due_[slot] = deadline(facing_clock_, verdict.facing_slack);
-    block_position_due_[block] = std::min(block_position_due_[block], position_due_[slot]);
-    block_facing_due_[block] = std::min(block_facing_due_[block], facing_due_[slot]);
+    const std::int32_t position = deadline(position_clock_down_, std::min(verdict.position_slack, longest_slack_));
+    const std::int32_t facing = deadline(facing_clock_down_, verdict.facing_slack);
+    position_due_[slot] = position;
+    facing_due_[slot] = facing;
+    block_position_due_[block] = std::min(block_position_due_[block], position);
+    block_facing_due_[block] = std::min(block_facing_due_[block], facing);
+}
+
+void CutFollower::set_clocks(double position, double facing) {
+    position_clock_ = position;
+    facing_clock_ = facing;
+    position_clock_down_ = rounded_down(position);
+    facing_clock_down_ = rounded_down(facing);
 }
 
 void CutFollower::refresh_block(std::size_t block) {
@@ -477,7 +481,7 @@ void CutFollower::restart_clocks() {
     };
     set_back(position_due_, position_clock_);
     set_back(facing_due_, facing_clock_);
-    position_clock_ = facing_clock_ = 0;
+    set_clocks(0, 0);
     for (std::size_t block = 0; block < block_position_due_.size(); ++block) refresh_block(block);
 }
 

@@ -55,12 +55,16 @@ private:
     void test_nodes(const Cut& cut, std::span<const NodeId> nodes);
     float keeping_factor() const;
     void unfold_wave(Cut& cut);
-    void add_live(NodeId node);
+    Slot add_live(NodeId node);
     void remove_children(NodeId node);
-    void set_deadlines(NodeId node, const Verdict& verdict);
+    void set_deadlines(Slot slot, const Verdict& verdict);
+    void set_clocks(double position, double facing);
+    void set_farthest(double distance) noexcept {
+        farthest_ = distance;
+        longest_slack_ = static_cast<float>(distance);
+    }
     void refresh_block(std::size_t block);
     void restart_clocks();
-    std::int32_t deadline(double clock, float slack) const;
 
     const VertexTree& tree_;
     bool is_tracking_ = false;
@@ -75,6 +79,7 @@ private:
     double farthest_ = 1;          // of the tree's points from the eye; no slack is longer
     std::optional<std::chrono::steady_clock::time_point> time_limit_;
     double position_clock_ = 0, facing_clock_ = 0;
+    float position_clock_down_ = 0, facing_clock_down_ = 0, longest_slack_ = 1;
 
     // By slot. Deadlines are the bits of non-negative floats, which compare like the floats.
     std::vector<NodeId> node_;

@@ -249,8 +249,23 @@ struct Lanes {
         alignas(64) float hi[count];
 
         UNSEEN_INLINE explicit Slabs(const FacingBatch& batch) {
-            for (std::size_t i = 0; i < count; ++i) lo[i] = batch.lo[i];
-            for (std::size_t i = 0; i < count; ++i) hi[i] = batch.hi[i];
+            // Sixteen rows of sixteen bytes, interleaved four times, are their columns.
+            using Bytes = std::int8_t __attribute__((vector_size(16)));
+            static_assert(kernel_lanes == 16);
+            Bytes rows[16], mixed[16];
+            std::memcpy(rows, batch.slabs, sizeof rows);
+            for (int stage = 0; stage < 4; ++stage) {
+                for (std::size_t i = 0; i < 8; ++i) {
+                    mixed[2 * i] = __builtin_shuffle(rows[i], rows[i + 8], Bytes{0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23});
+                    mixed[2 * i + 1] =
+                        __builtin_shuffle(rows[i], rows[i + 8], Bytes{8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31});
+                }
+                std::memcpy(rows, mixed, sizeof rows);
+            }
+            std::int8_t bytes[2 * count];
+            std::memcpy(bytes, rows, sizeof bytes);
+            for (std::size_t i = 0; i < count; ++i) lo[i] = bytes[i];
+            for (std::size_t i = 0; i < count; ++i) hi[i] = bytes[count + i];
         }
         UNSEEN_INLINE Interval operator()(std::size_t axis, std::size_t first) const {
             return {load(lo + axis * kernel_lanes + first), load(hi + axis * kernel_lanes + first)};

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <cstring>
 #include <span>
 #include <vector>
 
@@ -81,16 +82,13 @@ void finish_slacks(const KernelView& view, const FoldBatch& batch, Findings& fin
 
 // Sixteen rings: their slabs, the vectors from the centres of their spheres to the eye, and the spheres' radii.
 struct FacingBatch {
-    alignas(64) std::int8_t lo[NormalSlabs::axis_count * kernel_lanes]; // [axis * lanes + lane]
-    alignas(64) std::int8_t hi[NormalSlabs::axis_count * kernel_lanes];
+    alignas(64) std::int8_t slabs[kernel_lanes][16]; // by lane: lo of the seven axes, then hi; the last two are not used
     alignas(64) float to_eye[3][kernel_lanes];
     alignas(64) float radius[kernel_lanes];
 
-    void set(std::size_t lane, const NormalSlabs& slabs, float x, float y, float z, float r) noexcept {
-        for (std::size_t axis = 0; axis < NormalSlabs::axis_count; ++axis) {
-            lo[axis * kernel_lanes + lane] = slabs.lo[axis];
-            hi[axis * kernel_lanes + lane] = slabs.hi[axis];
-        }
+    void set(std::size_t lane, const NormalSlabs& of, float x, float y, float z, float r) noexcept {
+        static_assert(sizeof(NormalSlabs) == 14);
+        std::memcpy(slabs[lane], &of, sizeof of);
         to_eye[0][lane] = x, to_eye[1][lane] = y, to_eye[2][lane] = z;
         radius[lane] = r;
     }

@@ -64,8 +64,20 @@ void FoldTester::test(std::span<const NodeId> nodes, std::span<Verdict> verdicts
 void FoldTester::test_costs(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const { test(nodes, verdicts, true); }
 
 void FoldTester::test(std::span<const NodeId> nodes, std::span<Verdict> verdicts, bool costs) const {
-    for (std::size_t first = 0; first < nodes.size(); first += kernel_lanes)
+    for (std::size_t first = 0; first < nodes.size(); first += kernel_lanes) {
+        // Nodes lie anywhere in a large tree: the next ones are on their way while these are tested.
+        constexpr std::size_t ahead = 2 * kernel_lanes;
+        const std::size_t end = std::min(first + ahead + kernel_lanes, nodes.size());
+        for (std::size_t i = std::min(first + ahead, end); i < end; ++i) prefetch(nodes[i]);
         test_batch(nodes.subspan(first, std::min(kernel_lanes, nodes.size() - first)), verdicts.data() + first, costs);
+    }
+}
+
+void FoldTester::prefetch(NodeId node) const {
+#if defined(__GNUC__)
+    __builtin_prefetch(tree_.bounds().data() + node);
+    if (!criterion_.parts().classes.empty()) __builtin_prefetch(criterion_.parts().classes.data() + node);
+#endif
 }
 
 // Unused lanes repeat the last node.

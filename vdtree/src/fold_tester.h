@@ -54,6 +54,7 @@ public:
 
 private:
     void test(std::span<const NodeId> nodes, std::span<Verdict> verdicts, bool costs) const;
+    void prefetch(NodeId node) const;
     void load(std::span<const NodeId> nodes, FoldBatch& batch) const;
     void test_batch(std::span<const NodeId> nodes, Verdict* verdicts, bool costs) const;
     void find_facings(std::span<const NodeId> nodes, const FoldBatch& batch, bool costs, Findings& findings) const;
