@@ -271,6 +271,15 @@ std::vector<Lie> lies() {
         {"a corner is just beyond the leaves",
          [](TreeFile& f) { f["triangles"].set(0, static_cast<std::uint32_t>(f["source_vertices"].count())); }},
         {"a corner comes twice", [](TreeFile& f) { f["triangles"].set(1, f["triangles"].get<std::uint32_t>(0)); }},
+        {"a triangle vanishes elsewhere",
+         [](TreeFile& f) {
+             for (std::size_t k = 0; k < 3; ++k) {
+                 const auto corner = f["triangles"].get<std::uint32_t>(k);
+                 const std::size_t last = f["triangles"].count() * 3 - 3 + k;
+                 f["triangles"].set(k, f["triangles"].get<std::uint32_t>(last));
+                 f["triangles"].set(last, corner);
+             }
+         }},
         {"a source vertex is out of range", set("source_vertices", 0, 0x7fffffffu)},
         {"a source triangle is out of range", set("source_triangles", 0, 0x7fffffffu)},
         {"an infinite position", set("positions", 3, inf)},

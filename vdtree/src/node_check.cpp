@@ -1,6 +1,9 @@
 #include "node_check.h"
 
+#include <algorithm>
 #include <cmath>
+#include <span>
+#include <vector>
 
 namespace unseen::vdtree {
 
@@ -15,6 +18,7 @@ bool is_finite(const float* values, int count) {
 constexpr const char* links_fault = "contradicts its neighbours in the tree.";
 constexpr const char* triangles_fault = "has triangles of another node.";
 constexpr const char* corner_fault = "has a triangle with a corner out of range or twice.";
+constexpr const char* vanishing_fault = "has a triangle that does not vanish there.";
 
 // Calls f for every child; null or what is wrong.
 template <class F>
@@ -43,6 +47,24 @@ const char* walk_children(const TreeGeometry& g, NodeId node, F&& f) {
     return child == skip ? nullptr : links_fault;
 }
 
+// Whether a triangle with different corners has two in the leaves [begin, end), and no two in one child of those whose first
+// leaves are given, ascending.
+bool vanishes(Triangle t, Index begin, Index end, std::span<const Index> child_starts) {
+    std::sort(t.begin(), t.end());
+    const auto inside = [&](Index leaf) { return begin <= leaf && leaf < end; };
+    const auto apart = [&](Index a, Index b) { // a < b
+        const auto next = std::upper_bound(child_starts.begin(), child_starts.end(), a);
+        return next != child_starts.end() && *next <= b;
+    };
+    int pairs = 0; // of neighbours in the sorted order; leaves in a node have none between them that is outside
+    for (std::size_t k = 0; k < 2; ++k) {
+        if (!inside(t[k]) || !inside(t[k + 1])) continue;
+        if (!apart(t[k], t[k + 1])) return false;
+        ++pairs;
+    }
+    return pairs > 0;
+}
+
 } // namespace
 
 const char* fault_in_root(const TreeGeometry& g) noexcept {
@@ -53,15 +75,16 @@ const char* fault_in_root(const TreeGeometry& g) noexcept {
     return g.first_triangle[0] == 0 && g.first_triangle[interior] == g.triangles.size() ? nullptr : triangles_fault;
 }
 
-const char* fault_in_links(const TreeGeometry& g, NodeId node) noexcept {
+const char* fault_in_links(const TreeGeometry& g, NodeId node) {
     const NodeId interior = static_cast<NodeId>(g.first_leaf.size());
     const std::size_t leaves = g.parents.size() - interior;
     // In depth-first order, the triangles of the node come before those of its children's subtrees.
     Index before = g.first_triangle[node + 1];
     if (g.first_triangle[node] > before || before > g.triangles.size()) return triangles_fault;
-    std::uint64_t children = 0;
+    thread_local std::vector<Index> child_starts; // kept: most nodes have two children
+    child_starts.clear();
     const char* fault = walk_children(g, node, [&](NodeId child) -> const char* {
-        ++children;
+        child_starts.push_back(child < interior ? g.first_leaf[child] : child - interior);
         if (child >= interior) return nullptr;
         const Index end = g.first_triangle[g.subtree_end[child]];
         if (g.first_triangle[child] != before || end < before || end > g.triangles.size()) return triangles_fault;
@@ -69,12 +92,13 @@ const char* fault_in_links(const TreeGeometry& g, NodeId node) noexcept {
         return nullptr;
     });
     if (fault) return fault;
-    if (children < 2) return links_fault;
+    if (child_starts.size() < 2) return links_fault;
     for (Index t = g.first_triangle[node]; t < g.first_triangle[node + 1]; ++t) {
         const Triangle& tri = g.triangles[t];
         if (tri[0] >= leaves || tri[1] >= leaves || tri[2] >= leaves || tri[0] == tri[1] || tri[1] == tri[2] ||
             tri[2] == tri[0])
             return corner_fault;
+        if (!vanishes(tri, g.first_leaf[node], g.leaf_end[node], child_starts)) return vanishing_fault;
     }
     return nullptr;
 }
@@ -94,7 +118,7 @@ NodeChecks::NodeChecks(const TreeGeometry& g)
     : g_(g), sound_(std::make_unique<std::atomic<std::uint64_t>[]>((g.first_leaf.size() + 63) / 64)) {}
 
 // The file does not change, so that several threads may look at one node.
-bool NodeChecks::look(NodeId node) noexcept {
+bool NodeChecks::look(NodeId node) {
     const char* fault = fault_in_links(g_, node);
     if (!fault && node == VertexTree::root()) fault = fault_in_values(g_, node);
     if (!fault) fault = walk_children(g_, node, [&](NodeId child) { return fault_in_values(g_, child); });

@@ -11,8 +11,8 @@ namespace unseen::vdtree {
 // What is wrong with how an interior node refers to others; null where nothing is. It looks at the node, the links of its
 // children and the triangles that vanish at it, whatever they say, and at nothing else; where the root's parts are the whole
 // tree and every node from the root down to here is sound, children tile their parents, triangles their nodes, and each number
-// lies within its array. Cost: the number of children and triangles.
-const char* fault_in_links(const TreeGeometry& g, NodeId node) noexcept;
+// lies within its array; triangles vanish where they are said to. Cost: the number of children and triangles.
+const char* fault_in_links(const TreeGeometry& g, NodeId node);
 
 // That the root stands for the whole tree.
 const char* fault_in_root(const TreeGeometry& g) noexcept;
@@ -26,13 +26,13 @@ public:
     explicit NodeChecks(const TreeGeometry& g);
 
     // Whether the links of an interior node and the values of its children can be used. Looks at them the first time.
-    bool is_sound(NodeId node) noexcept {
+    bool is_sound(NodeId node) {
         return (sound_[node >> 6].load(std::memory_order_relaxed) >> (node & 63) & 1) != 0 || look(node);
     }
     NodeId first_damaged() const noexcept { return damaged_.load(std::memory_order_relaxed); }
 
 private:
-    bool look(NodeId node) noexcept;
+    bool look(NodeId node);
 
     const TreeGeometry& g_;
     std::unique_ptr<std::atomic<std::uint64_t>[]> sound_; // one bit a node

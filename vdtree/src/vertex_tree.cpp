@@ -190,7 +190,7 @@ LuminanceRange VertexTree::luminance_range() const noexcept { return data_->ligh
 const Light& VertexTree::light() const noexcept { return data_->light.light; }
 bool VertexTree::is_prelit() const noexcept { return data_->light.prelit; }
 
-bool VertexTree::looks_sound(NodeId node) const noexcept { return checks_->is_sound(node); }
+bool VertexTree::looks_sound(NodeId node) const { return checks_->is_sound(node); }
 
 NodeId VertexTree::first_damaged() const noexcept { return checks_ ? checks_->first_damaged() : no_node; }
 

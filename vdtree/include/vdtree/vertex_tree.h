@@ -96,7 +96,7 @@ public:
     // order. Always, but for trees from map_tree, whose nodes are looked at when they are first asked about, from the root
     // down; a damaged node must stay folded, and has no children for for_each_child. What is read of mapped nodes of which
     // this has not been asked may be anything. Cost: one bit; the first time, the children and triangles.
-    bool is_sound(NodeId node) const noexcept { return !checks_ || looks_sound(node); }
+    bool is_sound(NodeId node) const { return !checks_ || looks_sound(node); }
     NodeId first_damaged() const noexcept; // the first node for which is_sound was false, or no_node
     Result<void> check() const;            // is_sound for all nodes; the error names one that is not
 
@@ -155,7 +155,7 @@ public:
     const Data& data() const noexcept { return *data_; }
 
 private:
-    bool looks_sound(NodeId node) const noexcept;
+    bool looks_sound(NodeId node) const;
 
     std::shared_ptr<const Data> data_;
     NodeChecks* checks_ = nullptr; // of data_
