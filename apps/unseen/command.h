@@ -22,6 +22,7 @@ struct Command {
 
 Command build_command(CLI::App& app);
 Command info_command(CLI::App& app);
+Command make_command(CLI::App& app);
 Command simplify_command(CLI::App& app);
 Command render_command(CLI::App& app);
 Command compare_command(CLI::App& app);
