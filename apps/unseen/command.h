@@ -20,6 +20,7 @@ struct Command {
     std::function<Result<int>()> run;
 };
 
+Command bench_command(CLI::App& app);
 Command build_command(CLI::App& app);
 Command info_command(CLI::App& app);
 Command make_command(CLI::App& app);

@@ -154,8 +154,10 @@ Effect magnification_effect(const Scene& scene, const WhatOptions& what) {
     return {"magnification", true, "the camera's field is " + fields + ": angles are those on the screen"};
 }
 
+constexpr const char* imperceptible_distance = "imperceptible distance";
+
 Effect distance_effect(const WhatOptions& what, const Simplification& result) {
-    const std::string name = "imperceptible distance";
+    const std::string name = imperceptible_distance;
     if (what.mode == Mode::full) return {name, true, "nothing is folded, so it holds from any distance"};
     if (!is_perceptual(what))
         return {name, false, "costs of the fold test " + name_of(what.test) + " are no distances"};
@@ -280,7 +282,12 @@ Result<Simplification> Follower::follow(vdtree::Cut& cut, const Scene& scene, co
     if (!is_full && result.stats.max_fold_cost == 0) result.stats.max_fold_cost = static_cast<float>(threshold_);
     result.imperceptible_from_m = imperceptible_from(scene, what, result.stats);
     add_effects(result, scene, what, Purpose::picture);
-    if (what.mode != Mode::full) result.effects.push_back(back_face_effect(scene));
+    if (is_full) return result;
+    result.effects.push_back(back_face_effect(scene));
+    if (is_perceptual(what))
+        for (Effect& effect : result.effects)
+            if (effect.name == imperceptible_distance)
+                effect.why = "the display's distance times " + rounded(threshold_, 4) + ", above which no fold costs";
     return result;
 }
 
