@@ -1,6 +1,8 @@
 // unseen build: a mesh becomes a vertex tree, once and for all.
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <memory>
 
@@ -28,10 +30,19 @@ Result<void> write(const std::string& file, const vdtree::VertexTree& tree) {
     return vdtree::write_tree(file, tree, bar);
 }
 
+// The most memory that this process has had resident, or nothing where the system does not tell.
+Json peak_bytes() {
+    std::ifstream status("/proc/self/status");
+    for (std::string line; std::getline(status, line);)
+        if (line.starts_with("VmHWM:")) return std::strtoull(line.c_str() + 6, nullptr, 10) * 1024; // it counts KiB
+    return nullptr;
+}
+
 Json to_json(const vdtree::VertexTree& tree, double seconds) {
     return {{"vertices", tree.leaf_count()},       {"triangles", tree.triangle_count()},
             {"dropped", tree.dropped_triangles()}, {"nodes", tree.node_count()},
-            {"bytes", tree.byte_size()},           {"build_seconds", number_or_null(seconds)}};
+            {"bytes", tree.byte_size()},           {"build_seconds", number_or_null(seconds)},
+            {"peak_bytes", peak_bytes()}};
 }
 
 void print(const vdtree::VertexTree& tree, double seconds) {

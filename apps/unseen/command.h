@@ -20,8 +20,10 @@ struct Command {
     std::function<Result<int>()> run;
 };
 
+Command bench_command(CLI::App& app);
 Command build_command(CLI::App& app);
 Command info_command(CLI::App& app);
+Command make_command(CLI::App& app);
 Command simplify_command(CLI::App& app);
 Command render_command(CLI::App& app);
 Command compare_command(CLI::App& app);

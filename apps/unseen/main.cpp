@@ -33,8 +33,9 @@ std::string complaint_about_verb(const CLI::App& app, const CLI::ParseError& err
 int report_usage(const CLI::App& app, const CLI::ParseError& error) {
     if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return app.exit(error); // --help, --version
     print_error(app.get_subcommands().empty() ? complaint_about_verb(app, error) : error.what());
-    const auto verbs = app.get_subcommands();
-    const std::string verb = verbs.empty() ? "" : " " + verbs.front()->get_name();
+    std::string verb;
+    for (auto verbs = app.get_subcommands(); !verbs.empty(); verbs = verbs.front()->get_subcommands())
+        verb += " " + verbs.front()->get_name();
     std::fprintf(stderr, "Run 'unseen%s --help' for more information.\n", verb.c_str());
     return exit_usage;
 }
@@ -60,7 +61,8 @@ int main(int argc, char** argv) {
     try {
         const std::vector<Command> commands = {build_command(app),  info_command(app),  simplify_command(app),
                                                render_command(app), sheet_command(app), compare_command(app),
-                                               csf_command(app),    view_command(app)};
+                                               csf_command(app),    view_command(app),  make_command(app),
+                                               bench_command(app)};
         app.parse(argc, argv);
         return run(commands);
     } catch (const CLI::ParseError& error) {

@@ -7,6 +7,7 @@
 #include <render/renderer.h>
 
 #include "command.h"
+#include "fly_through.h"
 #include "frame_image.h"
 #include "report.h"
 #include "simplification.h"
@@ -21,6 +22,7 @@ struct RenderArguments {
     DisplayOptions display;
     WhatOptions what;
     render::DrawOptions draw;
+    FlyThroughOptions flight; // where a path is given
 };
 
 bool is_for_people(const std::string& file) {
@@ -28,7 +30,19 @@ bool is_for_people(const std::string& file) {
     return ending == ".png" || ending == ".PNG";
 }
 
-Result<int> run(const RenderArguments& a) {
+Result<int> run_flight(RenderArguments& a) {
+    auto scene = load_scene(a.model, a.view, a.display);
+    if (!scene) return scene.error();
+    a.flight.pictures = a.out;
+    a.flight.json = a.json;
+    a.flight.what = a.what;
+    a.flight.draw = a.draw;
+    if (auto flown = fly_through(*scene, a.flight); !flown) return flown.error();
+    return exit_done;
+}
+
+Result<int> run(RenderArguments& a) {
+    if (!a.flight.path.empty()) return run_flight(a);
     std::error_code unknown;
     if (std::filesystem::equivalent(a.model, a.out, unknown))
         return Error{ErrorCode::invalid_argument,
@@ -61,6 +75,39 @@ Result<int> run(const RenderArguments& a) {
     return exit_done;
 }
 
+void add_path_options(CLI::App& verb, FlyThroughOptions& o) {
+    CLI::App& group = *verb.add_option_group("PATH", "A fly-through, with one cut that follows the camera");
+    group
+        .add_option("--path", o.path,
+                    "orbit:DEGREES[:FRAMES], around the target from VIEW on, so many degrees a frame (default: once "
+                    "around); or a CSV file with a header line and the columns eye_x, eye_y, eye_z, target_x, "
+                    "target_y, target_z, optionally up_x, up_y, up_z and gaze_x, gaze_y (pixels)")
+        ->type_name("orbit:D[:N]|FILE.csv");
+    group.add_option("--csv", o.csv, "One line a frame: triangles, changes, node tests, times, uploaded bytes")
+        ->type_name("FILE.csv");
+    group.add_option("--plot", o.plot, "Times, triangles, changes and uploaded bytes over the frames")
+        ->type_name("FILE.png")
+        ->check(ending_in({".png"}));
+    group.add_option("--threshold", o.threshold,
+                     "Fold up to this cost: 1 (default) what cannot be seen, 2 what cannot be seen from twice the distance")
+        ->type_name("X")
+        ->check(positive());
+    group.add_flag("!--no-draw", o.draws, "Only cut: draw nothing");
+}
+
+void check(const RenderArguments& a) {
+    const FlyThroughOptions& o = a.flight;
+    if (o.path.empty()) {
+        if (a.out.empty()) refuse("-o is required (or --path).");
+        if (!o.csv.empty() || !o.plot.empty() || o.threshold != 1 || !o.draws)
+            refuse("--csv, --plot, --threshold and --no-draw need --path.");
+        return;
+    }
+    if (a.out.empty()) return;
+    if (!o.draws) refuse("--no-draw and -o exclude each other.");
+    if (const auto complaint = complaint_about_picture_names(a.out); !complaint.empty()) refuse(complaint);
+}
+
 } // namespace
 
 Command render_command(CLI::App& app) {
@@ -69,11 +116,11 @@ Command render_command(CLI::App& app) {
     verb->add_option("TREE", a->model, "A tree, or a mesh")->required()->type_name("TREE.vdt|MESH");
     verb->add_option("-o,--output", a->out, "PNG for people; PFM or EXR for judging: luminance in cd/m2")
         ->type_name("OUT.png|.pfm|.exr")
-        ->required()
         ->check(ending_in({".png", ".pfm", ".exr"}));
-    verb->add_option("--samples", a->draw.samples, "Samples a pixel, 1 to 256 (default: 16)")
-        ->type_name("N")
-        ->check(within(1, 256));
+    CLI::Option* samples =
+        verb->add_option("--samples", a->draw.samples, "Samples a pixel, 1 to 256 (default: 16; with --path: 1)")
+            ->type_name("N")
+            ->check(within(1, 256));
     verb->add_flag("--wireframe", a->draw.wireframe, "Draw the triangles' edges, too");
     const std::map<std::string, render::Shading> shadings = {{"smooth", render::Shading::smooth},
                                                              {"flat", render::Shading::flat}};
@@ -81,12 +128,19 @@ Command render_command(CLI::App& app) {
         ->type_name("NAME")
         ->transform(CLI::CheckedTransformer(shadings).description(""));
     verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
+    add_path_options(*verb, a->flight);
+    verb->callback([a, samples] {
+        check(*a);
+        if (!a->flight.path.empty() && samples->empty()) a->draw.samples = 1;
+    });
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->what);
     verb->footer("Examples:\n  unseen render bunny.vdt -o bunny.png --wireframe\n"
                  "  unseen render bunny.vdt -o full.pfm --full --size 1024x1024\n"
-                 "  unseen render bunny.vdt -o aside.pfm --gaze 1603 512 --json -");
+                 "  unseen render bunny.vdt -o aside.pfm --gaze 1603 512 --json -\n"
+                 "  unseen render dragon.vdt --path orbit:1 --csv orbit.csv --plot orbit.png\n"
+                 "  unseen render dragon.vdt --path flight.csv -o frames/%04d.png --threshold 2");
     return {verb, [a] { return run(*a); }};
 }
 

@@ -33,6 +33,15 @@ perception::SceneLuminance scene_luminance(const Scene& scene) {
     return {std::min(range.lo, scene.background), std::max(range.hi, scene.background)};
 }
 
+perception::FoldTestOptions test_options(const Scene& scene, const WhatOptions& what) {
+    perception::FoldTestOptions test;
+    test.display = scene.display;
+    test.scene = scene_luminance(scene);
+    test.gaze_px = what.gaze_px;
+    test.csf = &scene.csf_table();
+    return test;
+}
+
 vdtree::AdjustStats adjust(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
     if (what.mode == Mode::full) {
         cut.unfold_all();
@@ -55,12 +64,8 @@ vdtree::AdjustStats adjust(vdtree::Cut& cut, const Scene& scene, const WhatOptio
                           options);
     case FoldTest::luebke_hallen: break;
     }
-    perception::FoldTestOptions test;
-    test.display = scene.display;
-    test.scene = scene_luminance(scene);
-    test.gaze_px = what.gaze_px;
-    test.csf = &scene.csf_table();
-    return cut.adjust(perception::LuebkeHallenCriterion(scene.tree, scene.view, test, scene.placement), options);
+    return cut.adjust(
+        perception::LuebkeHallenCriterion(scene.tree, scene.view, test_options(scene, what), scene.placement), options);
 }
 
 // Cost is v*/v for the perceptual test alone; the others count pixels.
@@ -149,14 +154,52 @@ Effect magnification_effect(const Scene& scene, const WhatOptions& what) {
     return {"magnification", true, "the camera's field is " + fields + ": angles are those on the screen"};
 }
 
+constexpr const char* imperceptible_distance = "imperceptible distance";
+
 Effect distance_effect(const WhatOptions& what, const Simplification& result) {
-    const std::string name = "imperceptible distance";
+    const std::string name = imperceptible_distance;
     if (what.mode == Mode::full) return {name, true, "nothing is folded, so it holds from any distance"};
     if (!is_perceptual(what))
         return {name, false, "costs of the fold test " + name_of(what.test) + " are no distances"};
     if (std::isinf(result.imperceptible_from_m))
         return {name, false, "a fold around the eye or across its plane stays visible from everywhere"};
     return {name, true, "the display's distance times the largest fold cost"};
+}
+
+// Whether faces that look away can be folded: they are not drawn, and nothing shows them from outside.
+bool culls_back_faces(const Scene& scene) {
+    const PlacedSphere sphere = placed_sphere(scene.tree, scene.placement);
+    return scene.tree.closedness() == vdtree::Closedness::closed_outward &&
+           glm::length(scene.view.eye - sphere.centre) > sphere.radius;
+}
+
+bool is_wholly_in_window(const Scene& scene) {
+    const vdtree::Sphere sphere = scene.tree.bounding_sphere();
+    const vdtree::Frustum frustum = vdtree::frustum_of(scene.tree, scene.view, scene.placement);
+    return std::all_of(frustum.planes.begin(), frustum.planes.end(), [&](const vdtree::Plane& plane) {
+        return glm::dot(plane.normal, glm::dvec3(sphere.centre)) + plane.offset > static_cast<double>(sphere.radius);
+    });
+}
+
+Effect back_face_effect(const Scene& scene) {
+    if (culls_back_faces(scene)) return {"back-face folding", true, "what faces away is not drawn, so it is folded"};
+    if (scene.tree.closedness() != vdtree::Closedness::closed_outward)
+        return {"back-face folding", false, "the surface is open or inside out"};
+    return {"back-face folding", false, "the eye is in the model"};
+}
+
+// Every effect with its reason.
+void add_effects(Simplification& result, const Scene& scene, const WhatOptions& what, Purpose purpose) {
+    result.effects = {fold_test_effect(what),
+                      gaze_effect(what),
+                      silhouette_effect(scene, what),
+                      csf_effect(scene, what),
+                      prelit_effect(scene),
+                      light_effect(scene),
+                      frustum_effect(what, purpose),
+                      culling_effect(scene, purpose),
+                      magnification_effect(scene, what),
+                      distance_effect(what, result)};
 }
 
 } // namespace
@@ -175,16 +218,76 @@ Simplification simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions&
     result.extract_ms = milliseconds_since(adapted);
 
     result.imperceptible_from_m = imperceptible_from(scene, what, result.stats);
-    result.effects = {fold_test_effect(what),
-                      gaze_effect(what),
-                      silhouette_effect(scene, what),
-                      csf_effect(scene, what),
-                      prelit_effect(scene),
-                      light_effect(scene),
-                      frustum_effect(what, purpose),
-                      culling_effect(scene, purpose),
-                      magnification_effect(scene, what),
-                      distance_effect(what, result)};
+    add_effects(result, scene, what, purpose);
+    return result;
+}
+
+Result<const vdtree::DistanceCriterion*> Follower::criterion_for(const Scene& scene, const WhatOptions& what) {
+    const bool perceptual = is_perceptual(what);
+    Key key{what.test, perceptual ? 0 : what.pixels, false, 0, scene.view.width, scene.view.height, scene.view.fov_y_degrees, 0};
+    if (perceptual) {
+        key.background = scene.background;
+        key.has_gaze = what.gaze_px.has_value();
+        // A gaze off the window reaches into larger magnifications: one criterion must do for all gazes up to there, so they are
+        // rounded up to whole windows.
+        if (key.has_gaze) {
+            const double side = std::max(scene.view.width, scene.view.height);
+            const glm::dvec2 from_centre = *what.gaze_px - glm::dvec2(scene.view.width, scene.view.height) * 0.5;
+            key.farthest_gaze_px = std::ceil(std::max(glm::length(from_centre) / side, 1.0)) * side;
+        }
+    }
+    if (criterion_ && key == key_) return &*criterion_;
+
+    auto made = [&]() -> Result<vdtree::DistanceCriterion> {
+        if (what.test == FoldTest::extent) return vdtree::extent_criterion(scene.tree, scene.view, what.pixels);
+        if (what.test == FoldTest::displacement) return vdtree::displacement_criterion(scene.tree, scene.view, what.pixels);
+        perception::FoldTestOptions options = test_options(scene, what);
+        if (key.has_gaze)
+            options.gaze_px = glm::dvec2(scene.view.width * 0.5 + key.farthest_gaze_px, scene.view.height * 0.5);
+        return perception::luebke_hallen_distances(scene.tree, scene.view, options);
+    }();
+    if (!made) return made.error();
+    criterion_ = std::move(*made);
+    key_ = key;
+    return &*criterion_;
+}
+
+Result<Simplification> Follower::follow(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what) {
+    const bool is_full = what.mode == Mode::full && cut.triangle_count() == scene.tree.triangle_count();
+    if (what.mode == Mode::budget || (what.mode == Mode::full && !is_full))
+        return simplify(cut, scene, what, Purpose::picture);
+    Simplification result;
+    result.source_triangles = scene.tree.triangle_count();
+    result.dropped = scene.tree.dropped_triangles();
+    result.stats.triangles = cut.triangle_count();
+    if (!is_full) {
+        const auto criterion = criterion_for(scene, what);
+        if (!criterion) return criterion.error();
+        vdtree::FollowOptions options;
+        options.threshold = static_cast<float>(threshold_);
+        options.cull_back_faces = culls_back_faces(scene);
+        // Where all is seen, a turning window must not cost anything.
+        const vdtree::Viewpoint viewpoint = perception::viewpoint_of(scene.tree, scene.view, test_options(scene, what),
+                                                                     scene.placement, !is_wholly_in_window(scene));
+        const auto start = Clock::now();
+        const auto stats = cut.follow(**criterion, viewpoint, options);
+        result.adapt_ms = milliseconds_since(start);
+        if (!stats) return stats.error();
+        result.stats = *stats;
+    }
+    const auto adapted = Clock::now();
+    static_cast<void>(cut.indices());
+    result.extract_ms = milliseconds_since(adapted);
+    // No fold costs more than the threshold.
+    if (!is_full && result.stats.max_fold_cost == 0) result.stats.max_fold_cost = static_cast<float>(threshold_);
+    result.imperceptible_from_m = imperceptible_from(scene, what, result.stats);
+    add_effects(result, scene, what, Purpose::picture);
+    if (is_full) return result;
+    result.effects.push_back(back_face_effect(scene));
+    if (is_perceptual(what))
+        for (Effect& effect : result.effects)
+            if (effect.name == imperceptible_distance)
+                effect.why = "the display's distance times " + rounded(threshold_, 4) + ", above which no fold costs";
     return result;
 }
 

@@ -1,6 +1,7 @@
 // From a scene and a wish to a cut, with its statistics and the effects that ran.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,36 @@ enum class Purpose {
 
 // Adjusts `cut`, which must be of the scene's tree. Cost: about a microsecond for each node test.
 Simplification simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose);
+
+// Keeps a cut at what moving views of a scene ask for. In the modes imperceptible and pixels the cost goes with what changes from
+// one call to the next; the others begin anew each time (full: once).
+class Follower {
+public:
+    // Folds up to this cost are made: 2 lets go what could be seen, but not from twice the display's distance. Pixels count in
+    // units of their tolerance.
+    void set_threshold(double threshold) { threshold_ = threshold; } // precondition: positive and finite
+
+    // Adjusts `cut`, which must be of the scene's tree and the same from call to call.
+    Result<Simplification> follow(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what);
+
+private:
+    // What a criterion depends on, besides the tree, its light and the display.
+    struct Key {
+        FoldTest test = FoldTest::luebke_hallen;
+        double pixels = 0;
+        bool has_gaze = false;
+        double farthest_gaze_px = 0;
+        int width = 0, height = 0;
+        double fov_y_degrees = 0;
+        float background = 0;
+        bool operator==(const Key&) const = default;
+    };
+    Result<const vdtree::DistanceCriterion*> criterion_for(const Scene& scene, const WhatOptions& what);
+
+    double threshold_ = 1;
+    Key key_;
+    std::optional<vdtree::DistanceCriterion> criterion_;
+};
 
 // The keys that simplify and render report; draw_ms is NaN where nothing was drawn.
 Json to_json(const Simplification& simplification, double draw_ms);

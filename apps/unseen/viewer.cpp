@@ -192,10 +192,11 @@ private:
     Result<void> draw_frame() {
         needs_frame_ = false;
         const auto start = Clock::now();
-        const Simplification result = simplify(cut_, scene_, what_, Purpose::picture);
+        const auto result = follower_.follow(cut_, scene_, what_);
+        if (!result) return result.error();
         if (auto drawn = renderer_.draw_to_window(cut_, scene_.view, draw_, scene_.placement); !drawn) return drawn;
         glfwSwapBuffers(window_);
-        show_title(result, milliseconds_since(start));
+        show_title(*result, milliseconds_since(start));
         return {};
     }
 
@@ -230,7 +231,7 @@ private:
 
     Result<void> save_picture(const std::string& file) {
         // Keys that came since the last frame count.
-        static_cast<void>(simplify(cut_, scene_, what_, Purpose::picture));
+        if (const auto result = follower_.follow(cut_, scene_, what_); !result) return result.error();
         const auto frame = renderer_.draw(cut_, scene_.view, draw_, scene_.placement);
         if (!frame) return frame.error();
         return perception::write_image(file, code_image(*frame, scene_.display));
@@ -252,6 +253,7 @@ private:
     GLFWwindow* window_;
     render::Renderer renderer_;
     vdtree::Cut cut_;
+    Follower follower_;
     vdtree::View first_view_;
     WhatOptions what_;
     render::DrawOptions draw_;

@@ -16,6 +16,7 @@ GLenum gl_stage(ShaderSource::Stage stage) {
     case ShaderSource::Stage::vertex: return GL_VERTEX_SHADER;
     case ShaderSource::Stage::geometry: return GL_GEOMETRY_SHADER;
     case ShaderSource::Stage::fragment: return GL_FRAGMENT_SHADER;
+    case ShaderSource::Stage::compute: return GL_COMPUTE_SHADER;
     }
     return 0;
 }
@@ -25,6 +26,7 @@ const char* stage_name(ShaderSource::Stage stage) {
     case ShaderSource::Stage::vertex: return "vertex";
     case ShaderSource::Stage::geometry: return "geometry";
     case ShaderSource::Stage::fragment: return "fragment";
+    case ShaderSource::Stage::compute: return "compute";
     }
     return "unknown";
 }
@@ -110,6 +112,10 @@ void Program::use() const {
 
 void Program::set(int location, float value) const {
     glProgramUniform1f(id(), location, value);
+}
+
+void Program::set(int location, unsigned value) const {
+    glProgramUniform1ui(id(), location, value);
 }
 
 void Program::set(int location, const glm::vec4& value) const {

@@ -120,10 +120,9 @@ Result<Camera> Renderer::Impl::prepare(const vdtree::Cut& cut, const vdtree::Vie
     if (auto current = context->platform->make_current(); !current)
         return current.error();
     context->errors.begin();
-    Result<void> set;
-    cut.render([&](const vdtree::VertexTree&, std::span<const vdtree::NodeId> indices) {
-        set = drawer.set_triangles(indices);
-    });
+    const auto indices = cut.indices(); // first: the rest is about what it returned
+    const auto set = drawer.set_triangles(
+        {indices, cut.index_version(), cut.index_writes_from(), cut.index_writes()});
     if (!set) {
         static_cast<void>(context->errors.take_new()); // the drawer's error says it better
         return set.error();
@@ -167,6 +166,8 @@ Result<Renderer> Renderer::create(Context& context, const vdtree::VertexTree& tr
         return made.error();
     return Renderer(std::move(impl));
 }
+
+std::uint64_t Renderer::uploaded_bytes() const noexcept { return impl_->drawer.uploaded_bytes(); }
 
 Result<Frame> Renderer::draw(const vdtree::Cut& cut, const vdtree::View& view, const DrawOptions& options,
                              const vdtree::Similarity& placement) {

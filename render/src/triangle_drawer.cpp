@@ -48,9 +48,8 @@ Vertex vertex_at(const VertexArrays& arrays, std::size_t i) {
     return {glm::vec3(position), glm::vec4(rgb, luminance)};
 }
 
-void describe_vertices(GLuint arrays, GLuint vertices, GLuint indices) {
+void describe_vertices(GLuint arrays, GLuint vertices) {
     glVertexArrayVertexBuffer(arrays, 0, vertices, 0, sizeof(Vertex));
-    glVertexArrayElementBuffer(arrays, indices);
     glEnableVertexArrayAttrib(arrays, 0);
     glVertexArrayAttribFormat(arrays, 0, 3, GL_FLOAT, GL_FALSE, offsetof(Vertex, position));
     glVertexArrayAttribBinding(arrays, 0, 0);
@@ -135,14 +134,16 @@ void read_pixels(const Framebuffer& from, std::span<glm::vec4> pixels) {
 } // namespace
 
 Result<TriangleDrawer> TriangleDrawer::create(const VertexArrays& vertices) {
-    TriangleDrawer drawer;
+    auto indices = GpuIndices::create();
+    if (!indices)
+        return indices.error();
+    TriangleDrawer drawer(std::move(*indices));
     drawer.vertices_ = Buffer::create("vertices");
-    drawer.indices_ = Buffer::create("triangles");
     drawer.surface_arrays_ = VertexArray::create("surface");
     drawer.no_arrays_ = VertexArray::create("full screen");
     if (auto uploaded = drawer.upload(vertices); !uploaded)
         return uploaded.error();
-    describe_vertices(drawer.surface_arrays_.id(), drawer.vertices_.id(), drawer.indices_.id());
+    describe_vertices(drawer.surface_arrays_.id(), drawer.vertices_.id());
 
     const ShaderSource sources[] = {{ShaderSource::Stage::vertex, shaders::full_screen_vert},
                                     {ShaderSource::Stage::fragment, shaders::accumulate_frag}};
@@ -177,21 +178,10 @@ Result<void> TriangleDrawer::upload(const VertexArrays& vertices) {
     return {};
 }
 
-Result<void> TriangleDrawer::set_triangles(std::span<const std::uint32_t> indices) {
-    const std::uint64_t bytes = indices.size_bytes();
-    if (bytes > index_capacity_) {
-        index_count_ = index_capacity_ = 0;
-        glNamedBufferData(indices_.id(), static_cast<GLsizeiptr>(bytes), indices.data(), GL_STREAM_DRAW);
-        if (glGetError() == GL_OUT_OF_MEMORY)
-            return Error{ErrorCode::unsupported, "The graphics memory does not hold the cut's " +
-                                                     std::to_string(indices.size() / 3) + " triangles; fold more."};
-        index_capacity_ = bytes;
-    } else if (bytes > 0) {
-        glInvalidateBufferData(indices_.id()); // so that the driver need not wait for the last frame
-        glNamedBufferSubData(indices_.id(), 0, static_cast<GLsizeiptr>(bytes), indices.data());
-    }
-    index_count_ = indices.size();
-    return {};
+Result<void> TriangleDrawer::set_triangles(const IndexState& state) {
+    auto updated = indices_.update(state);
+    glVertexArrayElementBuffer(surface_arrays_.id(), indices_.buffer());
+    return updated;
 }
 
 Result<std::span<const glm::vec4>> TriangleDrawer::draw(int width, int height,
@@ -288,7 +278,7 @@ Result<const Program*> TriangleDrawer::program_for(const SurfaceStyle& style, Ta
 
 void TriangleDrawer::draw_surface(const Program& program, const glm::mat4& clip_from_unit,
                                   const SurfaceStyle& style) const {
-    if (index_count_ == 0)
+    if (indices_.count() == 0)
         return;
     set_surface_state(style.cull);
     program.set(clip_from_unit_location, clip_from_unit);
@@ -296,8 +286,8 @@ void TriangleDrawer::draw_surface(const Program& program, const glm::mat4& clip_
     program.set(highest_shade_location, highest_shade_);
     program.use();
     glBindVertexArray(surface_arrays_.id());
-    for (std::uint64_t first = 0; first < index_count_; first += most_indices_a_call) {
-        const std::uint64_t count = std::min(most_indices_a_call, index_count_ - first);
+    for (std::uint64_t first = 0; first < indices_.count(); first += most_indices_a_call) {
+        const std::uint64_t count = std::min(most_indices_a_call, indices_.count() - first);
         glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(count), GL_UNSIGNED_INT,
                        reinterpret_cast<const void*>(static_cast<std::uintptr_t>(first * sizeof(std::uint32_t))));
     }

@@ -17,6 +17,7 @@
 #include <render/renderer.h>
 
 #include "camera.h"
+#include "gpu_indices.h"
 
 namespace unseen::render {
 
@@ -44,9 +45,10 @@ class TriangleDrawer {
 public:
     static Result<TriangleDrawer> create(const VertexArrays& vertices);
 
-    // The triangles of all draws until the next call; corners are vertex numbers. The memory is reused. Fails where it
-    // does not suffice; then there are no triangles.
-    Result<void> set_triangles(std::span<const std::uint32_t> indices);
+    // The triangles of all draws until the next call; corners are vertex numbers. Uploads what has changed since the last
+    // call, where the state knows it. Fails where the memory does not suffice; then there are no triangles.
+    Result<void> set_triangles(const IndexState& state);
+    std::uint64_t uploaded_bytes() const noexcept { return indices_.uploaded_bytes(); } // by set_triangles()
 
     // The mean over the matrices of the image that each gives: width x height pixels of linear RGB and relative
     // luminance, row-major from the top left. The pixels belong to the drawer and stay until its next draw.
@@ -59,7 +61,7 @@ public:
 private:
     enum class Target { image, window, window_to_encode };
 
-    TriangleDrawer() = default;
+    explicit TriangleDrawer(GpuIndices indices) : indices_(std::move(indices)) {}
     Result<void> upload(const VertexArrays& vertices);
     Result<void> fit_targets(int width, int height);
     Result<const Program*> program_for(const SurfaceStyle& style, Target target);
@@ -67,13 +69,11 @@ private:
     void add_sample_to_sum(float background) const;
 
     Buffer vertices_;
-    Buffer indices_;
+    GpuIndices indices_;
     VertexArray surface_arrays_;
     VertexArray no_arrays_; // for the full-screen triangle, which comes from nowhere
     glm::vec4 lowest_shade_ = glm::vec4(std::numeric_limits<float>::max()); // of all vertices
     glm::vec4 highest_shade_ = glm::vec4(std::numeric_limits<float>::lowest());
-    std::uint64_t index_capacity_ = 0; // bytes
-    std::uint64_t index_count_ = 0;
     std::array<std::optional<Program>, 12> programs_; // 3 targets x shading x wireframe, made when first used
     std::optional<Program> accumulate_;
     Framebuffer sample_;

@@ -12,6 +12,7 @@ using ::testing::Le;
 
 class UsageTest : public CommandTest {};
 class BuildTest : public CommandTest {};
+class MakeTest : public CommandTest {};
 class InfoTest : public CommandTest {};
 class SimplifyTest : public CommandTest {
 protected:
@@ -38,7 +39,7 @@ protected:
 TEST_F(UsageTest, EveryVerbHasHelpWithExamples) {
     const Outcome top = run({"--help"});
     EXPECT_EQ(top.status, 0);
-    for (const std::string verb : {"build", "info", "simplify", "compare", "csf"}) {
+    for (const std::string verb : {"build", "info", "simplify", "compare", "csf", "make"}) {
         EXPECT_THAT(top.out, HasSubstr("\n  " + verb + " ")) << top.out;
         const Outcome help = run({verb, "--help"});
         EXPECT_EQ(help.status, 0) << verb << help.err;
@@ -98,6 +99,14 @@ TEST_F(UsageTest, WrongUsageIsStatusTwoAndLeavesNothing) {
         {"compare", "a.png"},
         {"compare", "a.png", "b.png", "--model", "rpg99", "--gaze", "1", "1"},
         {"compare", "a.png", "b.png", "--profile", "perceptualdiff"},
+        {"make"},
+        {"make", "ball.obj"},
+        {"make", "subdivide"},
+        {"make", "subdivide", "ball.obj", "-o", "out.ply"},
+        {"make", "subdivide", "ball.obj", "-o", "out.ply", "--times", "-1"},
+        {"make", "subdivide", "ball.obj", "-o", "out.ply", "--times", "1", "--triangles", "5000"},
+        {"make", "subdivide", "ball.obj", "-o", "out.ply", "--times", "1", "--noise", "2"},
+        {"make", "subdivide", "ball.obj", "-o", "out.vdt", "--times", "1"},
         {"csf", "--frequency", "4"},
         {"csf", "--frequency", "0", "--luminance", "1"},
     };
@@ -178,6 +187,39 @@ TEST_F(UsageTest, DoesNotOverwriteItsInput) {
     EXPECT_EQ(run({"build", "ball.vdt", "-o", "ball.vdt"}).status, 1);
     EXPECT_EQ(read_text(path("ball.obj")), mesh);
     EXPECT_TRUE(read_text(path("ball.vdt")) == tree);
+}
+
+TEST_F(UsageTest, SubVerbsHaveHelpWithExamples) {
+    const Outcome help = run({"make", "subdivide", "--help"});
+    EXPECT_EQ(help.status, 0);
+    EXPECT_THAT(help.out, AllOf(HasSubstr("Examples:"), HasSubstr("unseen make subdivide"), HasSubstr("--noise")));
+    EXPECT_THAT(run({"make", "subdivide"}).err, HasSubstr("'unseen make subdivide --help'"));
+}
+
+TEST_F(MakeTest, SubdividedMeshesStayClosed) {
+    write_ball("ball.obj", 6, 8); // 80 triangles
+    const Outcome twice = run({"make", "subdivide", "ball.obj", "-o", "twice.ply", "--times", "2", "--json", "-"});
+    ASSERT_EQ(twice.status, 0) << twice.err;
+    EXPECT_EQ(twice.json()["source_triangles"], 80);
+    EXPECT_EQ(twice.json()["triangles"], 1280);
+    EXPECT_EQ(twice.json()["vertices"], 642) << "Euler: 2 + half the triangles";
+    const Outcome some = run({"make", "subdivide", "ball.obj", "-o", "some.ply", "--triangles", "1000"});
+    ASSERT_EQ(some.status, 0) << some.err;
+    EXPECT_THAT(some.out, HasSubstr("1,000 of 80"));
+    for (const std::string name : {"twice", "some"}) {
+        ASSERT_EQ(run({"build", name + ".ply", "-o", name + ".vdt"}).status, 0);
+        EXPECT_EQ(run({"info", name + ".vdt", "--json"}).json()["closed"], true) << name;
+    }
+}
+
+TEST_F(MakeTest, SaysWhatCannotBe) {
+    write_ball("ball.obj", 6, 8);
+    const Outcome few = run({"make", "subdivide", "ball.obj", "-o", "out.ply", "--triangles", "10"});
+    EXPECT_EQ(few.status, 1);
+    EXPECT_THAT(few.err, HasSubstr("80 triangles already"));
+    EXPECT_EQ(run({"make", "subdivide", "ball.obj", "-o", "ball.obj", "--times", "1"}).status, 1);
+    EXPECT_EQ(run({"make", "subdivide", "missing.obj", "-o", "out.ply", "--times", "1"}).status, 1);
+    EXPECT_THAT(files(), ElementsAre("ball.obj"));
 }
 
 TEST_F(BuildTest, ReportsATreeWithEitherClusterer) {

@@ -71,6 +71,96 @@ TEST_F(RenderCommandTest, TheImperceptibleCutShowsNoDifference) {
     EXPECT_EQ(rough.status, 1) << "the judge is not blind: " << rough.out;
 }
 
+std::vector<std::vector<double>> numbers_of(const std::string& csv) {
+    std::vector<std::vector<double>> rows;
+    std::istringstream lines(csv);
+    std::string line;
+    std::getline(lines, line);
+    EXPECT_EQ(line, "frame,triangles,folds,unfolds,changes,node_tests,cut_ms,index_ms,uploaded_bytes,draw_ms,frame_ms");
+    while (std::getline(lines, line)) {
+        std::istringstream cells(line);
+        rows.emplace_back();
+        for (std::string cell; std::getline(cells, cell, ',');) rows.back().push_back(cell.empty() ? -1 : std::stod(cell));
+        rows.back().resize(11, -1);
+    }
+    return rows;
+}
+
+TEST_F(RenderCommandTest, AnOrbitFollowsWithOneCut) {
+    const Outcome flown = run({"render", "ball.vdt", "--path", "orbit:2:24", "--size", "96x80", "--csv", "orbit.csv",
+                               "--plot", "orbit.png", "-o", "frames/%03d.png", "--threshold", "3", "--json", "-"});
+    ASSERT_EQ(flown.status, 0) << flown.err;
+    const Json report = flown.json();
+    EXPECT_EQ(report["frames"], 24);
+    EXPECT_EQ(effect_named(report, "back-face folding")["on"], true);
+    const auto rows = numbers_of(read_text(path("orbit.csv")));
+    ASSERT_EQ(rows.size(), 24u);
+    EXPECT_EQ(rows[0][8], 12 * rows[0][1]) << "the first frame uploads the whole";
+    double changes = 0, uploaded = 0;
+    for (std::size_t i = 1; i < rows.size(); ++i) {
+        EXPECT_EQ(rows[i][0], static_cast<double>(i));
+        EXPECT_EQ(rows[i][2] + rows[i][3], rows[i][4]);
+        changes += rows[i][4];
+        uploaded += rows[i][8];
+    }
+    EXPECT_GT(changes, 0);
+    EXPECT_GT(uploaded, 0);
+    EXPECT_EQ(read_image(path("orbit.png"))->image.width, 1200);
+    EXPECT_EQ(std::distance(fs::directory_iterator(path("frames")), fs::directory_iterator()), 24);
+    // A frame is the picture that is drawn of the same view alone, but for the cut, which is a little finer.
+    const auto last = read_image(path("frames/023.png"));
+    ASSERT_TRUE(last) << last.error().message;
+    EXPECT_EQ(last->image.height, 80);
+}
+
+TEST_F(RenderCommandTest, PathsComeFromFiles) {
+    write_text(path("path.csv"), "eye_x, eye_y,eye_z,target_x,target_y,target_z,gaze_x,gaze_y\r\n"
+                                 "0,0,4,0,0,0,48,40\r\n\n+0.1,0,4,0,0,0,48,41\n0.1,0,4,0,0,0,48,41\n");
+    const Outcome flown = run({"render", "ball.vdt", "--path", "path.csv", "--size", "96x80", "--csv", "out.csv", "--no-draw"});
+    ASSERT_EQ(flown.status, 0) << flown.err;
+    EXPECT_THAT(flown.out, HasSubstr("frames"));
+    const auto rows = numbers_of(read_text(path("out.csv")));
+    ASSERT_EQ(rows.size(), 3u);
+    EXPECT_EQ(rows[2][4], 0) << "a still view changes nothing";
+    EXPECT_EQ(rows[2][5], 0) << "and tests nothing";
+    EXPECT_EQ(rows[2][8], -1) << "nothing was drawn";
+}
+
+TEST_F(RenderCommandTest, BadPathsAreNamedByLineAndColumn) {
+    const std::string header = "eye_x,eye_y,eye_z,target_x,target_y,target_z\n";
+    const std::vector<std::pair<std::string, std::string>> files = {
+        {"", "line 1"},
+        {header, "no frame"},
+        {"eye_x,eye_y\n", "no column 'eye_z'"},
+        {"eye_x,eye_y,eye_z,target_x,target_y,target_z,up_x\n", "no column 'up_y'"},
+        {"eye_x,eye_y,eye_z,target_x,target_y,target_z,eye_x\n", "twice"},
+        {"eye_x,ear_y\n", "column 2, 'ear_y'"},
+        {header + "0,0,4,0,0,0\n0,0,4,0,0\n", "line 3: there are 5 columns"},
+        {header + "0,0,4,0,zero,0\n", "line 2: column 5 (target_y)"},
+        {header + "0,0,inf,0,0,0\n", "line 2: column 3 (eye_z)"},
+        {header + "1,2,3,1,2,3\n", "line 2: "},
+    };
+    for (const auto& [text, complaint] : files) {
+        write_text(path("path.csv"), text);
+        const Outcome outcome = run({"render", "ball.vdt", "--path", "path.csv", "--no-draw", "--csv", "out.csv"});
+        EXPECT_EQ(outcome.status, 1) << text;
+        EXPECT_THAT(outcome.err, IsAnErrorForPeople()) << text;
+        EXPECT_THAT(outcome.err, HasSubstr(complaint)) << text;
+        EXPECT_FALSE(fs::exists(path("out.csv")));
+    }
+    for (const std::string orbit : {"orbit:", "orbit:x", "orbit:1:0", "orbit:1:x", "orbit:0", "orbit:nan:5", "missing.csv"})
+        EXPECT_EQ(run({"render", "ball.vdt", "--path", orbit, "--no-draw"}).status, 1) << orbit;
+    const std::vector<std::vector<std::string>> wrong = {{"--csv", "a.csv"}, {"--path", "orbit:1", "-o", "same.png"},
+                                                         {"--path", "orbit:1", "-o", "%d%d.png"},
+                                                         {"--path", "orbit:1", "-o", "%s.png"}, {"--threshold", "2", "-o", "a.png"},
+                                                         {"--path", "orbit:1", "--threshold", "0"},
+                                                         {"--path", "orbit:1", "--no-draw", "-o", "%d.png"}};
+    for (auto words : wrong) {
+        words.insert(words.begin(), {"render", "ball.vdt"});
+        EXPECT_EQ(run(words).status, 2) << ::testing::PrintToString(words);
+    }
+}
+
 TEST_F(RenderCommandTest, OptionsChangeThePicture) {
     render({}, "plain.png");
     const std::string plain = read_text(path("plain.png"));

@@ -2,11 +2,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <set>
 #include <string>
 
 #include "bitmap_font.h"
 #include "canvas.h"
+#include "panel_plot.h"
 #include "plot.h"
 
 namespace {
@@ -90,6 +92,26 @@ TEST(Plot, DrawsACurveWhereItsPointsAre) {
     EXPECT_LT(left, image.width / 6);
     // The middle of the axis, on a logarithmic scale.
     EXPECT_NEAR((top + bottom) / 2.0, image.height / 2.0, image.height * 0.05);
+}
+
+TEST(PanelPlot, PutsCurvesInTheirPanels) {
+    PanelPlot plot;
+    plot.panels = {{"steady", {1, 0, 0}, {5, 5, 5, 5}}, {"gone", {0, 0, 1}, {0, std::nan(""), 3}}, {"empty", {0, 1, 0}, {}}};
+    const auto image = draw(plot);
+    EXPECT_EQ(image.width, plot.width);
+    const auto rows_with = [&](auto is_colour) {
+        std::set<int> rows;
+        for (int y = 0; y < image.height; ++y)
+            for (int x = 0; x < image.width; ++x)
+                if (is_colour(image.at(x, y, 0), image.at(x, y, 1), image.at(x, y, 2))) rows.insert(y);
+        return rows;
+    };
+    const auto red = rows_with([](float r, float g, float b) { return r > 0.9f && g < 0.1f && b < 0.1f; });
+    const auto blue = rows_with([](float r, float g, float b) { return b > 0.9f && g < 0.1f && r < 0.1f; });
+    ASSERT_FALSE(red.empty());
+    ASSERT_FALSE(blue.empty());
+    EXPECT_LT(*red.rbegin(), *blue.begin()) << "one below the other";
+    EXPECT_GT(image.height, 3 * plot.panel_height);
 }
 
 } // namespace

@@ -23,6 +23,7 @@ using unseen::vdtree::Similarity;
 using unseen::vdtree::View;
 
 constexpr float value_tolerance = 1e-5f;              // relative luminance inside of a triangle; see above
+constexpr float stored_tolerance = 0.5f / 65535 + 1e-6f; // luminance is stored in 16 bits
 constexpr double snapping_px = 1.0 / 256;             // of edges; see above
 constexpr double sample_share = 1.0 / 16;             // one of 16 samples a pixel
 
@@ -82,8 +83,8 @@ TEST_F(RendererTest, FillsTheScreenWithTheQuadsLuminance) {
         const Frame frame = draw(scene, frontal_view(width, height));
         ASSERT_EQ(frame.width, width);
         ASSERT_EQ(frame.height, height);
-        EXPECT_THAT(frame.luminance, ::testing::Each(::testing::FloatNear(0.5f, 1e-6f))) << width << "x" << height;
-        EXPECT_THAT(frame.colour, ::testing::Each(::testing::FloatNear(0.5f, 1e-6f))) << width << "x" << height;
+        EXPECT_THAT(frame.luminance, ::testing::Each(::testing::FloatNear(0.5f, stored_tolerance))) << width << "x" << height;
+        EXPECT_THAT(frame.colour, ::testing::Each(::testing::FloatNear(0.5f, stored_tolerance))) << width << "x" << height;
     }
 }
 
@@ -259,7 +260,7 @@ TEST_F(RendererTest, DrawsOpenSurfacesFromBothSidesAlike) {
     View view = frontal_view(16, 16);
     view.eye = {0, 0, -1};
     const Frame frame = draw(scene, view);
-    EXPECT_THAT(frame.luminance, ::testing::Each(::testing::FloatNear(0.5f, 1e-6f)));
+    EXPECT_THAT(frame.luminance, ::testing::Each(::testing::FloatNear(0.5f, stored_tolerance)));
 }
 
 TEST_F(RendererTest, DrawsAnInsideOutMeshLikeItsMirrorImage) {
@@ -385,7 +386,7 @@ TEST_F(RendererTest, ShadesFlatWithTheMeanOfTheCorners) {
     DrawOptions options;
     options.shading = Shading::flat;
     const Frame frame = draw(scene, frontal_view(32, 32), options);
-    EXPECT_THAT(frame.luminance, ::testing::Each(::testing::FloatNear(0.4f, 1e-6f)));
+    EXPECT_THAT(frame.luminance, ::testing::Each(::testing::FloatNear(0.4f, stored_tolerance)));
 }
 
 TEST_F(RendererTest, ShadesColoursSoThatTheirLuminanceIsTheVertexs) {
@@ -406,8 +407,8 @@ TEST_F(RendererTest, DrawsUncolouredMeshesGreyUnderTheirLight) {
     mesh.colours.clear();
     const Frame frame = draw(Scene(mesh), frontal_view(16, 16));
     const float lit = 0.8f * (0.2f + 0.8f * 0.59700935f); // n = +z under the default light
-    EXPECT_THAT(frame.luminance, ::testing::Each(::testing::FloatNear(lit, 1e-6f)));
-    EXPECT_THAT(frame.colour, ::testing::Each(::testing::FloatNear(lit, 1e-6f)));
+    EXPECT_THAT(frame.luminance, ::testing::Each(::testing::FloatNear(lit, stored_tolerance)));
+    EXPECT_THAT(frame.colour, ::testing::Each(::testing::FloatNear(lit, stored_tolerance)));
 }
 
 // Distance in pixels from a line through two points, all in pixels.

@@ -1,6 +1,7 @@
 #include <vdtree/cut.h>
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cassert>
 #include <cmath>
@@ -186,6 +187,12 @@ struct Cut::Indices {
     bool is_stale = true;
     bool is_patched = false;      // writes are the whole difference to the buffer before the last change
     bool few_changes_last = false;
+    std::uint64_t version = 0, writes_from = 0; // of the buffer, and before the last writes
+
+    void change_version() {
+        static std::atomic<std::uint64_t> last{0};
+        version = ++last;
+    }
 };
 
 Cut::Cut(const VertexTree& tree)
@@ -295,6 +302,7 @@ void Cut::begin_changes() {
     if (!indices_) return;
     indices_->is_patched = !indices_->is_stale && indices_->buffer.can_patch();
     indices_->buffer.begin_patch();
+    indices_->writes_from = indices_->version;
 }
 
 // Gives up patching where gathering has become the cheaper way.
@@ -342,8 +350,10 @@ void Cut::end_changes(AdjustStats& stats) {
     stats.triangles = triangle_count_;
     if (!indices_) return;
     indices_->few_changes_last = changes_.size() < few_changes(triangle_count_);
-    if (indices_->is_patched) indices_->buffer.end_patch();
-    else if (!changes_.empty()) indices_->is_stale = true;
+    if (indices_->is_patched) {
+        indices_->buffer.end_patch();
+        if (!indices_->buffer.writes().empty()) indices_->change_version();
+    } else if (!changes_.empty()) indices_->is_stale = true;
     else indices_->is_patched = !indices_->is_stale; // by no writes at all
 }
 
@@ -510,6 +520,7 @@ std::span<const NodeId> Cut::indices() const {
     if (indices_->is_stale) {
         indices_->buffer.gather(unfolded_, proxy_, triangle_count_);
         indices_->is_stale = false;
+        indices_->change_version();
         // When little changed last, little will change next.
         if (indices_->few_changes_last) indices_->buffer.make_lists(unfolded_);
     }
@@ -520,6 +531,9 @@ std::optional<std::span<const IndexWrite>> Cut::index_writes() const noexcept {
     if (!indices_ || !indices_->is_patched) return std::nullopt;
     return indices_->buffer.writes();
 }
+
+std::uint64_t Cut::index_version() const noexcept { return indices_ ? indices_->version : 0; }
+std::uint64_t Cut::index_writes_from() const noexcept { return indices_ ? indices_->writes_from : 0; }
 
 std::uint64_t Cut::byte_size() const noexcept {
     return sizeof(std::uint64_t) * unfolded_.capacity() + sizeof(NodeId) * proxy_.capacity() +

@@ -77,6 +77,10 @@ std::uint8_t to_byte(float channel) {
     return static_cast<std::uint8_t>(std::lround(std::clamp(channel, 0.0f, 1.0f) * 255.0f));
 }
 
+constexpr std::size_t items_a_report = std::size_t{1} << 18; // some milliseconds
+
+Error cancelled() { return {ErrorCode::cancelled, "Writing was cancelled."}; }
+
 void write_ply_header(Output& out, const MeshView& mesh, bool has_floats) {
     const std::string real = has_floats ? "float" : "double";
     // Few programs read unsigned indices, so they are used only where needed.
@@ -92,10 +96,14 @@ void write_ply_header(Output& out, const MeshView& mesh, bool has_floats) {
              (needs_unsigned ? "uint" : "int") + " vertex_indices\nend_header\n");
 }
 
-void write_ply(Output& out, const MeshView& mesh) {
+Result<void> write_ply(Output& out, const MeshView& mesh, Progress progress) {
     const bool has_floats = are_floats(mesh);
     write_ply_header(out, mesh, has_floats);
+    const auto vertex_count = static_cast<double>(mesh.positions.size());
+    const auto item_count = vertex_count + static_cast<double>(mesh.triangles.size());
+    const auto goes_on = [&](double items_done) { return !progress || progress(items_done / item_count, "writing"); };
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+        if (i % items_a_report == 0 && !goes_on(static_cast<double>(i))) return cancelled();
         for (int axis = 0; axis < 3; ++axis) {
             if (has_floats) out.binary(static_cast<float>(mesh.positions[i][axis]));
             else out.binary(mesh.positions[i][axis]);
@@ -114,10 +122,12 @@ void write_ply(Output& out, const MeshView& mesh) {
             out.binary(mesh.uvs[i].y);
         }
     }
-    for (const Triangle& triangle : mesh.triangles) {
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+        if (i % items_a_report == 0 && !goes_on(vertex_count + static_cast<double>(i))) return cancelled();
         out.binary(std::uint8_t{3});
-        for (const Index corner : triangle) out.binary(corner);
+        for (const Index corner : mesh.triangles[i]) out.binary(corner);
     }
+    return {};
 }
 
 // ---- OBJ ----
@@ -418,7 +428,7 @@ Error cannot_write(const fs::path& file, const std::string& why) {
 
 } // namespace
 
-Result<void> write_mesh(const fs::path& file, const MeshView& mesh) {
+Result<void> write_mesh(const fs::path& file, const MeshView& mesh, Progress progress) {
     std::string ending = file.extension().string();
     for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
     if (ending != ".ply" && ending != ".obj" && ending != ".glb") {
@@ -432,7 +442,7 @@ Result<void> write_mesh(const fs::path& file, const MeshView& mesh) {
     if (!target) return target.error();
     Output out(std::move(*target));
     if (ending == ".ply") {
-        write_ply(out, mesh);
+        if (const Result<void> written = write_ply(out, mesh, progress); !written) return written;
     } else if (ending == ".obj") {
         write_obj(out, mesh);
     } else if (const Result<void> written = GlbWriter(out, mesh).write(file); !written) {

@@ -14,7 +14,7 @@ namespace unseen::render {
 
 // GLSL 4.50 text. Sources have no #version line, it is put first.
 struct ShaderSource {
-    enum class Stage { vertex, geometry, fragment };
+    enum class Stage { vertex, geometry, fragment, compute };
     Stage stage = Stage::vertex;
     std::string_view text;
 };
@@ -32,6 +32,7 @@ public:
 
     // A location that the program does not use is an error of the caller, which the debug output reports.
     void set(int location, float value) const;
+    void set(int location, unsigned value) const;
     void set(int location, const glm::vec4& value) const;
     void set(int location, const glm::mat4& value) const;
 

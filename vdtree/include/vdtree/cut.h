@@ -112,6 +112,10 @@ public:
     // What the last follow() changed of the index buffer that was current before it, for copies of it: writes in order (a place
     // may come twice, or lie beyond the end by now). None: take the whole buffer.
     std::optional<std::span<const IndexWrite>> index_writes() const noexcept;
+    // Names what indices() returned last: another number after every change of it, and for every cut; 0 before. Writes lead from the
+    // version `index_writes_from()` to this one.
+    std::uint64_t index_version() const noexcept;
+    std::uint64_t index_writes_from() const noexcept;
     void render(RenderCallback callback) const { callback(*tree_, indices()); }
     Index triangle_count() const noexcept { return triangle_count_; }
 

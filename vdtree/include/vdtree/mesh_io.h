@@ -42,6 +42,7 @@ Result<ReadResult> read_mesh(const std::filesystem::path& file, const ReadOption
 // PLY: binary little-endian, float positions where they are exact and double otherwise; normals, colours (sRGB
 // 8 bit), UVs where present. OBJ: text with as many digits as needed to read the same values again.
 // GLB: one primitive for each material range.
-Result<void> write_mesh(const std::filesystem::path& file, const MeshView& mesh);
+// Progress is told, and can cancel, while a PLY is written.
+Result<void> write_mesh(const std::filesystem::path& file, const MeshView& mesh, Progress progress = {});
 
 } // namespace unseen::vdtree

@@ -1,0 +1,180 @@
+#include "camera_path.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <numbers>
+#include <string_view>
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+
+#include "terminal.h"
+
+namespace unseen::app {
+namespace {
+
+constexpr std::string_view orbit_prefix = "orbit:";
+constexpr double least_orbit_degrees = 1e-4; // below, once around would take millions of frames
+
+Error invalid(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
+
+std::string_view trimmed(std::string_view text) {
+    constexpr std::string_view spaces = " \t\r";
+    const std::size_t begin = text.find_first_not_of(spaces);
+    if (begin == std::string_view::npos) return {};
+    return text.substr(begin, text.find_last_not_of(spaces) - begin + 1);
+}
+
+template <class Number>
+bool parse(std::string_view text, Number& value) {
+    text = trimmed(text);
+    if (text.starts_with('+')) text.remove_prefix(1);
+    const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
+    return code == std::errc() && end == text.data() + text.size();
+}
+
+// ---- orbits
+
+Result<std::vector<CameraPose>> orbit(const std::string& path, const vdtree::View& first) {
+    const std::string_view text = std::string_view(path).substr(orbit_prefix.size());
+    const std::size_t colon = text.find(':');
+    double degrees = 0;
+    if (!parse(text.substr(0, colon), degrees) || !(std::abs(degrees) <= 360))
+        return invalid("'" + path + "' must be orbit:DEGREES[:FRAMES] with -360 to 360 degrees a frame.");
+    int frames = 0;
+    if (colon != std::string_view::npos) {
+        if (!parse(text.substr(colon + 1), frames) || frames < 1 || frames > most_path_frames)
+            return invalid("'" + path + "' must be orbit:DEGREES[:FRAMES] with 1 to " + std::to_string(most_path_frames) +
+                           " frames.");
+    } else if (!(std::abs(degrees) >= least_orbit_degrees)) {
+        return invalid("'" + path + "' never comes around; say how many frames: orbit:DEGREES:FRAMES.");
+    } else {
+        frames = std::clamp(static_cast<int>(std::ceil(360 / std::abs(degrees))), 1, most_path_frames);
+    }
+    const glm::dvec3 axis = glm::normalize(first.up);
+    std::vector<CameraPose> poses;
+    poses.reserve(static_cast<std::size_t>(frames));
+    for (int frame = 0; frame < frames; ++frame) {
+        const glm::dquat turn = glm::angleAxis(degrees * frame * std::numbers::pi / 180, axis);
+        poses.push_back({first.target + turn * (first.eye - first.target), first.target, first.up, {}});
+    }
+    return poses;
+}
+
+// ---- files
+
+enum Column { eye_x, eye_y, eye_z, target_x, target_y, target_z, up_x, up_y, up_z, gaze_x, gaze_y, column_count };
+constexpr std::array<std::string_view, column_count> column_names = {
+    "eye_x", "eye_y", "eye_z", "target_x", "target_y", "target_z", "up_x", "up_y", "up_z", "gaze_x", "gaze_y"};
+
+class PathReader {
+public:
+    PathReader(const std::string& file, const vdtree::View& first) : file_(file), first_(first), stream_(file) {}
+
+    Result<std::vector<CameraPose>> read() {
+        if (!stream_) return Error{ErrorCode::io_failure, "Cannot open '" + file_ + "': is it there, and readable?"};
+        if (auto header = read_header(); !header) return header.error();
+        std::vector<CameraPose> poses;
+        while (next_line()) {
+            if (trimmed(line_).empty()) continue;
+            if (poses.size() == static_cast<std::size_t>(most_path_frames))
+                return malformed("there are more than " + std::to_string(most_path_frames) + " frames.");
+            auto pose = read_pose();
+            if (!pose) return pose.error();
+            poses.push_back(*pose);
+        }
+        if (stream_.bad()) return Error{ErrorCode::io_failure, "Cannot read '" + file_ + "' to its end."};
+        if (poses.empty()) return malformed("there is no frame after the header.");
+        return poses;
+    }
+
+private:
+    bool next_line() {
+        ++line_number_;
+        return static_cast<bool>(std::getline(stream_, line_));
+    }
+
+    Error malformed(const std::string& what) const {
+        return {ErrorCode::malformed_data, file_ + ", line " + std::to_string(line_number_) + ": " + what};
+    }
+
+    std::vector<std::string_view> cells() const {
+        std::vector<std::string_view> cells;
+        std::string_view rest = line_;
+        for (std::size_t comma = 0; comma != std::string_view::npos;) {
+            comma = rest.find(',');
+            cells.push_back(trimmed(rest.substr(0, comma)));
+            if (comma != std::string_view::npos) rest.remove_prefix(comma + 1);
+        }
+        return cells;
+    }
+
+    Result<void> read_header() {
+        next_line();
+        if (line_.starts_with("\xef\xbb\xbf")) line_.erase(0, 3); // a byte order mark
+        for (const std::string_view name : cells()) {
+            const auto found = std::find(column_names.begin(), column_names.end(), name);
+            const auto column = static_cast<Column>(found - column_names.begin());
+            if (column == column_count)
+                return malformed("column " + std::to_string(columns_.size() + 1) + ", '" + std::string(name.substr(0, 40)) +
+                                 "', is none of eye_x, eye_y, eye_z, target_x, ..., up_x, ..., gaze_x, gaze_y.");
+            if (has(column)) return malformed("column '" + std::string(name) + "' comes twice.");
+            columns_.push_back(column);
+        }
+        for (int column = eye_x; column <= target_z; ++column)
+            if (!has(static_cast<Column>(column))) return missing(static_cast<Column>(column));
+        for (int column = up_x; column < column_count; ++column) { // all of a group or none of it
+            const Column first = column < gaze_x ? up_x : gaze_x, last = column < gaze_x ? up_z : gaze_y;
+            bool any = false;
+            for (int other = first; other <= last; ++other) any = any || has(static_cast<Column>(other));
+            if (any && !has(static_cast<Column>(column))) return missing(static_cast<Column>(column));
+        }
+        return {};
+    }
+
+    bool has(Column column) const { return std::find(columns_.begin(), columns_.end(), column) != columns_.end(); }
+    Error missing(Column column) const {
+        return malformed("the header has no column '" + std::string(column_names[column]) + "'.");
+    }
+
+    Result<CameraPose> read_pose() const {
+        const auto texts = cells();
+        if (texts.size() != columns_.size())
+            return malformed("there are " + std::to_string(texts.size()) + " columns, but " +
+                             std::to_string(columns_.size()) + " in the header.");
+        std::array<double, column_count> v{};
+        for (std::size_t i = 0; i < texts.size(); ++i)
+            if (!parse(texts[i], v[columns_[i]]) || !std::isfinite(v[columns_[i]]))
+                return malformed("column " + std::to_string(i + 1) + " (" + std::string(column_names[columns_[i]]) +
+                                 ") must be a finite number, not '" + std::string(texts[i].substr(0, 40)) + "'.");
+        CameraPose pose;
+        pose.eye = {v[eye_x], v[eye_y], v[eye_z]};
+        pose.target = {v[target_x], v[target_y], v[target_z]};
+        pose.up = has(up_x) ? glm::dvec3(v[up_x], v[up_y], v[up_z]) : first_.up;
+        if (has(gaze_x)) pose.gaze_px = glm::dvec2(v[gaze_x], v[gaze_y]);
+        vdtree::View view = first_;
+        view.eye = pose.eye;
+        view.target = pose.target;
+        view.up = pose.up;
+        if (auto valid = vdtree::validate(view); !valid) return malformed(valid.error().message);
+        return pose;
+    }
+
+    std::string file_;
+    const vdtree::View& first_;
+    std::ifstream stream_;
+    std::string line_;
+    std::uint64_t line_number_ = 0;
+    std::vector<Column> columns_;
+};
+
+} // namespace
+
+Result<std::vector<CameraPose>> read_camera_path(const std::string& path, const vdtree::View& first) {
+    return path.starts_with(orbit_prefix) ? orbit(path, first) : PathReader(path, first).read();
+}
+
+} // namespace unseen::app

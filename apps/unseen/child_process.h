@@ -1,0 +1,23 @@
+// Programs run for what they do and for what they take.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <vdtree/result.h>
+
+namespace unseen::app {
+
+struct ChildOutcome {
+    int status = 0;      // exit status; minus the signal that ended it
+    double seconds = 0;  // wall clock
+    std::string out;     // stdout
+};
+
+// Runs a program (found by PATH where its name has no slash) and waits for it; its stderr is this one's. Fails where it cannot be
+// started.
+Result<ChildOutcome> run_child(std::vector<std::string> words);
+
+std::string own_executable(); // this program's file
+
+} // namespace unseen::app

@@ -1,0 +1,290 @@
+#include "fly_through.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <limits>
+#include <optional>
+
+#include <output_file.h>
+#include <panel_plot.h>
+#include <perception/image.h>
+
+#include "camera_path.h"
+#include "frame_image.h"
+#include "progress_bar.h"
+#include "report.h"
+#include "terminal.h"
+
+namespace unseen::app {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double not_drawn = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t most_digits = 9; // of a frame's number in a file name
+
+// What one frame came to. Times in milliseconds of the wall clock.
+struct FrameRecord {
+    vdtree::AdjustStats stats;
+    double cut_ms = 0, index_ms = 0; // the cut with its patches, and gathering where patches did not do
+    double draw_ms = not_drawn, frame_ms = 0;
+    double uploaded_bytes = not_drawn;
+
+    std::uint64_t changes() const { return stats.folds + stats.unfolds; }
+};
+
+// A name with a number: what stands before it, how many digits at least, and what stands after.
+struct NamePattern {
+    std::string before, after;
+    std::size_t digits = 0;
+
+    std::string with(std::size_t number) const {
+        const std::string text = std::to_string(number);
+        return before + std::string(digits > text.size() ? digits - text.size() : 0, '0') + text + after;
+    }
+};
+
+std::optional<NamePattern> parse_pattern(const std::string& pattern) {
+    const std::size_t begin = pattern.find('%');
+    if (begin == std::string::npos || pattern.find('%', begin + 1) != std::string::npos) return std::nullopt;
+    std::size_t end = begin + 1;
+    while (end < pattern.size() && pattern[end] >= '0' && pattern[end] <= '9') ++end;
+    if (end == pattern.size() || pattern[end] != 'd' || end - begin > 3) return std::nullopt;
+    NamePattern result{pattern.substr(0, begin), pattern.substr(end + 1), 0};
+    if (end > begin + 1) result.digits = static_cast<std::size_t>(std::stoi(pattern.substr(begin + 1, end - begin - 1)));
+    return result.digits <= most_digits ? std::optional(result) : std::nullopt;
+}
+
+// The parts that draw, where anything is drawn.
+struct Drawing {
+    render::Context context;
+    render::Renderer renderer;
+};
+
+Result<std::optional<Drawing>> make_drawing(const Scene& scene, bool draws) {
+    if (!draws) return std::optional<Drawing>();
+    auto context = render::Context::headless();
+    if (!context) return context.error();
+    auto renderer = render::Renderer::create(*context, scene.tree);
+    if (!renderer) return renderer.error();
+    return std::optional<Drawing>(Drawing{std::move(*context), std::move(*renderer)});
+}
+
+std::string cell(double value) { return std::isfinite(value) ? shortest(value) : std::string(); }
+
+std::string to_csv(const std::vector<FrameRecord>& frames) {
+    std::string text = "frame,triangles,folds,unfolds,changes,node_tests,cut_ms,index_ms,uploaded_bytes,draw_ms,frame_ms\n";
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+        const FrameRecord& f = frames[i];
+        text += std::to_string(i) + "," + std::to_string(f.stats.triangles) + "," + std::to_string(f.stats.folds) + "," +
+                std::to_string(f.stats.unfolds) + "," + std::to_string(f.changes()) + "," +
+                std::to_string(f.stats.node_tests) + "," + cell(f.cut_ms) + "," + cell(f.index_ms) + "," +
+                cell(f.uploaded_bytes) + "," + cell(f.draw_ms) + "," + cell(f.frame_ms) + "\n";
+    }
+    return text;
+}
+
+template <class Value>
+std::vector<double> column(const std::vector<FrameRecord>& frames, Value value) {
+    std::vector<double> values;
+    values.reserve(frames.size());
+    for (const FrameRecord& frame : frames) values.push_back(static_cast<double>(value(frame)));
+    return values;
+}
+
+perception::Image plot_of(const std::vector<FrameRecord>& frames, const std::string& title) {
+    PanelPlot plot;
+    plot.title = title;
+    plot.x_label = "frame";
+    plot.panels = {
+        {"cut and index buffer, ms", {0.75f, 0.2f, 0.1f}, column(frames, [](auto& f) { return f.cut_ms + f.index_ms; })},
+        {"triangles", {0.1f, 0.35f, 0.75f}, column(frames, [](auto& f) { return f.stats.triangles; })},
+        {"changes (folds and unfolds)", {0.1f, 0.55f, 0.25f}, column(frames, [](auto& f) { return f.changes(); })}};
+    if (!frames.empty() && !std::isnan(frames.front().frame_ms) && !std::isnan(frames.front().draw_ms)) {
+        plot.panels.insert(plot.panels.begin(),
+                           {"frame, ms", {0.35f, 0.2f, 0.5f}, column(frames, [](auto& f) { return f.frame_ms; })});
+        plot.panels.push_back(
+            {"uploaded bytes", {0.7f, 0.45f, 0.0f}, column(frames, [](auto& f) { return f.uploaded_bytes; })});
+    }
+    return draw(plot);
+}
+
+double median(std::vector<double> values) {
+    values.erase(std::remove_if(values.begin(), values.end(), [](double v) { return !std::isfinite(v); }), values.end());
+    if (values.empty()) return not_drawn;
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+double largest(const std::vector<double>& values) {
+    double most = not_drawn;
+    for (const double v : values) most = std::fmax(most, v);
+    return most;
+}
+
+// The columns of the summary: their names in JSON, for people, and their values. Frames after the first: that one makes the cut.
+struct Measure {
+    const char* key;
+    const char* label;
+    std::vector<double> values;
+};
+
+std::vector<Measure> measures_of(const std::vector<FrameRecord>& frames) {
+    const std::vector<FrameRecord> later(frames.begin() + (frames.size() > 1 ? 1 : 0), frames.end());
+    return {{"triangles", "triangles", column(later, [](auto& f) { return f.stats.triangles; })},
+            {"changes", "changes", column(later, [](auto& f) { return f.changes(); })},
+            {"node_tests", "nodes tested", column(later, [](auto& f) { return f.stats.node_tests; })},
+            {"cut_ms", "cut, ms", column(later, [](auto& f) { return f.cut_ms; })},
+            {"index_ms", "index buffer, ms", column(later, [](auto& f) { return f.index_ms; })},
+            {"uploaded_bytes", "uploaded bytes", column(later, [](auto& f) { return f.uploaded_bytes; })},
+            {"draw_ms", "drawn in, ms", column(later, [](auto& f) { return f.draw_ms; })},
+            {"frame_ms", "frame, ms", column(later, [](auto& f) { return f.frame_ms; })}};
+}
+
+Json to_json(const Scene& scene, const std::vector<FrameRecord>& frames, const Simplification& last) {
+    Json json = {{"source_triangles", scene.tree.triangle_count()},
+                 {"frames", frames.size()},
+                 {"first_cut_ms", number_or_null(frames.front().cut_ms + frames.front().index_ms)}};
+    for (const Measure& m : measures_of(frames))
+        json[m.key] = {{"median", number_or_null(median(m.values))}, {"largest", number_or_null(largest(m.values))}};
+    json["imperceptible_from_m"] = number_or_null(last.imperceptible_from_m);
+    json["effects"] = app::to_json(last, not_drawn)["effects"];
+    return json;
+}
+
+void print(const Scene& scene, const std::vector<FrameRecord>& frames, const Simplification& last) {
+    print_table({{"frames", grouped(frames.size())},
+                 {"triangles of the model", grouped(scene.tree.triangle_count())},
+                 {"first cut", rounded(frames.front().cut_ms + frames.front().index_ms, 3) + " ms"}});
+    std::vector<std::vector<std::string>> rows = {{"", "median", "largest"}};
+    for (const Measure& m : measures_of(frames))
+        if (std::isfinite(median(m.values)))
+            rows.push_back({m.label, rounded(median(m.values), 4), rounded(largest(m.values), 4)});
+    print_table(rows);
+    const std::string metres = std::isfinite(last.imperceptible_from_m) ? " m" : "";
+    print_table({{"imperceptible from", rounded(last.imperceptible_from_m, 3) + metres}});
+    std::printf("effects of the last frame\n");
+    for (const Effect& effect : last.effects)
+        std::printf("  %-3s  %s: %s\n", effect.on ? "on" : "off", effect.name.c_str(), effect.why.c_str());
+}
+
+class FlyThrough {
+public:
+    FlyThrough(Scene& scene, const FlyThroughOptions& options)
+        : scene_(scene), options_(options), what_(options.what), cut_(scene.tree) {
+        follower_.set_threshold(options.threshold);
+    }
+
+    Result<void> run(const std::vector<CameraPose>& poses) {
+        auto drawing = make_drawing(scene_, options_.draws);
+        if (!drawing) return drawing.error();
+        const auto names = parse_pattern(options_.pictures);
+        ProgressBar bar("flying");
+        for (std::size_t i = 0; i < poses.size(); ++i) {
+            bar(static_cast<double>(i) / static_cast<double>(poses.size()), "frames");
+            take(poses[i]);
+            auto frame = next(*drawing);
+            if (!frame) return Error{frame.error().code, "Frame " + std::to_string(i) + ": " + frame.error().message};
+            if (!names) continue;
+            const auto image = code_image(*frame, scene_.display);
+            if (auto written = perception::write_image(names->with(i), image); !written) return written;
+        }
+        return {};
+    }
+
+    const std::vector<FrameRecord>& records() const { return records_; }
+    const Simplification& last() const { return last_; }
+
+private:
+    void take(const CameraPose& pose) {
+        scene_.view.eye = pose.eye;
+        scene_.view.target = pose.target;
+        scene_.view.up = pose.up;
+        if (pose.gaze_px) what_.gaze_px = pose.gaze_px;
+    }
+
+    Result<render::Frame> next(std::optional<Drawing>& drawing) {
+        const auto start = Clock::now();
+        auto simplified = follower_.follow(cut_, scene_, what_);
+        if (!simplified) return simplified.error();
+        last_ = std::move(*simplified);
+        FrameRecord record;
+        record.stats = last_.stats;
+        record.cut_ms = last_.adapt_ms;
+        record.index_ms = last_.extract_ms;
+        Result<render::Frame> frame = render::Frame{};
+        if (drawing) {
+            render::DrawOptions draw = options_.draw;
+            draw.background = scene_.background;
+            frame = drawing->renderer.draw(cut_, scene_.view, draw, scene_.placement);
+            if (!frame) return frame;
+            record.draw_ms = frame->draw_ms;
+            record.uploaded_bytes = static_cast<double>(drawing->renderer.uploaded_bytes());
+        }
+        record.frame_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+        records_.push_back(record);
+        return frame;
+    }
+
+    Scene& scene_;
+    const FlyThroughOptions& options_;
+    WhatOptions what_;
+    vdtree::Cut cut_;
+    Follower follower_;
+    std::vector<FrameRecord> records_;
+    Simplification last_;
+};
+
+// The folder that the pictures go to is made where it is missing.
+Result<void> make_folder_of(const std::string& name) {
+    const std::filesystem::path folder = std::filesystem::path(name).parent_path();
+    if (folder.empty()) return {};
+    std::error_code failed;
+    std::filesystem::create_directories(folder, failed);
+    if (!failed) return {};
+    return Error{ErrorCode::io_failure,
+                 "Cannot make the folder '" + folder.string() + "' for the pictures: " + failed.message() + "."};
+}
+
+} // namespace
+
+std::string complaint_about_picture_names(const std::string& pattern) {
+    if (parse_pattern(pattern) && (pattern.ends_with(".png") || pattern.ends_with(".PNG"))) return {};
+    return "with --path, -o must be a name with one %d or %04d for the frame's number and end in .png, not '" + pattern + "'.";
+}
+
+Result<void> fly_through(Scene& scene, const FlyThroughOptions& options) {
+    const auto poses = read_camera_path(options.path, scene.view);
+    if (!poses) return poses.error();
+    auto report = JsonReport::open(options.json);
+    if (!report) return report.error();
+    std::optional<OutputFile> csv;
+    if (!options.csv.empty()) {
+        auto file = OutputFile::create(options.csv);
+        if (!file) return file.error();
+        csv = std::move(*file);
+    }
+    if (!options.pictures.empty())
+        if (auto made = make_folder_of(options.pictures); !made) return made;
+
+    FlyThrough flight(scene, options);
+    if (auto flown = flight.run(*poses); !flown) return flown;
+    if (csv)
+        if (auto ok = csv->write(to_csv(flight.records())); !ok) return ok;
+    if (auto ok = report->prepare(to_json(scene, flight.records(), flight.last())); !ok) return ok;
+    if (!options.plot.empty()) {
+        const std::string title = grouped(scene.tree.triangle_count()) + " triangles, " + options.path;
+        if (auto ok = perception::write_image(options.plot, plot_of(flight.records(), title)); !ok) return ok;
+    }
+    if (csv)
+        if (auto ok = csv->commit(); !ok) return ok;
+    if (auto ok = report->publish(); !ok) return ok;
+    if (!report->is_on_stdout()) print(scene, flight.records(), flight.last());
+    return {};
+}
+
+} // namespace unseen::app

@@ -1,0 +1,29 @@
+// A camera's path through a scene, with one cut that follows it.
+#pragma once
+
+#include <string>
+
+#include <render/renderer.h>
+
+#include "scene.h"
+#include "simplification.h"
+
+namespace unseen::app {
+
+struct FlyThroughOptions {
+    std::string path;     // see camera_path.h
+    std::string pictures; // a name with one %d (or %04d, ...) for the frame's number; empty: none
+    std::string csv, plot, json;
+    double threshold = 1; // fold costs up to it
+    bool draws = true;
+    WhatOptions what;
+    render::DrawOptions draw;
+};
+
+// Ends in an error about --output unless it is a pattern for names of PNGs.
+std::string complaint_about_picture_names(const std::string& pattern);
+
+// Prints a summary, and writes what was asked for. The scene's view is the first one and changes.
+Result<void> fly_through(Scene& scene, const FlyThroughOptions& options);
+
+} // namespace unseen::app

@@ -1,0 +1,98 @@
+// unseen make: meshes made of other meshes.
+#include <filesystem>
+#include <memory>
+
+#include <subdivide.h>
+#include <vdtree/mesh_io.h>
+
+#include "command.h"
+#include "model_file.h"
+#include "options.h"
+#include "progress_bar.h"
+#include "report.h"
+#include "terminal.h"
+
+namespace unseen::app {
+namespace {
+
+struct SubdivideArguments {
+    std::string mesh, out, json;
+    SubdivideOptions options;
+    std::uint32_t triangles = 0; // 0: as many as the rounds give
+};
+
+Result<vdtree::Mesh> subdivide_with_progress(vdtree::Mesh mesh, const SubdivideArguments& a) {
+    ProgressBar bar("subdividing");
+    SubdivideOptions options = a.options;
+    options.progress = bar;
+    if (a.triangles > 0) options.triangles = a.triangles;
+    return subdivide(std::move(mesh), options);
+}
+
+Result<void> write(const std::string& file, const vdtree::Mesh& mesh) {
+    ProgressBar bar("writing " + file);
+    return vdtree::write_mesh(file, mesh.view(), bar);
+}
+
+Result<int> run(const SubdivideArguments& a) {
+    std::error_code unknown;
+    if (std::filesystem::equivalent(a.mesh, a.out, unknown))
+        return Error{ErrorCode::invalid_argument, "'" + a.out + "' is the mesh itself: give the result another name."};
+    auto report = JsonReport::open(a.json);
+    if (!report) return report.error();
+    auto read = read_mesh_file(a.mesh);
+    if (!read) return read.error();
+    const std::uint64_t before = read->mesh.triangles.size();
+    const auto mesh = subdivide_with_progress(std::move(read->mesh), a);
+    if (!mesh) return mesh.error();
+
+    const Json json = {{"source_triangles", before},
+                       {"triangles", mesh->triangles.size()},
+                       {"vertices", mesh->positions.size()}};
+    if (auto ok = report->prepare(json); !ok) return ok.error();
+    if (auto ok = write(a.out, *mesh); !ok) return ok.error();
+    if (auto ok = report->publish(); !ok) return ok.error();
+    if (!report->is_on_stdout())
+        print_table({{"triangles", grouped(mesh->triangles.size()) + " of " + grouped(before)},
+                     {"vertices", grouped(mesh->positions.size())}});
+    return exit_done;
+}
+
+Command subdivide_command(CLI::App& make) {
+    auto a = std::make_shared<SubdivideArguments>();
+    CLI::App* verb = make.add_subcommand("subdivide", "Split the triangles of a mesh into smaller ones, a little rough");
+    verb->add_option("MESH", a->mesh, "PLY, OBJ, OFF, STL or glTF")->required();
+    verb->add_option("-o,--output", a->out, "The larger mesh")
+        ->type_name("OUT.ply|.obj|.glb")
+        ->required()
+        ->check(ending_in({".ply", ".obj", ".glb"}));
+    CLI::Option* times = verb->add_option("--times", a->options.times, "Make four of every triangle, N times")
+                             ->type_name("N")
+                             ->check(within(0, most_subdivisions));
+    CLI::Option* triangles = add_triangles_option(
+        *verb, a->triangles, "Instead: up to N triangles; the last round splits the longest edges alone");
+    verb->add_option("--noise", a->options.noise,
+                     "How far new vertices may move, as a share of their edge's length, 0..1 (default: 0.02)")
+        ->type_name("SHARE")
+        ->check(within(0, 1));
+    verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
+    verb->callback([=] {
+        if (times->count() + triangles->count() != 1) refuse("give either --times or --triangles.");
+    });
+    verb->footer("A closed mesh stays closed, and the result depends on the mesh and the options alone.\n\n"
+                 "Examples:\n  unseen make subdivide dragon.ply -o dragon_14m.ply --times 2\n"
+                 "  unseen make subdivide dragon.ply -o dragon_28m.ply --triangles 28000000 --noise 0.01");
+    return {verb, [a] { return run(*a); }};
+}
+
+} // namespace
+
+Command make_command(CLI::App& app) {
+    CLI::App* verb = app.add_subcommand("make", "Make meshes of other meshes, to try things out with");
+    verb->require_subcommand(1);
+    verb->footer("Examples:\n  unseen make subdivide dragon.ply -o dragon_14m.ply --times 2\n\n"
+                 "'unseen make subdivide --help' tells more.");
+    return {verb, subdivide_command(*verb).run};
+}
+
+} // namespace unseen::app

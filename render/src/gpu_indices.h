@@ -1,0 +1,74 @@
+// The index buffer on the GPU: kept current by what changed, or brought there as a whole.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include <render/gl_object.h>
+#include <render/program.h>
+#include <vdtree/cut.h>
+
+#include "gl.h"
+
+namespace unseen::render {
+
+// An index buffer and where it came from. Writes lead from the version `writes_from` to `version`.
+struct IndexState {
+    std::span<const std::uint32_t> indices;
+    std::uint64_t version = 0; // another one for every content; 0: unknown
+    std::uint64_t writes_from = 0;
+    std::optional<std::span<const vdtree::IndexWrite>> writes = {};
+};
+
+// The buffer lies in the GPU's own memory, which drawing reads fastest. Changes go through a small buffer that stays mapped: the CPU
+// writes pairs of place and value to the next of its parts (and waits only where the GPU has not yet read what was there
+// three parts ago), and a compute pass puts them in their places, in order with the drawing before and after it. The bytes that are
+// uploaded are those of the changes. Where a whole buffer is less, or the GPU maps nothing, the whole is uploaded.
+// Move-only; needs a current context for everything.
+class GpuIndices {
+public:
+    static Result<GpuIndices> create();
+
+    // Fails where the memory does not suffice; then the buffer is empty.
+    Result<void> update(const IndexState& state);
+
+    unsigned buffer() const noexcept { return buffer_.id(); } // another one after it has grown
+    std::uint64_t count() const noexcept { return count_; }
+    std::uint64_t uploaded_bytes() const noexcept { return uploaded_bytes_; } // by the last update
+
+private:
+    struct DeleteSync {
+        void operator()(GLsync sync) const { glDeleteSync(sync); }
+    };
+    using Fence = std::unique_ptr<std::remove_pointer_t<GLsync>, DeleteSync>;
+    struct Write {
+        std::uint32_t place = 0, value = 0;
+    };
+    static constexpr std::size_t part_count = 3; // of the frames that a driver is usually ahead
+    static constexpr std::size_t part_writes = std::size_t{1} << 16;
+
+    explicit GpuIndices(Program patch) : patch_(std::move(patch)) {}
+    void map_staging();
+    Result<void> upload_all(std::span<const std::uint32_t> indices);
+    Result<void> reserve(std::uint64_t count, bool keep);
+    bool can_patch(const IndexState& state) const;
+    void patch(std::span<const vdtree::IndexWrite> writes, std::span<const std::uint32_t> indices);
+    void apply(std::size_t part, std::size_t writes);
+
+    Program patch_;
+    Buffer buffer_;
+    std::uint64_t capacity_ = 0, count_ = 0; // indices
+    std::uint64_t version_ = 0;
+    std::uint64_t uploaded_bytes_ = 0;
+
+    Buffer staging_;
+    Write* mapped_ = nullptr; // null: not to be had
+    std::array<Fence, part_count> in_use_;
+    std::size_t next_part_ = 0;
+    std::uint64_t window_indices_ = 0; // as many as a shader may see at a time
+};
+
+} // namespace unseen::render

@@ -1,0 +1,145 @@
+// Cuts that follow a view, by the perceptual test with silhouettes: what one frame takes with its index buffer, and what it
+// goes with. `unseen bench engine` prints the same against what is promised.
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+#include <limits>
+
+#include <perception/criterion.h>
+#include <vdtree/cut.h>
+
+#include "bench_mesh.h"
+
+namespace unseen::bench {
+namespace {
+
+using vdtree::Cut;
+
+// About half of the mesh is active, or 100,000 triangles where it is larger.
+constexpr double most_of_mesh = 0.5, wanted_active = 1e5;
+
+struct Subject {
+    Subject(const vdtree::VertexTree& tree_, bool gazes) : tree(tree_), options(fold_test(gazes)), criterion(make()) {
+        if (gazes) return; // as it comes out at threshold 1
+        const double wanted = std::min(wanted_active, most_of_mesh * tree.triangle_count());
+        Cut cut(tree);
+        double low = -20, high = 20; // log2 of the threshold
+        for (int step = 0; step < 20; ++step) {
+            threshold = static_cast<float>(std::exp2((low + high) / 2));
+            (follow(cut, 0).triangles > wanted ? low : high) = std::log2(static_cast<double>(threshold));
+        }
+    }
+
+    vdtree::AdjustStats follow(Cut& cut, double degrees) const { return follow(cut, degrees, threshold); }
+    vdtree::AdjustStats follow(Cut& cut, double degrees, float at) const {
+        return *cut.follow(criterion, perception::viewpoint_of(tree, orbit(tree, degrees), options, {}, false), {at, false});
+    }
+
+    const vdtree::VertexTree& tree;
+    perception::FoldTestOptions options;
+    vdtree::DistanceCriterion criterion;
+    float threshold = 1;
+
+private:
+    static perception::FoldTestOptions fold_test(bool gazes) {
+        perception::FoldTestOptions test;
+        if (gazes) test.gaze_px = glm::dvec2(1603, 512); // 29 degrees aside
+        return test;
+    }
+    vdtree::DistanceCriterion make() const { return *perception::luebke_hallen_distances(tree, orbit(tree, 0), options); }
+};
+
+const Subject& subject(bool gazes, bool large) {
+    static const Subject foveal(tree(), false), aside(tree(), true);
+    if (!large) return gazes ? aside : foveal;
+    static const Subject foveal_large(large_tree(), false);
+    return foveal_large;
+}
+
+void follow_orbit(benchmark::State& state, bool gazes, bool large) {
+    const Subject& s = subject(gazes, large);
+    Cut cut(s.tree);
+    double degrees = 0, changes = 0, triangles = 0;
+    const double step = static_cast<double>(state.range(0)) / 10;
+    const auto next = [&] {
+        const auto stats = s.follow(cut, degrees += step);
+        benchmark::DoNotOptimize(cut.indices().data());
+        changes += static_cast<double>(stats.folds + stats.unfolds);
+        triangles = stats.triangles;
+    };
+    for (int warm_up = 0; warm_up < 5; ++warm_up) next();
+    changes = 0;
+    for (auto _ : state) next();
+    state.counters["changes"] = benchmark::Counter(changes, benchmark::Counter::kAvgIterations);
+    state.counters["triangles"] = triangles;
+}
+BENCHMARK_CAPTURE(follow_orbit, foveal, false, false)->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(follow_orbit, gaze, true, false)->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(follow_orbit, foveal_of_16_times_the_mesh, false, true)
+    ->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
+
+void follow_still(benchmark::State& state) {
+    const Subject& s = subject(false, false);
+    const vdtree::Viewpoint viewpoint = perception::viewpoint_of(s.tree, orbit(s.tree, 0), s.options, {}, false);
+    Cut cut(s.tree);
+    for (auto _ : state) {
+        benchmark::DoNotOptimize(cut.follow(s.criterion, viewpoint, {s.threshold, false}));
+        benchmark::DoNotOptimize(cut.indices().data());
+    }
+}
+BENCHMARK(follow_still)->Unit(benchmark::kNanosecond);
+
+void follow_teleport(benchmark::State& state, bool large) {
+    const Subject& s = subject(false, large);
+    Cut cut(s.tree);
+    int jump = 0;
+    for (auto _ : state) {
+        s.follow(cut, 180 * ++jump + jump % 3);
+        benchmark::DoNotOptimize(cut.indices().data());
+    }
+}
+BENCHMARK_CAPTURE(follow_teleport, mesh, false)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(follow_teleport, 16_times_the_mesh, true)->Unit(benchmark::kMillisecond);
+
+// Thresholds next to each other: the cut is the same, but every node in use is tested again.
+void tests_from_scratch(benchmark::State& state) {
+    const Subject& s = subject(false, false);
+    Cut cut(s.tree);
+    std::uint64_t tests = 0, turn = 0;
+    for (auto _ : state)
+        tests += s.follow(cut, 0, ++turn % 2 ? std::nextafter(s.threshold, 0.0f) : s.threshold).node_tests;
+    state.counters["tests/s"] = benchmark::Counter(static_cast<double>(tests), benchmark::Counter::kIsRate);
+}
+BENCHMARK(tests_from_scratch)->Unit(benchmark::kMillisecond);
+
+void budget(benchmark::State& state, bool cold) {
+    const Subject& s = subject(false, false);
+    Cut cut(s.tree);
+    vdtree::AdjustOptions options;
+    options.triangle_budget = static_cast<vdtree::Index>(std::min(wanted_active, most_of_mesh * s.tree.triangle_count()));
+    double degrees = 0;
+    for (auto _ : state) {
+        if (cold) cut = Cut(s.tree);
+        cut.adjust(perception::LuebkeHallenCriterion(s.tree, orbit(s.tree, degrees += 1), s.options), options);
+        benchmark::DoNotOptimize(cut.indices().data());
+    }
+}
+BENCHMARK_CAPTURE(budget, cold, true)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(budget, orbit_of_1_degree, false)->Unit(benchmark::kMillisecond);
+
+void resident_bytes(benchmark::State& state) {
+    const Subject& s = subject(false, false);
+    Cut cut(s.tree);
+    double degrees = 0;
+    for (auto _ : state) {
+        s.follow(cut, degrees += 0.1);
+        benchmark::DoNotOptimize(cut.indices().data());
+    }
+    const double triangles = s.tree.triangle_count();
+    state.counters["bytes/triangle"] = static_cast<double>(s.tree.byte_size()) / triangles;
+    state.counters["with_cut"] = static_cast<double>(s.tree.byte_size() + cut.byte_size()) / triangles;
+}
+BENCHMARK(resident_bytes)->Iterations(10);
+
+} // namespace
+} // namespace unseen::bench
