@@ -203,6 +203,8 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
         group.add_flag_function("--imperceptible", counted, "Fold what nobody can see on this display");
     CLI::Option* triangles =
         add_triangles_option(group, o.triangles, "At most N triangles, as inconspicuous as can be");
+    CLI::Option* fill = group.add_flag("--fill-budget", o.fill_budget, "With --triangles: use all of them, even where it cannot be seen");
+    add_number(group, "--milliseconds", o.milliseconds, not_negative(), "T", "The best cut that T milliseconds are enough for");
     CLI::Option* pixels = group.add_option("--pixels", o.pixels, "Fold what is smaller than E pixels, seen or not")
                               ->type_name("E")
                               ->check(positive());
@@ -215,6 +217,8 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
         const std::size_t given = full->count() + imperceptible->count() + triangles->count() + pixels->count();
         if (given > 1)
             refuse("--full, --imperceptible, --triangles and --pixels exclude each other: give one of them.");
+        if (*fill && !*triangles) refuse("--fill-budget needs --triangles N.");
+        if (o.milliseconds && *full) refuse("--milliseconds and --full exclude each other.");
         if (*full) o.mode = Mode::full;
         if (*triangles) o.mode = Mode::budget;
         if (*pixels) o.mode = Mode::pixels;

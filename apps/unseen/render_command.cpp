@@ -57,7 +57,9 @@ Result<int> run(RenderArguments& a) {
     if (!renderer) return renderer.error();
 
     vdtree::Cut cut(scene->tree);
-    const Simplification result = simplify(cut, *scene, a.what, Purpose::picture);
+    const auto simplified = simplify(cut, *scene, a.what, Purpose::picture);
+    if (!simplified) return simplified.error();
+    const Simplification& result = *simplified;
     render::DrawOptions options = a.draw;
     options.background = scene->background;
     const auto frame = renderer->draw(cut, scene->view, options, scene->placement);

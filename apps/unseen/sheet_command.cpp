@@ -108,7 +108,9 @@ Result<std::vector<Column>> make_columns(const Scene& scene, const SheetArgument
     std::vector<Column> columns = wishes(scene, a);
     for (Column& column : columns) {
         vdtree::Cut cut(scene.tree);
-        column.simplification = simplify(cut, scene, column.what, Purpose::picture);
+        auto simplified = simplify(cut, scene, column.what, Purpose::picture);
+        if (!simplified) return simplified.error();
+        column.simplification = std::move(*simplified);
         if (auto ok = draw_pictures(column, cut, scene, a, *renderer); !ok) return ok.error();
         if (&column == &columns.front()) continue;
         if (auto ok = judge(column, columns.front(), scene); !ok) return ok.error();

@@ -202,9 +202,20 @@ void add_effects(Simplification& result, const Scene& scene, const WhatOptions& 
                       distance_effect(what, result)};
 }
 
+Effect time_limit_effect(const WhatOptions& what, const Simplification& result) {
+    if (!what.milliseconds) return {"time limit", false, "none is given"};
+    return {"time limit", true,
+            result.stats.is_complete ? "the cut was made within it" : "it ended the cut; the worst folds were undone first"};
+}
+
 } // namespace
 
-Simplification simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
+Result<Simplification> simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
+    if (what.fill_budget || what.milliseconds) {
+        Follower follower;
+        follower.set_hysteresis(1);
+        return follower.follow(cut, scene, what, purpose);
+    }
     if (is_perceptual(what)) scene.csf_table(); // built once; not this cut's time
     Simplification result;
     result.source_triangles = scene.tree.triangle_count();
@@ -224,7 +235,9 @@ Simplification simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions&
 
 Result<const vdtree::DistanceCriterion*> Follower::criterion_for(const Scene& scene, const WhatOptions& what) {
     const bool perceptual = is_perceptual(what);
-    Key key{what.test, perceptual ? 0 : what.pixels, false, 0, scene.view.width, scene.view.height, scene.view.fov_y_degrees, 0};
+    // A budget goes by the order of the costs alone, for which any tolerance will do.
+    const double tolerance_px = what.mode == Mode::pixels ? what.pixels : 1;
+    Key key{what.test, perceptual ? 0 : tolerance_px, false, 0, scene.view.width, scene.view.height, scene.view.fov_y_degrees, 0};
     if (perceptual) {
         key.background = scene.background;
         key.has_gaze = what.gaze_px.has_value();
@@ -239,8 +252,8 @@ Result<const vdtree::DistanceCriterion*> Follower::criterion_for(const Scene& sc
     if (criterion_ && key == key_) return &*criterion_;
 
     auto made = [&]() -> Result<vdtree::DistanceCriterion> {
-        if (what.test == FoldTest::extent) return vdtree::extent_criterion(scene.tree, scene.view, what.pixels);
-        if (what.test == FoldTest::displacement) return vdtree::displacement_criterion(scene.tree, scene.view, what.pixels);
+        if (what.test == FoldTest::extent) return vdtree::extent_criterion(scene.tree, scene.view, tolerance_px);
+        if (what.test == FoldTest::displacement) return vdtree::displacement_criterion(scene.tree, scene.view, tolerance_px);
         perception::FoldTestOptions options = test_options(scene, what);
         if (key.has_gaze)
             options.gaze_px = glm::dvec2(scene.view.width * 0.5 + key.farthest_gaze_px, scene.view.height * 0.5);
@@ -252,10 +265,9 @@ Result<const vdtree::DistanceCriterion*> Follower::criterion_for(const Scene& sc
     return &*criterion_;
 }
 
-Result<Simplification> Follower::follow(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what) {
+Result<Simplification> Follower::follow(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
     const bool is_full = what.mode == Mode::full && cut.triangle_count() == scene.tree.triangle_count();
-    if (what.mode == Mode::budget || (what.mode == Mode::full && !is_full))
-        return simplify(cut, scene, what, Purpose::picture);
+    if (what.mode == Mode::full && !is_full) return simplify(cut, scene, what, purpose);
     Simplification result;
     result.source_triangles = scene.tree.triangle_count();
     result.dropped = scene.tree.dropped_triangles();
@@ -265,10 +277,17 @@ Result<Simplification> Follower::follow(vdtree::Cut& cut, const Scene& scene, co
         if (!criterion) return criterion.error();
         vdtree::FollowOptions options;
         options.threshold = static_cast<float>(threshold_);
-        options.cull_back_faces = culls_back_faces(scene);
+        options.cull_back_faces = purpose == Purpose::picture && culls_back_faces(scene);
+        options.milliseconds = what.milliseconds;
+        if (what.mode == Mode::budget) {
+            options.triangle_budget = what.triangles;
+            options.fill_budget = what.fill_budget;
+            options.hysteresis = hysteresis_;
+        }
         // Where all is seen, a turning window must not cost anything.
         const vdtree::Viewpoint viewpoint = perception::viewpoint_of(scene.tree, scene.view, test_options(scene, what),
-                                                                     scene.placement, !is_wholly_in_window(scene));
+                                                                     scene.placement,
+                                                                     purpose == Purpose::picture && !is_wholly_in_window(scene));
         const auto start = Clock::now();
         const auto stats = cut.follow(**criterion, viewpoint, options);
         result.adapt_ms = milliseconds_since(start);
@@ -278,13 +297,12 @@ Result<Simplification> Follower::follow(vdtree::Cut& cut, const Scene& scene, co
     const auto adapted = Clock::now();
     static_cast<void>(cut.indices());
     result.extract_ms = milliseconds_since(adapted);
-    // No fold costs more than the threshold.
-    if (!is_full && result.stats.max_fold_cost == 0) result.stats.max_fold_cost = static_cast<float>(threshold_);
     result.imperceptible_from_m = imperceptible_from(scene, what, result.stats);
-    add_effects(result, scene, what, Purpose::picture);
+    add_effects(result, scene, what, purpose);
     if (is_full) return result;
     result.effects.push_back(back_face_effect(scene));
-    if (is_perceptual(what))
+    result.effects.push_back(time_limit_effect(what, result));
+    if (is_perceptual(what) && what.mode != Mode::budget)
         for (Effect& effect : result.effects)
             if (effect.name == imperceptible_distance)
                 effect.why = "the display's distance times " + rounded(threshold_, 4) + ", above which no fold costs";

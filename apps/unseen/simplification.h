@@ -36,7 +36,7 @@ enum class Purpose {
 };
 
 // Adjusts `cut`, which must be of the scene's tree. Cost: about a microsecond for each node test.
-Simplification simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose);
+Result<Simplification> simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose);
 
 // Keeps a cut at what moving views of a scene ask for. In the modes imperceptible and pixels the cost goes with what changes from
 // one call to the next; the others begin anew each time (full: once).
@@ -46,8 +46,12 @@ public:
     // units of their tolerance.
     void set_threshold(double threshold) { threshold_ = threshold; } // precondition: positive and finite
 
+    // Of triangle budgets: by what factor the largest fold cost may exceed the least, so that cuts keep still; 1: not at all.
+    void set_hysteresis(float hysteresis) { hysteresis_ = hysteresis; }
+
     // Adjusts `cut`, which must be of the scene's tree and the same from call to call.
-    Result<Simplification> follow(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what);
+    Result<Simplification> follow(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what,
+                                  Purpose purpose = Purpose::picture);
 
 private:
     // What a criterion depends on, besides the tree, its light and the display.
@@ -64,6 +68,7 @@ private:
     Result<const vdtree::DistanceCriterion*> criterion_for(const Scene& scene, const WhatOptions& what);
 
     double threshold_ = 1;
+    float hysteresis_ = 1.1f;
     Key key_;
     std::optional<vdtree::DistanceCriterion> criterion_;
 };

@@ -33,7 +33,9 @@ Result<int> run(const SimplifyArguments& a) {
     if (!scene) return scene.error();
 
     vdtree::Cut cut(scene->tree);
-    Simplification result = simplify(cut, *scene, a.what, Purpose::mesh);
+    auto simplified = simplify(cut, *scene, a.what, Purpose::mesh);
+    if (!simplified) return simplified.error();
+    Simplification& result = *simplified;
     const auto start = std::chrono::steady_clock::now();
     const vdtree::Mesh mesh = vdtree::extract_mesh(cut);
     result.extract_ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
