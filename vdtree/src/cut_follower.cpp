@@ -264,7 +264,7 @@ void CutFollower::make_all_due(const Cut& cut) {
     forget_slots();
     const auto subtree_end = tree_.subtree_end();
     const Verdict due{};
-    for (NodeId node = 0; node < tree_.interior_count(); node = cut.is_unfolded(node) ? node + 1 : subtree_end[node]) {
+    for (NodeId node = 0; node < tree_.interior_count(); node = cut.is_unfolded_interior(node) ? node + 1 : subtree_end[node]) {
         set_deadlines(add_live(node), due);
     }
 }
@@ -315,6 +315,7 @@ void CutFollower::settle_due(Cut& cut) {
 
 void CutFollower::collect_due() {
     due_.clear();
+    due_slots_.clear();
     due_blocks_.clear();
     // In floats the clock may be a little late.
     const std::int32_t position = bits_of(std::nextafter(static_cast<float>(position_clock_), 1e30f));
@@ -327,8 +328,11 @@ void CutFollower::collect_due() {
     for (const std::uint32_t block : due_blocks_) {
         const std::size_t first = block * block_slots;
         for (std::uint64_t due = due_bits<block_slots>(&position_due_[first], &facing_due_[first], position, facing, block_slots); due;
-             due &= due - 1)
-            due_.push_back(node_[first + static_cast<std::size_t>(std::countr_zero(due))]);
+             due &= due - 1) {
+            const std::size_t slot = first + static_cast<std::size_t>(std::countr_zero(due));
+            due_slots_.push_back(static_cast<Slot>(slot));
+            due_.push_back(node_[slot]);
+        }
     }
 }
 
@@ -343,43 +347,49 @@ void CutFollower::settle(Cut& cut) {
             stats_.is_complete = false;
             break;
         }
-        test_due(cut, std::span(due_).subspan(first, std::min(piece, due_.size() - first)));
+        const std::size_t count = std::min(piece, due_.size() - first);
+        test_due(cut, std::span(due_).subspan(first, count), std::span(due_slots_).subspan(first, count));
     }
     // Ancestors first: what they fold is gone.
     std::sort(folding_.begin(), folding_.end());
     for (const NodeId node : folding_)
-        if (cut.is_unfolded(node)) cut.fold_below(node, [&](NodeId folded) { remove_children(folded); });
+        if (cut.is_unfolded_interior(node)) cut.fold_below(node, [&](NodeId folded) { remove_children(folded); });
     unfold_wave(cut);
     for (const std::uint32_t block : due_blocks_) refresh_block(block);
     if (std::max(position_clock_, facing_clock_) > longest_run * length_per_radian_) restart_clocks();
 }
 
-void CutFollower::test_due(const Cut& cut, std::span<const NodeId> nodes) {
+void CutFollower::test_due(const Cut& cut, std::span<const NodeId> nodes, std::span<const Slot> slots) {
     const float keeping = keeping_factor();
     if (keeping == 1) {
-        test_nodes(cut, nodes);
+        test_nodes(cut, nodes, slots);
         return;
     }
     // What is unfolded stays so down to a somewhat lower cost.
-    const auto is_unfolded = [&](NodeId node) { return cut.is_unfolded(node); };
-    kept_.assign(nodes.begin(), nodes.end());
-    const auto folded = std::stable_partition(kept_.begin(), kept_.end(), is_unfolded);
-    tester_->set_threshold(threshold_ / keeping);
-    test_nodes(cut, {kept_.begin(), folded});
-    tester_->set_threshold(threshold_);
-    test_nodes(cut, {folded, kept_.end()});
+    for (const bool unfolded : {true, false}) {
+        kept_.clear();
+        kept_slots_.clear();
+        for (std::size_t i = 0; i < nodes.size(); ++i) {
+            if (cut.is_unfolded_interior(nodes[i]) != unfolded) continue;
+            kept_.push_back(nodes[i]);
+            kept_slots_.push_back(slots[i]);
+        }
+        tester_->set_threshold(unfolded ? threshold_ / keeping : threshold_);
+        test_nodes(cut, kept_, kept_slots_);
+    }
 }
 
-void CutFollower::test_nodes(const Cut& cut, std::span<const NodeId> nodes) {
+void CutFollower::test_nodes(const Cut& cut, std::span<const NodeId> nodes, std::span<const Slot> slots) {
     verdicts_.resize(nodes.size());
     tester_->test(nodes, verdicts_);
     stats_.node_tests += nodes.size();
     for (std::size_t i = 0; i < nodes.size(); ++i) {
         const NodeId node = nodes[i];
-        set_deadlines(slot_of_node_[node], verdicts_[i]);
-        const bool was_unfolded = cut.is_unfolded(node);
-        if (was_unfolded && !verdicts_[i].unfolded) folding_.push_back(node);
-        if (!was_unfolded && verdicts_[i].unfolded && tree_.is_sound(node)) wave_.push_back(node);
+        set_deadlines(slots[i], verdicts_[i]);
+        const bool was_unfolded = cut.is_unfolded_interior(node);
+        if (was_unfolded == verdicts_[i].unfolded) continue;
+        if (was_unfolded) folding_.push_back(node);
+        else if (tree_.is_sound(node)) wave_.push_back(node);
     }
 }
 

@@ -51,8 +51,8 @@ private:
     void collect_due();
     void settle_due(Cut& cut);
     void settle(Cut& cut);
-    void test_due(const Cut& cut, std::span<const NodeId> nodes);
-    void test_nodes(const Cut& cut, std::span<const NodeId> nodes);
+    void test_due(const Cut& cut, std::span<const NodeId> nodes, std::span<const Slot> slots);
+    void test_nodes(const Cut& cut, std::span<const NodeId> nodes, std::span<const Slot> slots);
     float keeping_factor() const;
     void unfold_wave(Cut& cut);
     Slot add_live(NodeId node);
@@ -90,6 +90,7 @@ private:
 
     // Of one frame.
     std::vector<NodeId> wave_, next_wave_, folding_, due_, kept_;
+    std::vector<Slot> due_slots_, kept_slots_;
     std::vector<Verdict> verdicts_;
     std::vector<std::uint32_t> due_blocks_;
     AdjustStats stats_;

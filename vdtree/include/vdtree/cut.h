@@ -124,6 +124,7 @@ public:
 private:
     friend class CutFollower;
 
+    bool is_unfolded_interior(NodeId node) const noexcept { return (unfolded_[node >> 6] >> (node & 63)) & 1; }
     void set_unfolded(NodeId node);
     void set_folded(NodeId node);
     void assign(NodeId node);
