@@ -33,4 +33,8 @@ Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file) {
     return build_tree_of(std::move(*read), {});
 }
 
+Result<vdtree::VertexTree> open_tree(const std::filesystem::path& file) {
+    return vdtree::is_tree_file(file) ? vdtree::map_tree(file) : load_tree(file);
+}
+
 } // namespace unseen::app

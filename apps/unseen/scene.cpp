@@ -108,7 +108,7 @@ Result<Scene> load_scene(const std::filesystem::path& model, const ViewOptions& 
         if (!read) return read.error();
         csf = std::move(*read);
     }
-    auto tree = load_tree(model);
+    auto tree = open_tree(model);
     if (!tree) return tree.error();
 
     Scene scene{std::move(*tree), {}, *shown_on, std::move(csf), {}, *background, false};
