@@ -14,18 +14,17 @@ namespace unseen::support {
 // What build_tree() would hand to a clusterer. The mesh must stay; it has no degenerate triangles or unused vertices.
 struct ClusteringTask {
     explicit ClusteringTask(const vdtree::Mesh& mesh)
-        : view(mesh.view()), coincident(vdtree::find_coincident(view.positions)), areas(vdtree::vertex_areas(view)),
-          normals(vdtree::vertex_normals(view, coincident, vdtree::Closedness::open)) {
+        : view(mesh.view()), coincident(vdtree::find_coincident(view.positions)),
+          surface(vdtree::analyse_surface(view, coincident)) {
         const bool prelit = !view.colours.empty();
         for (std::size_t v = 0; v < view.positions.size(); ++v)
-            luminance.push_back(vdtree::vertex_luminance(normals[v], prelit ? &view.colours[v] : nullptr, {}, prelit));
+            luminance.push_back(vdtree::vertex_luminance(surface.normals[v], prelit ? &view.colours[v] : nullptr, {}, prelit));
     }
-    vdtree::ClusterInput input() const { return {view, luminance, normals, areas, coincident}; }
+    vdtree::ClusterInput input() const { return {view, luminance, surface.normals, surface.areas, coincident}; }
 
     vdtree::MeshView view;
     std::vector<vdtree::Index> coincident;
-    std::vector<double> areas;
-    std::vector<glm::vec3> normals;
+    vdtree::Surface surface;
     std::vector<float> luminance;
 };
 
