@@ -20,7 +20,7 @@ using vdtree::Closedness;
 using vdtree::Mesh;
 
 Closedness closedness(const Mesh& mesh) {
-    return vdtree::analyse_topology(mesh.view(), vdtree::find_coincident(mesh.positions)).closedness;
+    return vdtree::analyse_surface(mesh.view(), vdtree::find_coincident(mesh.positions)).closedness;
 }
 
 Mesh subdivided(const Mesh& mesh, const SubdivideOptions& options) {

@@ -242,6 +242,11 @@ struct Lanes {
         const Floats a = weight * slab.lo, b = weight * slab.hi;
         return {min_of(a, b), max_of(a, b)};
     }
+    // Values of 1 or -1 times the slab.
+    static UNSEEN_INLINE Interval turned(const Interval& slab, float sign) {
+        return sign > 0 ? slab : Interval{-slab.hi, -slab.lo};
+    }
+
     // The slabs of all lanes as floats.
     struct Slabs {
         static constexpr std::size_t count = NormalSlabs::axis_count * kernel_lanes;
@@ -302,9 +307,21 @@ struct Lanes {
         Best best{all(-1e30f), all(1e30f)};
         best.offer(along[0].lo + along[1].lo + along[2].lo, along[0].hi + along[1].hi + along[2].hi,
                    squared[0] + squared[1] + squared[2] <= limit);
+        const Floats radius = load(batch.radius + first);
+        const Floats needed = radius + distance * rounding;
+        // Where the box alone proves everything, with much to spare, the rest would only add to that.
+        constexpr float scale = 1 / (slab_units * widest_reach), plenty = 0.125f; // of the distance
+        const Floats spare = needed + distance * plenty;
+        if (!any(~((best.least * scale > spare) | (-best.largest * scale > spare)))) {
+            store(gaps.front + first, best.least * scale - needed);
+            store(gaps.back + first, -best.largest * scale - needed);
+            return;
+        }
         constexpr float signs[4][3] = {{1, 1, 1}, {-1, 1, 1}, {1, -1, 1}, {1, 1, -1}};
+#pragma GCC unroll 4
         for (std::size_t d = 0; d < 4; ++d) {
             const Interval diagonal = slabs(3 + d, first);
+#pragma GCC unroll 3
             for (int k = 0; k < 3; ++k) {
                 // The diagonal in place of axis k: e = weight * diagonal + rest along i and j.
                 const int i = (k + 1) % 3, j = (k + 2) % 3;
@@ -313,16 +330,14 @@ struct Lanes {
                 const Interval a = scaled(diagonal, weight * sqrt3), b = scaled(slab[i], e[i] - weight * si),
                                c = scaled(slab[j], e[j] - weight * sj);
                 // The replaced coordinate, sk * (sqrt3 * diagonal - si * x_i - sj * x_j), is in this interval.
-                const Interval bi = scaled(slab[i], all(si)), bj = scaled(slab[j], all(sj));
+                const Interval bi = turned(slab[i], si), bj = turned(slab[j], sj);
                 const Floats high = diagonal.hi * sqrt3 - bi.lo - bj.lo, low = diagonal.lo * sqrt3 - bi.hi - bj.hi;
                 const Floats reach = max_of(abs_of(low), abs_of(high));
                 best.offer(a.lo + b.lo + c.lo, a.hi + b.hi + c.hi, reach * reach + squared[i] + squared[j] <= limit);
             }
         }
-        const Floats radius = load(batch.radius + first);
-        const Floats needed = radius + distance * rounding;
-        const Floats front = best.least * (1 / (slab_units * widest_reach)) - needed;
-        const Floats back = -best.largest * (1 / (slab_units * widest_reach)) - needed;
+        const Floats front = best.least * scale - needed;
+        const Floats back = -best.largest * scale - needed;
         store(gaps.front + first, front);
         store(gaps.back + first, back);
     }
