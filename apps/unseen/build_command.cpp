@@ -1,14 +1,18 @@
 // unseen build: a mesh becomes a vertex tree, once and for all.
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <memory>
+#include <optional>
 
+#include "build_team.h"
 #include "command.h"
 #include "model_file.h"
 #include "options.h"
+#include "process_team.h"
 #include "progress_bar.h"
 #include "report.h"
 #include "terminal.h"
@@ -56,32 +60,100 @@ void print(const vdtree::VertexTree& tree, double seconds) {
                  {"built in", rounded(seconds, 3) + " s"}});
 }
 
-Result<int> run(const BuildArguments& a) {
+vdtree::ReadOptions reading(const BuildArguments& a) {
+    vdtree::ReadOptions options;
+    options.colours = a.colours;
+    return options;
+}
+
+// Members of a team share the cores of their machine; the first one gets all of them when the others are done.
+vdtree::BuildOptions building(const BuildArguments& a, ProcessTeam* team) {
+    vdtree::BuildOptions options;
+    options.clusterer = a.clusterer;
+    options.threads = a.threads;
+    if (team && team->size() > 1) {
+        options.team = team;
+        const int members = team->members_on_machine();
+        if (a.threads == 0) options.threads = std::max(1, team->cores() / members);
+        options.threads_alone = a.threads == 0 ? team->cores() : a.threads * members;
+    }
+    return options;
+}
+
+Result<void> check_names(const BuildArguments& a) {
     std::error_code unknown;
     if (std::filesystem::equivalent(a.mesh, a.out, unknown))
         return Error{ErrorCode::invalid_argument, "'" + a.out + "' is the mesh itself: give the tree another name."};
     if (vdtree::is_tree_file(a.mesh))
         return Error{ErrorCode::invalid_argument, "'" + a.mesh + "' is a tree already; give a mesh."};
+    return {};
+}
+
+// What there has to be before anything is built.
+struct Source {
+    JsonReport report;
+    vdtree::ReadResult read;
+};
+
+Result<Source> open_source(const BuildArguments& a) {
+    if (const auto ok = check_names(a); !ok) return ok.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
-    vdtree::ReadOptions reading;
-    reading.colours = a.colours;
-    auto read = read_mesh_file(a.mesh, reading);
+    if (const auto ok = vdtree::prepare_tree_file(a.out); !ok) return ok.error();
+    auto read = read_mesh_file(a.mesh, reading(a));
     if (!read) return read.error();
+    if (const auto ok = vdtree::check_buildable(read->mesh.view()); !ok) return ok.error();
+    return Source{std::move(*report), std::move(*read)};
+}
 
-    vdtree::BuildOptions building;
-    building.clusterer = a.clusterer;
-    building.threads = a.threads;
+Result<vdtree::VertexTree> build(const BuildArguments& a, vdtree::ReadResult&& read, ProcessTeam* team) {
+    auto tree = build_tree_of(std::move(read), building(a, team));
+    if (team && tree) team->leave(); // else the others go when this one ends
+    return tree;
+}
+
+// The first of a team, or the only one.
+Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
+    auto source = open_source(a);
+    if (team) {
+        const Result<void> own = source ? Result<void>() : Result<void>(source.error());
+        const auto ok = agree(*team, own, source ? fingerprint(source->read.mesh.view(), a.clusterer) : 0);
+        if (!ok) {
+            team->leave();
+            return ok.error();
+        }
+    }
+    if (!source) return source.error();
     const auto start = std::chrono::steady_clock::now();
-    auto tree = build_tree_of(std::move(*read), building);
+    auto tree = build(a, std::move(source->read), team);
     if (!tree) return tree.error();
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
-    if (auto ok = report->prepare(to_json(*tree, seconds)); !ok) return ok.error();
+    JsonReport& report = source->report;
+    if (auto ok = report.prepare(to_json(*tree, seconds)); !ok) return ok.error();
     if (auto ok = write(a.out, *tree); !ok) return ok.error();
-    if (auto ok = report->publish(); !ok) return ok.error();
-    if (!report->is_on_stdout()) print(*tree, seconds);
+    if (auto ok = report.publish(); !ok) return ok.error();
+    if (!report.is_on_stdout()) print(*tree, seconds);
     return exit_done;
+}
+
+// The others: they write nothing, and print nothing unless they fail alone.
+Result<int> help(const BuildArguments& a, ProcessTeam& team) {
+    const auto read = vdtree::read_mesh(a.mesh, reading(a));
+    const Result<void> own = read ? vdtree::check_buildable(read->mesh.view()) : Result<void>(read.error());
+    const auto ok = agree(team, own, own ? fingerprint(read->mesh.view(), a.clusterer) : 0);
+    if (ok)
+        if (const auto helped = vdtree::help_build_tree(read->mesh.view(), building(a, &team)); !helped)
+            return helped.error();
+    team.leave();
+    return ok ? exit_done : exit_failed;
+}
+
+Result<int> run(const BuildArguments& a) {
+    const auto team = ProcessTeam::join();
+    if (!team) return team.error();
+    ProcessTeam* members = team->get();
+    return members && members->rank() != 0 ? help(a, *members) : lead(a, members);
 }
 
 } // namespace
@@ -101,12 +173,13 @@ Command build_command(CLI::App& app) {
     verb->add_option("--colours", a->colours, "How the file's colours are encoded: srgb (default) or linear")
         ->type_name("NAME")
         ->transform(CLI::CheckedTransformer(encodings).description(""));
-    verb->add_option("--threads", a->threads, "Threads to build with; the tree is the same (default: all cores)")
+    verb->add_option("--threads", a->threads, "Threads of each process; the tree is the same (default: all cores)")
         ->type_name("N")
         ->check(within(1, most_threads));
     verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
     verb->footer("Examples:\n  unseen build bunny.ply -o bunny.vdt\n"
-                 "  unseen build city.obj -o city.vdt --clusterer octree --threads 4");
+                 "  unseen build city.obj -o city.vdt --clusterer octree --threads 4\n"
+                 "  mpirun -np 4 unseen build city.obj -o city.vdt");
     return {verb, [a] { return run(*a); }};
 }
 

@@ -68,9 +68,15 @@ protected:
 
     pid_t start(const std::vector<std::string>& arguments, const fs::path& out, const fs::path& err,
                 const std::string& input = {}) const {
-        write_text(out.string() + ".in", input);
         std::vector<std::string> words = {UNSEEN_COMMAND};
         words.insert(words.end(), arguments.begin(), arguments.end());
+        return start_program(std::move(words), out, err, input);
+    }
+
+    // The first word is the program's path.
+    pid_t start_program(std::vector<std::string> words, const fs::path& out, const fs::path& err,
+                        const std::string& input = {}) const {
+        write_text(out.string() + ".in", input);
         std::vector<char*> argv;
         for (std::string& word : words) argv.push_back(word.data());
         argv.push_back(nullptr);
@@ -81,16 +87,24 @@ protected:
         posix_spawn_file_actions_addopen(&actions, 2, err.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
         posix_spawn_file_actions_addchdir_np(&actions, folder_.c_str());
         pid_t process = -1;
-        const int failed = posix_spawn(&process, UNSEEN_COMMAND, &actions, nullptr, argv.data(), environ);
+        const int failed = posix_spawn(&process, argv[0], &actions, nullptr, argv.data(), environ);
         posix_spawn_file_actions_destroy(&actions);
         return failed ? -1 : process;
     }
 
     Outcome run(const std::vector<std::string>& arguments, const std::string& input = {}) const {
+        std::vector<std::string> words = {UNSEEN_COMMAND};
+        words.insert(words.end(), arguments.begin(), arguments.end());
+        return run_program(std::move(words), input);
+    }
+    Outcome run_shell(const std::string& command) const { return run_program({"/bin/sh", "-c", command}); }
+
+    Outcome run_program(std::vector<std::string> words, const std::string& input = {}) const {
         // Beside the folder, so that its content is the command's alone.
         const fs::path out = folder_.string() + ".out", err = folder_.string() + ".err";
-        const pid_t process = start(arguments, out, err, input);
-        EXPECT_GT(process, 0) << UNSEEN_COMMAND;
+        const std::string program = words.front();
+        const pid_t process = start_program(std::move(words), out, err, input);
+        EXPECT_GT(process, 0) << program;
         Outcome outcome;
         outcome.status = wait_for(process);
         outcome.out = read_text(out);

@@ -6,7 +6,11 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <condition_variable>
+#include <deque>
 #include <functional>
+#include <map>
+#include <mutex>
 #include <random>
 #include <thread>
 
@@ -16,6 +20,7 @@
 #include <tbb/global_control.h>
 
 #include "clustering_tools.h"
+#include "help_cluster.h"
 #include "quadric_contraction.h"
 #include "shapes.h"
 
@@ -135,6 +140,85 @@ TEST(Clusterers, AreWholeAndFastOnHardMeshesWhateverTheThreads) {
                 }
             }
         }
+    }
+}
+
+// Members of a team that live in threads of this process. A message waits in the box of its two members.
+class Mailboxes {
+public:
+    void put(int from, int to, std::span<const std::byte> message) {
+        const std::lock_guard lock(mutex_);
+        boxes_[{from, to}].emplace_back(message.begin(), message.end());
+        arrived_.notify_all();
+    }
+    std::vector<std::byte> take(int from, int to) {
+        std::unique_lock lock(mutex_);
+        auto& box = boxes_[{from, to}];
+        arrived_.wait(lock, [&] { return !box.empty(); });
+        std::vector<std::byte> message = std::move(box.front());
+        box.pop_front();
+        return message;
+    }
+    bool all_empty() const {
+        return std::all_of(boxes_.begin(), boxes_.end(), [](const auto& box) { return box.second.empty(); });
+    }
+
+private:
+    std::mutex mutex_;
+    std::condition_variable arrived_;
+    std::map<std::pair<int, int>, std::deque<std::vector<std::byte>>> boxes_;
+};
+
+class ThreadTeam : public Team {
+public:
+    ThreadTeam(Mailboxes& mail, int rank, int size) : mail_(mail), rank_(rank), size_(size) {}
+    int rank() const override { return rank_; }
+    int size() const override { return size_; }
+    void send(int to, std::span<const std::byte> message) override {
+        EXPECT_LT(to, rank_);
+        mail_.put(rank_, to, message);
+    }
+    std::vector<std::byte> receive(int from) override { return mail_.take(from, rank_); }
+
+private:
+    Mailboxes& mail_;
+    int rank_, size_;
+};
+
+TEST(Clusterers, MakeTheSameWithATeamOfAnySize) {
+    for (const Hard& hard : hard_meshes) {
+        SCOPED_TRACE(hard.name);
+        const Mesh mesh = hard.make();
+        const ClusteringTask task(mesh);
+        const Clustering alone = clustered(task, ClustererKind::quadric);
+        for (const int members : {1, 2, 3, 5, 40}) {
+            Mailboxes mail;
+            std::vector<std::thread> others;
+            for (int rank = 1; rank < members; ++rank)
+                others.emplace_back([&, rank] {
+                    ThreadTeam team(mail, rank, members);
+                    EXPECT_TRUE(help_cluster_quadric(task.input(), team));
+                });
+            ThreadTeam team(mail, 0, members);
+            const auto together = cluster_quadric(task.input(), {}, &team);
+            for (std::thread& other : others) other.join();
+            ASSERT_TRUE(together) << together.error().message;
+            EXPECT_TRUE(equal(alone, *together)) << members << " members";
+            EXPECT_TRUE(mail.all_empty());
+        }
+    }
+}
+
+TEST(Clusterers, RefuseWhatIsNoMessageOfTheTeam) {
+    const Mesh mesh = shapes::bumpy_sphere(7); // several parts
+    const ClusteringTask task(mesh);
+    for (const std::size_t length : {0u, 7u, 8u, 100u}) {
+        Mailboxes mail;
+        mail.put(1, 0, std::vector<std::byte>(length, std::byte{0xff}));
+        ThreadTeam team(mail, 0, 2);
+        const auto made = cluster_quadric(task.input(), {}, &team);
+        ASSERT_FALSE(made);
+        EXPECT_EQ(made.error().code, ErrorCode::malformed_data);
     }
 }
 

@@ -14,6 +14,7 @@
 
 #include "bound_facing.h"
 #include "bound_spheres.h"
+#include "help_cluster.h"
 #include "mask_pool.h"
 #include "order_nodes.h"
 #include "place_proxies.h"
@@ -38,6 +39,20 @@ public:
 
 private:
     Progress progress_;
+};
+
+// How many threads may work, from its last use until it is destroyed.
+class ThreadLimit {
+public:
+    // 0: no limit.
+    void set(int threads) {
+        control_.reset();
+        if (threads > 0)
+            control_.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+    }
+
+private:
+    std::optional<tbb::global_control> control_;
 };
 
 Error cancelled_error() { return {ErrorCode::cancelled, "Building the tree was cancelled."}; }
@@ -174,12 +189,16 @@ Result<void> check_attributes(const MeshView& mesh) {
 // Moves what was measured to the tree's arrays.
 class TreeBuilder {
 public:
-    TreeBuilder(const MeshView& source, const CleanMesh& mesh, const BuildOptions& options, Reporter& reporter)
-        : source_(source), mesh_(mesh.view), clean_(mesh), options_(options), reporter_(reporter) {}
+    TreeBuilder(const MeshView& source, const CleanMesh& mesh, const BuildOptions& options, Reporter& reporter,
+                ThreadLimit& limit)
+        : source_(source), mesh_(mesh.view), clean_(mesh), options_(options), reporter_(reporter), limit_(limit) {}
 
     Result<VertexTree> build(Clusterer clusterer);
+    Result<void> help();
 
 private:
+    void analyse();
+    std::vector<float> find_luminance() const;
     Result<Clustering> cluster(Clusterer clusterer);
     void order(const Clustering& clustering);
     void place_vertices(const Clustering& clustering);
@@ -191,6 +210,7 @@ private:
     const CleanMesh& clean_;
     const BuildOptions& options_;
     Reporter& reporter_;
+    ThreadLimit& limit_;
 
     bool prelit_ = false;
     std::vector<Index> coincident_;
@@ -201,13 +221,12 @@ private:
 
 Result<VertexTree> TreeBuilder::build(Clusterer clusterer) {
     if (reporter_.cancelled(0.0, "analysing")) return cancelled_error();
-    prelit_ = !mesh_.colours.empty();
-    coincident_ = find_coincident(mesh_.positions);
-    surface_ = analyse_surface(mesh_, coincident_);
+    analyse();
     if (reporter_.cancelled(clustering_begins, "clustering")) return cancelled_error();
     {
         const Result<Clustering> clustering = cluster(clusterer);
         if (!clustering) return clustering.error();
+        if (options_.team) limit_.set(options_.threads_alone);
         if (reporter_.cancelled(clustering_ends, "ordering")) return cancelled_error();
         order(*clustering);
         place_vertices(*clustering);
@@ -225,12 +244,29 @@ Result<VertexTree> TreeBuilder::build(Clusterer clusterer) {
     return VertexTree(std::move(data));
 }
 
-Result<Clustering> TreeBuilder::cluster(Clusterer clusterer) {
+Result<void> TreeBuilder::help() {
+    analyse();
+    const std::vector<float> luminance = find_luminance();
+    return help_cluster_quadric({mesh_, luminance, surface_.normals, surface_.areas, coincident_}, *options_.team);
+}
+
+void TreeBuilder::analyse() {
+    prelit_ = !mesh_.colours.empty();
+    coincident_ = find_coincident(mesh_.positions);
+    surface_ = analyse_surface(mesh_, coincident_);
+}
+
+std::vector<float> TreeBuilder::find_luminance() const {
     std::vector<float> luminance(mesh_.positions.size());
     tbb::parallel_for(std::size_t{0}, luminance.size(), [&](std::size_t v) {
         luminance[v] =
             vertex_luminance(surface_.normals[v], prelit_ ? &mesh_.colours[v] : nullptr, options_.light, prelit_);
     });
+    return luminance;
+}
+
+Result<Clustering> TreeBuilder::cluster(Clusterer clusterer) {
+    const std::vector<float> luminance = find_luminance();
     Result<Clustering> clustering = clusterer({mesh_, luminance, surface_.normals, surface_.areas, coincident_});
     if (clustering)
         if (const auto valid = check(*clustering, mesh_.positions.size()); !valid) return valid.error();
@@ -326,23 +362,42 @@ void TreeBuilder::bound() {
     g_->triangles = std::move(triangles.triangles);
 }
 
-} // namespace
-
-std::string_view name(ClustererKind kind) { return kind == ClustererKind::quadric ? "quadric" : "octree"; }
-
-Result<VertexTree> build_tree(const MeshView& mesh, Clusterer clusterer, const BuildOptions& options) {
-    if (const auto valid = validate(mesh); !valid) return valid.error();
-    if (const auto valid = check_attributes(mesh); !valid) return valid.error();
-    if (const auto valid = check(options.light); !valid) return valid.error();
-    if (options.threads < 0) return Error{ErrorCode::invalid_argument, "The number of threads must be 0 or more."};
-    std::optional<tbb::global_control> limit;
-    if (options.threads > 0)
-        limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(options.threads));
+// Hands the mesh without what cannot be built on to `work`.
+template <class Value, class Work>
+Result<Value> with_builder(const MeshView& mesh, const BuildOptions& options, Work&& work) {
+    if (const auto valid = check_buildable(mesh, options); !valid) return valid.error();
+    ThreadLimit limit;
+    limit.set(options.threads);
     const CleanMesh cleaned = clean(mesh);
     if (cleaned.source_triangles.empty())
         return Error{ErrorCode::malformed_data, "The mesh has no triangle with three different vertices."};
     Reporter reporter(options.progress);
-    return TreeBuilder(mesh, cleaned, options, reporter).build(clusterer);
+    TreeBuilder builder(mesh, cleaned, options, reporter, limit);
+    return work(builder);
+}
+
+} // namespace
+
+std::string_view name(ClustererKind kind) { return kind == ClustererKind::quadric ? "quadric" : "octree"; }
+
+Result<void> check_buildable(const MeshView& mesh, const BuildOptions& options) {
+    if (const auto valid = validate(mesh); !valid) return valid.error();
+    if (const auto valid = check_attributes(mesh); !valid) return valid.error();
+    if (const auto valid = check(options.light); !valid) return valid.error();
+    if (options.threads < 0 || options.threads_alone < 0)
+        return Error{ErrorCode::invalid_argument, "The number of threads must be 0 or more."};
+    return {};
+}
+
+Result<VertexTree> build_tree(const MeshView& mesh, Clusterer clusterer, const BuildOptions& options) {
+    return with_builder<VertexTree>(mesh, options, [&](TreeBuilder& builder) { return builder.build(clusterer); });
+}
+
+Result<void> help_build_tree(const MeshView& mesh, const BuildOptions& options) {
+    if (!options.team || options.team->rank() < 1)
+        return Error{ErrorCode::invalid_argument, "Only members of a team other than its first help to build a tree."};
+    if (options.clusterer != ClustererKind::quadric) return check_buildable(mesh, options);
+    return with_builder<void>(mesh, options, [](TreeBuilder& builder) { return builder.help(); });
 }
 
 Result<VertexTree> build_tree(const MeshView& mesh, const BuildOptions& options) {
@@ -354,7 +409,7 @@ Result<VertexTree> build_tree(const MeshView& mesh, const BuildOptions& options)
         mesh,
         [&](const ClusterInput& input) {
             return options.clusterer == ClustererKind::octree ? cluster_octree(input, progress)
-                                                              : cluster_quadric(input, progress);
+                                                              : cluster_quadric(input, progress, options.team);
         },
         options);
 }

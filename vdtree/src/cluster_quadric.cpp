@@ -15,12 +15,15 @@
 #include <numeric>
 #include <span>
 #include <thread>
+#include <utility>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 
+#include "help_cluster.h"
+#include "message.h"
 #include "quadric.h"
 #include "quadric_contraction.h"
 #include "spatial_order.h"
@@ -362,24 +365,66 @@ MergeRecord take_record(Contraction& c) {
             std::move(c.vanishings)};
 }
 
+// Everything that is in a record, or in a contraction without its record, for a MessageWriter or a MessageReader.
+template <class Record, class Message>
+void exchange_record(Record& r, Message& message) {
+    message(r.merges), message(r.places), message(r.deviations), message(r.round_ends), message(r.vanishings);
+}
+
+template <class Joinable, class Message>
+void exchange_joinable(Joinable& c, Message& message) {
+    message(c.first_slot), message(c.end_slot), message(c.channels);
+    message(c.live.names), message(c.live.places), message(c.live.references), message(c.live.deviations);
+    message(c.live.made_by), message(c.live.vanishing), message(c.live.quadrics);
+    message(c.pairs), message(c.outer_edges), message(c.border_slots);
+}
+
 // The merges of all parts; first those of the parts themselves, then those of joined pairs of parts, and so on.
 using Level = std::vector<MergeRecord>;
 
-std::vector<Level> contract_all(const PartMaker& maker, std::size_t parts, MergeCounter& counter) {
-    const auto after_round = [&](std::size_t merges) { return counter.add(merges); };
-    std::vector<Level> levels;
-    std::vector<Contraction> current(parts);
-    for (std::size_t count = parts; count > 0; count /= 2) {
-        Level& level = levels.emplace_back(count);
+// Contracts the parts and joins them up the kd-tree, in one process or with a team. Each member has a run of parts; what is joined
+// belongs to the member that has its first part. Messages go to lower ranks only, those of a level are sent before any are waited for,
+// and so nobody waits in a circle.
+class PartContractor {
+public:
+    PartContractor(const PartMaker& maker, std::size_t parts, MergeCounter& counter, Team* team)
+        : maker_(maker), parts_(parts), counter_(counter), team_(team),
+          members_(team ? std::min<std::size_t>(static_cast<std::size_t>(team->size()), parts) : 1),
+          rank_(team ? static_cast<std::size_t>(team->rank()) : 0) {}
+
+    // Member 0 returns all merges; the others' levels hold only their own, which have been sent.
+    Result<std::vector<Level>> run() {
+        std::vector<Contraction> current;
+        for (std::size_t count = parts_; count > 0; count /= 2) {
+            if (const auto ok = gather_neighbours(current, count); !ok) return ok.error();
+            current = work_on_level(std::move(current), count);
+            if (counter_.stopped()) return Error{ErrorCode::cancelled, "Clustering was cancelled."};
+        }
+        if (const auto ok = gather_records(); !ok) return ok.error();
+        if (rank_ == 0) finish(current[0]);
+        return std::move(levels_);
+    }
+
+private:
+    // Member of node `i` of the level of so many; member m begins with part m * parts_ / members_.
+    std::size_t owner(std::size_t i, std::size_t count) const {
+        return ((i * (parts_ / count) + 1) * members_ - 1) / parts_;
+    }
+    bool is_ours(std::size_t i, std::size_t count) const { return owner(i, count) == rank_; }
+
+    std::vector<Contraction> work_on_level(std::vector<Contraction> current, std::size_t count) {
+        const auto after_round = [&](std::size_t merges) { return counter_.add(merges); };
         const Index target = count == 1 ? 1 : part_target;
+        Level& level = levels_.emplace_back(count);
         std::vector<Contraction> next(count);
         tbb::parallel_for(
             tbb::blocked_range<std::size_t>(0, count, 1),
             [&](const tbb::blocked_range<std::size_t>& range) {
                 for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                    if (counter.stopped()) return;
-                    if (count == parts) {
-                        next[i] = contract_part(maker.make(i), target, after_round);
+                    if (counter_.stopped()) return;
+                    if (!is_ours(i, count)) continue;
+                    if (count == parts_) {
+                        next[i] = contract_part(maker_.make(i), target, after_round);
                     } else {
                         next[i] = join(current[2 * i], current[2 * i + 1], target, after_round);
                         current[2 * i] = current[2 * i + 1] = {};
@@ -388,15 +433,69 @@ std::vector<Level> contract_all(const PartMaker& maker, std::size_t parts, Merge
                 }
             },
             tbb::simple_partitioner());
-        if (counter.stopped()) return levels;
-        current = std::move(next);
+        return next;
     }
+
+    // Before a level is worked on: the right halves go to the members that have the left ones.
+    Result<void> gather_neighbours(std::vector<Contraction>& halves, std::size_t count) {
+        if (members_ == 1 || count == parts_) return {};
+        for (std::size_t i = 0; i < count; ++i) {
+            if (is_ours(i, count) || !is_ours(2 * i + 1, 2 * count)) continue;
+            MessageWriter message;
+            exchange_joinable(std::as_const(halves[2 * i + 1]), message);
+            team_->send(static_cast<int>(owner(i, count)), message.bytes());
+            halves[2 * i + 1] = {};
+        }
+        for (std::size_t i = 0; i < count; ++i) {
+            if (!is_ours(i, count) || is_ours(2 * i + 1, 2 * count)) continue;
+            const std::vector<std::byte> bytes = team_->receive(static_cast<int>(owner(2 * i + 1, 2 * count)));
+            MessageReader message(bytes);
+            exchange_joinable(halves[2 * i + 1], message);
+            if (!message.complete() || halves[2 * i + 1].first_slot != halves[2 * i].end_slot) return strange_message();
+        }
+        return {};
+    }
+
+    Result<void> gather_records() {
+        if (members_ == 1) return {};
+        for (Level& level : levels_) {
+            for (std::size_t i = 0; i < level.size(); ++i) {
+                const std::size_t from = owner(i, level.size());
+                if (rank_ != 0 && from == rank_) {
+                    MessageWriter message;
+                    exchange_record(std::as_const(level[i]), message);
+                    team_->send(0, message.bytes());
+                    level[i] = {};
+                } else if (rank_ == 0 && from != 0) {
+                    const std::vector<std::byte> bytes = team_->receive(static_cast<int>(from));
+                    MessageReader message(bytes);
+                    exchange_record(level[i], message);
+                    if (!message.complete()) return strange_message();
+                }
+            }
+        }
+        return {};
+    }
+
     // Without the last triangles nothing is left of the model: that strays as far as it is large.
-    constexpr float whole_extent = 1;
-    const Index last = current[0].live.vanishing[0];
-    if (last != no_merge) levels.back()[0].vanishings.push_back({last, whole_extent});
-    return levels;
-}
+    void finish(const Contraction& whole) {
+        constexpr float whole_extent = 1;
+        const Index last = whole.live.vanishing[0];
+        if (last != no_merge) levels_.back()[0].vanishings.push_back({last, whole_extent});
+    }
+
+    static Error strange_message() {
+        return {ErrorCode::malformed_data,
+                "A process of the team sent something else than its part: all must run the same program on the same mesh."};
+    }
+
+    const PartMaker& maker_;
+    std::size_t parts_;
+    MergeCounter& counter_;
+    Team* team_;
+    std::size_t members_, rank_;
+    std::vector<Level> levels_;
+};
 
 // Numbers the clusters: vertices, joined coincident vertices, then the merges round by round, all parts side by side.
 class ClusteringWriter {
@@ -475,14 +574,25 @@ private:
 
 } // namespace
 
-Result<Clustering> cluster_quadric(const ClusterInput& input, const Progress& progress) {
+Result<Clustering> cluster_quadric(const ClusterInput& input, const Progress& progress, Team* team) {
     const SpatialNumbering numbering = number_by_space(input.mesh.positions, input.coincident);
     const PartMaker maker(input, numbering);
-    MergeCounter counter(progress, numbering.vertex_of_slot.size() - 1);
+    const std::size_t members = team ? static_cast<std::size_t>(team->size()) : 1; // each counts its own merges
+    MergeCounter counter(progress, (numbering.vertex_of_slot.size() - 1) / members);
     if (!counter.add(0)) return Error{ErrorCode::cancelled, "Clustering was cancelled."};
-    std::vector<Level> levels = contract_all(maker, numbering.parts, counter);
-    if (counter.stopped()) return Error{ErrorCode::cancelled, "Clustering was cancelled."};
-    return ClusteringWriter(input, numbering, maker).write(levels);
+    auto levels = PartContractor(maker, numbering.parts, counter, team).run();
+    if (!levels) return levels.error();
+    return ClusteringWriter(input, numbering, maker).write(*levels);
+}
+
+Result<void> help_cluster_quadric(const ClusterInput& input, Team& team) {
+    const SpatialNumbering numbering = number_by_space(input.mesh.positions, input.coincident);
+    if (static_cast<std::size_t>(team.rank()) >= numbering.parts) return {}; // more members than parts
+    const PartMaker maker(input, numbering);
+    MergeCounter counter({}, numbering.vertex_of_slot.size() - 1);
+    const auto levels = PartContractor(maker, numbering.parts, counter, &team).run();
+    if (!levels) return levels.error();
+    return {};
 }
 
 } // namespace unseen::vdtree

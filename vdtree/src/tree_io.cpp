@@ -582,6 +582,13 @@ Result<VertexTree> Reader::read() {
 
 } // namespace
 
+Result<void> prepare_tree_file(const std::filesystem::path& file) {
+    const Result<AtomicFile> out = AtomicFile::create(file);
+    if (!out) return out.error();
+    AtomicFile::remove_orphans(file);
+    return {};
+}
+
 Result<void> write_tree(const std::filesystem::path& file, const VertexTree& tree, const Progress& progress) {
     const TreeGeometry& g = *tree.data().geometry;
     const TreeLuminance& l = tree.data().light;

@@ -7,6 +7,7 @@
 #include <vdtree/function_ref.h>
 #include <vdtree/mesh.h>
 #include <vdtree/result.h>
+#include <vdtree/team.h>
 #include <vdtree/vertex_tree.h>
 
 namespace unseen::vdtree {
@@ -44,8 +45,9 @@ Result<Clustering> cluster_octree(const ClusterInput& input, const Progress& pro
 // Contraction of vertex pairs in the order of their quadric error over position, luminance and the mesh's own attributes
 // (Garland and Heckbert 1997, 1998; Hoppe 1999), with boundary and seam terms and optimal proxies; pairs are the edges, and,
 // for parts that no edge connects, near neighbours. The vertices are parted by space, and the parts contracted in
-// parallel and then joined; the result depends on the mesh alone. Fills deviations. Memory: about 100 bytes a triangle.
-Result<Clustering> cluster_quadric(const ClusterInput& input, const Progress& progress = {});
+// parallel and then joined; the result depends on the mesh alone. Fills deviations. Memory: about 100 bytes a triangle. With a team, of which this must be member 0, the
+// others contract their share of the parts.
+Result<Clustering> cluster_quadric(const ClusterInput& input, const Progress& progress = {}, Team* team = nullptr);
 
 enum class ClustererKind { quadric, octree };
 std::string_view name(ClustererKind kind);
@@ -56,11 +58,21 @@ struct BuildOptions {
     int threads = 0; // 0: as many as there are cores. The tree does not depend on it.
     std::uint64_t dropped_before = 0; // triangles that a reader has dropped; counted with the tree's
     Progress progress = {};
+    // Other processes that help with the clustering, by help_build_tree() with the same mesh and options; this is member 0. Only the
+    // quadric clusterer has work for them. The tree does not depend on it. Do not cancel then: the others would wait for ever.
+    Team* team = nullptr;
+    int threads_alone = 0; // like `threads`, for what comes after the clustering, when the team's others have gone
 };
 
 // Drops triangles that use a vertex twice (counted in the tree); fails where none is left, on non-finite positions and on
 // indices out of range. Memory: about 220 bytes a triangle while building.
 Result<VertexTree> build_tree(const MeshView& mesh, const BuildOptions& options = {});
 Result<VertexTree> build_tree(const MeshView& mesh, Clusterer clusterer, const BuildOptions& options = {});
+
+// Whether build_tree() would take these, without building anything.
+Result<void> check_buildable(const MeshView& mesh, const BuildOptions& options = {});
+
+// The share of a team's other members in build_tree(); returns when theirs is done. Fails like build_tree() on bad input.
+Result<void> help_build_tree(const MeshView& mesh, const BuildOptions& options);
 
 } // namespace unseen::vdtree

@@ -12,6 +12,10 @@ namespace unseen::vdtree {
 // Writes to a temporary name in the same folder, then renames.
 Result<void> write_tree(const std::filesystem::path& file, const VertexTree& tree, const Progress& progress = {});
 
+// For before long work: fails where write_tree() could not write, and removes the temporaries that processes which are no more
+// have left in the folder.
+Result<void> prepare_tree_file(const std::filesystem::path& file);
+
 // Reads and checks a whole tree: header, section table, the checksum of every page, and every value's range, so that no
 // file can make later use read out of bounds. Errors name file, section and page. A file cut short is an error.
 Result<VertexTree> read_tree(const std::filesystem::path& file, const Progress& progress = {});

@@ -1,0 +1,106 @@
+#include "build_team.h"
+
+#include <algorithm>
+#include <cstring>
+#include <string>
+#include <vector>
+
+namespace unseen::app {
+namespace {
+
+// FNV-1a over words instead of bytes: fast, and good enough against mistakes.
+class Hash {
+public:
+    template <class T>
+    void add(std::span<const T> values) {
+        const auto bytes = std::as_bytes(values);
+        add_word(bytes.size());
+        std::size_t at = 0;
+        for (; at < bytes.size(); at += sizeof(std::uint64_t)) {
+            std::uint64_t word = 0;
+            std::memcpy(&word, bytes.data() + at, std::min(sizeof(word), bytes.size() - at));
+            add_word(word);
+        }
+    }
+    void add_word(std::uint64_t word) { value_ = (value_ ^ word) * 0x100000001b3u; }
+    std::uint64_t value() const { return value_; }
+
+private:
+    std::uint64_t value_ = 0xcbf29ce484222325u;
+};
+
+// Says of each member: nothing and its fingerprint, or what went wrong.
+struct Statement {
+    std::uint64_t fingerprint = 0;
+    ErrorCode code = ErrorCode::io_failure;
+    std::string complaint;
+};
+
+std::vector<std::byte> to_bytes(const Statement& s) {
+    std::vector<std::byte> bytes(sizeof(s.fingerprint) + sizeof(s.code) + s.complaint.size());
+    std::memcpy(bytes.data(), &s.fingerprint, sizeof(s.fingerprint));
+    std::memcpy(bytes.data() + sizeof(s.fingerprint), &s.code, sizeof(s.code));
+    if (!s.complaint.empty())
+        std::memcpy(bytes.data() + sizeof(s.fingerprint) + sizeof(s.code), s.complaint.data(), s.complaint.size());
+    return bytes;
+}
+
+Statement to_statement(std::span<const std::byte> bytes) {
+    Statement s;
+    if (bytes.size() < sizeof(s.fingerprint) + sizeof(s.code)) {
+        s.complaint = "A process of the team is another program.";
+        return s;
+    }
+    std::memcpy(&s.fingerprint, bytes.data(), sizeof(s.fingerprint));
+    std::memcpy(&s.code, bytes.data() + sizeof(s.fingerprint), sizeof(s.code));
+    const auto text = bytes.subspan(sizeof(s.fingerprint) + sizeof(s.code));
+    s.complaint.assign(reinterpret_cast<const char*>(text.data()), text.size());
+    return s;
+}
+
+// What member 0 concludes from all statements.
+Statement conclude(vdtree::Team& team, Statement own) {
+    for (int other = 1; other < team.size(); ++other) {
+        const Statement theirs = to_statement(team.receive(other));
+        if (!own.complaint.empty()) continue; // but hear them all
+        if (!theirs.complaint.empty()) {
+            own.code = theirs.code;
+            own.complaint = "Process " + std::to_string(other) + ": " + theirs.complaint;
+        } else if (theirs.fingerprint != own.fingerprint) {
+            own.code = ErrorCode::malformed_data;
+            own.complaint = "Process " + std::to_string(other) +
+                            " has read another mesh than process 0: give all the same file and options.";
+        }
+    }
+    for (int other = 1; other < team.size(); ++other) team.send(other, to_bytes(own));
+    return own;
+}
+
+} // namespace
+
+std::uint64_t fingerprint(const vdtree::MeshView& mesh, vdtree::ClustererKind clusterer) {
+    Hash hash;
+    hash.add(mesh.positions);
+    hash.add(mesh.triangles);
+    hash.add(mesh.normals);
+    hash.add(mesh.colours);
+    hash.add(mesh.uvs);
+    hash.add_word(static_cast<std::uint64_t>(clusterer));
+    return hash.value();
+}
+
+Result<void> agree(vdtree::Team& team, const Result<void>& own, std::uint64_t fingerprint) {
+    Statement statement;
+    statement.fingerprint = fingerprint;
+    if (!own) statement.code = own.error().code, statement.complaint = own.error().message;
+    if (team.rank() == 0) {
+        statement = conclude(team, std::move(statement));
+    } else {
+        team.send(0, to_bytes(statement));
+        statement = to_statement(team.receive(0));
+    }
+    if (!statement.complaint.empty()) return Error{statement.code, statement.complaint};
+    return {};
+}
+
+} // namespace unseen::app

@@ -1,0 +1,24 @@
+// The processes that `mpirun -np N unseen build ...` starts.
+#pragma once
+
+#include <memory>
+
+#include <vdtree/result.h>
+#include <vdtree/team.h>
+
+namespace unseen::app {
+
+class ProcessTeam : public vdtree::Team {
+public:
+    // Joins the others; null where no mpirun has started this process. To be called once, before anything starts threads. Fails where
+    // mpirun has started several and this build cannot talk to them. A member that ends without leave() takes the others with it.
+    static Result<std::unique_ptr<ProcessTeam>> join();
+
+    virtual int cores() const = 0;            // that this machine has for all its members together
+    virtual int members_on_machine() const = 0;
+
+    // Waits, without using a core, until all members leave. Nothing may be sent afterwards.
+    virtual void leave() = 0;
+};
+
+} // namespace unseen::app
