@@ -94,7 +94,8 @@ void follow_teleport(benchmark::State& state, bool large) {
     Cut cut(s.tree);
     int jump = 0;
     for (auto _ : state) {
-        s.follow(cut, 180 * ++jump + jump % 3);
+        ++jump;
+        s.follow(cut, 180 * jump + jump % 3);
         benchmark::DoNotOptimize(cut.indices().data());
     }
 }
