@@ -20,7 +20,7 @@
 #ifdef UNSEEN_BENCH_WITH_CGAL
 #include <CGAL/Simple_cartesian.h>
 #include <CGAL/Surface_mesh.h>
-#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Face_count_ratio_stop_predicate.h>
+#include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Count_ratio_stop_predicate.h>
 #include <CGAL/Surface_mesh_simplification/edge_collapse.h>
 #include <CGAL/version.h>
 #endif
@@ -114,7 +114,8 @@ void to_a_tenth_cgal(benchmark::State& state) {
         for (const glm::dvec3& p : mesh().positions) vertices.push_back(surface.add_vertex({p.x, p.y, p.z}));
         for (const vdtree::Triangle& t : mesh().triangles) surface.add_face(vertices[t[0]], vertices[t[1]], vertices[t[2]]);
         state.ResumeTiming();
-        sms::edge_collapse(surface, sms::Face_count_ratio_stop_predicate<SurfaceMesh>(1.0 / one_in, surface));
+        // Of the edges, which go as the triangles do.
+        sms::edge_collapse(surface, sms::Count_ratio_stop_predicate<SurfaceMesh>(1.0 / one_in));
         left = surface.number_of_faces();
     }
     report(state, left);
