@@ -34,7 +34,11 @@ Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file) {
 }
 
 Result<vdtree::VertexTree> open_tree(const std::filesystem::path& file) {
-    return vdtree::is_tree_file(file) ? vdtree::map_tree(file) : load_tree(file);
+    // Smaller trees are read in less time than a picture takes, and checked to the last bit.
+    constexpr std::uintmax_t mapped_bytes = std::uintmax_t{256} << 20;
+    std::error_code unknown;
+    const bool is_large = std::filesystem::file_size(file, unknown) >= mapped_bytes && !unknown;
+    return is_large && vdtree::is_tree_file(file) ? vdtree::map_tree(file) : load_tree(file);
 }
 
 } // namespace unseen::app

@@ -17,7 +17,7 @@ Result<vdtree::VertexTree> build_tree_of(vdtree::ReadResult&& read, vdtree::Buil
 
 // A tree file, or a mesh file with a note that its tree is built now.
 Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file);
-// The same, but tree files are mapped: only what is used is read, and checked.
+// The same, but tree files of 256 MiB and more are mapped: only what is used is read, and checked.
 Result<vdtree::VertexTree> open_tree(const std::filesystem::path& file);
 
 } // namespace unseen::app
