@@ -6,10 +6,11 @@
 #include <fstream>
 #include <map>
 #include <memory>
-#include <optional>
+#include <thread>
 
 #include "build_team.h"
 #include "command.h"
+#include "memory_plan.h"
 #include "model_file.h"
 #include "options.h"
 #include "process_team.h"
@@ -25,6 +26,7 @@ struct BuildArguments {
     vdtree::ClustererKind clusterer = vdtree::ClustererKind::quadric;
     vdtree::ColourEncoding colours = vdtree::ColourEncoding::srgb;
     int threads = 0;
+    double memory_gib = 0; // 0: no limit
 };
 
 constexpr int most_threads = 1024;
@@ -66,6 +68,13 @@ vdtree::ReadOptions reading(const BuildArguments& a) {
     return options;
 }
 
+// Threads of this process while all members work.
+int threads(const BuildArguments& a, const ProcessTeam* team) {
+    if (a.threads > 0) return a.threads;
+    if (team) return std::max(1, team->cores() / team->members_on_machine());
+    return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
 // Members of a team share the cores of their machine; the first one gets all of them when the others are done.
 vdtree::BuildOptions building(const BuildArguments& a, ProcessTeam* team) {
     vdtree::BuildOptions options;
@@ -73,9 +82,8 @@ vdtree::BuildOptions building(const BuildArguments& a, ProcessTeam* team) {
     options.threads = a.threads;
     if (team && team->size() > 1) {
         options.team = team;
-        const int members = team->members_on_machine();
-        if (a.threads == 0) options.threads = std::max(1, team->cores() / members);
-        options.threads_alone = a.threads == 0 ? team->cores() : a.threads * members;
+        options.threads = threads(a, team);
+        options.threads_alone = a.threads == 0 ? team->cores() : a.threads * team->members_on_machine();
     }
     return options;
 }
@@ -89,20 +97,31 @@ Result<void> check_names(const BuildArguments& a) {
     return {};
 }
 
+// The mesh, if it can be built within the limit of memory. `read_file` reads it, with or without words.
+template <class ReadFile>
+Result<vdtree::ReadResult> read_source(const BuildArguments& a, ProcessTeam* team, ReadFile&& read_file) {
+    const auto limit = MemoryLimit::set(a.memory_gib, a.out, threads(a, team));
+    if (!limit) return limit.error();
+    Result<vdtree::ReadResult> read = read_file(a.mesh, reading(a));
+    if (!read) return read;
+    if (const auto ok = vdtree::check_buildable(read->mesh.view()); !ok) return ok.error();
+    if (const auto ok = limit->plan_for(read->mesh.view(), a.clusterer); !ok) return ok.error();
+    return read;
+}
+
 // What there has to be before anything is built.
 struct Source {
     JsonReport report;
     vdtree::ReadResult read;
 };
 
-Result<Source> open_source(const BuildArguments& a) {
+Result<Source> open_source(const BuildArguments& a, ProcessTeam* team) {
     if (const auto ok = check_names(a); !ok) return ok.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     if (const auto ok = vdtree::prepare_tree_file(a.out); !ok) return ok.error();
-    auto read = read_mesh_file(a.mesh, reading(a));
+    auto read = read_source(a, team, read_mesh_file);
     if (!read) return read.error();
-    if (const auto ok = vdtree::check_buildable(read->mesh.view()); !ok) return ok.error();
     return Source{std::move(*report), std::move(*read)};
 }
 
@@ -114,7 +133,7 @@ Result<vdtree::VertexTree> build(const BuildArguments& a, vdtree::ReadResult&& r
 
 // The first of a team, or the only one.
 Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
-    auto source = open_source(a);
+    auto source = open_source(a, team);
     if (team) {
         const Result<void> own = source ? Result<void>() : Result<void>(source.error());
         const auto ok = agree(*team, own, source ? fingerprint(source->read.mesh.view(), a.clusterer) : 0);
@@ -139,9 +158,9 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
 
 // The others: they write nothing, and print nothing unless they fail alone.
 Result<int> help(const BuildArguments& a, ProcessTeam& team) {
-    const auto read = vdtree::read_mesh(a.mesh, reading(a));
-    const Result<void> own = read ? vdtree::check_buildable(read->mesh.view()) : Result<void>(read.error());
-    const auto ok = agree(team, own, own ? fingerprint(read->mesh.view(), a.clusterer) : 0);
+    const auto read = read_source(a, &team, vdtree::read_mesh);
+    const Result<void> own = read ? Result<void>() : Result<void>(read.error());
+    const auto ok = agree(team, own, read ? fingerprint(read->mesh.view(), a.clusterer) : 0);
     if (ok)
         if (const auto helped = vdtree::help_build_tree(read->mesh.view(), building(a, &team)); !helped)
             return helped.error();
@@ -176,9 +195,14 @@ Command build_command(CLI::App& app) {
     verb->add_option("--threads", a->threads, "Threads of each process; the tree is the same (default: all cores)")
         ->type_name("N")
         ->check(within(1, most_threads));
+    verb->add_option("--memory", a->memory_gib,
+                     "Memory of each process; the tree is the same. What is larger waits in a temporary file beside the tree")
+        ->type_name("GIB")
+        ->check(positive());
     verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
     verb->footer("Examples:\n  unseen build bunny.ply -o bunny.vdt\n"
                  "  unseen build city.obj -o city.vdt --clusterer octree --threads 4\n"
+                 "  unseen build city.obj -o city.vdt --memory 4\n"
                  "  mpirun -np 4 unseen build city.obj -o city.vdt");
     return {verb, [a] { return run(*a); }};
 }

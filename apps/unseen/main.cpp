@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "command.h"
+#include "paged_memory.h"
 #include "terminal.h"
 
 namespace {
@@ -67,6 +68,8 @@ int main(int argc, char** argv) {
         return run(commands);
     } catch (const CLI::ParseError& error) {
         return report_usage(app, error);
+    } catch (const DiskFull& error) {
+        print_error(error.what());
     } catch (const std::bad_alloc&) {
         print_error("there is not enough memory for this.");
     } catch (const std::exception& error) {
