@@ -670,7 +670,9 @@ private:
             const auto in_core = build(*mesh, shop_ / "measured.vdt", {"--threads", "1"});
             if (!in_core) return in_core.error();
             constexpr double largest = 28e6, gib = 4; // the same share of the mesh where it is smaller
-            const double memory = gib * static_cast<double>(size) / largest;
+            // In proportion to the mesh, but not below what any build takes.
+            constexpr double least_gib = 0.125;
+            const double memory = std::max(gib * static_cast<double>(size) / largest, least_gib);
             const auto out_of_core = build(*mesh, shop_ / "measured.vdt", {"--threads", "1", "--memory", shortest(memory)});
             if (!out_of_core) return out_of_core.error();
             row.value = out_of_core->wall_seconds / in_core->wall_seconds;
