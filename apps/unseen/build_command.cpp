@@ -196,7 +196,7 @@ Command build_command(CLI::App& app) {
         ->type_name("N")
         ->check(within(1, most_threads));
     verb->add_option("--memory", a->memory_gib,
-                     "Memory of each process; the tree is the same. What is larger waits in a temporary file beside the tree")
+                     "Memory that each process aims to keep to; the rest waits in a temporary file beside the tree")
         ->type_name("GIB")
         ->check(positive());
     verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");

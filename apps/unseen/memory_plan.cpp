@@ -1,5 +1,6 @@
 #include "memory_plan.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -10,6 +11,7 @@ namespace unseen::app {
 namespace {
 
 constexpr double bytes_of_gib = 1 << 30;
+constexpr double most_gib = 1 << 20; // more than any machine has
 
 // Measured as the highest resident set of whole builds with one thread: bunny, dragon, and the dragon with four times the triangles;
 // the program and its libraries, and bytes for each triangle and its half a vertex.
@@ -25,7 +27,7 @@ constexpr std::uint64_t least_triangle_bytes = 16;
 
 Error too_small(std::uint64_t least, double gib) {
     const double needed = std::ceil(static_cast<double>(least) / bytes_of_gib * 100) / 100; // two digits, rounded up
-    return {ErrorCode::invalid_argument, "--memory " + shortest(gib) + " GiB is too small for this: it takes at least " +
+    return {ErrorCode::invalid_argument, "--memory " + rounded(gib, 3) + " GiB is too small for this: it takes at least " +
                                              shortest(needed) + " GiB."};
 }
 
@@ -46,9 +48,9 @@ std::uint64_t least_memory(std::size_t triangles, int threads) {
 Result<MemoryLimit> MemoryLimit::set(double gib, const std::filesystem::path& out, int threads) {
     MemoryLimit limit;
     if (!(gib > 0)) return limit;
-    limit.bytes_ = static_cast<std::uint64_t>(gib * bytes_of_gib);
+    limit.bytes_ = static_cast<std::uint64_t>(std::min(gib, most_gib) * bytes_of_gib);
     limit.threads_ = threads;
-    if (const std::uint64_t least = least_memory(0, threads); limit.bytes_ < least) return too_small(least, gib);
+    if (const std::uint64_t least = least_memory(0, threads); !(limit.bytes_ >= least)) return too_small(least, gib);
     if (const auto ok = start_paging(out.parent_path(), limit.bytes_); !ok) return ok.error();
     return limit;
 }

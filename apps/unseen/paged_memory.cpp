@@ -23,17 +23,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Blocks begin and end at multiples of this, which all page sizes divide.
-constexpr std::size_t granule = std::size_t{64} << 10;
+// Blocks begin and end at multiples of this; all page sizes divide it.
+constexpr std::size_t granule = paged_alignment;
 // Freed blocks up to this in all keep their disk space for the next of their size: rounds of work ask for the same sizes again.
 constexpr std::size_t most_kept = std::size_t{32} << 20;
 // The file is as long as all blocks there may ever be, and empty but for those that are in use.
 constexpr std::size_t longest_file = std::size_t{1} << 40, shortest_file = std::size_t{1} << 32;
 
-// How often the pager looks. A core touches some megabytes of new pages in that time.
-constexpr std::chrono::milliseconds look_interval{2};
+// How often the pager looks, far from the limit and near it. A read of one page may bring sixteen, so that two threads may come by
+// a hundred megabytes in a millisecond or two.
+constexpr std::chrono::microseconds far_interval{2000}, near_interval{200};
 // The pager begins this share of the limit below it, or so many bytes, for what is touched before it looks, and ends twice as far below.
-constexpr std::uint64_t margin_share = 16, least_margin = std::uint64_t{12} << 20;
+constexpr std::uint64_t margin_share = 12, least_margin = std::uint64_t{12} << 20;
 // Between two looks at how much is resident, pages are let go of in so much of the file.
 constexpr std::size_t sweep_step = std::size_t{4} << 20;
 
@@ -63,6 +64,7 @@ public:
     void* allocate(std::size_t size) {
         if (size > length_) throw std::bad_alloc();
         size = (size + granule - 1) / granule * granule;
+        make_room(size);
         const std::lock_guard lock(mutex_);
         std::size_t at = 0;
         if (const auto kept = kept_.find(size); kept != kept_.end()) {
@@ -140,15 +142,23 @@ private:
 
     void watch() {
         for (;;) {
-            if (resident() > high_) sweep();
-            std::this_thread::sleep_for(look_interval);
+            const std::uint64_t now = resident();
+            if (now > high_) sweep(low_);
+            std::this_thread::sleep_for(now < low_ / 2 ? far_interval : near_interval);
         }
     }
 
+    // Before a block is handed out, so that the pager need not keep pace with who fills it.
+    void make_room(std::size_t size) {
+        const std::uint64_t room = std::min<std::uint64_t>(size, low_ / 4);
+        if (resident() + room > high_) sweep(low_ - room);
+    }
+
     // Once around at most: what is then still there is no page of ours.
-    void sweep() {
+    void sweep(std::uint64_t goal) {
+        const std::lock_guard lock(sweep_mutex_);
         const std::size_t end = end_;
-        for (std::size_t swept = 0; swept < end && resident() > low_; swept += sweep_step) {
+        for (std::size_t swept = 0; swept < end && resident() > goal; swept += sweep_step) {
             if (hand_ >= end) hand_ = 0;
             // Of a shared mapping, only the view of the pages goes; what they hold is the file's.
             ::madvise(begin_ + hand_, std::min(sweep_step, end - hand_), MADV_DONTNEED);
@@ -169,6 +179,7 @@ private:
     std::size_t length_;
     std::string folder_;
     std::uint64_t high_, low_, page_;
+    std::mutex sweep_mutex_;
     std::size_t hand_ = 0; // of the clock
 
     std::mutex mutex_;

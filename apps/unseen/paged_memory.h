@@ -28,7 +28,11 @@ private:
 // memory, which grows with the mesh, is more.
 inline constexpr std::size_t least_paged_block = std::size_t{128} << 10;
 
-// From now on until the end of the process, at most `limit` bytes are to be resident, what is not paged included. The file lies in
+// Paged blocks begin at multiples of this.
+inline constexpr std::size_t paged_alignment = std::size_t{64} << 10;
+
+// From now on until the end of the process, about `limit` bytes stay resident, what is not paged included; for moments it may be a
+// hundred megabytes more, until the thread that looks has its turn. The file lies in
 // `folder`, without a name: nothing is left of it, however the process ends. Its disk space is reserved block by block, so that a full disk
 // is a DiskFull and nothing worse. Once a process. Fails where the folder cannot have such a file or lies in memory itself.
 Result<void> start_paging(const std::filesystem::path& folder, std::uint64_t limit);
