@@ -222,13 +222,15 @@ void CutFollower::change_threshold(Cut& cut, float factor) {
 // ---- from scratch
 
 void CutFollower::forget_slots() {
+    // Node by node, so that the cost does not go with the tree.
+    if (slot_of_node_.empty()) slot_of_node_.assign(tree_.interior_count(), no_slot);
+    for (const NodeId node : node_) slot_of_node_[node] = no_slot;
     node_.clear();
     position_due_.clear();
     facing_due_.clear();
     block_position_due_.clear();
     block_facing_due_.clear();
     free_slots_.clear();
-    slot_of_node_.assign(tree_.interior_count(), no_slot);
 }
 
 void CutFollower::start_over(Cut& cut) {

@@ -28,8 +28,8 @@ void for_each_set(std::span<const std::uint64_t> bits, F&& f) {
 } // namespace
 
 void IndexBuffer::gather(std::span<const std::uint64_t> unfolded, std::span<const NodeId> proxies, Index triangles) {
+    drop_lists();
     indices_.resize(std::size_t{3} * triangles);
-    has_lists_ = false;
     const auto first = tree_->first_triangle();
     const auto corners = tree_->triangles();
     NodeId* out = indices_.data();
@@ -49,20 +49,30 @@ void IndexBuffer::make_lists(std::span<const std::uint64_t> unfolded) {
             for (const Index leaf : corners[t]) *out++ = leaf;
     });
 
-    block_of_node_.assign(tree_->node_count(), 0);
+    // Only what is shown is touched, so that the cost does not go with the tree.
+    if (block_of_node_.empty()) block_of_node_.assign(tree_->node_count(), no_block);
+    for (const NodeId node : indices_) block_of_node_[node] = 0;
     for (const NodeId node : indices_) ++block_of_node_[node];
+    // Counts become blocks, in the order in which the buffer first shows the nodes, so that neighbours lie together.
     std::uint64_t words = 0;
     std::uint32_t longest = 0;
-    for (const std::uint32_t count : block_of_node_) {
-        longest = std::max(longest, count);
-        if (count > 0) words += std::uint64_t{1} << log2_size_for(count);
+    for (const NodeId node : indices_) {
+        std::uint32_t& entry = block_of_node_[node];
+        if (entry & is_block) continue;
+        longest = std::max(longest, entry);
+        words += std::uint64_t{1} << log2_size_for(entry);
+        entry |= is_block; // still the count: seen
     }
-    if (longest >= count_mask || words >= is_block) return;
+    has_lists_ = true;
+    if (longest >= count_mask || words >= is_block) {
+        drop_lists();
+        return;
+    }
+    for (const NodeId node : indices_) block_of_node_[node] &= ~is_block;
     for (auto& blocks : free_blocks_) blocks.clear();
     holes_.clear();
     pool_.clear();
     pool_.resize(words);
-    // In the order in which the buffer first shows the nodes, so that neighbours lie together.
     Block end = 0;
     for (std::size_t corner = 0; corner < indices_.size(); ++corner) {
         std::uint32_t& entry = block_of_node_[indices_[corner]];
@@ -76,8 +86,15 @@ void IndexBuffer::make_lists(std::span<const std::uint64_t> unfolded) {
         block[1 + (*block & count_mask)] = static_cast<Index>(corner);
         ++*block;
     }
-    for (std::uint32_t& entry : block_of_node_) entry = entry & is_block ? entry & ~is_block : no_block;
-    has_lists_ = true;
+    for (const NodeId node : indices_) block_of_node_[node] &= ~is_block;
+}
+
+// A node has a list only while a corner shows it.
+void IndexBuffer::drop_lists() noexcept {
+    if (!has_lists_) return;
+    has_lists_ = false;
+    for (const NodeId node : indices_)
+        if (node != no_node) block_of_node_[node] = no_block;
 }
 
 void IndexBuffer::write(Index corner, NodeId node) {

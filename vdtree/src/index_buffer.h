@@ -24,7 +24,7 @@ public:
     // Makes the lists for what was gathered from `unfolded`. Cost: a few times gather()'s. Buffers that are too large for them stay
     // without (a vertex in 2^27 triangles, or more than some 10^9 corners).
     void make_lists(std::span<const std::uint64_t> unfolded);
-    void drop_lists() noexcept { has_lists_ = false; }
+    void drop_lists() noexcept;
 
     // Precondition of all: can_patch(). Between begin_patch() and end_patch() the buffer may have holes.
     void begin_patch() { writes_.clear(); }
@@ -57,7 +57,7 @@ private:
     std::vector<NodeId> indices_;
     bool has_lists_ = false;
     std::vector<Index> leaves_;          // by corner: the leaf whose proxy it shows; only with lists
-    std::vector<Block> block_of_node_;   // by node; only with lists
+    std::vector<Block> block_of_node_;   // by node; no_block without lists
     std::vector<std::uint32_t> pool_;    // a block: log2 of its size << 27 | corners in it, then the corners
     std::vector<Block> free_blocks_[28]; // by log2 of the size
     std::vector<Index> holes_;           // triangles without corners
