@@ -314,6 +314,15 @@ bool Cut::is_patching() {
     return false;
 }
 
+// Three reads follow from each other for every unfold; those of the next ones are made to overlap.
+void Cut::prefetch_unfolds(std::span<const NodeId> nodes, std::size_t next) const {
+    if (!indices_ || !indices_->is_patched) return;
+    constexpr std::size_t stride = 3; // unfolds between one read and the next
+    if (next + 3 * stride < nodes.size()) indices_->buffer.prefetch_place(nodes[next + 3 * stride]);
+    if (next + 2 * stride < nodes.size()) indices_->buffer.prefetch_list(nodes[next + 2 * stride]);
+    if (next + stride < nodes.size()) indices_->buffer.prefetch_corners(nodes[next + stride]);
+}
+
 void Cut::apply_unfold(NodeId node) {
     set_unfolded(node);
     changes_.push_back({node, false});

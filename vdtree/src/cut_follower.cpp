@@ -403,7 +403,9 @@ void CutFollower::unfold_wave(Cut& cut) {
     std::size_t unfolded = 0;
     while (!wave_.empty()) {
         next_wave_.clear();
-        for (const NodeId node : wave_) {
+        for (std::size_t i = 0; i < wave_.size(); ++i) {
+            const NodeId node = wave_[i];
+            cut.prefetch_unfolds(wave_, i);
             if (slot_of_node_[node] == no_slot) continue; // an ancestor has folded
             if ((++unfolded % times_checked) == 0 && is_out_of_time()) stats_.is_complete = false;
             if (!stats_.is_complete) {

@@ -18,6 +18,12 @@ unsigned log2_size_for(std::uint32_t corners) {
     return std::max<unsigned>(least_log2_size, static_cast<unsigned>(std::bit_width(corners)));
 }
 
+void prefetch([[maybe_unused]] const void* what) {
+#if defined(__GNUC__)
+    __builtin_prefetch(what);
+#endif
+}
+
 template <class F>
 void for_each_set(std::span<const std::uint64_t> bits, F&& f) {
     for (std::size_t word = 0; word < bits.size(); ++word)
@@ -222,6 +228,30 @@ void IndexBuffer::unfold(NodeId node, std::span<const NodeId> children, std::spa
             write(corner, proxies[leaf]);
             append(proxies[leaf], corner);
         }
+    }
+}
+
+void IndexBuffer::prefetch_place(NodeId node) const {
+    prefetch(&block_of_node_[node]);
+    prefetch(tree_->first_triangle().data() + node);
+    prefetch(tree_->first_leaf().data() + node);
+}
+
+void IndexBuffer::prefetch_list(NodeId node) const {
+    const Block block = block_of_node_[node];
+    if (block != no_block) prefetch(&pool_[block]);
+    const Index triangle = tree_->first_triangle()[node];
+    if (triangle < tree_->triangle_count()) prefetch(tree_->triangles().data() + triangle);
+}
+
+void IndexBuffer::prefetch_corners(NodeId node) const {
+    const Block block = block_of_node_[node];
+    if (block == no_block) return;
+    const std::uint32_t* const corners = &pool_[block] + 1;
+    const std::uint32_t count = std::min<std::uint32_t>(pool_[block] & count_mask, (1u << least_log2_size) - 1);
+    for (std::uint32_t i = 0; i < count; ++i) {
+        prefetch(&indices_[corners[i]]);
+        prefetch(&leaves_[corners[i]]);
     }
 }
 

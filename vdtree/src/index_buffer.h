@@ -32,6 +32,11 @@ public:
     void fold(NodeId node, std::span<const NodeId> children);
     // `proxies` is current: the children stand for their leaves.
     void unfold(NodeId node, std::span<const NodeId> children, std::span<const NodeId> proxies);
+    // Brings nearer what unfold(node) will read: its list's place, then the list, then what its corners show. In this order, with
+    // some time in between. Precondition of the later ones: the node is active.
+    void prefetch_place(NodeId node) const;
+    void prefetch_list(NodeId node) const;
+    void prefetch_corners(NodeId node) const;
     // Closes the holes with triangles from the end.
     void end_patch();
 

@@ -133,6 +133,7 @@ private:
     // For those who change the cut in steps that are to be patched into the index buffer.
     void begin_changes();
     bool is_patching();
+    void prefetch_unfolds(std::span<const NodeId> nodes, std::size_t next) const;
     void apply_unfold(NodeId node);
     void fold_below(NodeId node, FunctionRef<void(NodeId)> on_fold); // tells each node, descendants first
     void apply_fold(NodeId node);
