@@ -286,6 +286,20 @@ TEST(FollowAfterOthers, StartsOverFromWhateverTheCutIs) {
     EXPECT_EQ(state_of(cut), state_of(other));
 }
 
+TEST(FollowAfterOthers, TakesACopyOfTheCriterionInEveryFrame) {
+    const VertexTree tree = built(shapes::torus(40, 20));
+    const DistanceCriterion original = rich_criterion(tree, 7, true);
+    Path path(tree, 14, true, true);
+    Cut cut(tree);
+    for (int frame = 0; frame < 50; ++frame) {
+        const Viewpoint viewpoint = path.next();
+        const auto copy = std::make_unique<DistanceCriterion>(original); // gone after the frame
+        const DistanceCriterion on_stack = *copy;
+        ASSERT_TRUE(cut.follow(frame % 2 ? *copy : on_stack, viewpoint));
+        ASSERT_EQ(state_of(cut), from_scratch(tree, original, viewpoint, {})) << "frame " << frame;
+    }
+}
+
 // Every closed-upward set of nodes of a small tree, as bit patterns.
 std::vector<std::uint32_t> all_cuts(const VertexTree& tree) {
     std::vector<std::uint32_t> cuts;

@@ -35,6 +35,7 @@ private:
 
     bool is_same_request(const DistanceCriterion& criterion, const FollowOptions& options) const;
     void prepare(const DistanceCriterion& criterion, const FollowOptions& options);
+    void take_copy(const DistanceCriterion& criterion);
     void place_clocks(const Viewpoint& viewpoint);
     void follow_threshold(Cut& cut, const Viewpoint& viewpoint, const Motion& motion);
     void follow_budget(Cut& cut, const Viewpoint& viewpoint, const Motion& motion);
@@ -73,6 +74,7 @@ private:
     std::uint64_t criterion_ = 0;
     FollowOptions options_;
     std::optional<FoldTester> tester_;
+    const DistanceCriterion* tested_ = nullptr; // what the tester refers to
     float threshold_ = 1;          // with hysteresis it follows the budget
     Viewpoint viewpoint_;
     double length_per_radian_ = 1;
