@@ -82,19 +82,16 @@ bool CutFollower::is_same_request(const DistanceCriterion& criterion, const Foll
 }
 
 void CutFollower::prepare(const DistanceCriterion& criterion, const FollowOptions& options) {
-    const bool has_budget = options.triangle_budget.has_value();
     criterion_ = criterion.id();
     options_ = options;
     threshold_ = options.threshold;
-    tester_.emplace(tree_, criterion, options.cull_back_faces, has_budget ? 1.0f : options.threshold, !has_budget);
-    tested_ = &criterion;
+    make_tester(criterion);
 }
 
-// The same values, but another object: the one that was tested may be gone.
-void CutFollower::take_copy(const DistanceCriterion& criterion) {
+// Also where the values are the same, but another object has them: the one that was tested may be gone.
+void CutFollower::make_tester(const DistanceCriterion& criterion) {
     const bool has_budget = options_.triangle_budget.has_value();
-    tester_.emplace(tree_, criterion, options_.cull_back_faces, has_budget ? 1.0f : options_.threshold, !has_budget);
-    if (has_budget) tester_->set_threshold(threshold_);
+    tester_.emplace(tree_, criterion, options_.cull_back_faces, threshold_, !has_budget);
     tested_ = &criterion;
 }
 
@@ -107,7 +104,7 @@ AdjustStats CutFollower::follow(Cut& cut, const DistanceCriterion& criterion, co
                       std::chrono::nanoseconds(static_cast<std::int64_t>(*options.milliseconds * 1e6));
     const bool is_same = is_same_request(criterion, options);
     if (!is_same) prepare(criterion, options);
-    else if (tested_ != &criterion) take_copy(criterion);
+    else if (tested_ != &criterion) make_tester(criterion);
     const Motion motion = is_same ? FoldTester::motion(tree_, viewpoint_, viewpoint, length_per_radian_)
                                   : Motion{std::numeric_limits<double>::infinity(), 0};
     if (is_same && was_complete_ && motion.position == 0 && motion.facing == 0) { // nothing can have changed

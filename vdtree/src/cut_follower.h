@@ -35,7 +35,7 @@ private:
 
     bool is_same_request(const DistanceCriterion& criterion, const FollowOptions& options) const;
     void prepare(const DistanceCriterion& criterion, const FollowOptions& options);
-    void take_copy(const DistanceCriterion& criterion);
+    void make_tester(const DistanceCriterion& criterion);
     void place_clocks(const Viewpoint& viewpoint);
     void follow_threshold(Cut& cut, const Viewpoint& viewpoint, const Motion& motion);
     void follow_budget(Cut& cut, const Viewpoint& viewpoint, const Motion& motion);
