@@ -138,8 +138,9 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
         const Result<void> own = source ? Result<void>() : Result<void>(source.error());
         const auto ok = agree(*team, own, source ? fingerprint(source->read.mesh.view(), a.clusterer) : 0);
         if (!ok) {
+            print_error(ok.error().message); // before anybody leaves: mpirun ends all when the first one fails
             team->leave();
-            return ok.error();
+            return exit_failed;
         }
     }
     if (!source) return source.error();
