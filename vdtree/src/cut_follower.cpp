@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <limits>
 
 #include <glm/geometric.hpp>
@@ -18,7 +19,7 @@ constexpr std::int32_t never = std::numeric_limits<std::int32_t>::max();
 
 // Clocks restart when they have run this many times the distance to the tree, so that deadlines in floats stay fine enough.
 constexpr double longest_run = 16;
-// With more than this share of the live nodes due, testing all of them from the root down is cheaper.
+// With more than this share of the watched nodes due, testing all of them from the root down is cheaper.
 constexpr std::size_t most_due = 3; // one in three
 // Beyond this step a good part of all verdicts would be due anyway. In lengths for a radian: twice the tree's distance.
 constexpr double longest_step = 0.125;
@@ -71,6 +72,12 @@ std::int32_t deadline(float clock, float slack) {
     return sum < std::numeric_limits<float>::max() ? std::max(bits_of(sum) - 1, 0) : never;
 }
 
+void prefetch([[maybe_unused]] const void* what) {
+#if defined(__GNUC__)
+    __builtin_prefetch(what);
+#endif
+}
+
 float rounded_down(double clock) { return clock > 0 ? std::nextafter(static_cast<float>(clock), 0.0f) : 0.0f; }
 
 } // namespace
@@ -93,6 +100,7 @@ void CutFollower::make_tester(const DistanceCriterion& criterion) {
     const bool has_budget = options_.triangle_budget.has_value();
     tester_.emplace(tree_, criterion, options_.cull_back_faces, threshold_, !has_budget);
     tested_ = &criterion;
+    watches_ancestors_ = !criterion.is_monotone();
 }
 
 AdjustStats CutFollower::follow(Cut& cut, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
@@ -130,7 +138,15 @@ void CutFollower::place_clocks(const Viewpoint& viewpoint) {
     length_per_radian_ = 2 * std::max(distance, least);
     set_farthest(distance + static_cast<double>(root.radius));
     set_clocks(0, 0);
+    look_from(viewpoint);
+}
+
+void CutFollower::look_from(const Viewpoint& viewpoint) {
     tester_->look_from(viewpoint, length_per_radian_);
+    // Nodes are at most this far away, and no farther than twice that when a deadline comes that is set now.
+    const Sphere& root = tree_.bounds()[VertexTree::root()].ring;
+    const double farthest = glm::length(viewpoint.eye - glm::dvec3(root.centre)) + 2 * static_cast<double>(root.radius);
+    hair_ = static_cast<float>(2 * farthest) * test_rounding;
 }
 
 void CutFollower::follow_threshold(Cut& cut, const Viewpoint& viewpoint, const Motion& motion) {
@@ -140,7 +156,7 @@ void CutFollower::follow_threshold(Cut& cut, const Viewpoint& viewpoint, const M
         else start_over(cut);
         return;
     }
-    tester_->look_from(viewpoint, length_per_radian_);
+    look_from(viewpoint);
     set_clocks(position_clock_ + motion.position, facing_clock_ + motion.facing);
     step(cut);
 }
@@ -156,7 +172,7 @@ void CutFollower::follow_budget(Cut& cut, const Viewpoint& viewpoint, const Moti
     }
     const Sphere& root = tree_.bounds()[VertexTree::root()].ring;
     set_farthest(glm::length(viewpoint.eye - glm::dvec3(root.centre)) + static_cast<double>(root.radius));
-    tester_->look_from(viewpoint, length_per_radian_);
+    look_from(viewpoint);
     set_clocks(position_clock_ + motion.position, facing_clock_ + motion.facing);
     cut.begin_changes();
     keep_within_budget(cut);
@@ -182,7 +198,7 @@ void CutFollower::start_with_budget(Cut& cut) {
     }
     threshold_ = std::max(decision.threshold, least_threshold);
     tester_->set_threshold(threshold_);
-    make_all_due(cut);
+    watch_all_due(cut);
 }
 
 // Of the hysteresis, half (as a factor: its root) keeps nodes unfolded, and half of the rest keeps the threshold.
@@ -231,10 +247,9 @@ void CutFollower::change_threshold(Cut& cut, float factor) {
 void CutFollower::forget_slots() {
     // Node by node, so that the cost does not go with the tree.
     if (slot_of_node_.empty()) slot_of_node_.assign(tree_.interior_count(), no_slot);
-    for (const NodeId node : node_) slot_of_node_[node] = no_slot;
-    node_.clear();
-    position_due_.clear();
-    facing_due_.clear();
+    for (const FoldCandidate& candidate : candidates_) slot_of_node_[candidate.node] = no_slot;
+    candidates_.clear();
+    blocks_.clear();
     block_position_due_.clear();
     block_facing_due_.clear();
     free_slots_.clear();
@@ -247,9 +262,17 @@ void CutFollower::start_over(Cut& cut) {
     // Level by level from the root down to subtrees that fit a core's cache, then one of these after the other: tests want batches,
     // and memory wants neighbours. The slots lie in the same order, which is what later frames profit from.
     std::vector<NodeId> subtrees;
+    parents_.clear();
     test_down(VertexTree::root(), unfolded, &subtrees);
     std::sort(subtrees.begin(), subtrees.end());
     for (const NodeId node : subtrees) test_down(node, unfolded, nullptr);
+    // Of the parents of these subtrees it was not known what is under them.
+    for (const NodeId node : parents_) {
+        if (has_unfolded_child(node, unfolded) && !watches_ancestors_) continue;
+        FoldCandidate candidate = tester_->candidate(node);
+        candidate.is_unfolded = true;
+        set_deadlines(watch(candidate), Verdict{}); // due in the next frame
+    }
     cut.change_to(std::move(unfolded), stats_);
 }
 
@@ -266,48 +289,89 @@ void CutFollower::start_in_time(Cut& cut) {
     stats_.is_complete = decision.is_complete;
     cut.change_to(std::move(decision.unfolded[0]), stats_);
     is_tracking_ = true;
-    make_all_due(cut);
+    watch_all_due(cut);
 }
 
-void CutFollower::make_all_due(const Cut& cut) {
+void CutFollower::watch_all_due(const Cut& cut) {
     forget_slots();
     const auto subtree_end = tree_.subtree_end();
-    const Verdict due{};
-    for (NodeId node = 0; node < tree_.interior_count(); node = cut.is_unfolded_interior(node) ? node + 1 : subtree_end[node]) {
-        set_deadlines(add_live(node), due);
+    for (NodeId node = 0; node < tree_.interior_count();) {
+        const bool is_unfolded = cut.is_unfolded_interior(node);
+        if (!is_unfolded || watches_ancestors_ || !has_unfolded_child(node, cut.unfolded_)) {
+            FoldCandidate candidate = tester_->candidate(node);
+            candidate.is_unfolded = is_unfolded;
+            set_deadlines(watch(candidate), Verdict{});
+        }
+        node = is_unfolded ? node + 1 : subtree_end[node];
     }
 }
 
 bool CutFollower::is_out_of_time() const { return time_limit_ && std::chrono::steady_clock::now() >= *time_limit_; }
 
-// Tests a subtree as far down as it unfolds. Children with subtrees of cache size are left to the caller where `left` is given.
+// Tests a subtree as far down as it unfolds. Children with subtrees of cache size are left to the caller where `left` is given, and
+// their parents to parents_.
 void CutFollower::test_down(NodeId top, std::vector<std::uint64_t>& unfolded, std::vector<NodeId>* left) {
     constexpr NodeId cached_nodes = 4096; // about 200 KB of what is read of them
     const auto subtree_end = tree_.subtree_end();
     wave_.assign(1, top);
+    wave_parents_.assign(1, nobody);
     while (!wave_.empty()) {
-        verdicts_.resize(wave_.size());
-        tester_->test(wave_, verdicts_);
-        stats_.node_tests += wave_.size();
+        test_wave();
+        settle_parents_of_wave();
         next_wave_.clear();
+        wave_parents_.clear();
         for (std::size_t i = 0; i < wave_.size(); ++i) {
             const NodeId node = wave_[i];
-            set_deadlines(add_live(node), verdicts_[i]);
-            if (!verdicts_[i].unfolded || !tree_.is_sound(node)) continue;
+            if (!wave_candidates_[i].is_unfolded) {
+                set_deadlines(watch(wave_candidates_[i]), verdicts_[i]);
+                continue;
+            }
             unfolded[node >> 6] |= std::uint64_t{1} << (node & 63);
-            for (NodeId child = node + 1; child < subtree_end[node]; child = subtree_end[child])
-                (left && subtree_end[child] - child <= cached_nodes ? *left : next_wave_).push_back(child);
+            bool leaves_children = false;
+            for (NodeId child = node + 1; child < subtree_end[node]; child = subtree_end[child]) {
+                const bool is_left = left && subtree_end[child] - child <= cached_nodes;
+                (is_left ? *left : next_wave_).push_back(child);
+                leaves_children |= is_left;
+            }
+            if (leaves_children) parents_.push_back(node);
+            else unsettled_.push_back({wave_candidates_[i], verdicts_[i]});
+            const auto parent = leaves_children ? nobody : static_cast<std::uint32_t>(unsettled_.size() - 1);
+            wave_parents_.resize(next_wave_.size(), parent);
         }
         wave_.swap(next_wave_);
     }
+    settle_parents_of_wave();
+}
+
+void CutFollower::test_wave() {
+    constexpr std::size_t ahead = 8; // tests between a node's prefetch and its use
+    wave_candidates_.clear();
+    for (std::size_t i = 0; i < wave_.size(); ++i) {
+        if (i + ahead < wave_.size()) tester_->prefetch(wave_[i + ahead]);
+        wave_candidates_.push_back(tester_->candidate(wave_[i]));
+    }
+    verdicts_.resize(wave_.size());
+    tester_->test(wave_candidates_, verdicts_);
+    stats_.node_tests += wave_.size();
+    for (std::size_t i = 0; i < wave_.size(); ++i)
+        wave_candidates_[i].is_unfolded = verdicts_[i].unfolded && tree_.is_sound(wave_[i]);
+}
+
+// Now that the children are tested.
+void CutFollower::settle_parents_of_wave() {
+    for (std::size_t i = 0; i < wave_.size(); ++i)
+        if (wave_candidates_[i].is_unfolded && wave_parents_[i] != nobody) unsettled_[wave_parents_[i]].has_unfolded_child = true;
+    for (const Unsettled& parent : unsettled_)
+        if (!parent.has_unfolded_child || watches_ancestors_) set_deadlines(watch(parent.candidate), parent.verdict);
+    unsettled_.clear();
 }
 
 // ---- from frame to frame
 
 void CutFollower::step(Cut& cut) {
     collect_due();
-    const std::size_t live = node_.size() - free_slots_.size();
-    if (due_.size() > live / most_due && !time_limit_) {
+    const std::size_t watched = candidates_.size() - free_slots_.size();
+    if (due_.size() > watched / most_due && !time_limit_) {
         set_clocks(0, 0);
         start_over(cut);
         return;
@@ -324,30 +388,35 @@ void CutFollower::settle_due(Cut& cut) {
 
 void CutFollower::collect_due() {
     due_.clear();
-    due_slots_.clear();
     due_blocks_.clear();
     // In floats the clock may be a little late.
     const std::int32_t position = bits_of(std::nextafter(static_cast<float>(position_clock_), 1e30f));
     const std::int32_t facing = bits_of(std::nextafter(static_cast<float>(facing_clock_), 1e30f));
-    const std::size_t blocks = block_position_due_.size();
-    for (std::size_t first = 0; first < blocks; first += 64)
+    const std::size_t blocks = blocks_.size();
+    for (std::size_t first = 0; first < blocks; first += 64) {
         for (std::uint64_t due = due_bits<64>(&block_position_due_[first], &block_facing_due_[first], position, facing, blocks - first);
-             due; due &= due - 1)
-            due_blocks_.push_back(static_cast<std::uint32_t>(first + static_cast<std::size_t>(std::countr_zero(due))));
+             due; due &= due - 1) {
+            const std::size_t block = first + static_cast<std::size_t>(std::countr_zero(due));
+            prefetch(&blocks_[block].position_due);
+            prefetch(&blocks_[block].facing_due);
+            due_blocks_.push_back(static_cast<std::uint32_t>(block));
+        }
+    }
     for (const std::uint32_t block : due_blocks_) {
-        const std::size_t first = block * block_slots;
-        for (std::uint64_t due = due_bits<block_slots>(&position_due_[first], &facing_due_[first], position, facing, block_slots); due;
+        const Block& dues = blocks_[block];
+        for (std::uint64_t due = due_bits<block_slots>(dues.position_due.data(), dues.facing_due.data(), position, facing, block_slots); due;
              due &= due - 1) {
-            const std::size_t slot = first + static_cast<std::size_t>(std::countr_zero(due));
-            due_slots_.push_back(static_cast<Slot>(slot));
-            due_.push_back(node_[slot]);
+            const std::size_t slot = block * block_slots + static_cast<std::size_t>(std::countr_zero(due));
+            prefetch(&candidates_[slot]);
+            due_.push_back(static_cast<Slot>(slot));
         }
     }
 }
 
-// Tests what is due, folds what has to go, and unfolds what has to come, with all that follows under it.
+// Tests what is due, folds what has to go, and unfolds what has to come, with all that follows above and under it.
 void CutFollower::settle(Cut& cut) {
     folding_.clear();
+    parents_.clear();
     wave_.clear();
     // In pieces, between which the clock is looked at; what is not reached stays due.
     constexpr std::size_t piece = 2048;
@@ -356,50 +425,93 @@ void CutFollower::settle(Cut& cut) {
             stats_.is_complete = false;
             break;
         }
-        const std::size_t count = std::min(piece, due_.size() - first);
-        test_due(cut, std::span(due_).subspan(first, count), std::span(due_slots_).subspan(first, count));
+        test_due(std::span(due_).subspan(first, std::min(piece, due_.size() - first)));
     }
-    // Ancestors first: what they fold is gone.
-    std::sort(folding_.begin(), folding_.end());
-    for (const NodeId node : folding_)
-        if (cut.is_unfolded_interior(node)) cut.fold_below(node, [&](NodeId folded) { remove_children(folded); });
+    while (!folding_.empty() || !parents_.empty()) {
+        fold_wave(cut);
+        test_parents(cut);
+    }
     unfold_wave(cut);
     for (const std::uint32_t block : due_blocks_) refresh_block(block);
     if (std::max(position_clock_, facing_clock_) > longest_run * length_per_radian_) restart_clocks();
 }
 
-void CutFollower::test_due(const Cut& cut, std::span<const NodeId> nodes, std::span<const Slot> slots) {
-    const float keeping = keeping_factor();
-    if (keeping == 1) {
-        test_nodes(cut, nodes, slots);
+void CutFollower::test_due(std::span<const Slot> slots) {
+    if (keeping_factor() == 1) {
+        test_slots(slots);
         return;
     }
-    // What is unfolded stays so down to a somewhat lower cost.
     for (const bool unfolded : {true, false}) {
         kept_.clear();
-        kept_slots_.clear();
-        for (std::size_t i = 0; i < nodes.size(); ++i) {
-            if (cut.is_unfolded_interior(nodes[i]) != unfolded) continue;
-            kept_.push_back(nodes[i]);
-            kept_slots_.push_back(slots[i]);
-        }
-        tester_->set_threshold(unfolded ? threshold_ / keeping : threshold_);
-        test_nodes(cut, kept_, kept_slots_);
+        for (const Slot slot : slots)
+            if (candidates_[slot].is_unfolded == unfolded) kept_.push_back(slot);
+        use_threshold_of(unfolded);
+        test_slots(kept_);
     }
 }
 
-void CutFollower::test_nodes(const Cut& cut, std::span<const NodeId> nodes, std::span<const Slot> slots) {
-    verdicts_.resize(nodes.size());
-    tester_->test(nodes, verdicts_);
-    stats_.node_tests += nodes.size();
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
-        const NodeId node = nodes[i];
-        set_deadlines(slots[i], verdicts_[i]);
-        const bool was_unfolded = cut.is_unfolded_interior(node);
-        if (was_unfolded == verdicts_[i].unfolded) continue;
-        if (was_unfolded) folding_.push_back(node);
-        else if (tree_.is_sound(node)) wave_.push_back(node);
+void CutFollower::test_slots(std::span<const Slot> slots) {
+    verdicts_.resize(slots.size());
+    tester_->test(candidates_, slots, verdicts_);
+    stats_.node_tests += slots.size();
+    for (std::size_t i = 0; i < slots.size(); ++i) {
+        const FoldCandidate& candidate = candidates_[slots[i]];
+        const Verdict& verdict = verdicts_[i];
+        set_deadlines(slots[i], verdict);
+        if (candidate.is_unfolded && !verdict.unfolded) folding_.push_back(candidate.node);
+        else if (candidate.is_unfolded && stands_by_a_hair(verdict)) ask_parent(candidate.node);
+        else if (verdict.unfolded && !candidate.is_unfolded && tree_.is_sound(candidate.node)) wave_.push_back(candidate.node);
     }
+}
+
+// Folds with all that is under it what the last tests want folded, the lowest nodes first; what is above may want to fold now.
+void CutFollower::fold_wave(Cut& cut) {
+    std::sort(folding_.begin(), folding_.end(), std::greater<>());
+    for (const NodeId node : folding_) {
+        if (!cut.is_unfolded_interior(node)) continue;
+        const auto subtree_end = tree_.subtree_end();
+        cut.fold_below(node, [&](NodeId folded) {
+            for (NodeId child = folded + 1; child < subtree_end[folded]; child = subtree_end[child]) unwatch(child);
+        });
+        candidates_[slot_of_node_[node]].is_unfolded = false;
+        ask_parent(node);
+    }
+    folding_.clear();
+}
+
+void CutFollower::ask_parent(NodeId node) {
+    if (node != VertexTree::root() && !watches_ancestors_) parents_.push_back(tree_.parents()[node]);
+}
+
+// Nodes that are watched are left to their deadlines.
+void CutFollower::test_parents(const Cut& cut) {
+    std::sort(parents_.begin(), parents_.end());
+    parents_.erase(std::unique(parents_.begin(), parents_.end()), parents_.end());
+    std::erase_if(parents_, [&](NodeId node) { return !cut.is_unfolded_interior(node) || slot_of_node_[node] != no_slot; });
+    wave_candidates_.clear();
+    for (const NodeId node : parents_) {
+        wave_candidates_.push_back(tester_->candidate(node));
+        wave_candidates_.back().is_unfolded = true;
+    }
+    parents_.clear();
+    if (wave_candidates_.empty()) return;
+    use_threshold_of(true);
+    verdicts_.resize(wave_candidates_.size());
+    tester_->test(wave_candidates_, verdicts_);
+    stats_.node_tests += wave_candidates_.size();
+    for (std::size_t i = 0; i < wave_candidates_.size(); ++i) {
+        const NodeId node = wave_candidates_[i].node;
+        if (!verdicts_[i].unfolded || !has_unfolded_child(node, cut.unfolded_)) set_deadlines(watch(wave_candidates_[i]), verdicts_[i]);
+        if (!verdicts_[i].unfolded) folding_.push_back(node);
+        else if (stands_by_a_hair(verdicts_[i])) ask_parent(node);
+    }
+    use_threshold_of(false);
+}
+
+// With hysteresis, what is unfolded stays so down to a somewhat lower cost.
+void CutFollower::use_threshold_of(bool unfolded) {
+    const float keeping = keeping_factor();
+    if (keeping > 1) tester_->set_threshold(unfolded ? threshold_ / keeping : threshold_);
 }
 
 // What unfolds, and then what unfolds under it. Where the time ends, the rest stays due.
@@ -420,60 +532,69 @@ void CutFollower::unfold_wave(Cut& cut) {
                 continue;
             }
             cut.apply_unfold(node);
+            candidates_[slot_of_node_[node]].is_unfolded = true;
+            if (node != VertexTree::root() && !watches_ancestors_) unwatch(tree_.parents()[node]);
             for (NodeId child = node + 1; child < subtree_end[node]; child = subtree_end[child]) {
-                add_live(child);
+                tester_->prefetch(child);
                 next_wave_.push_back(child);
             }
         }
-        verdicts_.resize(next_wave_.size());
-        tester_->test(next_wave_, verdicts_);
-        stats_.node_tests += next_wave_.size();
         wave_.clear();
-        for (std::size_t i = 0; i < next_wave_.size(); ++i) {
-            set_deadlines(slot_of_node_[next_wave_[i]], verdicts_[i]);
-            if (verdicts_[i].unfolded && tree_.is_sound(next_wave_[i])) wave_.push_back(next_wave_[i]);
-        }
+        wave_slots_.clear();
+        for (const NodeId node : next_wave_) wave_slots_.push_back(watch(tester_->candidate(node)));
+        test_slots(wave_slots_); // refills the wave
     }
 }
 
 // ---- slots
 
-CutFollower::Slot CutFollower::add_live(NodeId node) {
+bool CutFollower::has_unfolded_child(NodeId node, std::span<const std::uint64_t> unfolded) const {
+    const auto subtree_end = tree_.subtree_end();
+    for (NodeId child = node + 1; child < subtree_end[node]; child = subtree_end[child])
+        if ((unfolded[child >> 6] >> (child & 63)) & 1) return true;
+    return false;
+}
+
+CutFollower::Slot CutFollower::watch(const FoldCandidate& candidate) {
     Slot slot;
     if (free_slots_.empty()) {
-        slot = static_cast<Slot>(node_.size());
+        slot = static_cast<Slot>(candidates_.size());
         if (slot % block_slots == 0) {
-            position_due_.resize(slot + block_slots, never);
-            facing_due_.resize(slot + block_slots, never);
+            Block& block = blocks_.emplace_back();
+            block.position_due.fill(never);
+            block.facing_due.fill(never);
             block_position_due_.push_back(never);
             block_facing_due_.push_back(never);
         }
-        node_.push_back(node);
+        candidates_.push_back(candidate);
     } else {
         slot = free_slots_.back();
         free_slots_.pop_back();
-        node_[slot] = node;
+        candidates_[slot] = candidate;
     }
-    slot_of_node_[node] = slot;
+    slot_of_node_[candidate.node] = slot;
     return slot;
 }
 
-void CutFollower::remove_children(NodeId node) {
-    const auto subtree_end = tree_.subtree_end();
-    for (NodeId child = node + 1; child < subtree_end[node]; child = subtree_end[child]) {
-        const Slot slot = slot_of_node_[child];
-        slot_of_node_[child] = no_slot;
-        position_due_[slot] = facing_due_[slot] = never;
-        free_slots_.push_back(slot);
-    }
+// Also where it is not watched.
+void CutFollower::unwatch(NodeId node) {
+    const Slot slot = slot_of_node_[node];
+    if (slot == no_slot) return;
+    slot_of_node_[node] = no_slot;
+    Block& block = blocks_[slot / block_slots];
+    block.position_due[slot % block_slots] = block.facing_due[slot % block_slots] = never;
+    free_slots_.push_back(slot);
 }
 
+// Unfolded nodes speak for their ancestors, too, whose tests round in their own way.
 void CutFollower::set_deadlines(Slot slot, const Verdict& verdict) {
     const std::size_t block = slot / block_slots;
-    const std::int32_t position = deadline(position_clock_down_, std::min(verdict.position_slack, longest_slack_));
-    const std::int32_t facing = deadline(facing_clock_down_, verdict.facing_slack);
-    position_due_[slot] = position;
-    facing_due_[slot] = facing;
+    const float hair = verdict.unfolded ? hair_ : 0;
+    const float position_slack = std::min(verdict.position_slack, longest_slack_);
+    const std::int32_t position = deadline(position_clock_down_, std::max(position_slack - hair, 0.0f));
+    const std::int32_t facing = deadline(facing_clock_down_, std::max(verdict.facing_slack - hair, 0.0f));
+    blocks_[block].position_due[slot % block_slots] = position;
+    blocks_[block].facing_due[slot % block_slots] = facing;
     block_position_due_[block] = std::min(block_position_due_[block], position);
     block_facing_due_[block] = std::min(block_facing_due_[block], facing);
 }
@@ -486,28 +607,29 @@ void CutFollower::set_clocks(double position, double facing) {
 }
 
 void CutFollower::refresh_block(std::size_t block) {
-    const std::size_t first = block * block_slots;
-    block_position_due_[block] = least_of<block_slots>(&position_due_[first]);
-    block_facing_due_[block] = least_of<block_slots>(&facing_due_[first]);
+    block_position_due_[block] = least_of<block_slots>(blocks_[block].position_due.data());
+    block_facing_due_[block] = least_of<block_slots>(blocks_[block].facing_due.data());
 }
 
 // Sets both clocks to 0, and all deadlines back by what they showed.
 void CutFollower::restart_clocks() {
-    const auto set_back = [](std::vector<std::int32_t>& dues, double clock) {
+    const auto set_back = [](std::array<std::int32_t, block_slots>& dues, double clock) {
         for (std::int32_t& due : dues) {
             if (due == never) continue;
             const double left = static_cast<double>(std::bit_cast<float>(due)) - clock;
             due = left > 0 ? bits_of(std::nextafter(static_cast<float>(left), 0.0f)) : 0;
         }
     };
-    set_back(position_due_, position_clock_);
-    set_back(facing_due_, facing_clock_);
+    for (Block& block : blocks_) {
+        set_back(block.position_due, position_clock_);
+        set_back(block.facing_due, facing_clock_);
+    }
     set_clocks(0, 0);
-    for (std::size_t block = 0; block < block_position_due_.size(); ++block) refresh_block(block);
+    for (std::size_t block = 0; block < blocks_.size(); ++block) refresh_block(block);
 }
 
 std::uint64_t CutFollower::byte_size() const noexcept {
-    return sizeof(NodeId) * node_.capacity() + sizeof(std::int32_t) * (position_due_.capacity() + facing_due_.capacity()) +
+    return sizeof(FoldCandidate) * candidates_.capacity() + sizeof(Block) * blocks_.capacity() +
            sizeof(std::int32_t) * (block_position_due_.capacity() + block_facing_due_.capacity()) +
            sizeof(Slot) * (free_slots_.capacity() + slot_of_node_.capacity());
 }

@@ -1,6 +1,8 @@
 // Keeps a cut at what a distance criterion asks for while the viewpoint moves, testing nodes only when their time has come.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <optional>
@@ -13,11 +15,13 @@
 
 namespace unseen::vdtree {
 
-// Live nodes, those whose parent is unfolded, and the root, have a slot with two deadlines, one on each of the tester's clocks. Slots
-// come in blocks of 16 with the earliest deadlines of all, so that a frame looks at a few hundred blocks, tests the
-// nodes that are due, and changes what they say; its cost goes with the motion and with the active triangles, not with the mesh.
-// All live nodes are tested when their verdict may have changed, also those with unfolded nodes below: what a cut becomes does not
-// depend on the way to it, nor on the criterion's being monotone.
+// Watched are the folded nodes under unfolded ones (or the root), and the unfolded nodes that have no unfolded child: what can
+// fold or unfold next. Each has a slot with two deadlines, one on each of the tester's clocks. Slots come in blocks of 16 with
+// the earliest deadlines of all, so that a frame looks at some thousand numbers, tests the nodes that are due, and changes what they
+// say; its cost goes with the motion and with the active triangles, not with the mesh.
+// All other unfolded nodes stay so while one of their children does, for criteria are monotone: where a child's verdict stands by more
+// than the rounding of tests, its ancestors' tests would say the same; where it stands by less, the parent is tested too. Under a
+// criterion that is not monotone all unfolded nodes are watched. So what a cut becomes does not depend on the way to it.
 class CutFollower {
 public:
     explicit CutFollower(const VertexTree& tree) : tree_(tree) {}
@@ -37,6 +41,7 @@ private:
     void prepare(const DistanceCriterion& criterion, const FollowOptions& options);
     void make_tester(const DistanceCriterion& criterion);
     void place_clocks(const Viewpoint& viewpoint);
+    void look_from(const Viewpoint& viewpoint);
     void follow_threshold(Cut& cut, const Viewpoint& viewpoint, const Motion& motion);
     void follow_budget(Cut& cut, const Viewpoint& viewpoint, const Motion& motion);
     void keep_within_budget(Cut& cut);
@@ -45,19 +50,27 @@ private:
     void start_over(Cut& cut);
     void start_in_time(Cut& cut);
     void forget_slots();
-    void make_all_due(const Cut& cut);
+    void watch_all_due(const Cut& cut);
     void test_down(NodeId top, std::vector<std::uint64_t>& unfolded, std::vector<NodeId>* left);
+    void test_wave();
+    void settle_parents_of_wave();
     void step(Cut& cut);
     bool is_out_of_time() const;
     void collect_due();
     void settle_due(Cut& cut);
     void settle(Cut& cut);
-    void test_due(const Cut& cut, std::span<const NodeId> nodes, std::span<const Slot> slots);
-    void test_nodes(const Cut& cut, std::span<const NodeId> nodes, std::span<const Slot> slots);
+    void test_due(std::span<const Slot> slots);
+    void test_slots(std::span<const Slot> slots);
+    void fold_wave(Cut& cut);
+    void test_parents(const Cut& cut);
+    void use_threshold_of(bool unfolded);
+    bool stands_by_a_hair(const Verdict& verdict) const { return !(std::min(verdict.position_slack, verdict.facing_slack) > hair_); }
+    void ask_parent(NodeId node);
     float keeping_factor() const;
     void unfold_wave(Cut& cut);
-    Slot add_live(NodeId node);
-    void remove_children(NodeId node);
+    bool has_unfolded_child(NodeId node, std::span<const std::uint64_t> unfolded) const;
+    Slot watch(const FoldCandidate& candidate);
+    void unwatch(NodeId node);
     void set_deadlines(Slot slot, const Verdict& verdict);
     void set_clocks(double position, double facing);
     void set_farthest(double distance) noexcept {
@@ -75,24 +88,40 @@ private:
     FollowOptions options_;
     std::optional<FoldTester> tester_;
     const DistanceCriterion* tested_ = nullptr; // what the tester refers to
+    bool watches_ancestors_ = false; // the criterion is not monotone
     float threshold_ = 1;          // with hysteresis it follows the budget
     Viewpoint viewpoint_;
     double length_per_radian_ = 1;
     double farthest_ = 1;          // of the tree's points from the eye; no slack is longer
+    float hair_ = 0;               // more than the rounding of any node's test, mesh units
     std::optional<std::chrono::steady_clock::time_point> time_limit_;
     double position_clock_ = 0, facing_clock_ = 0;
     float position_clock_down_ = 0, facing_clock_down_ = 0, longest_slack_ = 1;
 
     // By slot. Deadlines are the bits of non-negative floats, which compare like the floats.
-    std::vector<NodeId> node_;
-    std::vector<std::int32_t> position_due_, facing_due_;
+    struct Block {
+        std::array<std::int32_t, block_slots> position_due, facing_due;
+    };
+    std::vector<FoldCandidate> candidates_;
+    std::vector<Block> blocks_;
     std::vector<std::int32_t> block_position_due_, block_facing_due_; // by block; not later than any of its slots'
     std::vector<Slot> free_slots_;
     std::vector<Slot> slot_of_node_; // by interior node
 
+    // An unfolded node of which is not yet known whether it has an unfolded child.
+    struct Unsettled {
+        FoldCandidate candidate;
+        Verdict verdict;
+        bool has_unfolded_child = false;
+    };
+    static constexpr std::uint32_t nobody = 0xffffffffu;
+
     // Of one frame.
-    std::vector<NodeId> wave_, next_wave_, folding_, due_, kept_;
-    std::vector<Slot> due_slots_, kept_slots_;
+    std::vector<NodeId> wave_, next_wave_, folding_, parents_;
+    std::vector<Slot> due_, kept_, wave_slots_;
+    std::vector<FoldCandidate> wave_candidates_;
+    std::vector<std::uint32_t> wave_parents_; // of nodes of the wave: their parent's place in unsettled_, or nobody
+    std::vector<Unsettled> unsettled_;
     std::vector<Verdict> verdicts_;
     std::vector<std::uint32_t> due_blocks_;
     AdjustStats stats_;

@@ -22,22 +22,51 @@ std::uint64_t next_id() {
 
 Error invalid(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
 
-// Whether no node's reach exceeds its parent's. Only for assertions: each node is looked at for every bin.
-[[maybe_unused]] bool is_monotone(const VertexTree& tree, const DistanceCriterion::Parts& p) {
-    const auto spheres = tree.support_spheres();
-    for (NodeId node = 1; node < tree.interior_count(); ++node) {
-        const NodeId parent = tree.parents()[node];
-        if (!p.lengths.empty() && p.lengths[node] > p.lengths[parent]) return false;
-        if (p.spheres == DistanceCriterion::Spheres::support && spheres[node].radius > spheres[parent].radius) return false;
-        if (p.classes.empty()) continue;
-        for (std::size_t bin = 0; bin < p.eccentricity_bins; ++bin) {
-            const auto exceeds = [&](std::uint16_t row, std::uint16_t parents) {
-                const std::size_t a = row * p.eccentricity_bins + bin, b = parents * p.eccentricity_bins + bin;
-                return p.reach[a] > p.reach[b] || (!p.least_cost.empty() && p.least_cost[a] > p.least_cost[b]);
-            };
-            const FoldClass a = p.classes[node], b = p.classes[parent];
-            if (exceeds(a.interior, b.interior) || exceeds(a.silhouette, b.silhouette)) return false;
+// Whether one row of a table is nowhere above another. Few pairs of rows come again and again.
+class RowOrder {
+public:
+    explicit RowOrder(const DistanceCriterion::Parts& parts) : parts_(parts), known_(1u << known_bits) {}
+
+    bool is_within(std::uint16_t row, std::uint16_t of) {
+        if (row == of) return true;
+        const std::uint32_t pair = row * 0x10000u + of;
+        Known& known = known_[(pair * 0x9e3779b1u) >> (32 - known_bits)];
+        if (known.pair != pair) known = {pair, compare(row, of)};
+        return known.is_within;
+    }
+
+private:
+    bool compare(std::uint16_t row, std::uint16_t of) const {
+        const std::size_t bins = parts_.eccentricity_bins, a = row * bins, b = of * bins;
+        for (std::size_t bin = 0; bin < bins; ++bin) {
+            if (parts_.reach[a + bin] > parts_.reach[b + bin]) return false;
+            if (!parts_.least_cost.empty() && parts_.least_cost[a + bin] > parts_.least_cost[b + bin]) return false;
         }
+        return true;
+    }
+
+    static constexpr unsigned known_bits = 12;
+    struct Known {
+        std::uint32_t pair = 0; // of row 0 and itself, which is not asked about
+        bool is_within = true;
+    };
+    const DistanceCriterion::Parts& parts_;
+    std::vector<Known> known_;
+};
+
+// Spheres nest in every tree.
+bool is_monotone_in(const VertexTree& tree, const DistanceCriterion::Parts& p) {
+    const auto parents = tree.parents();
+    RowOrder order(p);
+    for (NodeId node = 1; node < tree.interior_count(); ++node) {
+        const NodeId parent = parents[node];
+        if (!(parent < node)) return false; // in a damaged file
+        if (!p.lengths.empty() && p.lengths[node] > p.lengths[parent]) return false;
+        if (p.classes.empty()) continue;
+        const FoldClass a = p.classes[node], b = p.classes[parent];
+        if (!order.is_within(a.interior, b.interior) || !order.is_within(a.silhouette, b.silhouette)) return false;
+        // A parent may be a silhouette where its child is none.
+        if (!order.is_within(b.interior, b.silhouette)) return false;
     }
     return true;
 }
@@ -87,8 +116,10 @@ DistanceCriterion::DistanceCriterion(Parts parts) : parts_(std::move(parts)), id
 Result<DistanceCriterion> DistanceCriterion::create(const VertexTree& tree, Parts parts) {
     if (const auto valid = check(tree, parts); !valid) return valid.error();
     for (float& reach : parts.reach) reach = std::clamp(reach, never_visible, always_visible);
-    assert(is_monotone(tree, parts));
-    return DistanceCriterion(std::move(parts));
+    DistanceCriterion criterion(std::move(parts));
+    criterion.is_monotone_ = is_monotone_in(tree, criterion.parts_);
+    assert(criterion.is_monotone_);
+    return criterion;
 }
 
 Frustum frustum_of(const VertexTree& tree, const View& view, const Similarity& placement) {

@@ -24,6 +24,7 @@ constexpr float shift_per_gap = 1.16f; // asin(x) / x / (1 - longest_path) for x
 // distance to the eye: a dozen roundings of a float; the facing gap sums a few dozen products.
 constexpr float position_rounding = 2e-6f;
 constexpr float facing_rounding = 2e-5f;
+static_assert(position_rounding <= test_rounding && facing_rounding <= test_rounding);
 // Radians: angles come from cosines in floats, which near 1 tell angles apart to about half of this.
 constexpr float angle_rounding = 1e-3f;
 constexpr float slab_units = 127;                    // of NormalSlabs in 1

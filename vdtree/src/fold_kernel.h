@@ -77,6 +77,9 @@ struct Findings {
     alignas(64) float facing_slack[kernel_lanes];   // by facing alone
     alignas(64) float position_slack[kernel_lanes]; // with a gaze, from find_slacks(); else out
 };
+// Slacks are shortened so that rounding in a later test cannot change a verdict before its time: by less than this share of the
+// distance and the radius.
+inline constexpr float test_rounding = 2e-5f;
 // Brings both slacks of all lanes to what they are in all, 0 or more.
 void finish_slacks(const KernelView& view, const FoldBatch& batch, Findings& findings) noexcept;
 

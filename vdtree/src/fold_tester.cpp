@@ -14,11 +14,30 @@ namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
+// Unused lanes repeat the last candidate.
+void load(std::span<const FoldCandidate* const> lanes, FoldBatch& batch) {
+    const std::size_t last = lanes.size() - 1;
+    for (std::size_t i = 0; i < kernel_lanes; ++i) {
+        const FoldCandidate& of = *lanes[i < last ? i : last];
+        batch.centre[0][i] = of.sphere.centre.x;
+        batch.centre[1][i] = of.sphere.centre.y;
+        batch.centre[2][i] = of.sphere.centre.z;
+        batch.radius[i] = of.sphere.radius;
+        batch.length[i] = of.length;
+        batch.interior_row[i] = of.rows.interior;
+        batch.silhouette_row[i] = of.rows.silhouette;
+    }
+}
+
 } // namespace
 
 FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterion, bool cull_back_faces, float threshold, bool least_costs)
-    : tree_(tree), criterion_(criterion), cull_back_faces_(cull_back_faces), has_silhouettes_(criterion.uses_silhouettes()) {
+    : tree_(tree), criterion_(criterion), cull_back_faces_(cull_back_faces), has_silhouettes_(criterion.uses_silhouettes()),
+      bounds_(tree.bounds().data()) {
     const DistanceCriterion::Parts& parts = criterion.parts();
+    support_ = parts.spheres == DistanceCriterion::Spheres::support ? tree.support_spheres().data() : nullptr;
+    classes_ = parts.classes.empty() ? nullptr : parts.classes.data();
+    lengths_ = parts.lengths.empty() ? nullptr : parts.lengths.data();
     const bool has_least_costs = least_costs && !parts.least_cost.empty();
     reach_.resize(parts.reach.size());
     for (std::size_t i = 0; i < reach_.size(); ++i) {
@@ -57,48 +76,61 @@ void FoldTester::look_from(const Viewpoint& viewpoint, double length_per_radian)
     costs_view_.everybody = true;
 }
 
-void FoldTester::test(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const {
-    test(nodes, verdicts, false);
+FoldCandidate FoldTester::candidate(NodeId node) const {
+    const NodeBounds& around = bounds_[node];
+    FoldCandidate candidate;
+    candidate.sphere = support_ ? support_[node] : around.ring;
+    candidate.length = lengths_ ? lengths_[node] : candidate.sphere.radius;
+    if (classes_) candidate.rows = classes_[node];
+    candidate.ring = around.ring;
+    candidate.slabs = around.slabs;
+    candidate.flags = around.flags;
+    candidate.node = node;
+    return candidate;
 }
 
-void FoldTester::test_costs(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const { test(nodes, verdicts, true); }
-
-void FoldTester::test(std::span<const NodeId> nodes, std::span<Verdict> verdicts, bool costs) const {
-    for (std::size_t first = 0; first < nodes.size(); first += kernel_lanes) {
-        // Nodes lie anywhere in a large tree: the next ones are on their way while these are tested.
-        constexpr std::size_t ahead = 2 * kernel_lanes;
-        const std::size_t end = std::min(first + ahead + kernel_lanes, nodes.size());
-        for (std::size_t i = std::min(first + ahead, end); i < end; ++i) prefetch(nodes[i]);
-        test_batch(nodes.subspan(first, std::min(kernel_lanes, nodes.size() - first)), verdicts.data() + first, costs);
-    }
-}
-
-void FoldTester::prefetch(NodeId node) const {
+void FoldTester::prefetch([[maybe_unused]] NodeId node) const {
 #if defined(__GNUC__)
-    __builtin_prefetch(tree_.bounds().data() + node);
-    if (!criterion_.parts().classes.empty()) __builtin_prefetch(criterion_.parts().classes.data() + node);
+    __builtin_prefetch(bounds_ + node);
+    if (support_) __builtin_prefetch(support_ + node);
+    if (classes_) __builtin_prefetch(classes_ + node);
+    if (lengths_) __builtin_prefetch(lengths_ + node);
 #endif
 }
 
-// Unused lanes repeat the last node.
-void FoldTester::load(std::span<const NodeId> nodes, FoldBatch& batch) const {
-    const DistanceCriterion::Parts& parts = criterion_.parts();
-    const NodeBounds* const bounds = tree_.bounds().data();
-    const Sphere* const support = parts.spheres == DistanceCriterion::Spheres::support ? tree_.support_spheres().data() : nullptr;
-    const FoldClass* const classes = parts.classes.empty() ? nullptr : parts.classes.data();
-    const float* const lengths = parts.lengths.empty() ? nullptr : parts.lengths.data();
-    const std::size_t last = nodes.size() - 1;
-    for (std::size_t i = 0; i < kernel_lanes; ++i) {
-        const NodeId node = nodes[i < last ? i : last];
-        const Sphere& sphere = support ? support[node] : bounds[node].ring;
-        batch.centre[0][i] = sphere.centre.x;
-        batch.centre[1][i] = sphere.centre.y;
-        batch.centre[2][i] = sphere.centre.z;
-        batch.radius[i] = sphere.radius;
-        batch.length[i] = lengths ? lengths[node] : sphere.radius;
-        const FoldClass row = classes ? classes[node] : FoldClass{};
-        batch.interior_row[i] = row.interior;
-        batch.silhouette_row[i] = row.silhouette;
+void FoldTester::test(std::span<const FoldCandidate> candidates, std::span<const std::uint32_t> which, std::span<Verdict> verdicts) const {
+    std::array<const FoldCandidate*, kernel_lanes> lanes;
+    for (std::size_t first = 0; first < which.size(); first += kernel_lanes) {
+        const std::size_t count = std::min(kernel_lanes, which.size() - first);
+        for (std::size_t i = 0; i < count; ++i) lanes[i] = &candidates[which[first + i]];
+        test_batch({lanes.data(), count}, &verdicts[first], false);
+    }
+}
+
+void FoldTester::test(std::span<const FoldCandidate> candidates, std::span<Verdict> verdicts) const {
+    std::array<const FoldCandidate*, kernel_lanes> lanes;
+    for (std::size_t first = 0; first < candidates.size(); first += kernel_lanes) {
+        const std::size_t count = std::min(kernel_lanes, candidates.size() - first);
+        for (std::size_t i = 0; i < count; ++i) lanes[i] = &candidates[first + i];
+        test_batch({lanes.data(), count}, &verdicts[first], false);
+    }
+}
+
+void FoldTester::test(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const { test_nodes(nodes, verdicts, false); }
+
+void FoldTester::test_costs(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const { test_nodes(nodes, verdicts, true); }
+
+void FoldTester::test_nodes(std::span<const NodeId> nodes, std::span<Verdict> verdicts, bool costs) const {
+    std::array<FoldCandidate, kernel_lanes> candidates;
+    std::array<const FoldCandidate*, kernel_lanes> lanes;
+    for (std::size_t i = 0; i < kernel_lanes; ++i) lanes[i] = &candidates[i];
+    for (std::size_t first = 0; first < nodes.size(); first += kernel_lanes) {
+        // Nodes lie anywhere in a large tree: the next ones are on their way while these are tested.
+        constexpr std::size_t ahead = kernel_lanes;
+        const std::size_t count = std::min(kernel_lanes, nodes.size() - first);
+        for (std::size_t i = first + ahead; i < std::min(first + ahead + kernel_lanes, nodes.size()); ++i) prefetch(nodes[i]);
+        for (std::size_t i = 0; i < count; ++i) candidates[i] = candidate(nodes[first + i]);
+        test_batch({lanes.data(), count}, &verdicts[first], costs);
     }
 }
 
@@ -118,20 +150,18 @@ void FoldTester::find_position_slacks(const FoldBatch& batch, Findings& findings
 }
 
 // By their distances alone most nodes are settled; here are the others.
-void FoldTester::find_facings(std::span<const NodeId> nodes, const FoldBatch& batch, bool costs, Findings& findings) const {
-    const NodeBounds* const bounds = tree_.bounds().data();
-    const bool by_ring = criterion_.parts().spheres == DistanceCriterion::Spheres::ring;
+void FoldTester::find_facings(Lanes candidates, const FoldBatch& batch, bool costs, Findings& findings) const {
     FacingBatch facing;
     std::array<std::uint8_t, kernel_lanes> lanes;
     std::size_t count = 0;
     for (std::uint32_t left = batch.is_asked; left; left &= left - 1) {
         const auto i = static_cast<std::size_t>(std::countr_zero(left));
-        const NodeBounds& around = bounds[nodes[i]];
-        if (by_ring) {
-            facing.set(count, around.slabs, batch.to_eye[0][i], batch.to_eye[1][i], batch.to_eye[2][i], around.ring.radius);
+        const FoldCandidate& of = *candidates[i];
+        if (!support_) {
+            facing.set(count, of.slabs, batch.to_eye[0][i], batch.to_eye[1][i], batch.to_eye[2][i], of.ring.radius);
         } else { // another sphere than the one measured
-            const auto towards = [&](int k) { return (view_.eye_high[k] - around.ring.centre[k]) + view_.eye_low[k]; };
-            facing.set(count, around.slabs, towards(0), towards(1), towards(2), around.ring.radius);
+            const auto towards = [&](int k) { return (view_.eye_high[k] - of.ring.centre[k]) + view_.eye_low[k]; };
+            facing.set(count, of.slabs, towards(0), towards(1), towards(2), of.ring.radius);
         }
         lanes[count++] = static_cast<std::uint8_t>(i);
     }
@@ -141,7 +171,7 @@ void FoldTester::find_facings(std::span<const NodeId> nodes, const FoldBatch& ba
     for (std::size_t k = 0; k < count; ++k) {
         const std::size_t i = lanes[k];
         const std::uint32_t bit = 1u << i;
-        const NodeBounds& around = bounds[nodes[i]];
+        const FoldCandidate& around = *candidates[i];
         float front = gaps.front[k], back = gaps.back[k];
         if (around.flags & irregular_ring) front = back = -infinity;       // an outline from everywhere
         else if (around.slabs.empty()) front = infinity, back = -infinity; // no triangle with an area
@@ -162,25 +192,25 @@ void FoldTester::find_facings(std::span<const NodeId> nodes, const FoldBatch& ba
     }
 }
 
-void FoldTester::test_batch(std::span<const NodeId> nodes, Verdict* verdicts, bool costs) const {
+void FoldTester::test_batch(Lanes lanes, Verdict* verdicts, bool costs) const {
     FoldBatch batch;
-    load(nodes, batch);
+    load(lanes, batch);
     measure(costs ? costs_view_ : view_, batch);
-    batch.is_asked &= (1u << nodes.size()) - 1; // unused lanes are nobody's
+    batch.is_asked &= (1u << lanes.size()) - 1; // unused lanes are nobody's
     Findings findings;
     findings.unfolded = batch.is_inside & batch.is_near;
     findings.silhouettes = ~batch.is_near;
     std::fill_n(findings.facing_slack, kernel_lanes, infinity);
-    if (batch.is_asked) find_facings(nodes, batch, costs, findings);
+    if (batch.is_asked) find_facings(lanes, batch, costs, findings);
     if (view_.has_gaze) find_position_slacks(batch, findings);
     finish_slacks(view_, batch, findings);
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
+    for (std::size_t i = 0; i < lanes.size(); ++i) {
         verdicts[i].position_slack = findings.position_slack[i];
         verdicts[i].facing_slack = findings.facing_slack[i];
         verdicts[i].unfolded = (findings.unfolded >> i) & 1;
     }
     if (!costs) return;
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
+    for (std::size_t i = 0; i < lanes.size(); ++i) {
         verdicts[i].cost = verdicts[i].seen_cost = 0;
         const std::uint32_t bit = 1u << i;
         if ((batch.is_inside & bit) && !(findings.away & bit)) set_costs(verdicts[i], batch, i, findings.silhouettes & bit);

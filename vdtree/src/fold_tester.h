@@ -28,6 +28,19 @@ struct Motion {
     double facing = 0;   // the path of the eye, or the change of a height over a frustum's plane where that is more
 };
 
+// What a test reads of a node, in one cache line.
+struct alignas(64) FoldCandidate {
+    Sphere sphere;           // whose distance counts
+    float length = 0;
+    FoldClass rows;
+    Sphere ring;             // whose facing counts
+    NormalSlabs slabs;       // of the directions in the ring
+    std::uint8_t flags = 0;  // NodeFlags
+    bool is_unfolded = false; // for the one who keeps it; tests do not ask
+    NodeId node = no_node;
+};
+static_assert(sizeof(FoldCandidate) == 64);
+
 class FoldTester {
 public:
     // Nodes unfold where their seen cost exceeds `threshold`; without `least_costs`, where their cost does. Cost: a copy of the
@@ -43,7 +56,12 @@ public:
     // position clock; any positive value will do, and it must be the same for verdicts and motions.
     void look_from(const Viewpoint& viewpoint, double length_per_radian);
 
-    // One verdict for each node. Cost: about ten nanoseconds a node.
+    FoldCandidate candidate(NodeId node) const;
+    void prefetch(NodeId node) const; // what candidate(node) will read
+
+    // One verdict for each of `which` of the candidates, or for each node. Cost: some ten nanoseconds each.
+    void test(std::span<const FoldCandidate> candidates, std::span<const std::uint32_t> which, std::span<Verdict> verdicts) const;
+    void test(std::span<const FoldCandidate> candidates, std::span<Verdict> verdicts) const;
     void test(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const;
     // The same where costs count, not only what is above the threshold: what nodes face is always found out. (In the above, the
     // costs of nodes that are far from the threshold may be those of another facing.)
@@ -53,17 +71,22 @@ public:
     static Motion motion(const VertexTree& tree, const Viewpoint& from, const Viewpoint& to, double length_per_radian);
 
 private:
-    void test(std::span<const NodeId> nodes, std::span<Verdict> verdicts, bool costs) const;
-    void prefetch(NodeId node) const;
-    void load(std::span<const NodeId> nodes, FoldBatch& batch) const;
-    void test_batch(std::span<const NodeId> nodes, Verdict* verdicts, bool costs) const;
-    void find_facings(std::span<const NodeId> nodes, const FoldBatch& batch, bool costs, Findings& findings) const;
+    using Lanes = std::span<const FoldCandidate* const>; // of one batch, at most sixteen
+
+    void test_nodes(std::span<const NodeId> nodes, std::span<Verdict> verdicts, bool costs) const;
+    void test_batch(Lanes lanes, Verdict* verdicts, bool costs) const;
+    void find_facings(Lanes lanes, const FoldBatch& batch, bool costs, Findings& findings) const;
     void find_position_slacks(const FoldBatch& batch, Findings& findings) const;
     void set_costs(Verdict& verdict, const FoldBatch& batch, std::size_t lane, bool is_silhouette) const;
 
     const VertexTree& tree_;
     const DistanceCriterion& criterion_;
     bool cull_back_faces_, has_silhouettes_;
+    // Of the tree and the criterion, by node; null where they have none.
+    const NodeBounds* bounds_;
+    const Sphere* support_;
+    const FoldClass* classes_;
+    const float* lengths_;
     std::vector<float> reach_; // of the criterion; infinite where the fold is seen from everywhere
     KernelView view_, costs_view_;
 };

@@ -49,11 +49,14 @@ public:
     static constexpr float always_visible = std::numeric_limits<float>::max();
 
     // Fails where sizes do not fit the tree, a class has no row, a length or reach is NaN or a length is negative or infinite.
-    // A child whose reach exceeds its parent's is safe (it is folded with the parent), and an assertion in debug builds.
+    // A child whose reach exceeds its parent's is safe (it is folded with the parent) but costs time (see is_monotone), and an
+    // assertion in debug builds.
     static Result<DistanceCriterion> create(const VertexTree& tree, Parts parts);
 
     const Parts& parts() const noexcept { return parts_; }
     bool uses_silhouettes() const noexcept { return uses_silhouettes_; }
+    // Whether no node's reach exceeds its parent's. Then a cut needs to watch only its border; else every node above it, too.
+    bool is_monotone() const noexcept { return is_monotone_; }
     bool uses_gaze() const noexcept { return parts_.eccentricity_bins > 1; }
     std::uint64_t id() const noexcept { return id_; } // of these values; a copy shares it
 
@@ -61,7 +64,7 @@ private:
     explicit DistanceCriterion(Parts parts);
 
     Parts parts_;
-    bool uses_silhouettes_ = false;
+    bool uses_silhouettes_ = false, is_monotone_ = false;
     std::uint64_t id_;
 };
 
