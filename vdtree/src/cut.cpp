@@ -24,6 +24,12 @@ constexpr std::size_t batch_size = 1024;
 constexpr std::size_t triangles_per_patch = 40;
 std::size_t few_changes(Index triangles) { return std::max<std::size_t>(triangles / triangles_per_patch, 16); }
 
+void prefetch([[maybe_unused]] const void* what) {
+#if defined(__GNUC__)
+    __builtin_prefetch(what);
+#endif
+}
+
 bool test_bit(const std::vector<std::uint64_t>& bits, NodeId i) { return (bits[i >> 6] >> (i & 63)) & 1; }
 void set_bit(std::vector<std::uint64_t>& bits, NodeId i) { bits[i >> 6] |= std::uint64_t{1} << (i & 63); }
 void clear_bit(std::vector<std::uint64_t>& bits, NodeId i) { bits[i >> 6] &= ~(std::uint64_t{1} << (i & 63)); }
@@ -314,13 +320,30 @@ bool Cut::is_patching() {
     return false;
 }
 
-// Three reads follow from each other for every unfold; those of the next ones are made to overlap.
-void Cut::prefetch_unfolds(std::span<const NodeId> nodes, std::size_t next) const {
+// Reads follow from reads: links, lists, and what is drawn. Those of many changes are made to overlap.
+void Cut::prefetch_changes(std::span<const NodeId> nodes, bool folds) {
     if (!indices_ || !indices_->is_patched) return;
-    constexpr std::size_t stride = 3; // unfolds between one read and the next
-    if (next + 3 * stride < nodes.size()) indices_->buffer.prefetch_place(nodes[next + 3 * stride]);
-    if (next + 2 * stride < nodes.size()) indices_->buffer.prefetch_list(nodes[next + 2 * stride]);
-    if (next + stride < nodes.size()) indices_->buffer.prefetch_corners(nodes[next + stride]);
+    const auto first_leaf = tree_->first_leaf(), leaf_end = tree_->leaf_end(), first_triangle = tree_->first_triangle();
+    const auto subtree_end = tree_->subtree_end();
+    for (const NodeId node : nodes) {
+        prefetch(&first_leaf[node]);
+        prefetch(&leaf_end[node]);
+        prefetch(&subtree_end[node]);
+        if (!folds) prefetch(&first_triangle[node]);
+    }
+    soon_.clear();
+    if (folds)
+        for (const NodeId node : nodes) tree_->for_each_child(node, [&](NodeId child) { soon_.push_back(child); });
+    else soon_.assign(nodes.begin(), nodes.end());
+    const IndexBuffer& buffer = indices_->buffer;
+    buffer.prefetch_places(soon_);
+    if (!folds)
+        for (const NodeId node : nodes) {
+            prefetch(&proxy_[first_leaf[node]]);
+            if (first_triangle[node] < tree_->triangle_count()) prefetch(&tree_->triangles()[first_triangle[node]]);
+        }
+    buffer.prefetch_lists(soon_);
+    buffer.prefetch_corners(soon_);
 }
 
 void Cut::apply_unfold(NodeId node) {

@@ -9,9 +9,10 @@
 
 namespace unseen::vdtree {
 
-// For patches, every vertex in use has a list of the corners that show it. A fold hands its children's corners to the proxy, an
-// unfold deals them out again, so its cost is the valence of what changes, whatever the tree's size; the lists' memory goes
-// with the triangles shown. A list is a block of power-of-two size in one pool.
+// For patches, every vertex in use has a list of the corners that show it, with the leaves that these stand for. A fold hands its
+// children's corners to the proxy, an unfold deals them out again, so its cost is the valence of what changes, whatever the tree's
+// size; the lists' memory goes with the triangles shown. A list is a block of power-of-two size in one pool: nearly always one
+// cache line.
 class IndexBuffer {
 public:
     explicit IndexBuffer(const VertexTree& tree) : tree_(&tree) {}
@@ -32,11 +33,11 @@ public:
     void fold(NodeId node, std::span<const NodeId> children);
     // `proxies` is current: the children stand for their leaves.
     void unfold(NodeId node, std::span<const NodeId> children, std::span<const NodeId> proxies);
-    // Brings nearer what unfold(node) will read: its list's place, then the list, then what its corners show. In this order, with
-    // some time in between. Precondition of the later ones: the node is active.
-    void prefetch_place(NodeId node) const;
-    void prefetch_list(NodeId node) const;
-    void prefetch_corners(NodeId node) const;
+    // Bring nearer what changes around active nodes will read: their lists' places, then the lists, then what these show. In this
+    // order, for some nodes at once, so that the reads overlap.
+    void prefetch_places(std::span<const NodeId> active) const;
+    void prefetch_lists(std::span<const NodeId> active) const;
+    void prefetch_corners(std::span<const NodeId> active) const;
     // Closes the holes with triangles from the end.
     void end_patch();
 
@@ -47,12 +48,22 @@ public:
 private:
     using Block = std::uint32_t; // where a list starts in pool_
     static constexpr Block no_block = 0xffffffffu;
+    struct Entry {
+        Index corner = 0; // of the buffer; of a block's first entry, its head: log2 of the entries in it, itself included
+        Index leaf = 0;   // whose proxy it shows; of the head: the entries in use
+    };
 
+    struct alignas(64) Line {
+        Entry entries[8];
+    };
+
+    Entry* entries(Block block) { return pool_.data()->entries + block; }
+    const Entry* entries(Block block) const { return pool_.data()->entries + block; }
     void write(Index corner, NodeId node);
-    void append(NodeId node, Index corner);
+    void append(NodeId node, Entry entry);
     void remove(NodeId node, Index corner);
     void replace(NodeId node, Index corner, Index by);
-    std::span<Index> list(Block block);
+    std::span<Entry> list(Block block);
     Block allocate(unsigned log2_size);
     void discard(Block block);
     Index new_triangle();
@@ -61,12 +72,12 @@ private:
     const VertexTree* tree_;
     std::vector<NodeId> indices_;
     bool has_lists_ = false;
-    std::vector<Index> leaves_;          // by corner: the leaf whose proxy it shows; only with lists
     std::vector<Block> block_of_node_;   // by node; no_block without lists
-    std::vector<std::uint32_t> pool_;    // a block: log2 of its size << 27 | corners in it, then the corners
+    std::vector<Line> pool_;             // of entries; blocks are whole lines
     std::vector<Block> free_blocks_[28]; // by log2 of the size
     std::vector<Index> holes_;           // triangles without corners
-    std::vector<Index> scratch_, vanished_;
+    std::vector<Entry> scratch_;
+    std::vector<Index> vanished_;
     std::vector<IndexWrite> writes_;
 };
 

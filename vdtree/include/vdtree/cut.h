@@ -133,7 +133,7 @@ private:
     // For those who change the cut in steps that are to be patched into the index buffer.
     void begin_changes();
     bool is_patching();
-    void prefetch_unfolds(std::span<const NodeId> nodes, std::size_t next) const;
+    void prefetch_changes(std::span<const NodeId> nodes, bool folds);
     void apply_unfold(NodeId node);
     void fold_below(NodeId node, FunctionRef<void(NodeId)> on_fold); // tells each node, descendants first
     void apply_fold(NodeId node);
@@ -149,7 +149,7 @@ private:
     std::vector<NodeId> proxy_;            // by leaf: the active node that stands for it
     Index triangle_count_ = 0;
     std::vector<FoldChange> changes_;
-    std::vector<NodeId> children_;         // scratch
+    std::vector<NodeId> children_, soon_;  // scratch
     std::unique_ptr<CutFollower> follower_;
     struct Indices;
     mutable std::unique_ptr<Indices> indices_; // made when it is first asked for
