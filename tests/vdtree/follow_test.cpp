@@ -217,6 +217,27 @@ TEST_P(Follow, EqualsTheCutFromScratchOnRandomPaths) {
     EXPECT_LT(incremental_tests, 4 * all_tests);
 }
 
+#ifdef NDEBUG // else an assertion tells
+TEST_P(Follow, EqualsTheCutFromScratchUnderACriterionThatIsNotMonotone) {
+    const VertexTree tree = built(GetParam().make());
+    DistanceCriterion::Parts parts = rich_criterion(tree, 3, false).parts();
+    std::mt19937_64 random(17);
+    for (FoldClass& rows : parts.classes) rows = {static_cast<std::uint16_t>(random() % 8), static_cast<std::uint16_t>(random() % 20)};
+    const auto criterion = DistanceCriterion::create(tree, std::move(parts));
+    ASSERT_TRUE(criterion);
+    EXPECT_FALSE(criterion->is_monotone());
+    EXPECT_TRUE(rich_criterion(tree, 3, false).is_monotone());
+    Path path(tree, 19, false, true);
+    Cut cut(tree);
+    for (int frame = 0; frame < frame_count() / 4; ++frame) {
+        const Viewpoint viewpoint = path.next();
+        ASSERT_TRUE(cut.follow(*criterion, viewpoint));
+        ASSERT_EQ(state_of(cut), from_scratch(tree, *criterion, viewpoint, {})) << "frame " << frame;
+        ASSERT_EQ(support::fault_in_cut(cut), "") << "frame " << frame;
+    }
+}
+#endif
+
 TEST_P(Follow, PatchesTheIndexBufferThatACopyKeepsUpWith) {
     const VertexTree tree = built(GetParam().make());
     const DistanceCriterion criterion = rich_criterion(tree, 4, false);

@@ -416,43 +416,28 @@ void Cut::replay(std::span<const std::uint64_t> unfolded, AdjustStats& stats) {
     end_changes(stats);
 }
 
-// Every proxy is written once, and only where it changes, however deep the new cut is.
+// Every proxy is written at most once, however deep the new cut is.
 void Cut::become(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
     changes_.clear();
     const auto first = tree_->first_triangle();
-    const auto first_leaf = tree_->first_leaf(), leaf_end = tree_->leaf_end();
-    const auto subtree_end = tree_->subtree_end();
-    const NodeId interior = tree_->interior_count();
-    triangle_count_ = 0;
     for (std::size_t word = 0; word < unfolded.size(); ++word) {
-        for (std::uint64_t bits = unfolded[word]; bits; bits &= bits - 1) {
+        for (std::uint64_t bits = unfolded[word] & ~unfolded_[word]; bits; bits &= bits - 1) {
             const NodeId node = static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
             triangle_count_ += first[node + 1] - first[node];
-            const bool was_unfolded = test_bit(unfolded_, node);
-            if (!was_unfolded) changes_.push_back({node, false});
-            // Children that are active now and were not: leaves of a node that was folded, and nodes that are folded now.
-            NodeId child = node + 1;
-            for (Index leaf = first_leaf[node]; leaf < leaf_end[node];) {
-                if (child < subtree_end[node] && first_leaf[child] == leaf) {
-                    const bool was_active = was_unfolded && !test_bit(unfolded_, child);
-                    if (!was_active && !test_bit(unfolded, child))
-                        std::fill(proxy_.begin() + leaf, proxy_.begin() + leaf_end[child], child);
-                    leaf = leaf_end[child];
-                    child = subtree_end[child];
-                } else {
-                    if (!was_unfolded) proxy_[leaf] = interior + leaf;
-                    ++leaf;
-                }
-            }
+            changes_.push_back({node, false});
+            tree_->for_each_child(node, [&](NodeId child) {
+                if (tree_->is_leaf(child) || !test_bit(unfolded, child)) assign(child);
+            });
         }
     }
-    const NodeId root = VertexTree::root();
-    if (!test_bit(unfolded, root) && test_bit(unfolded_, root)) assign(root);
     for (std::size_t word = unfolded.size(); word-- > 0;) {
         for (std::uint64_t bits = unfolded_[word] & ~unfolded[word]; bits;) {
             const int highest = 63 - std::countl_zero(bits);
-            changes_.push_back({static_cast<NodeId>(word * 64 + static_cast<std::size_t>(highest)), true});
+            const NodeId node = static_cast<NodeId>(word * 64 + static_cast<std::size_t>(highest));
             bits &= ~(std::uint64_t{1} << highest);
+            triangle_count_ -= first[node + 1] - first[node];
+            changes_.push_back({node, true});
+            if (node == VertexTree::root() || test_bit(unfolded, tree_->parents()[node])) assign(node);
         }
     }
     for (const FoldChange& change : changes_) ++(change.folded ? stats.folds : stats.unfolds);

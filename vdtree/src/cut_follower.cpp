@@ -247,9 +247,11 @@ void CutFollower::change_threshold(Cut& cut, float factor) {
 // ---- from scratch
 
 void CutFollower::forget_slots() {
-    // Node by node, so that the cost does not go with the tree.
+    // Node by node where these are few, so that the cost does not go with the tree.
     if (slot_of_node_.empty()) slot_of_node_.assign(tree_.interior_count(), no_slot);
-    for (const FoldCandidate& candidate : candidates_) slot_of_node_[candidate.node] = no_slot;
+    const std::size_t many = slot_of_node_.size() / 32;
+    if (candidates_.size() > many) std::ranges::fill(slot_of_node_, no_slot);
+    else for (const FoldCandidate& candidate : candidates_) slot_of_node_[candidate.node] = no_slot;
     candidates_.clear();
     blocks_.clear();
     block_position_due_.clear();
@@ -268,13 +270,9 @@ void CutFollower::start_over(Cut& cut) {
     test_down(VertexTree::root(), unfolded, &subtrees);
     std::sort(subtrees.begin(), subtrees.end());
     for (const NodeId node : subtrees) test_down(node, unfolded, nullptr);
-    // Of the parents of these subtrees it was not known what is under them.
-    for (const NodeId node : parents_) {
-        if (has_unfolded_child(node, unfolded) && !watches_ancestors_) continue;
-        FoldCandidate candidate = tester_->candidate(node);
-        candidate.is_unfolded = true;
-        set_deadlines(watch(candidate), Verdict{}); // due in the next frame
-    }
+    if (!watches_ancestors_)
+        for (const NodeId node : parents_)
+            if (has_unfolded_child(node, unfolded)) unwatch(node);
     cut.change_to(std::move(unfolded), stats_);
 }
 
@@ -316,19 +314,14 @@ void CutFollower::test_down(NodeId top, std::vector<std::uint64_t>& unfolded, st
     constexpr NodeId cached_nodes = 4096; // about 200 KB of what is read of them
     const auto subtree_end = tree_.subtree_end();
     wave_.assign(1, top);
-    wave_parents_.assign(1, nobody);
     while (!wave_.empty()) {
-        test_wave();
-        settle_parents_of_wave();
+        watch_wave();
         next_wave_.clear();
-        wave_parents_.clear();
-        for (std::size_t i = 0; i < wave_.size(); ++i) {
-            const NodeId node = wave_[i];
-            if (!wave_candidates_[i].is_unfolded) {
-                set_deadlines(watch(wave_candidates_[i]), verdicts_[i]);
-                continue;
-            }
+        for (const Slot slot : wave_slots_) {
+            if (!candidates_[slot].is_unfolded) continue;
+            const NodeId node = candidates_[slot].node;
             unfolded[node >> 6] |= std::uint64_t{1} << (node & 63);
+            if (node != top && !watches_ancestors_) unwatch(tree_.parents()[node]);
             bool leaves_children = false;
             for (NodeId child = node + 1; child < subtree_end[node]; child = subtree_end[child]) {
                 const bool is_left = left && subtree_end[child] - child <= cached_nodes;
@@ -336,36 +329,26 @@ void CutFollower::test_down(NodeId top, std::vector<std::uint64_t>& unfolded, st
                 leaves_children |= is_left;
             }
             if (leaves_children) parents_.push_back(node);
-            else unsettled_.push_back({wave_candidates_[i], verdicts_[i]});
-            const auto parent = leaves_children ? nobody : static_cast<std::uint32_t>(unsettled_.size() - 1);
-            wave_parents_.resize(next_wave_.size(), parent);
         }
         wave_.swap(next_wave_);
     }
-    settle_parents_of_wave();
 }
 
-void CutFollower::test_wave() {
-    constexpr std::size_t ahead = 8; // tests between a node's prefetch and its use
-    wave_candidates_.clear();
+// Watches and tests the nodes of the wave.
+void CutFollower::watch_wave() {
+    constexpr std::size_t ahead = 16; // tests between a node's prefetch and its use
+    wave_slots_.clear();
     for (std::size_t i = 0; i < wave_.size(); ++i) {
         if (i + ahead < wave_.size()) tester_->prefetch(wave_[i + ahead]);
-        wave_candidates_.push_back(tester_->candidate(wave_[i]));
+        wave_slots_.push_back(watch(tester_->candidate(wave_[i])));
     }
     verdicts_.resize(wave_.size());
-    tester_->test(wave_candidates_, verdicts_);
+    tester_->test(candidates_, wave_slots_, verdicts_);
     stats_.node_tests += wave_.size();
-    for (std::size_t i = 0; i < wave_.size(); ++i)
-        wave_candidates_[i].is_unfolded = verdicts_[i].unfolded && tree_.is_sound(wave_[i]);
-}
-
-// Now that the children are tested.
-void CutFollower::settle_parents_of_wave() {
-    for (std::size_t i = 0; i < wave_.size(); ++i)
-        if (wave_candidates_[i].is_unfolded && wave_parents_[i] != nobody) unsettled_[wave_parents_[i]].has_unfolded_child = true;
-    for (const Unsettled& parent : unsettled_)
-        if (!parent.has_unfolded_child || watches_ancestors_) set_deadlines(watch(parent.candidate), parent.verdict);
-    unsettled_.clear();
+    for (std::size_t i = 0; i < wave_.size(); ++i) {
+        set_deadlines(wave_slots_[i], verdicts_[i]);
+        candidates_[wave_slots_[i]].is_unfolded = verdicts_[i].unfolded && tree_.is_sound(wave_[i]);
+    }
 }
 
 // ---- from frame to frame
@@ -493,20 +476,20 @@ void CutFollower::test_parents(const Cut& cut) {
     std::sort(parents_.begin(), parents_.end());
     parents_.erase(std::unique(parents_.begin(), parents_.end()), parents_.end());
     std::erase_if(parents_, [&](NodeId node) { return !cut.is_unfolded_interior(node) || slot_of_node_[node] != no_slot; });
-    wave_candidates_.clear();
+    parent_candidates_.clear();
     for (const NodeId node : parents_) {
-        wave_candidates_.push_back(tester_->candidate(node));
-        wave_candidates_.back().is_unfolded = true;
+        parent_candidates_.push_back(tester_->candidate(node));
+        parent_candidates_.back().is_unfolded = true;
     }
     parents_.clear();
-    if (wave_candidates_.empty()) return;
+    if (parent_candidates_.empty()) return;
     use_threshold_of(true);
-    verdicts_.resize(wave_candidates_.size());
-    tester_->test(wave_candidates_, verdicts_);
-    stats_.node_tests += wave_candidates_.size();
-    for (std::size_t i = 0; i < wave_candidates_.size(); ++i) {
-        const NodeId node = wave_candidates_[i].node;
-        if (!verdicts_[i].unfolded || !has_unfolded_child(node, cut.unfolded_)) set_deadlines(watch(wave_candidates_[i]), verdicts_[i]);
+    verdicts_.resize(parent_candidates_.size());
+    tester_->test(parent_candidates_, verdicts_);
+    stats_.node_tests += parent_candidates_.size();
+    for (std::size_t i = 0; i < parent_candidates_.size(); ++i) {
+        const NodeId node = parent_candidates_[i].node;
+        if (!verdicts_[i].unfolded || !has_unfolded_child(node, cut.unfolded_)) set_deadlines(watch(parent_candidates_[i]), verdicts_[i]);
         if (!verdicts_[i].unfolded) folding_.push_back(node);
         else if (stands_by_a_hair(verdicts_[i])) ask_parent(node);
     }

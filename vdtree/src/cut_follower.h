@@ -52,8 +52,7 @@ private:
     void forget_slots();
     void watch_all_due(const Cut& cut);
     void test_down(NodeId top, std::vector<std::uint64_t>& unfolded, std::vector<NodeId>* left);
-    void test_wave();
-    void settle_parents_of_wave();
+    void watch_wave();
     void step(Cut& cut);
     bool is_out_of_time() const;
     void collect_due();
@@ -108,20 +107,10 @@ private:
     std::vector<Slot> free_slots_;
     std::vector<Slot> slot_of_node_; // by interior node
 
-    // An unfolded node of which is not yet known whether it has an unfolded child.
-    struct Unsettled {
-        FoldCandidate candidate;
-        Verdict verdict;
-        bool has_unfolded_child = false;
-    };
-    static constexpr std::uint32_t nobody = 0xffffffffu;
-
     // Of one frame.
     std::vector<NodeId> wave_, next_wave_, folding_, parents_;
     std::vector<Slot> due_, kept_, wave_slots_;
-    std::vector<FoldCandidate> wave_candidates_;
-    std::vector<std::uint32_t> wave_parents_; // of nodes of the wave: their parent's place in unsettled_, or nobody
-    std::vector<Unsettled> unsettled_;
+    std::vector<FoldCandidate> parent_candidates_;
     std::vector<Verdict> verdicts_;
     std::vector<std::uint32_t> due_blocks_;
     AdjustStats stats_;
