@@ -222,7 +222,7 @@ TEST_P(Follow, EqualsTheCutFromScratchUnderACriterionThatIsNotMonotone) {
     const VertexTree tree = built(GetParam().make());
     DistanceCriterion::Parts parts = rich_criterion(tree, 3, false).parts();
     std::mt19937_64 random(17);
-    for (FoldClass& rows : parts.classes) rows = {static_cast<std::uint16_t>(random() % 8), static_cast<std::uint16_t>(random() % 20)};
+    for (FoldClass& rows : parts.classes) rows = {static_cast<std::uint16_t>(random() % 8), static_cast<std::uint16_t>(7 + random() % 13)};
     const auto criterion = DistanceCriterion::create(tree, std::move(parts));
     ASSERT_TRUE(criterion);
     EXPECT_FALSE(criterion->is_monotone());
@@ -515,6 +515,7 @@ TEST(FollowBadInput, CriteriaThatDoNotFitAreRefused) {
     EXPECT_FALSE(DistanceCriterion::create(tree, Parts{.classes = std::vector<FoldClass>(tree.interior_count(), {7, 7}), .reach = {1}}));
     EXPECT_FALSE(DistanceCriterion::create(tree, Parts{.lengths = std::vector<float>(tree.interior_count(), -1), .reach = {1}}));
     EXPECT_FALSE(DistanceCriterion::create(tree, Parts{.reach = {1, 2}, .eccentricity_bins = 2}));
+    EXPECT_FALSE(DistanceCriterion::create(tree, Parts{.classes = std::vector<FoldClass>(tree.interior_count(), {1, 0}), .reach = {1, 2}}));
     EXPECT_FALSE(extent_criterion(tree, View{}, 0));
     EXPECT_FALSE(displacement_criterion(tree, View{}, std::nan("")));
 }

@@ -54,23 +54,6 @@ private:
     std::vector<Known> known_;
 };
 
-// Spheres nest in every tree.
-bool is_monotone_in(const VertexTree& tree, const DistanceCriterion::Parts& p) {
-    const auto parents = tree.parents();
-    RowOrder order(p);
-    for (NodeId node = 1; node < tree.interior_count(); ++node) {
-        const NodeId parent = parents[node];
-        if (!(parent < node)) return false; // in a damaged file
-        if (!p.lengths.empty() && p.lengths[node] > p.lengths[parent]) return false;
-        if (p.classes.empty()) continue;
-        const FoldClass a = p.classes[node], b = p.classes[parent];
-        if (!order.is_within(a.interior, b.interior) || !order.is_within(a.silhouette, b.silhouette)) return false;
-        // A parent may be a silhouette where its child is none.
-        if (!order.is_within(b.interior, b.silhouette)) return false;
-    }
-    return true;
-}
-
 Result<void> check(const VertexTree& tree, const DistanceCriterion::Parts& p) {
     const std::size_t nodes = tree.interior_count();
     if (!p.classes.empty() && p.classes.size() != nodes)
@@ -101,7 +84,26 @@ Result<void> check(const VertexTree& tree, const DistanceCriterion::Parts& p) {
         if (i % p.eccentricity_bins != 0 && p.reach[i] > p.reach[i - 1])
             return invalid("Reach " + std::to_string(i) + " of a criterion grows with the eccentricity.");
     }
+    RowOrder order(p);
+    for (std::size_t i = 0; i < p.classes.size(); ++i)
+        if (!order.is_within(p.classes[i].interior, p.classes[i].silhouette))
+            return invalid("Node " + std::to_string(i) + " reaches farther in its interior than as a silhouette.");
     return {};
+}
+
+// Spheres nest in every tree.
+bool is_monotone_in(const VertexTree& tree, const DistanceCriterion::Parts& p) {
+    const auto parents = tree.parents();
+    RowOrder order(p);
+    for (NodeId node = 1; node < tree.interior_count(); ++node) {
+        const NodeId parent = parents[node];
+        if (!(parent < node)) return false; // in a damaged file
+        if (!p.lengths.empty() && p.lengths[node] > p.lengths[parent]) return false;
+        if (p.classes.empty()) continue;
+        const FoldClass a = p.classes[node], b = p.classes[parent];
+        if (!order.is_within(a.interior, b.interior) || !order.is_within(a.silhouette, b.silhouette)) return false;
+    }
+    return true;
 }
 
 double radians_of_pixels(const View& view, double pixels) { return pixels / pixels_per_radian(view); }

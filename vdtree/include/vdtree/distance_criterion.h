@@ -27,7 +27,7 @@ namespace unseen::vdtree {
 // Which row of the reach table a node uses.
 struct FoldClass {
     std::uint16_t interior = 0;   // all of the ring faces the eye, or faces away
-    std::uint16_t silhouette = 0; // the ring is, or may be, an outline; also where it has an irregular edge
+    std::uint16_t silhouette = 0; // the ring is, or may be, an outline, also where it has an irregular edge; nowhere below interior
 };
 
 class DistanceCriterion {
@@ -48,7 +48,8 @@ public:
     static constexpr float never_visible = -1;
     static constexpr float always_visible = std::numeric_limits<float>::max();
 
-    // Fails where sizes do not fit the tree, a class has no row, a length or reach is NaN or a length is negative or infinite.
+    // Fails where sizes do not fit the tree, a class has no row, a length or reach is NaN, a length is negative or infinite, or a
+    // node's interior reaches (or costs) more than its silhouette.
     // A child whose reach exceeds its parent's is safe (it is folded with the parent) but costs time (see is_monotone), and an
     // assertion in debug builds.
     static Result<DistanceCriterion> create(const VertexTree& tree, Parts parts);
