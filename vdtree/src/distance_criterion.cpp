@@ -22,6 +22,41 @@ std::uint64_t next_id() {
 
 Error invalid(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
 
+Result<void> check(const VertexTree& tree, const DistanceCriterion::Parts& p) {
+    const std::size_t nodes = tree.interior_count();
+    if (!p.classes.empty() && p.classes.size() != nodes)
+        return invalid("A criterion has " + std::to_string(p.classes.size()) + " classes for " + std::to_string(nodes) +
+                       " interior nodes.");
+    for (const auto* lengths : {&p.lengths, &p.silhouette_lengths}) {
+        if (!lengths->empty() && lengths->size() != nodes)
+            return invalid("A criterion has " + std::to_string(lengths->size()) + " lengths for " + std::to_string(nodes) +
+                           " interior nodes.");
+        for (std::size_t i = 0; i < lengths->size(); ++i)
+            if (!((*lengths)[i] >= 0) || !std::isfinite((*lengths)[i]))
+                return invalid("The length of node " + std::to_string(i) + " must be 0 or more and finite.");
+    }
+    if (p.eccentricity_bins == 0 || p.reach.empty() || p.reach.size() % p.eccentricity_bins != 0)
+        return invalid("A criterion's table of " + std::to_string(p.reach.size()) + " reaches has no whole rows of " +
+                       std::to_string(p.eccentricity_bins) + " bins.");
+    if (!p.least_cost.empty() && p.least_cost.size() != p.reach.size())
+        return invalid("A criterion's table of least costs is not of the size of its reaches.");
+    for (std::size_t i = 0; i < p.least_cost.size(); ++i)
+        if (!(p.least_cost[i] >= 0) || (i % p.eccentricity_bins != 0 && p.least_cost[i] > p.least_cost[i - 1]))
+            return invalid("Least cost " + std::to_string(i) + " of a criterion is negative, not a number, or grows with the eccentricity.");
+    if (!(p.bin_degrees > 0) || !std::isfinite(p.bin_degrees))
+        return invalid("The bins of eccentricity need a positive width.");
+    const std::size_t rows = p.reach.size() / p.eccentricity_bins;
+    for (std::size_t i = 0; i < p.classes.size(); ++i)
+        if (p.classes[i].interior >= rows || p.classes[i].silhouette >= rows)
+            return invalid("Node " + std::to_string(i) + " has a class beyond the " + std::to_string(rows) + " rows of the table.");
+    for (std::size_t i = 0; i < p.reach.size(); ++i) {
+        if (std::isnan(p.reach[i])) return invalid("Reach " + std::to_string(i) + " of a criterion is not a number.");
+        if (i % p.eccentricity_bins != 0 && p.reach[i] > p.reach[i - 1])
+            return invalid("Reach " + std::to_string(i) + " of a criterion grows with the eccentricity.");
+    }
+    return {};
+}
+
 // Whether one row of a table is nowhere above another. Few pairs of rows come again and again.
 class RowOrder {
 public:
@@ -54,43 +89,6 @@ private:
     std::vector<Known> known_;
 };
 
-Result<void> check(const VertexTree& tree, const DistanceCriterion::Parts& p) {
-    const std::size_t nodes = tree.interior_count();
-    if (!p.classes.empty() && p.classes.size() != nodes)
-        return invalid("A criterion has " + std::to_string(p.classes.size()) + " classes for " + std::to_string(nodes) +
-                       " interior nodes.");
-    if (!p.lengths.empty() && p.lengths.size() != nodes)
-        return invalid("A criterion has " + std::to_string(p.lengths.size()) + " lengths for " + std::to_string(nodes) +
-                       " interior nodes.");
-    if (p.eccentricity_bins == 0 || p.reach.empty() || p.reach.size() % p.eccentricity_bins != 0)
-        return invalid("A criterion's table of " + std::to_string(p.reach.size()) + " reaches has no whole rows of " +
-                       std::to_string(p.eccentricity_bins) + " bins.");
-    if (!p.least_cost.empty() && p.least_cost.size() != p.reach.size())
-        return invalid("A criterion's table of least costs is not of the size of its reaches.");
-    for (std::size_t i = 0; i < p.least_cost.size(); ++i)
-        if (!(p.least_cost[i] >= 0) || (i % p.eccentricity_bins != 0 && p.least_cost[i] > p.least_cost[i - 1]))
-            return invalid("Least cost " + std::to_string(i) + " of a criterion is negative, not a number, or grows with the eccentricity.");
-    if (!(p.bin_degrees > 0) || !std::isfinite(p.bin_degrees))
-        return invalid("The bins of eccentricity need a positive width.");
-    for (std::size_t i = 0; i < p.lengths.size(); ++i)
-        if (!(p.lengths[i] >= 0) || !std::isfinite(p.lengths[i]))
-            return invalid("The length of node " + std::to_string(i) + " must be 0 or more and finite.");
-    const std::size_t rows = p.reach.size() / p.eccentricity_bins;
-    for (std::size_t i = 0; i < p.classes.size(); ++i)
-        if (p.classes[i].interior >= rows || p.classes[i].silhouette >= rows)
-            return invalid("Node " + std::to_string(i) + " has a class beyond the " + std::to_string(rows) + " rows of the table.");
-    for (std::size_t i = 0; i < p.reach.size(); ++i) {
-        if (std::isnan(p.reach[i])) return invalid("Reach " + std::to_string(i) + " of a criterion is not a number.");
-        if (i % p.eccentricity_bins != 0 && p.reach[i] > p.reach[i - 1])
-            return invalid("Reach " + std::to_string(i) + " of a criterion grows with the eccentricity.");
-    }
-    RowOrder order(p);
-    for (std::size_t i = 0; i < p.classes.size(); ++i)
-        if (!order.is_within(p.classes[i].interior, p.classes[i].silhouette))
-            return invalid("Node " + std::to_string(i) + " reaches farther in its interior than as a silhouette.");
-    return {};
-}
-
 // Spheres nest in every tree.
 bool is_monotone_in(const VertexTree& tree, const DistanceCriterion::Parts& p) {
     const auto parents = tree.parents();
@@ -99,6 +97,7 @@ bool is_monotone_in(const VertexTree& tree, const DistanceCriterion::Parts& p) {
         const NodeId parent = parents[node];
         if (!(parent < node)) return false; // in a damaged file
         if (!p.lengths.empty() && p.lengths[node] > p.lengths[parent]) return false;
+        if (!p.silhouette_lengths.empty() && p.silhouette_lengths[node] > p.silhouette_lengths[parent]) return false;
         if (p.classes.empty()) continue;
         const FoldClass a = p.classes[node], b = p.classes[parent];
         if (!order.is_within(a.interior, b.interior) || !order.is_within(a.silhouette, b.silhouette)) return false;
@@ -112,7 +111,8 @@ double radians_of_pixels(const View& view, double pixels) { return pixels / pixe
 
 DistanceCriterion::DistanceCriterion(Parts parts) : parts_(std::move(parts)), id_(next_id()) {
     uses_silhouettes_ = std::any_of(parts_.classes.begin(), parts_.classes.end(),
-                                    [](FoldClass c) { return c.interior != c.silhouette; });
+                                    [](FoldClass c) { return c.interior != c.silhouette; }) ||
+                        (!parts_.classes.empty() && !parts_.silhouette_lengths.empty());
 }
 
 Result<DistanceCriterion> DistanceCriterion::create(const VertexTree& tree, Parts parts) {

@@ -13,6 +13,7 @@ namespace unseen::vdtree {
 namespace {
 
 #define UNSEEN_INLINE __attribute__((always_inline)) inline
+#define UNSEEN_INLINE_LAMBDA __attribute__((always_inline))
 
 constexpr float pi = std::numbers::pi_v<float>;
 constexpr float huge = 1e30f;
@@ -140,7 +141,9 @@ struct Lanes {
         std::memcpy(batch.bin + first, &bin, sizeof bin);
         const Floats gap = distance - radius;
         const Floats interior = distances(view, load(batch.interior_row + first), bin, length);
-        const Floats silhouette = view.nobody ? interior : distances(view, load(batch.silhouette_row + first), bin, length);
+        const Floats silhouette =
+            view.nobody ? interior
+                        : max_of(interior, distances(view, load(batch.silhouette_row + first), bin, load(batch.silhouette_length + first)));
         store(batch.interior + first, interior);
         store(batch.silhouette + first, silhouette);
 
@@ -183,7 +186,11 @@ struct Lanes {
     static UNSEEN_INLINE void find_slacks(const KernelView& view, SlackBatch& batch, std::size_t first) {
         const Floats gap = load(batch.gap + first), inward = load(batch.inward + first), length = load(batch.length + first);
         const Floats eccentricity = load(batch.eccentricity + first);
-        const Ints row = load(batch.row + first), bin = load(batch.bin + first);
+        const Floats other_length = load(batch.silhouette_length + first);
+        const Ints row = load(batch.row + first), other_row = load(batch.silhouette_row + first), bin = load(batch.bin + first);
+        const auto within = [&](const Ints& at) UNSEEN_INLINE_LAMBDA {
+            return max_of(distances(view, row, at, length), distances(view, other_row, at, other_length));
+        };
         const Ints outward_bins = __builtin_convertvector(inward, Ints); // reaches shrink away from the gaze
         const Floats degrees = all(1 / view.bins_per_radian);
         const Floats turn_of_path = view.turn_per_length + shift_per_gap / max_of(gap, all(least_length));
@@ -193,7 +200,7 @@ struct Lanes {
             Ints reached = bin + outward_bins * step;
             reached = reached < 0 ? Ints{} : reached;
             reached = reached > last ? last : reached;
-            const Floats there = (distances(view, row, reached, length) - gap) * inward;
+            const Floats there = (within(reached) - gap) * inward;
             // Up to the far edge of the bin that was looked at; none beyond the last.
             const Ints edge = reached + (inward > 0 ? Ints{} + 1 : Ints{});
             Floats turn = (__builtin_convertvector(edge, Floats) * degrees - eccentricity) * inward;
@@ -203,7 +210,7 @@ struct Lanes {
             if (!any(there > best)) break;
         }
         // From inside, or nearly, the eccentricity may be anything soon.
-        const Floats anywhere = (distances(view, row, last, length) - gap) * inward;
+        const Floats anywhere = (within(last) - gap) * inward;
         best = (gap > 0) | (inward < 0) ? best : max_of(anywhere, all(0));
         store(batch.slack + first, best);
     }

@@ -43,7 +43,7 @@ struct KernelView {
 struct FoldBatch {
     alignas(64) float centre[3][kernel_lanes];
     alignas(64) float radius[kernel_lanes];
-    alignas(64) float length[kernel_lanes];
+    alignas(64) float length[kernel_lanes], silhouette_length[kernel_lanes];
     alignas(64) std::int32_t interior_row[kernel_lanes], silhouette_row[kernel_lanes];
 
     // Out, by measure():
@@ -60,12 +60,12 @@ struct FoldBatch {
 };
 void measure(const KernelView& view, FoldBatch& batch) noexcept;
 
-// How far the position clock may advance with nodes still within, or beyond, the distance of a row.
+// How far the position clock may advance with nodes still within, or beyond, the larger distance of two rows.
 struct SlackBatch {
-    alignas(64) std::int32_t row[kernel_lanes];
+    alignas(64) std::int32_t row[kernel_lanes], silhouette_row[kernel_lanes];
     alignas(64) std::int32_t bin[kernel_lanes];
     alignas(64) float inward[kernel_lanes]; // 1: the node is within the distance, -1: beyond
-    alignas(64) float gap[kernel_lanes], eccentricity[kernel_lanes], length[kernel_lanes];
+    alignas(64) float gap[kernel_lanes], eccentricity[kernel_lanes], length[kernel_lanes], silhouette_length[kernel_lanes];
     alignas(64) float slack[kernel_lanes];  // out; may be a little negative
 };
 void find_slacks(const KernelView& view, SlackBatch& batch) noexcept;

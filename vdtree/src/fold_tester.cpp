@@ -24,6 +24,7 @@ void load(std::span<const FoldCandidate* const> lanes, FoldBatch& batch) {
         batch.centre[2][i] = of.sphere.centre.z;
         batch.radius[i] = of.sphere.radius;
         batch.length[i] = of.length;
+        batch.silhouette_length[i] = of.silhouette_length;
         batch.interior_row[i] = of.rows.interior;
         batch.silhouette_row[i] = of.rows.silhouette;
     }
@@ -38,6 +39,7 @@ FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterio
     support_ = parts.spheres == DistanceCriterion::Spheres::support ? tree.support_spheres().data() : nullptr;
     classes_ = parts.classes.empty() ? nullptr : parts.classes.data();
     lengths_ = parts.lengths.empty() ? nullptr : parts.lengths.data();
+    silhouette_lengths_ = parts.silhouette_lengths.empty() ? nullptr : parts.silhouette_lengths.data();
     const bool has_least_costs = least_costs && !parts.least_cost.empty();
     reach_.resize(parts.reach.size());
     for (std::size_t i = 0; i < reach_.size(); ++i) {
@@ -81,6 +83,7 @@ FoldCandidate FoldTester::candidate(NodeId node) const {
     FoldCandidate candidate;
     candidate.sphere = support_ ? support_[node] : around.ring;
     candidate.length = lengths_ ? lengths_[node] : candidate.sphere.radius;
+    candidate.silhouette_length = silhouette_lengths_ ? silhouette_lengths_[node] : candidate.length;
     if (classes_) candidate.rows = classes_[node];
     candidate.ring = around.ring;
     candidate.slabs = around.slabs;
@@ -95,6 +98,7 @@ void FoldTester::prefetch([[maybe_unused]] NodeId node) const {
     if (support_) __builtin_prefetch(support_ + node);
     if (classes_) __builtin_prefetch(classes_ + node);
     if (lengths_) __builtin_prefetch(lengths_ + node);
+    if (silhouette_lengths_) __builtin_prefetch(silhouette_lengths_ + node);
 #endif
 }
 
@@ -138,9 +142,12 @@ void FoldTester::test_nodes(std::span<const NodeId> nodes, std::span<Verdict> ve
 void FoldTester::find_position_slacks(const FoldBatch& batch, Findings& findings) const {
     SlackBatch asked;
     for (std::size_t i = 0; i < kernel_lanes; ++i) {
-        asked.row[i] = (findings.silhouettes >> i) & 1 ? batch.silhouette_row[i] : batch.interior_row[i];
+        const bool is_silhouette = (findings.silhouettes >> i) & 1;
         asked.inward[i] = (findings.unfolded >> i) & 1 ? 1.0f : -1.0f;
+        asked.silhouette_length[i] = is_silhouette ? batch.silhouette_length[i] : batch.length[i];
+        asked.silhouette_row[i] = is_silhouette ? batch.silhouette_row[i] : batch.interior_row[i];
     }
+    std::copy_n(batch.interior_row, kernel_lanes, asked.row);
     std::copy_n(batch.bin, kernel_lanes, asked.bin);
     std::copy_n(batch.gap, kernel_lanes, asked.gap);
     std::copy_n(batch.eccentricity, kernel_lanes, asked.eccentricity);
@@ -219,14 +226,20 @@ void FoldTester::test_batch(Lanes lanes, Verdict* verdicts, bool costs) const {
 
 // The thresholds at which the node would just fold.
 void FoldTester::set_costs(Verdict& verdict, const FoldBatch& batch, std::size_t lane, bool is_silhouette) const {
+    set_costs(verdict, batch.interior_row[lane], batch.bin[lane], batch.length[lane], batch.gap[lane]);
+    if (is_silhouette) set_costs(verdict, batch.silhouette_row[lane], batch.bin[lane], batch.silhouette_length[lane], batch.gap[lane]);
+}
+
+// Raises the costs to those of one row.
+void FoldTester::set_costs(Verdict& verdict, std::int32_t row, std::int32_t bin, float unit, float gap) const {
     const DistanceCriterion::Parts& parts = criterion_.parts();
-    const std::int32_t row = is_silhouette ? batch.silhouette_row[lane] : batch.interior_row[lane];
-    const auto entry = static_cast<std::size_t>(row * view_.bins + batch.bin[lane]);
-    const float reach = parts.reach[entry], length = batch.length[lane] * reach, gap = batch.gap[lane];
+    const auto entry = static_cast<std::size_t>(row * view_.bins + bin);
+    const float reach = parts.reach[entry], length = unit * reach;
     if (!(reach >= 0) || (!(length > 0) && gap > 0)) return; // from nowhere, or from inside only
     const bool always = reach >= DistanceCriterion::always_visible || !(gap > 0);
-    verdict.cost = always ? infinity : length / gap;
-    verdict.seen_cost = parts.least_cost.empty() ? verdict.cost : std::max(verdict.cost, parts.least_cost[entry]);
+    const float cost = always ? infinity : length / gap;
+    verdict.cost = std::max(verdict.cost, cost);
+    verdict.seen_cost = std::max(verdict.seen_cost, parts.least_cost.empty() ? cost : std::max(cost, parts.least_cost[entry]));
 }
 
 Motion FoldTester::motion(const VertexTree& tree, const Viewpoint& from, const Viewpoint& to, double length_per_radian) {

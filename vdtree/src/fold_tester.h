@@ -31,7 +31,7 @@ struct Motion {
 // What a test reads of a node, in one cache line.
 struct alignas(64) FoldCandidate {
     Sphere sphere;           // whose distance counts
-    float length = 0;
+    float length = 0, silhouette_length = 0;
     FoldClass rows;
     Sphere ring;             // whose facing counts
     NormalSlabs slabs;       // of the directions in the ring
@@ -78,6 +78,7 @@ private:
     void find_facings(Lanes lanes, const FoldBatch& batch, bool costs, Findings& findings) const;
     void find_position_slacks(const FoldBatch& batch, Findings& findings) const;
     void set_costs(Verdict& verdict, const FoldBatch& batch, std::size_t lane, bool is_silhouette) const;
+    void set_costs(Verdict& verdict, std::int32_t row, std::int32_t bin, float unit, float gap) const;
 
     const VertexTree& tree_;
     const DistanceCriterion& criterion_;
@@ -86,7 +87,7 @@ private:
     const NodeBounds* bounds_;
     const Sphere* support_;
     const FoldClass* classes_;
-    const float* lengths_;
+    const float *lengths_, *silhouette_lengths_;
     std::vector<float> reach_; // of the criterion; infinite where the fold is seen from everywhere
     KernelView view_, costs_view_;
 };

@@ -3,6 +3,7 @@
 //
 // A node is unfolded while
 //     |eye - c| - R < D(node, silhouette, eccentricity) / threshold,      D = length * reach[class][eccentricity]
+// (silhouettes: the larger of that and their own length * reach)
 // (or while the class's least cost is above the threshold), with c, R its ring's (or support's) sphere. `class` says how visible a fold of a given extent is; a node has one class for
 // when its ring faces the eye from one side, and another for when it is, or may be, a silhouette. Spheres and lengths nest and
 // classes grow up the tree, so D is at least its children's for equal arguments, and a parent's arguments are never
@@ -27,7 +28,7 @@ namespace unseen::vdtree {
 // Which row of the reach table a node uses.
 struct FoldClass {
     std::uint16_t interior = 0;   // all of the ring faces the eye, or faces away
-    std::uint16_t silhouette = 0; // the ring is, or may be, an outline, also where it has an irregular edge; nowhere below interior
+    std::uint16_t silhouette = 0; // the ring is, or may be, an outline, also where it has an irregular edge
 };
 
 class DistanceCriterion {
@@ -38,6 +39,7 @@ public:
         Spheres spheres = Spheres::ring;
         std::vector<FoldClass> classes = {};   // by interior node; empty: class 0 for all, whatever they face
         std::vector<float> lengths = {};       // by interior node, mesh units, 0 or more; empty: the spheres' radii
+        std::vector<float> silhouette_lengths = {}; // likewise, for the silhouettes' classes; empty: lengths
         std::vector<float> reach = {};         // [class * eccentricity_bins + bin]: distance in lengths; not growing with the bin
         std::vector<float> least_cost = {};    // of the same shape: no fold of this class costs less, from however far (drawn, it is at
                                           // least a pixel); empty: 0 for all
@@ -48,8 +50,7 @@ public:
     static constexpr float never_visible = -1;
     static constexpr float always_visible = std::numeric_limits<float>::max();
 
-    // Fails where sizes do not fit the tree, a class has no row, a length or reach is NaN, a length is negative or infinite, or a
-    // node's interior reaches (or costs) more than its silhouette.
+    // Fails where sizes do not fit the tree, a class has no row, a length or reach is NaN or a length is negative or infinite.
     // A child whose reach exceeds its parent's is safe (it is folded with the parent) but costs time (see is_monotone), and an
     // assertion in debug builds.
     static Result<DistanceCriterion> create(const VertexTree& tree, Parts parts);
