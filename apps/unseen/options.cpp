@@ -85,14 +85,14 @@ std::vector<std::string> fold_test_list() {
 }
 
 FoldTest fold_test(const std::string& name) {
-    if (name == perception::fold_test_names[1]) return FoldTest::extent;
-    return name == perception::fold_test_names[2] ? FoldTest::displacement : FoldTest::luebke_hallen;
+    const auto& names = perception::fold_test_names;
+    return static_cast<FoldTest>(std::find(std::begin(names), std::end(names), name) - std::begin(names));
 }
 
 void check(const WhatOptions& what) {
-    const bool is_perceptual = what.test == FoldTest::luebke_hallen;
+    const bool is_perceptual = app::is_perceptual(what.test);
     if (what.mode == Mode::pixels && is_perceptual)
-        refuse("--pixels needs --fold-test extent or displacement: luebke-hallen knows no pixels.");
+        refuse("--pixels needs --fold-test extent or displacement: " + what.fold_test + " knows no pixels.");
     if (what.mode == Mode::imperceptible && !is_perceptual)
         refuse("--fold-test " + what.fold_test +
                " cannot tell what is imperceptible: add --triangles N or --pixels E.");
@@ -211,7 +211,7 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
     std::string& name = o.fold_test;
     CLI::Option* test =
         group.add_option("--fold-test", name)->type_name("NAME")->check(CLI::IsMember(fold_test_list()));
-    test->description("luebke-hallen (perceptual; default), extent or displacement (in pixels; of --pixels: extent)");
+    test->description("error (perceptual; default), luebke-hallen (perceptual, of 2001), extent or displacement (in pixels; of --pixels: extent)");
     add_gaze_option(group, o.gaze_px);
     group.callback([=, &o] {
         const std::size_t given = full->count() + imperceptible->count() + triangles->count() + pixels->count();

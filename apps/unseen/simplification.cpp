@@ -25,7 +25,7 @@ double milliseconds_since(Clock::time_point start) {
     return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
-bool is_perceptual(const WhatOptions& what) { return what.mode != Mode::full && what.test == FoldTest::luebke_hallen; }
+bool is_perceptual(const WhatOptions& what) { return what.mode != Mode::full && is_perceptual(what.test); }
 
 // What silhouettes can be seen against.
 perception::SceneLuminance scene_luminance(const Scene& scene) {
@@ -62,6 +62,7 @@ vdtree::AdjustStats adjust(vdtree::Cut& cut, const Scene& scene, const WhatOptio
     case FoldTest::displacement:
         return cut.adjust(vdtree::DisplacementCriterion(scene.tree, scene.view, tolerance_px, scene.placement),
                           options);
+    case FoldTest::error: // has the distance form only
     case FoldTest::luebke_hallen: break;
     }
     return cut.adjust(
@@ -80,6 +81,8 @@ std::string name_of(FoldTest test) { return std::string(perception::fold_test_na
 
 Effect fold_test_effect(const WhatOptions& what) {
     if (what.mode == Mode::full) return {"fold test", false, "nothing is folded in the full model"};
+    if (what.test == FoldTest::error)
+        return {"fold test", true, "error: what each fold changes in luminance and outline, against the contrast sensitivity"};
     if (what.test == FoldTest::luebke_hallen)
         return {"fold test", true, "luebke-hallen: the worst grating of each fold against the contrast sensitivity"};
     return {"fold test", true, name_of(what.test) + ": pixels on the screen, whether they can be seen or not"};
@@ -211,7 +214,7 @@ Effect time_limit_effect(const WhatOptions& what, const Simplification& result) 
 } // namespace
 
 Result<Simplification> simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
-    if (what.fill_budget || what.milliseconds) {
+    if (what.fill_budget || what.milliseconds || (what.mode != Mode::full && what.test == FoldTest::error)) {
         Follower follower;
         follower.set_hysteresis(1);
         return follower.follow(cut, scene, what, purpose);
@@ -257,7 +260,9 @@ Result<const vdtree::DistanceCriterion*> Follower::criterion_for(const Scene& sc
         perception::FoldTestOptions options = test_options(scene, what);
         if (key.has_gaze)
             options.gaze_px = glm::dvec2(scene.view.width * 0.5 + key.farthest_gaze_px, scene.view.height * 0.5);
-        return perception::luebke_hallen_distances(scene.tree, scene.view, options);
+        if (what.test == FoldTest::luebke_hallen) return perception::luebke_hallen_distances(scene.tree, scene.view, options);
+        if (!errors_) errors_ = vdtree::measure_fold_errors(scene.tree);
+        return perception::error_distances(scene.tree, *errors_, scene.view, options);
     }();
     if (!made) return made.error();
     criterion_ = std::move(*made);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <vdtree/cut.h>
+#include <vdtree/fold_errors.h>
 
 #include "report.h"
 #include "scene.h"
@@ -56,7 +57,7 @@ public:
 private:
     // What a criterion depends on, besides the tree, its light and the display.
     struct Key {
-        FoldTest test = FoldTest::luebke_hallen;
+        FoldTest test = FoldTest::error;
         double pixels = 0;
         bool has_gaze = false;
         double farthest_gaze_px = 0;
@@ -71,6 +72,7 @@ private:
     float hysteresis_ = 1.1f;
     Key key_;
     std::optional<vdtree::DistanceCriterion> criterion_;
+    std::optional<vdtree::FoldErrors> errors_; // of the scene's tree; made when they are first asked for
 };
 
 // The keys that simplify and render report; draw_ms is NaN where nothing was drawn.

@@ -12,6 +12,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 
+#include <perception/criterion.h>
 #include <perception/image.h>
 
 #include "frame_image.h"
@@ -124,7 +125,7 @@ private:
     void choose(Mode mode) {
         what_.mode = mode;
         what_.triangles = budget_;
-        if (mode == Mode::imperceptible) what_.test = FoldTest::luebke_hallen;
+        if (mode == Mode::imperceptible && !is_perceptual(what_.test)) what_.test = FoldTest::error;
         what_.gaze_px.reset();
         gaze_follows_pointer_ = false;
     }
@@ -215,18 +216,9 @@ private:
                             grouped(s.source_triangles) + " triangles, " + rounded(s.adapt_ms, 2) + " ms to adapt, " +
                             rounded(frame_ms, 2) + " ms a frame";
         if (what_.mode != Mode::full)
-            title += ", " + std::string(perception_name(what_.test)) + ", unseen from " +
+            title += ", " + std::string(perception::fold_test_names[static_cast<std::size_t>(what_.test)]) + ", unseen from " +
                      rounded(s.imperceptible_from_m, 2) + (std::isfinite(s.imperceptible_from_m) ? " m" : "");
         glfwSetWindowTitle(window_, title.c_str());
-    }
-
-    static const char* perception_name(FoldTest test) {
-        switch (test) {
-        case FoldTest::extent: return "extent";
-        case FoldTest::displacement: return "displacement";
-        case FoldTest::luebke_hallen: break;
-        }
-        return "luebke-hallen";
     }
 
     Result<void> save_picture(const std::string& file) {

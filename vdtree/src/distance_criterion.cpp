@@ -27,6 +27,9 @@ Result<void> check(const VertexTree& tree, const DistanceCriterion::Parts& p) {
     if (!p.classes.empty() && p.classes.size() != nodes)
         return invalid("A criterion has " + std::to_string(p.classes.size()) + " classes for " + std::to_string(nodes) +
                        " interior nodes.");
+    if (!p.facing.empty() && p.facing.size() != nodes)
+        return invalid("A criterion has " + std::to_string(p.facing.size()) + " sets of directions for " + std::to_string(nodes) +
+                       " interior nodes.");
     for (const auto* lengths : {&p.lengths, &p.silhouette_lengths}) {
         if (!lengths->empty() && lengths->size() != nodes)
             return invalid("A criterion has " + std::to_string(lengths->size()) + " lengths for " + std::to_string(nodes) +
@@ -98,6 +101,7 @@ bool is_monotone_in(const VertexTree& tree, const DistanceCriterion::Parts& p) {
         if (!(parent < node)) return false; // in a damaged file
         if (!p.lengths.empty() && p.lengths[node] > p.lengths[parent]) return false;
         if (!p.silhouette_lengths.empty() && p.silhouette_lengths[node] > p.silhouette_lengths[parent]) return false;
+        if (!p.facing.empty() && !p.facing[parent].includes(p.facing[node])) return false;
         if (p.classes.empty()) continue;
         const FoldClass a = p.classes[node], b = p.classes[parent];
         if (!order.is_within(a.interior, b.interior) || !order.is_within(a.silhouette, b.silhouette)) return false;

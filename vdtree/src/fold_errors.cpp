@@ -15,6 +15,7 @@ namespace {
 constexpr Index none = 0xffffffffu;
 constexpr std::size_t witness_count = 4; // of a node, for its parent: the worst in distance, the worst in luminance
 constexpr Index spread_count = 4;        // leaves compared besides, at equal steps through the support
+constexpr std::size_t border_count = 12; // leaves compared that touch neighbours, likewise
 constexpr Index leaves_of_part = 4096;   // of a subtree that one task measures
 
 struct Point {
@@ -82,9 +83,16 @@ private:
         Index leaf; // none for points that are no leaves
         Difference error;
     };
+    struct Child {
+        Index first_leaf;
+        NodeId node;
+    };
     struct Scratch {
-        std::vector<Ring> ring;
+        std::vector<Ring> ring, before; // with neighbours folded
+        std::vector<Ring> fine;         // with neighbours unfolded
+        std::vector<Index> border;      // leaves of the support that touch others
         std::vector<Sample> samples;
+        std::vector<Child> children;
     };
     using Witnesses = std::array<Index, witness_count>;
 
@@ -137,27 +145,50 @@ private:
         const Point proxy = point(node);
         const auto is_inside = [&](Index leaf) { return leaf - begin < end - begin; };
         scratch.ring.clear();
+        scratch.before.clear();
+        scratch.fine.clear();
+        scratch.border.clear();
         scratch.samples.clear();
+        scratch.children.clear();
+        tree_.for_each_child(node, [&](NodeId child) {
+            scratch.children.push_back({tree_.is_leaf(child) ? child - interior_ : first_leaf_[child], child});
+        });
+        const auto child_of = [&](Index leaf) {
+            const auto after = std::upper_bound(scratch.children.begin(), scratch.children.end(), leaf,
+                                                [](Index l, const Child& child) { return l < child.first_leaf; });
+            return std::prev(after)->node;
+        };
+        NormalSlabs facing;
         double area_before = 0, luminance_before = 0, area_after = 0, luminance_after = 0;
         for (const Index t : crossing_[node]) {
-            Ring whole, fine, coarse;
-            std::array<NodeId, 3> shown;
+            Ring whole, before, fine, coarse;
+            std::array<NodeId, 3> shown, shown_before;
             for (std::size_t k = 0; k < 3; ++k) {
                 const Index leaf = triangles_[t][k];
                 whole.corner[k] = leaf_point(leaf);
                 shown[k] = is_inside(leaf) ? node : stand_in(leaf, node);
+                shown_before[k] = is_inside(leaf) ? child_of(leaf) : shown[k];
+                if (is_inside(leaf)) scratch.border.push_back(leaf);
                 fine.corner[k] = is_inside(leaf) ? proxy : whole.corner[k];
                 coarse.corner[k] = point(shown[k]);
+                before.corner[k] = point(shown_before[k]);
             }
+            insert_normal(whole, facing);
             add_area(whole, area_before, luminance_before);
+            if (are_distinct(shown_before)) {
+                scratch.before.push_back(before);
+                insert_normal(before, facing);
+            }
             if (t >= first_triangle_[node] && t < first_triangle_[node + 1]) {
-                const Point centre{(whole.corner[0].position + whole.corner[1].position + whole.corner[2].position) / 3.0f,
-                                   (whole.corner[0].luminance + whole.corner[1].luminance + whole.corner[2].luminance) / 3.0f};
-                scratch.samples.push_back({centre, none, {}});
+                scratch.samples.push_back({centre_of(whole), none, {}});
                 continue;
             }
             add_area(fine, area_after, luminance_after);
-            if (shown[0] != shown[1] && shown[1] != shown[2] && shown[2] != shown[0]) scratch.ring.push_back(coarse);
+            insert_normal(fine, facing);
+            scratch.fine.push_back(fine);
+            if (!are_distinct(shown)) continue;
+            scratch.ring.push_back(coarse);
+            insert_normal(coarse, facing);
         }
         if (scratch.ring.empty()) scratch.ring.push_back({{proxy, proxy, proxy}});
         add_samples(node, scratch);
@@ -167,19 +198,51 @@ private:
             mean = static_cast<float>(std::abs(luminance_after / area_after - luminance_before / area_before));
         for (Sample& sample : scratch.samples) {
             sample.error = compare(sample.point, scratch.ring);
+            if (!scratch.fine.empty()) {
+                const Difference fine_error = compare(sample.point, scratch.fine);
+                sample.error.distance = std::max(sample.error.distance, fine_error.distance);
+                sample.error.luminance = std::max(sample.error.luminance, fine_error.luminance);
+            }
             distance = std::max(distance, sample.error.distance);
             luminance = std::max(luminance, sample.error.luminance);
         }
         choose_witnesses(node, scratch.samples);
+        const auto compare_back = [&](const Point& p) {
+            const Difference error = compare(p, scratch.before);
+            distance = std::max(distance, error.distance);
+            luminance = std::max(luminance, error.luminance);
+        };
+        if (!scratch.before.empty()) {
+            compare_back(proxy);
+            for (const Ring& t : scratch.ring) compare_back(centre_of(t));
+        }
         tree_.for_each_child(node, [&](NodeId child) {
             if (tree_.is_leaf(child)) return;
             distance = std::max(distance, errors_.distance[child]);
             luminance = std::max(luminance, errors_.luminance[child]);
             mean = std::max(mean, errors_.mean[child]);
+            facing |= errors_.facing[child];
         });
+        errors_.facing[node] = facing;
         errors_.distance[node] = distance;
         errors_.luminance[node] = luminance;
         errors_.mean[node] = mean;
+    }
+
+    static bool are_distinct(const std::array<NodeId, 3>& nodes) {
+        return nodes[0] != nodes[1] && nodes[1] != nodes[2] && nodes[2] != nodes[0];
+    }
+
+    static Point centre_of(const Ring& t) {
+        return {(t.corner[0].position + t.corner[1].position + t.corner[2].position) / 3.0f,
+                (t.corner[0].luminance + t.corner[1].luminance + t.corner[2].luminance) / 3.0f};
+    }
+
+    static void insert_normal(const Ring& t, NormalSlabs& facing) {
+        const glm::dvec3 a(t.corner[0].position);
+        const glm::dvec3 normal = glm::cross(glm::dvec3(t.corner[1].position) - a, glm::dvec3(t.corner[2].position) - a);
+        const double length = glm::length(normal);
+        if (length > 0) facing.insert(normal / length);
     }
 
     static void add_area(const Ring& t, double& area, double& luminance) {
@@ -187,6 +250,15 @@ private:
         const double own = 0.5 * static_cast<double>(glm::length(glm::cross(t.corner[1].position - a, t.corner[2].position - a)));
         area += own;
         luminance += own * static_cast<double>(t.corner[0].luminance + t.corner[1].luminance + t.corner[2].luminance) / 3;
+    }
+
+    // The vector is sorted and thinned out.
+    static void keep_some(std::vector<Index>& leaves, std::size_t most) {
+        std::sort(leaves.begin(), leaves.end());
+        leaves.erase(std::unique(leaves.begin(), leaves.end()), leaves.end());
+        if (leaves.size() <= most) return;
+        for (std::size_t i = 0; i < most; ++i) leaves[i] = leaves[i * leaves.size() / most];
+        leaves.resize(most);
     }
 
     void add_samples(NodeId node, Scratch& scratch) const {
@@ -200,6 +272,8 @@ private:
             for (const Index leaf : witnesses_[child])
                 if (leaf != none) add_leaf(leaf);
         });
+        keep_some(scratch.border, border_count);
+        for (const Index leaf : scratch.border) add_leaf(leaf);
         const Index leaves = leaf_end_[node] - first_leaf_[node];
         for (Index i = 0; i < std::min(spread_count, leaves); ++i)
             add_leaf(first_leaf_[node] + static_cast<Index>((std::uint64_t{leaves} * (2 * i + 1)) / (2 * spread_count)));
@@ -254,6 +328,7 @@ private:
 FoldErrors measure_fold_errors(const VertexTree& tree, int threads) {
     FoldErrors errors;
     for (auto* values : {&errors.distance, &errors.luminance, &errors.mean}) values->resize(tree.interior_count());
+    errors.facing.resize(tree.interior_count());
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
     arena.execute([&] { Measurer(tree, errors).run(); });
     return errors;

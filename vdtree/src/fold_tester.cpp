@@ -38,6 +38,7 @@ FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterio
     const DistanceCriterion::Parts& parts = criterion.parts();
     support_ = parts.spheres == DistanceCriterion::Spheres::support ? tree.support_spheres().data() : nullptr;
     classes_ = parts.classes.empty() ? nullptr : parts.classes.data();
+    facing_ = parts.facing.empty() ? nullptr : parts.facing.data();
     lengths_ = parts.lengths.empty() ? nullptr : parts.lengths.data();
     silhouette_lengths_ = parts.silhouette_lengths.empty() ? nullptr : parts.silhouette_lengths.data();
     const bool has_least_costs = least_costs && !parts.least_cost.empty();
@@ -86,7 +87,7 @@ FoldCandidate FoldTester::candidate(NodeId node) const {
     candidate.silhouette_length = silhouette_lengths_ ? silhouette_lengths_[node] : candidate.length;
     if (classes_) candidate.rows = classes_[node];
     candidate.ring = around.ring;
-    candidate.slabs = around.slabs;
+    candidate.slabs = facing_ ? facing_[node] : around.slabs;
     candidate.flags = around.flags;
     candidate.node = node;
     return candidate;
@@ -97,6 +98,7 @@ void FoldTester::prefetch([[maybe_unused]] NodeId node) const {
     __builtin_prefetch(bounds_ + node);
     if (support_) __builtin_prefetch(support_ + node);
     if (classes_) __builtin_prefetch(classes_ + node);
+    if (facing_) __builtin_prefetch(facing_ + node);
     if (lengths_) __builtin_prefetch(lengths_ + node);
     if (silhouette_lengths_) __builtin_prefetch(silhouette_lengths_ + node);
 #endif

@@ -87,6 +87,7 @@ private:
     const NodeBounds* bounds_;
     const Sphere* support_;
     const FoldClass* classes_;
+    const NormalSlabs* facing_;
     const float *lengths_, *silhouette_lengths_;
     std::vector<float> reach_; // of the criterion; infinite where the fold is seen from everywhere
     KernelView view_, costs_view_;

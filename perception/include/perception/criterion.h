@@ -10,6 +10,7 @@
 #include <perception/display.h>
 #include <vdtree/criteria.h>
 #include <vdtree/distance_criterion.h>
+#include <vdtree/fold_errors.h>
 
 namespace unseen::perception {
 
@@ -62,11 +63,24 @@ private:
 Result<vdtree::DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTree& tree, const vdtree::View& view,
                                                           const FoldTestOptions& options);
 
+// The test by errors: what a fold changes in fact, not what could change within its ring. In distance form, like the above.
+//
+// With theta0 = 2 asin(r0 / d) for the support's sphere; h, eY, mY of measure_fold_errors(), in cd/m2 where they are luminances; the
+// ring's range lo1..hi1 and its sphere's r1; L the middle of the range; S the table's conservative form; and by eccentricity:
+//   interior    c = (eY + (hi1 - lo1) min(1, h / r1)) / L:  c min(1, (theta0 / pixel)^2) S(1 / (2 max(theta0, pixel))) <= 1
+//   mean        mY / L S(1 / (2 theta)) <= 1, theta the whole object's
+//   silhouette  a strip of width w, the angle of h, that changes between the ring's luminance and anything in the scene, with the
+//               contrast cs over the pair's mean:  cs max over rho of min(1, 2 rho w) S(rho) <= 1, rho up to the display's limit
+// Below a pixel a fold counts by the share of the pixel that it covers, so from far enough away everything folds: drawing must be
+// antialiased. Open and irregular rings are silhouettes. Cost: as luebke_hallen_distances().
+Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree, const vdtree::FoldErrors& errors,
+                                                  const vdtree::View& view, const FoldTestOptions& options);
+
 // Where the eye and the gaze are in the tree's frame. With the view's frustum if `window_only`: what lies outside folds.
 vdtree::Viewpoint viewpoint_of(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options,
                                const vdtree::Similarity& placement = {}, bool window_only = true);
 
 // The names that --fold-test takes.
-inline constexpr std::string_view fold_test_names[] = {"luebke-hallen", "extent", "displacement"};
+inline constexpr std::string_view fold_test_names[] = {"error", "luebke-hallen", "extent", "displacement"};
 
 } // namespace unseen::perception

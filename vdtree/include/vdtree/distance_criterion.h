@@ -40,6 +40,7 @@ public:
         std::vector<FoldClass> classes = {};   // by interior node; empty: class 0 for all, whatever they face
         std::vector<float> lengths = {};       // by interior node, mesh units, 0 or more; empty: the spheres' radii
         std::vector<float> silhouette_lengths = {}; // likewise, for the silhouettes' classes; empty: lengths
+        std::vector<NormalSlabs> facing = {};  // by interior node: of the directions that make it a silhouette; empty: the tree's
         std::vector<float> reach = {};         // [class * eccentricity_bins + bin]: distance in lengths; not growing with the bin
         std::vector<float> least_cost = {};    // of the same shape: no fold of this class costs less, from however far (drawn, it is at
                                           // least a pixel); empty: 0 for all

@@ -10,13 +10,17 @@ namespace unseen::vdtree {
 // By interior node, each at least as large as its children's. The mesh's own surface in the node's support is compared with the
 // ring of triangles around the proxy while the neighbours are folded as far as nodes that are no larger than this one: the
 // cut in which nodes fold in the order of their size. Points compared: the children's proxies, leaves spread over the support,
-// the leaves that were worst in the children, and the centres of the triangles that vanish here.
+// the leaves that were worst in the children, and the centres of the triangles that vanish here; and, the other way, the proxy and the
+// centres of the ring's triangles with the surface before the fold.
 //
 // A measurement, not a bound over all cuts: neighbours may be finer (then the ring is, too) or coarser than assumed, and the worst
 // point may lie between those compared.
 struct FoldErrors {
-    std::vector<float> distance;  // mesh units: to the nearest point of the ring
+    std::vector<float> distance;  // mesh units: to the nearest point of the other surface
     std::vector<float> luminance; // relative, 0..1: the difference to that point
+    // Of all triangles that touch the support, before and after the fold, with unfolded and with folded neighbours: where all of
+    // these face the eye, or none does, the fold moves no outline.
+    std::vector<NormalSlabs> facing;
     // Relative, 0..1: by how much the mean luminance of the ring's area shifts against the mesh's, with unfolded neighbours.
     std::vector<float> mean;
 };

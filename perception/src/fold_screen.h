@@ -1,0 +1,49 @@
+// What fold tests in distance form know of the camera and the display.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+
+#include <perception/criterion.h>
+
+namespace unseen::perception {
+
+inline constexpr double degrees_per_radian = 180 / std::numbers::pi;
+
+inline constexpr double degrees_per_bin = 0.5;  // of eccentricity on the screen
+inline constexpr std::size_t bin_count = 128;   // up to 64 degrees; beyond, sensitivity is taken as there
+
+// Covers the rounding of a reach to float.
+inline constexpr double reach_rounding = 1e-6;
+
+// The camera's and the display's geometry, as far as the test needs it.
+struct Screen {
+    double scale = 1;     // tangent on the screen over tangent in the camera
+    double pixel_deg = 0; // one pixel at the screen's centre
+    double pitch_over_distance = 0;
+    double largest_magnification = 1, least_magnification = 1; // of angles, from the camera to the screen
+
+    Screen(const vdtree::View& view, const FoldTestOptions& options) {
+        const double tan_physical = std::tan(to_radians(physical_field(options.display, view.height)).value() / 2);
+        const double tan_camera = std::tan(view.fov_y_degrees * std::numbers::pi / 360);
+        scale = tan_physical / tan_camera;
+        constexpr double same = 1e-9; // the default field is the physical one by way of degrees
+        if (std::abs(scale - 1) < same) scale = 1;
+        pixel_deg = 1 / pixels_per_degree(options.display).value();
+        pitch_over_distance = options.display.pixel_pitch.value() / options.display.distance.value();
+        // From the axis to the farthest corner of the window, or to the gaze if that is farther.
+        const double aspect = static_cast<double>(view.width) / view.height;
+        double farthest = tan_camera * std::hypot(aspect, 1);
+        if (options.gaze_px)
+            farthest = std::max(farthest, std::hypot(options.gaze_px->x - view.width * 0.5, options.gaze_px->y - view.height * 0.5) *
+                                              pitch_over_distance / scale);
+        const double t2 = farthest * farthest;
+        const double at_edge = scale * (1 + t2) / (1 + scale * scale * t2); // along the radius; across it, its root in between
+        largest_magnification = std::max(scale, at_edge);
+        least_magnification = std::min(scale, at_edge);
+    }
+};
+
+} // namespace unseen::perception
