@@ -404,6 +404,39 @@ TEST(Geomorph, FewChangesGlideHoweverCoarseTheCut) {
     EXPECT_TRUE(geomorph.is_gliding());
 }
 
+// A tree as deep as it has vertices, all of it gliding at once.
+TEST(Geomorph, GlidesDownChainsOfAnyDepth) {
+    constexpr Index leaves = 30'000;
+    Mesh mesh;
+    for (Index i = 0; i < leaves; ++i) mesh.positions.push_back({0.001 * i, i % 2, 0.0});
+    for (Index i = 0; i + 2 < leaves; ++i) mesh.triangles.push_back({i, i + 1, i + 2});
+    const auto chain = [](const ClusterInput&) -> Result<Clustering> {
+        Clustering clustering; // cluster leaves + k has leaf k + 1 and the cluster before, or leaf 0
+        clustering.parents.resize(2 * leaves - 1);
+        clustering.parents[0] = leaves;
+        for (Index k = 0; k + 1 < leaves; ++k) {
+            clustering.parents[k + 1] = leaves + k;
+            clustering.parents[leaves + k] = std::min(leaves + k + 1, 2 * leaves - 2);
+        }
+        return clustering;
+    };
+    const auto tree = build_tree(mesh.view(), chain);
+    ASSERT_TRUE(tree) << tree.error().message;
+    Cut cut(*tree);
+    Geomorph geomorph = made(*tree, {0.25, std::numeric_limits<double>::infinity()});
+    ASSERT_TRUE(geomorph.step(cut, 0));
+    cut.unfold_all();
+    ASSERT_TRUE(geomorph.step(cut, 0));
+    ASSERT_TRUE(geomorph.step(cut, 0.1));
+    EXPECT_EQ(geomorph.moved().size(), leaves);
+    ASSERT_TRUE(geomorph.step(cut, 0.2));
+    EXPECT_FALSE(geomorph.is_gliding());
+    cut.fold_all();
+    ASSERT_TRUE(geomorph.step(cut, 0));
+    ASSERT_TRUE(geomorph.step(cut, 0.3));
+    EXPECT_EQ(geomorph.drawn().triangle_count(), 0u);
+}
+
 TEST(Geomorph, InNoTimeIsTheFollowedCut) {
     const VertexTree tree = tree_classes[0].make();
     const Waves waves(tree, 6);

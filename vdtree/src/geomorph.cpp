@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <utility>
 
 #include <glm/common.hpp>
 
@@ -86,7 +87,7 @@ bool Geomorph::is_jump(const Cut& cut, std::span<const FoldChange> changes) cons
 }
 
 void Geomorph::become(const Cut& cut) {
-    for (const Glide& glide : glides_) slot_of_node_[glide.node] = no_slot;
+    for (const Glide& glide : glides_) slot_of_node_[glide.own.node] = no_slot;
     glides_.clear();
     moved_.clear();
     AdjustStats unused;
@@ -112,7 +113,7 @@ void Geomorph::take_up(const Cut& cut, std::span<const FoldChange> changes) {
             begin(node, 1);
         }
     }
-    for (Glide& glide : glides_) glide.unfolds = cut.is_unfolded_interior(glide.node);
+    for (Glide& glide : glides_) glide.unfolds = cut.is_unfolded_interior(glide.own.node);
 }
 
 // A child never has more of its way left to the proxy than its parent, for it folds no later and unfolds no sooner; where rounding
@@ -121,12 +122,12 @@ void Geomorph::end_glides() {
     arrived_.clear();
     const bool at_once = !(options_.seconds > 0);
     for (const Glide& glide : glides_)
-        if (at_once || (glide.unfolds ? glide.weight >= 1 - arrived : glide.weight <= arrived)) arrived_.push_back(glide.node);
+        if (at_once || (glide.unfolds ? glide.weight >= 1 - arrived : glide.weight <= arrived)) arrived_.push_back(glide.own.node);
     std::sort(arrived_.begin(), arrived_.end(), std::greater<>()); // children first
     for (const NodeId node : arrived_) {
         if (!glides_[slot_of_node_[node]].unfolds) {
             bool is_flat = true;
-            drawn_.tree().for_each_child(node, [&](NodeId child) { is_flat &= !drawn_.is_unfolded(child); });
+            for (const MovedVertex& child : glides_[slot_of_node_[node]].children) is_flat &= !drawn_.is_unfolded(child.node);
             if (!is_flat) continue;
             drawn_.apply_fold(node);
         }
@@ -136,43 +137,55 @@ void Geomorph::end_glides() {
 
 void Geomorph::move_vertices() {
     moved_.clear();
-    for (const Glide& glide : glides_) {
-        const MovedVertex proxy = place(glide.node);
+    ++steps_;
+    for (Slot slot = 0; slot < glides_.size(); ++slot) {
+        place(slot);
+        const Glide& glide = glides_[slot];
         const float share = static_cast<float>(glide.weight);
-        drawn_.tree().for_each_child(glide.node, [&](NodeId child) {
-            if (drawn_.is_active(child)) moved_.push_back(between(proxy, at_rest(drawn_.tree(), child), share));
-        });
+        for (const MovedVertex& child : glide.children) // those of a node that is unfolded are active, or unfolded, too
+            if (!drawn_.is_unfolded(child.node)) moved_.push_back(between(glide.drawn, child, share));
     }
 }
 
-// Where a node's vertex is, or would be, drawn: upwards as far as nodes glide.
-MovedVertex Geomorph::place(NodeId node) const {
-    const MovedVertex own = at_rest(drawn_.tree(), node);
-    const NodeId parent = drawn_.tree().parents()[node];
-    if (parent == no_node || !is_gliding(parent)) return own;
-    return between(place(parent), own, static_cast<float>(glides_[slot_of_node_[parent]].weight));
+// Finds out where a gliding node's vertex would be drawn, and those above it as far as they glide, once a step. Without recursion, for
+// trees may be as deep as they have vertices.
+void Geomorph::place(Slot slot) {
+    unplaced_.clear();
+    for (; slot != no_slot && glides_[slot].placed != steps_; slot = slot_of(glides_[slot].parent)) unplaced_.push_back(slot);
+    for (; !unplaced_.empty(); unplaced_.pop_back()) {
+        Glide& glide = glides_[unplaced_.back()];
+        const Slot parent = slot_of(glide.parent);
+        glide.placed = steps_;
+        glide.drawn = parent == no_slot
+                          ? glide.own
+                          : between(glides_[parent].drawn, glide.own, static_cast<float>(glides_[parent].weight));
+    }
 }
 
 void Geomorph::begin(NodeId node, double weight) {
-    if (slot_of_node_.empty()) slot_of_node_.assign(drawn_.tree().interior_count(), no_slot);
+    const VertexTree& tree = drawn_.tree();
+    if (slot_of_node_.empty()) slot_of_node_.assign(tree.interior_count(), no_slot);
     slot_of_node_[node] = static_cast<Slot>(glides_.size());
-    glides_.push_back({node, weight == 0, weight});
+    glides_.push_back({weight, weight == 0, tree.parents()[node], at_rest(tree, node), {}, 0, {}});
+    tree.for_each_child(node, [&](NodeId child) { glides_.back().children.push_back(at_rest(tree, child)); });
 }
 
 void Geomorph::end(NodeId node) {
     const Slot slot = slot_of_node_[node];
     slot_of_node_[node] = no_slot;
     if (slot + 1 < glides_.size()) {
-        glides_[slot] = glides_.back();
-        slot_of_node_[glides_[slot].node] = slot;
+        glides_[slot] = std::move(glides_.back());
+        slot_of_node_[glides_[slot].own.node] = slot;
     }
     glides_.pop_back();
 }
 
 std::uint64_t Geomorph::byte_size() const noexcept {
-    return drawn_.byte_size() + sizeof(Glide) * glides_.capacity() + sizeof(Slot) * slot_of_node_.capacity() +
+    std::uint64_t children = 0;
+    for (const Glide& glide : glides_) children += glide.children.capacity();
+    return drawn_.byte_size() + sizeof(Glide) * glides_.capacity() + sizeof(MovedVertex) * children + sizeof(Slot) * slot_of_node_.capacity() +
            sizeof(MovedVertex) * moved_.capacity() + sizeof(FoldChange) * changes_.capacity() +
-           sizeof(NodeId) * arrived_.capacity();
+           sizeof(NodeId) * arrived_.capacity() + sizeof(Slot) * unplaced_.capacity();
 }
 
 } // namespace unseen::vdtree

@@ -42,7 +42,7 @@ struct MovedVertex {
 };
 
 // Not thread-safe. Move-only. What is drawn follows from the sequence of cuts and time steps alone. Memory: a cut, 4 bytes an interior
-// node, and about 50 bytes a gliding vertex.
+// node, and about 200 bytes a gliding vertex.
 class Geomorph {
 public:
     // The tree must outlive the geomorph. Fails where an option is negative or NaN, or the time infinite.
@@ -68,11 +68,15 @@ private:
     using Slot = std::uint32_t;
     static constexpr Slot no_slot = 0xffffffffu;
 
-    // A node of the drawn cut whose children are on their way.
+    // A node of the drawn cut whose children are on their way. What frames read of the tree is kept here, side by side.
     struct Glide {
-        NodeId node = 0;
-        bool unfolds = true;
         double weight = 0; // 0: the children are at the proxy, 1: at their own places
+        bool unfolds = true;
+        NodeId parent = no_node;
+        MovedVertex own;                   // the node, in its own place
+        MovedVertex drawn;                 // where it would be drawn, as of the step `placed`
+        std::uint64_t placed = 0;
+        std::vector<MovedVertex> children; // in their own places
     };
 
     Geomorph(const VertexTree& tree, const GeomorphOptions& options);
@@ -84,19 +88,22 @@ private:
     void end_glides();
     void move_vertices();
 
-    bool is_gliding(NodeId node) const { return !slot_of_node_.empty() && slot_of_node_[node] != no_slot; }
+    Slot slot_of(NodeId node) const { return slot_of_node_.empty() || node == no_node ? no_slot : slot_of_node_[node]; }
+    bool is_gliding(NodeId node) const { return slot_of(node) != no_slot; }
     void begin(NodeId node, double weight);
     void end(NodeId node);
-    MovedVertex place(NodeId node) const;
+    void place(Slot slot);
 
     GeomorphOptions options_;
     Cut drawn_;
     std::uint64_t revision_ = 0; // of the followed cut, when it was last taken up
+    std::uint64_t steps_ = 0;
     std::vector<Glide> glides_;
     std::vector<Slot> slot_of_node_; // of a node's glide; made when the first one begins
     std::vector<MovedVertex> moved_;
     std::vector<FoldChange> changes_; // scratch, as the following
     std::vector<NodeId> arrived_;
+    std::vector<Slot> unplaced_;
 };
 
 } // namespace unseen::vdtree
