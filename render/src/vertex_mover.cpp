@@ -35,7 +35,8 @@ Result<VertexMover> VertexMover::create() {
     mover.moves_ = Buffer::create("moved vertices");
     mover.window_vertices_ = vertices_in_a_window();
     if (mover.window_vertices_ == 0)
-        return Error{ErrorCode::unsupported, "The graphics driver gives shaders no buffer for moved vertices; draw without geomorphs."};
+        return Error{ErrorCode::unsupported,
+                     "The graphics driver gives shaders no buffer for moved vertices; draw without geomorphs."};
     return mover;
 }
 
@@ -51,7 +52,8 @@ void VertexMover::move(unsigned vertices, std::uint64_t count, std::span<const V
             const std::uint64_t size = std::min(window_vertices_, count - first);
             program_.set(window_first_location, static_cast<unsigned>(first));
             program_.set(window_size_location, static_cast<unsigned>(size));
-            glBindBufferRange(GL_SHADER_STORAGE_BUFFER, window_binding, vertices, static_cast<GLintptr>(first * sizeof(Vertex)),
+            glBindBufferRange(GL_SHADER_STORAGE_BUFFER, window_binding, vertices,
+                              static_cast<GLintptr>(first * sizeof(Vertex)),
                               static_cast<GLsizeiptr>(size * sizeof(Vertex)));
             glDispatchCompute(static_cast<GLuint>((part.size() + group_size - 1) / group_size), 1, 1);
         }

@@ -18,8 +18,8 @@ struct VertexMove {
 };
 static_assert(sizeof(VertexMove) == 32, "move.comp counts on it");
 
-// The moves are uploaded as they are, and a compute pass puts them in their places, in order with the drawing before and after it.
-// Move-only; needs a current context for everything. GL errors are left for the caller to ask for.
+// The moves are uploaded as they are, and a compute pass puts them in their places, in order with the drawing before
+// and after it. Move-only; needs a current context for everything. GL errors are left for the caller to ask for.
 class VertexMover {
 public:
     static Result<VertexMover> create();

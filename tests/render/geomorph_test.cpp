@@ -147,7 +147,8 @@ TEST_F(GeomorphTest, BeginsAtOnePictureAndEndsAtTheOther) {
 }
 
 TEST_F(GeomorphTest, AVertexInTheMiddleIsDrawnThere) {
-    // One triangle at a time, of a quad whose four vertices come from one proxy: their shares of the way scale the picture.
+    // One triangle at a time, of a quad whose four vertices come from one proxy: their shares of the way scale the
+    // picture.
     Scene scene(rectangle({-0.5, -0.5}, {0.5, 0.5}, 0, grey(0.8f)));
     auto renderer = Renderer::create(context(), scene.tree);
     ASSERT_TRUE(renderer);

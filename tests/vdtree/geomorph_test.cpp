@@ -54,7 +54,8 @@ const TreeClass tree_classes[] = {
     {"soup", [] { return built(shapes::random_soup(300, 900, 7), ClustererKind::octree); }},
 };
 
-// Costs that rise and fall from node to node, each at its own pace: folds and unfolds everywhere, many of them taken back soon.
+// Costs that rise and fall from node to node, each at its own pace: folds and unfolds everywhere, many of them taken
+// back soon.
 class Waves {
 public:
     Waves(const VertexTree& tree, std::uint64_t seed) {

@@ -20,7 +20,8 @@ constexpr std::size_t fewest_of_a_jump = 64;
 constexpr double arrived = 1e-9;
 
 MovedVertex at_rest(const VertexTree& tree, NodeId node) {
-    return {node, tree.positions()[node], tree.luminance()[node], tree.colours().empty() ? glm::vec4(0) : tree.colours()[node]};
+    return {node, tree.positions()[node], tree.luminance()[node],
+            tree.colours().empty() ? glm::vec4(0) : tree.colours()[node]};
 }
 
 MovedVertex between(const MovedVertex& proxy, const MovedVertex& own, float share) {
@@ -42,7 +43,8 @@ Result<Geomorph> Geomorph::create(const VertexTree& tree, const GeomorphOptions&
 Geomorph::Geomorph(const VertexTree& tree, const GeomorphOptions& options) : options_(options), drawn_(tree) {}
 
 Result<void> Geomorph::step(const Cut& cut, double seconds) {
-    if (!(seconds >= 0) || !std::isfinite(seconds)) return invalid("A geomorph's time step must be 0 or more seconds, and finite.");
+    if (!(seconds >= 0) || !std::isfinite(seconds))
+        return invalid("A geomorph's time step must be 0 or more seconds, and finite.");
     if (std::addressof(cut.tree().data()) != std::addressof(drawn_.tree().data()))
         return invalid("The cut belongs to another tree than the geomorph's; make a geomorph for that tree.");
     const bool is_first = revision_ == 0;
@@ -116,18 +118,20 @@ void Geomorph::take_up(const Cut& cut, std::span<const FoldChange> changes) {
     for (Glide& glide : glides_) glide.unfolds = cut.is_unfolded_interior(glide.own.node);
 }
 
-// A child never has more of its way left to the proxy than its parent, for it folds no later and unfolds no sooner; where rounding
-// says otherwise, the parent waits for it.
+// A child never has more of its way left to the proxy than its parent, for it folds no later and unfolds no sooner;
+// where rounding says otherwise, the parent waits for it.
 void Geomorph::end_glides() {
     arrived_.clear();
     const bool at_once = !(options_.seconds > 0);
     for (const Glide& glide : glides_)
-        if (at_once || (glide.unfolds ? glide.weight >= 1 - arrived : glide.weight <= arrived)) arrived_.push_back(glide.own.node);
+        if (at_once || (glide.unfolds ? glide.weight >= 1 - arrived : glide.weight <= arrived))
+            arrived_.push_back(glide.own.node);
     std::sort(arrived_.begin(), arrived_.end(), std::greater<>()); // children first
     for (const NodeId node : arrived_) {
         if (!glides_[slot_of_node_[node]].unfolds) {
             bool is_flat = true;
-            for (const MovedVertex& child : glides_[slot_of_node_[node]].children) is_flat &= !drawn_.is_unfolded(child.node);
+            for (const MovedVertex& child : glides_[slot_of_node_[node]].children)
+                is_flat &= !drawn_.is_unfolded(child.node);
             if (!is_flat) continue;
             drawn_.apply_fold(node);
         }
@@ -147,11 +151,12 @@ void Geomorph::move_vertices() {
     }
 }
 
-// Finds out where a gliding node's vertex would be drawn, and those above it as far as they glide, once a step. Without recursion, for
-// trees may be as deep as they have vertices.
+// Finds out where a gliding node's vertex would be drawn, and those above it as far as they glide, once a step. Without
+// recursion, for trees may be as deep as they have vertices.
 void Geomorph::place(Slot slot) {
     unplaced_.clear();
-    for (; slot != no_slot && glides_[slot].placed != steps_; slot = slot_of(glides_[slot].parent)) unplaced_.push_back(slot);
+    for (; slot != no_slot && glides_[slot].placed != steps_; slot = slot_of(glides_[slot].parent))
+        unplaced_.push_back(slot);
     for (; !unplaced_.empty(); unplaced_.pop_back()) {
         Glide& glide = glides_[unplaced_.back()];
         const Slot parent = slot_of(glide.parent);
@@ -183,7 +188,8 @@ void Geomorph::end(NodeId node) {
 std::uint64_t Geomorph::byte_size() const noexcept {
     std::uint64_t children = 0;
     for (const Glide& glide : glides_) children += glide.children.capacity();
-    return drawn_.byte_size() + sizeof(Glide) * glides_.capacity() + sizeof(MovedVertex) * children + sizeof(Slot) * slot_of_node_.capacity() +
+    return drawn_.byte_size() + sizeof(Glide) * glides_.capacity() + sizeof(MovedVertex) * children +
+           sizeof(Slot) * slot_of_node_.capacity() +
            sizeof(MovedVertex) * moved_.capacity() + sizeof(FoldChange) * changes_.capacity() +
            sizeof(NodeId) * arrived_.capacity() + sizeof(Slot) * unplaced_.capacity();
 }
