@@ -32,6 +32,7 @@ struct FrameRecord {
     double cut_ms = 0, index_ms = 0; // the cut with its patches, and gathering where patches did not do
     double draw_ms = not_drawn, frame_ms = 0;
     double uploaded_bytes = not_drawn;
+    double drawn_triangles = not_drawn, gliding = not_drawn; // of geomorphs
 
     std::uint64_t changes() const { return stats.folds + stats.unfolds; }
 };
@@ -76,13 +77,15 @@ Result<std::optional<Drawing>> make_drawing(const Scene& scene, bool draws) {
 std::string cell(double value) { return std::isfinite(value) ? shortest(value) : std::string(); }
 
 std::string to_csv(const std::vector<FrameRecord>& frames) {
-    std::string text = "frame,triangles,folds,unfolds,changes,node_tests,cut_ms,index_ms,uploaded_bytes,draw_ms,frame_ms\n";
+    std::string text = "frame,triangles,folds,unfolds,changes,node_tests,cut_ms,index_ms,uploaded_bytes,draw_ms,frame_ms,"
+                       "drawn_triangles,gliding\n";
     for (std::size_t i = 0; i < frames.size(); ++i) {
         const FrameRecord& f = frames[i];
         text += std::to_string(i) + "," + std::to_string(f.stats.triangles) + "," + std::to_string(f.stats.folds) + "," +
                 std::to_string(f.stats.unfolds) + "," + std::to_string(f.changes()) + "," +
                 std::to_string(f.stats.node_tests) + "," + cell(f.cut_ms) + "," + cell(f.index_ms) + "," +
-                cell(f.uploaded_bytes) + "," + cell(f.draw_ms) + "," + cell(f.frame_ms) + "\n";
+                cell(f.uploaded_bytes) + "," + cell(f.draw_ms) + "," + cell(f.frame_ms) + "," +
+                cell(f.drawn_triangles) + "," + cell(f.gliding) + "\n";
     }
     return text;
 }
@@ -142,7 +145,9 @@ std::vector<Measure> measures_of(const std::vector<FrameRecord>& frames) {
             {"index_ms", "index buffer, ms", column(later, [](auto& f) { return f.index_ms; })},
             {"uploaded_bytes", "uploaded bytes", column(later, [](auto& f) { return f.uploaded_bytes; })},
             {"draw_ms", "drawn in, ms", column(later, [](auto& f) { return f.draw_ms; })},
-            {"frame_ms", "frame, ms", column(later, [](auto& f) { return f.frame_ms; })}};
+            {"frame_ms", "frame, ms", column(later, [](auto& f) { return f.frame_ms; })},
+            {"drawn_triangles", "drawn triangles", column(later, [](auto& f) { return f.drawn_triangles; })},
+            {"gliding", "gliding vertices", column(later, [](auto& f) { return f.gliding; })}};
 }
 
 Json to_json(const Scene& scene, const std::vector<FrameRecord>& frames, const Simplification& last) {
@@ -182,6 +187,8 @@ public:
     Result<void> run(const std::vector<CameraPose>& poses) {
         auto drawing = make_drawing(scene_, options_.draws);
         if (!drawing) return drawing.error();
+        if (options_.geomorph_seconds)
+            if (auto set = follower_.set_geomorph(scene_, *options_.geomorph_seconds); !set) return set;
         const auto names = parse_pattern(options_.pictures);
         ProgressBar bar("flying");
         for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -208,6 +215,7 @@ private:
     }
 
     Result<render::Frame> next(std::optional<Drawing>& drawing) {
+        if (options_.geomorph_seconds) follower_.let_pass(1 / options_.frames_a_second);
         const auto start = Clock::now();
         auto simplified = follower_.follow(cut_, scene_, what_);
         if (!simplified) return simplified.error();
@@ -216,14 +224,20 @@ private:
         record.stats = last_.stats;
         record.cut_ms = last_.adapt_ms;
         record.index_ms = last_.extract_ms;
+        if (last_.drawn_triangles) {
+            record.drawn_triangles = *last_.drawn_triangles;
+            record.gliding = static_cast<double>(last_.gliding);
+        }
         Result<render::Frame> frame = render::Frame{};
         if (drawing) {
             render::DrawOptions draw = options_.draw;
             draw.background = scene_.background;
-            frame = drawing->renderer.draw(cut_, scene_.view, draw, scene_.placement);
+            render::Renderer& renderer = drawing->renderer;
+            frame = follower_.geomorph() ? renderer.draw(*follower_.geomorph(), scene_.view, draw, scene_.placement)
+                                         : renderer.draw(cut_, scene_.view, draw, scene_.placement);
             if (!frame) return frame;
             record.draw_ms = frame->draw_ms;
-            record.uploaded_bytes = static_cast<double>(drawing->renderer.uploaded_bytes());
+            record.uploaded_bytes = static_cast<double>(renderer.uploaded_bytes());
         }
         record.frame_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
         records_.push_back(record);

@@ -1,6 +1,7 @@
 // A camera's path through a scene, with one cut that follows it.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include <render/renderer.h>
@@ -16,6 +17,8 @@ struct FlyThroughOptions {
     std::string csv, plot, json;
     double threshold = 1; // fold costs up to it
     bool draws = true;
+    std::optional<double> geomorph_seconds; // that vertices glide for; none: they do not
+    double frames_a_second = 60;            // of the glides
     WhatOptions what;
     render::DrawOptions draw;
 };

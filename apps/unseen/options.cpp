@@ -130,6 +130,12 @@ CLI::Validator ending_in(std::vector<std::string> endings) {
         "");
 }
 
+void add_geomorph_option(CLI::App& verb, std::optional<double>& seconds) {
+    add_number(verb, "--geomorph", seconds, within(0, 60), "SECONDS",
+               "Vertices glide for so long where the cut changes, up to 60 s (default: they do not); what folds is "
+               "drawn until then");
+}
+
 void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px) {
     verb.add_option_function<std::array<double, 2>>(
             "--gaze", [&gaze_px](const std::array<double, 2>& v) { gaze_px = glm::dvec2(v[0], v[1]); },

@@ -53,6 +53,7 @@ struct WhatOptions {
 void add_view_options(CLI::App& verb, ViewOptions& options);
 void add_display_options(CLI::App& verb, DisplayOptions& options);
 void add_what_options(CLI::App& verb, WhatOptions& options);
+void add_geomorph_option(CLI::App& verb, std::optional<double>& seconds);
 void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px);
 CLI::Option* add_triangles_option(CLI::App& verb, std::uint32_t& triangles, const std::string& text);
 

@@ -94,6 +94,10 @@ void add_path_options(CLI::App& verb, FlyThroughOptions& o) {
                      "Fold up to this cost: 1 (default) what cannot be seen, 2 what cannot be seen from twice the distance")
         ->type_name("X")
         ->check(positive());
+    add_geomorph_option(group, o.geomorph_seconds);
+    group.add_option("--fps", o.frames_a_second, "With --geomorph: frames a second of the path (default: 60)")
+        ->type_name("N")
+        ->check(within(1, 1e6));
     group.add_flag("!--no-draw", o.draws, "Only cut: draw nothing");
 }
 
@@ -101,8 +105,8 @@ void check(const RenderArguments& a) {
     const FlyThroughOptions& o = a.flight;
     if (o.path.empty()) {
         if (a.out.empty()) refuse("-o is required (or --path).");
-        if (!o.csv.empty() || !o.plot.empty() || o.threshold != 1 || !o.draws)
-            refuse("--csv, --plot, --threshold and --no-draw need --path.");
+        if (!o.csv.empty() || !o.plot.empty() || o.threshold != 1 || !o.draws || o.geomorph_seconds)
+            refuse("--csv, --plot, --threshold, --geomorph and --no-draw need --path.");
         return;
     }
     if (a.out.empty()) return;
@@ -131,7 +135,9 @@ Command render_command(CLI::App& app) {
         ->transform(CLI::CheckedTransformer(shadings).description(""));
     verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
     add_path_options(*verb, a->flight);
-    verb->callback([a, samples] {
+    CLI::Option* frames_a_second = verb->get_option("--fps");
+    verb->callback([a, samples, frames_a_second] {
+        if (!frames_a_second->empty() && !a->flight.geomorph_seconds) refuse("--fps needs --geomorph.");
         check(*a);
         if (!a->flight.path.empty() && samples->empty()) a->draw.samples = 1;
     });
@@ -142,7 +148,8 @@ Command render_command(CLI::App& app) {
                  "  unseen render bunny.vdt -o full.pfm --full --size 1024x1024\n"
                  "  unseen render bunny.vdt -o aside.pfm --gaze 1603 512 --json -\n"
                  "  unseen render dragon.vdt --path orbit:1 --csv orbit.csv --plot orbit.png\n"
-                 "  unseen render dragon.vdt --path flight.csv -o frames/%04d.png --threshold 2");
+                 "  unseen render dragon.vdt --path flight.csv -o frames/%04d.png --threshold 2\n"
+                 "  unseen render dragon.vdt --path orbit:1 -o frames/%04d.png --triangles 20000 --geomorph 0.25 --fps 60");
     return {verb, [a] { return run(*a); }};
 }
 

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include <glm/geometric.hpp>
 
@@ -211,10 +212,27 @@ Effect time_limit_effect(const WhatOptions& what, const Simplification& result) 
             result.stats.is_complete ? "the cut was made within it" : "it ended the cut; the worst folds were undone first"};
 }
 
+Effect geomorph_effect(const vdtree::Geomorph* geomorph, const Simplification& result) {
+    if (!geomorph) return {"geomorphs", false, "vertices do not glide unless --geomorph says for how long"};
+    return {"geomorphs", true,
+            "vertices glide for " + rounded(geomorph->seconds(), 3) + " s; " + grouped(result.gliding) + " do now, and " +
+                grouped(*result.drawn_triangles - result.stats.triangles) + " triangles wait for them to be folded"};
+}
+
+// The view through a window whose sides are so much farther from its centre.
+vdtree::View widened(const vdtree::View& view) {
+    constexpr double wider = 1.3, widest_degrees = 179;
+    const double half_tangent = std::tan(view.fov_y_degrees * (std::numbers::pi / 360));
+    vdtree::View wide = view;
+    wide.fov_y_degrees =
+        std::max(view.fov_y_degrees, std::min(std::atan(wider * half_tangent) * (360 / std::numbers::pi), widest_degrees));
+    return wide;
+}
+
 } // namespace
 
 Result<Simplification> simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
-    if (what.fill_budget || what.milliseconds || (what.mode != Mode::full && what.test == FoldTest::error)) {
+    if (what.mode != Mode::full && (what.fill_budget || what.milliseconds || what.test == FoldTest::error)) {
         Follower follower;
         follower.set_hysteresis(1);
         return follower.follow(cut, scene, what, purpose);
@@ -270,7 +288,25 @@ Result<const vdtree::DistanceCriterion*> Follower::criterion_for(const Scene& sc
     return &*criterion_;
 }
 
-Result<Simplification> Follower::follow(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
+Result<void> Follower::set_geomorph(const Scene& scene, double seconds) {
+    auto made = vdtree::Geomorph::create(scene.tree, {.seconds = seconds});
+    if (!made) return made.error();
+    geomorph_ = std::move(*made);
+    passed_ = 0;
+    return {};
+}
+
+vdtree::Viewpoint Follower::viewpoint_for(const Scene& scene, const WhatOptions& what, Purpose purpose) const {
+    // Where all is seen, a turning window must not cost anything.
+    const bool window_only = purpose == Purpose::picture && !is_wholly_in_window(scene);
+    vdtree::Viewpoint viewpoint =
+        perception::viewpoint_of(scene.tree, scene.view, test_options(scene, what), scene.placement, window_only);
+    // What comes into the window shall not glide there any more.
+    if (window_only && geomorph_) viewpoint.frusta = {vdtree::frustum_of(scene.tree, widened(scene.view), scene.placement)};
+    return viewpoint;
+}
+
+Result<Simplification> Follower::change(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
     const bool is_full = what.mode == Mode::full && cut.triangle_count() == scene.tree.triangle_count();
     if (what.mode == Mode::full && !is_full) return simplify(cut, scene, what, purpose);
     Simplification result;
@@ -289,19 +325,13 @@ Result<Simplification> Follower::follow(vdtree::Cut& cut, const Scene& scene, co
             options.fill_budget = what.fill_budget;
             options.hysteresis = hysteresis_;
         }
-        // Where all is seen, a turning window must not cost anything.
-        const vdtree::Viewpoint viewpoint = perception::viewpoint_of(scene.tree, scene.view, test_options(scene, what),
-                                                                     scene.placement,
-                                                                     purpose == Purpose::picture && !is_wholly_in_window(scene));
+        const vdtree::Viewpoint viewpoint = viewpoint_for(scene, what, purpose);
         const auto start = Clock::now();
         const auto stats = cut.follow(**criterion, viewpoint, options);
         result.adapt_ms = milliseconds_since(start);
         if (!stats) return stats.error();
         result.stats = *stats;
     }
-    const auto adapted = Clock::now();
-    static_cast<void>(cut.indices());
-    result.extract_ms = milliseconds_since(adapted);
     result.imperceptible_from_m = imperceptible_from(scene, what, result.stats);
     add_effects(result, scene, what, purpose);
     if (is_full) return result;
@@ -311,6 +341,26 @@ Result<Simplification> Follower::follow(vdtree::Cut& cut, const Scene& scene, co
         for (Effect& effect : result.effects)
             if (effect.name == imperceptible_distance)
                 effect.why = "the display's distance times " + rounded(threshold_, 4) + ", above which no fold costs";
+    return result;
+}
+
+Result<void> Follower::glide(const vdtree::Cut& cut, Simplification& result) {
+    if (auto stepped = geomorph_->step(cut, passed_); !stepped) return stepped;
+    passed_ = 0;
+    result.drawn_triangles = geomorph_->drawn().triangle_count();
+    result.gliding = geomorph_->moved().size();
+    return {};
+}
+
+Result<Simplification> Follower::follow(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
+    auto result = change(cut, scene, what, purpose);
+    if (!result) return result;
+    const auto changed = Clock::now();
+    if (geomorph_)
+        if (auto glided = glide(cut, *result); !glided) return glided.error();
+    static_cast<void>(geomorph_ ? geomorph_->drawn().indices() : cut.indices());
+    result->extract_ms += milliseconds_since(changed);
+    result->effects.push_back(geomorph_effect(geomorph(), *result));
     return result;
 }
 

@@ -7,6 +7,7 @@
 
 #include <vdtree/cut.h>
 #include <vdtree/fold_errors.h>
+#include <vdtree/geomorph.h>
 
 #include "report.h"
 #include "scene.h"
@@ -27,6 +28,8 @@ struct Simplification {
     double adapt_ms = 0;             // making the cut
     double extract_ms = 0;           // its index buffer
     double imperceptible_from_m = 0; // infinite: from nowhere; NaN: the fold test does not know
+    std::optional<vdtree::Index> drawn_triangles; // with geomorphs: those that are still drawn, too
+    std::size_t gliding = 0;                      // vertices
     std::vector<Effect> effects;
 };
 
@@ -50,6 +53,11 @@ public:
     // Of triangle budgets: by what factor the largest fold cost may exceed the least, so that cuts keep still; 1: not at all.
     void set_hysteresis(float hysteresis) { hysteresis_ = hysteresis; }
 
+    // From now on vertices glide for so long where the cut changes, and geomorph() is what to draw. Fails where that is no time.
+    Result<void> set_geomorph(const Scene& scene, double seconds);
+    void let_pass(double seconds) { passed_ += seconds; } // for the glides of the next call; precondition: not negative, finite
+    const vdtree::Geomorph* geomorph() const { return geomorph_ ? &*geomorph_ : nullptr; }
+
     // Adjusts `cut`, which must be of the scene's tree and the same from call to call.
     Result<Simplification> follow(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what,
                                   Purpose purpose = Purpose::picture);
@@ -67,12 +75,17 @@ private:
         bool operator==(const Key&) const = default;
     };
     Result<const vdtree::DistanceCriterion*> criterion_for(const Scene& scene, const WhatOptions& what);
+    vdtree::Viewpoint viewpoint_for(const Scene& scene, const WhatOptions& what, Purpose purpose) const;
+    Result<Simplification> change(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose);
+    Result<void> glide(const vdtree::Cut& cut, Simplification& result);
 
     double threshold_ = 1;
     float hysteresis_ = 1.1f;
     Key key_;
     std::optional<vdtree::DistanceCriterion> criterion_;
     std::optional<vdtree::FoldErrors> errors_; // of the scene's tree; made when they are first asked for
+    std::optional<vdtree::Geomorph> geomorph_;
+    double passed_ = 0; // seconds since its last step
 };
 
 // The keys that simplify and render report; draw_ms is NaN where nothing was drawn.

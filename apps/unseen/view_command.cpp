@@ -42,11 +42,13 @@ Command view_command(CLI::App& app) {
     verb->add_option("--frames", a->viewer.frames, "End after so many frames, for scripts")
         ->type_name("N")
         ->check(within(1, 1e6));
+    add_geomorph_option(*verb, a->viewer.geomorph_seconds);
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->viewer.what);
     verb->footer(std::string(viewer_help) + "\nExamples:\n  unseen view bunny.vdt\n"
-                                            "  unseen view bunny.vdt --triangles 5000 --wireframe");
+                                            "  unseen view bunny.vdt --triangles 5000 --wireframe\n"
+                                            "  unseen view dragon.vdt --milliseconds 2 --geomorph 0.25");
     return {verb, [a] { return run(*a); }};
 }
 

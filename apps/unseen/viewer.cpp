@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <utility>
 
 #define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
@@ -68,6 +69,8 @@ public:
     Viewer& operator=(const Viewer&) = delete;
 
     Result<void> run() {
+        if (options_.geomorph_seconds)
+            if (auto set = follower_.set_geomorph(scene_, *options_.geomorph_seconds); !set) return set;
         for (int frame = 0; !glfwWindowShouldClose(window_);) {
             follow_window_size();
             if (needs_frame_ && scene_.view.width > 0 && scene_.view.height > 0) {
@@ -77,6 +80,8 @@ public:
             if (options_.frames > 0) {
                 if (frame >= options_.frames) break;
                 needs_frame_ = true;
+                glfwPollEvents();
+            } else if (needs_frame_) {
                 glfwPollEvents();
             } else {
                 glfwWaitEventsTimeout(idle_seconds);
@@ -193,10 +198,16 @@ private:
     Result<void> draw_frame() {
         needs_frame_ = false;
         const auto start = Clock::now();
+        follower_.let_pass(std::chrono::duration<double>(start - std::exchange(last_frame_, start)).count());
         const auto result = follower_.follow(cut_, scene_, what_);
         if (!result) return result.error();
-        if (auto drawn = renderer_.draw_to_window(cut_, scene_.view, draw_, scene_.placement); !drawn) return drawn;
+        const vdtree::Geomorph* const geomorph = follower_.geomorph();
+        const auto drawn = geomorph ? renderer_.draw_to_window(*geomorph, scene_.view, draw_, scene_.placement)
+                                    : renderer_.draw_to_window(cut_, scene_.view, draw_, scene_.placement);
+        if (!drawn) return drawn;
         glfwSwapBuffers(window_);
+        // What the time limit has left to do, and what glides, goes on in the next frame.
+        needs_frame_ = !result->stats.is_complete || result->gliding > 0;
         show_title(*result, milliseconds_since(start));
         return {};
     }
@@ -218,13 +229,17 @@ private:
         if (what_.mode != Mode::full)
             title += ", " + std::string(perception::fold_test_names[static_cast<std::size_t>(what_.test)]) + ", unseen from " +
                      rounded(s.imperceptible_from_m, 2) + (std::isfinite(s.imperceptible_from_m) ? " m" : "");
+        if (!s.stats.is_complete) title += ", time is up: to be continued";
+        if (s.gliding > 0) title += ", " + grouped(s.gliding) + " vertices glide";
         glfwSetWindowTitle(window_, title.c_str());
     }
 
     Result<void> save_picture(const std::string& file) {
         // Keys that came since the last frame count.
         if (const auto result = follower_.follow(cut_, scene_, what_); !result) return result.error();
-        const auto frame = renderer_.draw(cut_, scene_.view, draw_, scene_.placement);
+        const vdtree::Geomorph* const geomorph = follower_.geomorph();
+        const auto frame = geomorph ? renderer_.draw(*geomorph, scene_.view, draw_, scene_.placement)
+                                    : renderer_.draw(cut_, scene_.view, draw_, scene_.placement);
         if (!frame) return frame.error();
         return perception::write_image(file, code_image(*frame, scene_.display));
     }
@@ -254,6 +269,7 @@ private:
     bool is_dragging_ = false;
     bool gaze_follows_pointer_ = false;
     bool needs_frame_ = true;
+    Clock::time_point last_frame_ = Clock::now();
     int screenshots_ = 0;
     std::optional<Error> failure_; // of a callback, which cannot return it
 };

@@ -1,6 +1,7 @@
 // The interactive viewer: a window in which a model is orbited while its cut follows.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include <render/context.h>
@@ -15,6 +16,7 @@ struct ViewerOptions {
     bool has_fixed_field = false; // the camera's field was asked for; else it follows the window's height
     render::DrawOptions draw;
     std::string screenshot; // written when the viewer ends
+    std::optional<double> geomorph_seconds; // that vertices glide for; none: they do not
     int frames = 0;         // ends after so many; 0: when the user wants to
 };
 

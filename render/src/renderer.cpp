@@ -66,6 +66,10 @@ double milliseconds_since(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
+VertexArrays arrays_of(const vdtree::VertexTree& tree, const UnitFrame& frame) {
+    return {tree.positions(), tree.luminance(), tree.colours(), frame};
+}
+
 Frame frame_of(std::span<const glm::vec4> pixels, int width, int height) {
     Frame frame;
     frame.width = width;
@@ -97,14 +101,14 @@ struct Renderer::Impl {
     vdtree::Closedness closedness = vdtree::Closedness::open;
     std::vector<glm::mat4> matrices; // of the samples
 
-    Result<Camera> prepare(const vdtree::Cut& cut, const vdtree::View& view, const DrawOptions& options,
+    Result<Camera> prepare(const vdtree::Cut& cut, Moved moved, const vdtree::View& view, const DrawOptions& options,
                            const vdtree::Similarity& placement);
     SurfaceStyle style(const DrawOptions& options, const Camera& camera) const;
     Result<void> gl_result(const char* what);
 };
 
 // Checks everything that can be wrong, brings the cut's triangles to the GPU and aims the camera.
-Result<Camera> Renderer::Impl::prepare(const vdtree::Cut& cut, const vdtree::View& view, const DrawOptions& options,
+Result<Camera> Renderer::Impl::prepare(const vdtree::Cut& cut, Moved moved, const vdtree::View& view, const DrawOptions& options,
                                        const vdtree::Similarity& placement) {
     if (auto valid = vdtree::validate(view); !valid)
         return valid.error();
@@ -123,9 +127,10 @@ Result<Camera> Renderer::Impl::prepare(const vdtree::Cut& cut, const vdtree::Vie
     const auto indices = cut.indices(); // first: the rest is about what it returned
     const auto set = drawer.set_triangles(
         {indices, cut.index_version(), cut.index_writes_from(), cut.index_writes()});
-    if (!set) {
+    const auto put = set ? drawer.set_moved(arrays_of(cut.tree(), frame), moved) : set;
+    if (!put) {
         static_cast<void>(context->errors.take_new()); // the drawer's error says it better
-        return set.error();
+        return put.error();
     }
     return camera;
 }
@@ -150,15 +155,14 @@ Result<Renderer> Renderer::create(Context& context, const vdtree::VertexTree& tr
     if (auto current = context.make_current(); !current)
         return current.error();
     context.impl_->errors.begin();
-    VertexArrays arrays{tree.positions(), tree.luminance(), tree.colours(), {}};
-    arrays.frame = unit_frame(tree.bounds()[tree.root()].ring);
-    auto drawer = TriangleDrawer::create(arrays);
+    const UnitFrame frame = unit_frame(tree.bounds()[tree.root()].ring);
+    auto drawer = TriangleDrawer::create(arrays_of(tree, frame));
     if (!drawer) {
         static_cast<void>(context.impl_->errors.take_new()); // the drawer's error says it better
         return drawer.error();
     }
     auto impl = std::make_unique<Impl>(context.impl_.get(), std::move(*drawer));
-    impl->frame = arrays.frame;
+    impl->frame = frame;
     impl->tree = std::addressof(tree.data());
     impl->origin = tree.origin();
     impl->closedness = tree.closedness();
@@ -171,7 +175,17 @@ std::uint64_t Renderer::uploaded_bytes() const noexcept { return impl_->drawer.u
 
 Result<Frame> Renderer::draw(const vdtree::Cut& cut, const vdtree::View& view, const DrawOptions& options,
                              const vdtree::Similarity& placement) {
-    const auto camera = impl_->prepare(cut, view, options, placement);
+    return draw(cut, {}, view, options, placement);
+}
+
+Result<Frame> Renderer::draw(const vdtree::Geomorph& geomorph, const vdtree::View& view, const DrawOptions& options,
+                             const vdtree::Similarity& placement) {
+    return draw(geomorph.drawn(), geomorph.moved(), view, options, placement);
+}
+
+Result<Frame> Renderer::draw(const vdtree::Cut& cut, Moved moved, const vdtree::View& view, const DrawOptions& options,
+                             const vdtree::Similarity& placement) {
+    const auto camera = impl_->prepare(cut, moved, view, options, placement);
     if (!camera)
         return camera.error();
     impl_->matrices.clear();
@@ -196,7 +210,17 @@ Result<Frame> Renderer::draw(const vdtree::Cut& cut, const vdtree::View& view, c
 
 Result<void> Renderer::draw_to_window(const vdtree::Cut& cut, const vdtree::View& view, const DrawOptions& options,
                                       const vdtree::Similarity& placement) {
-    const auto camera = impl_->prepare(cut, view, options, placement);
+    return draw_to_window(cut, {}, view, options, placement);
+}
+
+Result<void> Renderer::draw_to_window(const vdtree::Geomorph& geomorph, const vdtree::View& view, const DrawOptions& options,
+                                      const vdtree::Similarity& placement) {
+    return draw_to_window(geomorph.drawn(), geomorph.moved(), view, options, placement);
+}
+
+Result<void> Renderer::draw_to_window(const vdtree::Cut& cut, Moved moved, const vdtree::View& view, const DrawOptions& options,
+                                      const vdtree::Similarity& placement) {
+    const auto camera = impl_->prepare(cut, moved, view, options, placement);
     if (!camera)
         return camera.error();
     const glm::dvec2 pixel_centre(0.5);

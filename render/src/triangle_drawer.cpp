@@ -15,12 +15,6 @@ namespace {
 // Rec. 709 luminance of linear RGB, as everywhere in Unseen.
 constexpr glm::dvec3 rec709(0.2126, 0.7152, 0.0722);
 
-struct Vertex {
-    glm::vec3 position;
-    glm::vec4 shade; // linear RGB; relative luminance in a
-};
-static_assert(sizeof(Vertex) == 28, "the vertex layout below counts on it");
-
 constexpr std::size_t upload_batch = 1u << 16;              // vertices; bounds the memory that uploading takes
 constexpr std::uint64_t most_indices_a_call = 3ull << 28;    // a multiple of 3 that fits GLsizei
 
@@ -41,11 +35,15 @@ glm::vec3 shaded_colour(glm::vec4 colour, float luminance) {
     return glm::vec3(scaled);
 }
 
+// `colour`: null where there are none.
+Vertex vertex_of(const UnitFrame& frame, glm::vec3 position, float luminance, const glm::vec4* colour) {
+    const glm::vec3 rgb = colour ? shaded_colour(*colour, luminance) : glm::vec3(luminance);
+    const glm::dvec3 in_frame = (glm::dvec3(position) - frame.centre) / frame.unit;
+    return {glm::vec3(in_frame), glm::vec4(rgb, luminance)};
+}
+
 Vertex vertex_at(const VertexArrays& arrays, std::size_t i) {
-    const float luminance = arrays.luminance[i];
-    const glm::vec3 rgb = arrays.colours.empty() ? glm::vec3(luminance) : shaded_colour(arrays.colours[i], luminance);
-    const glm::dvec3 position = (glm::dvec3(arrays.positions[i]) - arrays.frame.centre) / arrays.frame.unit;
-    return {glm::vec3(position), glm::vec4(rgb, luminance)};
+    return vertex_of(arrays.frame, arrays.positions[i], arrays.luminance[i], arrays.colours.empty() ? nullptr : &arrays.colours[i]);
 }
 
 void describe_vertices(GLuint arrays, GLuint vertices) {
@@ -156,6 +154,7 @@ Result<TriangleDrawer> TriangleDrawer::create(const VertexArrays& vertices) {
 
 Result<void> TriangleDrawer::upload(const VertexArrays& vertices) {
     const std::size_t count = vertices.positions.size();
+    vertex_count_ = count;
     glNamedBufferStorage(vertices_.id(), static_cast<GLsizeiptr>(std::max<std::size_t>(count, 1) * sizeof(Vertex)),
                          nullptr, GL_DYNAMIC_STORAGE_BIT);
     if (glGetError() == GL_OUT_OF_MEMORY)
@@ -182,6 +181,34 @@ Result<void> TriangleDrawer::set_triangles(const IndexState& state) {
     auto updated = indices_.update(state);
     glVertexArrayElementBuffer(surface_arrays_.id(), indices_.buffer());
     return updated;
+}
+
+Result<void> TriangleDrawer::set_moved(const VertexArrays& vertices, std::span<const vdtree::MovedVertex> moved) {
+    moves_.clear();
+    if (moved.empty() && moved_.empty())
+        return {};
+    if (!mover_) {
+        auto made = VertexMover::create();
+        if (!made)
+            return made.error();
+        mover_ = std::move(*made);
+    }
+    std::vector<std::uint32_t> now;
+    now.reserve(moved.size());
+    for (const vdtree::MovedVertex& vertex : moved) {
+        now.push_back(vertex.node);
+        const glm::vec4* const colour = vertices.colours.empty() ? nullptr : &vertex.colour;
+        moves_.push_back({vertex.node, vertex_of(vertices.frame, vertex.position, vertex.luminance, colour)});
+    }
+    std::sort(now.begin(), now.end());
+    for (auto next = now.begin(); const std::uint32_t vertex : moved_) { // those that are not moved any more
+        next = std::lower_bound(next, now.end(), vertex);
+        if (next == now.end() || *next != vertex)
+            moves_.push_back({vertex, vertex_at(vertices, vertex)});
+    }
+    moved_.swap(now);
+    mover_->move(vertices_.id(), vertex_count_, moves_);
+    return {};
 }
 
 Result<std::span<const glm::vec4>> TriangleDrawer::draw(int width, int height,

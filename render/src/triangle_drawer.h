@@ -15,9 +15,11 @@
 #include <render/gl_object.h>
 #include <render/program.h>
 #include <render/renderer.h>
+#include <vdtree/geomorph.h>
 
 #include "camera.h"
 #include "gpu_indices.h"
+#include "vertex_mover.h"
 
 namespace unseen::render {
 
@@ -48,7 +50,13 @@ public:
     // The triangles of all draws until the next call; corners are vertex numbers. Uploads what has changed since the last
     // call, where the state knows it. Fails where the memory does not suffice; then there are no triangles.
     Result<void> set_triangles(const IndexState& state);
-    std::uint64_t uploaded_bytes() const noexcept { return indices_.uploaded_bytes(); } // by set_triangles()
+
+    // Until the next call the `moved` vertices have these values, all others those of `vertices`, which are the ones that the drawer was
+    // made with. Nothing at all is done, or made, while no vertex is, or was, moved.
+    Result<void> set_moved(const VertexArrays& vertices, std::span<const vdtree::MovedVertex> moved);
+
+    // By the last set_triangles() and set_moved().
+    std::uint64_t uploaded_bytes() const noexcept { return indices_.uploaded_bytes() + moves_.size() * sizeof(VertexMove); }
 
     // The mean over the matrices of the image that each gives: width x height pixels of linear RGB and relative
     // luminance, row-major from the top left. The pixels belong to the drawer and stay until its next draw.
@@ -69,6 +77,10 @@ private:
     void add_sample_to_sum(float background) const;
 
     Buffer vertices_;
+    std::uint64_t vertex_count_ = 0;
+    std::optional<VertexMover> mover_;        // made when the first vertex is moved
+    std::vector<std::uint32_t> moved_;        // that are not where they belong, ascending
+    std::vector<VertexMove> moves_;           // the last ones
     GpuIndices indices_;
     VertexArray surface_arrays_;
     VertexArray no_arrays_; // for the full-screen triangle, which comes from nowhere

@@ -76,7 +76,8 @@ std::vector<std::vector<double>> numbers_of(const std::string& csv) {
     std::istringstream lines(csv);
     std::string line;
     std::getline(lines, line);
-    EXPECT_EQ(line, "frame,triangles,folds,unfolds,changes,node_tests,cut_ms,index_ms,uploaded_bytes,draw_ms,frame_ms");
+    EXPECT_EQ(line, "frame,triangles,folds,unfolds,changes,node_tests,cut_ms,index_ms,uploaded_bytes,draw_ms,frame_ms,"
+                    "drawn_triangles,gliding");
     while (std::getline(lines, line)) {
         std::istringstream cells(line);
         rows.emplace_back();
@@ -154,11 +155,48 @@ TEST_F(RenderCommandTest, BadPathsAreNamedByLineAndColumn) {
                                                          {"--path", "orbit:1", "-o", "%d%d.png"},
                                                          {"--path", "orbit:1", "-o", "%s.png"}, {"--threshold", "2", "-o", "a.png"},
                                                          {"--path", "orbit:1", "--threshold", "0"},
+                                                         {"--geomorph", "0.2", "-o", "a.png"},
+                                                         {"--path", "orbit:1", "--geomorph", "-1"},
+                                                         {"--path", "orbit:1", "--geomorph", "nan"},
+                                                         {"--path", "orbit:1", "--fps", "30"},
                                                          {"--path", "orbit:1", "--no-draw", "-o", "%d.png"}};
     for (auto words : wrong) {
         words.insert(words.begin(), {"render", "ball.vdt"});
         EXPECT_EQ(run(words).status, 2) << ::testing::PrintToString(words);
     }
+}
+
+TEST_F(RenderCommandTest, AFlightGlidesWhenItIsAskedTo) {
+    std::string away = "eye_x,eye_y,eye_z,target_x,target_y,target_z\n";
+    for (int i = 0; i < 20; ++i) away += "0,0," + std::to_string(60 + 2 * i) + ",0,0,0\n";
+    write_text(path("away.csv"), away);
+    const std::vector<std::string> flight = {"render", "ball.vdt", "--path", "away.csv", "--size", "96x80", "--pixels", "6"};
+    const auto fly = [&](std::vector<std::string> more) {
+        more.insert(more.begin(), flight.begin(), flight.end());
+        const Outcome flown = run(more);
+        EXPECT_EQ(flown.status, 0) << flown.err;
+        return flown.json();
+    };
+    const Json still = fly({"--csv", "still.csv", "-o", "still%d.png", "--json", "-"});
+    EXPECT_EQ(effect_named(still, "geomorphs")["on"], false);
+    EXPECT_TRUE(still["gliding"]["largest"].is_null());
+    const Json gliding = fly({"--csv", "gliding.csv", "-o", "gliding%d.png", "--json", "-", "--geomorph", "0.25", "--fps", "25"});
+    EXPECT_EQ(effect_named(gliding, "geomorphs")["on"], true);
+    EXPECT_THAT(std::string(effect_named(gliding, "geomorphs")["why"]), HasSubstr("0.25 s"));
+    EXPECT_GT(gliding["gliding"]["largest"], 0);
+    EXPECT_EQ(gliding["triangles"], still["triangles"]) << "the followed cut is the same";
+    const auto rows = numbers_of(read_text(path("gliding.csv")));
+    ASSERT_EQ(rows.size(), 20u);
+    for (const auto& row : rows) EXPECT_GE(row[11], row[1]) << "what folds is drawn until it is folded";
+    EXPECT_TRUE(read_text(path("still0.png")) == read_text(path("gliding0.png"))) << "nothing glides at first";
+    bool differs = false;
+    for (int i = 1; i < 20; ++i)
+        differs |= read_text(path("still" + std::to_string(i) + ".png")) != read_text(path("gliding" + std::to_string(i) + ".png"));
+    EXPECT_TRUE(differs);
+    // In no time, every frame is the one without.
+    fly({"-o", "nothing%d.png", "--json", "-", "--geomorph", "0"});
+    for (int i = 0; i < 20; ++i)
+        EXPECT_TRUE(read_text(path("still" + std::to_string(i) + ".png")) == read_text(path("nothing" + std::to_string(i) + ".png"))) << i;
 }
 
 TEST_F(RenderCommandTest, OptionsChangeThePicture) {

@@ -230,6 +230,55 @@ TEST_F(ViewCommandTest, DraggingTurnsAndTheWheelZooms) {
     EXPECT_LT(background(moved->image), background(still->image) * 9 / 10);
 }
 
+// "... 368 of 1,472 triangles ..." -> "368 of 1,472 triangles"
+std::string triangles_in(const std::string& title) {
+    const std::size_t end = title.find(" triangles"), begin = title.rfind(": ", end);
+    return end == std::string::npos || begin == std::string::npos ? title : title.substr(begin + 2, end - begin - 2);
+}
+
+TEST_F(ViewCommandTest, ATimeLimitIsGoneOnWithUntilTheCutIsMade) {
+    if (!open({})) GTEST_SKIP() << "no window: " << errors();
+    const std::string whole = triangles_in(window().title_with("imperceptible"));
+    window().press(XK_q);
+    ASSERT_EQ(ended(), 0) << errors();
+
+    // So little that it takes many frames; nobody touches anything meanwhile.
+    ASSERT_TRUE(open({"--milliseconds", "0.005"})) << errors();
+    EXPECT_THAT(window().title_with(": " + whole + " triangles"), HasSubstr(whole));
+    std::string title;
+    for (int look = 0; look < 100; ++look) {
+        title = window().title();
+        if (title.find("to be continued") == std::string::npos) break;
+        std::this_thread::sleep_for(pause);
+    }
+    EXPECT_THAT(title, ::testing::Not(HasSubstr("to be continued")));
+    // All modes can be reached, the full model too, which has no limit.
+    window().press(XK_1);
+    EXPECT_THAT(window().title_with("full"), HasSubstr("1,472 of 1,472"));
+    window().press(XK_2);
+    EXPECT_THAT(window().title_with(": " + whole + " triangles"), HasSubstr(whole));
+    window().press(XK_q);
+    EXPECT_EQ(ended(), 0) << errors();
+}
+
+TEST_F(ViewCommandTest, GlidesComeToRestByThemselves) {
+    if (!open({"--triangles", "400", "--geomorph", "0.5"})) GTEST_SKIP() << "no window: " << errors();
+    EXPECT_THAT(window().title_with("budget of 400"), HasSubstr("triangles"));
+    for (int click = 0; click < 2; ++click) window().press(XK_plus, ShiftMask); // few enough changes to glide
+    EXPECT_THAT(window().title_with("vertices glide"), HasSubstr("vertices glide"));
+    std::string title;
+    const auto end = std::chrono::steady_clock::now() + patience;
+    while (std::chrono::steady_clock::now() < end) {
+        title = window().title();
+        if (title.find("glide") == std::string::npos) break;
+        std::this_thread::sleep_for(pause);
+    }
+    EXPECT_THAT(title, ::testing::Not(HasSubstr("glide")));
+    window().press(XK_s);
+    window().press(XK_q);
+    EXPECT_EQ(ended(), 0) << errors();
+}
+
 TEST_F(ViewCommandTest, ResetGoesBackToTheFirstView) {
     if (!open({"--screenshot", "reset.png"})) GTEST_SKIP() << "no window: " << errors();
     window().title_with("imperceptible"); // a budget's cut depends on the way, within its hysteresis

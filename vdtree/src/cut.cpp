@@ -30,6 +30,12 @@ void prefetch([[maybe_unused]] const void* what) {
 #endif
 }
 
+// Revisions of one cut never come to those of another one.
+std::uint64_t first_revision() {
+    static std::atomic<std::uint64_t> cuts{0};
+    return ++cuts << 40;
+}
+
 bool test_bit(const std::vector<std::uint64_t>& bits, NodeId i) { return (bits[i >> 6] >> (i & 63)) & 1; }
 void set_bit(std::vector<std::uint64_t>& bits, NodeId i) { bits[i >> 6] |= std::uint64_t{1} << (i & 63); }
 void clear_bit(std::vector<std::uint64_t>& bits, NodeId i) { bits[i >> 6] &= ~(std::uint64_t{1} << (i & 63)); }
@@ -202,7 +208,8 @@ struct Cut::Indices {
 };
 
 Cut::Cut(const VertexTree& tree)
-    : tree_(&tree), unfolded_((tree.interior_count() + 63) / 64), proxy_(tree.leaf_count(), VertexTree::root()) {}
+    : tree_(&tree), unfolded_((tree.interior_count() + 63) / 64), proxy_(tree.leaf_count(), VertexTree::root()),
+      revision_(first_revision()) {}
 Cut::Cut(Cut&&) noexcept = default;
 Cut& Cut::operator=(Cut&&) noexcept = default;
 Cut::~Cut() = default;
@@ -243,6 +250,7 @@ std::span<const NodeId> Cut::children_of(NodeId node) {
 // Somebody else than the follower changes the cut: what it knows, and the index buffer, are out of date.
 void Cut::make_stale() {
     changes_.clear();
+    revision_ += 2;
     if (follower_) follower_->forget();
     if (!indices_) return;
     indices_->is_stale = true;
@@ -305,6 +313,7 @@ void Cut::fold_all() { fold_subtree(VertexTree::root()); }
 
 void Cut::begin_changes() {
     changes_.clear();
+    ++revision_;
     if (!indices_) return;
     indices_->is_patched = !indices_->is_stale && indices_->buffer.can_patch();
     indices_->buffer.begin_patch();
@@ -419,6 +428,7 @@ void Cut::replay(std::span<const std::uint64_t> unfolded, AdjustStats& stats) {
 // Every proxy is written at most once, however deep the new cut is.
 void Cut::become(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
     changes_.clear();
+    ++revision_;
     const auto first = tree_->first_triangle();
     for (std::size_t word = 0; word < unfolded.size(); ++word) {
         for (std::uint64_t bits = unfolded[word] & ~unfolded_[word]; bits; bits &= bits - 1) {

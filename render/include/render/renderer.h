@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -10,6 +11,7 @@
 
 #include <render/context.h>
 #include <vdtree/cut.h>
+#include <vdtree/geomorph.h>
 #include <vdtree/view.h>
 
 namespace unseen::render {
@@ -53,12 +55,24 @@ public:
     Result<void> draw_to_window(const vdtree::Cut& cut, const vdtree::View& view, const DrawOptions& options = {},
                                 const vdtree::Similarity& placement = {});
 
-    // Of the cut's triangles, by the last draw: nothing where the cut is as it was, 8 bytes a changed corner where the cut
-    // knows what changed since then, else 12 bytes a triangle.
+    // The same for what a geomorph draws: its drawn cut, with the vertices that glide where they are. What that needs on the GPU is made
+    // when a vertex is first moved; before, and for cuts, nothing is.
+    Result<Frame> draw(const vdtree::Geomorph& geomorph, const vdtree::View& view, const DrawOptions& options = {},
+                       const vdtree::Similarity& placement = {});
+    Result<void> draw_to_window(const vdtree::Geomorph& geomorph, const vdtree::View& view, const DrawOptions& options = {},
+                                const vdtree::Similarity& placement = {});
+
+    // By the last draw. Of the cut's triangles: nothing where the cut is as it was, 8 bytes a changed corner where the cut
+    // knows what changed since then, else 12 bytes a triangle. Of vertices: 32 bytes for each that glides, or did in the draw before.
     std::uint64_t uploaded_bytes() const noexcept;
 
 private:
     struct Impl;
+    using Moved = std::span<const vdtree::MovedVertex>;
+    Result<Frame> draw(const vdtree::Cut& cut, Moved moved, const vdtree::View& view, const DrawOptions& options,
+                       const vdtree::Similarity& placement);
+    Result<void> draw_to_window(const vdtree::Cut& cut, Moved moved, const vdtree::View& view, const DrawOptions& options,
+                                const vdtree::Similarity& placement);
     explicit Renderer(std::unique_ptr<Impl> impl);
     std::unique_ptr<Impl> impl_;
 };

@@ -123,6 +123,7 @@ public:
 
 private:
     friend class CutFollower;
+    friend class Geomorph;
 
     bool is_unfolded_interior(NodeId node) const noexcept { return (unfolded_[node >> 6] >> (node & 63)) & 1; }
     void set_unfolded(NodeId node);
@@ -149,6 +150,7 @@ private:
     std::vector<NodeId> proxy_;            // by leaf: the active node that stands for it
     Index triangle_count_ = 0;
     std::vector<FoldChange> changes_;
+    std::uint64_t revision_;               // of the state: one more for what changes_ tells, two for what nobody knows
     std::vector<NodeId> children_, soon_;  // scratch
     std::unique_ptr<CutFollower> follower_;
     struct Indices;
