@@ -339,14 +339,15 @@ void TreeBuilder::bound() {
     NodeSpheres spheres = bound_spheres(input);
     g_->bounding_sphere = bound_corners(input);
     g_->displacement = bound_displacements(input, spheres.support);
-    NodeFacing facing = bound_facing(input, triangles.triangles, places, spheres.support, ancestors);
+    const std::vector<Directions> facing = bound_facing(input, triangles.triangles, places, spheres.support, ancestors);
     g_->support_spheres = std::move(spheres.support);
     std::vector<NodeBounds> bounds(shape.interior());
     std::vector<std::uint32_t> mask_at(shape.interior());
     MaskPool pool;
     for (NodeId node = 0; node < shape.interior(); ++node) {
-        const Directions& seen = facing.directions[node];
-        bounds[node] = {spheres.ring[node], seen.slabs(), facing.flags[node], 0};
+        const Directions& seen = facing[node];
+        const auto flags = static_cast<std::uint8_t>(seen.marked() ? irregular_ring : 0);
+        bounds[node] = {spheres.ring[node], seen.slabs(), flags, 0};
         const std::uint32_t at = pool.add(seen.mask);
         // A parent, which has a lower number, includes its children: a full pool still gives true masks that nest.
         mask_at[node] = at != MaskPool::no_record ? at : mask_at[shape.parents[node]];
