@@ -3,7 +3,8 @@
 //
 //   clang++ -std=c++20 -g -O1 -fsanitize=fuzzer,address,undefined -Ivdtree/include -Itests/support
 //       tests/fuzz/tree_fuzz.cpp vdtree/src/{atomic_file,criteria,cut,distance_criterion,facing_gap,fold_tester}.cpp
-//       vdtree/src/{mapped_file,mask_pool,mesh,node_check,normal_mask,packed,tree_io,verify,vertex_tree,view}.cpp
+//       vdtree/src/{mapped_file,mask_pool,mesh,node_check,normal_mask,packed,tree_io,tree_parts,verify}.cpp
+//       vdtree/src/{vertex_tree,view}.cpp -ltbb
 //
 // Start it with a folder of small trees made by `unseen build`.
 #include <cstddef>

@@ -23,9 +23,12 @@
 #include <vdtree/cut.h>
 
 #include "shapes.h"
+#include "triangle_distance.h"
 
 namespace unseen::vdtree {
 namespace {
+
+using support::distance_to_triangle;
 
 VertexTree built(const Mesh& mesh, ClustererKind kind) {
     Result<VertexTree> tree = build_tree(mesh.view(), {.clusterer = kind});
@@ -42,21 +45,6 @@ Mesh simplified(const VertexTree& tree, Index triangles) {
     Cut cut(tree);
     cut.adjust(displacement, {.triangle_budget = triangles});
     return extract_mesh(cut);
-}
-
-double distance_to_segment(glm::dvec3 p, glm::dvec3 a, glm::dvec3 b) {
-    const double squared = glm::dot(b - a, b - a);
-    const double t = squared > 0 ? std::clamp(glm::dot(p - a, b - a) / squared, 0.0, 1.0) : 0.0;
-    return glm::distance(p, a + t * (b - a));
-}
-
-double distance_to_triangle(glm::dvec3 p, glm::dvec3 a, glm::dvec3 b, glm::dvec3 c) {
-    const glm::dvec3 n = glm::cross(b - a, c - a);
-    const double squared = glm::dot(n, n);
-    if (squared > 0 && glm::dot(glm::cross(b - a, p - a), n) >= 0 && glm::dot(glm::cross(c - b, p - b), n) >= 0 &&
-        glm::dot(glm::cross(a - c, p - c), n) >= 0)
-        return std::abs(glm::dot(p - a, n)) / std::sqrt(squared);
-    return std::min({distance_to_segment(p, a, b), distance_to_segment(p, b, c), distance_to_segment(p, c, a)});
 }
 
 double mean_distance(const Mesh& original, const Mesh& simple) {

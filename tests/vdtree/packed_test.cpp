@@ -103,14 +103,15 @@ TEST(MaskPool, GivesBackEveryMask) {
     std::mt19937_64 random(3);
     NormalMask all;
     all.faces.fill(~std::uint64_t{0});
-    std::vector<NormalMask> masks = {NormalMask{}, all};
-    for (int i = 0; i < 20'000; ++i) masks.push_back(random_mask(random));
-    MaskPool pool;
-    std::vector<std::uint32_t> at;
-    for (const NormalMask& mask : masks) at.push_back(pool.add(mask));
-    for (std::size_t i = 0; i < masks.size(); ++i) ASSERT_EQ(pool.add(masks[i]), at[i]) << "equal masks share";
-    const auto records = pool.take();
-    for (std::size_t i = 0; i < masks.size(); ++i) ASSERT_EQ(unpack_mask(records, at[i]), masks[i]);
+    std::vector<Directions> nodes(2);
+    nodes[1].mask = all;
+    for (int i = 0; i < 20'000; ++i) nodes.emplace_back().mask = random_mask(random);
+    const std::size_t different = nodes.size();
+    for (std::size_t i = 0; i < different; i += 3) nodes.push_back(nodes[i]);
+    const PooledMasks pool = pool_masks(nodes, std::vector<NodeId>(nodes.size(), 0));
+    ASSERT_EQ(pool.at.size(), nodes.size());
+    for (std::size_t i = 0; i < nodes.size(); ++i) ASSERT_EQ(unpack_mask(pool.records, pool.at[i]), nodes[i].mask);
+    for (std::size_t i = different; i < nodes.size(); ++i) ASSERT_EQ(pool.at[i], pool.at[(i - different) * 3]) << "equal masks share";
 }
 
 TEST(MaskPool, ReadsAnyBytes) {

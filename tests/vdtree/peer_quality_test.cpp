@@ -22,26 +22,12 @@
 #include "extra_meshes.h"
 #include "shapes.h"
 #include "temp_folder.h"
+#include "triangle_distance.h"
 
 namespace unseen::vdtree {
 namespace {
 
 #ifdef UNSEEN_TEST_WITH_MESHOPTIMIZER
-
-double distance_to_segment(glm::dvec3 p, glm::dvec3 a, glm::dvec3 b) {
-    const double squared = glm::dot(b - a, b - a);
-    const double t = squared > 0 ? std::clamp(glm::dot(p - a, b - a) / squared, 0.0, 1.0) : 0.0;
-    return glm::distance(p, a + t * (b - a));
-}
-
-double distance_to_triangle(glm::dvec3 p, glm::dvec3 a, glm::dvec3 b, glm::dvec3 c) {
-    const glm::dvec3 n = glm::cross(b - a, c - a);
-    const double squared = glm::dot(n, n);
-    if (squared > 0 && glm::dot(glm::cross(b - a, p - a), n) >= 0 && glm::dot(glm::cross(c - b, p - b), n) >= 0 &&
-        glm::dot(glm::cross(a - c, p - c), n) >= 0)
-        return std::abs(glm::dot(p - a, n)) / std::sqrt(squared);
-    return std::min({distance_to_segment(p, a, b), distance_to_segment(p, b, c), distance_to_segment(p, c, a)});
-}
 
 // The triangles by the cells of a cubic grid that their boxes meet.
 class TriangleGrid {
@@ -94,7 +80,7 @@ private:
     std::vector<Index>& list(int x, int y, int z) { return lists_[static_cast<std::size_t>((z * cells + y) * cells + x)]; }
     double distance_to(glm::dvec3 p, Index t) const {
         const Triangle& tri = mesh_.triangles[t];
-        return distance_to_triangle(p, mesh_.positions[tri[0]], mesh_.positions[tri[1]], mesh_.positions[tri[2]]);
+        return support::distance_to_triangle(p, mesh_.positions[tri[0]], mesh_.positions[tri[1]], mesh_.positions[tri[2]]);
     }
 
     const Mesh& mesh_;

@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
+#include <cstring>
 #include <limits>
+
+#include <tbb/parallel_for.h>
 
 namespace unseen::vdtree {
 
@@ -23,165 +27,212 @@ constexpr Index never = std::numeric_limits<Index>::max();
 class Folds {
 public:
     Folds(const BoundInput& input, const Ancestors& ancestors)
-        : in_(input), ancestors_(ancestors), border_(input.shape.interior(), 0) {}
+        : in_(input), ancestors_(ancestors), steps_(input.shape.parents.size()), border_(input.shape.interior(), 0) {
+        const TreeShape& shape = input.shape;
+        tbb::parallel_for(NodeId{0}, static_cast<NodeId>(steps_.size()), [&](NodeId node) {
+            const NodeId above = shape.parents[node];
+            const bool is_top = above == no_node || input.parts.is_top(node < shape.interior() ? node : above);
+            const bool is_followed = above != no_node && input.parts.is_top(above) == is_top;
+            steps_[node] = {input.positions[node], above, is_followed ? shape.made[above] : never};
+        });
+    }
 
-    // Calls see(node, a, b, c) for each such view from a node of the part, with the triangle's corners in order. Corners
-    // outside of the part are looked up when they are needed.
+    // Calls see(no_node, corners) for the triangle as it is, then see(node, corners) for each such view from a node of the part,
+    // with the triangle's corners in order. Corners outside of the part are looked up when they are needed.
     template <class See>
     void follow(const Triangle& triangle, const TreePart& part, See&& see) {
-        const TreeShape& shape = in_.shape;
-        NodeId nodes[3], above[3];
-        Index next[3];   // when the corner moves to the node above; never: it is not followed
-        bool current[3]; // whether the corner is where `nodes` says until then
-        glm::vec3 at[3];
-        const auto put = [&](std::size_t k, NodeId node) {
-            nodes[k] = node;
-            at[k] = in_.positions[node];
-            above[k] = shape.parents[node];
-            current[k] = above[k] != no_node && in_.parts.owns(part, above[k]);
-            next[k] = current[k] ? shape.made[above[k]] : never;
-        };
+        Corners c;
         for (std::size_t k = 0; k < 3; ++k) {
-            const NodeId leaf = shape.node_of_leaf(triangle[k]);
-            put(k, leaf);
-            if (current[k] || !in_.parts.is_top(0) || !in_.parts.owns(part, 0)) continue;
+            const NodeId leaf = in_.shape.node_of_leaf(triangle[k]);
+            c.put(k, leaf, steps_[leaf]);
+        }
+        see(no_node, c.at);
+        for (std::size_t k = 0; k < 3; ++k) {
+            if (in_.parts.owns_leaf(part, triangle[k])) continue;
+            c.current[k] = false;
+            c.next[k] = never;
+            if (!in_.parts.is_top(0) || !in_.parts.owns(part, 0)) continue;
             // Of the nodes above the other parts, the first is looked for.
-            above[k] = ancestors_.lowest(above[k], [&](NodeId node) { return in_.parts.is_top(node); });
-            next[k] = shape.made[above[k]];
+            c.above[k] = ancestors_.lowest(c.above[k], [&](NodeId node) { return in_.parts.is_top(node); });
+            c.next[k] = in_.shape.made[c.above[k]];
         }
-        for (;;) {
-            const Index now = std::min(next[0], std::min(next[1], next[2]));
-            const bool moves[3] = {next[0] == now, next[1] == now, next[2] == now};
-            if (moves[0] + moves[1] + moves[2] != 1) return; // two corners meet, or none is followed
-            const std::size_t k = moves[1] + 2u * moves[2];
-            put(k, above[k]);
-            const NodeId node = nodes[k];
-            if (border_[node] > most_border_triangles) {
-                // It faces everywhere already, and so do the nodes above: what they see is of no interest any more.
-                current[k] = false;
-                next[k] = never;
-                continue;
-            }
-            for (std::size_t other = 0; other < 3; ++other) {
-                if (current[other] || other == k) continue;
-                nodes[other] = ancestors_.highest_made_by(nodes[other], now);
-                at[other] = in_.positions[nodes[other]];
-            }
-            if (nodes[0] == nodes[1] || nodes[1] == nodes[2] || nodes[2] == nodes[0]) return;
-            ++border_[node];
-            see(node, at[0], at[1], at[2]);
-        }
+        if (c.current[0] && c.current[1] && c.current[2]) follow_all(c, see);
+        else follow_some(c, see);
     }
 
     // Whether more triangles came by than were followed. To be asked when all have been.
     bool too_many(NodeId node) const { return border_[node] > most_border_triangles; }
 
 private:
+    // What a corner has to know when it comes to a node, in one piece.
+    struct Step {
+        glm::vec3 at;
+        NodeId above;
+        Index next; // when the corner moves on, to the node above; never: the part ends here
+    };
+
+    // A triangle while it is followed.
+    struct Corners {
+        Corner at[3];
+        NodeId nodes[3], above[3];
+        Index next[3];                // when the corner moves to the node above; never: it is not followed
+        bool current[3];              // whether the corner is where `nodes` says until then
+
+        void put(std::size_t k, NodeId node, const Step& step) {
+            std::memcpy(&at[k], &step, sizeof(Corner));
+            nodes[k] = node;
+            above[k] = step.above;
+            next[k] = step.next;
+            current[k] = step.next != never;
+        }
+    };
+
+    // With all three in the part, until two meet or one leaves it. Which corner moves is as good as random: the processor is not
+    // left to guess.
+    template <class See>
+    void follow_all(Corners& c, See&& see) {
+        using Mask = int __attribute__((vector_size(16)));
+        for (;;) {
+            const Index now = std::min(c.next[0], std::min(c.next[1], c.next[2]));
+            if ((c.next[0] == now) + (c.next[1] == now) + (c.next[2] == now) != 1) return;
+            NodeId node = 0;
+            Index moves[3]; // all bits or none
+            for (std::size_t k = 0; k < 3; ++k) {
+                moves[k] = Index{0} - (c.next[k] == now);
+                node |= c.above[k] & moves[k];
+            }
+            const Step& step = steps_[node];
+            if (border_[node] > most_border_triangles || step.next == never) return follow_some(c, see);
+            Corner at;
+            std::memcpy(&at, &step, sizeof(at));
+            for (std::size_t k = 0; k < 3; ++k) {
+                const int bits = static_cast<int>(moves[k]);
+                const Mask mask = {bits, bits, bits, bits};
+                c.at[k] = std::bit_cast<Corner>((std::bit_cast<Mask>(at) & mask) | (std::bit_cast<Mask>(c.at[k]) & ~mask));
+                c.nodes[k] ^= (c.nodes[k] ^ node) & moves[k];
+                c.above[k] ^= (c.above[k] ^ step.above) & moves[k];
+                c.next[k] ^= (c.next[k] ^ step.next) & moves[k];
+            }
+            ++border_[node];
+            see(node, c.at);
+        }
+    }
+
+    // With some of them elsewhere, or from where follow_all() does not know further.
+    template <class See>
+    void follow_some(Corners& c, See&& see) {
+        for (;;) {
+            const Index now = std::min(c.next[0], std::min(c.next[1], c.next[2]));
+            const bool moves[3] = {c.next[0] == now, c.next[1] == now, c.next[2] == now};
+            if (moves[0] + moves[1] + moves[2] != 1) return; // two corners meet, or none is followed
+            const std::size_t k = moves[1] + 2u * moves[2];
+            const NodeId node = c.above[k];
+            c.put(k, node, steps_[node]);
+            if (border_[node] > most_border_triangles) {
+                // It faces everywhere already, and so do the nodes above: what they see is of no interest any more.
+                c.current[k] = false;
+                c.next[k] = never;
+                continue;
+            }
+            for (std::size_t other = 0; other < 3; ++other) {
+                if (c.current[other] || other == k) continue;
+                c.nodes[other] = ancestors_.highest_made_by(c.nodes[other], now);
+                std::memcpy(&c.at[other], &steps_[c.nodes[other]], sizeof(Corner));
+            }
+            if (c.nodes[0] == c.nodes[1] || c.nodes[1] == c.nodes[2] || c.nodes[2] == c.nodes[0]) return;
+            ++border_[node];
+            see(node, c.at);
+        }
+    }
+
     const BoundInput& in_;
     const Ancestors& ancestors_;
+    std::vector<Step> steps_;           // by node
     std::vector<std::uint16_t> border_; // by node: triangles around it after its fold, up to one too many
 };
 
-// Adds the directions of triangles to nodes and to leaves, some at a time.
+// Adds the directions of triangles to nodes, or to up to three leaves each, `none` standing for those to leave out: many at a time.
+template <std::size_t targets>
 class Views {
 public:
-    Views(std::span<Directions> nodes, std::span<Directions> leaves) : nodes_(nodes), leaves_(leaves) {}
+    using Target = std::array<Index, targets>;
+    static constexpr Index none = never;
+
+    explicit Views(std::span<Directions> seen) : seen_(seen) {}
     ~Views() { flush(); }
     Views(const Views&) = delete;
     Views& operator=(const Views&) = delete;
 
-    // To one node, or to up to three leaves, `none` standing for those to leave out.
-    void add(NodeId node, glm::vec3 a, glm::vec3 b, glm::vec3 c) { push({true, {node, none, none}}, a, b, c); }
-    void add(const Triangle& leaves, glm::vec3 a, glm::vec3 b, glm::vec3 c) { push({false, leaves}, a, b, c); }
-
-    static constexpr Index none = never;
-
-private:
-    struct Target {
-        bool is_node;
-        Triangle which;
-    };
-    void push(const Target& target, glm::vec3 a, glm::vec3 b, glm::vec3 c) {
+    void add(const Target& target, const Corner (&at)[3]) {
         targets_[batch_.size()] = target;
-        batch_.push(a, b, c);
+        batch_.push(at[0], at[1], at[2]);
         if (batch_.full()) flush();
     }
+
+private:
     void flush() {
         const std::size_t count = batch_.size();
         batch_.measure();
-        for (std::size_t i = 0; i < count; ++i) {
-            const Target& to = targets_[i];
-            if (to.is_node) {
-                batch_.insert(i, nodes_[to.which[0]]);
-            } else {
-                for (const Index leaf : to.which)
-                    if (leaf != none) batch_.insert(i, leaves_[leaf]);
-            }
-        }
+        for (std::size_t i = 0; i < count; ++i)
+            for (const Index to : targets_[i])
+                if (to != none) batch_.insert(i, seen_[to]);
     }
 
-    std::span<Directions> nodes_, leaves_;
+    std::span<Directions> seen_;
     NormalBatch batch_;
     std::array<Target, NormalBatch::capacity> targets_;
 };
 
 } // namespace
 
-NodeFacing bound_facing(const BoundInput& input, std::span<const Triangle> triangles, const LeafPlaces& places,
+std::vector<Directions> bound_facing(const BoundInput& input, std::span<const Triangle> triangles, const LeafPlaces& places,
                         std::span<const Sphere> support, const Ancestors& ancestors) {
     const TreeShape& shape = input.shape;
-    NodeFacing facing;
-    facing.directions.resize(shape.interior());
-    facing.flags.assign(shape.interior(), 0);
+    std::vector<Directions> facing(shape.interior());
 
     std::vector<Directions> around(shape.leaves()); // by leaf: the normals of the triangles there
     Folds folds(input, ancestors);
     input.parts.for_each_triangle([&](const TreePart& part) {
-        return [&, views = Views(facing.directions, around)](Index t) mutable {
+        return [&, by_node = Views<1>(facing), by_leaf = Views<3>(around)](Index t) mutable {
             const Triangle& corners = triangles[t];
-            const auto at = [&](std::size_t k) { return input.positions[shape.node_of_leaf(corners[k])]; };
-            const auto owned = [&](Index leaf) { return input.parts.owns_leaf(part, leaf) ? leaf : Views::none; };
-            views.add({owned(corners[0]), owned(corners[1]), owned(corners[2])}, at(0), at(1), at(2));
-            folds.follow(corners, part,
-                         [&](NodeId node, glm::vec3 a, glm::vec3 b, glm::vec3 c) { views.add(node, a, b, c); });
+            const auto owned = [&](Index leaf) { return input.parts.owns_leaf(part, leaf) ? leaf : by_leaf.none; };
+            folds.follow(corners, part, [&](NodeId node, const Corner(&at)[3]) {
+                if (node != no_node) by_node.add({node}, at);
+                else by_leaf.add({owned(corners[0]), owned(corners[1]), owned(corners[2])}, at);
+            });
         };
     });
     // The dilation runs over places: an unwelded crease is no end of the surface.
-    for (Index leaf = 0; leaf < shape.leaves(); ++leaf)
+    for (Index leaf = 0; leaf < shape.leaves(); ++leaf) {
+        around[leaf].mark(places.irregular[leaf]);
         if (places.weld[leaf] != leaf) around[places.weld[leaf]] |= around[leaf];
+    }
     for (Index leaf = 0; leaf < shape.leaves(); ++leaf)
         if (places.weld[leaf] != leaf) around[leaf] = around[places.weld[leaf]];
 
     input.parts.bottom_up([&] {
         return [&](NodeId node) {
-            Directions& seen = facing.directions[node];
+            Directions seen = facing[node];
             if (support[node].radius == 0) {
-                seen = {};
+                facing[node] = {};
                 return;
             }
             if (folds.too_many(node)) seen = Directions::everything();
-            std::uint8_t flags = 0;
             const auto add_leaf = [&](Index leaf) {
                 const auto ring = input.rings.around(leaf);
                 if (ring.empty()) return; // no triangle uses it
                 seen |= around[leaf];
-                bool irregular = places.irregular[leaf];
-                for (const Index neighbour : ring) {
-                    seen |= around[neighbour];
-                    irregular |= places.irregular[neighbour];
-                }
-                if (irregular) flags |= irregular_ring;
+                for (const Index neighbour : ring) seen |= around[neighbour];
             };
             shape.for_each_child(
                 node,
                 [&](NodeId child) {
-                    seen |= facing.directions[child];
-                    flags |= facing.flags[child];
+                    seen |= facing[child];
                     if (support[child].radius == 0) // it has none of its own
                         for (Index leaf = shape.first_leaf[child]; leaf < shape.leaf_end[child]; ++leaf) add_leaf(leaf);
                 },
                 add_leaf);
-            facing.flags[node] = flags;
+            facing[node] = seen;
         };
     });
     return facing;

@@ -13,12 +13,9 @@ namespace unseen::vdtree {
 // By interior node. The normals of all triangles at the corners of the ring's triangles (the ring dilated by one more ring),
 // and those of the triangles around the node after its fold, the other clusters standing as they did when the clusterer made it;
 // and the same of all nodes below. Nothing for nodes whose leaves are at one point: when they fold nothing moves.
-struct NodeFacing {
-    std::vector<Directions> directions;
-    std::vector<std::uint8_t> flags;
-};
-
-NodeFacing bound_facing(const BoundInput& input, std::span<const Triangle> triangles, const LeafPlaces& places,
+//
+// Marked where the ring has an irregular edge.
+std::vector<Directions> bound_facing(const BoundInput& input, std::span<const Triangle> triangles, const LeafPlaces& places,
                         std::span<const Sphere> support, const Ancestors& ancestors);
 
 } // namespace unseen::vdtree

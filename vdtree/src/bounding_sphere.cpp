@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -210,30 +211,43 @@ DSphere enclosing_sphere(std::span<const glm::dvec3> points, std::span<const DSp
     return enclose(points, spheres, sphere_slack);
 }
 
+namespace {
+
+constexpr std::size_t lanes = 4;
+
+Floats load(const std::vector<float>& v, std::size_t i) {
+    Floats out;
+    std::memcpy(&out, v.data() + i, sizeof out);
+    return out;
+}
+Floats larger(Floats a, Floats b) { return a > b ? a : b; }
+float largest(Floats v) {
+    const Floats two = larger(v, __builtin_shuffle(v, Ints{2, 3, 0, 1}));
+    return std::max(two[0], two[1]);
+}
+
+// Of the distance between two of the points: covers the rounding of their positions relative to each other, and of the distance, in
+// floats: less than 8 times half a unit in the last place.
+constexpr double float_slack = 1e-6;
+// Squares below this, in units of the tree's extent, may have lost digits, or everything.
+constexpr float least_square = 1e-30f;
+
+} // namespace
+
 // The view of a BallSet that a basis grows in.
 class BallSet::Scaled {
 public:
     explicit Scaled(const BallSet& set) : set_(set) {}
 
     DSphere first() const { return {glm::dvec3(0), 0}; }
+    // Of points nearly as far as each other, any one.
     Farthest farthest(glm::dvec3 from) const {
-        const float x = static_cast<float>(from.x), y = static_cast<float>(from.y), z = static_cast<float>(from.z);
-        Floats largest = {-1, -1, -1, -1};
-        Ints where = {0, 0, 0, 0}, at = {0, 1, 2, 3};
-        for (std::size_t i = 0; i < set_.x_.size(); i += 4) {
-            const Floats dx = load(set_.x_, i) - x, dy = load(set_.y_, i) - y, dz = load(set_.z_, i) - z;
-            const Floats squared = dx * dx + dy * dy + dz * dz;
-            const Ints farther = squared > largest;
-            largest = farther ? squared : largest;
-            where = farther ? at : where;
-            at += 4;
+        Farthest out{{glm::dvec3(0), 0}, -1};
+        for (std::size_t begin = 0; begin < set_.count_; begin += block) {
+            const glm::dvec3 point = farthest_in_block(begin, glm::vec3(from));
+            const double reach = glm::distance(point, from);
+            if (reach > out.reach) out = {{point, 0}, reach};
         }
-        int lane = 0;
-        for (int k = 1; k < 4; ++k)
-            if (largest[k] > largest[lane]) lane = k;
-        const auto i = static_cast<std::size_t>(where[lane]);
-        const glm::dvec3 point(set_.x_[i], set_.y_[i], set_.z_[i]);
-        Farthest out{{point, 0}, glm::distance(point, from)};
         for (const DSphere& s : set_.scaled_spheres_) {
             const double reach = glm::distance(s.centre, from) + s.radius;
             if (reach > out.reach) out = {s, reach};
@@ -242,29 +256,66 @@ public:
     }
 
 private:
-    static Floats load(const std::vector<float>& v, std::size_t i) {
-        Floats out;
-        std::memcpy(&out, v.data() + i, sizeof out);
-        return out;
+    // The last digits of the squared distances make room for the points' numbers: one comparison brings both.
+    static constexpr std::size_t block = 256;
+    glm::dvec3 farthest_in_block(std::size_t begin, glm::vec3 from) const {
+        const auto& [x, y, z] = set_.relative_;
+        const std::size_t end = std::min(begin + block, set_.count_);
+        Floats farthest = {0, 0, 0, 0};
+        Ints number = {0, 1, 2, 3};
+        for (std::size_t i = begin; i < end; i += lanes) {
+            const Floats dx = load(x, i) - from.x, dy = load(y, i) - from.y, dz = load(z, i) - from.z;
+            const Floats squared = dx * dx + dy * dy + dz * dz;
+            const Ints numbered = (std::bit_cast<Ints>(squared) & ~static_cast<int>(block - 1)) | number;
+            farthest = larger(farthest, std::bit_cast<Floats>(numbered));
+            number += static_cast<int>(lanes);
+        }
+        const std::size_t i = begin + (std::bit_cast<unsigned>(largest(farthest)) & (block - 1));
+        return {x[i], y[i], z[i]};
     }
+
     const BallSet& set_;
 };
 
-void BallSet::clear() {
-    points_.clear(), x_.clear(), y_.clear(), z_.clear(), spheres_.clear(), scaled_spheres_.clear();
+void BallSet::grow() {
+    constexpr std::size_t least = 64;
+    for (auto& axis : points_) axis.resize(std::max(least, 2 * count_));
+    for (auto& axis : relative_) axis.resize(points_[0].size());
+}
+
+void BallSet::make_relative() {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        std::vector<float>& from = points_[axis];
+        for (std::size_t i = count_; i % lanes != 0; ++i) from[i] = from[0]; // the first point again
+        for (std::size_t i = 0; i < count_; i += lanes) {
+            const Floats scaled = (load(from, i) - from[0]) * scale_;
+            std::memcpy(relative_[axis].data() + i, &scaled, sizeof scaled);
+        }
+    }
 }
 
 DSphere BallSet::enclose(double slack) {
-    const glm::dvec3 origin(points_[0]);
+    make_relative();
+    const auto point = [&](std::size_t i) { return glm::dvec3(points_[0][i], points_[1][i], points_[2][i]); };
+    const glm::dvec3 origin = point(0);
     const double scale = scale_;
+    scaled_spheres_.clear();
     for (const Sphere& s : spheres_)
         scaled_spheres_.push_back({(glm::dvec3(s.centre) - origin) * scale, s.radius * scale});
-    while (x_.size() % 4 != 0) x_.push_back(0), y_.push_back(0), z_.push_back(0); // the first point again
-    const glm::dvec3 centre = grow_basis(Scaled(*this), slack).centre / scale + origin;
-    // Exactly what has to be contained, without the rounding of the way here.
-    double squared_reach = 0;
-    for (const glm::vec3& p : points_) squared_reach = std::max(squared_reach, squared(glm::dvec3(p) - centre));
-    double reach = std::sqrt(squared_reach);
+    const glm::vec3 middle(grow_basis(Scaled(*this), slack).centre);
+    const glm::dvec3 centre = glm::dvec3(middle) / scale + origin;
+    Floats most = {0, 0, 0, 0};
+    for (std::size_t i = 0; i < count_; i += lanes) {
+        const Floats dx = load(relative_[0], i) - middle.x, dy = load(relative_[1], i) - middle.y,
+                     dz = load(relative_[2], i) - middle.z;
+        most = larger(most, dx * dx + dy * dy + dz * dz);
+    }
+    double reach = 0;
+    if (const float squared_reach = largest(most); squared_reach >= least_square) {
+        reach = std::sqrt(static_cast<double>(squared_reach)) * (1 + float_slack) / scale;
+    } else {
+        for (std::size_t i = 0; i < count_; ++i) reach = std::max(reach, glm::distance(point(i), centre));
+    }
     for (const Sphere& s : spheres_) reach = std::max(reach, glm::distance(glm::dvec3(s.centre), centre) + s.radius);
     return {centre, reach};
 }

@@ -1,6 +1,8 @@
 // Small enclosing spheres of points and of spheres.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -30,13 +32,14 @@ public:
     // `scale` brings the tree's extent to about 1, so that squares in floats neither overflow nor vanish.
     explicit BallSet(float scale) : scale_(scale) {}
 
-    void clear();
+    void clear() {
+        count_ = 0;
+        spheres_.clear();
+    }
     void add(glm::vec3 point) {
-        const glm::vec3 p = (point - (points_.empty() ? point : points_[0])) * scale_;
-        points_.push_back(point);
-        x_.push_back(p.x);
-        y_.push_back(p.y);
-        z_.push_back(p.z);
+        if (count_ == points_[0].size()) grow();
+        for (int axis = 0; axis < 3; ++axis) points_[static_cast<std::size_t>(axis)][count_] = point[axis];
+        ++count_;
     }
     void add(const Sphere& sphere) { spheres_.push_back(sphere); }
 
@@ -47,9 +50,14 @@ public:
 private:
     class Scaled;
 
+    using Axes = std::array<std::vector<float>, 3>;
+
+    void grow();
+    void make_relative();
+
     float scale_;
-    std::vector<glm::vec3> points_;
-    std::vector<float> x_, y_, z_; // relative to the first, scaled
+    std::size_t count_ = 0; // of the points; there is room for more, in whole vectors
+    Axes points_, relative_; // to the first, scaled
     std::vector<Sphere> spheres_;
     std::vector<DSphere> scaled_spheres_;
 };

@@ -55,6 +55,12 @@ private:
     std::optional<tbb::global_control> control_;
 };
 
+// Gives memory back that is not needed any more.
+template <class T>
+void release(std::vector<T>& values) {
+    std::vector<T>().swap(values);
+}
+
 Error cancelled_error() { return {ErrorCode::cancelled, "Building the tree was cancelled."}; }
 
 // The input less what cannot be built on: triangles that use a vertex twice, and vertices that no triangle uses
@@ -216,6 +222,7 @@ private:
     std::vector<Index> coincident_;
     Surface surface_;
     NodeOrder nodes_;
+    std::optional<TreeParts> parts_;
     std::shared_ptr<TreeGeometry> g_ = std::make_shared<TreeGeometry>();
 };
 
@@ -230,6 +237,8 @@ Result<VertexTree> TreeBuilder::build(Clusterer clusterer) {
         if (reporter_.cancelled(clustering_ends, "ordering")) return cancelled_error();
         order(*clustering);
         place_vertices(*clustering);
+        release(surface_.areas); // bounding is what takes most memory
+        release(surface_.normals);
     }
     if (reporter_.cancelled(0.8, "bounding")) return cancelled_error();
     bound();
@@ -238,7 +247,7 @@ Result<VertexTree> TreeBuilder::build(Clusterer clusterer) {
     g_->dropped_triangles = clean_.dropped + options_.dropped_before;
     g_->ranges.assign(source_.ranges.begin(), source_.ranges.end());
     auto data = std::make_shared<VertexTree::Data>();
-    data->light = derive_luminance(*g_, options_.light, prelit_);
+    data->light = derive_luminance(*g_, *parts_, options_.light, prelit_);
     data->geometry = std::move(g_);
     if (reporter_.cancelled(1.0, "done")) return cancelled_error();
     return VertexTree(std::move(data));
@@ -280,6 +289,7 @@ void TreeBuilder::order(const Clustering& clustering) {
     for (Index v = 0; v < nodes_.leaf_of_vertex.size(); ++v)
         source_vertices[nodes_.leaf_of_vertex[v]] = v < vertices ? clean_.source_vertices[v] : clean_.unreferenced[v - vertices];
     g_->source_vertices = std::move(source_vertices);
+    parts_.emplace(nodes_.shape.links());
 }
 
 void TreeBuilder::place_vertices(const Clustering& clustering) {
@@ -292,7 +302,7 @@ void TreeBuilder::place_vertices(const Clustering& clustering) {
         weights[nodes_.leaf_of_vertex[v]] = surface_.areas[v];
         normals[nodes_.leaf_of_vertex[v]] = surface_.normals[v];
     }
-    const TreeParts parts(nodes_.shape);
+    const TreeParts& parts = *parts_;
     ProxyVertices proxies =
         place_proxies(nodes_.shape, parts, {source_, g_->source_vertices, weights, normals, g_->origin});
     for (std::size_t i = 0; i < clustering.positions.size(); ++i) {
@@ -330,8 +340,13 @@ void TreeBuilder::bound() {
         for (Index& t : triangles.sources) t = clean_.source_triangles[t];
         g_->source_triangles = std::move(triangles.sources);
     }
+    release(triangles.sources);
     const LeafPlaces places = find_places();
-    TreeParts parts(shape);
+    release(coincident_);
+    release(surface_.irregular);
+    release(nodes_.leaf_of_vertex);
+    release(nodes_.node_of_cluster);
+    TreeParts& parts = *parts_;
     parts.assign_triangles(triangles.first_triangle, triangles.triangles);
     const LeafRings rings = find_rings(triangles.triangles, places, parts);
     const BoundInput input{shape, parts, rings, g_->positions};
@@ -339,21 +354,17 @@ void TreeBuilder::bound() {
     NodeSpheres spheres = bound_spheres(input);
     g_->bounding_sphere = bound_corners(input);
     g_->displacement = bound_displacements(input, spheres.support);
-    NodeFacing facing = bound_facing(input, triangles.triangles, places, spheres.support, ancestors);
+    const std::vector<Directions> facing = bound_facing(input, triangles.triangles, places, spheres.support, ancestors);
     g_->support_spheres = std::move(spheres.support);
     std::vector<NodeBounds> bounds(shape.interior());
-    std::vector<std::uint32_t> mask_at(shape.interior());
-    MaskPool pool;
-    for (NodeId node = 0; node < shape.interior(); ++node) {
-        const Directions& seen = facing.directions[node];
-        bounds[node] = {spheres.ring[node], seen.slabs(), facing.flags[node], 0};
-        const std::uint32_t at = pool.add(seen.mask);
-        // A parent, which has a lower number, includes its children: a full pool still gives true masks that nest.
-        mask_at[node] = at != MaskPool::no_record ? at : mask_at[shape.parents[node]];
-    }
+    tbb::parallel_for(NodeId{0}, shape.interior(), [&](NodeId node) {
+        const auto flags = static_cast<std::uint8_t>(facing[node].marked() ? irregular_ring : 0);
+        bounds[node] = {spheres.ring[node], facing[node].slabs(), flags, 0};
+    });
+    PooledMasks masks = pool_masks(facing, shape.parents);
     g_->bounds = std::move(bounds);
-    g_->mask_at = std::move(mask_at);
-    g_->mask_records = pool.take();
+    g_->mask_at = std::move(masks.at);
+    g_->mask_records = std::move(masks.records);
     g_->parents = std::move(shape.parents);
     g_->first_leaf = std::move(shape.first_leaf);
     g_->leaf_end = std::move(shape.leaf_end);

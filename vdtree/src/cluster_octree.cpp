@@ -6,16 +6,15 @@
 #include <vdtree/builder.h>
 
 #include <algorithm>
-#include <atomic>
 #include <bit>
 #include <numeric>
 #include <span>
-#include <thread>
 
 #include <glm/common.hpp>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "progress_counter.h"
 #include "spatial_order.h"
 
 namespace unseen::vdtree {
@@ -111,27 +110,6 @@ private:
 
     std::span<const glm::dvec3> positions_;
     std::span<Index> parents_;
-};
-
-// Tells the caller how far clustering is, on the caller's own thread only, and everybody whether to stop.
-class VertexCounter {
-public:
-    VertexCounter(const Progress& progress, std::size_t all) : progress_(progress), all_(static_cast<double>(all)) {}
-
-    void add(std::size_t vertices) {
-        done_ += vertices;
-        if (progress_ && std::this_thread::get_id() == caller_ && !stopped_ &&
-            !progress_(static_cast<double>(done_) / all_, "clustering"))
-            stopped_ = true;
-    }
-    bool stopped() const { return stopped_; }
-
-private:
-    Progress progress_;
-    std::thread::id caller_ = std::this_thread::get_id();
-    double all_;
-    std::atomic<std::size_t> done_ = 0;
-    std::atomic<bool> stopped_ = false;
 };
 
 class Octree {
@@ -250,7 +228,7 @@ private:
     }
 
     std::span<const glm::dvec3> positions_;
-    VertexCounter counter_;
+    ProgressCounter counter_;
     Clustering result_;
     int bucket_shift_ = 0;
     std::vector<CodedIndex> items_, scratch_; // by bucket

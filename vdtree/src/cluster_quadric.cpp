@@ -9,12 +9,9 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
-#include <mutex>
 #include <numeric>
 #include <span>
-#include <thread>
 #include <utility>
 
 #include <glm/common.hpp>
@@ -24,6 +21,7 @@
 
 #include "help_cluster.h"
 #include "message.h"
+#include "progress_counter.h"
 #include "quadric.h"
 #include "quadric_contraction.h"
 #include "spatial_order.h"
@@ -328,29 +326,6 @@ PartMesh PartMaker::make(std::size_t part) const {
 
 // ---- the whole
 
-// Tells the caller how many merges are made, on the caller's own thread only, and everybody whether to stop.
-class MergeCounter {
-public:
-    MergeCounter(const Progress& progress, std::size_t merges_to_make)
-        : progress_(progress), all_(static_cast<double>(std::max<std::size_t>(merges_to_make, 1))) {}
-
-    bool add(std::size_t merges) {
-        done_ += merges;
-        if (progress_ && std::this_thread::get_id() == caller_ && !stopped_ &&
-            !progress_(std::min(1.0, static_cast<double>(done_) / all_), "clustering"))
-            stopped_ = true;
-        return !stopped_;
-    }
-    bool stopped() const { return stopped_; }
-
-private:
-    Progress progress_;
-    std::thread::id caller_ = std::this_thread::get_id();
-    double all_;
-    std::atomic<std::size_t> done_ = 0;
-    std::atomic<bool> stopped_ = false;
-};
-
 // What a contraction leaves when it has been joined into another.
 struct MergeRecord {
     std::vector<Merge> merges;
@@ -387,7 +362,7 @@ using Level = std::vector<MergeRecord>;
 // and so nobody waits in a circle.
 class PartContractor {
 public:
-    PartContractor(const PartMaker& maker, std::size_t parts, MergeCounter& counter, Team* team)
+    PartContractor(const PartMaker& maker, std::size_t parts, ProgressCounter& counter, Team* team)
         : maker_(maker), parts_(parts), counter_(counter), team_(team),
           members_(team ? std::min<std::size_t>(static_cast<std::size_t>(team->size()), parts) : 1),
           rank_(team ? static_cast<std::size_t>(team->rank()) : 0) {}
@@ -491,7 +466,7 @@ private:
 
     const PartMaker& maker_;
     std::size_t parts_;
-    MergeCounter& counter_;
+    ProgressCounter& counter_;
     Team* team_;
     std::size_t members_, rank_;
     std::vector<Level> levels_;
@@ -578,7 +553,7 @@ Result<Clustering> cluster_quadric(const ClusterInput& input, const Progress& pr
     const SpatialNumbering numbering = number_by_space(input.mesh.positions, input.coincident);
     const PartMaker maker(input, numbering);
     const std::size_t members = team ? static_cast<std::size_t>(team->size()) : 1; // each counts its own merges
-    MergeCounter counter(progress, (numbering.vertex_of_slot.size() - 1) / members);
+    ProgressCounter counter(progress, (numbering.vertex_of_slot.size() - 1) / members);
     if (!counter.add(0)) return Error{ErrorCode::cancelled, "Clustering was cancelled."};
     auto levels = PartContractor(maker, numbering.parts, counter, team).run();
     if (!levels) return levels.error();
@@ -589,7 +564,7 @@ Result<void> help_cluster_quadric(const ClusterInput& input, Team& team) {
     const SpatialNumbering numbering = number_by_space(input.mesh.positions, input.coincident);
     if (static_cast<std::size_t>(team.rank()) >= numbering.parts) return {}; // more members than parts
     const PartMaker maker(input, numbering);
-    MergeCounter counter({}, numbering.vertex_of_slot.size() - 1);
+    ProgressCounter counter({}, numbering.vertex_of_slot.size() - 1);
     const auto levels = PartContractor(maker, numbering.parts, counter, &team).run();
     if (!levels) return levels.error();
     return {};

@@ -1,13 +1,14 @@
 #include "directions.h"
 
 #include <bit>
+#include <cstring>
 
 namespace unseen::vdtree {
 
 namespace {
 
 constexpr float units = 127;    // of NormalSlabs in 1
-constexpr float margin = 1e-4f; // units; covers the rounding of unit vectors in floats
+constexpr float margin = 2e-4f; // units; covers the rounding of unit vectors in floats, here and in what checks them
 
 // Four numbers at a time (an extension that GCC and Clang share).
 using Floats = float __attribute__((vector_size(16)));
@@ -18,6 +19,7 @@ constexpr float s = 0.57735026918962576f;
 constexpr Floats axis_x[2] = {{1, 0, 0, s}, {-s, s, s, 0}};
 constexpr Floats axis_y[2] = {{0, 1, 0, s}, {s, -s, s, 0}};
 constexpr Floats axis_z[2] = {{0, 0, 1, s}, {s, s, -s, 0}};
+constexpr Ints is_axis = {-1, -1, -1, 0}; // of the second four
 
 // 128 more than the least whole units not below `along`.
 inline Ints reached(Floats along) { return 255 - __builtin_convertvector(units - margin - along, Ints); }
@@ -29,13 +31,39 @@ inline double row(double along, double b0, double b1, double b2) {
     return along < 0 ? 3 - steps : 4 + steps;
 }
 
-} // namespace
+template <std::size_t capacity>
+struct Batch {
+    std::size_t count;
+    const Corner (&triangles)[capacity][3];
+    int (&cells)[capacity];
+    Directions::Reach (&reach)[capacity];
+};
 
-void NormalBatch::measure() noexcept {
+// Coordinate `axis` of corner `corner` of all triangles is number 3 * corner + axis.
+template <std::size_t capacity>
+[[gnu::always_inline]] inline void transpose(const Corner (&triangles)[capacity][3], float (&coordinates)[9][capacity]) {
+    for (std::size_t i = 0; i < capacity; i += 4) {
+        for (std::size_t corner = 0; corner < 3; ++corner) {
+            const Floats a = triangles[i][corner], b = triangles[i + 1][corner];
+            const Floats c = triangles[i + 2][corner], d = triangles[i + 3][corner];
+            const Floats low_ab = __builtin_shuffle(a, b, Ints{0, 4, 1, 5}), low_cd = __builtin_shuffle(c, d, Ints{0, 4, 1, 5});
+            const Floats high_ab = __builtin_shuffle(a, b, Ints{2, 6, 3, 7}), high_cd = __builtin_shuffle(c, d, Ints{2, 6, 3, 7});
+            const Floats out[3] = {__builtin_shuffle(low_ab, low_cd, Ints{0, 1, 4, 5}),
+                                   __builtin_shuffle(low_ab, low_cd, Ints{2, 3, 6, 7}),
+                                   __builtin_shuffle(high_ab, high_cd, Ints{0, 1, 4, 5})};
+            for (std::size_t axis = 0; axis < 3; ++axis)
+                std::memcpy(&coordinates[3 * corner + axis][i], &out[axis], sizeof(Floats));
+        }
+    }
+}
+
+template <std::size_t capacity>
+[[gnu::always_inline]] inline void measure_all(const Batch<capacity>& batch) {
     // In doubles: cross products of differences of floats neither overflow when squared nor lose what cells depend on.
-    alignas(64) float x[capacity], y[capacity], z[capacity];
+    alignas(64) float corners[9][capacity], x[capacity], y[capacity], z[capacity];
+    transpose(batch.triangles, corners);
     for (std::size_t i = 0; i < capacity; ++i) {
-        const auto at = [&](std::size_t k) { return static_cast<double>(corners_[k][i]); };
+        const auto at = [&](std::size_t k) { return static_cast<double>(corners[k][i]); };
         const double ux = at(3) - at(0), uy = at(4) - at(1), uz = at(5) - at(2);
         const double vx = at(6) - at(0), vy = at(7) - at(1), vz = at(8) - at(2);
         const double nx = uy * vz - vy * uz, ny = uz * vx - vz * ux, nz = ux * vy - vx * uy;
@@ -48,20 +76,50 @@ void NormalBatch::measure() noexcept {
                      on_z = (nz < 0 ? 320.0 : 256.0) + rx + 8 * ry;
         const double on_xz = ax >= az ? on_x : on_z, on_yz = ay >= az ? on_y : on_z;
         const double cell = ax >= ay ? on_xz : on_yz;
-        cells_[i] = static_cast<int>(largest > 0 ? cell : -1.0);
-        const double scale = units / std::sqrt(largest > 0 ? nx * nx + ny * ny + nz * nz : 1.0);
+        batch.cells[i] = static_cast<int>(largest > 0 ? cell : -1.0);
+        const double scale = 1 / (largest > 0 ? largest : 1.0);
         x[i] = static_cast<float>(nx * scale);
         y[i] = static_cast<float>(ny * scale);
         z[i] = static_cast<float>(nz * scale);
     }
-    // Whole units outward: what is cut off is below the ends of the scale.
-    for (std::size_t i = 0; i < count_; ++i) {
-        const Floats low = x[i] * axis_x[0] + y[i] * axis_y[0] + z[i] * axis_z[0],
-                     high = x[i] * axis_x[1] + y[i] * axis_y[1] + z[i] * axis_z[1];
-        const auto reach = std::bit_cast<std::array<int, 16>>(
-            std::array<Ints, 4>{reached(low), reached(high), reached(-low), reached(-high)});
-        for (std::size_t k = 0; k < 16; ++k) reach_[i][k] = static_cast<std::uint8_t>(reach[k]);
+    // Now that the largest component is 1, floats do.
+    for (std::size_t i = 0; i < capacity; ++i) {
+        const float squared = x[i] * x[i] + y[i] * y[i] + z[i] * z[i], scale = units / std::sqrt(squared > 0 ? squared : 1);
+        x[i] *= scale;
+        y[i] *= scale;
+        z[i] *= scale;
     }
+    // Whole units outward: what is cut off is below the ends of the scale. Four numbers of eight bits are shifted into each lane.
+    for (std::size_t i = 0; i < batch.count; ++i) {
+        const Floats first = x[i] * axis_x[0] + y[i] * axis_y[0] + z[i] * axis_z[0],
+                     second = x[i] * axis_x[1] + y[i] * axis_y[1] + z[i] * axis_z[1];
+        const Ints reach = reached(first) | reached(-first) << 8 |
+                           ((reached(second) | reached(-second) << 8) & is_axis) << 16;
+        batch.reach[i] = std::bit_cast<Directions::Reach>(reach);
+    }
+}
+
+using FullBatch = Batch<NormalBatch::capacity>;
+
+#if defined(__x86_64__) && defined(__GNUC__)
+
+[[gnu::target("avx2")]] void measure_avx2(const FullBatch& batch) { measure_all(batch); }
+const bool has_avx2 = __builtin_cpu_supports("avx2");
+
+#else
+
+void measure_avx2(const FullBatch&) {}
+constexpr bool has_avx2 = false;
+
+#endif
+
+} // namespace
+
+// Neither has fused operations, so both give the same bits.
+void NormalBatch::measure() noexcept {
+    const FullBatch batch{count_, triangles_, cells_, reach_};
+    if (has_avx2) measure_avx2(batch);
+    else measure_all(batch);
     count_ = 0;
 }
 

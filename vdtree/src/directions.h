@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 
 #include <glm/common.hpp>
 #include <glm/vec3.hpp>
@@ -34,33 +36,56 @@ inline int cell_of(glm::dvec3 v, double largest) noexcept {
 
 struct alignas(64) Directions {
     NormalMask mask;
-    // By slab: 128 more than its upper end, then 128 more than its lower end's opposite; 0: nothing yet.
-    std::array<std::uint8_t, 16> reach{};
+    // For each slab two bytes: 128 more than its upper end, and 128 more than its lower end's opposite; 0: nothing yet. In the order
+    // in which NormalBatch comes by them; the last two bytes are of no slab.
+    using Reach = std::array<std::uint8_t, 16>;
+    Reach reach{};
 
     Directions& operator|=(const Directions& other) noexcept {
-        mask |= other.mask;
+        using Bits = std::uint64_t __attribute__((vector_size(16)));
+        for (std::size_t i = 0; i < mask.faces.size(); i += 2) {
+            Bits mine, theirs;
+            std::memcpy(&mine, &mask.faces[i], sizeof(Bits));
+            std::memcpy(&theirs, &other.mask.faces[i], sizeof(Bits));
+            mine |= theirs;
+            std::memcpy(&mask.faces[i], &mine, sizeof(Bits));
+        }
         widen(other.reach);
         return *this;
     }
-    void widen(const std::array<std::uint8_t, 16>& other) noexcept {
-        for (std::size_t i = 0; i < reach.size(); ++i) reach[i] = std::max(reach[i], other[i]);
+    void widen(const Reach& other) noexcept {
+        using Bytes = std::uint8_t __attribute__((vector_size(16)));
+        const Bytes mine = std::bit_cast<Bytes>(reach), theirs = std::bit_cast<Bytes>(other);
+        reach = std::bit_cast<Reach>(mine > theirs ? mine : theirs);
     }
     static Directions everything() noexcept {
         Directions all;
         all.mask.faces.fill(~std::uint64_t{0});
         all.reach.fill(255);
+        all.mark(false);
         return all;
     }
     NormalSlabs slabs() const noexcept {
         NormalSlabs out;
         if (reach[0] == 0) return out;
         for (std::size_t i = 0; i < NormalSlabs::axis_count; ++i) {
-            out.hi[i] = static_cast<std::int8_t>(reach[i] - 128);
-            out.lo[i] = static_cast<std::int8_t>(128 - reach[8 + i]);
+            out.hi[i] = static_cast<std::int8_t>(reach[upper_end(i)] - 128);
+            out.lo[i] = static_cast<std::int8_t>(128 - reach[upper_end(i) + 1]);
         }
         return out;
     }
+
+    // A mark that unions keep, for whoever collects directions to have one fact more with them.
+    void mark(bool marked) noexcept { reach[mark_byte] = marked ? 1 : 0; }
+    bool marked() const noexcept { return reach[mark_byte] != 0; }
+
+private:
+    static constexpr std::size_t mark_byte = 15;
+    static constexpr std::size_t upper_end(std::size_t slab) noexcept { return slab % 4 * 4 + slab / 4 * 2; }
 };
+
+// A corner of a triangle: x, y and z, and a fourth number that does not matter.
+using Corner = float __attribute__((vector_size(16)));
 
 // Finds the directions of the normals of many triangles at once: several per instruction.
 class NormalBatch {
@@ -69,13 +94,10 @@ public:
 
     bool full() const noexcept { return count_ == capacity; }
     std::size_t size() const noexcept { return count_; }
-    void push(glm::vec3 a, glm::vec3 b, glm::vec3 c) noexcept {
-        for (int axis = 0; axis < 3; ++axis) {
-            const auto k = static_cast<std::size_t>(axis);
-            corners_[k][count_] = a[axis];
-            corners_[3 + k][count_] = b[axis];
-            corners_[6 + k][count_] = c[axis];
-        }
+    void push(Corner a, Corner b, Corner c) noexcept {
+        triangles_[count_][0] = a;
+        triangles_[count_][1] = b;
+        triangles_[count_][2] = c;
         ++count_;
     }
 
@@ -90,9 +112,9 @@ public:
 
 private:
     std::size_t count_ = 0;
-    alignas(64) float corners_[9][capacity];
+    alignas(64) Corner triangles_[capacity][3];
     alignas(64) int cells_[capacity];
-    alignas(64) std::array<std::uint8_t, 16> reach_[capacity];
+    alignas(64) Directions::Reach reach_[capacity];
 };
 
 } // namespace unseen::vdtree

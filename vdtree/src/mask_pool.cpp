@@ -3,46 +3,70 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <functional>
-#include <string_view>
-#include <utility>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 
 namespace unseen::vdtree {
 
 namespace {
 
-constexpr std::size_t first_slots = 1024;
+// Equal masks are found in so many independent groups.
+constexpr std::uint32_t group_bits = 3;
 
-std::uint8_t row_of(std::uint64_t face, int row) { return static_cast<std::uint8_t>(face >> (8 * row)); }
+constexpr std::uint32_t no_record = 0xffffffffu;
+
+// Which of the eight bytes are not 0.
+std::uint8_t rows_of(std::uint64_t face) {
+    constexpr std::uint64_t low_bits = 0x7f7f7f7f7f7f7f7f, gather_bytes = 0x0102040810204080;
+    const std::uint64_t high_bits = (((face & low_bits) + low_bits) | face) & ~low_bits;
+    return static_cast<std::uint8_t>((high_bits >> 7) * gather_bytes >> 56);
+}
 
 // The number of bytes of the record.
 std::size_t pack(const NormalMask& mask, std::array<std::uint8_t, most_mask_bytes>& out) {
     std::size_t size = 1;
     out[0] = 0;
     for (std::size_t face = 0; face < mask.faces.size(); ++face) {
-        if (mask.faces[face] == 0) continue;
+        const std::uint8_t face_rows = rows_of(mask.faces[face]);
+        if (face_rows == 0) continue;
         out[0] |= static_cast<std::uint8_t>(1u << face);
-        std::uint8_t& rows = out[size++];
-        rows = 0;
-        for (int row = 0; row < 8; ++row) {
-            const std::uint8_t cells = row_of(mask.faces[face], row);
-            if (cells == 0) continue;
-            rows |= static_cast<std::uint8_t>(1u << row);
-            out[size++] = cells;
-        }
+        out[size++] = face_rows;
+        for (unsigned rows = face_rows; rows; rows &= rows - 1)
+            out[size++] = static_cast<std::uint8_t>(mask.faces[face] >> (8 * std::countr_zero(rows)));
     }
     return size;
 }
 
-std::size_t record_bytes(const std::uint8_t* record) {
-    std::size_t size = 1;
-    for (int face = std::popcount(record[0]); face > 0; --face)
-        size += 1 + static_cast<std::size_t>(std::popcount(record[size]));
-    return size;
+std::uint32_t hash(const NormalMask& mask) {
+    constexpr std::uint64_t odd = 0x9e3779b97f4a7c15;
+    std::uint64_t h = 0;
+    for (const std::uint64_t face : mask.faces) h = (std::rotl(h, 23) ^ face) * odd;
+    return static_cast<std::uint32_t>((h ^ h >> 29) * odd >> 32);
 }
 
-std::size_t hash(std::span<const std::uint8_t> record) {
-    return std::hash<std::string_view>{}({reinterpret_cast<const char*>(record.data()), record.size()});
+// For each node, the first one with the same mask.
+std::vector<NodeId> find_equal(std::span<const Directions> nodes) {
+    std::vector<std::uint32_t> hashes(nodes.size());
+    tbb::parallel_for(std::size_t{0}, nodes.size(), [&](std::size_t n) { hashes[n] = hash(nodes[n].mask); });
+    std::vector<NodeId> first(nodes.size());
+    tbb::parallel_for(std::uint32_t{0}, std::uint32_t{1} << group_bits, [&](std::uint32_t group) {
+        const auto is_ours = [&](std::size_t n) { return hashes[n] >> (32 - group_bits) == group; };
+        std::size_t count = 0;
+        for (std::size_t n = 0; n < nodes.size(); ++n) count += is_ours(n);
+        const std::size_t wrap = std::bit_ceil(2 * count + 1) - 1;
+        std::vector<NodeId> table(wrap + 1, no_node);
+        for (std::size_t n = 0; n < nodes.size(); ++n) {
+            if (!is_ours(n)) continue;
+            std::size_t slot = hashes[n] & wrap;
+            while (table[slot] != no_node &&
+                   !(hashes[table[slot]] == hashes[n] && nodes[table[slot]].mask == nodes[n].mask))
+                slot = (slot + 1) & wrap;
+            if (table[slot] == no_node) table[slot] = static_cast<NodeId>(n);
+            first[n] = table[slot];
+        }
+    });
+    return first;
 }
 
 } // namespace
@@ -62,45 +86,40 @@ NormalMask unpack_mask(std::span<const std::uint8_t> records, std::size_t at) no
     return mask;
 }
 
-std::span<const std::uint8_t> MaskPool::record_at(std::uint32_t at) const {
-    return std::span(records_).subspan(at, record_bytes(records_.data() + at));
-}
-
-// The slot that holds the record, or the empty one where it belongs.
-std::size_t MaskPool::slot_of(std::span<const std::uint8_t> record) const {
-    const std::size_t wrap = slots_.size() - 1;
-    std::size_t slot = hash(record) & wrap;
-    while (slots_[slot] != no_record && !std::ranges::equal(record_at(slots_[slot]), record)) slot = (slot + 1) & wrap;
-    return slot;
-}
-
-void MaskPool::grow() {
-    const std::vector<std::uint32_t> old = std::exchange(
-        slots_, std::vector<std::uint32_t>(std::max(first_slots, 2 * slots_.size()), std::uint32_t{no_record}));
-    for (const std::uint32_t at : old)
-        if (at != no_record) slots_[slot_of(record_at(at))] = at;
-}
-
-std::uint32_t MaskPool::add(const NormalMask& mask) {
-    if (used_ * 2 >= slots_.size()) grow();
-    std::array<std::uint8_t, most_mask_bytes> bytes;
-    const std::span<const std::uint8_t> record(bytes.data(), pack(mask, bytes));
-    std::uint32_t& slot = slots_[slot_of(record)];
-    if (slot == no_record) {
-        if (records_.size() >= no_record - most_mask_bytes) return no_record;
-        slot = static_cast<std::uint32_t>(records_.size());
-        records_.insert(records_.end(), record.begin(), record.end());
-        ++used_;
+PooledMasks pool_masks(std::span<const Directions> nodes, std::span<const NodeId> parents) {
+    constexpr std::size_t grain = 4096; // nodes
+    PooledMasks pool;
+    pool.at = find_equal(nodes);
+    std::vector<std::uint8_t> sizes(nodes.size(), 0); // of the records, by first node; 0: none
+    const auto for_each_first = [&](auto&& f) {
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, nodes.size(), grain), [&](const auto& range) {
+            std::array<std::uint8_t, most_mask_bytes> record;
+            for (std::size_t n = range.begin(); n < range.end(); ++n) f(n, record);
+        });
+    };
+    for_each_first([&](std::size_t n, auto& record) {
+        if (pool.at[n] == n) sizes[n] = static_cast<std::uint8_t>(pack(nodes[n].mask, record));
+    });
+    std::uint32_t end = 0;
+    for (std::size_t n = 0; n < nodes.size(); ++n) {
+        const NodeId first = pool.at[n];
+        if (first == n && sizes[n] > no_record - most_mask_bytes - end) sizes[n] = 0;
+        if (sizes[first] == 0) {
+            pool.at[n] = pool.at[parents[n]];
+        } else if (first == n) {
+            pool.at[n] = end;
+            end += sizes[n];
+        } else {
+            pool.at[n] = pool.at[first];
+        }
     }
-    return slot;
-}
-
-std::vector<std::uint8_t> MaskPool::take() {
-    records_.resize(records_.size() + most_mask_bytes, 0);
-    records_.shrink_to_fit();
-    slots_ = {};
-    used_ = 0;
-    return std::exchange(records_, {});
+    pool.records.assign(end + most_mask_bytes, 0);
+    for_each_first([&](std::size_t n, auto& record) {
+        if (sizes[n] == 0) return;
+        pack(nodes[n].mask, record);
+        std::copy_n(record.data(), sizes[n], pool.records.data() + pool.at[n]);
+    });
+    return pool;
 }
 
 } // namespace unseen::vdtree

@@ -10,6 +10,9 @@
 #include <vector>
 
 #include <vdtree/normal_mask.h>
+#include <vdtree/vertex_tree.h>
+
+#include "directions.h"
 
 namespace unseen::vdtree {
 
@@ -20,23 +23,13 @@ inline constexpr std::size_t most_mask_bytes = 1 + 6 * (1 + 8);
 // The mask whose record begins at `at`; everything where that leads beyond the last record.
 NormalMask unpack_mask(std::span<const std::uint8_t> records, std::size_t at) noexcept;
 
-class MaskPool {
-public:
-    static constexpr std::uint32_t no_record = 0xffffffffu;
-
-    // Where the mask's record begins; no_record when the records would outgrow their 32-bit offsets.
-    std::uint32_t add(const NormalMask& mask);
-
-    std::vector<std::uint8_t> take(); // the records with the zeros behind
-
-private:
-    void grow();
-    std::size_t slot_of(std::span<const std::uint8_t> record) const;
-    std::span<const std::uint8_t> record_at(std::uint32_t at) const;
-
-    std::vector<std::uint8_t> records_;
-    std::vector<std::uint32_t> slots_; // hash table of records; its length is a power of two
-    std::size_t used_ = 0;
+struct PooledMasks {
+    std::vector<std::uint8_t> records; // with the zeros behind
+    std::vector<std::uint32_t> at;     // by node: where the record of its mask begins
 };
+
+// Records in the order of the nodes that have their mask first; parallel. Where records would outgrow their 32-bit offsets, nodes
+// get their parents' masks, which include theirs; a parent has a lower number.
+PooledMasks pool_masks(std::span<const Directions> nodes, std::span<const NodeId> parents);
 
 } // namespace unseen::vdtree

@@ -24,7 +24,9 @@ PackedNormal PackedNormal::nearest(glm::vec3 direction) noexcept {
     if (!(size > 0) || !std::isfinite(size)) return {};
     glm::dvec2 p(n.x / size, n.y / size);
     if (n.z < 0) p = fold_over(p.x, p.y);
-    const auto rounded = [](double v) { return static_cast<std::int16_t>(std::lround(std::clamp(v, -1.0, 1.0) * largest)); };
+    const auto rounded = [](double v) {
+        return static_cast<std::int16_t>(std::clamp(v, -1.0, 1.0) * largest + std::copysign(0.5, v));
+    };
     return {rounded(p.x), rounded(p.y)};
 }
 

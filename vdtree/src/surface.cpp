@@ -4,6 +4,8 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstddef>
+#include <cstring>
 #include <functional>
 #include <numeric>
 #include <utility>
@@ -12,6 +14,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
+#include <tbb/task_arena.h>
 
 #include "unit_vector.h"
 
@@ -127,35 +130,84 @@ struct Incidence {
 Incidence find_incidence(const MeshView& mesh, std::span<const Index> coincident) {
     Incidence incidence;
     incidence.start.assign(mesh.positions.size() + 1, 0);
-    for (const Triangle& t : mesh.triangles)
-        for (const Index v : t) ++incidence.start[coincident[v]];
+    // Each thread looks at all triangles, for a range of the places: they are soon seen, and counting is what takes time.
+    constexpr int most_ranges = 8;
+    const auto ranges = static_cast<std::size_t>(std::min(tbb::this_task_arena::max_concurrency(), most_ranges));
+    const auto for_each_use = [&](auto&& use) {
+        tbb::parallel_for(std::size_t{0}, ranges, [&](std::size_t r) {
+            const std::size_t begin = mesh.positions.size() * r / ranges, size = mesh.positions.size() * (r + 1) / ranges - begin;
+            for (std::size_t t = mesh.triangles.size(); t-- > 0;)
+                for (const Index v : mesh.triangles[t])
+                    if (coincident[v] - begin < size) use(incidence.start[coincident[v]], t);
+        });
+    };
+    for_each_use([](Index& count, std::size_t) { ++count; });
     std::partial_sum(incidence.start.begin(), incidence.start.end(), incidence.start.begin());
     incidence.triangles.resize(mesh.triangles.size() * 3);
-    for (std::size_t t = mesh.triangles.size(); t-- > 0;)
-        for (const Index v : mesh.triangles[t])
-            incidence.triangles[--incidence.start[coincident[v]]] = static_cast<Index>(t);
+    for_each_use([&](Index& end, std::size_t t) { incidence.triangles[--end] = static_cast<Index>(t); });
     return incidence;
 }
 
-// Whether every edge at the vertices around which `out` follow and `in` precede has two triangles that run it in opposite ways:
-// each neighbour follows once and precedes once.
-bool is_regular(std::vector<Index>& out, std::vector<Index>& in) {
-    constexpr std::size_t few = 16;
-    if (out.size() > few) {
-        std::sort(out.begin(), out.end());
-        std::sort(in.begin(), in.end());
-        return out == in && std::adjacent_find(out.begin(), out.end()) == out.end();
-    }
-    for (std::size_t i = 0; i < out.size(); ++i) {
-        int followed = 0, preceded = 0;
-        for (std::size_t k = 0; k < out.size(); ++k) {
-            followed += out[k] == out[i];
-            preceded += in[k] == out[i];
+// The ends of the edges around a place: `following` in the triangles there, and `preceding`.
+class Fan {
+public:
+    void clear() { size_ = 0; }
+    void add(Index following, Index preceding) {
+        if (size_ == following_.size()) {
+            following_.resize(2 * size_ + few);
+            preceding_.resize(following_.size());
         }
-        if (followed != 1 || preceded != 1) return false;
+        following_[size_] = following;
+        preceding_[size_++] = preceding;
     }
-    return true;
-}
+
+    // Whether every edge has two triangles that run it in opposite ways: each neighbour follows once and precedes once. Sorts what
+    // was added.
+    bool is_regular() {
+        if (size_ > few) return is_large_regular();
+        constexpr Index no_neighbour = ~Index{0};
+        std::size_t padded = size_;
+        for (; padded % lanes != 0; ++padded) following_[padded] = preceding_[padded] = no_neighbour;
+        Lanes irregular{};
+        for (std::size_t i = 0; i < size_; ++i) {
+            const Index one = following_[i];
+            const Lanes same = {one, one, one, one};
+            Lanes followed{}, preceded{}; // less than none, by lane
+            for (std::size_t k = 0; k < padded; k += lanes) {
+                followed += load(following_, k) == same;
+                preceded += load(preceding_, k) == same;
+            }
+            irregular |= (sum_of_lanes(followed) ^ minus_one) | (sum_of_lanes(preceded) ^ minus_one);
+        }
+        return irregular[0] == 0;
+    }
+
+private:
+    using Lanes = Index __attribute__((vector_size(16)));
+    static constexpr std::size_t lanes = 4, few = 16;
+    static constexpr Lanes minus_one = {~Index{0}, ~Index{0}, ~Index{0}, ~Index{0}};
+
+    static Lanes load(const std::vector<Index>& v, std::size_t i) {
+        Lanes out;
+        std::memcpy(&out, v.data() + i, sizeof(out));
+        return out;
+    }
+    static Lanes sum_of_lanes(Lanes v) {
+        v += __builtin_shuffle(v, Lanes{2, 3, 0, 1});
+        return v + __builtin_shuffle(v, Lanes{1, 0, 3, 2});
+    }
+
+    bool is_large_regular() {
+        const auto end = static_cast<std::ptrdiff_t>(size_);
+        std::sort(following_.begin(), following_.begin() + end);
+        std::sort(preceding_.begin(), preceding_.begin() + end);
+        return std::equal(following_.begin(), following_.begin() + end, preceding_.begin()) &&
+               std::adjacent_find(following_.begin(), following_.begin() + end) == following_.begin() + end;
+    }
+
+    std::size_t size_ = 0;
+    std::vector<Index> following_, preceding_;
+};
 
 // Looks at one position after another.
 class SurfaceWorker {
@@ -164,22 +216,22 @@ public:
         : mesh_(mesh), coincident_(coincident), incidence_(incidence), surface_(surface) {}
 
     void operator()(std::size_t v) {
-        following_.clear(), preceding_.clear();
+        fan_.clear();
         const glm::dvec3 here = mesh_.positions[v];
         glm::dvec3 sum(0);
         for (const Index t : incidence_.around(v)) {
             const Triangle& corners = mesh_.triangles[t];
             const Triangle w = {coincident_[corners[0]], coincident_[corners[1]], coincident_[corners[2]]};
             if (w[0] == w[1] || w[1] == w[2] || w[2] == w[0]) continue; // it has neither edges nor an area
-            const std::size_t k = w[0] == v ? 0 : w[1] == v ? 1 : 2;
-            following_.push_back(w[(k + 1) % 3]);
-            preceding_.push_back(w[(k + 2) % 3]);
-            const glm::dvec3 area =
-                glm::cross(mesh_.positions[corners[(k + 1) % 3]] - here, mesh_.positions[corners[(k + 2) % 3]] - here);
+            const std::size_t k = (w[1] == v) + 2u * (w[2] == v);
+            constexpr std::size_t next[] = {1, 2, 0, 1};
+            const std::size_t after = next[k], before = next[k + 1];
+            fan_.add(w[after], w[before]);
+            const glm::dvec3 area = glm::cross(mesh_.positions[corners[after]] - here, mesh_.positions[corners[before]] - here);
             sum += area;
             surface_.areas[corners[k]] += glm::length(area) / 6;
         }
-        surface_.irregular[v] = !is_regular(following_, preceding_);
+        surface_.irregular[v] = !fan_.is_regular();
         surface_.normals[v] = glm::vec3(unit(sum));
     }
 
@@ -188,7 +240,7 @@ private:
     std::span<const Index> coincident_;
     const Incidence& incidence_;
     Surface& surface_;
-    std::vector<Index> following_, preceding_;
+    Fan fan_;
 };
 
 // How well the mesh's own normals agree with its faces: positive where they do.
@@ -265,14 +317,21 @@ Surface analyse_surface(const MeshView& mesh, std::span<const Index> coincident)
     const bool inward = surface.closedness == Closedness::closed_inward;
     const float face_sign = inward ? -1 : 1;
     const double own_sign = inward && agreement_of_own_normals(mesh) > 0 ? -1 : 1;
-    // A vertex is as irregular as the position that it shares. Those that stand for their positions come before the others.
-    for (std::size_t v = vertices; v-- > 0;) {
-        const Index place = coincident[v];
-        surface.irregular[v] = surface.irregular[place];
-        const bool own = !mesh.normals.empty() && has_length(mesh.normals[v]);
-        surface.normals[v] =
-            own ? glm::vec3(own_sign * unit(glm::dvec3(mesh.normals[v]))) : face_sign * surface.normals[place];
-    }
+    // A vertex is as irregular as the position that it shares. Those that stand for their positions come last, for the others read them.
+    const auto complete = [&](bool standing) {
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices, grain), [&](const auto& range) {
+            for (std::size_t v = range.begin(); v < range.end(); ++v) {
+                const Index place = coincident[v];
+                if ((place == v) != standing) continue;
+                surface.irregular[v] = surface.irregular[place];
+                const bool own = !mesh.normals.empty() && has_length(mesh.normals[v]);
+                surface.normals[v] =
+                    own ? glm::vec3(own_sign * unit(glm::dvec3(mesh.normals[v]))) : face_sign * surface.normals[place];
+            }
+        });
+    };
+    complete(false);
+    complete(true);
     return surface;
 }
 

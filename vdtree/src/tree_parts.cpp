@@ -13,21 +13,21 @@ constexpr Index least_leaves = 1024; // of a part that is worth a task
 
 } // namespace
 
-TreeParts::TreeParts(const TreeShape& shape)
-    : shape_(shape), top_{0, shape.interior(), 0, shape.leaves(), 0, 0, {}}, is_top_(shape.interior(), 0) {
-    const Index most_leaves = std::max(shape.leaves() / most_parts, least_leaves);
-    for (NodeId node = 0; node < shape.interior();) {
-        const Index first_leaf = shape.first_leaf[node], leaf_end = shape.leaf_end[node];
+TreeParts::TreeParts(const TreeLinks& tree)
+    : tree_(tree), top_{0, tree.interior(), 0, tree.leaves(), 0, 0, {}}, is_top_(tree.interior(), 0) {
+    const Index most_leaves = std::max(tree.leaves() / most_parts, least_leaves);
+    for (NodeId node = 0; node < tree.interior();) {
+        const Index first_leaf = tree.first_leaf[node], leaf_end = tree.leaf_end[node];
         if (leaf_end - first_leaf > most_leaves) {
             is_top_[node] = 1;
             top_nodes_.push_back(node++);
             continue;
         }
-        const NodeId end = shape.subtree_end[node];
+        const NodeId end = tree.subtree_end[node];
         TreePart* before = parts_.empty() ? nullptr : &parts_.back();
         // Small siblings share a part, but for leaves of their parent between them.
         if (before && before->end == node && before->leaf_end == first_leaf &&
-            shape.parents[before->begin] == shape.parents[node] && leaf_end - before->first_leaf <= most_leaves) {
+            tree.parents[before->begin] == tree.parents[node] && leaf_end - before->first_leaf <= most_leaves) {
             before->end = end;
             before->leaf_end = leaf_end;
         } else {

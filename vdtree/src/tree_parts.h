@@ -22,7 +22,8 @@ struct TreePart {
 
 class TreeParts {
 public:
-    explicit TreeParts(const TreeShape& shape);
+    // The links must stay where they are.
+    explicit TreeParts(const TreeLinks& tree);
 
     // To be called before for_each_triangle().
     void assign_triangles(std::span<const Index> first_triangle, std::span<const Triangle> triangles);
@@ -32,7 +33,7 @@ public:
         return &part == &top_ ? is_top_[node] : node - part.begin < part.end - part.begin;
     }
     bool owns_leaf(const TreePart& part, Index leaf) const {
-        return &part == &top_ ? is_top_[shape_.parents[shape_.node_of_leaf(leaf)]]
+        return &part == &top_ ? is_top_[tree_.parents[tree_.node_of_leaf(leaf)]]
                               : leaf - part.first_leaf < part.leaf_end - part.first_leaf;
     }
 
@@ -61,7 +62,7 @@ public:
     }
 
 private:
-    const TreeShape& shape_;
+    TreeLinks tree_;
     std::vector<TreePart> parts_; // ascending
     TreePart top_;
     std::vector<NodeId> top_nodes_;    // ascending

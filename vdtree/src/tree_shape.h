@@ -8,13 +8,12 @@
 
 namespace unseen::vdtree {
 
-// Numbered as in <vdtree/vertex_tree.h>: interior nodes depth-first, then the leaves.
-struct TreeShape {
-    std::vector<NodeId> parents;   // by node
-    std::vector<Index> first_leaf; // by interior node, and so on
-    std::vector<Index> leaf_end;
-    std::vector<NodeId> subtree_end;
-    std::vector<Index> made; // when the clusterer made the node: its cluster's number, higher than its children's
+// How the nodes hang together; numbered as in <vdtree/vertex_tree.h>: interior nodes depth-first, then the leaves.
+struct TreeLinks {
+    std::span<const NodeId> parents;   // by node
+    std::span<const Index> first_leaf; // by interior node, and so on
+    std::span<const Index> leaf_end;
+    std::span<const NodeId> subtree_end;
 
     NodeId interior() const { return static_cast<NodeId>(first_leaf.size()); }
     Index leaves() const { return static_cast<Index>(parents.size() - first_leaf.size()); }
@@ -24,8 +23,10 @@ struct TreeShape {
     template <class Child, class Leaf>
     void for_each_child(NodeId node, Child&& on_child, Leaf&& on_leaf) const {
         NodeId child = node + 1;
-        for (Index leaf = first_leaf[node]; leaf < leaf_end[node];) {
-            if (child < subtree_end[node] && first_leaf[child] == leaf) {
+        const NodeId child_end = subtree_end[node];
+        const Index end = leaf_end[node];
+        for (Index leaf = first_leaf[node]; leaf < end;) {
+            if (child < child_end && first_leaf[child] == leaf) {
                 on_child(child);
                 leaf = leaf_end[child];
                 child = subtree_end[child];
@@ -33,6 +34,24 @@ struct TreeShape {
                 on_leaf(leaf++);
             }
         }
+    }
+};
+
+// The same while the tree is being built.
+struct TreeShape {
+    std::vector<NodeId> parents;
+    std::vector<Index> first_leaf;
+    std::vector<Index> leaf_end;
+    std::vector<NodeId> subtree_end;
+    std::vector<Index> made; // by interior node: when the clusterer made it: its cluster's number, higher than its children's
+
+    TreeLinks links() const { return {parents, first_leaf, leaf_end, subtree_end}; }
+    NodeId interior() const { return links().interior(); }
+    Index leaves() const { return links().leaves(); }
+    NodeId node_of_leaf(Index leaf) const { return interior() + leaf; }
+    template <class Child, class Leaf>
+    void for_each_child(NodeId node, Child&& on_child, Leaf&& on_leaf) const {
+        links().for_each_child(node, on_child, on_leaf);
     }
 };
 

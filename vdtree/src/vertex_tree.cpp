@@ -5,9 +5,12 @@
 #include <string>
 
 #include <glm/geometric.hpp>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 
 #include "mask_pool.h"
 #include "node_check.h"
+#include "tree_parts.h"
 
 namespace unseen::vdtree {
 
@@ -32,17 +35,73 @@ PackedRange shortened(PackedRange ring, PackedRange spread) {
     return {ring.lo, {static_cast<std::uint16_t>(std::min<int>(ring.hi.value, hi))}};
 }
 
-// A third of the area of the triangles around each leaf, in double against overflow at extreme scales.
-std::vector<double> leaf_areas(const TreeGeometry& g, NodeId interior) {
-    std::vector<double> areas(g.first_leaf.empty() ? 0 : g.leaf_end[0], 0.0);
-    for (const Triangle& t : g.triangles) {
-        const glm::dvec3 a = g.positions[interior + t[0]], b = g.positions[interior + t[1]],
-                         c = g.positions[interior + t[2]];
-        const double area = glm::length(glm::cross(b - a, c - a)) / 6;
-        for (const Index leaf : t) areas[leaf] += area;
-    }
-    return areas;
+TreeLinks links_of(const TreeGeometry& g) {
+    return {g.parents, g.first_leaf, g.leaf_end, g.subtree_end};
 }
+
+// By leaf: the luminance of the triangles around, its own where there is none, and a third of their area, in double against
+// overflow at extreme scales. And the luminance of all corners.
+struct LeafSurroundings {
+    std::vector<PackedRange> ring;
+    std::vector<double> areas;
+    PackedRange corners = empty_range;
+};
+
+LeafSurroundings survey_leaves(const TreeGeometry& g, const TreeParts& parts, std::span<const Unorm16> luminance) {
+    const NodeId interior = static_cast<NodeId>(g.first_leaf.size());
+    LeafSurroundings out;
+    out.ring.assign(g.leaf_end[0], empty_range);
+    out.areas.assign(g.leaf_end[0], 0.0);
+    parts.for_each_triangle([&](const TreePart& part) {
+        return [&](Index triangle) {
+            const Triangle& t = g.triangles[triangle];
+            const glm::dvec3 a = g.positions[interior + t[0]], b = g.positions[interior + t[1]],
+                             c = g.positions[interior + t[2]];
+            const double area = glm::length(glm::cross(b - a, c - a)) / 6;
+            PackedRange range = empty_range;
+            for (const Index leaf : t) range = unite(range, luminance[interior + leaf]);
+            for (const Index leaf : t) {
+                if (!parts.owns_leaf(part, leaf)) continue;
+                out.areas[leaf] += area;
+                out.ring[leaf] = unite(out.ring[leaf], range);
+            }
+        };
+    });
+    for (Index leaf = 0; leaf < out.ring.size(); ++leaf) {
+        if (out.ring[leaf] == empty_range) out.ring[leaf] = unite(empty_range, luminance[interior + leaf]);
+        else out.corners = unite(out.corners, luminance[interior + leaf]);
+    }
+    return out;
+}
+
+// Area-weighted means over ranges of leaves.
+class RunningSums {
+public:
+    RunningSums(std::span<const double> areas, std::span<const Unorm16> luminance)
+        : area_(areas.size() + 1, 0.0), weighted_(areas.size() + 1, 0.0), plain_(areas.size() + 1, 0.0) {
+        double largest = 0;
+        for (const double a : areas) largest = std::max(largest, a);
+        const double scale = largest > 0 ? 1 / largest : 0;
+        for (std::size_t leaf = 0; leaf < areas.size(); ++leaf) {
+            const double area = areas[leaf] * scale, y = luminance[leaf].value;
+            area_[leaf + 1] = area_[leaf] + area;
+            weighted_[leaf + 1] = weighted_[leaf] + area * y;
+            plain_[leaf + 1] = plain_[leaf] + y;
+        }
+    }
+
+    // In units of Unorm16.
+    double mean(Index begin, Index end) const {
+        // Below this share of the largest vertex area, per leaf, the difference of two running sums is rounding noise.
+        constexpr double least_mean_area = 1e-9;
+        const double area = area_[end] - area_[begin];
+        if (area > least_mean_area * (end - begin)) return (weighted_[end] - weighted_[begin]) / area;
+        return (plain_[end] - plain_[begin]) / (end - begin);
+    }
+
+private:
+    std::vector<double> area_, weighted_, plain_; // by leaf: over those before it
+};
 
 // Whether all leaves of a node lie at one point, its proxy's: then folding it moves nothing.
 bool is_coincident(const TreeGeometry& g, NodeId node) { return g.support_spheres[node].radius == 0; }
@@ -59,89 +118,64 @@ float vertex_luminance(glm::vec3 normal, const glm::vec4* colour, const Light& l
     return std::max(0.0f, std::min(1.0f, albedo * lit));
 }
 
-TreeLuminance derive_luminance(const TreeGeometry& g, const Light& light, bool prelit) {
-    const NodeId interior = static_cast<NodeId>(g.first_leaf.size());
-    const Index leaves = g.leaf_end[0];
+TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, const Light& light, bool prelit) {
+    const TreeLinks tree = links_of(g);
+    const NodeId interior = tree.interior();
+    const Index leaves = tree.leaves();
     LuminanceArrays<Vector> out;
     out.luminance.resize(std::size_t{interior} + leaves);
     out.support_range.resize(interior);
     out.ring_range.resize(interior);
     out.adaptation.resize(interior);
 
-    std::vector<PackedRange> leaf_ring(leaves);
-    for (Index leaf = 0; leaf < leaves; ++leaf) {
-        const NodeId node = interior + leaf;
-        const auto y = Unorm16::nearest(
-            vertex_luminance(g.normals[node], g.colours.empty() ? nullptr : &g.colours[node], light, prelit));
-        out.luminance[node] = y;
-        leaf_ring[leaf] = {y, y};
-    }
-    for (const Triangle& t : g.triangles) {
-        PackedRange range = empty_range;
-        for (const Index leaf : t) range = unite(range, out.luminance[interior + leaf]);
-        for (const Index leaf : t) leaf_ring[leaf] = unite(leaf_ring[leaf], range);
-    }
-
+    constexpr Index grain = 4096; // leaves
+    tbb::parallel_for(tbb::blocked_range<Index>(0, leaves, grain), [&](const auto& range) {
+        for (Index leaf = range.begin(); leaf < range.end(); ++leaf) {
+            const NodeId node = interior + leaf;
+            out.luminance[node] = Unorm16::nearest(
+                vertex_luminance(g.normals[node], g.colours.empty() ? nullptr : &g.colours[node], light, prelit));
+        }
+    });
+    const LeafSurroundings leaf = survey_leaves(g, parts, out.luminance);
     // A proxy's luminance is the area-weighted mean of its leaves: folds keep the mean of their surroundings.
-    const std::vector<double> areas = leaf_areas(g, interior);
-    std::vector<double> area_sum(leaves + 1, 0.0), weighted_sum(leaves + 1, 0.0), plain_sum(leaves + 1, 0.0);
-    double largest = 0;
-    for (const double a : areas) largest = std::max(largest, a);
-    const double scale = largest > 0 ? 1 / largest : 0;
-    for (Index leaf = 0; leaf < leaves; ++leaf) {
-        const double area = areas[leaf] * scale, y = out.luminance[interior + leaf].value;
-        area_sum[leaf + 1] = area_sum[leaf] + area;
-        weighted_sum[leaf + 1] = weighted_sum[leaf] + area * y;
-        plain_sum[leaf + 1] = plain_sum[leaf] + y;
-    }
-    // Below this share of the largest vertex area, per leaf, the difference of two running sums is rounding noise.
-    constexpr double least_mean_area = 1e-9;
+    const RunningSums sums(leaf.areas, std::span(out.luminance).subspan(interior));
 
-    PackedRange corners = empty_range;
-    for (NodeId node = interior; node-- > 0;) {
-        const Index begin = g.first_leaf[node], end = g.leaf_end[node];
-        PackedRange support = empty_range, ring = empty_range;
-        Unorm16 adaptation;
-        // Interior children have higher numbers and are done.
-        NodeId child = node + 1;
-        for (Index leaf = begin; leaf < end;) {
-            if (child < g.subtree_end[node] && g.first_leaf[child] == leaf) {
-                support = unite(support, out.support_range[child]);
-                ring = unite(ring, out.ring_range[child]);
-                if (is_coincident(g, child)) // its ring_range is narrower than its ring
-                    for (Index l = g.first_leaf[child]; l < g.leaf_end[child]; ++l) ring = unite(ring, leaf_ring[l]);
-                adaptation = std::max(adaptation, out.adaptation[child]);
-                leaf = g.leaf_end[child];
-                child = g.subtree_end[child];
-            } else {
-                support = unite(support, out.luminance[interior + leaf]);
-                ring = unite(ring, leaf_ring[leaf]);
-                ++leaf;
+    parts.bottom_up([&] {
+        return [&](NodeId node) {
+            PackedRange support = empty_range, ring = empty_range;
+            Unorm16 adaptation;
+            tree.for_each_child(
+                node,
+                [&](NodeId child) {
+                    support = unite(support, out.support_range[child]);
+                    ring = unite(ring, out.ring_range[child]);
+                    if (is_coincident(g, child)) // its ring_range is narrower than its ring
+                        for (Index l = g.first_leaf[child]; l < g.leaf_end[child]; ++l) ring = unite(ring, leaf.ring[l]);
+                    adaptation = std::max(adaptation, out.adaptation[child]);
+                },
+                [&](Index l) {
+                    support = unite(support, out.luminance[interior + l]);
+                    ring = unite(ring, leaf.ring[l]);
+                });
+            // The mean lies within the leaves' range but for rounding.
+            const double mean = sums.mean(g.first_leaf[node], g.leaf_end[node]);
+            const Unorm16 y = std::clamp(Unorm16::nearest(mean / Unorm16::largest), support.lo, support.hi);
+            out.luminance[node] = y;
+            support = unite(support, y);
+            ring = unite(ring, y);
+            if (is_coincident(g, node)) {
+                // Nothing moves; a pixel of the ring changes by the spread of the coincident vertices at most. The
+                // contrast of that is largest on the ring's darkest luminance.
+                ring = shortened(ring, support);
             }
-        }
-        const double area = area_sum[end] - area_sum[begin];
-        double mean;
-        if (area > least_mean_area * (end - begin)) mean = (weighted_sum[end] - weighted_sum[begin]) / area;
-        else mean = (plain_sum[end] - plain_sum[begin]) / (end - begin);
-        // The mean lies within the leaves' range but for rounding.
-        const Unorm16 y = std::clamp(Unorm16::nearest(mean / Unorm16::largest), support.lo, support.hi);
-        out.luminance[node] = y;
-        support = unite(support, y);
-        ring = unite(ring, y);
-        if (is_coincident(g, node)) {
-            // Nothing moves; a pixel of the ring changes by the spread of the coincident vertices at most. The
-            // contrast of that is largest on the ring's darkest luminance.
-            ring = shortened(ring, support);
-        }
-        out.support_range[node] = support;
-        out.ring_range[node] = ring;
-        out.adaptation[node] = std::max(adaptation, middle(ring));
-    }
-    for (const Triangle& t : g.triangles)
-        for (const Index leaf : t) corners = unite(corners, out.luminance[interior + leaf]);
+            out.support_range[node] = support;
+            out.ring_range[node] = ring;
+            out.adaptation[node] = std::max(adaptation, middle(ring));
+        };
+    });
     TreeLuminance done{{std::move(out.luminance), std::move(out.support_range), std::move(out.ring_range),
                         std::move(out.adaptation)},
-                       light, prelit, corners};
+                       light, prelit, leaf.corners};
     return done;
 }
 
@@ -207,7 +241,9 @@ Result<VertexTree> VertexTree::relit(const Light& light) const {
     auto data = std::make_shared<Data>();
     data->geometry = data_->geometry;
     data->checks = data_->checks;
-    data->light = derive_luminance(*data_->geometry, light, false);
+    TreeParts parts(links_of(*data_->geometry));
+    parts.assign_triangles(first_triangle(), triangles());
+    data->light = derive_luminance(*data_->geometry, parts, light, false);
     return VertexTree(std::move(data));
 }
 

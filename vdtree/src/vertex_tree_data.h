@@ -78,8 +78,11 @@ struct VertexTree::Data {
     std::shared_ptr<NodeChecks> checks; // none: everything has been checked or comes from the builder
 };
 
-// Luminance of every node and the bounds over support and ring, bottom-up. Cost: one pass over triangles and nodes.
-TreeLuminance derive_luminance(const TreeGeometry& geometry, const Light& light, bool prelit);
+class TreeParts;
+
+// Luminance of every node and the bounds over support and ring, bottom-up. `parts`: of this tree, with its triangles. Cost: one
+// pass over triangles and nodes; parallel.
+TreeLuminance derive_luminance(const TreeGeometry& geometry, const TreeParts& parts, const Light& light, bool prelit);
 
 // Relative luminance of one vertex.
 float vertex_luminance(glm::vec3 normal, const glm::vec4* colour, const Light& light, bool prelit);
