@@ -175,7 +175,7 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
         patches[node] = above(patches[node], levels.level(change, middle));
         for (const auto& [bright, dark] : {std::pair(brightest, lo), std::pair(hi, darkest)})
             strips[node] = above(strips[node], levels.level(bright - dark, (bright + dark) / 2));
-        parts.lengths[node] = std::max(parts.lengths[node], tree.support_spheres()[node].radius);
+        parts.lengths[node] = std::max({parts.lengths[node], tree.support_spheres()[node].radius, errors.extent[node]});
         parts.silhouette_lengths[node] = std::max(parts.silhouette_lengths[node], errors.distance[node]);
         if (node > 0) {
             const NodeId parent = tree.parents()[node];

@@ -15,7 +15,8 @@ namespace {
 constexpr Index none = 0xffffffffu;
 constexpr std::size_t witness_count = 4; // of a node, for its parent: the worst in distance, the worst in luminance
 constexpr Index spread_count = 4;        // leaves compared besides, at equal steps through the support
-constexpr std::size_t border_count = 12; // leaves compared that touch neighbours, likewise
+constexpr float much_worse = 2;      // in luminance, than the node: such neighbours fold later
+constexpr std::size_t triangles_compared = 16; // of each surface, at equal steps
 constexpr Index leaves_of_part = 4096;   // of a subtree that one task measures
 
 struct Point {
@@ -24,36 +25,91 @@ struct Point {
 };
 
 struct Difference {
-    float distance, luminance;
+    float distance = 0, luminance = 0;
 };
 
-// The point of triangle abc nearest to p, as weights of b and c; after Ericson, Real-Time Collision Detection, 5.1.5.
-glm::vec2 nearest_weights(glm::vec3 p, glm::vec3 a, glm::vec3 b, glm::vec3 c) {
-    const glm::vec3 ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
-    const float d1 = glm::dot(ab, ap), d2 = glm::dot(ac, ap);
-    if (d1 <= 0 && d2 <= 0) return {0, 0};
-    const float d3 = glm::dot(ab, bp), d4 = glm::dot(ac, bp);
-    if (d3 >= 0 && d4 <= d3) return {1, 0};
-    const float d5 = glm::dot(ab, cp), d6 = glm::dot(ac, cp);
-    if (d6 >= 0 && d5 <= d6) return {0, 1};
-    const float vc = d1 * d4 - d3 * d2;
-    if (vc <= 0 && d1 >= 0 && d3 <= 0) return {d1 - d3 > 0 ? d1 / (d1 - d3) : 0, 0};
-    const float vb = d5 * d2 - d1 * d6;
-    if (vb <= 0 && d2 >= 0 && d6 <= 0) return {0, d2 - d6 > 0 ? d2 / (d2 - d6) : 0};
-    const float va = d3 * d6 - d5 * d4;
-    if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
-        const float along = (d4 - d3) + (d5 - d6);
-        const float w = along > 0 ? (d4 - d3) / along : 0;
-        return {1 - w, w};
+struct Ring {
+    Point corner[3];
+    unsigned inside = 0; // a bit for each corner in the support
+};
+
+// Triangles by columns, so that one point is compared with several at once.
+class Surface {
+public:
+    void assign(std::span<const Ring> rings) {
+        size_ = rings.size();
+        for (auto* column : {&a_x_, &a_y_, &a_z_, &b_x_, &b_y_, &b_z_, &c_x_, &c_y_, &c_z_, &a_l_, &b_l_, &c_l_, &bb_, &bc_, &cc_, &inverse_, &squared_, &luminance_})
+            column->resize(size_);
+        for (std::size_t i = 0; i < size_; ++i) {
+            const auto& [a, b, c] = rings[i].corner;
+            const glm::vec3 ab = b.position - a.position, ac = c.position - a.position;
+            a_x_[i] = a.position.x, a_y_[i] = a.position.y, a_z_[i] = a.position.z, a_l_[i] = a.luminance;
+            b_x_[i] = ab.x, b_y_[i] = ab.y, b_z_[i] = ab.z, b_l_[i] = b.luminance - a.luminance;
+            c_x_[i] = ac.x, c_y_[i] = ac.y, c_z_[i] = ac.z, c_l_[i] = c.luminance - a.luminance;
+            bb_[i] = glm::dot(ab, ab), bc_[i] = glm::dot(ab, ac), cc_[i] = glm::dot(ac, ac);
+            const float determinant = bb_[i] * cc_[i] - bc_[i] * bc_[i];
+            inverse_[i] = determinant > least_determinant * bb_[i] * cc_[i] ? 1 / determinant : 0; // 0: only its edges count
+        }
     }
-    const float sum = va + vb + vc;
-    return sum > 0 ? glm::vec2(vb / sum, vc / sum) : glm::vec2(0);
-}
+    bool empty() const { return size_ == 0; }
+
+    // From the nearest of its points.
+    Difference compare(const Point& p) {
+        measure(p.position.x, p.position.y, p.position.z);
+        const auto nearest = static_cast<std::size_t>(std::min_element(squared_.begin(), squared_.end()) - squared_.begin());
+        return {std::sqrt(squared_[nearest]), std::abs(p.luminance - luminance_[nearest])};
+    }
+
+private:
+    // Triangles whose area is less than a thousandth of its edges' squares count by their edges.
+    static constexpr float least_determinant = 1e-6f;
+
+    // The nearest point a + v ab + w ac of each triangle: of its inside, where the foot of the perpendicular lies there, or of an edge.
+#if defined(__x86_64__) && defined(__GNUC__)
+    [[gnu::target_clones("avx2", "default")]]
+#endif
+    void measure(float x, float y, float z) {
+        const float *ax = a_x_.data(), *ay = a_y_.data(), *az = a_z_.data(), *bx = b_x_.data(), *by = b_y_.data(), *bz = b_z_.data();
+        const float *cx = c_x_.data(), *cy = c_y_.data(), *cz = c_z_.data(), *al = a_l_.data(), *bl = b_l_.data(), *cl = c_l_.data();
+        const float *bb = bb_.data(), *bc = bc_.data(), *cc = cc_.data(), *inverse = inverse_.data();
+        float *squared = squared_.data(), *luminance = luminance_.data();
+        const std::size_t count = size_;
+        const auto share = [](float part, float whole) {
+            const float s = whole > 0 ? part / whole : 0;
+            return s > 0 ? (s < 1 ? s : 1.0f) : 0.0f;
+        };
+#pragma GCC ivdep
+        for (std::size_t i = 0; i < count; ++i) {
+            const float px = x - ax[i], py = y - ay[i], pz = z - az[i];
+            const float pb = px * bx[i] + py * by[i] + pz * bz[i], pc = px * cx[i] + py * cy[i] + pz * cz[i];
+            const auto cost = [&](float v, float w) { return v * (v * bb[i] + 2 * w * bc[i] - 2 * pb) + w * (w * cc[i] - 2 * pc); };
+            const float v0 = (cc[i] * pb - bc[i] * pc) * inverse[i], w0 = (bb[i] * pc - bc[i] * pb) * inverse[i];
+            const float on_ab = share(pb, bb[i]), on_ac = share(pc, cc[i]);
+            const float on_bc = share(pc - pb - bc[i] + bb[i], bb[i] - 2 * bc[i] + cc[i]);
+            const float cost_ab = cost(on_ab, 0), cost_ac = cost(0, on_ac), cost_bc = cost(1 - on_bc, on_bc);
+            float v = cost_ab < cost_ac ? on_ab : 0, w = cost_ab < cost_ac ? 0 : on_ac;
+            const float least = cost_ab < cost_ac ? cost_ab : cost_ac;
+            v = cost_bc < least ? 1 - on_bc : v;
+            w = cost_bc < least ? on_bc : w;
+            const bool is_inside = (inverse[i] > 0) & (v0 >= 0) & (w0 >= 0) & (v0 + w0 <= 1);
+            v = is_inside ? v0 : v;
+            w = is_inside ? w0 : w;
+            const float dx = px - v * bx[i] - w * cx[i], dy = py - v * by[i] - w * cy[i], dz = pz - v * bz[i] - w * cz[i];
+            squared[i] = dx * dx + dy * dy + dz * dz;
+            luminance[i] = al[i] + v * bl[i] + w * cl[i];
+        }
+    }
+
+    std::size_t size_ = 0;
+    // The corner a; b and c from there; their products.
+    std::vector<float> a_x_, a_y_, a_z_, b_x_, b_y_, b_z_, c_x_, c_y_, c_z_, a_l_, b_l_, c_l_, bb_, bc_, cc_, inverse_;
+    std::vector<float> squared_, luminance_; // of the last comparison
+};
 
 class Measurer {
 public:
-    Measurer(const VertexTree& tree, FoldErrors& errors)
-        : tree_(tree), errors_(errors), first_leaf_(tree.first_leaf()), leaf_end_(tree.leaf_end()), parents_(tree.parents()),
+    Measurer(const VertexTree& tree, const FoldErrors* first_guess, FoldErrors& errors)
+        : tree_(tree), first_guess_(first_guess), errors_(errors), first_leaf_(tree.first_leaf()), leaf_end_(tree.leaf_end()), parents_(tree.parents()),
           first_triangle_(tree.first_triangle()), triangles_(tree.triangles()), support_(tree.support_spheres()),
           interior_(tree.interior_count()), crossing_(interior_), witnesses_(interior_) {
         find_triangles_of_leaves();
@@ -75,8 +131,12 @@ public:
     }
 
 private:
-    struct Ring {
-        Point corner[3];
+    struct Worst : Difference {
+        float mean = 0;
+        void include(const Difference& other) {
+            distance = std::max(distance, other.distance);
+            luminance = std::max(luminance, other.luminance);
+        }
     };
     struct Sample {
         Point point;
@@ -87,12 +147,18 @@ private:
         Index first_leaf;
         NodeId node;
     };
+    // Triangles that touch the support: the mesh's; the same before and after the fold, with folded neighbours; after it, with unfolded.
     struct Scratch {
-        std::vector<Ring> ring, before; // with neighbours folded
-        std::vector<Ring> fine;         // with neighbours unfolded
-        std::vector<Index> border;      // leaves of the support that touch others
+        std::vector<Ring> whole, before, after, fine;
+        Surface before_surface, after_surface;
         std::vector<Sample> samples;
         std::vector<Child> children;
+
+        void clear() {
+            for (auto* surface : {&whole, &before, &after, &fine}) surface->clear();
+            samples.clear();
+            children.clear();
+        }
     };
     using Witnesses = std::array<Index, witness_count>;
 
@@ -132,10 +198,14 @@ private:
         return support_[a].radius != support_[b].radius ? support_[a].radius > support_[b].radius : a < b;
     }
 
-    // What stands for a leaf outside the node while nodes up to its size are folded.
+    // What stands for a leaf outside the node when it folds: nodes up to its size are folded, as far as they are not much worse.
     NodeId stand_in(Index leaf, NodeId node) const {
         NodeId at = interior_ + leaf;
-        for (NodeId up = parents_[at]; up != no_node && is_larger(node, up); up = parents_[at]) at = up;
+        const float most = first_guess_ ? much_worse * first_guess_->luminance[node] : std::numeric_limits<float>::infinity();
+        for (NodeId up = parents_[at]; up != no_node && is_larger(node, up); up = parents_[at]) {
+            if (first_guess_ && !(first_guess_->luminance[up] <= most)) break;
+            at = up;
+        }
         return at;
     }
 
@@ -144,12 +214,7 @@ private:
         const Index begin = first_leaf_[node], end = leaf_end_[node];
         const Point proxy = point(node);
         const auto is_inside = [&](Index leaf) { return leaf - begin < end - begin; };
-        scratch.ring.clear();
-        scratch.before.clear();
-        scratch.fine.clear();
-        scratch.border.clear();
-        scratch.samples.clear();
-        scratch.children.clear();
+        scratch.clear();
         tree_.for_each_child(node, [&](NodeId child) {
             scratch.children.push_back({tree_.is_leaf(child) ? child - interior_ : first_leaf_[child], child});
         });
@@ -159,78 +224,105 @@ private:
             return std::prev(after)->node;
         };
         NormalSlabs facing;
-        double area_before = 0, luminance_before = 0, area_after = 0, luminance_after = 0;
+        const auto add = [&](std::vector<Ring>& surface, const Ring& t) {
+            surface.push_back(t);
+            insert_normal(t, facing);
+        };
         for (const Index t : crossing_[node]) {
-            Ring whole, before, fine, coarse;
+            Ring whole, before, after;
             std::array<NodeId, 3> shown, shown_before;
+            whole.inside = 0;
             for (std::size_t k = 0; k < 3; ++k) {
                 const Index leaf = triangles_[t][k];
+                const bool is_here = is_inside(leaf);
                 whole.corner[k] = leaf_point(leaf);
-                shown[k] = is_inside(leaf) ? node : stand_in(leaf, node);
-                shown_before[k] = is_inside(leaf) ? child_of(leaf) : shown[k];
-                if (is_inside(leaf)) scratch.border.push_back(leaf);
-                fine.corner[k] = is_inside(leaf) ? proxy : whole.corner[k];
-                coarse.corner[k] = point(shown[k]);
+                whole.inside |= static_cast<unsigned>(is_here) << k;
+                shown[k] = is_here ? node : stand_in(leaf, node);
+                shown_before[k] = is_here ? child_of(leaf) : shown[k];
+            }
+            before.inside = after.inside = whole.inside;
+            for (std::size_t k = 0; k < 3; ++k) {
                 before.corner[k] = point(shown_before[k]);
+                after.corner[k] = point(shown[k]);
             }
-            insert_normal(whole, facing);
-            add_area(whole, area_before, luminance_before);
-            if (are_distinct(shown_before)) {
-                scratch.before.push_back(before);
-                insert_normal(before, facing);
-            }
-            if (t >= first_triangle_[node] && t < first_triangle_[node + 1]) {
-                scratch.samples.push_back({centre_of(whole), none, {}});
-                continue;
-            }
-            add_area(fine, area_after, luminance_after);
-            insert_normal(fine, facing);
-            scratch.fine.push_back(fine);
-            if (!are_distinct(shown)) continue;
-            scratch.ring.push_back(coarse);
-            insert_normal(coarse, facing);
+            add(scratch.whole, whole);
+            if (are_distinct(shown_before)) add(scratch.before, before);
+            if (t >= first_triangle_[node] && t < first_triangle_[node + 1]) continue; // vanishes here
+            Ring fine = whole;
+            for (std::size_t k = 0; k < 3; ++k)
+                if ((whole.inside >> k) & 1) fine.corner[k] = proxy;
+            add(scratch.fine, fine);
+            if (are_distinct(shown)) add(scratch.after, after);
         }
-        if (scratch.ring.empty()) scratch.ring.push_back({{proxy, proxy, proxy}});
-        add_samples(node, scratch);
 
-        float distance = 0, luminance = 0, mean = 0;
-        if (area_before > 0 && area_after > 0)
-            mean = static_cast<float>(std::abs(luminance_after / area_after - luminance_before / area_before));
+        Worst worst;
+        worst.mean = mean_shift(scratch.whole, scratch.fine);
+        if (scratch.after.empty()) scratch.after.push_back({{proxy, proxy, proxy}, 7}); // all of it vanishes
+        scratch.before_surface.assign(scratch.before);
+        scratch.after_surface.assign(scratch.after);
+        add_samples(node, scratch);
         for (Sample& sample : scratch.samples) {
-            sample.error = compare(sample.point, scratch.ring);
-            if (!scratch.fine.empty()) {
-                const Difference fine_error = compare(sample.point, scratch.fine);
-                sample.error.distance = std::max(sample.error.distance, fine_error.distance);
-                sample.error.luminance = std::max(sample.error.luminance, fine_error.luminance);
-            }
-            distance = std::max(distance, sample.error.distance);
-            luminance = std::max(luminance, sample.error.luminance);
+            sample.error = scratch.after_surface.compare(sample.point);
+            worst.include(sample.error);
         }
         choose_witnesses(node, scratch.samples);
-        const auto compare_back = [&](const Point& p) {
-            const Difference error = compare(p, scratch.before);
-            distance = std::max(distance, error.distance);
-            luminance = std::max(luminance, error.luminance);
-        };
-        if (!scratch.before.empty()) {
-            compare_back(proxy);
-            for (const Ring& t : scratch.ring) compare_back(centre_of(t));
-        }
+        compare(scratch.before, scratch.after_surface, worst);
+        compare(scratch.after, scratch.before_surface, worst);
+        float extent = 0;
         tree_.for_each_child(node, [&](NodeId child) {
             if (tree_.is_leaf(child)) return;
-            distance = std::max(distance, errors_.distance[child]);
-            luminance = std::max(luminance, errors_.luminance[child]);
-            mean = std::max(mean, errors_.mean[child]);
+            worst.include({errors_.distance[child], errors_.luminance[child]});
+            worst.mean = std::max(worst.mean, errors_.mean[child]);
             facing |= errors_.facing[child];
+            extent = std::max(extent, errors_.extent[child]);
         });
+        errors_.distance[node] = worst.distance;
+        errors_.luminance[node] = worst.luminance;
+        errors_.mean[node] = worst.mean;
         errors_.facing[node] = facing;
-        errors_.distance[node] = distance;
-        errors_.luminance[node] = luminance;
-        errors_.mean[node] = mean;
+        errors_.extent[node] = std::max(mean_reach(scratch.after, proxy) / 2, extent);
+    }
+
+    // The mean distance of the ring's other corners from the proxy.
+    static float mean_reach(std::span<const Ring> ring, const Point& proxy) {
+        float sum = 0;
+        int count = 0;
+        for (const Ring& t : ring) {
+            for (std::size_t k = 0; k < 3; ++k) {
+                if ((t.inside >> k) & 1) continue;
+                sum += glm::length(t.corner[k].position - proxy.position);
+                ++count;
+            }
+        }
+        return count > 0 ? sum / static_cast<float>(count) : 0;
+    }
+
+    static float mean_shift(std::span<const Ring> before, std::span<const Ring> after) {
+        double area[2] = {}, luminance[2] = {};
+        for (const Ring& t : before) add_area(t, area[0], luminance[0]);
+        for (const Ring& t : after) add_area(t, area[1], luminance[1]);
+        return area[0] > 0 && area[1] > 0 ? static_cast<float>(std::abs(luminance[1] / area[1] - luminance[0] / area[0])) : 0.0f;
+    }
+
+    // Where two such surfaces differ most, they do so at a vertex or where two edges cross: looked at are the middles of the edges
+    // that move, and the centres of triangles.
+    static void compare(std::span<const Ring> surface, Surface& with, Worst& worst) {
+        if (with.empty()) return;
+        const std::size_t count = std::min(surface.size(), triangles_compared);
+        for (std::size_t i = 0; i < count; ++i) {
+            const Ring& t = surface[i * surface.size() / count];
+            worst.include(with.compare(centre_of(t)));
+            for (std::size_t k = 0; k < 3; ++k)
+                if ((t.inside >> k) & 1) worst.include(with.compare(middle_of(t.corner[k], t.corner[(k + 1) % 3])));
+        }
     }
 
     static bool are_distinct(const std::array<NodeId, 3>& nodes) {
         return nodes[0] != nodes[1] && nodes[1] != nodes[2] && nodes[2] != nodes[0];
+    }
+
+    static Point middle_of(const Point& a, const Point& b) {
+        return {(a.position + b.position) * 0.5f, (a.luminance + b.luminance) * 0.5f};
     }
 
     static Point centre_of(const Ring& t) {
@@ -252,15 +344,6 @@ private:
         luminance += own * static_cast<double>(t.corner[0].luminance + t.corner[1].luminance + t.corner[2].luminance) / 3;
     }
 
-    // The vector is sorted and thinned out.
-    static void keep_some(std::vector<Index>& leaves, std::size_t most) {
-        std::sort(leaves.begin(), leaves.end());
-        leaves.erase(std::unique(leaves.begin(), leaves.end()), leaves.end());
-        if (leaves.size() <= most) return;
-        for (std::size_t i = 0; i < most; ++i) leaves[i] = leaves[i * leaves.size() / most];
-        leaves.resize(most);
-    }
-
     void add_samples(NodeId node, Scratch& scratch) const {
         const auto add_leaf = [&](Index leaf) { scratch.samples.push_back({leaf_point(leaf), leaf, {}}); };
         tree_.for_each_child(node, [&](NodeId child) {
@@ -272,26 +355,9 @@ private:
             for (const Index leaf : witnesses_[child])
                 if (leaf != none) add_leaf(leaf);
         });
-        keep_some(scratch.border, border_count);
-        for (const Index leaf : scratch.border) add_leaf(leaf);
         const Index leaves = leaf_end_[node] - first_leaf_[node];
         for (Index i = 0; i < std::min(spread_count, leaves); ++i)
             add_leaf(first_leaf_[node] + static_cast<Index>((std::uint64_t{leaves} * (2 * i + 1)) / (2 * spread_count)));
-    }
-
-    static Difference compare(const Point& p, std::span<const Ring> ring) {
-        Difference nearest{std::numeric_limits<float>::max(), 0};
-        for (const Ring& t : ring) {
-            const auto& [a, b, c] = t.corner;
-            const glm::vec2 w = nearest_weights(p.position, a.position, b.position, c.position);
-            const glm::vec3 there = a.position + w.x * (b.position - a.position) + w.y * (c.position - a.position);
-            const float squared = glm::dot(p.position - there, p.position - there);
-            if (!(squared < nearest.distance)) continue;
-            const float luminance = a.luminance + w.x * (b.luminance - a.luminance) + w.y * (c.luminance - a.luminance);
-            nearest = {squared, std::abs(p.luminance - luminance)};
-        }
-        nearest.distance = std::sqrt(nearest.distance);
-        return nearest;
     }
 
     void choose_witnesses(NodeId node, std::span<Sample> samples) {
@@ -311,6 +377,7 @@ private:
     }
 
     const VertexTree& tree_;
+    const FoldErrors* first_guess_;
     FoldErrors& errors_;
     std::span<const Index> first_leaf_, leaf_end_;
     std::span<const NodeId> parents_;
@@ -326,11 +393,24 @@ private:
 } // namespace
 
 FoldErrors measure_fold_errors(const VertexTree& tree, int threads) {
-    FoldErrors errors;
-    for (auto* values : {&errors.distance, &errors.luminance, &errors.mean}) values->resize(tree.interior_count());
-    errors.facing.resize(tree.interior_count());
+    const auto made = [&] {
+        FoldErrors errors;
+        for (auto* values : {&errors.distance, &errors.luminance, &errors.mean, &errors.extent}) values->resize(tree.interior_count());
+        errors.facing.resize(tree.interior_count());
+        return errors;
+    };
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
-    arena.execute([&] { Measurer(tree, errors).run(); });
+    FoldErrors guess = made(), errors = made();
+    arena.execute([&] {
+        Measurer(tree, nullptr, guess).run();
+        Measurer(tree, &guess, errors).run();
+    });
+    for (NodeId node = 0; node < tree.interior_count(); ++node) {
+        errors.distance[node] = std::max(errors.distance[node], guess.distance[node]);
+        errors.luminance[node] = std::max(errors.luminance[node], guess.luminance[node]);
+        errors.extent[node] = std::max(errors.extent[node], guess.extent[node]);
+        errors.facing[node] |= guess.facing[node];
+    }
     return errors;
 }
 

@@ -18,6 +18,9 @@ namespace unseen::vdtree {
 struct FoldErrors {
     std::vector<float> distance;  // mesh units: to the nearest point of the other surface
     std::vector<float> luminance; // relative, 0..1: the difference to that point
+    // Mesh units: half the mean distance of the ring's other corners from the proxy. What a fold changes is largest at the vertex and fades
+    // to nothing at these, so it is about as wide as this, in a radius, also where the support is small in a ring of long triangles.
+    std::vector<float> extent;
     // Of all triangles that touch the support, before and after the fold, with unfolded and with folded neighbours: where all of
     // these face the eye, or none does, the fold moves no outline.
     std::vector<NormalSlabs> facing;
