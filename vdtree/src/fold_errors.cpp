@@ -15,6 +15,7 @@ namespace {
 constexpr Index none = 0xffffffffu;
 constexpr std::size_t witness_count = 4; // of a node, for its parent: the worst in distance, the worst in luminance
 constexpr Index spread_count = 4;        // leaves compared besides, at equal steps through the support
+constexpr Index cells_in_area = 32; // so many folds that shift the mean together count as systematic
 constexpr float much_worse = 2;      // in luminance, than the node: such neighbours fold later
 constexpr std::size_t triangles_compared = 16; // of each surface, at equal steps
 constexpr Index leaves_of_part = 4096;   // of a subtree that one task measures
@@ -111,7 +112,7 @@ public:
     Measurer(const VertexTree& tree, const FoldErrors* first_guess, FoldErrors& errors)
         : tree_(tree), first_guess_(first_guess), errors_(errors), first_leaf_(tree.first_leaf()), leaf_end_(tree.leaf_end()), parents_(tree.parents()),
           first_triangle_(tree.first_triangle()), triangles_(tree.triangles()), support_(tree.support_spheres()),
-          interior_(tree.interior_count()), crossing_(interior_), witnesses_(interior_) {
+          interior_(tree.interior_count()), crossing_(interior_), witnesses_(interior_), shifts_(interior_) {
         find_triangles_of_leaves();
     }
 
@@ -128,11 +129,14 @@ public:
         });
         Scratch scratch;
         for (std::size_t i = above.size(); i-- > 0;) measure(above[i], scratch);
+        if (first_guess_) find_means();
     }
 
 private:
+    struct Shift {
+        double total = 0, area = 0; // of luminance times area, and area
+    };
     struct Worst : Difference {
-        float mean = 0;
         void include(const Difference& other) {
             distance = std::max(distance, other.distance);
             luminance = std::max(luminance, other.luminance);
@@ -226,7 +230,7 @@ private:
         NormalSlabs facing;
         const auto add = [&](std::vector<Ring>& surface, const Ring& t) {
             surface.push_back(t);
-            insert_normal(t, facing);
+            if (first_guess_) insert_normal(t, facing);
         };
         for (const Index t : crossing_[node]) {
             Ring whole, before, after;
@@ -256,7 +260,7 @@ private:
         }
 
         Worst worst;
-        worst.mean = mean_shift(scratch.whole, scratch.fine);
+        if (first_guess_) shifts_[node] = mean_shift(scratch.whole, scratch.fine);
         if (scratch.after.empty()) scratch.after.push_back({{proxy, proxy, proxy}, 7}); // all of it vanishes
         scratch.before_surface.assign(scratch.before);
         scratch.after_surface.assign(scratch.after);
@@ -266,19 +270,19 @@ private:
             worst.include(sample.error);
         }
         choose_witnesses(node, scratch.samples);
-        compare(scratch.before, scratch.after_surface, worst);
-        compare(scratch.after, scratch.before_surface, worst);
+        if (first_guess_) {
+            compare(scratch.before, scratch.after_surface, worst);
+            compare(scratch.after, scratch.before_surface, worst);
+        }
         float extent = 0;
         tree_.for_each_child(node, [&](NodeId child) {
             if (tree_.is_leaf(child)) return;
             worst.include({errors_.distance[child], errors_.luminance[child]});
-            worst.mean = std::max(worst.mean, errors_.mean[child]);
             facing |= errors_.facing[child];
             extent = std::max(extent, errors_.extent[child]);
         });
         errors_.distance[node] = worst.distance;
         errors_.luminance[node] = worst.luminance;
-        errors_.mean[node] = worst.mean;
         errors_.facing[node] = facing;
         errors_.extent[node] = std::max(mean_reach(scratch.after, proxy) / 2, extent);
     }
@@ -297,21 +301,50 @@ private:
         return count > 0 ? sum / static_cast<float>(count) : 0;
     }
 
-    static float mean_shift(std::span<const Ring> before, std::span<const Ring> after) {
+    static Shift mean_shift(std::span<const Ring> before, std::span<const Ring> after) {
         double area[2] = {}, luminance[2] = {};
         for (const Ring& t : before) add_area(t, area[0], luminance[0]);
         for (const Ring& t : after) add_area(t, area[1], luminance[1]);
-        return area[0] > 0 && area[1] > 0 ? static_cast<float>(std::abs(luminance[1] / area[1] - luminance[0] / area[0])) : 0.0f;
+        if (!(area[0] > 0 && area[1] > 0)) return {};
+        return {(luminance[1] / area[1] - luminance[0] / area[0]) * area[1], area[1]};
+    }
+
+    // Shifts of cells that have the same sign show over an area of many; those of random signs cancel.
+    void find_means() {
+        std::vector<Shift> sums(interior_);
+        const auto leaves = [&](NodeId node) { return leaf_end_[node] - first_leaf_[node]; };
+        // Calls f for each node whose cells, its largest descendants with at most a share of its leaves, include this one.
+        const auto for_each_area = [&](NodeId cell, auto&& f) {
+            const std::uint64_t most = std::uint64_t{cells_in_area} * (cell == 0 ? 0 : leaves(parents_[cell]));
+            for (NodeId up = cell; up != no_node && leaves(up) < most; up = parents_[up])
+                if (leaves(up) >= std::uint64_t{cells_in_area} * leaves(cell)) f(up);
+        };
+        for (NodeId cell = 0; cell < interior_; ++cell) {
+            for_each_area(cell, [&](NodeId area) {
+                sums[area].total += shifts_[cell].total;
+                sums[area].area += shifts_[cell].area;
+            });
+        }
+        const auto mean = [](const Shift& shift) { return shift.area > 0 ? static_cast<float>(std::abs(shift.total) / shift.area) : 0.0f; };
+        for (NodeId node = interior_; node-- > 0;) {
+            float& own = errors_.mean[node];
+            const bool has_areas = std::uint64_t{cells_in_area} * leaves(node) <= tree_.leaf_count();
+            errors_.shift[node] = std::max(errors_.shift[node], mean(shifts_[node]));
+            if (!has_areas) own = std::max(own, mean(shifts_[node]));
+            for_each_area(node, [&](NodeId area) { own = std::max(own, mean(sums[area])); });
+            if (node == 0) break;
+            errors_.mean[parents_[node]] = std::max(errors_.mean[parents_[node]], own);
+            errors_.shift[parents_[node]] = std::max(errors_.shift[parents_[node]], errors_.shift[node]);
+        }
     }
 
     // Where two such surfaces differ most, they do so at a vertex or where two edges cross: looked at are the middles of the edges
-    // that move, and the centres of triangles.
+    // that move. The vertices are among the samples.
     static void compare(std::span<const Ring> surface, Surface& with, Worst& worst) {
         if (with.empty()) return;
         const std::size_t count = std::min(surface.size(), triangles_compared);
         for (std::size_t i = 0; i < count; ++i) {
             const Ring& t = surface[i * surface.size() / count];
-            worst.include(with.compare(centre_of(t)));
             for (std::size_t k = 0; k < 3; ++k)
                 if ((t.inside >> k) & 1) worst.include(with.compare(middle_of(t.corner[k], t.corner[(k + 1) % 3])));
         }
@@ -323,11 +356,6 @@ private:
 
     static Point middle_of(const Point& a, const Point& b) {
         return {(a.position + b.position) * 0.5f, (a.luminance + b.luminance) * 0.5f};
-    }
-
-    static Point centre_of(const Ring& t) {
-        return {(t.corner[0].position + t.corner[1].position + t.corner[2].position) / 3.0f,
-                (t.corner[0].luminance + t.corner[1].luminance + t.corner[2].luminance) / 3.0f};
     }
 
     static void insert_normal(const Ring& t, NormalSlabs& facing) {
@@ -388,6 +416,7 @@ private:
     std::vector<Index> first_of_leaf_, of_leaf_;
     std::vector<std::vector<Index>> crossing_; // of nodes whose parent has not been measured yet
     std::vector<Witnesses> witnesses_;
+    std::vector<Shift> shifts_; // of the mean luminance, with unfolded neighbours
 };
 
 } // namespace
@@ -395,7 +424,7 @@ private:
 FoldErrors measure_fold_errors(const VertexTree& tree, int threads) {
     const auto made = [&] {
         FoldErrors errors;
-        for (auto* values : {&errors.distance, &errors.luminance, &errors.mean, &errors.extent}) values->resize(tree.interior_count());
+        for (auto* values : {&errors.distance, &errors.luminance, &errors.shift, &errors.mean, &errors.extent}) values->resize(tree.interior_count());
         errors.facing.resize(tree.interior_count());
         return errors;
     };
@@ -409,7 +438,6 @@ FoldErrors measure_fold_errors(const VertexTree& tree, int threads) {
         errors.distance[node] = std::max(errors.distance[node], guess.distance[node]);
         errors.luminance[node] = std::max(errors.luminance[node], guess.luminance[node]);
         errors.extent[node] = std::max(errors.extent[node], guess.extent[node]);
-        errors.facing[node] |= guess.facing[node];
     }
     return errors;
 }

@@ -67,7 +67,8 @@ Result<vdtree::DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTr
 //
 // With theta0 = 2 asin(r0 / d) for the support's sphere; h, eY, mY of measure_fold_errors(), in cd/m2 where they are luminances; the
 // ring's range lo1..hi1 and its sphere's r1; L the middle of the range; S the table's conservative form; and by eccentricity:
-//   interior    c = (eY + (hi1 - lo1) min(1, h / r1)) / L:  c min(1, (theta0 / pixel)^2) S(1 / (2 max(theta0, pixel))) <= 1
+//   interior    c = (eY + (hi1 - lo1) min(1, h / r1)) / L:  c S(1 / (2 theta0)) <= 1; below a pixel, with the
+//               ring's shift of mean luminance s = sY / L:  (c theta0 / pixel + s) theta0 / pixel S(1 / (2 pixel)) <= 1
 //   mean        mY / L S(1 / (2 theta)) <= 1, theta the whole object's
 //   silhouette  a strip of width w, the angle of h, that changes between the ring's luminance and anything in the scene, with the
 //               contrast cs over the pair's mean:  cs max over rho of min(1, 2 rho w) S(rho) <= 1, rho up to the display's limit

@@ -25,6 +25,9 @@ struct FoldErrors {
     // these face the eye, or none does, the fold moves no outline.
     std::vector<NormalSlabs> facing;
     // Relative, 0..1: by how much the mean luminance of the ring's area shifts against the mesh's, with unfolded neighbours.
+    std::vector<float> shift;
+    // Relative, 0..1: by how much the mean luminance of an area of some 32 nodes like this one shifts: what adds up, and does not
+    // cancel.
     std::vector<float> mean;
 };
 
