@@ -89,10 +89,7 @@ std::vector<CyclesPerDegree> kinks(CsfModel model, const CsfConditions& conditio
 
 double sensitivity(CsfModel model, const Stimulus& s) {
     if (!in_domain(s)) return std::numeric_limits<double>::quiet_NaN();
-    if (model == CsfModel::daly) {
-        const DalyBranches branches = daly_branches(s);
-        return std::min(branches.ceiling, branches.eccentric) * motion_factor(model, s);
-    }
+    if (model == CsfModel::daly) return std::min(daly_ceiling(s), daly_eccentric(s)) * motion_factor(model, s);
     const double loss = decay_per_degree(model, s.frequency, s.field) * s.eccentricity.value();
     return static_at_fovea(model, s) * motion_factor(model, s) * std::pow(10.0, -loss);
 }

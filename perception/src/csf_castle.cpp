@@ -220,6 +220,11 @@ CyclesPerDegree equal_decay_frequency(CsfModel model) {
     return CyclesPerDegree((k.temporal.k0 - k.nasal.k0) / (k.nasal.k1 - k.temporal.k1));
 }
 
+Luminance castle_transient_kink() {
+    const ModelConstants& k = castle_constants;
+    return Luminance(std::pow(10.0, (omega0_floor_hz - k.omega0_at_1_cdm2) / k.omega0_per_decade));
+}
+
 // ---- all three directions -------------------------------------------------------------------------------------------
 
 OpponentContrast opponent_contrast(const glm::dvec3& background, const glm::dvec3& delta) {

@@ -21,7 +21,7 @@ namespace {
 
 // exp(-x) sqrt(1 + 0.06 exp(x)), common to Daly, Rushmeier and Barten 1989. Written like that it is 0 times infinity
 // for large x.
-double damping(double x) { return std::sqrt(std::exp(-2 * x) + 0.06 * std::exp(-x)); }
+double damping(double x) { return std::exp(-x / 2) * std::sqrt(std::exp(-x) + 0.06); }
 
 // ---- relative models ------------------------------------------------------------------------------------------------
 
@@ -110,13 +110,15 @@ double barten_1999(double cpd, double cdm2, double area_deg2) {
 
 } // namespace
 
-DalyBranches daly_branches(const Stimulus& s) {
+double daly_ceiling(const Stimulus& s) {
+    return daly_branch(s.frequency.value(), s.luminance.value(), s.area.value());
+}
+
+double daly_eccentric(const Stimulus& s) {
     const double accommodation = 0.856 * std::pow(s.distance.value(), 0.14);
-    const double eccentric = 1 / (1 + daly_eccentricity * s.eccentricity.value());
+    const double scale = 1 / (1 + daly_eccentricity * s.eccentricity.value());
     // Horizontal and vertical gratings, which are seen best: Daly's factor for orientation is 1.
-    const double cpd = s.frequency.value(), scaled_cpd = cpd / (accommodation * eccentric);
-    return {daly_branch(cpd, s.luminance.value(), s.area.value()),
-            daly_branch(scaled_cpd, s.luminance.value(), s.area.value())};
+    return daly_branch(s.frequency.value() / (accommodation * scale), s.luminance.value(), s.area.value());
 }
 
 bool is_relative(CsfModel model) { return model == CsfModel::mannos_sakrison || model == CsfModel::rushmeier; }

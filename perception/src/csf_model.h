@@ -17,6 +17,8 @@ double castle_family_at_fovea(CsfModel model, const Stimulus& stimulus);
 double castle_family_decay(CsfModel model, CyclesPerDegree frequency, VisualField field);
 // Where the nasal and the temporal field lose sensitivity equally fast: a kink in frequency of the worst field.
 CyclesPerDegree equal_decay_frequency(CsfModel model);
+// Where castle's transient channel reaches the lowest temporal frequency that it peaks at: a kink in luminance.
+Luminance castle_transient_kink();
 
 // ---- the older models (csf_classical.cpp) -------------------------------------------------------------------------------
 
@@ -24,11 +26,9 @@ CyclesPerDegree equal_decay_frequency(CsfModel model);
 double classical_at_fovea(CsfModel model, const Stimulus& stimulus);
 // The shape over frequency only: luminance and area do not matter.
 bool is_relative(CsfModel model);
-// Daly's model is the smaller of two branches, the first of which knows no eccentricity.
-struct DalyBranches {
-    double ceiling, eccentric;
-};
-DalyBranches daly_branches(const Stimulus& stimulus);
+// Daly's model, static, is the smaller of two branches, the first of which knows no eccentricity.
+double daly_ceiling(const Stimulus& stimulus);
+double daly_eccentric(const Stimulus& stimulus);
 
 // ---- what is common (csf.cpp) -------------------------------------------------------------------------------------------
 

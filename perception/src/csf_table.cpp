@@ -43,13 +43,15 @@ struct Density {
 };
 // Log sensitivity over log frequency bends by up to 24 where Barten's optics end visibility; the adaptation laws
 // bend by little.
-constexpr Density smooth_model{24, 12};
+constexpr Density smooth_model{24, 10};
 // castle and stela: the sustained channel's plateau ends in a change of slope of 0.43 at 0.6 times its peak frequency.
 // That lies below 1.25 cpd and moves with the luminance, by up to 0.26 octaves an octave, up to 300 cd/m2.
-constexpr Density below_plateau{48, 24}, above_plateau{24, 8};
+constexpr Density below_plateau{32, 16}, above_plateau{20, 12};
 constexpr double plateau_cpd = 1.25, plateau_cdm2 = 300;
+// castle's transient channel, which flicker needs, moves fast with the luminance just above a kink.
+constexpr double transient_per_decade = 72, transient_decades = 0.8;
 // daly's frequencies scale with 1 + 0.24 e: steps of this in the logarithm of that.
-constexpr double daly_eccentricity_scale = 0.24, daly_log_step = 0.05;
+constexpr double daly_eccentricity_scale = 0.24, daly_log_step = 0.065;
 
 std::string number(double value) {
     std::array<char, 32> text;
@@ -131,9 +133,15 @@ std::vector<double> model_eccentricities(CsfModel model) {
     return degrees;
 }
 
-std::vector<double> model_luminances(CsfModel model) {
+std::vector<double> model_luminances(CsfModel model, const CsfConditions& conditions) {
     std::vector<double> cdm2;
-    if (has_plateau(model)) {
+    if (model == CsfModel::castle && conditions.temporal.value() > 0) {
+        const double kink = castle_transient_kink().value(), calm = kink * std::pow(10.0, transient_decades);
+        append_ladder(cdm2, lowest_luminance_cdm2, kink, 10, below_plateau.per_decade);
+        append_ladder(cdm2, kink, calm, 10, transient_per_decade);
+        append_ladder(cdm2, calm, plateau_cdm2, 10, below_plateau.per_decade);
+        append_ladder(cdm2, plateau_cdm2, highest_luminance_cdm2, 10, above_plateau.per_decade);
+    } else if (has_plateau(model)) {
         append_ladder(cdm2, lowest_luminance_cdm2, plateau_cdm2, 10, below_plateau.per_decade);
         append_ladder(cdm2, plateau_cdm2, highest_luminance_cdm2, 10, above_plateau.per_decade);
     } else if (is_relative(model)) {
@@ -182,15 +190,20 @@ void fill(CsfSamples& samples, CsfModel model, VisualField field, MakeStimulus s
 template <class MakeStimulus>
 void fill_daly(CsfSamples& samples, std::vector<double>& eccentric, std::vector<double>& ceiling,
                MakeStimulus stimulus) {
+    std::vector<double> motion;
+    for (const double cdm2 : samples.luminance_cdm2) {
+        for (const double cpd : samples.frequency_cpd) {
+            const Stimulus s = stimulus(cpd, 0, cdm2);
+            motion.push_back(motion_factor(CsfModel::daly, s));
+            ceiling.push_back(floored(daly_ceiling(s) * motion.back()));
+        }
+    }
     for (const double degrees : samples.eccentricity_deg) {
+        std::size_t i = 0;
         for (const double cdm2 : samples.luminance_cdm2) {
             for (const double cpd : samples.frequency_cpd) {
-                const Stimulus s = stimulus(cpd, degrees, cdm2);
-                const DalyBranches branches = daly_branches(s);
-                const double motion = motion_factor(CsfModel::daly, s);
-                eccentric.push_back(floored(branches.eccentric * motion));
-                if (degrees == 0) ceiling.push_back(floored(branches.ceiling * motion));
-                samples.sensitivity.push_back(floored(std::min(branches.eccentric, branches.ceiling) * motion));
+                eccentric.push_back(floored(daly_eccentric(stimulus(cpd, degrees, cdm2)) * motion[i]));
+                samples.sensitivity.push_back(std::min(eccentric.back(), ceiling[i++]));
             }
         }
     }
@@ -286,7 +299,7 @@ Result<CsfTable> CsfTable::from_model(CsfModel model, const CsfConditions& condi
     samples.source = model_source(model, conditions);
     samples.frequency_cpd = model_frequencies(model, conditions);
     samples.eccentricity_deg = model_eccentricities(model);
-    samples.luminance_cdm2 = model_luminances(model);
+    samples.luminance_cdm2 = model_luminances(model, conditions);
 
     Branches branches;
     if (model == CsfModel::daly) {

@@ -51,7 +51,7 @@ double velocity_factor(CyclesPerDegree frequency, DegreesPerSecond velocity, con
 }
 
 glm::dvec3 sight_rotation(const glm::dvec3& eye_to_point, const glm::dvec3& velocity, const glm::dvec3& head_rotation) {
-    const double distance = glm::length(eye_to_point);
+    const double distance = std::hypot(eye_to_point.x, eye_to_point.y, eye_to_point.z); // its square may overflow
     if (!(distance > 0)) return glm::dvec3(nan);
     return degrees_per_radian * glm::cross(eye_to_point / distance, velocity / distance) - head_rotation;
 }
