@@ -217,8 +217,7 @@ TEST(CsfModels, FallWithEccentricityInAnyField) {
 }
 
 TEST(CsfModels, ModelsWithoutAPeripheryTakeGeislerAndPerrys) {
-    // Their cutoff: contrast 1 / 64 at the fovea, times exp(0.106 rho e / 2.3), reaches 64 at the same frequency that
-    // makes exp(0.106 rho (e + 2.3) / 2.3) / 64 = 1.
+    // Threshold contrast grows as exp(0.106 rho (e + 2.3) / 2.3), so relative to the fovea as exp(0.106 rho e / 2.3).
     for (const CsfModel model : by_geisler_perry) {
         for (const double degrees : {1.0, 10.0, 50.0}) {
             const double ratio = sensitivity(model, at(foveal(2, 50), degrees)) / sensitivity(model, foveal(2, 50));
