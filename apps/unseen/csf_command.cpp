@@ -1,4 +1,5 @@
 // unseen csf: contrast sensitivity for one stimulus, for a table of them, or as a plot.
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -249,6 +250,7 @@ Result<int> run_plot(const CsfArguments& a, const Observer& observer) {
     plot.y_label = "sensitivity, 1 / threshold contrast";
     plot.x_range = {lowest_frequency, highest_frequency};
     plot.y_range = {1, 1000};
+    double peak = 0;
     for (std::size_t l = 0; l < plotted_luminances.size(); ++l) {
         if (a.stimulus.luminance && l > 0) break;
         for (std::size_t e = 0; e < plotted_eccentricities.size(); ++e) {
@@ -261,9 +263,12 @@ Result<int> run_plot(const CsfArguments& a, const Observer& observer) {
             auto curve = curve_of(observer, stimulus, luminance_colours[l] + (paper - luminance_colours[l]) * paleness);
             if (!curve) return curve.error();
             curve->dashed = e > 0;
+            for (const auto& point : curve->points) peak = std::max(peak, static_cast<double>(point.y));
             plot.curves.push_back(std::move(*curve));
         }
     }
+    // Coarse gratings that move are seen far better than any that stand.
+    plot.y_range.y = std::max(1000.0, std::pow(10.0, std::ceil(std::log10(peak))));
     if (auto ok = perception::write_image(a.plot, draw(plot)); !ok) return ok.error();
     return exit_done;
 }
