@@ -81,8 +81,9 @@ public:
             by_table = choice->model.has_value();
             if (choice->model) observer.model_ = *choice->model;
             if (choice->table && has_conditions(a.stimulus))
-                return invalid("a viewer's table was measured under conditions of its own: leave --temporal, --velocity, "
-                               "--field and --distance away.");
+                return invalid(
+                    "a viewer's table was measured under conditions of its own: leave --temporal, --velocity, "
+                    "--field and --distance away.");
             observer.table_ = std::move(choice->table);
         }
         if (by_table) {
@@ -102,8 +103,9 @@ public:
         if (!s.frequency) return invalid("--frequency is missing.");
         if (!s.luminance) return invalid("--luminance is missing.");
         if (table_ && (s.area || !same_conditions(s, fixed_)))
-            return invalid("a table holds patches of 1.5 cycles radius under the same conditions: leave area, temporal, "
-                           "velocity, field and distance away.");
+            return invalid(
+                "a table holds patches of 1.5 cycles radius under the same conditions: leave area, temporal, "
+                "velocity, field and distance away.");
         Stimulus stimulus = stimulus_of(conditions_of(s, is_pursued_), CyclesPerDegree(*s.frequency),
                                         Degrees(s.eccentricity.value_or(0)), Luminance(*s.luminance));
         if (s.area) stimulus.area = SquareDegrees(*s.area);
@@ -306,8 +308,7 @@ void check(const CsfArguments& a) {
     const int outputs = !a.csv.empty() + !a.plot.empty() + !a.save.empty();
     if (outputs > 1) refuse("--csv, --plot and --save-table exclude each other: give one of them.");
     const bool is_table = a.by_table || !a.csf.empty();
-    if (is_table && a.stimulus.area)
-        refuse("--table and --csf hold patches of 1.5 cycles radius: leave --area away.");
+    if (is_table && a.stimulus.area) refuse("--table and --csf hold patches of 1.5 cycles radius: leave --area away.");
     if (!a.save.empty() && !is_table) refuse("--save-table needs --table or --csf.");
     if (a.by_table && !a.csf.empty()) refuse("--table and --csf exclude each other: give one of them.");
     if (a.stimulus.temporal && a.stimulus.velocity)
@@ -342,7 +343,8 @@ Command csf_command(CLI::App& app) {
     number("--velocity", s->velocity, not_negative(), "DEG/S", "How fast the grating moves on the retina (default: 0)");
     number("--distance", s->distance, positive(), "METRES", "Of the grating, for --model daly (default: 0.5)");
     number("--area", s->area, positive(), "DEG2", "Area of the patch (default: pi (1.5 / frequency)^2)");
-    verb->add_flag("--pursuit", a->is_pursued, "The velocities are the image's, and the eye follows: what it lags is left");
+    verb->add_flag("--pursuit", a->is_pursued,
+                   "The velocities are the image's, and the eye follows: what it lags is left");
     verb->add_option_function<std::string>(
             "--field", [s](const std::string& name) { s->field = field_of(name); },
             "Side of the visual field: nasal, temporal, or the worst of them (default)")

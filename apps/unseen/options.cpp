@@ -191,7 +191,7 @@ void add_display_options(CLI::App& verb, DisplayOptions& o) {
     add_number(group, "--distance", o.distance_m, positive(), "METRES", "From the eye to the screen");
     add_number(group, "--peak", o.peak_cdm2, positive(), "CDM2", "Luminance of white");
     add_number(group, "--black", o.black_cdm2, positive(), "CDM2", "Luminance of black");
-    group.add_option("--csf", o.csf, "Contrast sensitivity: a model's name (see unseen csf --help; default: castle), or a viewer's table")
+    group.add_option("--csf", o.csf, "Contrast sensitivity: a model of unseen csf (default: castle), or a viewer's table")
         ->type_name("MODEL|FILE");
 }
 

@@ -95,7 +95,7 @@ Result<CsfChoice> choose_csf(const std::string& model_or_file) {
     const auto model = perception::csf_model(model_or_file);
     if (model) {
         if (perception::is_achromatic(*model)) return CsfChoice{*model, {}};
-        return invalid("--csf " + model_or_file + " is sensitivity to colour: it says nothing about luminance contrast.");
+        return invalid("--csf " + model_or_file + " is sensitivity to colour, not to luminance contrast.");
     }
     std::error_code unknown;
     if (!std::filesystem::exists(model_or_file, unknown))

@@ -104,9 +104,7 @@ double evaluate(const SaturatingLaw& law, double luminance) {
     return law.p1 * std::exp(-law.p3 * std::log1p(law.p2 / luminance));
 }
 // p4/L is below the spacing of doubles around 1 for bright stimuli: never written as 1 - (1 + x)^-p5.
-double evaluate(const GlareLaw& law, double luminance) {
-    return -std::expm1(-law.p5 * std::log1p(law.p4 / luminance));
-}
+double evaluate(const GlareLaw& law, double luminance) { return -std::expm1(-law.p5 * std::log1p(law.p4 / luminance)); }
 
 // Smax P(rho) rho sqrt(Ac / (1 + Ac / A)) without Smax.
 double channel(const BandShape& shape, double freq_cpd, double peak_cpd, double area_deg2) {

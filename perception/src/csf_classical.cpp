@@ -33,15 +33,13 @@ double mannos_sakrison(double cpd) {
     return 2.6 * (0.0192 + x) * std::exp(-std::pow(x, 1.1));
 }
 
-double rushmeier(double cpd) {
-    return std::pow(0.008 / (cpd * cpd * cpd) + 1, -0.2) * 1.42 * cpd * damping(0.3 * cpd);
-}
+double rushmeier(double cpd) { return std::pow(0.008 / (cpd * cpd * cpd) + 1, -0.2) * 1.42 * cpd * damping(0.3 * cpd); }
 
 // ---- Daly -----------------------------------------------------------------------------------------------------------
 
-constexpr double daly_peak = 250;             // P
-constexpr double daly_epsilon = 0.9;          // scale of frequency and amplitude
-constexpr double daly_eccentricity = 0.24;    // k, per degree
+constexpr double daly_peak = 250;          // P
+constexpr double daly_epsilon = 0.9;       // scale of frequency and amplitude
+constexpr double daly_eccentricity = 0.24; // k, per degree
 static_assert(relative_models_peak == daly_peak);
 
 // ((3.23 (rho^2 A)^-0.3)^5 + 1)^-0.2, by logarithms: rho^2 A under- and overflows long before rho and A do.
@@ -86,16 +84,16 @@ double retinal_illuminance(double pupil, double cdm2) {
 }
 
 double barten_1999(double cpd, double cdm2, double area_deg2) {
-    constexpr double signal_to_noise = 3;                       // k
-    constexpr double integration_time = 0.1;                    // T, s
-    constexpr double greatest_field = 12;                       // Xmax, degrees
-    constexpr double greatest_cycles = 15;                      // Nmax
-    constexpr double quantum_efficiency = 0.03;                 // eta
-    constexpr double photons = 1.2274e6;                        // p, per s, deg2 and troland
-    constexpr double neural_noise = 3e-8;                       // Phi0, s deg2
-    constexpr double inhibition_cpd = 7;                        // u0
-    constexpr double line_spread_deg = 0.5 / 60;                // sigma0; 0.5 minutes of arc
-    constexpr double aberration_deg = 0.08 / 60;                // Cab, per mm of the pupil
+    constexpr double signal_to_noise = 3;        // k
+    constexpr double integration_time = 0.1;     // T, s
+    constexpr double greatest_field = 12;        // Xmax, degrees
+    constexpr double greatest_cycles = 15;       // Nmax
+    constexpr double quantum_efficiency = 0.03;  // eta
+    constexpr double photons = 1.2274e6;         // p, per s, deg2 and troland
+    constexpr double neural_noise = 3e-8;        // Phi0, s deg2
+    constexpr double inhibition_cpd = 7;         // u0
+    constexpr double line_spread_deg = 0.5 / 60; // sigma0; 0.5 minutes of arc
+    constexpr double aberration_deg = 0.08 / 60; // Cab, per mm of the pupil
 
     const double pupil = pupil_mm(cdm2, area_deg2);
     const double sigma_deg = std::hypot(line_spread_deg, aberration_deg * pupil);
@@ -110,9 +108,7 @@ double barten_1999(double cpd, double cdm2, double area_deg2) {
 
 } // namespace
 
-double daly_ceiling(const Stimulus& s) {
-    return daly_branch(s.frequency.value(), s.luminance.value(), s.area.value());
-}
+double daly_ceiling(const Stimulus& s) { return daly_branch(s.frequency.value(), s.luminance.value(), s.area.value()); }
 
 double daly_eccentric(const Stimulus& s) {
     const double accommodation = 0.856 * std::pow(s.distance.value(), 0.14);

@@ -8,7 +8,7 @@
 
 namespace unseen::perception {
 
-// ---- castleCSF and stelaCSF (csf_castle.cpp) --------------------------------------------------------------------------
+// ---- castleCSF and stelaCSF (csf_castle.cpp) -----------------------------------------------------------------------
 
 bool is_castle_family(CsfModel model);
 // At the fovea, at the stimulus' temporal frequency.
@@ -20,7 +20,7 @@ CyclesPerDegree equal_decay_frequency(CsfModel model);
 // Where castle's transient channel reaches the lowest temporal frequency that it peaks at: a kink in luminance.
 Luminance castle_transient_kink();
 
-// ---- the older models (csf_classical.cpp) -------------------------------------------------------------------------------
+// ---- the older models (csf_classical.cpp) --------------------------------------------------------------------------
 
 // At the fovea, static.
 double classical_at_fovea(CsfModel model, const Stimulus& stimulus);
@@ -30,7 +30,7 @@ bool is_relative(CsfModel model);
 double daly_ceiling(const Stimulus& stimulus);
 double daly_eccentric(const Stimulus& stimulus);
 
-// ---- what is common (csf.cpp) -------------------------------------------------------------------------------------------
+// ---- what is common (csf.cpp) --------------------------------------------------------------------------------------
 
 // All models but daly are S(rho, e, L) = S(rho, 0, L) 10^(-decay(rho) e).
 double decay_per_degree(CsfModel model, CyclesPerDegree frequency, VisualField field);

@@ -292,8 +292,9 @@ Result<CsfTable> CsfTable::from_model(CsfModel model, const CsfConditions& condi
     };
     if (std::isnan(perception::sensitivity(model, stimulus(1, 0, 1)))) {
         return bad("temporal frequency and velocity must be finite and 0 or more, one of them 0, and the distance "
-                   "above 0 m, but they are " + number(conditions.temporal.value()) + " Hz, " +
-                   number(conditions.velocity.value()) + " degrees/s and " + number(conditions.distance.value()) + " m");
+                   "above 0 m, but they are " +
+                   number(conditions.temporal.value()) + " Hz, " + number(conditions.velocity.value()) +
+                   " degrees/s and " + number(conditions.distance.value()) + " m");
     }
     CsfSamples samples;
     samples.source = model_source(model, conditions);
@@ -433,7 +434,8 @@ double CsfTable::sensitivity(CyclesPerDegree frequency, Degrees eccentricity, Lu
     const auto along_luminance = [&](const std::vector<double>& values, std::size_t ei) {
         return std::lerp(along_frequency(values, ei, l.first), along_frequency(values, ei, l.second), l.fraction);
     };
-    const double log2_s = std::lerp(along_luminance(surface(), e.first), along_luminance(surface(), e.second), e.fraction);
+    const double log2_s =
+        std::lerp(along_luminance(surface(), e.first), along_luminance(surface(), e.second), e.fraction);
     if (branches_.ceiling.empty()) return std::exp2(log2_s);
     return std::exp2(std::min(log2_s, along_luminance(branches_.ceiling, 0)));
 }

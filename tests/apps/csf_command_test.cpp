@@ -88,7 +88,8 @@ TEST_F(CsfCommandTest, ContradictionsAreRefused) {
         EXPECT_THAT(outcome.err, HasSubstr(expected));
     }
     ASSERT_EQ(run({"csf", "--table", "--save-table", "own.json"}).status, 0);
-    const Outcome outcome = run({"csf", "--csf", "own.json", "--frequency", "4", "--luminance", "9", "--velocity", "1"});
+    const Outcome outcome =
+        run({"csf", "--csf", "own.json", "--frequency", "4", "--luminance", "9", "--velocity", "1"});
     EXPECT_EQ(outcome.status, 1);
     EXPECT_THAT(outcome.err, HasSubstr("--velocity"));
 }
@@ -183,9 +184,11 @@ TEST_F(CsfCommandTest, TablesCanBeSavedAndUsed) {
 }
 
 TEST_F(CsfCommandTest, ATableKeepsItsMotion) {
-    ASSERT_EQ(run({"csf", "--model", "barten-1999", "--table", "--velocity", "5", "--save-table", "moving.json"}).status, 0);
-    EXPECT_EQ(sensitivity({"--csf", "moving.json", "--frequency", "5", "--luminance", "12"}),
-              sensitivity({"--model", "barten-1999", "--table", "--velocity", "5", "--frequency", "5", "--luminance", "12"}));
+    ASSERT_EQ(
+        run({"csf", "--model", "barten-1999", "--table", "--velocity", "5", "--save-table", "moving.json"}).status, 0);
+    EXPECT_EQ(
+        sensitivity({"--csf", "moving.json", "--frequency", "5", "--luminance", "12"}),
+        sensitivity({"--model", "barten-1999", "--table", "--velocity", "5", "--frequency", "5", "--luminance", "12"}));
     EXPECT_EQ(sensitivity({"--csf", "daly", "--frequency", "5", "--luminance", "12"}),
               sensitivity({"--model", "daly", "--table", "--frequency", "5", "--luminance", "12"}));
     // A row cannot have conditions that the table has not.

@@ -1,5 +1,5 @@
-// The classical models and castleCSF's chromatic branches: golden values, what eccentricity and motion add to models that
-// know neither, and the places where formulas lose their digits or their finiteness.
+// The classical models and castleCSF's chromatic branches: golden values, what eccentricity and motion add to models
+// that know neither, and the places where formulas lose their digits or their finiteness.
 #include <perception/csf.h>
 #include <perception/motion.h>
 
@@ -72,7 +72,8 @@ TEST(CsfModels, ClassicalOnesAgreeWithTheReferenceToItsLastDigit) {
                 << name(model) << " at " << row[0] << " cpd, " << row[1] << " cd/m2, " << row[2] << " deg2, " << row[3];
         };
         const double scale = 1 / relative_models_peak;
-        expect(CsfModel::mannos_sakrison, sensitivity(CsfModel::mannos_sakrison, s) * scale * mannos_sakrison_peak, row[4]);
+        expect(CsfModel::mannos_sakrison, sensitivity(CsfModel::mannos_sakrison, s) * scale * mannos_sakrison_peak,
+               row[4]);
         expect(CsfModel::rushmeier, sensitivity(CsfModel::rushmeier, s) * scale * rushmeier_peak, row[5]);
         expect(CsfModel::daly, sensitivity(CsfModel::daly, at(s, row[3])), row[6]);
         expect(CsfModel::barten_1989, sensitivity(CsfModel::barten_1989, s), row[7]);
@@ -89,19 +90,34 @@ TEST(CsfModels, ClassicalOnesAgreeWithFiftyDigitArithmetic) {
     constexpr std::array columns = {CsfModel::daly,        CsfModel::barten_1989,     CsfModel::barten_1999,
                                     CsfModel::barten_2004, CsfModel::mannos_sakrison, CsfModel::rushmeier};
     const Row rows[] = {
-        {4, 100, 1, 0,
+        {4,
+         100,
+         1,
+         0,
          {1.6358102519387097e+02, 5.1417204086281276e+02, 1.9730312565294969e+02, 1.8112129329703777e+02,
           2.0658217876958142e+02, 2.4871593962381911e+02}},
-        {0.5, 3, 10, 20,
+        {0.5,
+         3,
+         10,
+         20,
          {2.8968618486773526e+01, 1.6969852208910135e+02, 9.0188639719492585e+01, 8.7678664994012365e+01,
           4.8379880354908060e+01, 8.2876485882324374e+01}},
-        {20, 300, 0.1, 5,
+        {20,
+         300,
+         0.1,
+         5,
          {8.4222619882476968e-01, 9.5454802959687555e+01, 3.5499893331712748e+01, 5.2602037542508043e+01,
           1.2812009906197315e+02, 4.6921665506310092e+01}},
-        {60, 0.5, 2, 0,
+        {60,
+         0.5,
+         2,
+         0,
          {2.6540893512955908e-07, 1.1881461323605956e-05, 6.2250460234960692e-05, 1.5064285153562960e-03,
           1.1408041562732658e+00, 3.4193013113549475e-01}},
-        {1, 0.001, 100, 40,
+        {1,
+         0.001,
+         100,
+         40,
          {5.1514381151197422e-03, 2.5270865615770209e+01, 1.5201968027701081e+01, 2.1122714419533025e+01,
           8.0529890501804175e+01, 1.4497445231013083e+02}},
     };
@@ -138,18 +154,14 @@ TEST(CsfModels, CastlesPeaksAreWhereTheyShouldBe) {
         double cdm2, degrees, area_deg2, hertz, peak_cpd, peak;
     };
     const Row rows[] = {
-        {0.1, 0, 1, 0, 0.95926, 16.45047},
-        {1, 0, 1, 8, 1.1173, 30.99676},
-        {1, 20, 10, 8, 0.23651, 13.29724},
-        {10, 0, 10, 0, 2.0849, 210.6925},
-        {100, 0, 1, 0, 3.9449, 134.2961},
-        {100, 20, 10, 0, 1.1975, 21.62938},
-        {1000, 20, 1, 0, 2.0849, 8.105955},
-        {1000, 20, 10, 8, 0.18686, 50.6008},
+        {0.1, 0, 1, 0, 0.95926, 16.45047},  {1, 0, 1, 8, 1.1173, 30.99676},      {1, 20, 10, 8, 0.23651, 13.29724},
+        {10, 0, 10, 0, 2.0849, 210.6925},   {100, 0, 1, 0, 3.9449, 134.2961},    {100, 20, 10, 0, 1.1975, 21.62938},
+        {1000, 20, 1, 0, 2.0849, 8.105955}, {1000, 20, 10, 8, 0.18686, 50.6008},
     };
     for (const Row& row : rows) {
         const auto at_frequency = [&](double cpd) {
-            return sensitivity(CsfModel::castle, flickering(at(foveal(cpd, row.cdm2, row.area_deg2), row.degrees), row.hertz));
+            return sensitivity(CsfModel::castle,
+                               flickering(at(foveal(cpd, row.cdm2, row.area_deg2), row.degrees), row.hertz));
         };
         EXPECT_NEAR(at_frequency(row.peak_cpd) / row.peak, 1, castle_tolerance) << row.cdm2 << " cd/m2";
         double peak = 0;
@@ -167,7 +179,8 @@ TEST(CsfModels, ChromaWithoutLuminanceIsLessVisible) {
     EXPECT_EQ(opponent_contrast(grey, {0, 0, 0.1}).red_green, 0);
     EXPECT_GT(opponent_contrast(grey, {0, 0, 0.1}).yellow_violet, 0);
     const auto ratio = [](double cpd) {
-        return sensitivity(CsfModel::castle_yellow_violet, foveal(cpd, 50)) / sensitivity(CsfModel::castle, foveal(cpd, 50));
+        return sensitivity(CsfModel::castle_yellow_violet, foveal(cpd, 50)) /
+               sensitivity(CsfModel::castle, foveal(cpd, 50));
     };
     EXPECT_GT(ratio(0.1), 10 * ratio(10)) << "colour is seen in the large";
     EXPECT_TRUE(std::isnan(opponent_contrast({0, 0, 1}, {1, 1, 1}).luminance));
@@ -296,8 +309,8 @@ TEST(CsfModels, AreFiniteOverTheWholeDomain) {
 }
 
 TEST(CsfModels, DampingDoesNotMultiplyZeroByInfinity) {
-    // exp(b rho) overflows from b rho = 710 on. sqrt(0.06) exp(-b rho / 2) is what remains, and it is a normal number up
-    // to twice that.
+    // exp(b rho) overflows from b rho = 710 on. sqrt(0.06) exp(-b rho / 2) is what remains, and it is a normal number
+    // up to twice that.
     const double b = 0.3 * std::pow(1 + 100 / 1e-5, 0.15), cpd = 800 / b;
     const double expected = 440 * std::pow(1 + 0.7 / 1e-5, -0.2) * cpd * std::sqrt(0.06) * std::exp(-400.0);
     EXPECT_NEAR(sensitivity(CsfModel::barten_1989, foveal(cpd, 1e-5)) / expected, 1, 1e-9);
@@ -347,7 +360,8 @@ TEST(CsfModels, HaveDistinctNames) {
     }
     const auto unknown = csf_model("barten");
     ASSERT_FALSE(unknown);
-    for (const CsfModel model : csf_models) EXPECT_THAT(unknown.error().message, testing::HasSubstr(std::string(name(model))));
+    for (const CsfModel model : csf_models)
+        EXPECT_THAT(unknown.error().message, testing::HasSubstr(std::string(name(model))));
 }
 
 } // namespace

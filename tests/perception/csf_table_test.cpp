@@ -110,7 +110,8 @@ TEST(CsfTable, IsWithinHalfAPercentOfTheClosedForm) {
             int checked = 0;
             for (int i = 0; i < 8000; ++i) {
                 const Place p = random.next();
-                const double s = sensitivity(model, stimulus_of(conditions, CyclesPerDegree(p.cpd), Degrees(p.degrees), Luminance(p.cdm2)));
+                const double s = sensitivity(
+                    model, stimulus_of(conditions, CyclesPerDegree(p.cpd), Degrees(p.degrees), Luminance(p.cdm2)));
                 if (!(s > 1)) continue;
                 ++checked;
                 ASSERT_NEAR(interpolated(*table, p) / s, 1, table_accuracy)
@@ -133,14 +134,18 @@ TEST(CsfTable, IsWithinHalfAPercentWhereTheFormsHaveKinks) {
         const auto daly = CsfTable::from_model(CsfModel::daly, conditions);
         ASSERT_TRUE(castle && daly);
         for (int i = 0; i < 20000; ++i) {
-            const double cdm2 = i % 2 ? 0.0182 * std::pow(10, random.uniform(-0.5, 1)) : std::pow(10, random.uniform(-3, 4));
+            const double cdm2 =
+                i % 2 ? 0.0182 * std::pow(10, random.uniform(-0.5, 1)) : std::pow(10, random.uniform(-3, 4));
             const double plateau_end = 0.611 * 1.78119 * std::pow(1 + 91.5718 / cdm2, -0.256682);
             const double degrees = random.uniform(0, 100);
-            const Place near_plateau{std::max(plateau_end * std::exp2(random.uniform(-0.1, 0.1)), 1.0 / 16), degrees / 10, cdm2};
-            const Place near_crossing{4 / std::sqrt(1 + 0.24 * degrees) * std::exp2(random.uniform(-1.5, 1.5)), degrees, cdm2};
+            const Place near_plateau{std::max(plateau_end * std::exp2(random.uniform(-0.1, 0.1)), 1.0 / 16),
+                                     degrees / 10, cdm2};
+            const Place near_crossing{4 / std::sqrt(1 + 0.24 * degrees) * std::exp2(random.uniform(-1.5, 1.5)), degrees,
+                                      cdm2};
             for (const auto& [model, table, p] : {std::tuple{CsfModel::castle, &*castle, near_plateau},
                                                   std::tuple{CsfModel::daly, &*daly, near_crossing}}) {
-                const double s = sensitivity(model, stimulus_of(conditions, CyclesPerDegree(p.cpd), Degrees(p.degrees), Luminance(p.cdm2)));
+                const double s = sensitivity(
+                    model, stimulus_of(conditions, CyclesPerDegree(p.cpd), Degrees(p.degrees), Luminance(p.cdm2)));
                 if (!(s > 1)) continue;
                 ASSERT_NEAR(interpolated(*table, p) / s, 1, table_accuracy)
                     << table->samples().source << ": " << p.cpd << " cpd, " << p.degrees << " deg, " << p.cdm2;
@@ -151,9 +156,12 @@ TEST(CsfTable, IsWithinHalfAPercentWhereTheFormsHaveKinks) {
 
 TEST(CsfTable, RefusesConditionsOutsideOfTheDomain) {
     const CsfConditions bad[] = {
-        {.temporal = Hertz(-1)},        {.temporal = Hertz(infinity)},
-        {.temporal = Hertz(not_a_number)}, {.velocity = DegreesPerSecond(-1)},
-        {.velocity = DegreesPerSecond(not_a_number)}, {.temporal = Hertz(8), .velocity = DegreesPerSecond(1)},
+        {.temporal = Hertz(-1)},
+        {.temporal = Hertz(infinity)},
+        {.temporal = Hertz(not_a_number)},
+        {.velocity = DegreesPerSecond(-1)},
+        {.velocity = DegreesPerSecond(not_a_number)},
+        {.temporal = Hertz(8), .velocity = DegreesPerSecond(1)},
         {.distance = Metres(0)},
     };
     for (const CsfConditions& conditions : bad) {
@@ -258,9 +266,9 @@ TEST(CsfTable, MonotoneFormTakesTheLargestOfWhatIsHarderToSee) {
     CsfSamples s = small_samples();
     s.sensitivity = {4, 16, 1, 64, 16, 4, 1.6, 0.4, 2, 6.4, 1.6, 0.4};
     const CsfTable table = create(s);
-    EXPECT_NEAR(monotone(table, {1, 0, 1}), 16, 16 * rounding);   // the peak, below the peak
-    EXPECT_NEAR(monotone(table, {16, 0, 1}), 2, float_rounding); // larger further out
-    EXPECT_NEAR(monotone(table, {1, 10, 1}), 2, float_rounding); // larger at a higher frequency
+    EXPECT_NEAR(monotone(table, {1, 0, 1}), 16, 16 * rounding);     // the peak, below the peak
+    EXPECT_NEAR(monotone(table, {16, 0, 1}), 2, float_rounding);    // larger further out
+    EXPECT_NEAR(monotone(table, {1, 10, 1}), 2, float_rounding);    // larger at a higher frequency
     EXPECT_NEAR(monotone(table, {16, 10, 100}), 2, float_rounding); // larger in dimmer light
     EXPECT_NEAR(table.peak_sensitivity(0.0_deg, 1.0_cdm2), 16, 16 * rounding);
 }

@@ -23,31 +23,38 @@ enum class VisualField { nasal, temporal, worst };
 
 struct Stimulus {
     CyclesPerDegree frequency{4};
-    Luminance luminance{100};      // adaptation luminance
+    Luminance luminance{100}; // adaptation luminance
     Degrees eccentricity{0};
-    Hertz temporal{0};             // counterphase flicker
-    SquareDegrees area{1};         // pi sigma^2 of a Gaussian envelope; a square field's, for the older models
+    Hertz temporal{0};     // counterphase flicker
+    SquareDegrees area{1}; // pi sigma^2 of a Gaussian envelope; a square field's, for the older models
     VisualField field = VisualField::worst;
-    DegreesPerSecond velocity{0};  // on the retina: see motion.h for how to get it from motion in the world
-    Metres distance{0.5};          // from the eye; only Daly's model depends on it
+    DegreesPerSecond velocity{0}; // on the retina: see motion.h for how to get it from motion in the world
+    Metres distance{0.5};         // from the eye; only Daly's model depends on it
 };
 
 // The formulas, their sources, and what each model does not know: docs/perception.md.
 enum class CsfModel {
-    castle,               // castleCSF, achromatic branch (Ashraf, Mantiuk, Chapiro, Wuerger 2024): the default
-    stela,                // stelaCSF (Mantiuk, Ashraf, Chapiro 2022)
-    daly,                 // Daly 1993, the Visible Differences Predictor's
-    barten_1989,          // Barten 1989, the short form that Ramasubramanian et al. 1999 and PerceptualDiff use
-    barten_1999,          // Barten 1999, the physical model in full, both eyes
-    barten_2004,          // Barten 2003/04, the short form
-    mannos_sakrison,      // Mannos and Sakrison 1974; relative
-    rushmeier,            // Rushmeier et al. 1995, a simplification of Daly's; relative
-    castle_red_green,     // castleCSF's isoluminant branches: contrast is that of opponent_contrast() below
+    castle,           // castleCSF, achromatic branch (Ashraf, Mantiuk, Chapiro, Wuerger 2024): the default
+    stela,            // stelaCSF (Mantiuk, Ashraf, Chapiro 2022)
+    daly,             // Daly 1993, the Visible Differences Predictor's
+    barten_1989,      // Barten 1989, the short form that Ramasubramanian et al. 1999 and PerceptualDiff use
+    barten_1999,      // Barten 1999, the physical model in full, both eyes
+    barten_2004,      // Barten 2003/04, the short form
+    mannos_sakrison,  // Mannos and Sakrison 1974; relative
+    rushmeier,        // Rushmeier et al. 1995, a simplification of Daly's; relative
+    castle_red_green, // castleCSF's isoluminant branches: contrast is that of opponent_contrast() below
     castle_yellow_violet,
 };
-inline constexpr std::array csf_models = {
-    CsfModel::castle,      CsfModel::stela,           CsfModel::daly,      CsfModel::barten_1989,      CsfModel::barten_1999,
-    CsfModel::barten_2004, CsfModel::mannos_sakrison, CsfModel::rushmeier, CsfModel::castle_red_green, CsfModel::castle_yellow_violet};
+inline constexpr std::array csf_models = {CsfModel::castle,
+                                          CsfModel::stela,
+                                          CsfModel::daly,
+                                          CsfModel::barten_1989,
+                                          CsfModel::barten_1999,
+                                          CsfModel::barten_2004,
+                                          CsfModel::mannos_sakrison,
+                                          CsfModel::rushmeier,
+                                          CsfModel::castle_red_green,
+                                          CsfModel::castle_yellow_violet};
 
 std::string_view name(CsfModel model);
 Result<CsfModel> csf_model(std::string_view name);
@@ -92,18 +99,18 @@ Stimulus stimulus_of(const CsfConditions& conditions, CyclesPerDegree frequency,
 // Sensitivity over frequency x eccentricity x luminance, interpolated linearly in log S over log frequency,
 // eccentricity and log luminance; outside of the axes clamped to their ends.
 struct CsfSamples {
-    std::string source;                    // what filled it: model and conditions, or observer and date
-    std::vector<double> frequency_cpd;     // strictly ascending, > 0
-    std::vector<double> eccentricity_deg;  // strictly ascending, from 0 on
-    std::vector<double> luminance_cdm2;    // strictly ascending, > 0
-    std::vector<double> sensitivity;       // > 0; [(e * luminances + l) * frequencies + f]
+    std::string source;                   // what filled it: model and conditions, or observer and date
+    std::vector<double> frequency_cpd;    // strictly ascending, > 0
+    std::vector<double> eccentricity_deg; // strictly ascending, from 0 on
+    std::vector<double> luminance_cdm2;   // strictly ascending, > 0
+    std::vector<double> sensitivity;      // > 0; [(e * luminances + l) * frequencies + f]
 };
 
 class CsfTable {
 public:
     // Checks the samples; the error names the field and the index. Then prepares the conservative form below.
     static Result<CsfTable> create(CsfSamples samples);
-    // Filled from a model under fixed conditions, for patches of patch_area(frequency): 1/16 to 64 cpd, 0 to 120 degrees,
+    // Filled from a model under fixed conditions, for patches of patch_area(frequency): 1/16 to 64 cpd, 0 to 120 deg,
     // 1e-3 to 1e4 cd/m2, within 0.5% of the closed form wherever S > 1. An error where the conditions are outside of
     // the model's domain. Cost: 20 to 400 ms, 1 to 30 MB; daly's is the largest.
     static Result<CsfTable> from_model(CsfModel model, const CsfConditions& conditions);
@@ -136,8 +143,8 @@ public:
 private:
     // The samples of one axis, with a uniform grid over them that finds the samples around a value in constant time.
     struct Axis {
-        std::vector<double> positions;           // log2 cpd, degrees, log2 cd/m2
-        std::vector<std::uint32_t> first_cell;   // of each of the uniform buckets, and the last cell once more
+        std::vector<double> positions;         // log2 cpd, degrees, log2 cd/m2
+        std::vector<std::uint32_t> first_cell; // of each of the uniform buckets, and the last cell once more
         double buckets_per_unit = 0;
     };
     // Two neighbouring samples and how far a position, clamped to the axis, lies between them, 0..1.

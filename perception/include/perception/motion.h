@@ -7,7 +7,7 @@
 
 namespace unseen::perception {
 
-// ---- sensitivity to moving gratings ---------------------------------------------------------------------------------
+// ---- sensitivity to moving gratings --------------------------------------------------------------------------------
 
 // S(rho, v) = gain k v (2 pi spatial rho)^2 exp(-4 pi spatial rho / rho_max), k = 6.1 + 7.3 |log10(speed v / 3)|^3,
 // rho_max = 45.9 / (speed v + 2) cpd. Kelly 1979 measured it with the image held still on the retina; Daly 1998 and
@@ -31,7 +31,7 @@ double spatiovelocity_sensitivity(CyclesPerDegree frequency, DegreesPerSecond ve
 double velocity_factor(CyclesPerDegree frequency, DegreesPerSecond velocity,
                        const Spatiovelocity& constants = laird_2006);
 
-// ---- from motion in the world to motion on the retina -----------------------------------------------------------------
+// ---- from motion in the world to motion on the retina --------------------------------------------------------------
 
 // Rotations are axes times speeds in degrees per second, right-handed.
 
