@@ -33,7 +33,7 @@ constexpr std::array<std::pair<CsfModel, std::string_view>, csf_models.size()> n
 // W. Geisler, J. Perry, "A real-time foveated multiresolution system for low-bandwidth video communication", SPIE 3299,
 // 1998: threshold contrast grows as exp(0.106 rho (e + 2.3) / 2.3), relative to the fovea as exp(0.106 rho e / 2.3).
 constexpr double geisler_perry_alpha = 0.106, geisler_perry_half_degrees = 2.3;
-const double geisler_perry_decay = geisler_perry_alpha / geisler_perry_half_degrees / std::numbers::ln10;
+constexpr double geisler_perry_decay = geisler_perry_alpha / geisler_perry_half_degrees / std::numbers::ln10;
 
 bool in_domain(const Stimulus& s) {
     const auto positive = [](double v) { return v > 0 && std::isfinite(v); };
