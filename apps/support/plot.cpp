@@ -11,7 +11,7 @@ namespace unseen::app {
 namespace {
 
 constexpr glm::vec3 paper{1.0f}, ink{0.1f}, faint{0.88f}, grid{0.75f};
-constexpr int margin_left = 76, margin_right = 24, margin_top = 46, margin_bottom = 60; // pixels
+constexpr int margin_left = 92, margin_right = 24, margin_top = 46, margin_bottom = 60; // pixels
 constexpr int text_scale = 2;
 constexpr int legend_sample = 34, legend_padding = 12; // pixels
 constexpr double curve_width = 2;                      // pixels

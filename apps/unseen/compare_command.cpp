@@ -7,7 +7,6 @@
 
 #include <glm/common.hpp>
 
-#include <calibration/observer_profile.h>
 #include <perception/image.h>
 #include <perception/judge.h>
 
@@ -69,12 +68,13 @@ Result<Verdict> judge_modern(const CompareArguments& a, const Pair& pair, const 
     perception::JudgeOptions options;
     options.display = display;
     options.gaze_px = a.gaze_px;
-    std::optional<perception::CsfTable> own;
-    if (!a.display.csf_file.empty()) {
-        auto read = calibration::read_csf(a.display.csf_file);
-        if (!read) return read.error();
-        own = std::move(*read);
-        options.csf_table = &*own;
+    CsfChoice choice;
+    if (!a.display.csf.empty()) {
+        auto chosen = choose_csf(a.display.csf);
+        if (!chosen) return chosen.error();
+        choice = std::move(*chosen);
+        if (choice.model) options.csf = *choice.model;
+        if (choice.table) options.csf_table = &*choice.table;
     }
     auto judgement = perception::judge_modern(reference, test, options);
     if (!judgement) return judgement.error();
@@ -184,7 +184,7 @@ void check(CompareArguments& a) {
     if (a.model == Model::modern && !a.profile.empty()) refuse("--profile perceptualdiff needs --model rpg99.");
     if (a.model == Model::modern && a.field_degrees) refuse("--field needs --model rpg99; modern takes the display's.");
     if (a.model == Model::rpg99 && a.gaze_px) refuse("--gaze needs --model modern: rpg99 knows no eccentricity.");
-    if (a.model == Model::rpg99 && !a.display.csf_file.empty()) refuse("--csf needs --model modern.");
+    if (a.model == Model::rpg99 && !a.display.csf.empty()) refuse("--csf needs --model modern.");
 }
 
 } // namespace

@@ -1,4 +1,5 @@
 // unseen csf: contrast sensitivity for one stimulus, for a table of them, or as a plot.
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -12,10 +13,12 @@
 #include <calibration/observer_profile.h>
 #include <perception/csf.h>
 #include <perception/image.h>
+#include <perception/motion.h>
 
 #include "command.h"
 #include "options.h"
 #include "plot.h"
+#include "scene.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -25,13 +28,14 @@ using namespace perception;
 
 // What the options, or a row of the CSV file, say about a stimulus.
 struct StimulusOptions {
-    std::optional<double> frequency, luminance, eccentricity, temporal, area;
+    std::optional<double> frequency, luminance, eccentricity, temporal, area, velocity, distance;
     std::optional<VisualField> field;
 };
 
 struct CsfArguments {
-    std::string model_name = "castle", csv, plot, csf_file, save;
+    std::string model_name = "castle", csv, plot, csf, save;
     bool by_table = false;
+    bool is_pursued = false; // the velocity is the image's, and the eye follows it
     StimulusOptions stimulus;
 };
 
@@ -44,25 +48,52 @@ std::optional<VisualField> field_of(const std::string& name) {
 
 Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
 
-// Sensitivity by a model's closed form or by a table.
+CsfConditions conditions_of(const StimulusOptions& s, bool is_pursued) {
+    CsfConditions c;
+    if (s.temporal) c.temporal = Hertz(*s.temporal);
+    if (s.velocity) c.velocity = DegreesPerSecond(*s.velocity);
+    if (s.velocity && is_pursued) c.velocity = retinal_velocity_of_target(c.velocity);
+    if (s.field) c.field = *s.field;
+    if (s.distance) c.distance = Metres(*s.distance);
+    return c;
+}
+
+// What a table holds constant.
+bool same_conditions(const StimulusOptions& a, const StimulusOptions& b) {
+    return a.temporal == b.temporal && a.velocity == b.velocity && a.field == b.field && a.distance == b.distance;
+}
+bool has_conditions(const StimulusOptions& s) { return !same_conditions(s, {}); }
+
+// Sensitivity by a model's closed form, by a model's table under the options' conditions, or by a viewer's table.
 class Observer {
 public:
     static Result<Observer> create(const CsfArguments& a) {
         Observer observer;
+        observer.fixed_ = a.stimulus;
+        observer.is_pursued_ = a.is_pursued;
         auto model = csf_model(a.model_name);
         if (!model) return model.error();
         observer.model_ = *model;
-        if (!a.csf_file.empty()) {
-            auto table = calibration::read_csf(a.csf_file);
+        bool by_table = a.by_table;
+        if (!a.csf.empty()) {
+            auto choice = choose_csf(a.csf);
+            if (!choice) return choice.error();
+            by_table = choice->model.has_value();
+            if (choice->model) observer.model_ = *choice->model;
+            if (choice->table && has_conditions(a.stimulus))
+                return invalid(
+                    "a viewer's table was measured under conditions of its own: leave --temporal, --velocity, "
+                    "--field and --distance away.");
+            observer.table_ = std::move(choice->table);
+        }
+        if (by_table) {
+            auto table = CsfTable::from_model(observer.model_, conditions_of(a.stimulus, a.is_pursued));
             if (!table) return table.error();
             observer.table_ = std::move(*table);
-        } else if (a.by_table) {
-            observer.table_ = CsfTable::from_model(*model);
         }
         return observer;
     }
 
-    bool is_table() const { return table_.has_value(); }
     const CsfTable& table() const { return *table_; }
     std::string name() const {
         return table_ ? "table: " + table_->samples().source : std::string(perception::name(model_));
@@ -71,27 +102,28 @@ public:
     Result<double> operator()(const StimulusOptions& s) const {
         if (!s.frequency) return invalid("--frequency is missing.");
         if (!s.luminance) return invalid("--luminance is missing.");
-        if (table_ && (s.temporal || s.area || s.field))
-            return invalid("a table holds static patches of 1.5 cycles radius in the worst field: "
-                           "leave temporal, area and field away.");
-        Stimulus stimulus;
-        stimulus.frequency = CyclesPerDegree(*s.frequency);
-        stimulus.luminance = Luminance(*s.luminance);
-        stimulus.eccentricity = Degrees(s.eccentricity.value_or(0));
-        stimulus.temporal = Hertz(s.temporal.value_or(0));
-        stimulus.area = s.area ? SquareDegrees(*s.area) : patch_area(stimulus.frequency);
-        stimulus.field = s.field.value_or(VisualField::worst);
+        if (table_ && (s.area || !same_conditions(s, fixed_)))
+            return invalid(
+                "a table holds patches of 1.5 cycles radius under the same conditions: leave area, temporal, "
+                "velocity, field and distance away.");
+        Stimulus stimulus = stimulus_of(conditions_of(s, is_pursued_), CyclesPerDegree(*s.frequency),
+                                        Degrees(s.eccentricity.value_or(0)), Luminance(*s.luminance));
+        if (s.area) stimulus.area = SquareDegrees(*s.area);
+        if (stimulus.temporal.value() > 0 && stimulus.velocity.value() > 0)
+            return invalid("no sensitivity: give a temporal frequency or a velocity, not both.");
         const double value = table_ ? table_->sensitivity(stimulus.frequency, stimulus.eccentricity, stimulus.luminance)
                                     : sensitivity(model_, stimulus);
         if (!std::isfinite(value))
-            return invalid("no sensitivity: frequency, luminance and area must be above 0, eccentricity and temporal "
-                           "frequency 0 or more, and none of them extreme.");
+            return invalid("no sensitivity: frequency, luminance, area and distance must be above 0, eccentricity, "
+                           "temporal frequency and velocity 0 or more, and none of them extreme.");
         return value;
     }
 
 private:
     Observer() = default;
     CsfModel model_ = CsfModel::castle;
+    StimulusOptions fixed_;
+    bool is_pursued_ = false;
     std::optional<CsfTable> table_;
 };
 
@@ -129,6 +161,8 @@ Result<void> read_cell(const std::string& column, const std::string& cell, Stimu
                                    : column == "eccentricity" ? &stimulus.eccentricity
                                    : column == "temporal"     ? &stimulus.temporal
                                    : column == "area"         ? &stimulus.area
+                                   : column == "velocity"     ? &stimulus.velocity
+                                   : column == "distance"     ? &stimulus.distance
                                                               : nullptr;
     if (!value) return {};
     *value = number_in(cell);
@@ -218,6 +252,7 @@ Result<int> run_plot(const CsfArguments& a, const Observer& observer) {
     plot.y_label = "sensitivity, 1 / threshold contrast";
     plot.x_range = {lowest_frequency, highest_frequency};
     plot.y_range = {1, 1000};
+    double peak = 0;
     for (std::size_t l = 0; l < plotted_luminances.size(); ++l) {
         if (a.stimulus.luminance && l > 0) break;
         for (std::size_t e = 0; e < plotted_eccentricities.size(); ++e) {
@@ -230,9 +265,12 @@ Result<int> run_plot(const CsfArguments& a, const Observer& observer) {
             auto curve = curve_of(observer, stimulus, luminance_colours[l] + (paper - luminance_colours[l]) * paleness);
             if (!curve) return curve.error();
             curve->dashed = e > 0;
+            for (const auto& point : curve->points) peak = std::max(peak, static_cast<double>(point.y));
             plot.curves.push_back(std::move(*curve));
         }
     }
+    // Coarse gratings that move are seen far better than any that stand.
+    plot.y_range.y = std::max(1000.0, std::pow(10.0, std::ceil(std::log10(peak))));
     if (auto ok = perception::write_image(a.plot, draw(plot)); !ok) return ok.error();
     return exit_done;
 }
@@ -254,15 +292,28 @@ Result<int> run(const CsfArguments& a) {
     return exit_done;
 }
 
+std::vector<std::string> model_names() {
+    std::vector<std::string> names;
+    for (const CsfModel model : csf_models) names.emplace_back(name(model));
+    return names;
+}
+
+std::string model_list() {
+    std::string list;
+    for (const std::string& name : model_names()) list += (list.empty() ? "" : ", ") + name;
+    return list;
+}
+
 void check(const CsfArguments& a) {
     const int outputs = !a.csv.empty() + !a.plot.empty() + !a.save.empty();
     if (outputs > 1) refuse("--csv, --plot and --save-table exclude each other: give one of them.");
-    const bool is_table = a.by_table || !a.csf_file.empty();
-    if (is_table && (a.stimulus.temporal || a.stimulus.area || a.stimulus.field))
-        refuse("--table and --csf hold static patches of 1.5 cycles radius in the worst field: "
-               "leave --temporal, --area and --field away.");
+    const bool is_table = a.by_table || !a.csf.empty();
+    if (is_table && a.stimulus.area) refuse("--table and --csf hold patches of 1.5 cycles radius: leave --area away.");
     if (!a.save.empty() && !is_table) refuse("--save-table needs --table or --csf.");
-    if (a.by_table && !a.csf_file.empty()) refuse("--table and --csf exclude each other: give one of them.");
+    if (a.by_table && !a.csf.empty()) refuse("--table and --csf exclude each other: give one of them.");
+    if (a.stimulus.temporal && a.stimulus.velocity)
+        refuse("--temporal and --velocity exclude each other: give one of them.");
+    if (a.is_pursued && !a.stimulus.velocity && a.csv.empty()) refuse("--pursuit needs --velocity.");
     if (outputs > 0) return;
     if (!a.stimulus.frequency) refuse("--frequency is required, or else --csv, --plot or --save-table.");
     if (!a.stimulus.luminance) refuse("--luminance is required, or else --csv, --plot or --save-table.");
@@ -275,9 +326,9 @@ Command csf_command(CLI::App& app) {
     StimulusOptions* s = &a->stimulus;
     CLI::App* verb =
         app.add_subcommand("csf", "Contrast sensitivity: 1 / the least visible contrast of a grating patch");
-    verb->add_option("--model", a->model_name, "castle (castleCSF, achromatic; default) or stela (stelaCSF)")
+    verb->add_option("--model", a->model_name, "Which closed form (default: castle). " + model_list())
         ->type_name("NAME")
-        ->check(CLI::IsMember({"castle", "stela"}).description(""));
+        ->check(CLI::IsMember(model_names()).description(""));
     const auto number = [verb](const char* name, std::optional<double>& value, const CLI::Validator& validator,
                                const char* unit, const char* text) {
         verb->add_option_function<double>(
@@ -289,7 +340,11 @@ Command csf_command(CLI::App& app) {
     number("--luminance", s->luminance, positive(), "CDM2", "Adaptation luminance");
     number("--eccentricity", s->eccentricity, not_negative(), "DEG", "From the point of gaze (default: 0)");
     number("--temporal", s->temporal, not_negative(), "HZ", "Temporal frequency (default: 0)");
+    number("--velocity", s->velocity, not_negative(), "DEG/S", "How fast the grating moves on the retina (default: 0)");
+    number("--distance", s->distance, positive(), "METRES", "Of the grating, for --model daly (default: 0.5)");
     number("--area", s->area, positive(), "DEG2", "Area of the patch (default: pi (1.5 / frequency)^2)");
+    verb->add_flag("--pursuit", a->is_pursued,
+                   "The velocities are the image's, and the eye follows: what it lags is left");
     verb->add_option_function<std::string>(
             "--field", [s](const std::string& name) { s->field = field_of(name); },
             "Side of the visual field: nasal, temporal, or the worst of them (default)")
@@ -299,14 +354,16 @@ Command csf_command(CLI::App& app) {
         ->type_name("FILE|-");
     verb->add_option("--plot", a->plot, "Curves over frequency")->type_name("OUT.png")->check(ending_in({".png"}));
     verb->add_flag("--table", a->by_table, "Through the interpolated table that fold tests use, not the closed form");
-    verb->add_option("--csf", a->csf_file, "Through a viewer's table")->type_name("FILE.json");
+    verb->add_option("--csf", a->csf, "Through a model's table, or a viewer's")->type_name("MODEL|FILE");
     verb->add_option("--save-table", a->save, "With --table or --csf: write the table")
         ->type_name("OUT.json")
         ->check(ending_in({".json"}));
     verb->callback([o = a.get()] { check(*o); });
     verb->footer("Examples:\n  unseen csf --frequency 4 --luminance 100\n"
+                 "  unseen csf --frequency 4 --luminance 100 --model barten-1999 --velocity 10 --pursuit\n"
                  "  unseen csf --csv stimuli.csv --model stela > with-sensitivity.csv\n  unseen csf --plot csf.png\n"
-                 "  unseen csf --table --save-table standard.json");
+                 "  unseen csf --table --save-table standard.json\n"
+                 "  unseen csf --table --velocity 5 --save-table moving.json");
     return {verb, [a] { return run(*a); }};
 }
 

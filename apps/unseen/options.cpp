@@ -197,8 +197,8 @@ void add_display_options(CLI::App& verb, DisplayOptions& o) {
     add_number(group, "--distance", o.distance_m, positive(), "METRES", "From the eye to the screen");
     add_number(group, "--peak", o.peak_cdm2, positive(), "CDM2", "Luminance of white");
     add_number(group, "--black", o.black_cdm2, positive(), "CDM2", "Luminance of black");
-    group.add_option("--csf", o.csf_file, "A viewer's contrast sensitivity table (default: castleCSF)")
-        ->type_name("FILE.json");
+    group.add_option("--csf", o.csf, "Contrast sensitivity: a model of unseen csf (default: castle), or a viewer's table")
+        ->type_name("MODEL|FILE");
 }
 
 void add_what_options(CLI::App& verb, WhatOptions& o) {

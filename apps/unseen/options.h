@@ -28,7 +28,7 @@ struct ViewOptions {
 struct DisplayOptions {
     std::string file;
     std::optional<double> pixels_per_degree, distance_m, peak_cdm2, black_cdm2;
-    std::string csf_file;
+    std::string csf; // a model's name or a file's
 };
 
 enum class Mode { full, imperceptible, budget, pixels };

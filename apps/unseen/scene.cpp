@@ -91,6 +91,20 @@ Result<perception::Display> make_display(const DisplayOptions& options) {
     return display;
 }
 
+Result<CsfChoice> choose_csf(const std::string& model_or_file) {
+    const auto model = perception::csf_model(model_or_file);
+    if (model) {
+        if (perception::is_achromatic(*model)) return CsfChoice{*model, {}};
+        return invalid("--csf " + model_or_file + " is sensitivity to colour, not to luminance contrast.");
+    }
+    std::error_code unknown;
+    if (!std::filesystem::exists(model_or_file, unknown))
+        return invalid("--csf: there is no such file, and " + model.error().message + ".");
+    auto table = calibration::read_csf(model_or_file);
+    if (!table) return table.error();
+    return CsfChoice{{}, std::move(*table)};
+}
+
 PlacedSphere placed_sphere(const vdtree::VertexTree& tree, const vdtree::Similarity& placement) {
     const vdtree::Sphere sphere = tree.bounding_sphere();
     return {placement.to_world(tree.origin() + glm::dvec3(sphere.centre)), placement.scale * sphere.radius};
@@ -103,10 +117,10 @@ Result<Scene> load_scene(const std::filesystem::path& model, const ViewOptions& 
     auto background = relative_background(*shown_on, view.background_cdm2);
     if (!background) return background.error();
     std::optional<perception::CsfTable> csf;
-    if (!display.csf_file.empty()) {
-        auto read = calibration::read_csf(display.csf_file);
-        if (!read) return read.error();
-        csf = std::move(*read);
+    if (!display.csf.empty()) {
+        auto choice = choose_csf(display.csf);
+        if (!choice) return choice.error();
+        csf = choice->model ? perception::CsfTable::from_model(*choice->model) : *std::move(choice->table);
     }
     auto tree = open_tree(model);
     if (!tree) return tree.error();

@@ -18,7 +18,7 @@ struct Scene {
     vdtree::VertexTree tree;
     vdtree::Similarity placement;
     perception::Display display;
-    std::optional<perception::CsfTable> csf; // empty: the standard table
+    std::optional<perception::CsfTable> csf; // what --csf names; empty: the standard table
     vdtree::View view;
     float background = 0;  // relative luminance
     bool is_relit = false; // the light is not the one that the tree was built for
@@ -28,6 +28,13 @@ struct Scene {
 
 // The display that the options describe; ranges are checked.
 Result<perception::Display> make_display(const DisplayOptions& options);
+
+// What --csf says: a model's name, or else the file of a table. A model must be of luminance contrast.
+struct CsfChoice {
+    std::optional<perception::CsfModel> model;
+    std::optional<perception::CsfTable> table; // of the file; where a model is named, none
+};
+Result<CsfChoice> choose_csf(const std::string& model_or_file);
 
 // Fails on a file that cannot be read, and on options that contradict the model or the display.
 Result<Scene> load_scene(const std::filesystem::path& model, const ViewOptions& view, const DisplayOptions& display);

@@ -112,7 +112,7 @@ Effect silhouette_effect(const Scene& scene, const WhatOptions& what) {
 Effect csf_effect(const Scene& scene, const WhatOptions& what) {
     if (!is_perceptual(what)) return {"csf table", false, "only the perceptual fold test looks sensitivity up"};
     return {"csf table", scene.csf.has_value(),
-            scene.csf ? "the viewer's own: " + scene.csf->samples().source
+            scene.csf ? "by --csf: " + scene.csf->samples().source
                       : "the standard observer is used, castleCSF"};
 }
 

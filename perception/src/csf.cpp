@@ -1,182 +1,114 @@
-// The closed forms: the achromatic branch of castleCSF, and stelaCSF. One set of equations, two sets of constants.
-//
-// castleCSF: M. Ashraf, R. K. Mantiuk, A. Chapiro, S. Wuerger, "castleCSF - A contrast sensitivity function of color,
-// area, spatiotemporal frequency, luminance and eccentricity", Journal of Vision 24(4), 2024.
-// stelaCSF: R. K. Mantiuk, M. Ashraf, A. Chapiro, "stelaCSF - A unified model of contrast sensitivity as the function
-// of spatio-temporal frequency, eccentricity, luminance and area", ACM Transactions on Graphics 41(4), 2022.
+// The one interface to the closed forms: names, domain, and what gives eccentricity and motion to models that know
+// neither.
 #include <perception/csf.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <string>
+#include <utility>
+
+#include <perception/motion.h>
 
 #include "csf_model.h"
 
 namespace unseen::perception {
 namespace {
 
-// lum(L) = p1 (1 + p2/L)^-p3: rises with luminance and saturates.
-struct SaturatingLaw {
-    double p1, p2, p3;
-};
-// The fall of the sustained peak at high luminance: 1 - (1 + p4/L)^-p5.
-struct GlareLaw {
-    double p4, p5;
-};
-// lum(L) = scale L^exponent.
-struct PowerLaw {
-    double exponent, scale;
-};
-// The log-parabola over frequency with a plateau on its low side, and the spatial summation over area.
-struct BandShape {
-    double log2_bandwidth; // the parabola's width is 2^this
-    double truncation;     // below the peak the parabola falls by no more than this share
-    double area0, frequency0;
-};
-struct Decay {
-    double k0, k1; // log10 sensitivity lost per degree: k0 + k1 frequency
-};
+constexpr std::array<std::pair<CsfModel, std::string_view>, csf_models.size()> names = {{
+    {CsfModel::castle, "castle"},
+    {CsfModel::stela, "stela"},
+    {CsfModel::daly, "daly"},
+    {CsfModel::barten_1989, "barten-1989"},
+    {CsfModel::barten_1999, "barten-1999"},
+    {CsfModel::barten_2004, "barten-2004"},
+    {CsfModel::mannos_sakrison, "mannos-sakrison"},
+    {CsfModel::rushmeier, "rushmeier"},
+    {CsfModel::castle_red_green, "castle-red-green"},
+    {CsfModel::castle_yellow_violet, "castle-yellow-violet"},
+}};
 
-struct ModelConstants {
-    SaturatingLaw sustained_peak;
-    GlareLaw sustained_glare;
-    SaturatingLaw sustained_frequency;
-    BandShape sustained;
-    double sustained_temporal_scale;
-    PowerLaw transient_peak;
-    double transient_frequency;
-    BandShape transient;
-    double transient_temporal_scale;
-    double omega0_at_1_cdm2, omega0_per_decade; // Hz
-    Decay temporal_field, nasal_field;
-};
-
-// Fitted constants as published with the models' programs (gfxdisp/castleCSF, class CSF_stelaCSF_lum_peak).
-constexpr ModelConstants castle_constants{
-    .sustained_peak = {56.4947, 7.54726, 0.144532},
-    .sustained_glare = {5.58341e-7, 9.66862e9},
-    .sustained_frequency = {1.78119, 91.5718, 0.256682},
-    .sustained = {0.000213047, 0.100207, 157.103, 0.702338},
-    .sustained_temporal_scale = 10.5795,
-    .transient_peak = {0.193434, 2748.09},
-    .transient_frequency = 0.000316696,
-    .transient = {2.6761, 0.000241177, 3.81611, 3.01389},
-    .transient_temporal_scale = 0.0844836,
-    .omega0_at_1_cdm2 = 4.7036,
-    .omega0_per_decade = 2.41482,
-    .temporal_field = {0.0239853, 0.0189038},
-    .nasal_field = {0.0400662, 0.00813619},
-};
-
-// gfxdisp/stelaCSF, class CSF_stelaCSF.
-constexpr ModelConstants stela_constants{
-    .sustained_peak = {68.9501, 59.5023, 0.164274},
-    .sustained_glare = {7.54866e-7, 7.77268e9},
-    .sustained_frequency = {1.62144, 36.6565, 0.255823},
-    .sustained = {0.000219263, 0.103686, 270, 0.65},
-    .sustained_temporal_scale = 5.79336,
-    .transient_peak = {0.500846, 57.3469},
-    .transient_frequency = 0.0267489,
-    .transient = {1.75147, 0.000273289, 270, 0.65},
-    .transient_temporal_scale = 0.12314,
-    .omega0_at_1_cdm2 = 5,
-    .omega0_per_decade = 0,
-    .temporal_field = {0.0296662, 0.0190062},
-    .nasal_field = {0.0113638, 0.0193858},
-};
-
-// Hz. castle's omega0 is negative below 0.0113 cd/m2, where a power of it is no number; 0 would switch the transient
-// channel fully on for static stimuli and triple the sensitivity. At this floor the values are those of the published
-// program, except for its spike at 0.0113 cd/m2.
-constexpr double omega0_floor_hz = 0.5;
-// Exponents of temporal frequency in the two channels, common to both models.
-constexpr double sustained_temporal_exponent = 1.3314;
-constexpr double transient_temporal_exponent = 0.1898;
-
-const ModelConstants& constants(CsfModel model) {
-    return model == CsfModel::stela ? stela_constants : castle_constants;
-}
-
-double evaluate(const SaturatingLaw& law, double luminance) {
-    return law.p1 * std::exp(-law.p3 * std::log1p(law.p2 / luminance));
-}
-// p4/L is below the spacing of doubles around 1 for bright stimuli: never written as 1 - (1 + x)^-p5.
-double evaluate(const GlareLaw& law, double luminance) {
-    return -std::expm1(-law.p5 * std::log1p(law.p4 / luminance));
-}
-
-// Smax P(rho) rho sqrt(Ac / (1 + Ac / A)) without Smax.
-double channel(const BandShape& shape, double freq_cpd, double peak_cpd, double area_deg2) {
-    const double octaves10 = std::log10(freq_cpd / peak_cpd);
-    double parabola = std::pow(10.0, -octaves10 * octaves10 / std::exp2(shape.log2_bandwidth));
-    if (freq_cpd < peak_cpd) parabola = std::max(parabola, 1 - shape.truncation);
-    const double relative = freq_cpd / shape.frequency0;
-    const double summation_area = shape.area0 / (1 + relative * relative);
-    return parabola * freq_cpd * std::sqrt(summation_area / (1 + summation_area / area_deg2));
-}
-
-double foveal_sensitivity(const ModelConstants& k, double freq_cpd, double lum, double omega_hz, double area_deg2) {
-    const double sustained_response =
-        std::exp(-std::pow(omega_hz, sustained_temporal_exponent) / k.sustained_temporal_scale);
-    const double omega0 = std::max(k.omega0_at_1_cdm2 + k.omega0_per_decade * std::log10(lum), omega0_floor_hz);
-    const double distance =
-        std::pow(omega_hz, transient_temporal_exponent) - std::pow(omega0, transient_temporal_exponent);
-    const double transient_response = std::exp(-distance * distance / k.transient_temporal_scale);
-
-    const double sustained_max = evaluate(k.sustained_peak, lum) * evaluate(k.sustained_glare, lum);
-    const double sustained_cpd = evaluate(k.sustained_frequency, lum);
-    const double transient_max = k.transient_peak.scale * std::pow(lum, k.transient_peak.exponent);
-    return sustained_response * sustained_max * channel(k.sustained, freq_cpd, sustained_cpd, area_deg2) +
-           transient_response * transient_max * channel(k.transient, freq_cpd, k.transient_frequency, area_deg2);
-}
+// W. Geisler, J. Perry, "A real-time foveated multiresolution system for low-bandwidth video communication", SPIE 3299,
+// 1998: threshold contrast grows as exp(0.106 rho (e + 2.3) / 2.3), relative to the fovea as exp(0.106 rho e / 2.3).
+constexpr double geisler_perry_alpha = 0.106, geisler_perry_half_degrees = 2.3;
+constexpr double geisler_perry_decay = geisler_perry_alpha / geisler_perry_half_degrees / std::numbers::ln10;
 
 bool in_domain(const Stimulus& s) {
     const auto positive = [](double v) { return v > 0 && std::isfinite(v); };
     const auto not_negative = [](double v) { return v >= 0 && std::isfinite(v); };
     return positive(s.frequency.value()) && positive(s.luminance.value()) && positive(s.area.value()) &&
-           not_negative(s.eccentricity.value()) && not_negative(s.temporal.value());
+           positive(s.distance.value()) && not_negative(s.eccentricity.value()) && not_negative(s.temporal.value()) &&
+           not_negative(s.velocity.value()) && (s.temporal.value() == 0 || s.velocity.value() == 0);
+}
+
+double static_at_fovea(CsfModel model, const Stimulus& s) {
+    return is_castle_family(model) ? castle_family_at_fovea(model, s) : classical_at_fovea(model, s);
 }
 
 } // namespace
 
-std::string_view name(CsfModel model) { return model == CsfModel::stela ? "stela" : "castle"; }
+std::string_view name(CsfModel model) {
+    return std::ranges::find(names, model, &decltype(names)::value_type::first)->second;
+}
 
 Result<CsfModel> csf_model(std::string_view text) {
-    for (const CsfModel model : {CsfModel::castle, CsfModel::stela}) {
-        if (text == name(model)) return model;
+    std::string known;
+    for (const auto& [model, name] : names) {
+        if (text == name) return model;
+        known.append(known.empty() ? "" : model == names.back().first ? " or " : ", ").append(name);
     }
     return Error{ErrorCode::invalid_argument,
-                 "there is no contrast sensitivity model \"" + std::string(text) + "\": use castle or stela"};
+                 "there is no contrast sensitivity model \"" + std::string(text) + "\": use " + known};
+}
+
+bool is_achromatic(CsfModel model) {
+    return model != CsfModel::castle_red_green && model != CsfModel::castle_yellow_violet;
 }
 
 double decay_per_degree(CsfModel model, CyclesPerDegree frequency, VisualField field) {
-    const ModelConstants& k = constants(model);
-    const double temporal = k.temporal_field.k0 + k.temporal_field.k1 * frequency.value();
-    const double nasal = k.nasal_field.k0 + k.nasal_field.k1 * frequency.value();
-    switch (field) {
-    case VisualField::temporal: return temporal;
-    case VisualField::nasal: return nasal;
-    case VisualField::worst: break;
-    }
-    return std::min(temporal, nasal);
+    if (is_castle_family(model)) return castle_family_decay(model, frequency, field);
+    return geisler_perry_decay * frequency.value();
 }
 
-CyclesPerDegree equal_decay_frequency(CsfModel model) {
-    const ModelConstants& k = constants(model);
-    return CyclesPerDegree((k.temporal_field.k0 - k.nasal_field.k0) / (k.nasal_field.k1 - k.temporal_field.k1));
+double motion_factor(CsfModel model, const Stimulus& s) {
+    if (s.velocity.value() > 0) return velocity_factor(s.frequency, s.velocity);
+    if (is_castle_family(model) || s.temporal.value() == 0) return 1;
+    return velocity_factor(s.frequency, DegreesPerSecond(s.temporal.value() / s.frequency.value()));
+}
+
+std::vector<CyclesPerDegree> kinks(CsfModel model, const CsfConditions& conditions) {
+    if (is_castle_family(model)) {
+        if (conditions.field != VisualField::worst) return {};
+        return {equal_decay_frequency(model)};
+    }
+    if (conditions.temporal.value() == 0) return {};
+    return {CyclesPerDegree(conditions.temporal.value() / least_velocity.value())};
 }
 
 double sensitivity(CsfModel model, const Stimulus& s) {
     if (!in_domain(s)) return std::numeric_limits<double>::quiet_NaN();
-    const double foveal = foveal_sensitivity(constants(model), s.frequency.value(), s.luminance.value(),
-                                             s.temporal.value(), s.area.value());
-    return foveal * std::pow(10.0, -decay_per_degree(model, s.frequency, s.field) * s.eccentricity.value());
+    if (model == CsfModel::daly) return std::min(daly_ceiling(s), daly_eccentric(s)) * motion_factor(model, s);
+    const double loss = decay_per_degree(model, s.frequency, s.field) * s.eccentricity.value();
+    return static_at_fovea(model, s) * motion_factor(model, s) * std::pow(10.0, -loss);
 }
 
 SquareDegrees patch_area(CyclesPerDegree frequency) {
     const double radius_deg = 1.5 / frequency.value();
     return SquareDegrees(std::numbers::pi * radius_deg * radius_deg);
+}
+
+Stimulus stimulus_of(const CsfConditions& conditions, CyclesPerDegree frequency, Degrees eccentricity,
+                     Luminance luminance) {
+    return {.frequency = frequency,
+            .luminance = luminance,
+            .eccentricity = eccentricity,
+            .temporal = conditions.temporal,
+            .area = patch_area(frequency),
+            .field = conditions.field,
+            .velocity = conditions.velocity,
+            .distance = conditions.distance};
 }
 
 } // namespace unseen::perception

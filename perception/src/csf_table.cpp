@@ -32,10 +32,26 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double sensitivity_floor = 1e-300;
 
 constexpr double lowest_frequency_cpd = 1.0 / 16, highest_frequency_cpd = 64;
-// With the interpolation error growing as the step squared, 16 per octave keep it below 0.5% at the model's kinks.
-constexpr int samples_per_octave = 16;
-constexpr double lowest_luminance_cdm2 = 1e-3;
-constexpr int luminance_decades = 7, samples_per_decade = 8;
+constexpr double lowest_luminance_cdm2 = 1e-3, highest_luminance_cdm2 = 1e4;
+constexpr double highest_eccentricity_deg = 120;
+
+// How densely a model's table samples, for an error of 0.5% where S > 1. Interpolation errs by h^2 / 8 times the
+// curvature and by h / 4 times the change of slope at a kink that no sample lies on.
+struct Density {
+    double per_octave;
+    double per_decade;
+};
+// Log sensitivity over log frequency bends by up to 24 where Barten's optics end visibility; the adaptation laws
+// bend by little.
+constexpr Density smooth_model{24, 10};
+// castle and stela: the sustained channel's plateau ends in a change of slope of 0.43 at 0.6 times its peak frequency.
+// That lies below 1.25 cpd and moves with the luminance, by up to 0.26 octaves an octave, up to 300 cd/m2.
+constexpr Density below_plateau{32, 16}, above_plateau{20, 12};
+constexpr double plateau_cpd = 1.25, plateau_cdm2 = 300;
+// castle's transient channel, which flicker needs, moves fast with the luminance just above a kink.
+constexpr double transient_per_decade = 72, transient_decades = 0.8;
+// daly's frequencies scale with 1 + 0.24 e: steps of this in the logarithm of that.
+constexpr double daly_eccentricity_scale = 0.24, daly_log_step = 0.065;
 
 std::string number(double value) {
     std::array<char, 32> text;
@@ -75,48 +91,148 @@ Result<void> check_axis(std::string_view field, std::span<const double> values, 
     return {};
 }
 
-// The frequencies of a model's table, with a sample at the kink, so that no cell straddles it.
-std::vector<double> model_frequencies(double kink_cpd) {
-    const auto steps_to = [&](double cpd) { return std::log2(cpd / kink_cpd) * samples_per_octave; };
-    const int first = static_cast<int>(std::ceil(steps_to(lowest_frequency_cpd)));
-    const int last = static_cast<int>(std::floor(steps_to(highest_frequency_cpd)));
-    std::vector<double> cpd{lowest_frequency_cpd};
-    for (int step = first; step <= last; ++step) {
-        const double frequency = kink_cpd * std::exp2(double(step) / samples_per_octave);
-        const bool too_close = frequency < 1.01 * lowest_frequency_cpd || frequency > 0.99 * highest_frequency_cpd;
-        if (!too_close) cpd.push_back(frequency);
+// From `first` to `last` in steps of equal ratio, at least `per_unit` to each factor of `unit`.
+void append_ladder(std::vector<double>& values, double first, double last, double unit, double per_unit) {
+    const int steps = static_cast<int>(std::ceil(std::log(last / first) / std::log(unit) * per_unit - 1e-9));
+    for (int i = 0; i < steps; ++i) values.push_back(first * std::pow(last / first, double(i) / steps));
+}
+
+bool has_plateau(CsfModel model) { return model == CsfModel::castle || model == CsfModel::stela; }
+
+std::vector<double> model_frequencies(CsfModel model, const CsfConditions& conditions) {
+    std::vector<double> cpd;
+    if (has_plateau(model)) {
+        append_ladder(cpd, lowest_frequency_cpd, plateau_cpd, 2, below_plateau.per_octave);
+        append_ladder(cpd, plateau_cpd, highest_frequency_cpd, 2, above_plateau.per_octave);
+    } else {
+        append_ladder(cpd, lowest_frequency_cpd, highest_frequency_cpd, 2, smooth_model.per_octave);
     }
     cpd.push_back(highest_frequency_cpd);
+    // With a sample at each kink, no cell straddles it.
+    for (const CyclesPerDegree kink : kinks(model, conditions)) {
+        const auto next = std::ranges::upper_bound(cpd, kink.value());
+        if (next == cpd.begin() || next == cpd.end()) continue;
+        const auto is_apart = [&](double other) {
+            return std::abs(std::log2(other / kink.value())) > 2 * smallest_spacing;
+        };
+        if (is_apart(*next) && is_apart(*(next - 1))) cpd.insert(next, kink.value());
+    }
     return cpd;
 }
 
-// The logarithm of a model's sensitivity is linear in eccentricity, but its peak over frequency is not, and that bends
-// most near the fovea.
-std::vector<double> model_eccentricities() {
+std::vector<double> model_eccentricities(CsfModel model) {
+    if (model != CsfModel::daly) {
+        // Log sensitivity is linear in eccentricity. The two between keep the slope where 120 degrees underflow.
+        return {0, 5, 20, highest_eccentricity_deg};
+    }
+    const double log_end = std::log1p(daly_eccentricity_scale * highest_eccentricity_deg);
+    const int steps = static_cast<int>(std::ceil(log_end / daly_log_step));
     std::vector<double> degrees;
-    const auto append = [&](int until, int step) {
-        for (int e = degrees.empty() ? 0 : static_cast<int>(degrees.back()) + step; e <= until; e += step) {
-            degrees.push_back(e);
-        }
-    };
-    append(10, 1);
-    append(20, 2);
-    append(60, 5);
-    append(120, 10);
+    for (int i = 0; i < steps; ++i) degrees.push_back(std::expm1(log_end * i / steps) / daly_eccentricity_scale);
+    degrees.push_back(highest_eccentricity_deg);
     return degrees;
 }
 
-std::vector<double> model_luminances() {
+std::vector<double> model_luminances(CsfModel model, const CsfConditions& conditions) {
     std::vector<double> cdm2;
-    for (int i = 0; i <= luminance_decades * samples_per_decade; ++i) {
-        cdm2.push_back(lowest_luminance_cdm2 * std::pow(10.0, double(i) / samples_per_decade));
+    if (model == CsfModel::castle && conditions.temporal.value() > 0) {
+        const double kink = castle_transient_kink().value(), calm = kink * std::pow(10.0, transient_decades);
+        append_ladder(cdm2, lowest_luminance_cdm2, kink, 10, below_plateau.per_decade);
+        append_ladder(cdm2, kink, calm, 10, transient_per_decade);
+        append_ladder(cdm2, calm, plateau_cdm2, 10, below_plateau.per_decade);
+        append_ladder(cdm2, plateau_cdm2, highest_luminance_cdm2, 10, above_plateau.per_decade);
+    } else if (has_plateau(model)) {
+        append_ladder(cdm2, lowest_luminance_cdm2, plateau_cdm2, 10, below_plateau.per_decade);
+        append_ladder(cdm2, plateau_cdm2, highest_luminance_cdm2, 10, above_plateau.per_decade);
+    } else if (is_relative(model)) {
+        return {lowest_luminance_cdm2, highest_luminance_cdm2};
+    } else {
+        append_ladder(cdm2, lowest_luminance_cdm2, highest_luminance_cdm2, 10, smooth_model.per_decade);
     }
+    cdm2.push_back(highest_luminance_cdm2);
     return cdm2;
 }
 
-std::string model_source(CsfModel model) {
-    return std::string(name(model)) +
-           ", closed form; 0 Hz, area pi (1.5 / frequency)^2, worse of nasal and temporal field";
+std::string model_source(CsfModel model, const CsfConditions& c) {
+    std::string text = std::string(name(model)) + ", closed form; " + number(c.temporal.value()) + " Hz, " +
+                       number(c.velocity.value()) + " degrees/s, area pi (1.5 / frequency)^2";
+    if (model == CsfModel::daly) return text + ", from " + number(c.distance.value()) + " m";
+    if (!is_castle_family(model)) return text;
+    switch (c.field) {
+    case VisualField::nasal: return text + ", nasal field";
+    case VisualField::temporal: return text + ", temporal field";
+    case VisualField::worst: break;
+    }
+    return text + ", worse of nasal and temporal field";
+}
+
+double floored(double sensitivity) { return std::max(sensitivity, sensitivity_floor); }
+
+// All models but daly are a product of a foveal part and of one that only depends on frequency and eccentricity.
+// `stimulus` makes one of frequency, eccentricity and luminance.
+template <class MakeStimulus>
+void fill(CsfSamples& samples, CsfModel model, VisualField field, MakeStimulus stimulus) {
+    std::vector<double> foveal;
+    for (const double cdm2 : samples.luminance_cdm2) {
+        for (const double cpd : samples.frequency_cpd) foveal.push_back(sensitivity(model, stimulus(cpd, 0, cdm2)));
+    }
+    std::vector<double> remaining(samples.frequency_cpd.size());
+    for (const double degrees : samples.eccentricity_deg) {
+        std::ranges::transform(samples.frequency_cpd, remaining.begin(), [&](double cpd) {
+            return std::pow(10.0, -decay_per_degree(model, CyclesPerDegree(cpd), field) * degrees);
+        });
+        for (std::size_t i = 0; i < foveal.size(); ++i) {
+            samples.sensitivity.push_back(floored(foveal[i] * remaining[i % remaining.size()]));
+        }
+    }
+}
+
+template <class MakeStimulus>
+void fill_daly(CsfSamples& samples, std::vector<double>& eccentric, std::vector<double>& ceiling,
+               MakeStimulus stimulus) {
+    std::vector<double> motion;
+    for (const double cdm2 : samples.luminance_cdm2) {
+        for (const double cpd : samples.frequency_cpd) {
+            const Stimulus s = stimulus(cpd, 0, cdm2);
+            motion.push_back(motion_factor(CsfModel::daly, s));
+            ceiling.push_back(floored(daly_ceiling(s) * motion.back()));
+        }
+    }
+    for (const double degrees : samples.eccentricity_deg) {
+        std::size_t i = 0;
+        for (const double cdm2 : samples.luminance_cdm2) {
+            for (const double cpd : samples.frequency_cpd) {
+                eccentric.push_back(floored(daly_eccentric(stimulus(cpd, degrees, cdm2)) * motion[i]));
+                samples.sensitivity.push_back(std::min(eccentric.back(), ceiling[i++]));
+            }
+        }
+    }
+}
+
+// Between samples further apart than these, the monotone form puts columns of its own: the peak over frequency is not
+// linear in eccentricity even where log sensitivity is, and it bends most near the fovea.
+std::vector<double> peak_eccentricities() {
+    std::vector<double> degrees;
+    const auto append = [&](int from, int until, int step) {
+        for (int e = from; e <= until; e += step) degrees.push_back(e);
+    };
+    append(0, 10, 1);
+    append(12, 20, 2);
+    append(25, 60, 5);
+    append(70, 120, 10);
+    return degrees;
+}
+
+std::vector<double> refined(std::span<const double> degrees) {
+    constexpr double clear = 0.1; // degrees between samples and what is put between them
+    std::vector<double> all(degrees.begin(), degrees.end());
+    for (const double extra : peak_eccentricities()) {
+        const bool is_inside = extra > degrees.front() && extra < degrees.back();
+        const bool is_clear = std::ranges::none_of(degrees, [&](double e) { return std::abs(e - extra) < clear; });
+        if (is_inside && is_clear) all.push_back(extra);
+    }
+    std::ranges::sort(all);
+    return all;
 }
 
 // Written so that NaN is not valid.
@@ -126,7 +242,9 @@ bool is_valid(double contrast, double eccentricity_deg, double luminance_cdm2) {
 
 } // namespace
 
-Result<CsfTable> CsfTable::create(CsfSamples samples) {
+Result<CsfTable> CsfTable::create(CsfSamples samples) { return create(std::move(samples), {}); }
+
+Result<CsfTable> CsfTable::create(CsfSamples samples, Branches branches) {
     const CsfSamples& s = samples;
     if (s.frequency_cpd.size() < 2) return bad("frequency_cpd needs two samples or more");
     if (s.eccentricity_deg.empty()) return bad("eccentricity_deg is empty");
@@ -159,42 +277,42 @@ Result<CsfTable> CsfTable::create(CsfSamples samples) {
     CsfTable table;
     table.frequency_ = make_axis(std::move(log2_frequency));
     table.eccentricity_ = make_axis(samples.eccentricity_deg);
+    table.monotone_eccentricity_ = make_axis(refined(samples.eccentricity_deg));
     table.luminance_ = make_axis(std::move(log2_luminance));
     table.samples_ = std::move(samples);
+    table.branches_ = std::move(branches);
     table.prepare_monotone();
     table.prepare_extrapolation();
     return table;
 }
 
-CsfTable CsfTable::from_model(CsfModel model) {
+Result<CsfTable> CsfTable::from_model(CsfModel model, const CsfConditions& conditions) {
+    const auto stimulus = [&](double cpd, double degrees, double cdm2) {
+        return stimulus_of(conditions, CyclesPerDegree(cpd), Degrees(degrees), Luminance(cdm2));
+    };
+    if (std::isnan(perception::sensitivity(model, stimulus(1, 0, 1)))) {
+        return bad("temporal frequency and velocity must be finite and 0 or more, one of them 0, and the distance "
+                   "above 0 m, but they are " +
+                   number(conditions.temporal.value()) + " Hz, " + number(conditions.velocity.value()) +
+                   " degrees/s and " + number(conditions.distance.value()) + " m");
+    }
     CsfSamples samples;
-    samples.source = model_source(model);
-    samples.frequency_cpd = model_frequencies(equal_decay_frequency(model).value());
-    samples.eccentricity_deg = model_eccentricities();
-    samples.luminance_cdm2 = model_luminances();
+    samples.source = model_source(model, conditions);
+    samples.frequency_cpd = model_frequencies(model, conditions);
+    samples.eccentricity_deg = model_eccentricities(model);
+    samples.luminance_cdm2 = model_luminances(model, conditions);
 
-    // The model is a product of a foveal part and of one that only depends on frequency and eccentricity.
-    std::vector<double> foveal, log10_loss;
-    for (const double cdm2 : samples.luminance_cdm2) {
-        for (const double cpd : samples.frequency_cpd) {
-            foveal.push_back(perception::sensitivity(model, {.frequency = CyclesPerDegree(cpd),
-                                                             .luminance = Luminance(cdm2),
-                                                             .area = patch_area(CyclesPerDegree(cpd))}));
-        }
+    Branches branches;
+    if (model == CsfModel::daly) {
+        fill_daly(samples, branches.sensitivity, branches.ceiling, stimulus);
+    } else {
+        fill(samples, model, conditions.field, stimulus);
     }
-    for (const double cpd : samples.frequency_cpd) {
-        log10_loss.push_back(decay_per_degree(model, CyclesPerDegree(cpd), VisualField::worst));
-    }
-    samples.sensitivity.reserve(samples.eccentricity_deg.size() * foveal.size());
-    std::vector<double> remaining(log10_loss.size());
-    for (const double degrees : samples.eccentricity_deg) {
-        std::ranges::transform(log10_loss, remaining.begin(),
-                               [&](double loss) { return std::pow(10.0, -loss * degrees); });
-        for (std::size_t i = 0; i < foveal.size(); ++i) {
-            samples.sensitivity.push_back(std::max(foveal[i] * remaining[i % remaining.size()], sensitivity_floor));
-        }
-    }
-    Result<CsfTable> table = create(std::move(samples));
+    return create(std::move(samples), std::move(branches));
+}
+
+CsfTable CsfTable::from_model(CsfModel model) {
+    Result<CsfTable> table = from_model(model, {});
     assert(table && "a model's samples are valid");
     return *std::move(table);
 }
@@ -247,7 +365,7 @@ CsfTable::Cell CsfTable::locate(const Axis& axis, double position) {
 }
 
 CsfTable::Blend CsfTable::blend(double eccentricity_deg, double log2_luminance) const {
-    const Cell e = locate(eccentricity_, eccentricity_deg), l = locate(luminance_, log2_luminance);
+    const Cell e = locate(monotone_eccentricity_, eccentricity_deg), l = locate(luminance_, log2_luminance);
     const std::size_t frequencies = frequency_.positions.size(), luminances = luminance_.positions.size();
     const auto column = [&](std::size_t ei, std::size_t li) {
         return log2_monotone_.data() + (ei * luminances + li) * frequencies;
@@ -258,14 +376,25 @@ CsfTable::Blend CsfTable::blend(double eccentricity_deg, double log2_luminance) 
              e.fraction * l.fraction}};
 }
 
+// What interpolation works on.
+const std::vector<double>& CsfTable::surface() const {
+    return branches_.sensitivity.empty() ? samples_.sensitivity : branches_.sensitivity;
+}
+
 // Running maxima along the three axes in turn. Each is the largest value over a set that only shrinks along the axes
-// before it, so it leaves what they have reached.
+// before it, so it leaves what they have reached. A ceiling is left out, which can only make the maxima larger.
 void CsfTable::prepare_monotone() {
     const std::size_t frequencies = frequency_.positions.size();
     const std::size_t plane = frequencies * luminance_.positions.size();
-    log2_monotone_.resize(samples_.sensitivity.size());
-    std::ranges::transform(samples_.sensitivity, log2_monotone_.begin(),
-                           [](double s) { return static_cast<float>(std::log2(s)); });
+    const std::vector<double> logs = log2_of(surface());
+    log2_monotone_.reserve(plane * monotone_eccentricity_.positions.size());
+    for (const double degrees : monotone_eccentricity_.positions) {
+        const Cell e = locate(eccentricity_, degrees);
+        const double *low = logs.data() + e.first * plane, *high = logs.data() + e.second * plane;
+        for (std::size_t i = 0; i < plane; ++i) {
+            log2_monotone_.push_back(static_cast<float>(std::lerp(low[i], high[i], e.fraction)));
+        }
+    }
     std::vector<float>& v = log2_monotone_;
     for (std::size_t i = v.size() - 1; i-- > 0;) {
         if ((i + 1) % frequencies != 0) v[i] = std::max(v[i], v[i + 1]);
@@ -298,14 +427,17 @@ double CsfTable::sensitivity(CyclesPerDegree frequency, Degrees eccentricity, Lu
     const Cell f = locate(frequency_, log2_cpd), e = locate(eccentricity_, eccentricity.value());
     const Cell l = locate(luminance_, log2_cdm2);
     const std::size_t frequencies = frequency_.positions.size(), luminances = luminance_.positions.size();
-    const auto along_frequency = [&](std::size_t ei, std::size_t li) {
-        const double* column = samples_.sensitivity.data() + (ei * luminances + li) * frequencies;
+    const auto along_frequency = [&](const std::vector<double>& values, std::size_t ei, std::size_t li) {
+        const double* column = values.data() + (ei * luminances + li) * frequencies;
         return std::lerp(std::log2(column[f.first]), std::log2(column[f.second]), f.fraction);
     };
-    const auto along_luminance = [&](std::size_t ei) {
-        return std::lerp(along_frequency(ei, l.first), along_frequency(ei, l.second), l.fraction);
+    const auto along_luminance = [&](const std::vector<double>& values, std::size_t ei) {
+        return std::lerp(along_frequency(values, ei, l.first), along_frequency(values, ei, l.second), l.fraction);
     };
-    return std::exp2(std::lerp(along_luminance(e.first), along_luminance(e.second), e.fraction));
+    const double log2_s =
+        std::lerp(along_luminance(surface(), e.first), along_luminance(surface(), e.second), e.fraction);
+    if (branches_.ceiling.empty()) return std::exp2(log2_s);
+    return std::exp2(std::min(log2_s, along_luminance(branches_.ceiling, 0)));
 }
 
 double CsfTable::monotone_sensitivity(CyclesPerDegree frequency, Degrees eccentricity, Luminance luminance) const {

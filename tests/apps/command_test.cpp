@@ -388,7 +388,15 @@ TEST_F(SimplifyTest, ReadsDisplaysAndViewers) {
                                      "peak_cdm2": 100, "black_cdm2": 0.5})");
     ASSERT_EQ(run({"csf", "--table", "--model", "stela", "--save-table", "stela.json"}).status, 0);
     EXPECT_LT(simplify({"--display", "far.json"})["triangles"], simplify({"--distance", "0.3"})["triangles"]);
-    EXPECT_EQ(effect_named(simplify({"--csf", "stela.json"}), "csf table")["on"], true);
+    const Json by_file = simplify({"--csf", "stela.json"}), by_name = simplify({"--csf", "stela"});
+    EXPECT_EQ(effect_named(by_file, "csf table")["on"], true);
+    EXPECT_EQ(effect_named(by_name, "csf table")["on"], true);
+    EXPECT_EQ(by_file["triangles"], by_name["triangles"]);
+    for (const std::string model : {"castle", "daly", "barten-1989", "barten-1999", "barten-2004", "mannos-sakrison", "rushmeier"})
+        EXPECT_GT(simplify({"--csf", model})["triangles"], 0) << model;
+    const Outcome unknown = run({"simplify", "ball.vdt", "-o", "o.ply", "--csf", "stella"});
+    EXPECT_EQ(unknown.status, 1);
+    EXPECT_THAT(unknown.err, AllOf(HasSubstr("stella"), HasSubstr("barten-1999")));
 }
 
 TEST_F(SimplifyTest, ASingleTriangleIsValid) {

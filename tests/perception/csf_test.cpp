@@ -1,4 +1,4 @@
-// The closed forms against the published programs, and at the edges of their domain.
+// castleCSF and stelaCSF against the published programs, and at the edges of their domain.
 #include <perception/csf.h>
 
 #include <array>

@@ -9,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include <glm/vec3.hpp>
+
 #include <perception/units.h>
 #include <vdtree/function_ref.h>
 #include <vdtree/result.h>
@@ -21,44 +23,98 @@ enum class VisualField { nasal, temporal, worst };
 
 struct Stimulus {
     CyclesPerDegree frequency{4};
-    Luminance luminance{100};      // adaptation luminance
+    Luminance luminance{100}; // adaptation luminance
     Degrees eccentricity{0};
-    Hertz temporal{0};
-    SquareDegrees area{1};         // pi sigma^2 of a Gaussian envelope
+    Hertz temporal{0};     // counterphase flicker
+    SquareDegrees area{1}; // pi sigma^2 of a Gaussian envelope; a square field's, for the older models
     VisualField field = VisualField::worst;
+    DegreesPerSecond velocity{0}; // on the retina: see motion.h for how to get it from motion in the world
+    Metres distance{0.5};         // from the eye; only Daly's model depends on it
 };
 
+// The formulas, their sources, and what each model does not know: docs/perception.md.
 enum class CsfModel {
-    castle,  // castleCSF, achromatic branch (Ashraf, Mantiuk, Chapiro, Wuerger 2024): the default
-    stela,   // stelaCSF (Mantiuk, Ashraf, Chapiro 2022)
+    castle,           // castleCSF, achromatic branch (Ashraf, Mantiuk, Chapiro, Wuerger 2024): the default
+    stela,            // stelaCSF (Mantiuk, Ashraf, Chapiro 2022)
+    daly,             // Daly 1993, the Visible Differences Predictor's
+    barten_1989,      // Barten 1989, the short form that Ramasubramanian et al. 1999 and PerceptualDiff use
+    barten_1999,      // Barten 1999, the physical model in full, both eyes
+    barten_2004,      // Barten 2003/04, the short form
+    mannos_sakrison,  // Mannos and Sakrison 1974; relative
+    rushmeier,        // Rushmeier et al. 1995, a simplification of Daly's; relative
+    castle_red_green, // castleCSF's isoluminant branches: contrast is that of opponent_contrast() below
+    castle_yellow_violet,
 };
+inline constexpr std::array csf_models = {CsfModel::castle,
+                                          CsfModel::stela,
+                                          CsfModel::daly,
+                                          CsfModel::barten_1989,
+                                          CsfModel::barten_1999,
+                                          CsfModel::barten_2004,
+                                          CsfModel::mannos_sakrison,
+                                          CsfModel::rushmeier,
+                                          CsfModel::castle_red_green,
+                                          CsfModel::castle_yellow_violet};
+
 std::string_view name(CsfModel model);
 Result<CsfModel> csf_model(std::string_view name);
+// Whether S is that of luminance contrast, which is what fold tests and judges ask for.
+bool is_achromatic(CsfModel model);
 
-// The closed form, unclamped. Domain: frequency > 0, luminance > 0, area > 0, eccentricity >= 0; outside of it NaN.
-// Cost: about 0.2 us.
+// The relative models give the shape of S over frequency only. They are scaled to this at their peaks, the peak
+// sensitivity of Daly's model, of which Rushmeier's is a simplification.
+constexpr double relative_models_peak = 250;
+
+// The closed form, unclamped. Domain: frequency, luminance, area and distance > 0; eccentricity, temporal frequency
+// and velocity >= 0, and one of the last two is 0; outside of it NaN. Cost: 0.1 to 0.3 us.
+// - Eccentricity: castle and stela by field; daly by its own law; the others lose the factor that Geisler and Perry
+//   1998 found, exp(-0.0461 frequency eccentricity), on either side of the field.
+// - Temporal frequency: castle and stela by their own channels; the others as a drift of velocity temporal / frequency.
+// - Velocity multiplies any model's static sensitivity by velocity_factor() of motion.h.
 double sensitivity(CsfModel model, const Stimulus& stimulus);
 
-// The set-up of the fold test and of the judge: a static patch of 1.5 cycles radius, area pi (1.5 / frequency)^2.
+// Contrast in castleCSF's three directions: luminance, red-green, yellow-violet.
+struct OpponentContrast {
+    double luminance = 0, red_green = 0, yellow_violet = 0; // at least 0
+};
+// Of a change `delta` on a `background`, both in the cones' responses L, M, S (CIE 2006, 2 degrees, scaled so that
+// L + M is the luminance). NaN where the background's luminance is not above 0.
+OpponentContrast opponent_contrast(const glm::dvec3& background_lms, const glm::dvec3& delta_lms);
+// How far above threshold a coloured grating is: sqrt(sum over the directions of (contrast S)^2); 1 is just visible.
+double castle_visibility(const OpponentContrast& contrast, const Stimulus& stimulus);
+
+// The set-up of the fold test and of the judge: a patch of 1.5 cycles radius, area pi (1.5 / frequency)^2.
 SquareDegrees patch_area(CyclesPerDegree frequency);
+
+// What a table holds constant; as in Stimulus.
+struct CsfConditions {
+    Hertz temporal{0};
+    DegreesPerSecond velocity{0};
+    VisualField field = VisualField::worst;
+    Metres distance{0.5};
+};
+Stimulus stimulus_of(const CsfConditions& conditions, CyclesPerDegree frequency, Degrees eccentricity,
+                     Luminance luminance); // of patch_area(frequency)
 
 // Sensitivity over frequency x eccentricity x luminance, interpolated linearly in log S over log frequency,
 // eccentricity and log luminance; outside of the axes clamped to their ends.
 struct CsfSamples {
-    std::string source;                    // what filled it: model and conditions, or observer and date
-    std::vector<double> frequency_cpd;     // strictly ascending, > 0
-    std::vector<double> eccentricity_deg;  // strictly ascending, from 0 on
-    std::vector<double> luminance_cdm2;    // strictly ascending, > 0
-    std::vector<double> sensitivity;       // > 0; [(e * luminances + l) * frequencies + f]
+    std::string source;                   // what filled it: model and conditions, or observer and date
+    std::vector<double> frequency_cpd;    // strictly ascending, > 0
+    std::vector<double> eccentricity_deg; // strictly ascending, from 0 on
+    std::vector<double> luminance_cdm2;   // strictly ascending, > 0
+    std::vector<double> sensitivity;      // > 0; [(e * luminances + l) * frequencies + f]
 };
 
 class CsfTable {
 public:
     // Checks the samples; the error names the field and the index. Then prepares the conservative form below.
     static Result<CsfTable> create(CsfSamples samples);
-    // Filled from a model at 0 Hz, patch_area(frequency), the worst field: 1/16 to 64 cpd, 0 to 120 degrees,
-    // 1e-3 to 1e4 cd/m2, within 1% of the closed form wherever S > 1.
-    static CsfTable from_model(CsfModel model);
+    // Filled from a model under fixed conditions, for patches of patch_area(frequency): 1/16 to 64 cpd, 0 to 120 deg,
+    // 1e-3 to 1e4 cd/m2, within 0.5% of the closed form wherever S > 1. An error where the conditions are outside of
+    // the model's domain. Cost: 20 to 400 ms, 1 to 30 MB; daly's is the largest.
+    static Result<CsfTable> from_model(CsfModel model, const CsfConditions& conditions);
+    static CsfTable from_model(CsfModel model); // static gratings, the worst field
     // The default table, built once.
     static const CsfTable& standard();
 
@@ -87,8 +143,8 @@ public:
 private:
     // The samples of one axis, with a uniform grid over them that finds the samples around a value in constant time.
     struct Axis {
-        std::vector<double> positions;           // log2 cpd, degrees, log2 cd/m2
-        std::vector<std::uint32_t> first_cell;   // of each of the uniform buckets, and the last cell once more
+        std::vector<double> positions;         // log2 cpd, degrees, log2 cd/m2
+        std::vector<std::uint32_t> first_cell; // of each of the uniform buckets, and the last cell once more
         double buckets_per_unit = 0;
     };
     // Two neighbouring samples and how far a position, clamped to the axis, lies between them, 0..1.
@@ -112,7 +168,15 @@ private:
         std::size_t sample; // the last one that reaches the threshold, as far as known
     };
 
+    // What a model's table knows beyond its samples: log S is the smaller of two smooth surfaces. Interpolated each for
+    // itself, they keep the kink between them sharp. Empty: the samples are all there is.
+    struct Branches {
+        std::vector<double> sensitivity; // same layout as the samples
+        std::vector<double> ceiling;     // [l * frequencies + f], whatever the eccentricity
+    };
+
     CsfTable() = default;
+    static Result<CsfTable> create(CsfSamples samples, Branches branches);
     static Axis make_axis(std::vector<double> positions);
     static std::size_t find_cell(const Axis& axis, double position);
     static Cell locate(const Axis& axis, double position);
@@ -120,12 +184,15 @@ private:
     template <std::size_t Count>
     void bisect(std::array<Query, Count>& queries) const;
     double log2_crossing(const Query& query) const;
+    const std::vector<double>& surface() const;
     void prepare_monotone();
     void prepare_extrapolation();
 
     CsfSamples samples_;
-    std::vector<float> log2_monotone_; // same layout as samples_.sensitivity
+    Branches branches_;
     Axis frequency_, eccentricity_, luminance_;
+    Axis monotone_eccentricity_;       // the samples' eccentricities, and more of them where they lie far apart
+    std::vector<float> log2_monotone_; // [(e * luminances + l) * frequencies + f] over these
     double last_slope_ = 0; // octaves of sensitivity per octave of frequency above the last; negative, or 0: none falls
 };
 

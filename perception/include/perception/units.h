@@ -33,6 +33,7 @@ using Radians = Quantity<struct RadiansUnit>;
 using SquareDegrees = Quantity<struct SquareDegreesUnit>;
 using Metres = Quantity<struct MetresUnit>;
 using Hertz = Quantity<struct HertzUnit>;
+using DegreesPerSecond = Quantity<struct DegreesPerSecondUnit>;
 using Lux = Quantity<struct LuxUnit>;
 using Luminance = Quantity<struct CandelaPerSquareMetreUnit>;
 using CyclesPerDegree = Quantity<struct CyclesPerDegreeUnit>;
