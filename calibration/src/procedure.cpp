@@ -30,6 +30,8 @@ constexpr double still = 1e-4; // log10 units, a fiftieth of a grid step
 
 // Settings scatter at least so much (log10 units): a few that happen to agree do not make a place certain.
 constexpr double least_scatter = 0.04;
+// Of seeing nothing at the highest contrast, however far below it the threshold is believed to be.
+constexpr double least_chance = 1e-6;
 
 Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
 
@@ -113,7 +115,7 @@ double PlaceEstimate::high() const { return std::pow(10, log10_sensitivity.mean 
 
 Procedure::Procedure(CalibrationPlan plan, CsfTable expected, QuestPlus blank)
     : plan_(std::move(plan)), expected_(std::move(expected)), field_(plan_.places, expected_, plan_.luminance),
-      quests_(plan_.places.size(), std::move(blank)) {
+      quests_(plan_.places.size(), std::move(blank)), asked_(plan_.places.size(), 0) {
     combine();
 }
 
@@ -140,8 +142,13 @@ Trial Procedure::next() const {
     trial.phase_deg = 360 * random.uniform();
     trial.interval = random.uniform() < 0.5 ? 1 : 2;
     if (plan_.method == Method::adjustment) return next_adjustment(trial);
+    // Now and then the place that was asked least, so that no place rests on what the others say about it.
+    constexpr int round = 4;
+    const auto least_asked = static_cast<std::size_t>(std::min_element(asked_.begin(), asked_.end()) - asked_.begin());
+    const bool is_for_all = trial.number % round == round - 1;
     double most = -1;
     for (std::size_t i = 0; i < quests_.size(); ++i) {
+        if (is_for_all && i != least_asked) continue;
         const QuestPlus::Choice choice = quests_[i].next();
         if (!(choice.gain_bits > most)) continue;
         most = choice.gain_bits;
@@ -182,18 +189,19 @@ void Procedure::choose(int interval) {
 
 void Procedure::set(double contrast) {
     assert(plan_.method == Method::adjustment && contrast > 0);
-    take({next().place, std::log10(contrast), true});
+    take({next().place, std::log10(std::min(contrast, plan_.highest_contrast)), contrast < plan_.highest_contrast});
     combine();
 }
 
 void Procedure::take(const Answer& answer) {
     answers_.push_back(answer);
+    ++asked_[answer.place];
     if (plan_.method == Method::two_interval) quests_[answer.place].update(answer.log10_contrast, answer.is_right);
 }
 
 // Each place's answers against what the others say about it, in turn, until nothing changes any more.
 void Procedure::combine() {
-    if (plan_.method == Method::adjustment) return combine_settings();
+    if (plan_.method == Method::adjustment) weigh_settings();
     const std::vector<double>& thresholds = quests_.front().grid().log10_threshold;
     std::vector<double> prior(thresholds.size());
     const auto believe_others = [&](std::size_t i) {
@@ -204,12 +212,10 @@ void Procedure::combine() {
         }
         quests_[i].set_log_prior(prior);
     };
-    std::vector<bool> is_answered(quests_.size(), false);
-    for (const Answer& answer : answers_) is_answered[answer.place] = true;
     for (int sweep = 0; sweep < most_sweeps; ++sweep) {
         double change = 0;
         for (std::size_t i = 0; i < quests_.size(); ++i) {
-            if (!is_answered[i]) continue;
+            if (asked_[i] == 0) continue;
             const double before = field_.belief(i).mean;
             believe_others(i);
             const QuestPlus::Belief belief = quests_[i].log10_threshold();
@@ -221,25 +227,38 @@ void Procedure::combine() {
     for (std::size_t i = 0; i < quests_.size(); ++i) believe_others(i);
 }
 
-// Means of the log contrasts of each place, the first left out, with the scatter that all places have in common.
-void Procedure::combine_settings() {
+// The scatter that all places have in common makes likelihoods of the settings. The first round is practice.
+void Procedure::weigh_settings() {
     const std::size_t count = plan_.places.size();
-    std::vector<std::vector<double>> settings(count);
-    for (std::size_t i = count; i < answers_.size(); ++i) settings[answers_[i].place].push_back(answers_[i].log10_contrast);
+    std::vector<std::vector<double>> settings(count); // the seen ones
+    std::vector<int> unseen(count, 0);
+    for (std::size_t i = count; i < answers_.size(); ++i) {
+        if (answers_[i].is_right) settings[answers_[i].place].push_back(answers_[i].log10_contrast);
+        else ++unseen[answers_[i].place];
+    }
     double squares = 0;
     std::size_t freedom = 0;
-    std::vector<double> means(count, 0.0);
-    for (std::size_t p = 0; p < count; ++p) {
-        if (settings[p].empty()) continue;
-        means[p] = std::accumulate(settings[p].begin(), settings[p].end(), 0.0) / static_cast<double>(settings[p].size());
-        for (const double s : settings[p]) squares += (s - means[p]) * (s - means[p]);
-        freedom += settings[p].size() - 1;
+    for (const std::vector<double>& of_place : settings) {
+        if (of_place.empty()) continue;
+        const double mean = std::accumulate(of_place.begin(), of_place.end(), 0.0) / static_cast<double>(of_place.size());
+        for (const double s : of_place) squares += (s - mean) * (s - mean);
+        freedom += of_place.size() - 1;
     }
     constexpr double usual_scatter = 0.15; // until it is known
     const double scatter = freedom < count ? usual_scatter : std::max(least_scatter, std::sqrt(squares / static_cast<double>(freedom)));
-    for (std::size_t p = 0; p < count; ++p)
-        if (!settings[p].empty())
-            field_.set_measurement(p, {-means[p], scatter / std::sqrt(static_cast<double>(settings[p].size()))});
+    const double highest = std::log10(plan_.highest_contrast);
+    const std::vector<double>& thresholds = quests_.front().grid().log10_threshold;
+    std::vector<double> likelihood(thresholds.size());
+    for (std::size_t p = 0; p < count; ++p) {
+        for (std::size_t t = 0; t < thresholds.size(); ++t) {
+            likelihood[t] = unseen[p] * std::log(std::erfc((highest - thresholds[t]) / (scatter * std::numbers::sqrt2)) + least_chance);
+            for (const double s : settings[p]) {
+                const double z = (s - thresholds[t]) / scatter;
+                likelihood[t] -= z * z / 2;
+            }
+        }
+        quests_[p].set_log_likelihood(likelihood);
+    }
 }
 
 std::vector<PlaceEstimate> Procedure::estimates() const {
@@ -248,8 +267,8 @@ std::vector<PlaceEstimate> Procedure::estimates() const {
         result[i].place = plan_.places[i];
         result[i].log10_sensitivity = field_.belief(i);
         result[i].local = field_.local_deviation(i);
+        result[i].answers = asked_[i];
     }
-    for (const Answer& answer : answers_) ++result[answer.place].answers;
     return result;
 }
 
@@ -378,7 +397,7 @@ Result<Procedure> Procedure::resume(const std::filesystem::path& file, CsfTable 
             return object->key_error(where, "has no place " + to_text(row[0]));
         constexpr double least_log10 = -10;
         if (!(row[1] >= least_log10 && row[1] <= 0)) return object->key_error(where, "has a log10 contrast that is not in -10..0");
-        if (row[2] != 0 && row[2] != 1) return object->key_error(where, "must end in 1 (right) or 0 (wrong)");
+        if (row[2] != 0 && row[2] != 1) return object->key_error(where, "must end in 1 (right, seen) or 0 (wrong, unseen)");
         if (procedure->plan_.method == Method::adjustment) {
             const std::size_t due = procedure->next().place;
             if (static_cast<std::size_t>(row[0]) != due) return object->key_error(where, "is not of the place whose turn it was");

@@ -114,6 +114,12 @@ void QuestPlus::update(double log10_contrast, bool is_right) {
     refresh();
 }
 
+void QuestPlus::set_log_likelihood(std::span<const double> by_threshold) {
+    assert(by_threshold.size() == log_prior_.size());
+    for (std::size_t i = 0; i < log_likelihood_.size(); ++i) log_likelihood_[i] = by_threshold[i % by_threshold.size()];
+    refresh();
+}
+
 void QuestPlus::refresh() {
     const std::size_t thresholds = log_prior_.size();
     for (std::size_t i = 0; i < posterior_.size(); ++i) posterior_[i] = log_likelihood_[i] + log_prior_[i % thresholds];

@@ -11,10 +11,10 @@ namespace {
 // about 6 dB in gain; the rest is chosen wide enough for the published models to be reached from one another.
 constexpr double gain = 0.3;
 constexpr double tilt_per_octave = 0.08;
-constexpr double cutoff_per_cpd = 0.012;
+constexpr double cutoff_per_cpd = 0.015;
 constexpr double decline_per_degree = 0.012;
-constexpr double fall_per_cpd_degree = 0.0025;
-constexpr double local = 0.06;
+constexpr double fall_per_cpd_degree = 0.003;
+constexpr double local = 0.08;
 constexpr double local_octaves = 1.5; // length over which it stays alike; also in octaves of 2 deg + eccentricity
 
 constexpr double middle_cpd = 3; // near the peak of sensitivity, where tilting leaves the gain as it is
@@ -100,18 +100,30 @@ void SensitivityField::set_own(std::size_t i, const Belief& with_own) {
     const double rest_precision = 1 / (rest.deviation * rest.deviation);
     const double precision = 1 / (with_own.deviation * with_own.deviation);
     // Surprising answers can widen a belief; a factor of negative precision would be no distribution.
-    precision_[i] = std::max(precision - rest_precision, 1e-6 * rest_precision);
-    shift_[i] = (with_own.mean - expected_[i]) * (precision_[i] + rest_precision) - (rest.mean - expected_[i]) * rest_precision;
-    update();
+    const double own = std::max(precision - rest_precision, 1e-6 * rest_precision);
+    const double shift = (with_own.mean - expected_[i]) * (own + rest_precision) - (rest.mean - expected_[i]) * rest_precision;
+    change_factor(i, own - precision_[i], shift - shift_[i]);
 }
 
-void SensitivityField::set_measurement(std::size_t i, const Belief& measured) {
-    precision_[i] = 1 / (measured.deviation * measured.deviation);
-    shift_[i] = (measured.mean - expected_[i]) * precision_[i];
-    update();
+// One factor changes the covariance by a matrix of rank one. Rounding adds up, so that now and then all is computed anew.
+void SensitivityField::change_factor(std::size_t i, double more_precision, double more_shift) {
+    precision_[i] += more_precision;
+    shift_[i] += more_shift;
+    constexpr int most_changes = 200;
+    if (++changes_ > most_changes) return update();
+    const std::size_t n = size();
+    const double weight = more_precision / (1 + more_precision * covariance_[i * n + i]);
+    const std::vector<double> column(covariance_.begin() + static_cast<std::ptrdiff_t>(i * n),
+                                     covariance_.begin() + static_cast<std::ptrdiff_t>((i + 1) * n));
+    const double pull = more_shift - weight * (mean_[i] + column[i] * more_shift);
+    for (std::size_t j = 0; j < n; ++j) {
+        mean_[j] += column[j] * pull;
+        for (std::size_t k = 0; k < n; ++k) covariance_[j * n + k] -= weight * column[j] * column[k];
+    }
 }
 
 void SensitivityField::update() {
+    changes_ = 0;
     const std::size_t n = size();
     const std::vector<double> factor = weighted_factor(prior_, precision_);
     // K - K R (I + R K R)^-1 R K, by columns v = L^-1 R K.

@@ -55,7 +55,7 @@ struct Trial {
 struct Answer {
     std::size_t place = 0;
     double log10_contrast = 0; // shown, or set
-    bool is_right = false;     // two-interval
+    bool is_right = false;     // two-interval; adjustment: seen at all
 };
 
 // What a place comes to.
@@ -80,11 +80,12 @@ public:
     bool is_done() const noexcept { return static_cast<int>(answers_.size()) >= trials(); }
 
     // The same until it is answered, and the same for the same plan and answers. Precondition: !is_done(). Two-interval: the place
-    // and the contrast whose answer is expected to leave the least entropy. Cost: about 2 ms for 24 places.
+    // and the contrast whose answer is expected to leave the least entropy; every fourth time at the place that was asked least.
+    // Cost: about 1 ms for 18 places.
     Trial next() const;
     // Answers next(). Preconditions: !is_done(), and the plan's method.
     void choose(int interval);
-    void set(double contrast); // above 0
+    void set(double contrast); // above 0; the highest contrast or more: not seen even there
 
     std::vector<PlaceEstimate> estimates() const;
     // The expected table with the measured deviations, on the axes of a profile (see calibrated_table in the sources): beyond the
@@ -100,7 +101,7 @@ private:
     Procedure(CalibrationPlan plan, perception::CsfTable expected, QuestPlus blank);
     void take(const Answer& answer);
     void combine();
-    void combine_settings();
+    void weigh_settings();
     Trial next_adjustment(Trial trial) const;
 
     CalibrationPlan plan_;
@@ -108,6 +109,7 @@ private:
     std::vector<Answer> answers_;
     SensitivityField field_;
     std::vector<QuestPlus> quests_; // by place: with the belief of the others as prior
+    std::vector<int> asked_;        // answers by place
 };
 
 } // namespace unseen::calibration

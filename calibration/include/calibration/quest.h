@@ -48,9 +48,9 @@ public:
     // replaced at any time; the answers stay.
     void set_log_prior(std::span<const double> log_weights);
     void update(double log10_contrast, bool is_right);
+    // Answers of another kind, in place of all before: log likelihoods by threshold, up to a constant.
+    void set_log_likelihood(std::span<const double> by_threshold);
 
-    // Log likelihood of all answers by threshold, up to a constant; of the other parameters the most likely.
-    std::span<const double> log_likelihood() const noexcept { return log_likelihood_; } // all combinations, thresholds first
     // Probability of each combination, thresholds first: [(lapse * slopes + slope) * thresholds + threshold]. Sum 1.
     std::span<const double> posterior() const noexcept { return posterior_; }
 

@@ -21,7 +21,7 @@ struct GratingPlace {
 // So what is measured in one place tells about the others, and what does not fit the shape still comes through.
 //
 // Answers come in as likelihoods by place, and are combined by expectation propagation (Minka 2001) with one Gaussian
-// factor for each place. Cost of refine(): places^3.
+// factor for each place. Cost of set_own(): places^2, of a prediction places^3.
 class SensitivityField {
 public:
     struct Belief {
@@ -45,11 +45,10 @@ public:
     // A place's own answers as a Gaussian factor that makes this belief of the one without them: moments of the product
     // of without_own() and the answers' likelihood. Then all beliefs are computed anew.
     void set_own(std::size_t i, const Belief& with_own);
-    // A measurement with a normal error.
-    void set_measurement(std::size_t i, const Belief& measured);
 
 private:
     void update();
+    void change_factor(std::size_t i, double more_precision, double more_shift);
 
     std::vector<GratingPlace> places_;
     std::vector<double> expected_;
@@ -57,6 +56,7 @@ private:
     std::vector<double> precision_; // of the places' own factors
     std::vector<double> shift_;     // precision times mean of the deviation
     std::vector<double> covariance_, mean_; // posterior, of the deviations
+    int changes_ = 0;                       // since all was computed
 };
 
 } // namespace unseen::calibration
