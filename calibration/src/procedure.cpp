@@ -26,7 +26,12 @@ constexpr double two_sided_95 = 1.959964; // standard deviations
 
 // Sweeps over all places until the beliefs keep still; more than enough, as each answer changes little.
 constexpr int most_sweeps = 8;
-constexpr double still = 1e-4; // log10 units, a fiftieth of a grid step
+constexpr double still = 5e-4; // log10 units, a fiftieth of a grid step
+
+// What observers' psychometric functions are taken to be one of; 3.5 and a lapse rate of 0.01 are QUEST's own. A choice of
+// lapse rates was tried: it costs more certainty than it gains with careless observers.
+constexpr double possible_slopes[] = {1.8, 2.5, 3.5, 5};
+constexpr double usual_lapse = 0.01;
 
 // Settings scatter at least so much (log10 units): a few that happen to agree do not make a place certain.
 constexpr double least_scatter = 0.04;
@@ -122,6 +127,10 @@ Procedure::Procedure(CalibrationPlan plan, CsfTable expected, QuestPlus blank)
 Result<Procedure> Procedure::create(CalibrationPlan plan, CsfTable expected) {
     if (auto valid = validate(plan); !valid) return valid.error();
     QuestGrid grid = standard_grid();
+    if (plan.method == Method::two_interval) {
+        grid.slope.assign(std::begin(possible_slopes), std::end(possible_slopes));
+        grid.lapse = {usual_lapse};
+    }
     std::erase_if(grid.log10_contrast, [&](double c) { return c > std::log10(plan.highest_contrast); });
     if (grid.log10_contrast.empty())
         return invalid("The display's highest contrast, " + to_text(plan.highest_contrast) + ", shows nothing that could be measured.");
@@ -204,13 +213,21 @@ void Procedure::combine() {
     if (plan_.method == Method::adjustment) weigh_settings();
     const std::vector<double>& thresholds = quests_.front().grid().log10_threshold;
     std::vector<double> prior(thresholds.size());
+    // Of the slope and the lapse rate, which are the observer's and not the place's: what the answers of all places say.
+    std::vector<std::vector<double>> evidence;
+    for (const QuestPlus& quest : quests_) evidence.push_back(quest.log_evidence());
+    std::vector<double> functions(evidence.front().size());
     const auto believe_others = [&](std::size_t i) {
         const SensitivityField::Belief others = field_.without_own(i);
         for (std::size_t t = 0; t < thresholds.size(); ++t) {
             const double z = (-thresholds[t] - others.mean) / others.deviation;
             prior[t] = -z * z / 2;
         }
-        quests_[i].set_log_prior(prior);
+        std::fill(functions.begin(), functions.end(), 0.0);
+        for (std::size_t j = 0; j < evidence.size(); ++j)
+            for (std::size_t f = 0; f < functions.size() && j != i; ++f) functions[f] += evidence[j][f];
+        quests_[i].set_log_prior(prior, functions);
+        evidence[i] = quests_[i].log_evidence();
     };
     for (int sweep = 0; sweep < most_sweeps; ++sweep) {
         double change = 0;
@@ -403,8 +420,8 @@ Result<Procedure> Procedure::resume(const std::filesystem::path& file, CsfTable 
             if (static_cast<std::size_t>(row[0]) != due) return object->key_error(where, "is not of the place whose turn it was");
         }
         procedure->take({static_cast<std::size_t>(row[0]), row[1], row[2] == 1});
+        procedure->combine(); // each time, so that beliefs come out to the last bit as if there had been no break
     }
-    procedure->combine();
     return procedure;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "json_file.h"
@@ -51,8 +52,8 @@ Result<void> validate(const Psychometric& f) {
 
 QuestGrid standard_grid() {
     QuestGrid grid;
-    for (int i = 0; i <= 200; ++i) grid.log10_threshold.push_back(-3.5 + 0.02 * i);
-    for (int i = 0; i <= 70; ++i) grid.log10_contrast.push_back(-3.5 + 0.05 * i);
+    for (int i = 0; i <= 160; ++i) grid.log10_threshold.push_back(-3.5 + 0.025 * i);
+    for (int i = 0; i <= 35; ++i) grid.log10_contrast.push_back(-3.5 + 0.1 * i);
     grid.slope = {Psychometric().slope};
     grid.lapse = {Psychometric().lapse};
     return grid;
@@ -69,7 +70,7 @@ struct QuestPlus::Tables {
 
 QuestPlus::QuestPlus(std::shared_ptr<const Tables> tables)
     : tables_(std::move(tables)), log_prior_(tables_->grid.log10_threshold.size(), 0.0),
-      log_likelihood_(tables_->combinations(), 0.0), posterior_(tables_->combinations()) {
+      log_prior_of_functions_(tables_->functions.size(), 0.0), log_likelihood_(tables_->combinations(), 0.0), posterior_(tables_->combinations()) {
     refresh();
 }
 
@@ -98,10 +99,26 @@ Result<QuestPlus> QuestPlus::create(const QuestGrid& grid) {
 
 const QuestGrid& QuestPlus::grid() const noexcept { return tables_->grid; }
 
-void QuestPlus::set_log_prior(std::span<const double> log_weights) {
-    assert(log_weights.size() == log_prior_.size());
-    log_prior_.assign(log_weights.begin(), log_weights.end());
+void QuestPlus::set_log_prior(std::span<const double> of_thresholds, std::span<const double> of_functions) {
+    assert(of_thresholds.size() == log_prior_.size());
+    assert(of_functions.empty() || of_functions.size() == log_prior_of_functions_.size());
+    log_prior_.assign(of_thresholds.begin(), of_thresholds.end());
+    if (of_functions.empty()) log_prior_of_functions_.assign(log_prior_of_functions_.size(), 0.0);
+    else log_prior_of_functions_.assign(of_functions.begin(), of_functions.end());
     refresh();
+}
+
+std::vector<double> QuestPlus::log_evidence() const {
+    const std::size_t thresholds = log_prior_.size();
+    std::vector<double> evidence;
+    for (std::size_t f = 0; f < tables_->functions.size(); ++f) {
+        const std::span likelihood = std::span(log_likelihood_).subspan(f * thresholds, thresholds);
+        double largest = -std::numeric_limits<double>::infinity(), sum = 0;
+        for (std::size_t t = 0; t < thresholds; ++t) largest = std::max(largest, likelihood[t] + log_prior_[t]);
+        for (std::size_t t = 0; t < thresholds; ++t) sum += std::exp(likelihood[t] + log_prior_[t] - largest);
+        evidence.push_back(largest + std::log(sum));
+    }
+    return evidence;
 }
 
 void QuestPlus::update(double log10_contrast, bool is_right) {
@@ -122,7 +139,8 @@ void QuestPlus::set_log_likelihood(std::span<const double> by_threshold) {
 
 void QuestPlus::refresh() {
     const std::size_t thresholds = log_prior_.size();
-    for (std::size_t i = 0; i < posterior_.size(); ++i) posterior_[i] = log_likelihood_[i] + log_prior_[i % thresholds];
+    for (std::size_t i = 0; i < posterior_.size(); ++i) 
+        posterior_[i] = log_likelihood_[i] + log_prior_[i % thresholds] + log_prior_of_functions_[i / thresholds];
     const double largest = *std::max_element(posterior_.begin(), posterior_.end());
     double sum = 0;
     for (double& p : posterior_) sum += p = std::exp(p - largest);

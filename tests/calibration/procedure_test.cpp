@@ -74,20 +74,19 @@ TEST_F(ProcedureTest, ThePlanFitsTheDisplay) {
 
 struct Case {
     const char* observer;
-    double db_at_200, db_at_400; // root mean square over three runs
+    double db_at_200, db_at_400; // root mean square over the runs
 };
 
 // What is owed: 1.5 dB in 400 trials. Where the observer is near a published model, 1 dB in 200.
 TEST_F(ProcedureTest, FindsTheSensitivityOfSimulatedObservers) {
     const Case cases[] = {{"castle", 1.0, 1.0},
-                          {"castle:gain=0.7", 1.0, 1.0},
-                          {"stela", 1.0, 1.0},
+                          {"stela:gain=0.7", 1.0, 1.0},
                           {"castle:gain=1.6,frequency=1.3,eccentricity=0.7", 1.1, 1.0},
                           {"castle:gain=0.35,frequency=0.75,eccentricity=1.5", 2.0, 1.5},
-                          {"castle:slope=2.5,lapse=0.03", 1.3, 1.5}};
+                          {"castle:slope=2,lapse=0.03", 1.3, 1.3}};
     for (const Case& c : cases) {
         double at_200 = 0, at_400 = 0;
-        constexpr int runs = 3;
+        constexpr int runs = 2;
         for (std::uint64_t seed = 1; seed <= runs; ++seed) {
             CalibrationPlan plan = default_plan();
             plan.trials = 400;
@@ -149,7 +148,7 @@ TEST_F(ProcedureTest, WhatIsNotEvenSeenAtTheHighestContrastIsNoThreshold) {
 
 TEST_F(ProcedureTest, IntervalsHoldTheTruthAboutAsOftenAsTheySay) {
     int inside = 0, all = 0;
-    for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    for (std::uint64_t seed = 1; seed <= 4; ++seed) {
         CalibrationPlan plan = default_plan();
         plan.seed = seed;
         Procedure procedure = begin(plan);
@@ -230,7 +229,7 @@ TEST_F(ProcedureTest, RunsRepeatAndResume) {
             EXPECT_EQ(second->answers()[i].log10_contrast, whole.answers()[i].log10_contrast) << i;
             EXPECT_EQ(second->answers()[i].is_right, whole.answers()[i].is_right) << i;
         }
-        EXPECT_NEAR(second->estimates()[3].sensitivity() / whole.estimates()[3].sensitivity(), 1, 0.01);
+        EXPECT_EQ(second->estimates()[3].sensitivity(), whole.estimates()[3].sensitivity());
     }
     CalibrationPlan other = default_plan();
     other.seed = 43;

@@ -32,7 +32,7 @@ struct QuestGrid {
     double guess = 0.5, at_threshold = 0.82;
 };
 
-// Thresholds 10^-3.5 to 10^0.5 in steps of 0.02, contrasts 10^-3.5 to 1 in steps of 0.05, slope and lapse as by default.
+// Thresholds 10^-3.5 to 10^0.5 in steps of 0.025, contrasts 10^-3.5 to 1 in steps of 0.1, slope and lapse as by default.
 QuestGrid standard_grid();
 
 // Copies share the grid's tables. Cost: a function value for each combination of parameters in update(), and two
@@ -44,9 +44,12 @@ public:
 
     const QuestGrid& grid() const noexcept;
 
-    // Belief about the threshold before all answers: log weights, up to a constant, one for each log10_threshold. May be
-    // replaced at any time; the answers stay.
-    void set_log_prior(std::span<const double> log_weights);
+    // Belief before all answers: log weights, up to a constant, one for each log10_threshold, and one for each pair of slope and
+    // lapse, slopes first (none: all equal). May be replaced at any time; the answers stay.
+    void set_log_prior(std::span<const double> of_thresholds, std::span<const double> of_functions = {});
+    // What the answers say about the pairs of slope and lapse: the log of the likelihood's mean over the prior of the
+    // thresholds, up to a constant, in the same order.
+    std::vector<double> log_evidence() const;
     void update(double log10_contrast, bool is_right);
     // Answers of another kind, in place of all before: log likelihoods by threshold, up to a constant.
     void set_log_likelihood(std::span<const double> by_threshold);
@@ -74,6 +77,7 @@ private:
 
     std::shared_ptr<const Tables> tables_;
     std::vector<double> log_prior_;      // by threshold
+    std::vector<double> log_prior_of_functions_;
     std::vector<double> log_likelihood_; // by combination
     std::vector<double> posterior_;      // by combination
 };
