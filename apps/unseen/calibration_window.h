@@ -19,7 +19,14 @@ struct CalibrationWindowOptions {
     std::string screenshot;   // PNG of the last thing shown
 };
 
-extern const char* const calibration_window_help;
+inline constexpr const char* calibration_window_help =
+    R"(In the window: look at the cross, from the display's distance; gratings may appear beside it
+  2ifc        one and two dots under the cross mark two intervals: 1 or 2, in which was the grating?
+  adjustment  space or return when it appears (fading in) or vanishes (fading out); arrows change the
+              contrast by hand; n when it cannot be seen at all
+  --gamma     arrows and page keys until both halves are equally bright, then return
+  q, Esc      stop; with --resume the answers are kept
+)";
 
 // Shows the procedure's trials until it is done or the window is closed. After every answer the state goes to `state`, unless that
 // is empty.
