@@ -45,7 +45,8 @@ double pq_encode(double cdm2) {
 // Beyond 1 the last step goes on, so that values stay ordered.
 double table_decode(const std::vector<double>& table, double code) {
     const double position = code * static_cast<double>(table.size() - 1);
-    const std::size_t i = static_cast<std::size_t>(std::clamp(position, 0.0, static_cast<double>(table.size() - 2)));
+    // NaN takes the first step, and stays NaN.
+    const std::size_t i = position > 0 ? static_cast<std::size_t>(std::min(position, static_cast<double>(table.size() - 2))) : 0;
     return table[i] + (position - static_cast<double>(i)) * (table[i + 1] - table[i]);
 }
 double table_encode(const std::vector<double>& table, double linear) {
