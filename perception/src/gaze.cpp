@@ -11,6 +11,7 @@
 #include <string>
 
 #include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
 
 #include <perception/random.h>
 
