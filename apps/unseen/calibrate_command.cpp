@@ -1,4 +1,5 @@
 // unseen calibrate: measures a viewer, or a simulated one, and a display.
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
@@ -73,6 +74,21 @@ Result<CalibrationPlan> make_plan(const CalibrateArguments& a, const perception:
         return invalid("No grating fits the display '" + display.name + "': give --frequencies and --eccentricities.");
     if (auto valid = calibration::validate(plan); !valid) return valid.error();
     return plan;
+}
+
+// What a person is shown must be what the plan says, also where the plan comes from a file.
+Result<void> check_display(const CalibrationPlan& plan, const perception::Display& display) {
+    const double black = perception::black_level(display).value(), white = perception::to_luminance(display, 1).value();
+    const double mean = plan.luminance.value(), amplitude = mean * plan.highest_contrast;
+    constexpr double rounding = 1e-9;
+    if (!(mean - amplitude >= black - rounding * white && mean + amplitude <= white * (1 + rounding)))
+        return invalid("The display '" + display.name + "' cannot show contrasts up to " + rounded(plan.highest_contrast, 3) + " around " +
+                       rounded(mean, 4) + " cd/m2: use the one that the calibration was begun on.");
+    for (const calibration::GratingPlace& place : plan.places)
+        if (!calibration::fits(display, place))
+            return invalid("The display '" + display.name + "' has no room for a grating of " + shortest(place.frequency_cpd) + " cpd at " +
+                           shortest(place.eccentricity_deg) + " degrees: choose other --frequencies and --eccentricities.");
+    return {};
 }
 
 // ---- what comes out -----------------------------------------------------------------------------------------------
@@ -204,6 +220,7 @@ Result<int> calibrate_observer(CalibrateArguments& a, const perception::Display&
         if (!a.state.empty())
             if (auto saved = procedure->save(a.state); !saved) return saved.error();
     } else {
+        if (auto shown = check_display(procedure->plan(), display); !shown) return shown.error();
         a.window.display = display;
         if (auto shown = run_calibration_window(*procedure, a.window, a.state); !shown) return shown.error();
         if (!procedure->is_done()) {

@@ -51,17 +51,17 @@ double farthest_eccentricity_deg(const perception::Display& display, double freq
     return 2 * half - patch_radius_deg(frequency_cpd) - 1; // the cross takes a degree
 }
 
-bool fits(const perception::Display& display, const GratingPlace& place) {
-    const double height = perception::physical_field(display, display.height_px).value();
-    const double radius = patch_radius_deg(place.frequency_cpd);
-    return 2 * radius <= height && place.eccentricity_deg <= farthest_eccentricity_deg(display, place.frequency_cpd);
-}
-
 double log10_expected(const CsfTable& table, const GratingPlace& place, Luminance luminance) {
     return std::log10(table.sensitivity(CyclesPerDegree(place.frequency_cpd), Degrees(place.eccentricity_deg), luminance));
 }
 
 } // namespace
+
+bool fits(const perception::Display& display, const GratingPlace& place) {
+    const double height = perception::physical_field(display, display.height_px).value();
+    const double radius = patch_radius_deg(place.frequency_cpd);
+    return 2 * radius <= height && place.eccentricity_deg <= farthest_eccentricity_deg(display, place.frequency_cpd);
+}
 
 std::string_view name(Method method) { return method == Method::two_interval ? "2ifc" : "adjustment"; }
 

@@ -37,6 +37,9 @@ struct CalibrationPlan {
 inline constexpr double pixels_per_cycle = 4;
 CalibrationPlan plan_for(const perception::Display& display, const perception::CsfTable& expected);
 
+// Whether a patch and the cross beside it fit on the display.
+bool fits(const perception::Display& display, const GratingPlace& place);
+
 // 1 to 1000 places with finite positive frequencies and eccentricities of 0 or more, none twice; 1 to 100,000 trials; 2 to 1000
 // settings; luminance above 0; 0 < highest_contrast <= 1. The error names the field.
 Result<void> validate(const CalibrationPlan& plan);
