@@ -63,7 +63,7 @@ protected:
         const auto end = std::chrono::steady_clock::now() + patience;
         while (answers() < count && std::chrono::steady_clock::now() < end) {
             window().press(key);
-            std::this_thread::sleep_for(pause);
+            std::this_thread::sleep_for(poll_pause);
         }
         EXPECT_GE(answers(), count);
     }

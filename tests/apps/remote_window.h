@@ -1,6 +1,8 @@
 // A window of the command, driven from another X client by synthetic events.
 #pragma once
 
+#include "run_command.h" // with GoogleTest, which must come before X11's macros
+
 #include <chrono>
 #include <string>
 #include <thread>
@@ -12,7 +14,7 @@
 namespace unseen::app::testing {
 
 inline constexpr std::chrono::seconds patience{60}; // software rendering on a busy machine
-inline constexpr std::chrono::milliseconds pause{20};
+inline constexpr std::chrono::milliseconds poll_pause{20};
 
 // The first window whose title begins with "Unseen".
 class RemoteWindow {
@@ -24,7 +26,7 @@ public:
         while (std::chrono::steady_clock::now() < end) {
             window_ = search(DefaultRootWindow(display_));
             if (window_) return true;
-            std::this_thread::sleep_for(pause);
+            std::this_thread::sleep_for(poll_pause);
         }
         return false;
     }
@@ -38,7 +40,7 @@ public:
         while (std::chrono::steady_clock::now() < end) {
             last = title();
             if (last.find(text) != std::string::npos) return last;
-            std::this_thread::sleep_for(pause);
+            std::this_thread::sleep_for(poll_pause);
         }
         return last;
     }
