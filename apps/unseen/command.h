@@ -27,6 +27,7 @@ Command make_command(CLI::App& app);
 Command simplify_command(CLI::App& app);
 Command render_command(CLI::App& app);
 Command compare_command(CLI::App& app);
+Command calibrate_command(CLI::App& app);
 Command csf_command(CLI::App& app);
 Command sheet_command(CLI::App& app);
 Command view_command(CLI::App& app);

@@ -14,6 +14,7 @@
 
 #include "camera_path.h"
 #include "frame_image.h"
+#include "gaze_player.h"
 #include "progress_bar.h"
 #include "report.h"
 #include "terminal.h"
@@ -189,11 +190,15 @@ public:
         if (!drawing) return drawing.error();
         if (options_.geomorph_seconds)
             if (auto set = follower_.set_geomorph(scene_, *options_.geomorph_seconds); !set) return set;
+        const double frame_s = 1 / options_.frames_a_second;
+        const auto gaze = GazePlayer::create(options_.gaze, scene_, static_cast<double>(poses.size()) * frame_s);
+        if (!gaze) return gaze.error();
         const auto names = parse_pattern(options_.pictures);
         ProgressBar bar("flying");
         for (std::size_t i = 0; i < poses.size(); ++i) {
             bar(static_cast<double>(i) / static_cast<double>(poses.size()), "frames");
             take(poses[i]);
+            gaze->apply(what_, scene_, static_cast<double>(i) * frame_s);
             auto frame = next(*drawing);
             if (!frame) return Error{frame.error().code, "Frame " + std::to_string(i) + ": " + frame.error().message};
             if (!names) continue;

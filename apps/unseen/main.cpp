@@ -62,7 +62,8 @@ int main(int argc, char** argv) {
     try {
         const std::vector<Command> commands = {build_command(app),  info_command(app),  simplify_command(app),
                                                render_command(app), sheet_command(app), compare_command(app),
-                                               csf_command(app),    view_command(app),  make_command(app),
+                                               csf_command(app),    calibrate_command(app),
+                                               view_command(app),  make_command(app),
                                                bench_command(app)};
         app.parse(argc, argv);
         return run(commands);

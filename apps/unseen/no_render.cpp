@@ -1,4 +1,5 @@
 // The verbs that draw, in a build without OpenGL: they say so.
+#include "calibration_window.h"
 #include "command.h"
 
 namespace unseen::app {
@@ -14,7 +15,18 @@ Command absent(CLI::App& app, const std::string& name) {
             }};
 }
 
+Error no_window() {
+    return {ErrorCode::unsupported, "This build has no windows, for it was made without OpenGL; configure it with "
+                                    "-DUNSEEN_BUILD_RENDER=ON, or use --simulate."};
+}
+
 } // namespace
+
+Result<void> run_calibration_window(calibration::Procedure&, const CalibrationWindowOptions&, const std::filesystem::path&) {
+    return no_window();
+}
+Result<std::vector<GammaMatch>> match_gamma(const CalibrationWindowOptions&) { return no_window(); }
+Result<void> show_chart(const CalibrationWindowOptions&, const std::string&) { return no_window(); }
 
 Command render_command(CLI::App& app) { return absent(app, "render"); }
 Command sheet_command(CLI::App& app) { return absent(app, "sheet"); }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <map>
 #include <memory>
 
 #include <perception/criterion.h>
@@ -143,6 +144,37 @@ void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px) {
             "(default: nowhere known, so everything is seen as sharply as at the fovea)")
         ->type_name("X Y")
         ->check(finite());
+}
+
+void add_moving_gaze_options(CLI::App& verb, GazeOptions& o, bool allows_mouse) {
+    CLI::App& group = *verb.add_option_group("GAZE", "Where the viewer looks, frame by frame, instead of --gaze");
+    std::map<std::string, GazeSource> sources = {{"head", GazeSource::head}, {"simulated", GazeSource::simulated}};
+    if (allows_mouse) sources["mouse"] = GazeSource::mouse;
+    CLI::Option* mode = group.add_option("--gaze-mode", o.source,
+                                         std::string("simulated: fixations and saccades by published statistics; head: no tracker, within 15 "
+                                                     "degrees of the middle") + (allows_mouse ? "; mouse: at the pointer" : ""))
+                            ->type_name("NAME")
+                            ->transform(CLI::CheckedTransformer(sources).description(""));
+    CLI::Option* trace = group.add_option("--gaze-trace", o.trace, "A recording: CSV with the header time_s,x_px,y_px")->type_name("FILE.csv");
+    group
+        .add_option_function<double>(
+            "--seed", [&o](const double& v) { o.seed = static_cast<std::uint64_t>(v); }, "Of simulated gazes (default: 1)")
+        ->type_name("N")
+        ->check(within(0, 9007199254740992.0));
+    group.add_option("--gaze-error", o.tracker.error_deg, "The tracker's error, which widens the fovea (default: 0)")
+        ->type_name("DEGREES")
+        ->check(within(0, 180));
+    group
+        .add_option_function<double>(
+            "--gaze-latency", [&o](const double& ms) { o.tracker.latency_s = ms / 1000; },
+            "From the eye to the picture; widens the fovea by the gaze's speed (default: 0)")
+        ->type_name("MILLISECONDS")
+        ->check(within(0, 10000));
+    group.add_flag("--suppression", o.tracker.suppression, "Keep still during saccades, when nothing is seen");
+    group.callback([=, &o] {
+        if (*mode && *trace) refuse("--gaze-mode and --gaze-trace exclude each other: give one of them.");
+        if (*trace) o.source = GazeSource::trace;
+    });
 }
 
 CLI::Option* add_triangles_option(CLI::App& verb, std::uint32_t& triangles, const std::string& text) {

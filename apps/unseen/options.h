@@ -9,6 +9,8 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include <perception/gaze.h>
+
 namespace unseen::app {
 
 // VIEW. What is not given follows from the model and the display, see scene.h.
@@ -46,6 +48,16 @@ struct WhatOptions {
     bool fill_budget = false;                // of Mode::budget: go on where nothing more can be seen
     std::optional<double> milliseconds;      // at most so long for the cut
     std::optional<glm::dvec2> gaze_px;
+    double gaze_margin_deg = 0;              // the true gaze may be so far from it
+};
+
+// Where gazes come from.
+enum class GazeSource { none, mouse, head, trace, simulated }; // a fixed one is WhatOptions::gaze_px
+struct GazeOptions {
+    GazeSource source = GazeSource::none;
+    std::string trace; // a file
+    std::uint64_t seed = 1;
+    perception::TrackerOptions tracker;
 };
 
 // Each adds a group of options to a verb. The structs must outlive the parser. Impossible values and combinations end
@@ -53,6 +65,8 @@ struct WhatOptions {
 void add_view_options(CLI::App& verb, ViewOptions& options);
 void add_display_options(CLI::App& verb, DisplayOptions& options);
 void add_what_options(CLI::App& verb, WhatOptions& options);
+// Beside add_what_options(), for verbs with frames in time: gazes that move. `allows_mouse`: the verb has a window.
+void add_moving_gaze_options(CLI::App& verb, GazeOptions& options, bool allows_mouse);
 void add_geomorph_option(CLI::App& verb, std::optional<double>& seconds);
 void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px);
 CLI::Option* add_triangles_option(CLI::App& verb, std::uint32_t& triangles, const std::string& text);

@@ -9,6 +9,7 @@
 #include "command.h"
 #include "fly_through.h"
 #include "frame_image.h"
+#include "gaze_player.h"
 #include "report.h"
 #include "simplification.h"
 #include "terminal.h"
@@ -57,6 +58,9 @@ Result<int> run(RenderArguments& a) {
     if (!renderer) return renderer.error();
 
     vdtree::Cut cut(scene->tree);
+    const auto gaze = GazePlayer::create(a.flight.gaze, *scene, 0);
+    if (!gaze) return gaze.error();
+    gaze->apply(a.what, *scene, 0);
     const auto simplified = simplify(cut, *scene, a.what, Purpose::picture);
     if (!simplified) return simplified.error();
     const Simplification& result = *simplified;
@@ -95,14 +99,18 @@ void add_path_options(CLI::App& verb, FlyThroughOptions& o) {
         ->type_name("X")
         ->check(positive());
     add_geomorph_option(group, o.geomorph_seconds);
-    group.add_option("--fps", o.frames_a_second, "With --geomorph: frames a second of the path (default: 60)")
+    group.add_option("--fps", o.frames_a_second, "With --geomorph and moving gazes: frames a second of the path (default: 60)")
         ->type_name("N")
         ->check(within(1, 1e6));
     group.add_flag("!--no-draw", o.draws, "Only cut: draw nothing");
 }
 
+bool is_moving(const GazeOptions& gaze) { return gaze.source == GazeSource::trace || gaze.source == GazeSource::simulated; }
+
 void check(const RenderArguments& a) {
     const FlyThroughOptions& o = a.flight;
+    if (o.path.empty() && is_moving(o.gaze)) refuse("--gaze-trace and --gaze-mode simulated need --path.");
+    if (a.what.gaze_px && o.gaze.source != GazeSource::none) refuse("--gaze excludes --gaze-trace and --gaze-mode.");
     if (o.path.empty()) {
         if (a.out.empty()) refuse("-o is required (or --path).");
         if (!o.csv.empty() || !o.plot.empty() || o.threshold != 1 || !o.draws || o.geomorph_seconds)
@@ -137,16 +145,19 @@ Command render_command(CLI::App& app) {
     add_path_options(*verb, a->flight);
     CLI::Option* frames_a_second = verb->get_option("--fps");
     verb->callback([a, samples, frames_a_second] {
-        if (!frames_a_second->empty() && !a->flight.geomorph_seconds) refuse("--fps needs --geomorph.");
+        if (!frames_a_second->empty() && !a->flight.geomorph_seconds && !is_moving(a->flight.gaze))
+            refuse("--fps needs --geomorph, --gaze-trace or --gaze-mode simulated.");
         check(*a);
         if (!a->flight.path.empty() && samples->empty()) a->draw.samples = 1;
     });
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->what);
+    add_moving_gaze_options(*verb, a->flight.gaze, false);
     verb->footer("Examples:\n  unseen render bunny.vdt -o bunny.png --wireframe\n"
                  "  unseen render bunny.vdt -o full.pfm --full --size 1024x1024\n"
                  "  unseen render bunny.vdt -o aside.pfm --gaze 1603 512 --json -\n"
+                 "  unseen render dragon.vdt --path orbit:1 --gaze-mode simulated --seed 7 --gaze-error 0.5 --gaze-latency 50\n"
                  "  unseen render dragon.vdt --path orbit:1 --csv orbit.csv --plot orbit.png\n"
                  "  unseen render dragon.vdt --path flight.csv -o frames/%04d.png --threshold 2\n"
                  "  unseen render dragon.vdt --path orbit:1 -o frames/%04d.png --triangles 20000 --geomorph 0.25 --fps 60");

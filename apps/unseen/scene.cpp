@@ -105,6 +105,12 @@ Result<CsfChoice> choose_csf(const std::string& model_or_file) {
     return CsfChoice{{}, std::move(*table)};
 }
 
+const perception::CsfTable* Scene::csf_table(perception::Degrees margin) const {
+    if (margin.value() == 0) return &csf_table();
+    if (!widened_tables) widened_tables = std::make_unique<perception::WidenedTables>(csf_table());
+    return widened_tables->at(margin);
+}
+
 PlacedSphere placed_sphere(const vdtree::VertexTree& tree, const vdtree::Similarity& placement) {
     const vdtree::Sphere sphere = tree.bounding_sphere();
     return {placement.to_world(tree.origin() + glm::dvec3(sphere.centre)), placement.scale * sphere.radius};
@@ -125,7 +131,7 @@ Result<Scene> load_scene(const std::filesystem::path& model, const ViewOptions& 
     auto tree = open_tree(model);
     if (!tree) return tree.error();
 
-    Scene scene{std::move(*tree), {}, *shown_on, std::move(csf), {}, *background, false};
+    Scene scene{std::move(*tree), {}, *shown_on, std::move(csf), {}, *background, false, {}};
     scene.placement.scale = view.unit_metres;
     if (const auto lit = light(scene, view); !lit) return lit.error();
     scene.view = make_view(scene, view);

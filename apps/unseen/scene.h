@@ -2,11 +2,13 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include <perception/csf.h>
 #include <perception/display.h>
+#include <perception/gaze.h>
 #include <vdtree/vertex_tree.h>
 #include <vdtree/view.h>
 
@@ -24,6 +26,9 @@ struct Scene {
     bool is_relit = false; // the light is not the one that the tree was built for
 
     const perception::CsfTable& csf_table() const { return csf ? *csf : perception::CsfTable::standard(); }
+    // For gazes that are known to a margin only; null where the margin is so wide that everything may be looked at.
+    const perception::CsfTable* csf_table(perception::Degrees margin) const;
+    mutable std::unique_ptr<perception::WidenedTables> widened_tables; // made when they are asked for
 };
 
 // The display that the options describe; ranges are checked.

@@ -38,8 +38,12 @@ perception::FoldTestOptions test_options(const Scene& scene, const WhatOptions& 
     perception::FoldTestOptions test;
     test.display = scene.display;
     test.scene = scene_luminance(scene);
-    test.gaze_px = what.gaze_px;
     test.csf = &scene.csf_table();
+    if (!what.gaze_px) return test;
+    const perception::CsfTable* around_gaze = scene.csf_table(perception::Degrees(what.gaze_margin_deg));
+    if (!around_gaze) return test;
+    test.gaze_px = what.gaze_px;
+    test.csf = around_gaze;
     return test;
 }
 
@@ -93,9 +97,11 @@ Effect gaze_effect(const WhatOptions& what) {
     if (what.mode == Mode::full) return {"gaze", false, "nothing is folded in the full model"};
     if (!is_perceptual(what)) return {"gaze", false, "the fold test " + name_of(what.test) + " does not use it"};
     if (!what.gaze_px) return {"gaze", false, "no gaze is given, so everything counts as looked at"};
+    const std::string around =
+        what.gaze_margin_deg > 0 ? ", give or take " + rounded(what.gaze_margin_deg, 3) + " degrees," : std::string(",");
     return {"gaze", true,
-            "the viewer looks at pixel " + rounded(what.gaze_px->x, 6) + ", " + rounded(what.gaze_px->y, 6) +
-                ", and sees less sharply elsewhere"};
+            "the viewer looks at pixel " + rounded(what.gaze_px->x, 6) + ", " + rounded(what.gaze_px->y, 6) + around +
+                " and sees less sharply elsewhere"};
 }
 
 Effect silhouette_effect(const Scene& scene, const WhatOptions& what) {
@@ -258,10 +264,12 @@ Result<const vdtree::DistanceCriterion*> Follower::criterion_for(const Scene& sc
     const bool perceptual = is_perceptual(what);
     // A budget goes by the order of the costs alone, for which any tolerance will do.
     const double tolerance_px = what.mode == Mode::pixels ? what.pixels : 1;
-    Key key{what.test, perceptual ? 0 : tolerance_px, false, 0, scene.view.width, scene.view.height, scene.view.fov_y_degrees, 0};
+    Key key{what.test, perceptual ? 0 : tolerance_px, false, 0, scene.view.width, scene.view.height, scene.view.fov_y_degrees, 0, nullptr};
     if (perceptual) {
         key.background = scene.background;
-        key.has_gaze = what.gaze_px.has_value();
+        const perception::FoldTestOptions options = test_options(scene, what);
+        key.has_gaze = options.gaze_px.has_value();
+        key.csf = options.csf;
         // A gaze off the window reaches into larger magnifications: one criterion must do for all gazes up to there, so they are
         // rounded up to whole windows.
         if (key.has_gaze) {

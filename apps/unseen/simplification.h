@@ -72,6 +72,7 @@ private:
         int width = 0, height = 0;
         double fov_y_degrees = 0;
         float background = 0;
+        const perception::CsfTable* csf = nullptr;
         bool operator==(const Key&) const = default;
     };
     Result<const vdtree::DistanceCriterion*> criterion_for(const Scene& scene, const WhatOptions& what);

@@ -46,6 +46,7 @@ Command view_command(CLI::App& app) {
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->viewer.what);
+    add_moving_gaze_options(*verb, a->viewer.gaze, true);
     verb->footer(std::string(viewer_help) + "\nExamples:\n  unseen view bunny.vdt\n"
                                             "  unseen view bunny.vdt --triangles 5000 --wireframe\n"
                                             "  unseen view dragon.vdt --milliseconds 2 --geomorph 0.25");

@@ -17,6 +17,7 @@
 #include <perception/image.h>
 
 #include "frame_image.h"
+#include "gaze_player.h"
 #include "simplification.h"
 #include "terminal.h"
 
@@ -51,6 +52,7 @@ public:
         : scene_(scene), options_(options), window_(context.glfw_window()), renderer_(std::move(renderer)),
           cut_(scene.tree), first_view_(scene.view), what_(options.what), draw_(options.draw) {
         draw_.background = scene.background;
+        gaze_follows_pointer_ = options.gaze.source == GazeSource::mouse;
         budget_ = what_.mode == Mode::budget ? what_.triangles : std::max(1U, scene.tree.triangle_count() / 4);
         glfwSetWindowUserPointer(window_, this);
         glfwSetCharCallback(window_, [](GLFWwindow* w, unsigned c) { of(w).on_character(c); });
@@ -69,6 +71,10 @@ public:
     Viewer& operator=(const Viewer&) = delete;
 
     Result<void> run() {
+        constexpr double longest_simulation_s = 3600; // then the eye keeps still
+        auto gaze = GazePlayer::create(options_.gaze, scene_, longest_simulation_s);
+        if (!gaze) return gaze.error();
+        gaze_ = std::move(*gaze);
         if (options_.geomorph_seconds)
             if (auto set = follower_.set_geomorph(scene_, *options_.geomorph_seconds); !set) return set;
         for (int frame = 0; !glfwWindowShouldClose(window_);) {
@@ -132,7 +138,7 @@ private:
         what_.triangles = budget_;
         if (mode == Mode::imperceptible && !is_perceptual(what_.test)) what_.test = FoldTest::error;
         what_.gaze_px.reset();
-        gaze_follows_pointer_ = false;
+        gaze_follows_pointer_ = plays_gaze_ = false;
     }
 
     void scale_budget(double factor) {
@@ -199,6 +205,7 @@ private:
         needs_frame_ = false;
         const auto start = Clock::now();
         follower_.let_pass(std::chrono::duration<double>(start - std::exchange(last_frame_, start)).count());
+        if (plays_gaze_) gaze_->apply(what_, scene_, std::chrono::duration<double>(start - first_frame_).count());
         const auto result = follower_.follow(cut_, scene_, what_);
         if (!result) return result.error();
         const vdtree::Geomorph* const geomorph = follower_.geomorph();
@@ -207,7 +214,7 @@ private:
         if (!drawn) return drawn;
         glfwSwapBuffers(window_);
         // What the time limit has left to do, and what glides, goes on in the next frame.
-        needs_frame_ = !result->stats.is_complete || result->gliding > 0;
+        needs_frame_ = !result->stats.is_complete || result->gliding > 0 || (plays_gaze_ && gaze_->is_moving());
         show_title(*result, milliseconds_since(start));
         return {};
     }
@@ -268,6 +275,9 @@ private:
     glm::dvec2 pointer_px_ = glm::dvec2(0);
     bool is_dragging_ = false;
     bool gaze_follows_pointer_ = false;
+    std::optional<GazePlayer> gaze_;
+    bool plays_gaze_ = true; // until a mode is chosen
+    Clock::time_point first_frame_ = Clock::now();
     bool needs_frame_ = true;
     Clock::time_point last_frame_ = Clock::now();
     int screenshots_ = 0;

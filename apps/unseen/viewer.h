@@ -13,6 +13,7 @@ namespace unseen::app {
 
 struct ViewerOptions {
     WhatOptions what;             // to begin with
+    GazeOptions gaze;             // that what is looked at follows from the first frame on
     bool has_fixed_field = false; // the camera's field was asked for; else it follows the window's height
     render::DrawOptions draw;
     std::string screenshot; // written when the viewer ends

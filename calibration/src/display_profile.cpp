@@ -45,11 +45,39 @@ Result<void> read_transfer(const JsonObject& object, Display& display) {
         display.transfer = TransferFunction::srgb;
         return {};
     }
-    if (text == "linear") {
-        display.transfer = TransferFunction::linear;
+    for (const auto& [name, transfer] : {std::pair{"linear", TransferFunction::linear}, {"pq", TransferFunction::pq},
+                                         {"table", TransferFunction::table}}) {
+        if (text != name) continue;
+        display.transfer = transfer;
         return {};
     }
-    return object.key_error("transfer", "must be \"srgb\", \"linear\", or a gamma as a number above 0");
+    return object.key_error("transfer", "must be \"srgb\", \"linear\", \"pq\", \"table\", or a gamma as a number above 0");
+}
+
+// The keys that only some displays have.
+Result<void> read_table(const JsonObject& object, Display& display) {
+    const bool wanted = display.transfer == TransferFunction::table;
+    if (!wanted && object.has("transfer_table"))
+        return object.key_error("transfer_table", "needs \"transfer\": \"table\"");
+    if (!wanted) return {};
+    const auto array = object.array("transfer_table");
+    if (!array) return array.error();
+    return object.append_numbers(**array, "transfer_table", std::nullopt, display.table);
+}
+
+Result<void> read_lens(const JsonObject& object, Display& display) {
+    if (auto ok = object.get("field_deg", display.field_deg, {.minimum = 0, .maximum = 359, .minimum_allowed = false}); !ok) return ok;
+    if (!object.has("pixels_per_degree_at")) return {};
+    const auto rows = object.array("pixels_per_degree_at");
+    if (!rows) return rows.error();
+    for (const auto& row : **rows) {
+        std::vector<double> values;
+        const std::string where = "pixels_per_degree_at[" + std::to_string(display.lens.size()) + "]";
+        if (auto ok = object.append_numbers(row, where, 2, values); !ok) return ok;
+        display.lens.push_back({values[0], values[1]});
+    }
+    if (display.lens.empty()) return object.key_error("pixels_per_degree_at", "is empty");
+    return {};
 }
 
 } // namespace
@@ -57,7 +85,8 @@ Result<void> read_transfer(const JsonObject& object, Display& display) {
 Result<Display> read_display(const std::filesystem::path& file) {
     const auto object = JsonObject::read(file, {"name", "width_px", "height_px", "pixel_pitch_m", "diagonal_m",
                                                 "viewing_distance_m", "peak_cdm2", "black_cdm2", "transfer",
-                                                "ambient_lux", "reflectivity", "source"});
+                                                "ambient_lux", "reflectivity", "source", "transfer_table",
+                                                "pixels_per_degree_at", "field_deg"});
     if (!object) return object.error();
 
     Display display;
@@ -88,6 +117,8 @@ Result<Display> read_display(const std::filesystem::path& file) {
     display.black = perception::Luminance(*black);
 
     if (auto ok = read_transfer(*object, display); !ok) return ok.error();
+    if (auto ok = read_table(*object, display); !ok) return ok.error();
+    if (auto ok = read_lens(*object, display); !ok) return ok.error();
     double ambient = display.ambient.value();
     if (auto ok = object->get("ambient_lux", ambient, not_negative); !ok) return ok.error();
     if (auto ok = object->get("reflectivity", display.reflectivity, share); !ok) return ok.error();
@@ -102,6 +133,8 @@ Result<void> write_display(const std::filesystem::path& file, const Display& dis
     std::string transfer = to_text(display.gamma);
     if (display.transfer == TransferFunction::srgb) transfer = "\"srgb\"";
     if (display.transfer == TransferFunction::linear) transfer = "\"linear\"";
+    if (display.transfer == TransferFunction::pq) transfer = "\"pq\"";
+    if (display.transfer == TransferFunction::table) transfer = "\"table\"";
 
     std::string text = "{\n    \"name\": " + to_json(display.name);
     const auto add = [&](const char* key, const std::string& value) {
@@ -116,6 +149,18 @@ Result<void> write_display(const std::filesystem::path& file, const Display& dis
     add("transfer", transfer);
     add("ambient_lux", to_text(display.ambient.value()));
     add("reflectivity", to_text(display.reflectivity));
+    if (display.transfer == TransferFunction::table) {
+        std::string values;
+        for (const double value : display.table) values.append(values.empty() ? "[" : ", ").append(to_text(value));
+        add("transfer_table", values + "]");
+    }
+    if (!display.lens.empty()) {
+        std::string rows;
+        for (const perception::PixelsPerDegreeAt& at : display.lens)
+            rows.append(rows.empty() ? "[[" : ", [").append(to_text(at.angle_deg)).append(", ").append(to_text(at.pixels_per_degree)).append("]");
+        add("pixels_per_degree_at", rows + "]");
+    }
+    if (display.field_deg > 0) add("field_deg", to_text(display.field_deg));
     return write_text(file, text.append("\n}\n"));
 }
 

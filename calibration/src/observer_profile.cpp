@@ -10,7 +10,7 @@ namespace unseen::calibration {
 namespace {
 
 constexpr std::string_view format_name = "unseen-csf";
-constexpr int format_version = 1;
+constexpr int table_version = 1, measured_version = 2;
 
 Result<std::vector<double>> read_axis(const JsonObject& object, const char* key) {
     const auto array = object.array(key);
@@ -50,18 +50,54 @@ Result<void> read_sensitivity(const JsonObject& object, perception::CsfSamples& 
     return {};
 }
 
-Result<void> check_format(const JsonObject& object) {
+Result<int> read_version(const JsonObject& object) {
     std::string format = "missing";
-    if (auto ok = object.get("format", format); !ok) return ok;
+    if (auto ok = object.get("format", format); !ok) return ok.error();
     if (format != format_name) {
         return object.key_error("format", "must be \"unseen-csf\": this is no sensitivity table");
     }
     const auto version = object.number("version", {.minimum = 1, .maximum = 1e9, .whole = true});
     if (!version) return version.error();
-    if (*version == format_version) return {};
-    Error error = object.key_error("version", "must be 1, but is " + to_text(*version) + ": a newer program wrote it");
+    if (*version <= measured_version) return static_cast<int>(*version);
+    Error error = object.key_error("version", "must be 1 or 2, but is " + to_text(*version) + ": a newer program wrote it");
     error.code = ErrorCode::unsupported;
     return error;
+}
+
+constexpr const char* text_keys[] = {"observer", "date", "method", "display", "conditions"};
+constexpr std::string ObserverProfile::* texts[] = {&ObserverProfile::observer, &ObserverProfile::date, &ObserverProfile::method,
+                                                    &ObserverProfile::display, &ObserverProfile::conditions};
+
+Result<std::vector<Measurement>> read_measurements(const JsonObject& object) {
+    const auto rows = object.array("measured");
+    if (!rows) return rows.error();
+    std::vector<Measurement> measured;
+    for (const auto& row : **rows) {
+        const std::string where = "measured[" + std::to_string(measured.size()) + "]";
+        std::vector<double> v;
+        if (auto ok = object.append_numbers(row, where, 6, v); !ok) return ok.error();
+        const bool is_place = v[0] > 0 && v[1] >= 0;
+        const bool is_interval = v[3] > 0 && v[3] <= v[2] && v[2] <= v[4];
+        constexpr double most_answers = 1e6;
+        if (!is_place) return object.key_error(where, "must begin with a frequency above 0 and an eccentricity of 0 or more");
+        if (!is_interval) return object.key_error(where, "must have a sensitivity above 0 that lies in its interval");
+        if (!(v[5] >= 0 && v[5] <= most_answers)) return object.key_error(where, "must end in how many answers there were");
+        measured.push_back({{v[0], v[1]}, v[2], v[3], v[4], static_cast<int>(v[5])});
+    }
+    return measured;
+}
+
+Result<void> read_circumstances(const JsonObject& object, ObserverProfile& profile) {
+    for (std::size_t i = 0; i < std::size(text_keys); ++i)
+        if (auto ok = object.get(text_keys[i], profile.*texts[i]); !ok) return ok;
+    const Range positive{.minimum = 0, .maximum = 1e6, .minimum_allowed = false};
+    const auto luminance = object.number("measured_at_cdm2", positive);
+    if (!luminance) return luminance.error();
+    profile.measured_at_cdm2 = *luminance;
+    auto measured = read_measurements(object);
+    if (!measured) return measured.error();
+    profile.measured = std::move(*measured);
+    return {};
 }
 
 std::string to_array(std::span<const double> values) {
@@ -72,11 +108,16 @@ std::string to_array(std::span<const double> values) {
 
 } // namespace
 
-Result<perception::CsfTable> read_csf(const std::filesystem::path& file) {
+Result<ObserverProfile> read_observer(const std::filesystem::path& file) {
     const auto object = JsonObject::read(file, {"format", "version", "source", "frequency_cpd", "eccentricity_deg",
-                                                "luminance_cdm2", "sensitivity"});
+                                                "luminance_cdm2", "sensitivity", "observer", "date", "method", "display",
+                                                "conditions", "measured_at_cdm2", "measured"});
     if (!object) return object.error();
-    if (auto ok = check_format(*object); !ok) return ok.error();
+    const auto version = read_version(*object);
+    if (!version) return version.error();
+    for (const char* key : {"observer", "date", "method", "display", "conditions", "measured_at_cdm2", "measured"})
+        if (*version < measured_version && object->has(key))
+            return object->key_error(key, "is unknown in version 1: remove it, or give version 2");
 
     perception::CsfSamples samples;
     if (auto ok = object->get("source", samples.source); !ok) return ok.error();
@@ -91,13 +132,27 @@ Result<perception::CsfTable> read_csf(const std::filesystem::path& file) {
 
     auto table = perception::CsfTable::create(std::move(samples));
     if (!table) return object->error(table.error().message);
-    return table;
+    ObserverProfile profile;
+    profile.table = std::move(*table);
+    if (*version == measured_version)
+        if (auto ok = read_circumstances(*object, profile); !ok) return ok.error();
+    return profile;
 }
 
-Result<void> write_csf(const std::filesystem::path& file, const perception::CsfTable& table) {
+Result<perception::CsfTable> read_csf(const std::filesystem::path& file) {
+    auto profile = read_observer(file);
+    if (!profile) return profile.error();
+    return std::move(profile->table);
+}
+
+namespace {
+
+// `circumstances`: further keys, each with a comma before it.
+Result<void> write(const std::filesystem::path& file, const perception::CsfTable& table, int version,
+                   const std::string& circumstances) {
     const perception::CsfSamples& samples = table.samples();
-    std::string text = "{\n\"format\": " + to_json(format_name) + ",\n\"version\": " + std::to_string(format_version);
-    text += ",\n\"source\": " + to_json(samples.source);
+    std::string text = "{\n\"format\": " + to_json(format_name) + ",\n\"version\": " + std::to_string(version);
+    text += circumstances + ",\n\"source\": " + to_json(samples.source);
     text += ",\n\"frequency_cpd\": " + to_array(samples.frequency_cpd);
     text += ",\n\"eccentricity_deg\": " + to_array(samples.eccentricity_deg);
     text += ",\n\"luminance_cdm2\": " + to_array(samples.luminance_cdm2);
@@ -113,6 +168,26 @@ Result<void> write_csf(const std::filesystem::path& file, const perception::CsfT
         text += "]";
     }
     return write_text(file, text + "]\n}\n");
+}
+
+} // namespace
+
+Result<void> write_csf(const std::filesystem::path& file, const perception::CsfTable& table) {
+    return write(file, table, table_version, {});
+}
+
+Result<void> write_observer(const std::filesystem::path& file, const ObserverProfile& profile) {
+    std::string text;
+    for (std::size_t i = 0; i < std::size(text_keys); ++i)
+        text += ",\n\"" + std::string(text_keys[i]) + "\": " + to_json(profile.*texts[i]);
+    text += ",\n\"measured_at_cdm2\": " + to_text(profile.measured_at_cdm2) + ",\n\"measured\": [";
+    for (std::size_t i = 0; i < profile.measured.size(); ++i) {
+        const Measurement& m = profile.measured[i];
+        const double row[] = {m.place.frequency_cpd, m.place.eccentricity_deg, m.sensitivity, m.low, m.high,
+                              static_cast<double>(m.answers)};
+        text += (i > 0 ? ",\n" : "\n") + to_array(row);
+    }
+    return write(file, profile.table, measured_version, text + "]");
 }
 
 } // namespace unseen::calibration

@@ -1,6 +1,7 @@
 // The display model: photometry (black level, transfer function) and viewing geometry of a flat screen.
 #include <perception/display.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -28,31 +29,98 @@ double srgb_encode(double linear) {
     return linear <= 0.0031308 ? linear * 12.92 : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
 }
 
+// SMPTE ST 2084 (2014): 0..1 to cd/m2 and back, 10,000 at most.
+constexpr double pq_m1 = 2610.0 / 16384, pq_m2 = 2523.0 / 4096 * 128;
+constexpr double pq_c1 = 3424.0 / 4096, pq_c2 = 2413.0 / 4096 * 32, pq_c3 = 2392.0 / 4096 * 32;
+constexpr double pq_peak_cdm2 = 10000;
+double pq_decode(double code) {
+    const double root = std::pow(code, 1 / pq_m2);
+    return pq_peak_cdm2 * std::pow(std::max(root - pq_c1, 0.0) / (pq_c2 - pq_c3 * root), 1 / pq_m1);
+}
+double pq_encode(double cdm2) {
+    const double power = std::pow(cdm2 / pq_peak_cdm2, pq_m1);
+    return std::pow((pq_c1 + pq_c2 * power) / (1 + pq_c3 * power), pq_m2);
+}
+
+// Beyond 1 the last step goes on, so that values stay ordered.
+double table_decode(const std::vector<double>& table, double code) {
+    const double position = code * static_cast<double>(table.size() - 1);
+    // NaN takes the first step, and stays NaN.
+    const std::size_t i = position > 0 ? static_cast<std::size_t>(std::min(position, static_cast<double>(table.size() - 2))) : 0;
+    return table[i] + (position - static_cast<double>(i)) * (table[i + 1] - table[i]);
+}
+double table_encode(const std::vector<double>& table, double linear) {
+    const auto above = std::upper_bound(table.begin() + 1, table.end() - 1, linear);
+    const std::size_t i = static_cast<std::size_t>(above - table.begin()) - 1;
+    return (static_cast<double>(i) + (linear - table[i]) / (table[i + 1] - table[i])) / static_cast<double>(table.size() - 1);
+}
+
+// What no display reaches: values beyond are a slip of the unit.
+constexpr double largest_pitch_m = 1, farthest_m = 1e4, brightest_cdm2 = 1e6, brightest_ambient_lux = 1e6;
+constexpr double largest_gamma = 10, most_ppd = 1e5;
+
+std::string in_brackets(const char* name, std::size_t i) { return std::string(name).append("[").append(std::to_string(i)).append("]"); }
+
+Result<void> check_transfer(const Display& d) {
+    if (d.transfer == TransferFunction::gamma && !(positive(d.gamma) && d.gamma <= largest_gamma))
+        return bad("gamma must be above 0 and at most 10, but is " + number(d.gamma));
+    if (d.transfer == TransferFunction::pq && !(d.peak.value() <= pq_peak_cdm2))
+        return bad("peak must be at most 10000 cd/m2 with the transfer function pq, but is " + number(d.peak.value()));
+    if (d.transfer != TransferFunction::table) return {};
+    constexpr std::size_t least_size = 3, largest_size = 65536;
+    if (d.table.size() < least_size || d.table.size() > largest_size)
+        return bad("table must have 3 to 65536 values, but has " + std::to_string(d.table.size()));
+    if (d.table.front() != 0 || d.table.back() != 1)
+        return bad("table must go from 0 to 1, but goes from " + number(d.table.front()) + " to " + number(d.table.back()));
+    for (std::size_t i = 1; i < d.table.size(); ++i)
+        if (!(d.table[i] > d.table[i - 1])) return bad(in_brackets("table", i) + " must be above the value before it, but is " + number(d.table[i]));
+    return {};
+}
+
+Result<void> check_lens(const Display& d) {
+    if (!(d.field_deg >= 0 && d.field_deg < 360)) return bad("field_deg must lie in 0..360, but is " + number(d.field_deg));
+    if (d.lens.empty()) return {};
+    if (d.lens.size() == 1 || d.lens.size() > 10'000)
+        return bad("lens must have 2 to 10000 angles, but has " + std::to_string(d.lens.size()));
+    if (d.lens.front().angle_deg != 0) return bad("lens[0] must be at 0 degrees, but is at " + number(d.lens.front().angle_deg));
+    for (std::size_t i = 0; i < d.lens.size(); ++i) {
+        const PixelsPerDegreeAt& at = d.lens[i];
+        if (i > 0 && !(at.angle_deg > d.lens[i - 1].angle_deg && at.angle_deg <= 180))
+            return bad(in_brackets("lens", i) + " must be at a larger angle than the one before it, up to 180 degrees, but is at " + number(at.angle_deg));
+        if (!(positive(at.pixels_per_degree) && at.pixels_per_degree <= most_ppd))
+            return bad(in_brackets("lens", i) + " must have pixels per degree above 0 and at most 1e5, but has " + number(at.pixels_per_degree));
+    }
+    return {};
+}
+
 } // namespace
 
 Result<void> validate(const Display& d) {
     if (d.width_px <= 0) return bad("width_px must be above 0, but is " + std::to_string(d.width_px));
     if (d.height_px <= 0) return bad("height_px must be above 0, but is " + std::to_string(d.height_px));
-    if (!positive(d.pixel_pitch.value())) {
-        return bad("pixel_pitch must be a length above 0 metres, but is " + number(d.pixel_pitch.value()));
+    constexpr int most_pixels = 1'000'000; // a side
+    if (d.width_px > most_pixels) return bad("width_px must be at most 1000000, but is " + std::to_string(d.width_px));
+    if (d.height_px > most_pixels) return bad("height_px must be at most 1000000, but is " + std::to_string(d.height_px));
+    if (!(positive(d.pixel_pitch.value()) && d.pixel_pitch.value() <= largest_pitch_m)) {
+        return bad("pixel_pitch must be a length above 0 metres and at most 1, but is " + number(d.pixel_pitch.value()));
     }
-    if (!positive(d.distance.value())) {
-        return bad("distance must be a length above 0 metres, but is " + number(d.distance.value()));
+    if (!(positive(d.distance.value()) && d.distance.value() <= farthest_m)) {
+        return bad("distance must be a length above 0 metres and at most 10 km, but is " + number(d.distance.value()));
     }
     if (!positive(pixels_per_degree(d).value())) {
         return bad("pixel_pitch " + number(d.pixel_pitch.value()) + " m at distance " + number(d.distance.value()) +
                    " m gives no finite number of pixels per degree");
     }
-    if (!positive(d.peak.value())) return bad("peak must be above 0 cd/m2, but is " + number(d.peak.value()));
+    if (!(positive(d.peak.value()) && d.peak.value() <= brightest_cdm2))
+        return bad("peak must be above 0 and at most 1e6 cd/m2, but is " + number(d.peak.value()));
     if (!(d.black.value() > 0 && d.black < d.peak)) {
         return bad("black must be above 0 and below the peak of " + number(d.peak.value()) + " cd/m2, but is " +
                    number(d.black.value()));
     }
-    if (d.transfer == TransferFunction::gamma && !positive(d.gamma)) {
-        return bad("gamma must be above 0, but is " + number(d.gamma));
-    }
-    if (!(d.ambient.value() >= 0 && std::isfinite(d.ambient.value()))) {
-        return bad("ambient must be 0 lux or more, but is " + number(d.ambient.value()));
+    if (auto ok = check_transfer(d); !ok) return ok;
+    if (auto ok = check_lens(d); !ok) return ok;
+    if (!(d.ambient.value() >= 0 && d.ambient.value() <= brightest_ambient_lux)) {
+        return bad("ambient must be 0 to 1e6 lux, but is " + number(d.ambient.value()));
     }
     if (!(d.reflectivity >= 0 && d.reflectivity <= 1)) {
         return bad("reflectivity must lie in 0..1, but is " + number(d.reflectivity));
@@ -61,12 +129,38 @@ Result<void> validate(const Display& d) {
 }
 
 PixelsPerDegree pixels_per_degree(const Display& display) {
-    return PixelsPerDegree(1 / physical_field(display, 1).value());
+    if (display.lens.empty()) return PixelsPerDegree(1 / physical_field(display, 1).value());
+    double most = 0;
+    for (const PixelsPerDegreeAt& at : display.lens) most = std::max(most, at.pixels_per_degree);
+    return PixelsPerDegree(most);
+}
+
+PixelsPerDegree pixels_per_degree_at(const Display& display, Degrees from_centre) {
+    const double angle_deg = std::abs(from_centre.value());
+    const std::vector<PixelsPerDegreeAt>& lens = display.lens;
+    if (lens.empty()) {
+        constexpr double nearly_grazing_deg = 89.9;
+        const double a = to_radians(Degrees(std::min(angle_deg, nearly_grazing_deg))).value();
+        const double ppd = 1 / physical_field(display, 1).value();
+        const double delta = to_radians(Degrees(0.5 / ppd)).value();
+        // tan(a + d) - tan a = sin d / (cos(a + d) cos a), without cancellation.
+        return PixelsPerDegree(ppd * std::cos(delta) / (std::cos(a + delta) * std::cos(a)));
+    }
+    const auto above = std::find_if(lens.begin(), lens.end(), [&](const PixelsPerDegreeAt& at) { return at.angle_deg > angle_deg; });
+    if (above == lens.end()) return PixelsPerDegree(lens.back().pixels_per_degree);
+    const PixelsPerDegreeAt &lo = *(above - 1), &hi = *above;
+    const double t = (angle_deg - lo.angle_deg) / (hi.angle_deg - lo.angle_deg);
+    return PixelsPerDegree(lo.pixels_per_degree + t * (hi.pixels_per_degree - lo.pixels_per_degree));
+}
+
+Degrees display_field(const Display& display) {
+    return display.field_deg > 0 ? Degrees(display.field_deg) : physical_field(display, display.width_px);
 }
 
 void set_pixels_per_degree(Display& display, PixelsPerDegree ppd) {
     const double half_pixel_rad = to_radians(Degrees(1 / ppd.value())).value() / 2;
     display.pixel_pitch = 2 * std::tan(half_pixel_rad) * display.distance;
+    display.lens.clear();
 }
 
 Degrees physical_field(const Display& display, int pixels) {
@@ -92,6 +186,9 @@ double decode(const Display& display, double code) {
     switch (display.transfer) {
     case TransferFunction::srgb: return std::copysign(srgb_decode(magnitude), code);
     case TransferFunction::gamma: return std::copysign(std::pow(magnitude, display.gamma), code);
+    case TransferFunction::pq:
+        return std::copysign(std::min(pq_decode(std::min(magnitude, 1.0)) / display.peak.value(), 1.0), code);
+    case TransferFunction::table: return std::copysign(table_decode(display.table, magnitude), code);
     case TransferFunction::linear: break;
     }
     return code;
@@ -102,6 +199,8 @@ double encode(const Display& display, double linear) {
     switch (display.transfer) {
     case TransferFunction::srgb: return std::copysign(srgb_encode(magnitude), linear);
     case TransferFunction::gamma: return std::copysign(std::pow(magnitude, 1 / display.gamma), linear);
+    case TransferFunction::pq: return std::copysign(pq_encode(magnitude * display.peak.value()), linear);
+    case TransferFunction::table: return std::copysign(table_encode(display.table, magnitude), linear);
     case TransferFunction::linear: break;
     }
     return linear;

@@ -12,5 +12,6 @@ extern const std::string_view patch_comp;
 extern const std::string_view surface_vert;
 extern const std::string_view surface_geom;
 extern const std::string_view surface_frag;
+extern const std::string_view test_pattern_frag;
 
 } // namespace unseen::render::shaders

@@ -13,8 +13,6 @@ namespace {
 // here.
 bool glfw_started = false;
 
-constexpr int wanted_samples = 8; // a pixel; fewer, or none, are fine
-
 std::string glfw_reason() {
     const char* text = nullptr;
     const int code = glfwGetError(&text);
@@ -32,7 +30,7 @@ void set_hints(const WindowOptions& options) {
     glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
     glfwWindowHint(GLFW_OPENGL_DEBUG_CONTEXT, GLFW_TRUE);
     glfwWindowHint(GLFW_SRGB_CAPABLE, GLFW_TRUE);
-    glfwWindowHint(GLFW_SAMPLES, wanted_samples);
+    glfwWindowHint(GLFW_SAMPLES, options.samples); // fewer, or none, are fine
     glfwWindowHint(GLFW_VISIBLE, options.visible ? GLFW_TRUE : GLFW_FALSE);
 }
 
@@ -76,7 +74,10 @@ Result<std::unique_ptr<Platform>> make_glfw_platform(const WindowOptions& option
         return no_window("No window can be opened");
     glfw_started = true;
     set_hints(options);
-    GLFWwindow* window = glfwCreateWindow(options.width, options.height, options.title.c_str(), nullptr, nullptr);
+    GLFWmonitor* monitor = options.full_screen ? glfwGetPrimaryMonitor() : nullptr;
+    const GLFWvidmode* mode = monitor ? glfwGetVideoMode(monitor) : nullptr;
+    GLFWwindow* window = glfwCreateWindow(mode ? mode->width : options.width, mode ? mode->height : options.height,
+                                          options.title.c_str(), mode ? monitor : nullptr, nullptr);
     if (!window)
         return no_window("No window with an OpenGL 4.5 context can be opened");
     auto platform = std::make_unique<GlfwPlatform>(window);

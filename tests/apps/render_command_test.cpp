@@ -1,6 +1,8 @@
 // unseen render and sheet, where there is an OpenGL; and what they say where there is none.
 #include "run_command.h"
 
+#include <numeric>
+
 #include <perception/image.h>
 
 namespace {
@@ -125,6 +127,58 @@ TEST_F(RenderCommandTest, PathsComeFromFiles) {
     EXPECT_EQ(rows[2][4], 0) << "a still view changes nothing";
     EXPECT_EQ(rows[2][5], 0) << "and tests nothing";
     EXPECT_EQ(rows[2][8], -1) << "nothing was drawn";
+}
+
+TEST_F(RenderCommandTest, GazesArePlayedAndRepeat) {
+    const auto triangles = [&](std::vector<std::string> more) {
+        more.insert(more.begin(), {"render", "ball.vdt", "--path", "orbit:0:40", "--size", "800x640", "--csv", "out.csv", "--no-draw"});
+        const Outcome flown = run(more);
+        EXPECT_EQ(flown.status, 0) << flown.err;
+        std::vector<double> column;
+        for (const auto& row : numbers_of(read_text(path("out.csv")))) column.push_back(row[1]);
+        EXPECT_EQ(column.size(), 40u);
+        return column;
+    };
+    const auto sum = [](const std::vector<double>& v) { return std::accumulate(v.begin(), v.end(), 0.0); };
+    const auto first = triangles({"--gaze-mode", "simulated", "--seed", "7"});
+    EXPECT_EQ(triangles({"--gaze-mode", "simulated", "--seed", "7"}), first) << "the same gaze gives the same run";
+    EXPECT_NE(triangles({"--gaze-mode", "simulated", "--seed", "8"}), first);
+    const double everywhere = sum(triangles({}));
+    EXPECT_LT(sum(first), everywhere);
+    const double unsure = sum(triangles({"--gaze-mode", "simulated", "--seed", "7", "--gaze-error", "5"}));
+    EXPECT_GT(unsure, sum(first)) << "an error widens the fovea";
+    EXPECT_LE(unsure, everywhere);
+    EXPECT_LE(sum(triangles({"--gaze-mode", "simulated", "--seed", "7", "--gaze-latency", "60"})), everywhere);
+    triangles({"--gaze-mode", "head"});
+
+    // Half a second of looking at one corner, then at the other: at 60 frames a second, after 30 frames.
+    write_text(path("gaze.csv"), "time_s,x_px,y_px\n0,0,0\n0.499,0,0\n0.5,800,640\n1,800,640\n");
+    const auto traced = triangles({"--gaze-trace", "gaze.csv"});
+    EXPECT_EQ(traced[5], traced[25]);
+    EXPECT_EQ(traced[32], traced[39]);
+    EXPECT_NE(traced[25], traced[35]) << "the ball is not symmetric";
+    const Outcome still = run({"render", "ball.vdt", "-o", "head.png", "--gaze-mode", "head", "--size", "96x80", "--json", "-"});
+    ASSERT_EQ(still.status, 0) << still.err;
+    EXPECT_THAT(effect_named(still.json(), "gaze")["why"].get<std::string>(), HasSubstr("give or take 15 degrees"));
+}
+
+TEST_F(RenderCommandTest, BadGazesAreRefused) {
+    const std::vector<std::string> flight = {"render", "ball.vdt", "--path", "orbit:0:2", "--no-draw"};
+    const auto with = [&](std::vector<std::string> more) {
+        more.insert(more.begin(), flight.begin(), flight.end());
+        return run(more);
+    };
+    write_text(path("gap.csv"), "time_s,x_px,y_px\n0,1,2\n3,1,2\n");
+    const Outcome gap = with({"--gaze-trace", "gap.csv"});
+    EXPECT_EQ(gap.status, 1);
+    EXPECT_THAT(gap.err, IsAnErrorForPeople());
+    EXPECT_THAT(gap.err, HasSubstr("gap.csv: line 3"));
+    EXPECT_EQ(with({"--gaze-trace", "missing.csv"}).status, 1);
+    for (const std::vector<std::string>& more : std::vector<std::vector<std::string>>{
+             {"--gaze-mode", "nobody"}, {"--gaze-mode", "mouse"}, {"--gaze-error", "-1"}, {"--gaze-error", "nan"}, {"--gaze-latency", "1e9"},
+             {"--gaze-mode", "head", "--gaze-trace", "gap.csv"}, {"--gaze", "1", "2", "--gaze-mode", "head"}})
+        EXPECT_EQ(with(more).status, 2) << more.back();
+    EXPECT_EQ(run({"render", "ball.vdt", "-o", "o.png", "--gaze-mode", "simulated"}).status, 2) << "one picture has no time";
 }
 
 TEST_F(RenderCommandTest, BadPathsAreNamedByLineAndColumn) {

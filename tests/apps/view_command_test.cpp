@@ -1,123 +1,18 @@
 // unseen view under X, driven by synthetic events: what the window's title says follows the keys and the mouse.
+#include "remote_window.h"
 #include "run_command.h"
 #include "virtual_display.h"
 
-#include <chrono>
 #include <csignal>
 #include <memory>
-#include <thread>
 
 #include <perception/image.h>
-
-#include <X11/Xlib.h>
-#include <X11/Xutil.h>
-#include <X11/keysym.h>
 
 namespace {
 
 using namespace unseen::app::testing;
 using ::testing::HasSubstr;
 using unseen::render::testing::VirtualDisplay;
-
-constexpr std::chrono::seconds patience{60}; // software rendering on a busy machine
-constexpr std::chrono::milliseconds pause{20};
-
-// The viewer's process and window, seen from another client.
-class RemoteWindow {
-public:
-    explicit RemoteWindow(Display* display) : display_(display) {}
-
-    bool find() {
-        const auto end = std::chrono::steady_clock::now() + patience;
-        while (std::chrono::steady_clock::now() < end) {
-            window_ = search(DefaultRootWindow(display_));
-            if (window_) return true;
-            std::this_thread::sleep_for(pause);
-        }
-        return false;
-    }
-
-    std::string title() const { return title_of(window_); }
-
-    // Waits until the title contains a text; the last title if it never does.
-    std::string title_with(const std::string& text) const {
-        const auto end = std::chrono::steady_clock::now() + patience;
-        std::string last;
-        while (std::chrono::steady_clock::now() < end) {
-            last = title();
-            if (last.find(text) != std::string::npos) return last;
-            std::this_thread::sleep_for(pause);
-        }
-        return last;
-    }
-
-    void press(KeySym key, unsigned modifiers = 0) {
-        XEvent event{};
-        event.xkey.keycode = XKeysymToKeycode(display_, key);
-        event.xkey.state = modifiers;
-        for (const int type : {KeyPress, KeyRelease}) {
-            fill(event.xkey, type);
-            send(event, type == KeyPress ? KeyPressMask : KeyReleaseMask);
-        }
-    }
-
-    void move_to(int x, int y, unsigned held = 0) {
-        XEvent event{};
-        fill(event.xmotion, MotionNotify);
-        event.xmotion.x = x;
-        event.xmotion.y = y;
-        event.xmotion.state = held;
-        send(event, PointerMotionMask);
-    }
-
-    void button(unsigned number, bool is_down, int x, int y) {
-        XEvent event{};
-        fill(event.xbutton, is_down ? ButtonPress : ButtonRelease);
-        event.xbutton.button = number;
-        event.xbutton.x = x;
-        event.xbutton.y = y;
-        send(event, is_down ? ButtonPressMask : ButtonReleaseMask);
-    }
-
-private:
-    std::string title_of(Window window) const {
-        char* text = nullptr;
-        std::string title;
-        if (XFetchName(display_, window, &text) && text) title = text;
-        if (text) XFree(text);
-        return title;
-    }
-
-    Window search(Window window) const {
-        if (title_of(window).rfind("Unseen", 0) == 0) return window;
-        Window root = 0, parent = 0, found = 0;
-        Window* children = nullptr;
-        unsigned count = 0;
-        if (!XQueryTree(display_, window, &root, &parent, &children, &count)) return 0;
-        for (unsigned i = 0; i < count && !found; ++i) found = search(children[i]);
-        if (children) XFree(children);
-        return found;
-    }
-
-    template <class Event>
-    void fill(Event& event, int type) {
-        event.type = type;
-        event.display = display_;
-        event.window = window_;
-        event.root = DefaultRootWindow(display_);
-        event.same_screen = True;
-        event.time = ++time_;
-    }
-
-    void send(XEvent& event, long mask) {
-        XSendEvent(display_, window_, True, mask, &event);
-        XFlush(display_);
-    }
-
-    Display* display_;
-    Window window_ = 0;
-    Time time_ = 1;
-};
 
 class ViewCommandTest : public CommandTest {
 protected:

@@ -57,6 +57,40 @@ TEST_F(DisplayProfile, MissingOptionalKeysTakeTheDefaults) {
     EXPECT_EQ(display->reflectivity, Display().reflectivity);
 }
 
+TEST_F(DisplayProfile, TablesAndLensesGoThereAndBack) {
+    Display display;
+    display.transfer = TransferFunction::table;
+    display.table = {0, 0.1, 1.0 / 3, 1};
+    display.lens = {{0, 20.5}, {30, 1.0 / 3}};
+    display.field_deg = 98.5;
+    const auto file = folder() / "headset.json";
+    ASSERT_TRUE(write_display(file, display));
+    const auto back = read_display(file);
+    ASSERT_TRUE(back) << back.error().message;
+    expect_same(*back, display);
+    EXPECT_EQ(back->table, display.table);
+    ASSERT_EQ(back->lens.size(), 2u);
+    EXPECT_EQ(back->lens[1].angle_deg, 30);
+    EXPECT_EQ(back->lens[1].pixels_per_degree, 1.0 / 3);
+    EXPECT_EQ(back->field_deg, 98.5);
+    const std::pair<const char*, const char*> bad[] = {
+        {"{\"transfer\": \"table\",", "\"transfer_table\" is missing"},
+        {"{\"transfer_table\": [0, 0.5, 1],", "\"transfer_table\" needs"},
+        {"{\"transfer\": \"table\", \"transfer_table\": [0, 0.5, 0.4, 1],", "table[2]"},
+        {"{\"transfer\": \"table\", \"transfer_table\": [0, null, 1],", "transfer_table[1]"},
+        {"{\"pixels_per_degree_at\": [],", "pixels_per_degree_at"},
+        {"{\"pixels_per_degree_at\": [[0, 20], [10]],", "pixels_per_degree_at[1]"},
+        {"{\"pixels_per_degree_at\": [[0, 20], [10, 0]],", "lens[1]"},
+        {"{\"field_deg\": 400,", "field_deg"},
+        {"{\"ambient_lux\": 1e9,", "ambient"},
+    };
+    for (const auto& [start, expected] : bad) {
+        const auto read = read_display(write(replaced(minimal, "{", start), "bad.json"));
+        ASSERT_FALSE(read) << start;
+        EXPECT_THAT(read.error().message, AllOf(HasSubstr("bad.json"), HasSubstr(expected)));
+    }
+}
+
 TEST_F(DisplayProfile, TheDiagonalGivesThePitch) {
     const std::string text = replaced(minimal, "\"pixel_pitch_m\": 0.00027", "\"diagonal_m\": 0.508");
     const auto display = read_display(write(replaced(text, "1920", "1600")));
@@ -72,6 +106,7 @@ TEST_F(DisplayProfile, ReadsEveryTransferFunction) {
     EXPECT_EQ(with("\"linear\"")->transfer, TransferFunction::linear);
     EXPECT_EQ(with("2.4")->transfer, TransferFunction::gamma);
     EXPECT_EQ(with("2.4")->gamma, 2.4);
+    EXPECT_EQ(with("\"pq\"")->transfer, TransferFunction::pq);
     for (const char* bad : {"\"gamma\"", "\"\"", "0", "-2.2", "null", "true", "[2.2]", "{}"}) {
         const auto display = with(bad);
         ASSERT_FALSE(display) << bad;

@@ -16,7 +16,7 @@ using perception::CsfTable;
 using testing::AllOf;
 using testing::HasSubstr;
 
-class ObserverProfile : public ProfileFiles {};
+class ObserverProfileTest : public ProfileFiles {};
 
 const std::string small = R"({
 "format": "unseen-csf", "version": 1, "source": "measured by hand",
@@ -37,7 +37,7 @@ void expect_same(const CsfSamples& a, const CsfSamples& b) {
     EXPECT_EQ(a.sensitivity, b.sensitivity);
 }
 
-TEST_F(ObserverProfile, ReadsASmallTable) {
+TEST_F(ObserverProfileTest, ReadsASmallTable) {
     const auto table = read_csf(write(small));
     ASSERT_TRUE(table) << table.error().message;
     const CsfSamples& s = table->samples();
@@ -48,13 +48,13 @@ TEST_F(ObserverProfile, ReadsASmallTable) {
     EXPECT_EQ(s.sensitivity, (std::vector<double>{60, 40, 5, 120, 80, 10, 30, 15, 0.5, 50, 25, 1.5}));
 }
 
-TEST_F(ObserverProfile, TheSourceIsOptional) {
+TEST_F(ObserverProfileTest, TheSourceIsOptional) {
     const auto table = read_csf(write(replaced(small, ", \"source\": \"measured by hand\"", "")));
     ASSERT_TRUE(table) << table.error().message;
     EXPECT_EQ(table->samples().source, "");
 }
 
-TEST_F(ObserverProfile, RoundTripOfTheModelsIsExact) {
+TEST_F(ObserverProfileTest, RoundTripOfTheModelsIsExact) {
     for (const CsfModel model : {CsfModel::castle, CsfModel::stela}) {
         const CsfTable table = CsfTable::from_model(model);
         const auto file = folder() / "model.json";
@@ -70,7 +70,7 @@ TEST_F(ObserverProfile, RoundTripOfTheModelsIsExact) {
     EXPECT_EQ(files_in_folder(), 1) << "no temporary file stays behind";
 }
 
-TEST_F(ObserverProfile, RoundTripOfOddNumbersIsExact) {
+TEST_F(ObserverProfileTest, RoundTripOfOddNumbersIsExact) {
     CsfSamples samples;
     samples.source = "quotes \" and \\ and \n lines";
     samples.frequency_cpd = {1e-300, 1.0 / 3, 1e300};
@@ -86,7 +86,7 @@ TEST_F(ObserverProfile, RoundTripOfOddNumbersIsExact) {
     expect_same(back->samples(), samples);
 }
 
-TEST_F(ObserverProfile, ErrorsNameTheFileAndThePlace) {
+TEST_F(ObserverProfileTest, ErrorsNameTheFileAndThePlace) {
     struct Case {
         const char *from, *to, *expected;
     };
@@ -125,7 +125,15 @@ TEST_F(ObserverProfile, ErrorsNameTheFileAndThePlace) {
         {"0.5", "1e999", ":8:"},
         {"0.5", "NaN", ":8:"},
         {"0.5]", "0.5", ":10:"},
-        {"\"version\": 1", "\"version\": 1, \"observer\": \"me\"", "\"observer\" is unknown"},
+        {"\"version\": 1", "\"version\": 1, \"viewer\": \"me\"", "\"viewer\" is unknown"},
+        {"\"version\": 1", "\"version\": 1, \"observer\": \"me\"", "\"observer\" is unknown in version 1"},
+        {"\"version\": 1", "\"version\": 2", "\"measured_at_cdm2\" is missing"},
+        {"\"version\": 1", "\"version\": 2, \"measured_at_cdm2\": 50", "\"measured\" is missing"},
+        {"\"version\": 1", "\"version\": 2, \"measured_at_cdm2\": 0, \"measured\": []", "measured_at_cdm2"},
+        {"\"version\": 1", "\"version\": 2, \"measured_at_cdm2\": 50, \"measured\": [[1, 0, 50, 40, 60]]", "measured[0]"},
+        {"\"version\": 1", "\"version\": 2, \"measured_at_cdm2\": 50, \"measured\": [[1, 0, 50, 55, 60, 7]]", "measured[0]"},
+        {"\"version\": 1", "\"version\": 2, \"measured_at_cdm2\": 50, \"measured\": [[0, 0, 50, 40, 60, 7]]", "measured[0]"},
+        {"\"version\": 1", "\"version\": 2, \"date\": 7, \"measured_at_cdm2\": 50, \"measured\": []", "date"},
         {"\"version\": 1", "\"version\": 1, \"version\": 1", "\"version\" twice"},
     };
     for (const Case& bad : cases) {
@@ -137,14 +145,14 @@ TEST_F(ObserverProfile, ErrorsNameTheFileAndThePlace) {
     }
 }
 
-TEST_F(ObserverProfile, NewerVersionsAreUnsupported) {
-    const auto table = read_csf(write(replaced(small, "\"version\": 1", "\"version\": 2")));
+TEST_F(ObserverProfileTest, NewerVersionsAreUnsupported) {
+    const auto table = read_csf(write(replaced(small, "\"version\": 1", "\"version\": 3")));
     ASSERT_FALSE(table);
     EXPECT_EQ(table.error().code, ErrorCode::unsupported);
     EXPECT_THAT(table.error().message, HasSubstr("version"));
 }
 
-TEST_F(ObserverProfile, SurvivesMutatedFiles) {
+TEST_F(ObserverProfileTest, SurvivesMutatedFiles) {
     int accepted = 0;
     for_each_mutation(small, 5000, [&](const std::string& text) {
         const auto table = read_csf(write(text));
@@ -159,7 +167,41 @@ TEST_F(ObserverProfile, SurvivesMutatedFiles) {
     EXPECT_GT(accepted, 0);
 }
 
-TEST_F(ObserverProfile, WritingFailsWithoutLeavingAFile) {
+TEST_F(ObserverProfileTest, MeasurementsGoThereAndBack) {
+    ObserverProfile profile;
+    profile.observer = "anna \"a\"";
+    profile.date = "2001-06-25";
+    profile.method = "2ifc";
+    profile.display = "20-inch";
+    profile.conditions = "dim room\nafter 10 minutes";
+    profile.measured_at_cdm2 = 50.25;
+    profile.measured = {{{0.5, 0}, 60.1, 50, 70, 12}, {{8, 10}, 1.0 / 3, 0.25, 0.5, 0}};
+    const auto file = folder() / "anna.json";
+    ASSERT_TRUE(write_observer(file, profile));
+    const auto back = read_observer(file);
+    ASSERT_TRUE(back) << back.error().message;
+    EXPECT_EQ(back->observer, profile.observer);
+    EXPECT_EQ(back->date, profile.date);
+    EXPECT_EQ(back->method, profile.method);
+    EXPECT_EQ(back->display, profile.display);
+    EXPECT_EQ(back->conditions, profile.conditions);
+    EXPECT_EQ(back->measured_at_cdm2, profile.measured_at_cdm2);
+    ASSERT_EQ(back->measured.size(), 2u);
+    EXPECT_EQ(back->measured[1].place, profile.measured[1].place);
+    EXPECT_EQ(back->measured[1].sensitivity, 1.0 / 3);
+    EXPECT_EQ(back->measured[0].low, 50);
+    EXPECT_EQ(back->measured[0].high, 70);
+    EXPECT_EQ(back->measured[0].answers, 12);
+    expect_same(back->table.samples(), profile.table.samples());
+    const auto table = read_csf(file);
+    ASSERT_TRUE(table) << table.error().message;
+    expect_same(table->samples(), profile.table.samples());
+    const auto old = read_observer(write(small));
+    ASSERT_TRUE(old) << old.error().message;
+    EXPECT_TRUE(old->measured.empty());
+}
+
+TEST_F(ObserverProfileTest, WritingFailsWithoutLeavingAFile) {
     const auto nowhere = write_csf(folder() / "no" / "folder.json", CsfTable::standard());
     ASSERT_FALSE(nowhere);
     EXPECT_EQ(nowhere.error().code, ErrorCode::io_failure);

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -114,6 +115,84 @@ TEST(Display, TransferFunctionsKeepOrderBelowZero) {
     }
 }
 
+// SMPTE ST 2084: code 0.508 is about 100 cd/m2, and 1 is 10,000.
+TEST(Display, PqIsAbsoluteAndClipsAtThePeak) {
+    Display display;
+    display.transfer = TransferFunction::pq;
+    display.peak = Luminance(10000);
+    EXPECT_NEAR(decode(display, 0.508078421) * 10000, 100, 0.01);
+    EXPECT_NEAR(decode(display, 1), 1, rounding);
+    EXPECT_NEAR(decode(display, 0), 0, rounding);
+    for (double code = 0.05; code < 1; code += 0.05) EXPECT_NEAR(encode(display, decode(display, code)), code, 1e-9);
+    display.peak = Luminance(1000);
+    EXPECT_NEAR(decode(display, 0.508078421) * 1000, 100, 0.01);
+    EXPECT_EQ(decode(display, 0.9), 1);
+    EXPECT_DOUBLE_EQ(decode(display, -0.5), -decode(display, 0.5));
+    EXPECT_TRUE(std::isnan(decode(display, not_a_number)));
+    EXPECT_TRUE(validate(display));
+    display.peak = Luminance(20000);
+    EXPECT_FALSE(validate(display));
+}
+
+TEST(Display, TablesAreInterpolated) {
+    Display display;
+    display.transfer = TransferFunction::table;
+    display.table = {0, 0.1, 0.3, 1};
+    ASSERT_TRUE(validate(display));
+    EXPECT_DOUBLE_EQ(decode(display, 0.5), 0.2);
+    EXPECT_DOUBLE_EQ(decode(display, 1), 1);
+    EXPECT_DOUBLE_EQ(decode(display, -0.5), -0.2);
+    EXPECT_TRUE(std::isnan(decode(display, not_a_number)));
+    EXPECT_TRUE(std::isnan(encode(display, not_a_number)));
+    for (double code = 0; code <= 1; code += 1.0 / 64) EXPECT_NEAR(encode(display, decode(display, code)), code, 1e-12);
+    const std::vector<double> bad[] = {{}, {0, 1}, {0, 0.5, 0.5, 1}, {0, 0.6, 0.4, 1}, {0.1, 0.5, 1}, {0, 0.5, 0.9}, {0, not_a_number, 1}};
+    for (const auto& table : bad) {
+        display.table = table;
+        const auto result = validate(display);
+        ASSERT_FALSE(result) << table.size();
+        EXPECT_THAT(result.error().message, HasSubstr("table"));
+    }
+}
+
+// Against the tangents themselves, half a pixel to either side would be the derivative: here from the angle on, outwards.
+TEST(Display, PixelsPerDegreeGrowAsideOnFlatScreens) {
+    const Display display;
+    const double ppd = pixels_per_degree(display).value();
+    const double delta = 0.5 / ppd * std::numbers::pi / 180;
+    EXPECT_NEAR(pixels_per_degree_at(display, Degrees(0)).value(), ppd, 1e-6);
+    for (const double angle : {1.0, 10.0, 22.0, 45.0, 80.0}) {
+        const double a = angle * std::numbers::pi / 180;
+        const double expected = ppd * (std::tan(a + delta) - std::tan(a)) / std::tan(delta);
+        EXPECT_NEAR(pixels_per_degree_at(display, Degrees(angle)).value() / expected, 1, 1e-9) << angle;
+        EXPECT_NEAR(expected / (ppd / std::pow(std::cos(a), 2)), 1, 0.01);
+        EXPECT_EQ(pixels_per_degree_at(display, Degrees(-angle)), pixels_per_degree_at(display, Degrees(angle)));
+    }
+    EXPECT_TRUE(std::isfinite(pixels_per_degree_at(display, Degrees(90)).value()));
+}
+
+TEST(Display, HeadsetsHaveThePixelsOfTheirLens) {
+    Display display;
+    display.lens = {{0, 20}, {20, 18}, {50, 12}};
+    display.field_deg = 100;
+    ASSERT_TRUE(validate(display));
+    EXPECT_EQ(pixels_per_degree(display).value(), 20);
+    EXPECT_DOUBLE_EQ(pixels_per_degree_at(display, Degrees(10)).value(), 19);
+    EXPECT_DOUBLE_EQ(pixels_per_degree_at(display, Degrees(35)).value(), 15);
+    EXPECT_DOUBLE_EQ(pixels_per_degree_at(display, Degrees(80)).value(), 12);
+    EXPECT_EQ(display_field(display).value(), 100);
+    EXPECT_NEAR(display_field(Display()).value(), 44.24, 0.01);
+    const std::vector<PixelsPerDegreeAt> bad[] = {{{0, 20}}, {{1, 20}, {2, 20}}, {{0, 20}, {0, 20}}, {{0, 20}, {10, 0}}, {{0, 20}, {10, -1}},
+                                                  {{0, not_a_number}, {10, 1}}, {{0, 20}, {not_a_number, 1}}, {{0, 20}, {200, 1}}, {{0, 1e9}, {1, 1}}};
+    for (const auto& lens : bad) {
+        display.lens = lens;
+        const auto result = validate(display);
+        ASSERT_FALSE(result);
+        EXPECT_THAT(result.error().message, HasSubstr("lens"));
+    }
+    set_pixels_per_degree(display, PixelsPerDegree(30));
+    EXPECT_NEAR(pixels_per_degree(display).value(), 30, 1e-9);
+}
+
 TEST(Display, LuminanceWeightsSumToOne) {
     EXPECT_NEAR(luminance_weights[0] + luminance_weights[1] + luminance_weights[2], 1, rounding);
 }
@@ -126,15 +205,15 @@ struct BadDisplay {
 
 TEST(Display, ValidationNamesTheField) {
     const BadDisplay cases[] = {
-        {"width_px", [](Display& d, double v) { d.width_px = int(v); }, {0, -1}},
+        {"width_px", [](Display& d, double v) { d.width_px = int(v); }, {0, -1, 2e6}},
         {"height_px", [](Display& d, double v) { d.height_px = int(v); }, {0, -5}},
         {"pixel_pitch",
          [](Display& d, double v) { d.pixel_pitch = Metres(v); },
-         {0, -1, infinity, not_a_number, 1e-320}},
-        {"distance", [](Display& d, double v) { d.distance = Metres(v); }, {0, -1, infinity, not_a_number}},
-        {"peak", [](Display& d, double v) { d.peak = Luminance(v); }, {0, -1, 0.5, infinity, not_a_number}},
+         {0, -1, 2, infinity, not_a_number, 1e-320}},
+        {"distance", [](Display& d, double v) { d.distance = Metres(v); }, {0, -1, 1e5, infinity, not_a_number}},
+        {"peak", [](Display& d, double v) { d.peak = Luminance(v); }, {0, -1, 0.5, 1e7, infinity, not_a_number}},
         {"black", [](Display& d, double v) { d.black = Luminance(v); }, {0, -1, 100, 101, infinity, not_a_number}},
-        {"ambient", [](Display& d, double v) { d.ambient = Lux(v); }, {-1, infinity, not_a_number}},
+        {"ambient", [](Display& d, double v) { d.ambient = Lux(v); }, {-1, 1e7, infinity, not_a_number}},
         {"reflectivity", [](Display& d, double v) { d.reflectivity = v; }, {-0.1, 1.1, infinity, not_a_number}},
         {"gamma",
          [](Display& d, double v) {

@@ -2,15 +2,29 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include <perception/units.h>
 #include <vdtree/result.h>
 
 namespace unseen::perception {
 
-enum class TransferFunction { srgb, gamma, linear };
+enum class TransferFunction {
+    srgb,
+    gamma,
+    linear,
+    pq,    // SMPTE ST 2084, of HDR displays: absolute up to 10,000 cd/m2, clipped at the peak
+    table, // measured, see Display::table
+};
 
-// A flat screen, seen from straight in front of its centre (which is also the centre of the window).
+// How many pixels a degree has at an angle from the centre of the view.
+struct PixelsPerDegreeAt {
+    double angle_deg = 0;
+    double pixels_per_degree = 0;
+};
+
+// A flat screen, seen from straight in front of its centre (which is also the centre of the window); or, with `lens`, one seen
+// through the lens of a headset.
 // Default: the 20-inch monitor of the 2001 paper's field, 34.357 pixels per degree at its centre.
 struct Display {
     std::string name = "20-inch 1600x1200 at 0.5 m";
@@ -22,16 +36,28 @@ struct Display {
     Luminance black{0.5};           // of the screen itself, without ambient light; above 0 (Weber contrast needs a floor)
     TransferFunction transfer = TransferFunction::srgb;
     double gamma = 2.2;             // used by TransferFunction::gamma
+    std::vector<double> table;      // used by TransferFunction::table: linear light of equidistant codes from 0 to 1, both
+                                    // included; from 0 to 1, strictly ascending, interpolated
     Lux ambient{0};
     double reflectivity = 0.005;    // share of the ambient light that the screen scatters back, 0..1
+    // Of headsets: angles strictly ascending from 0, at least two; interpolated, and constant beyond the last. Empty: flat.
+    std::vector<PixelsPerDegreeAt> lens;
+    double field_deg = 0;           // of headsets: the whole field of view across; 0: that of the screen
 };
 
-// Finite and positive sizes, 0 < black < peak, reflectivity in 0..1. The error names the field.
+// Finite and positive sizes within what a display can be, 0 < black < peak, reflectivity in 0..1, tables as above. The error names
+// the field.
 Result<void> validate(const Display& display);
 
-// At the centre of the screen: 1 / (2 atan(pitch / (2 distance))).
+// At the centre of the screen: 1 / (2 atan(pitch / (2 distance))). Of headsets: the largest anywhere, which is safe for tests that
+// know one figure only.
 PixelsPerDegree pixels_per_degree(const Display& display);
-// Sets the pixel pitch so that the centre has `ppd` at the display's distance.
+// At an angle from the centre, along the radius. Flat screens: ppd (tan(a + delta) - tan a) / tan delta, delta half a pixel, so about
+// ppd / cos^2 a; angles are clamped to 89.9 degrees. Headsets: by the lens's table.
+PixelsPerDegree pixels_per_degree_at(const Display& display, Degrees from_centre);
+// The angle across the whole display: that of the screen's width, or the headset's.
+Degrees display_field(const Display& display);
+// Sets the pixel pitch so that the centre has `ppd` at the display's distance; the display is flat then.
 void set_pixels_per_degree(Display& display, PixelsPerDegree ppd);
 // The field that `pixels` centred pixels fill: 2 atan(pixels pitch / (2 distance)).
 Degrees physical_field(const Display& display, int pixels);

@@ -12,12 +12,15 @@ namespace unseen::render {
 
 class Platform;
 class Renderer;
+class TestPatternDrawer;
 
 struct WindowOptions {
     int width = 1024;
     int height = 1024;
     std::string title = "Unseen";
     bool visible = true;
+    bool full_screen = false; // the primary monitor as it is, whatever the size
+    int samples = 8;          // a pixel, wished for; 0: exact pixels
 };
 
 // Move-only; current on the thread that made it until another one is made or used there; stays on that thread. GL debug
@@ -49,6 +52,7 @@ public:
 
 private:
     friend class Renderer;
+    friend class TestPatternDrawer;
     struct Impl;
     explicit Context(std::unique_ptr<Impl> impl);
     static Result<Context> adopt(std::unique_ptr<Platform> platform);

@@ -1,0 +1,368 @@
+// unseen calibrate: measures a viewer, or a simulated one, and a display.
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <memory>
+#include <optional>
+
+#include <calibration/display_fit.h>
+#include <calibration/display_profile.h>
+#include <calibration/observer_profile.h>
+#include <calibration/procedure.h>
+#include <calibration/simulated_observer.h>
+
+#include "calibration_window.h"
+#include "command.h"
+#include "options.h"
+#include "progress_bar.h"
+#include "report.h"
+#include "scene.h"
+#include "terminal.h"
+
+namespace unseen::app {
+namespace {
+
+using calibration::CalibrationPlan;
+using calibration::Method;
+using calibration::PlaceEstimate;
+using calibration::Procedure;
+using calibration::SimulatedObserver;
+
+struct CalibrateArguments {
+    std::string out, json, simulate, state, photometer, observer, conditions, method = "2ifc", date;
+    bool chart = false, gamma = false;
+    double seed = 1, trials = 200, settings = 7;
+    std::vector<double> frequencies, eccentricities;
+    std::optional<double> luminance;
+    DisplayOptions display;
+    CalibrationWindowOptions window;
+};
+
+Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
+
+std::string today() {
+    std::array<char, 32> text;
+    const std::time_t now = std::time(nullptr);
+    std::tm local{};
+    localtime_r(&now, &local);
+    std::strftime(text.data(), text.size(), "%Y-%m-%d", &local);
+    return text.data();
+}
+
+Result<CalibrationPlan> make_plan(const CalibrateArguments& a, const perception::Display& display, const perception::CsfTable& expected) {
+    CalibrationPlan plan = calibration::plan_for(display, expected);
+    plan.method = a.method == "adjustment" ? Method::adjustment : Method::two_interval;
+    plan.seed = static_cast<std::uint64_t>(a.seed);
+    plan.trials = static_cast<int>(a.trials);
+    plan.settings = static_cast<int>(a.settings);
+    if (a.luminance) {
+        const double black = perception::black_level(display).value(), white = perception::to_luminance(display, 1).value();
+        if (!(*a.luminance > black && *a.luminance < white))
+            return invalid("--luminance " + shortest(*a.luminance) + " cd/m2 is not between the display's black (" + shortest(black) +
+                           ") and white (" + shortest(white) + ").");
+        plan.luminance = perception::Luminance(*a.luminance);
+        plan.highest_contrast = std::min(*a.luminance - black, white - *a.luminance) / *a.luminance;
+    }
+    if (!a.frequencies.empty() || !a.eccentricities.empty()) {
+        if (a.frequencies.empty() || a.eccentricities.empty()) return invalid("--frequencies and --eccentricities need each other.");
+        plan.places.clear();
+        for (const double e : a.eccentricities)
+            for (const double f : a.frequencies) plan.places.push_back({f, e});
+    }
+    if (plan.places.empty())
+        return invalid("No grating fits the display '" + display.name + "': give --frequencies and --eccentricities.");
+    if (auto valid = calibration::validate(plan); !valid) return valid.error();
+    return plan;
+}
+
+// What a person is shown must be what the plan says, also where the plan comes from a file.
+Result<void> check_display(const CalibrationPlan& plan, const perception::Display& display) {
+    const double black = perception::black_level(display).value(), white = perception::to_luminance(display, 1).value();
+    const double mean = plan.luminance.value(), amplitude = mean * plan.highest_contrast;
+    constexpr double rounding = 1e-9;
+    if (!(mean - amplitude >= black - rounding * white && mean + amplitude <= white * (1 + rounding)))
+        return invalid("The display '" + display.name + "' cannot show contrasts up to " + rounded(plan.highest_contrast, 3) + " around " +
+                       rounded(mean, 4) + " cd/m2: use the one that the calibration was begun on.");
+    for (const calibration::GratingPlace& place : plan.places)
+        if (!calibration::fits(display, place))
+            return invalid("The display '" + display.name + "' has no room for a grating of " + shortest(place.frequency_cpd) + " cpd at " +
+                           shortest(place.eccentricity_deg) + " degrees: choose other --frequencies and --eccentricities.");
+    return {};
+}
+
+// ---- what comes out -----------------------------------------------------------------------------------------------
+
+double decibels(double ratio) { return 20 * std::log10(ratio); }
+
+// Whether there is a threshold at all within the display's contrasts.
+bool is_visible(double sensitivity, const CalibrationPlan& plan) { return sensitivity * plan.highest_contrast >= 1; }
+
+// Root mean square error over the places that the observer can see.
+double rms_db(const Procedure& procedure, const SimulatedObserver& observer) {
+    double squares = 0, count = 0;
+    for (const PlaceEstimate& e : procedure.estimates()) {
+        const double truth = observer.sensitivity(e.place, procedure.plan().luminance);
+        if (!is_visible(truth, procedure.plan())) continue;
+        squares += std::pow(decibels(e.sensitivity() / truth), 2);
+        ++count;
+    }
+    return std::sqrt(squares / count);
+}
+
+// How far the places stray from the fitted shape, root mean square in dB.
+double misfit_db(const Procedure& procedure) {
+    double squares = 0;
+    const auto estimates = procedure.estimates();
+    for (const PlaceEstimate& e : estimates) squares += std::pow(20 * e.local.mean, 2);
+    return std::sqrt(squares / static_cast<double>(estimates.size()));
+}
+
+Json to_json(const Procedure& procedure, const SimulatedObserver* truth) {
+    const CalibrationPlan& plan = procedure.plan();
+    Json measured = Json::array();
+    for (const PlaceEstimate& e : procedure.estimates()) {
+        Json row = {{"frequency_cpd", e.place.frequency_cpd}, {"eccentricity_deg", e.place.eccentricity_deg},
+                    {"sensitivity", e.sensitivity()},         {"low", e.low()},
+                    {"high", e.high()},                       {"answers", e.answers},
+                    {"off_shape_db", 20 * e.local.mean}};
+        if (truth) {
+            const double value = truth->sensitivity(e.place, plan.luminance);
+            row["true_sensitivity"] = value;
+            row["error_db"] = decibels(e.sensitivity() / value);
+        }
+        measured.push_back(row);
+    }
+    Json json = {{"method", calibration::name(plan.method)},
+                 {"seed", plan.seed},
+                 {"answers", procedure.answers().size()},
+                 {"done", procedure.is_done()},
+                 {"luminance_cdm2", plan.luminance.value()},
+                 {"highest_contrast", plan.highest_contrast},
+                 {"misfit_db", misfit_db(procedure)},
+                 {"measured", measured}};
+    if (truth) json["rms_error_db"] = number_or_null(rms_db(procedure, *truth));
+    return json;
+}
+
+void print(const Procedure& procedure, const SimulatedObserver* truth) {
+    std::vector<std::vector<std::string>> rows = {{"eccentricity", "frequency", "sensitivity", "95% from", "to", "answers", "off shape"}};
+    if (truth) rows.front().insert(rows.front().end(), {"true", "error"});
+    for (const PlaceEstimate& e : procedure.estimates()) {
+        rows.push_back({rounded(e.place.eccentricity_deg, 3) + " deg", rounded(e.place.frequency_cpd, 3) + " cpd", rounded(e.sensitivity(), 3),
+                        rounded(e.low(), 3), rounded(e.high(), 3), std::to_string(e.answers), rounded(20 * e.local.mean, 2) + " dB"});
+        if (!truth) continue;
+        const double value = truth->sensitivity(e.place, procedure.plan().luminance);
+        rows.back().push_back(rounded(value, 3));
+        rows.back().push_back(is_visible(value, procedure.plan()) ? rounded(decibels(e.sensitivity() / value), 2) + " dB" : "unseen");
+    }
+    print_table(rows);
+    std::printf("%zu answers at %s cd/m2, contrasts up to %s; off the fitted shape by %s dB (rms)\n", procedure.answers().size(),
+                rounded(procedure.plan().luminance.value(), 4).c_str(), rounded(procedure.plan().highest_contrast, 3).c_str(),
+                rounded(misfit_db(procedure), 2).c_str());
+    if (truth) std::printf("error %s dB (rms over what can be seen)\n", rounded(rms_db(procedure, *truth), 3).c_str());
+}
+
+calibration::ObserverProfile profile_of(const Procedure& procedure, const CalibrateArguments& a, const perception::Display& display) {
+    calibration::ObserverProfile profile;
+    profile.observer = !a.observer.empty() ? a.observer : a.simulate.empty() ? "unnamed" : "simulated: " + a.simulate;
+    profile.date = a.date.empty() ? today() : a.date;
+    profile.method = std::string(calibration::name(procedure.plan().method)) + ", " + std::to_string(procedure.answers().size()) +
+                     " answers, seed " + std::to_string(procedure.plan().seed);
+    profile.display = display.name;
+    profile.conditions = a.conditions;
+    profile.measured_at_cdm2 = procedure.plan().luminance.value();
+    for (const PlaceEstimate& e : procedure.estimates())
+        profile.measured.push_back({e.place, e.sensitivity(), e.low(), e.high(), e.answers});
+    profile.table = procedure.table(profile.observer + ", " + profile.date + ", " + profile.method);
+    return profile;
+}
+
+// ---- ways to answer -----------------------------------------------------------------------------------------------
+
+void simulate(Procedure& procedure, const SimulatedObserver& observer) {
+    ProgressBar bar("calibrating");
+    while (!procedure.is_done()) {
+        bar(static_cast<double>(procedure.answers().size()) / procedure.trials(), "answers");
+        const calibration::Trial trial = procedure.next();
+        if (procedure.plan().method == Method::adjustment) procedure.set(observer.set(trial, procedure.plan()));
+        else procedure.choose(observer.choose(trial, procedure.plan().luminance));
+    }
+}
+
+Result<perception::CsfTable> expected_table(const CalibrateArguments& a) {
+    if (a.display.csf_file.empty()) return perception::CsfTable::standard();
+    return calibration::read_csf(a.display.csf_file);
+}
+
+Result<Procedure> begin_or_resume(const CalibrateArguments& a, const perception::Display& display) {
+    auto expected = expected_table(a);
+    if (!expected) return expected.error();
+    if (!a.state.empty() && std::filesystem::exists(a.state)) return Procedure::resume(a.state, std::move(*expected));
+    auto plan = make_plan(a, display, *expected);
+    if (!plan) return plan.error();
+    return Procedure::create(std::move(*plan), std::move(*expected));
+}
+
+Result<int> calibrate_observer(CalibrateArguments& a, const perception::Display& display) {
+    auto report = JsonReport::open(a.json);
+    if (!report) return report.error();
+    std::optional<SimulatedObserver> observer;
+    if (!a.simulate.empty()) {
+        auto made = calibration::simulated_observer(a.simulate, static_cast<std::uint64_t>(a.seed));
+        if (!made) return made.error();
+        observer = std::move(*made);
+    }
+    auto procedure = begin_or_resume(a, display);
+    if (!procedure) return procedure.error();
+    if (observer) {
+        simulate(*procedure, *observer);
+        if (!a.state.empty())
+            if (auto saved = procedure->save(a.state); !saved) return saved.error();
+    } else {
+        if (auto shown = check_display(procedure->plan(), display); !shown) return shown.error();
+        a.window.display = display;
+        if (auto shown = run_calibration_window(*procedure, a.window, a.state); !shown) return shown.error();
+        if (!procedure->is_done()) {
+            print_note(std::to_string(procedure->answers().size()) + " of " + std::to_string(procedure->trials()) + " answers were given" +
+                       (a.state.empty() ? "; with --resume FILE they would have been kept."
+                                        : "; go on with --resume '" + a.state + "'."));
+            return exit_done;
+        }
+    }
+    const SimulatedObserver* truth = observer ? &*observer : nullptr;
+    if (auto ok = report->prepare(to_json(*procedure, truth)); !ok) return ok.error();
+    if (!a.out.empty())
+        if (auto ok = calibration::write_observer(a.out, profile_of(*procedure, a, display)); !ok) return ok.error();
+    if (auto ok = report->publish(); !ok) return ok.error();
+    if (!report->is_on_stdout()) print(*procedure, truth);
+    return exit_done;
+}
+
+Result<int> write_measured_display(const CalibrateArguments& a, const perception::Display& display) {
+    if (!a.out.empty()) {
+        if (auto ok = calibration::write_display(a.out, display); !ok) return ok.error();
+    }
+    return exit_done;
+}
+
+Result<int> calibrate_gamma(CalibrateArguments& a, perception::Display display) {
+    a.window.display = display;
+    const auto matches = match_gamma(a.window);
+    if (!matches) return matches.error();
+    std::vector<calibration::BrightnessMatch> fitted;
+    for (const GammaMatch& m : *matches) fitted.push_back({m.share, m.code});
+    if (fitted.empty()) return invalid("The window was closed before anything was matched.");
+    const auto gamma = calibration::fit_gamma(fitted);
+    if (!gamma) return gamma.error();
+    for (const GammaMatch& m : *matches)
+        std::printf("%s of white looks like code %d (a gamma of %s)\n", rounded(m.share, 3).c_str(),
+                    static_cast<int>(std::lround(m.code * 255)), rounded(std::log(m.share) / std::log(m.code), 3).c_str());
+    std::printf("gamma %s\n", rounded(*gamma, 4).c_str());
+    display.transfer = perception::TransferFunction::gamma;
+    display.gamma = *gamma;
+    return write_measured_display(a, display);
+}
+
+Result<int> calibrate_by_photometer(const CalibrateArguments& a, const perception::Display& display) {
+    const auto table = calibration::read_photometer(a.photometer);
+    if (!table) return table.error();
+    const auto measured = calibration::with_photometer(display, *table);
+    if (!measured) return Error{measured.error().code, a.photometer + ": " + measured.error().message};
+    std::printf("peak %s cd/m2, black %s cd/m2, %zu codes measured\n", rounded(measured->peak.value(), 4).c_str(),
+                rounded(measured->black.value(), 4).c_str(), table->code.size());
+    return write_measured_display(a, *measured);
+}
+
+Result<int> run(CalibrateArguments& a) {
+    const auto display = make_display(a.display);
+    if (!display) return display.error();
+    if (!a.photometer.empty()) return calibrate_by_photometer(a, *display);
+    if (a.gamma) return calibrate_gamma(a, *display);
+    if (a.chart) {
+        a.window.display = *display;
+        if (auto shown = show_chart(a.window, a.out); !shown) return shown.error();
+        return exit_done;
+    }
+    return calibrate_observer(a, *display);
+}
+
+void check(const CalibrateArguments& a) {
+    const int modes = a.chart + a.gamma + !a.photometer.empty() + !a.simulate.empty();
+    if (modes > 1) refuse("--simulate, --gamma, --photometer and --chart exclude each other: give one of them.");
+    const std::string ending = a.chart ? ".png" : ".json";
+    if (!a.out.empty() && !a.out.ends_with(ending)) refuse("-o must end in " + ending + ", not '" + a.out + "'.");
+    if (!a.photometer.empty() && a.out.empty()) refuse("--photometer needs -o DISPLAY.json for what was measured.");
+    if ((a.chart || a.gamma || !a.photometer.empty()) && !a.json.empty()) refuse("--json is for observers.");
+}
+
+CLI::Validator whole(double low, double high) {
+    return within(low, high) & CLI::Validator(
+                                   [](std::string& text) {
+                                       return text.find_first_not_of("0123456789") == std::string::npos
+                                                  ? std::string()
+                                                  : "must be a whole number, not '" + text + "'";
+                                   },
+                                   "");
+}
+
+} // namespace
+
+Command calibrate_command(CLI::App& app) {
+    auto a = std::make_shared<CalibrateArguments>();
+    CLI::App* verb = app.add_subcommand("calibrate", "Measure a viewer's contrast sensitivity, for --csf; or a display");
+    verb->add_option("-o,--output", a->out, "The observer's profile; of --gamma and --photometer the display's; of --chart a picture")
+        ->type_name("OUT.json|.png");
+    verb->add_option("--method", a->method, "2ifc (default): in which of two intervals was a grating? adjustment: gratings fade in and out")
+        ->type_name("NAME")
+        ->check(CLI::IsMember({"2ifc", "adjustment"}).description(""));
+    verb->add_option("--trials", a->trials, "Of 2ifc (default: 200)")->type_name("N")->check(whole(1, 1e5));
+    verb->add_option("--settings", a->settings, "Of adjustment, at each place; the first does not count (default: 7)")
+        ->type_name("N")
+        ->check(whole(2, 1000));
+    constexpr double most_seed = 9007199254740992.0; // 2^53, which JSON keeps
+    verb->add_option("--seed", a->seed, "Of the order of trials, and of simulated observers (default: 1)")
+        ->type_name("N")
+        ->check(whole(0, most_seed));
+    verb->add_option("--simulate", a->simulate,
+                     "Without a person: a CSF model or a profile, with gain=, frequency=, eccentricity=, slope=, lapse=, scatter=, delay=")
+        ->type_name("NAME|FILE.json[:key=value,...]");
+    verb->add_option("--resume", a->state, "Keep all answers in this file, and go on with those that are there")->type_name("STATE.json");
+    verb->add_option("--frequencies", a->frequencies, "To measure at (default: octaves that fit the display)")
+        ->type_name("CPD ...")
+        ->check(positive());
+    verb->add_option("--eccentricities", a->eccentricities, "To measure at (default: 0, 5, 10, 20 as far as they fit)")
+        ->type_name("DEG ...")
+        ->check(not_negative());
+    verb->add_option_function<double>(
+            "--luminance", [o = a.get()](const double& v) { o->luminance = v; }, "Mean of the gratings (default: midway from black to white)")
+        ->type_name("CDM2")
+        ->check(positive());
+    verb->add_option("--observer", a->observer, "Who it is, for the profile")->type_name("NAME");
+    verb->add_option("--conditions", a->conditions, "Room, light, glasses, for the profile")->type_name("TEXT");
+    verb->add_option("--date", a->date, "For the profile (default: today)")->type_name("TEXT");
+    verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
+    verb->add_flag("--gamma", a->gamma, "Measure the display's gamma by matching patches");
+    verb->add_option("--photometer", a->photometer, "Take the display's luminances from a table, header code,cdm2")->type_name("FILE.csv");
+    verb->add_flag("--chart", a->chart, "Campbell and Robson's chart, in a window or with -o as a picture");
+    verb->add_flag("--full-screen", a->window.full_screen, "Not in a window");
+    verb->add_option("--interval", a->window.interval_s, "Seconds of a grating, and of the pause between two (default: 0.5)")
+        ->type_name("S")
+        ->check(within(0.01, 60));
+    verb->add_option("--fade", a->window.fade_per_s, "Of adjustment: decades of contrast a second (default: 0.25)")
+        ->type_name("D")
+        ->check(within(0.001, 100));
+    verb->add_option("--screenshot", a->window.screenshot, "Write a picture of what is shown at the end")
+        ->type_name("OUT.png")
+        ->check(ending_in({".png"}));
+    add_display_options(*verb, a->display);
+    verb->callback([o = a.get()] { check(*o); });
+    verb->footer(std::string(calibration_window_help) +
+                 "\nExamples:\n  unseen calibrate --display mine.json --observer anna --resume anna-state.json -o anna.json\n"
+                 "  unseen calibrate --simulate castle:gain=0.7 --seed 3 -o observer.json\n"
+                 "  unseen calibrate --gamma --display mine.json -o mine-measured.json\n"
+                 "  unseen calibrate --chart -o chart.png\n  unseen render bunny.vdt --csf anna.json -o bunny.png");
+    return {verb, [a] { return run(*a); }};
+}
+
+} // namespace unseen::app

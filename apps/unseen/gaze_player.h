@@ -1,0 +1,30 @@
+// The gaze of every frame, from where the options say.
+#pragma once
+
+#include <optional>
+
+#include <perception/gaze.h>
+
+#include "options.h"
+#include "scene.h"
+
+namespace unseen::app {
+
+class GazePlayer {
+public:
+    // For frames up to `duration_s`. Reads the trace; a simulated gaze is in the scene's window.
+    static Result<GazePlayer> create(const GazeOptions& options, const Scene& scene, double duration_s);
+
+    // Puts what is known at an instant into `what`. A gaze that the options do not play, such as the mouse's, stays as it
+    // is, with the tracker's error around it.
+    void apply(WhatOptions& what, const Scene& scene, double time_s) const;
+    bool is_moving() const noexcept { return tracker_.has_value(); }
+
+private:
+    explicit GazePlayer(const GazeOptions& options) : options_(options) {}
+
+    GazeOptions options_;
+    std::optional<perception::GazeTracker> tracker_;
+};
+
+} // namespace unseen::app

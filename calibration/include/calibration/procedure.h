@@ -1,0 +1,118 @@
+// Measuring an observer: which grating to show next, and what the answers say. Knows neither windows nor keys.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <calibration/quest.h>
+#include <calibration/sensitivity_field.h>
+#include <perception/csf.h>
+#include <perception/display.h>
+#include <vdtree/result.h>
+
+namespace unseen::calibration {
+
+enum class Method {
+    two_interval, // a grating in one of two intervals: in which? Contrasts by QUEST+
+    adjustment,   // the observer sets the contrast to where the grating just appears (the 2001 paper) or disappears
+};
+std::string_view name(Method method); // "2ifc", "adjustment"
+
+struct CalibrationPlan {
+    Method method = Method::two_interval;
+    std::vector<GratingPlace> places;          // what is measured
+    int trials = 200;                          // of two_interval
+    int settings = 7;                          // of adjustment, at each place; the first is practice and does not count
+    perception::Luminance luminance{50};       // mean luminance of the gratings
+    double highest_contrast = 1;               // Michelson, that the display can show
+    std::uint64_t seed = 1;
+};
+
+// A plan whose gratings fit a display: octaves from 0.5 cpd to 16, as far as a cycle has `pixels_per_cycle`; eccentricities of 0,
+// 5, 10 and 20 degrees, as far as they fit beside a fixation cross at the screen's edge; of these, what the expected observer
+// sees at a third of the highest contrast. The luminance is midway between the display's black and white.
+inline constexpr double pixels_per_cycle = 4;
+CalibrationPlan plan_for(const perception::Display& display, const perception::CsfTable& expected);
+
+// Whether a patch and the cross beside it fit on the display.
+bool fits(const perception::Display& display, const GratingPlace& place);
+
+// 1 to 1000 places with finite positive frequencies and eccentricities of 0 or more, none twice; 1 to 100,000 trials; 2 to 1000
+// settings; luminance above 0; 0 < highest_contrast <= 1. The error names the field.
+Result<void> validate(const CalibrationPlan& plan);
+
+// One thing to show. Two-interval: the grating is in `interval` 1 or 2. Adjustment: it begins at `contrast`, unseen if ascending.
+struct Trial {
+    int number = 0; // from 0
+    std::size_t place = 0;
+    GratingPlace grating;
+    double contrast = 0; // Michelson
+    int interval = 1;
+    bool is_ascending = false;
+    double phase_deg = 0;
+};
+
+struct Answer {
+    std::size_t place = 0;
+    double log10_contrast = 0; // shown, or set
+    bool is_right = false;     // two-interval; adjustment: seen at all
+};
+
+// What a place comes to.
+struct PlaceEstimate {
+    GratingPlace place;
+    int answers = 0;
+    SensitivityField::Belief log10_sensitivity;
+    SensitivityField::Belief local; // how far it strays from the fitted shape, log10 units
+    double low() const;             // 95% interval of the sensitivity
+    double high() const;
+    double sensitivity() const;
+};
+
+class Procedure {
+public:
+    // `expected` is what an observer is believed to see before any answer.
+    static Result<Procedure> create(CalibrationPlan plan, perception::CsfTable expected);
+
+    const CalibrationPlan& plan() const noexcept { return plan_; }
+    const std::vector<Answer>& answers() const noexcept { return answers_; }
+    int trials() const noexcept; // in all
+    bool is_done() const noexcept { return static_cast<int>(answers_.size()) >= trials(); }
+
+    // The same until it is answered, and the same for the same plan and answers. Precondition: !is_done(). Two-interval: the place
+    // and the contrast whose answer is expected to leave the least entropy; every fourth time at the place that was asked least.
+    // Cost: about 1 ms for 18 places.
+    Trial next() const;
+    // Answers next(). Preconditions: !is_done(), and the plan's method.
+    void choose(int interval);
+    void set(double contrast); // above 0; the highest contrast or more: not seen even there
+
+    std::vector<PlaceEstimate> estimates() const;
+    // The expected table with the measured deviations, on the axes of a profile (see calibrated_table in the sources): beyond the
+    // measured places, and at other luminances, the deviation of the nearest measured frequency and eccentricity is taken.
+    perception::CsfTable table(std::string source) const;
+
+    // The plan and all answers, to go on later. Reading checks everything, the plan and each answer, and fails on a bad file with
+    // its name and the place.
+    Result<void> save(const std::filesystem::path& file) const;
+    static Result<Procedure> resume(const std::filesystem::path& file, perception::CsfTable expected);
+
+private:
+    Procedure(CalibrationPlan plan, perception::CsfTable expected, QuestPlus blank);
+    void take(const Answer& answer);
+    void combine();
+    void weigh_settings();
+    Trial next_adjustment(Trial trial) const;
+
+    CalibrationPlan plan_;
+    perception::CsfTable expected_;
+    std::vector<Answer> answers_;
+    SensitivityField field_;
+    std::vector<QuestPlus> quests_; // by place: with the belief of the others as prior
+    std::vector<int> asked_;        // answers by place
+};
+
+} // namespace unseen::calibration

@@ -1,0 +1,188 @@
+// QUEST+: a posterior on a grid, and the mutual information of stimuli's answers and parameters.
+#include <calibration/quest.h>
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "json_file.h"
+
+namespace unseen::calibration {
+namespace {
+
+Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
+
+// -p log2 p, 0 at 0.
+double surprise(double p) { return p > 0 ? -p * std::log2(p) : 0; }
+
+double entropy_of_answer(double p) { return surprise(p) + surprise(1 - p); }
+
+Result<void> check_axis(const std::vector<double>& axis, const std::string& name) {
+    if (axis.empty()) return invalid("QUEST+: " + name + " has no values.");
+    for (std::size_t i = 0; i < axis.size(); ++i)
+        if (!std::isfinite(axis[i]) || (i > 0 && !(axis[i] > axis[i - 1])))
+            return invalid("QUEST+: " + name + "[" + std::to_string(i) + "] is " + to_text(axis[i]) +
+                           ": the values must be finite and ascend.");
+    return {};
+}
+
+} // namespace
+
+double Psychometric::shift() const {
+    const double still_unseen = (1 - (at_threshold - lapse * guess) / (1 - lapse)) / (1 - guess);
+    return std::log10(-std::log(still_unseen)) / slope;
+}
+
+double Psychometric::probability(double x) const {
+    const double unseen = std::exp(-std::pow(10.0, slope * (x + shift())));
+    return lapse * guess + (1 - lapse) * (1 - (1 - guess) * unseen);
+}
+
+Result<void> validate(const Psychometric& f) {
+    if (!(f.slope > 0 && std::isfinite(f.slope))) return invalid("The slope must be above 0, not " + to_text(f.slope) + ".");
+    if (!(f.lapse >= 0 && f.lapse < 1)) return invalid("The lapse rate must lie in 0..1, not " + to_text(f.lapse) + ".");
+    if (!(f.guess >= 0 && f.guess < 1)) return invalid("The guess rate must lie in 0..1, not " + to_text(f.guess) + ".");
+    if (!std::isfinite(f.shift()))
+        return invalid("The threshold cannot be at " + to_text(f.at_threshold) + " right answers: with a guess rate of " +
+                       to_text(f.guess) + " and a lapse rate of " + to_text(f.lapse) + " they never are so many or so few.");
+    return {};
+}
+
+QuestGrid standard_grid() {
+    QuestGrid grid;
+    for (int i = 0; i <= 160; ++i) grid.log10_threshold.push_back(-3.5 + 0.025 * i);
+    for (int i = 0; i <= 35; ++i) grid.log10_contrast.push_back(-3.5 + 0.1 * i);
+    grid.slope = {Psychometric().slope};
+    grid.lapse = {Psychometric().lapse};
+    return grid;
+}
+
+struct QuestPlus::Tables {
+    QuestGrid grid;
+    std::vector<Psychometric> functions; // by lapse and slope
+    // By stimulus and combination: the probability of a right answer, and the entropy of the answer in bits.
+    std::vector<float> right, entropy;
+
+    std::size_t combinations() const { return functions.size() * grid.log10_threshold.size(); }
+};
+
+QuestPlus::QuestPlus(std::shared_ptr<const Tables> tables)
+    : tables_(std::move(tables)), log_prior_(tables_->grid.log10_threshold.size(), 0.0),
+      log_prior_of_functions_(tables_->functions.size(), 0.0), log_likelihood_(tables_->combinations(), 0.0), posterior_(tables_->combinations()) {
+    refresh();
+}
+
+Result<QuestPlus> QuestPlus::create(const QuestGrid& grid) {
+    for (const auto& [axis, name] : {std::pair{&grid.log10_threshold, "log10_threshold"}, {&grid.slope, "slope"},
+                                     {&grid.lapse, "lapse"}, {&grid.log10_contrast, "log10_contrast"}})
+        if (auto ok = check_axis(*axis, name); !ok) return ok.error();
+    auto tables = std::make_shared<Tables>();
+    tables->grid = grid;
+    for (const double lapse : grid.lapse)
+        for (const double slope : grid.slope) {
+            tables->functions.push_back({slope, lapse, grid.guess, grid.at_threshold});
+            if (auto ok = validate(tables->functions.back()); !ok) return ok.error();
+        }
+    tables->right.reserve(grid.log10_contrast.size() * tables->combinations());
+    tables->entropy.reserve(tables->right.capacity());
+    for (const double contrast : grid.log10_contrast)
+        for (const Psychometric& function : tables->functions)
+            for (const double threshold : grid.log10_threshold) {
+                const double right = function.probability(contrast - threshold);
+                tables->right.push_back(static_cast<float>(right));
+                tables->entropy.push_back(static_cast<float>(entropy_of_answer(right)));
+            }
+    return QuestPlus(std::move(tables));
+}
+
+const QuestGrid& QuestPlus::grid() const noexcept { return tables_->grid; }
+
+void QuestPlus::set_log_prior(std::span<const double> of_thresholds, std::span<const double> of_functions) {
+    assert(of_thresholds.size() == log_prior_.size());
+    assert(of_functions.empty() || of_functions.size() == log_prior_of_functions_.size());
+    log_prior_.assign(of_thresholds.begin(), of_thresholds.end());
+    if (of_functions.empty()) log_prior_of_functions_.assign(log_prior_of_functions_.size(), 0.0);
+    else log_prior_of_functions_.assign(of_functions.begin(), of_functions.end());
+    refresh();
+}
+
+std::vector<double> QuestPlus::log_evidence() const {
+    const std::size_t thresholds = log_prior_.size();
+    std::vector<double> evidence;
+    for (std::size_t f = 0; f < tables_->functions.size(); ++f) {
+        const std::span likelihood = std::span(log_likelihood_).subspan(f * thresholds, thresholds);
+        double largest = -std::numeric_limits<double>::infinity(), sum = 0;
+        for (std::size_t t = 0; t < thresholds; ++t) largest = std::max(largest, likelihood[t] + log_prior_[t]);
+        for (std::size_t t = 0; t < thresholds; ++t) sum += std::exp(likelihood[t] + log_prior_[t] - largest);
+        evidence.push_back(largest + std::log(sum));
+    }
+    return evidence;
+}
+
+void QuestPlus::update(double log10_contrast, bool is_right) {
+    std::size_t i = 0;
+    for (const Psychometric& function : tables_->functions)
+        for (const double threshold : tables_->grid.log10_threshold) {
+            const double right = function.probability(log10_contrast - threshold);
+            log_likelihood_[i++] += std::log(is_right ? right : 1 - right);
+        }
+    refresh();
+}
+
+void QuestPlus::set_log_likelihood(std::span<const double> by_threshold) {
+    assert(by_threshold.size() == log_prior_.size());
+    for (std::size_t i = 0; i < log_likelihood_.size(); ++i) log_likelihood_[i] = by_threshold[i % by_threshold.size()];
+    refresh();
+}
+
+void QuestPlus::refresh() {
+    const std::size_t thresholds = log_prior_.size();
+    for (std::size_t i = 0; i < posterior_.size(); ++i) 
+        posterior_[i] = log_likelihood_[i] + log_prior_[i % thresholds] + log_prior_of_functions_[i / thresholds];
+    const double largest = *std::max_element(posterior_.begin(), posterior_.end());
+    double sum = 0;
+    for (double& p : posterior_) sum += p = std::exp(p - largest);
+    for (double& p : posterior_) p /= sum;
+}
+
+QuestPlus::Belief QuestPlus::log10_threshold() const {
+    const std::vector<double>& values = tables_->grid.log10_threshold;
+    std::vector<double> marginal(values.size(), 0.0);
+    for (std::size_t i = 0; i < posterior_.size(); ++i) marginal[i % values.size()] += posterior_[i];
+    Belief belief;
+    for (std::size_t t = 0; t < values.size(); ++t) belief.mean += marginal[t] * values[t];
+    double variance = 0;
+    for (std::size_t t = 0; t < values.size(); ++t) variance += marginal[t] * (values[t] - belief.mean) * (values[t] - belief.mean);
+    belief.deviation = std::sqrt(variance);
+    belief.mode = values[static_cast<std::size_t>(std::max_element(marginal.begin(), marginal.end()) - marginal.begin())];
+    return belief;
+}
+
+double QuestPlus::entropy_bits() const {
+    double sum = 0;
+    for (const double p : posterior_) sum += surprise(p);
+    return sum;
+}
+
+// The expected entropy after an answer is that of now less the information that the answer carries about the
+// parameters: the entropy of the answer, less that which is left when the parameters are known.
+QuestPlus::Choice QuestPlus::next() const {
+    Choice best;
+    best.gain_bits = -1;
+    const std::size_t combinations = posterior_.size();
+    for (std::size_t s = 0; s < tables_->grid.log10_contrast.size(); ++s) {
+        const float *const right = &tables_->right[s * combinations], *const entropy = &tables_->entropy[s * combinations];
+        double expected_right = 0, known = 0;
+        for (std::size_t i = 0; i < combinations; ++i) {
+            expected_right += posterior_[i] * static_cast<double>(right[i]);
+            known += posterior_[i] * static_cast<double>(entropy[i]);
+        }
+        const double gain = std::max(0.0, entropy_of_answer(std::min(1.0, expected_right)) - known);
+        if (gain > best.gain_bits) best = {tables_->grid.log10_contrast[s], gain};
+    }
+    return best;
+}
+
+} // namespace unseen::calibration

@@ -1,0 +1,186 @@
+// A Gaussian process over log sensitivity: covariances, and posteriors by Cholesky's factorisation.
+#include <calibration/sensitivity_field.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace unseen::calibration {
+namespace {
+
+// Standard deviations of an observer from the expected one, in log10 units (0.05 is 1 dB). Observers of one age differ by
+// about 6 dB in gain; the rest is chosen wide enough for the published models to be reached from one another.
+constexpr double gain = 0.3;
+constexpr double tilt_per_octave = 0.08;
+constexpr double cutoff_per_cpd = 0.015;
+constexpr double decline_per_degree = 0.012;
+constexpr double fall_per_cpd_degree = 0.003;
+constexpr double local = 0.08;
+constexpr double local_octaves = 1.5; // length over which it stays alike; also in octaves of 2 deg + eccentricity
+
+constexpr double middle_cpd = 3; // near the peak of sensitivity, where tilting leaves the gain as it is
+constexpr double fovea_deg = 2;
+// Added to variances, so that places which nothing tells apart do not make the matrix singular; 0.02 dB.
+constexpr double jitter = 1e-6;
+
+double octaves(const GratingPlace& p) { return std::log2(p.frequency_cpd / middle_cpd); }
+double aside(const GratingPlace& p) { return std::log2(1 + p.eccentricity_deg / fovea_deg); }
+
+double shape_covariance(const GratingPlace& a, const GratingPlace& b) {
+    const auto square = [](double x) { return x * x; };
+    const double fa = a.frequency_cpd, fb = b.frequency_cpd, ea = a.eccentricity_deg, eb = b.eccentricity_deg;
+    return square(gain) + square(tilt_per_octave) * octaves(a) * octaves(b) + square(cutoff_per_cpd) * fa * fb +
+           square(decline_per_degree) * ea * eb + square(fall_per_cpd_degree) * fa * ea * fb * eb;
+}
+
+double local_covariance(const GratingPlace& a, const GratingPlace& b) {
+    const double du = (octaves(a) - octaves(b)) / local_octaves, dv = (aside(a) - aside(b)) / local_octaves;
+    return local * local * std::exp(-(du * du + dv * dv) / 2);
+}
+
+double covariance(const GratingPlace& a, const GratingPlace& b) { return shape_covariance(a, b) + local_covariance(a, b); }
+
+// The lower factor of a symmetric positive definite matrix, in place; the upper part is left as it is.
+void factorise(std::vector<double>& m, std::size_t n) {
+    for (std::size_t j = 0; j < n; ++j) {
+        for (std::size_t i = j; i < n; ++i) {
+            double sum = m[i * n + j];
+            for (std::size_t k = 0; k < j; ++k) sum -= m[i * n + k] * m[j * n + k];
+            m[i * n + j] = i == j ? std::sqrt(sum) : sum / m[j * n + j];
+        }
+    }
+}
+
+// Solves L x = b in place.
+void solve_lower(const std::vector<double>& factor, std::size_t n, std::vector<double>& x) {
+    for (std::size_t i = 0; i < n; ++i) {
+        for (std::size_t k = 0; k < i; ++k) x[i] -= factor[i * n + k] * x[k];
+        x[i] /= factor[i * n + i];
+    }
+}
+
+// The factor of I + R K R, R the roots of the precisions: well conditioned, whatever is not measured.
+std::vector<double> weighted_factor(const std::vector<double>& prior, const std::vector<double>& precision) {
+    const std::size_t n = precision.size();
+    std::vector<double> b(n * n);
+    for (std::size_t i = 0; i < n; ++i)
+        for (std::size_t j = 0; j < n; ++j)
+            b[i * n + j] = std::sqrt(precision[i] * precision[j]) * prior[i * n + j] + (i == j ? 1.0 : 0.0);
+    factorise(b, n);
+    return b;
+}
+
+} // namespace
+
+SensitivityField::SensitivityField(std::vector<GratingPlace> places, const perception::CsfTable& table,
+                                   perception::Luminance luminance)
+    : places_(std::move(places)), precision_(places_.size(), 0.0), shift_(places_.size(), 0.0) {
+    const std::size_t n = places_.size();
+    prior_.resize(n * n);
+    for (std::size_t i = 0; i < n; ++i) {
+        expected_.push_back(std::log10(table.sensitivity(perception::CyclesPerDegree(places_[i].frequency_cpd),
+                                                         perception::Degrees(places_[i].eccentricity_deg), luminance)));
+        for (std::size_t j = 0; j < n; ++j) prior_[i * n + j] = covariance(places_[i], places_[j]) + (i == j ? jitter : 0.0);
+    }
+    update();
+}
+
+SensitivityField::Belief SensitivityField::belief(std::size_t i) const {
+    return {expected_[i] + mean_[i], std::sqrt(covariance_[i * size() + i])};
+}
+
+SensitivityField::Belief SensitivityField::without_own(std::size_t i) const {
+    const double variance = covariance_[i * size() + i];
+    // At least the posterior's own precision is left: a factor's can exceed it by rounding only.
+    const double rest = std::max(1 / variance - precision_[i], 1e-9 / variance);
+    return {expected_[i] + (mean_[i] / variance - shift_[i]) / rest, std::sqrt(1 / rest)};
+}
+
+void SensitivityField::set_own(std::size_t i, const Belief& with_own) {
+    const Belief rest = without_own(i);
+    const double rest_precision = 1 / (rest.deviation * rest.deviation);
+    const double precision = 1 / (with_own.deviation * with_own.deviation);
+    // Surprising answers can widen a belief; a factor of negative precision would be no distribution.
+    const double own = std::max(precision - rest_precision, 1e-6 * rest_precision);
+    const double shift = (with_own.mean - expected_[i]) * (own + rest_precision) - (rest.mean - expected_[i]) * rest_precision;
+    change_factor(i, own - precision_[i], shift - shift_[i]);
+}
+
+// One factor changes the covariance by a matrix of rank one. Rounding adds up, so that now and then all is computed anew.
+void SensitivityField::change_factor(std::size_t i, double more_precision, double more_shift) {
+    precision_[i] += more_precision;
+    shift_[i] += more_shift;
+    constexpr int most_changes = 200;
+    if (++changes_ > most_changes) return update();
+    const std::size_t n = size();
+    const double weight = more_precision / (1 + more_precision * covariance_[i * n + i]);
+    const std::vector<double> column(covariance_.begin() + static_cast<std::ptrdiff_t>(i * n),
+                                     covariance_.begin() + static_cast<std::ptrdiff_t>((i + 1) * n));
+    const double pull = more_shift - weight * (mean_[i] + column[i] * more_shift);
+    for (std::size_t j = 0; j < n; ++j) {
+        mean_[j] += column[j] * pull;
+        for (std::size_t k = 0; k < n; ++k) covariance_[j * n + k] -= weight * column[j] * column[k];
+    }
+}
+
+void SensitivityField::update() {
+    changes_ = 0;
+    const std::size_t n = size();
+    const std::vector<double> factor = weighted_factor(prior_, precision_);
+    // K - K R (I + R K R)^-1 R K, by columns v = L^-1 R K.
+    std::vector<std::vector<double>> columns(n, std::vector<double>(n));
+    for (std::size_t j = 0; j < n; ++j) {
+        for (std::size_t i = 0; i < n; ++i) columns[j][i] = std::sqrt(precision_[i]) * prior_[i * n + j];
+        solve_lower(factor, n, columns[j]);
+    }
+    covariance_.resize(n * n);
+    for (std::size_t i = 0; i < n; ++i)
+        for (std::size_t j = 0; j < n; ++j) {
+            double sum = prior_[i * n + j];
+            for (std::size_t k = 0; k < n; ++k) sum -= columns[i][k] * columns[j][k];
+            covariance_[i * n + j] = sum;
+        }
+    mean_.assign(n, 0.0);
+    for (std::size_t i = 0; i < n; ++i)
+        for (std::size_t j = 0; j < n; ++j) mean_[i] += covariance_[i * n + j] * shift_[j];
+}
+
+namespace {
+
+// The posterior of a quantity whose covariances with the places' deviations are `with_places`.
+SensitivityField::Belief predict(const std::vector<double>& prior, const std::vector<double>& precision,
+                                 const std::vector<double>& shift, const std::vector<double>& with_places, double variance) {
+    const std::size_t n = precision.size();
+    const std::vector<double> factor = weighted_factor(prior, precision);
+    // w = R (I + R K R)^-1 R applied to the factors' means, where they have any precision.
+    std::vector<double> pull(n), reach(n);
+    for (std::size_t i = 0; i < n; ++i) {
+        const double root = std::sqrt(precision[i]);
+        pull[i] = root > 0 ? shift[i] / root : 0;
+        reach[i] = root * with_places[i];
+    }
+    solve_lower(factor, n, pull);
+    solve_lower(factor, n, reach);
+    SensitivityField::Belief belief;
+    for (std::size_t i = 0; i < n; ++i) {
+        belief.mean += reach[i] * pull[i];
+        variance -= reach[i] * reach[i];
+    }
+    belief.deviation = std::sqrt(std::max(0.0, variance));
+    return belief;
+}
+
+} // namespace
+
+SensitivityField::Belief SensitivityField::deviation(const GratingPlace& at) const {
+    std::vector<double> with_places;
+    for (const GratingPlace& p : places_) with_places.push_back(covariance(at, p));
+    return predict(prior_, precision_, shift_, with_places, covariance(at, at));
+}
+
+SensitivityField::Belief SensitivityField::local_deviation(std::size_t i) const {
+    std::vector<double> with_places;
+    for (const GratingPlace& p : places_) with_places.push_back(local_covariance(places_[i], p));
+    return predict(prior_, precision_, shift_, with_places, local_covariance(places_[i], places_[i]));
+}
+
+} // namespace unseen::calibration

@@ -1,0 +1,99 @@
+// The simulated observer: thresholds from a table, chance from the seed and the trial.
+#include <calibration/simulated_observer.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+
+#include <calibration/observer_profile.h>
+#include <perception/random.h>
+
+#include "json_file.h"
+
+namespace unseen::calibration {
+namespace {
+
+Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
+
+struct Key {
+    std::string_view name;
+    double SimulatedObserver::* value = nullptr;
+    double Psychometric::* of_psychometric = nullptr;
+    double least, most;
+};
+// The ranges keep thresholds within what a procedure can measure.
+constexpr Key keys[] = {
+    {"gain", &SimulatedObserver::gain, nullptr, 1e-2, 1e2},
+    {"frequency", &SimulatedObserver::frequency, nullptr, 0.1, 10},
+    {"eccentricity", &SimulatedObserver::eccentricity, nullptr, 0, 10},
+    {"slope", nullptr, &Psychometric::slope, 0.1, 20},
+    {"lapse", nullptr, &Psychometric::lapse, 0, 0.3},
+    {"scatter", &SimulatedObserver::scatter, nullptr, 0, 1},
+    {"delay", &SimulatedObserver::delay, nullptr, -1, 1},
+};
+
+Result<void> apply(SimulatedObserver& observer, std::string_view assignment) {
+    const std::size_t equals = assignment.find('=');
+    const std::string_view name = assignment.substr(0, equals);
+    const auto key = std::find_if(std::begin(keys), std::end(keys), [&](const Key& k) { return k.name == name; });
+    if (key == std::end(keys) || equals == assignment.npos)
+        return invalid("observer: '" + std::string(assignment) +
+                       "' is none of gain=, frequency=, eccentricity=, slope=, lapse=, scatter= and delay=.");
+    const std::string_view text = assignment.substr(equals + 1);
+    double value = 0;
+    const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (code != std::errc() || end != text.data() + text.size() || !(value >= key->least && value <= key->most))
+        return invalid("observer: " + std::string(name) + " must be a number from " + to_text(key->least) + " to " +
+                       to_text(key->most) + ", not '" + std::string(text) + "'.");
+    if (key->value) observer.*key->value = value;
+    else observer.psychometric.*key->of_psychometric = value;
+    return {};
+}
+
+Result<perception::CsfTable> table_named(const std::string& name) {
+    if (name.ends_with(".json")) return read_csf(name);
+    const auto model = perception::csf_model(name);
+    if (!model) return invalid("observer: '" + name + "' is neither a CSF model nor the file of a profile (.json).");
+    return perception::CsfTable::from_model(*model);
+}
+
+// Numbers of its own for each trial, other than those that make the trial.
+perception::Random chance(std::uint64_t seed, int trial) {
+    constexpr std::uint64_t observers = 0x6f62736572766572u;
+    return perception::random_for(seed ^ observers, static_cast<std::uint64_t>(trial));
+}
+
+} // namespace
+
+double SimulatedObserver::sensitivity(const GratingPlace& place, perception::Luminance luminance) const {
+    return gain * csf.sensitivity(perception::CyclesPerDegree(place.frequency_cpd / frequency),
+                                  perception::Degrees(place.eccentricity_deg * eccentricity), luminance);
+}
+
+int SimulatedObserver::choose(const Trial& trial, perception::Luminance luminance) const {
+    const double right = psychometric.probability(std::log10(trial.contrast * sensitivity(trial.grating, luminance)));
+    return chance(seed, trial.number).uniform() < right ? trial.interval : 3 - trial.interval;
+}
+
+double SimulatedObserver::set(const Trial& trial, const CalibrationPlan& plan) const {
+    const double threshold = -std::log10(sensitivity(trial.grating, plan.luminance));
+    const double setting = threshold + scatter * chance(seed, trial.number).normal() + (trial.is_ascending ? delay : -delay);
+    return std::min(std::pow(10, setting), plan.highest_contrast);
+}
+
+Result<SimulatedObserver> simulated_observer(std::string_view description, std::uint64_t seed) {
+    const std::size_t colon = description.find(':');
+    auto table = table_named(std::string(description.substr(0, colon)));
+    if (!table) return table.error();
+    SimulatedObserver observer{.csf = std::move(*table), .psychometric = {}, .seed = seed};
+    std::string_view rest = colon == description.npos ? "" : description.substr(colon + 1);
+    while (!rest.empty()) {
+        const std::size_t comma = rest.find(',');
+        if (auto ok = apply(observer, rest.substr(0, comma)); !ok) return ok.error();
+        rest = comma == rest.npos ? "" : rest.substr(comma + 1);
+    }
+    if (auto valid = validate(observer.psychometric); !valid) return valid.error();
+    return observer;
+}
+
+} // namespace unseen::calibration

@@ -1,0 +1,143 @@
+// unseen calibrate: a simulated observer from beginning to end, profiles for --csf, displays, and what is refused.
+#include "run_command.h"
+
+#include <perception/image.h>
+
+namespace {
+
+using namespace unseen::app::testing;
+using ::testing::HasSubstr;
+
+class CalibrateCommandTest : public CommandTest {};
+
+TEST_F(CalibrateCommandTest, MeasuresASimulatedObserver) {
+    const Outcome outcome = run({"calibrate", "--simulate", "castle:gain=0.7", "--seed", "3", "--trials", "400", "-o", "observer.json",
+                                 "--json", "report.json", "--date", "2001-06-25", "--conditions", "dim room"});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_THAT(outcome.out, HasSubstr("400 answers"));
+    EXPECT_THAT(outcome.out, HasSubstr("dB (rms over what can be seen)"));
+    const Json report = Json::parse(read_text(path("report.json")));
+    EXPECT_LT(report["rms_error_db"], 1.5);
+    EXPECT_EQ(report["answers"], 400);
+    EXPECT_EQ(report["done"], true);
+    for (const Json& row : report["measured"]) {
+        EXPECT_LT(row["low"], row["sensitivity"]);
+        EXPECT_GT(row["high"], row["sensitivity"]);
+    }
+    const Json profile = Json::parse(read_text(path("observer.json")));
+    EXPECT_EQ(profile["version"], 2);
+    EXPECT_EQ(profile["date"], "2001-06-25");
+    EXPECT_EQ(profile["conditions"], "dim room");
+    EXPECT_EQ(profile["observer"], "simulated: castle:gain=0.7");
+    EXPECT_EQ(profile["measured"].size(), report["measured"].size());
+
+    // The table stands for the observer: 0.7 of the standard one.
+    const auto sensitivity = [&](std::vector<std::string> more) {
+        more.insert(more.begin(), {"csf", "--frequency", "3", "--luminance", "50.25", "--eccentricity", "7"});
+        return std::strtod(run(more).out.c_str(), nullptr);
+    };
+    EXPECT_NEAR(20 * std::log10(sensitivity({"--csf", "observer.json"}) / (0.7 * sensitivity({"--table"}))), 0, 1.5);
+}
+
+TEST_F(CalibrateCommandTest, EveryVerbTakesTheProfile) {
+    build_ball();
+    ASSERT_EQ(run({"calibrate", "--simulate", "castle:gain=0.2", "--trials", "60", "-o", "poor.json"}).status, 0);
+    const auto triangles = [&](std::vector<std::string> more) {
+        more.insert(more.begin(), {"simplify", "ball.vdt", "-o", "out.ply", "--json", "-", "--size", "256x256"});
+        const Outcome outcome = run(more);
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        return outcome.json()["triangles"].get<int>();
+    };
+    EXPECT_LT(triangles({"--csf", "poor.json"}), triangles({})) << "who sees less needs less";
+}
+
+TEST_F(CalibrateCommandTest, RepeatsWithItsSeedAndResumes) {
+    const std::vector<std::string> words = {"calibrate", "--simulate", "stela", "--trials", "40", "--date", "now"};
+    const auto with = [&](std::vector<std::string> more) {
+        more.insert(more.begin(), words.begin(), words.end());
+        const Outcome outcome = run(more);
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+    };
+    with({"--seed", "5", "-o", "a.json"});
+    with({"--seed", "5", "-o", "b.json", "--resume", "state.json"});
+    with({"--seed", "6", "-o", "c.json"});
+    EXPECT_TRUE(read_text(path("a.json")) == read_text(path("b.json")));
+    EXPECT_FALSE(read_text(path("a.json")) == read_text(path("c.json")));
+    // Half of the answers taken away: the rest comes again.
+    Json state = Json::parse(read_text(path("state.json")));
+    ASSERT_EQ(state["answers"].size(), 40u);
+    state["answers"].erase(state["answers"].begin() + 20, state["answers"].end());
+    write_text(path("state.json"), state.dump());
+    with({"--seed", "5", "-o", "d.json", "--resume", "state.json"});
+    EXPECT_TRUE(read_text(path("a.json")) == read_text(path("d.json")));
+}
+
+TEST_F(CalibrateCommandTest, AdjustsToo) {
+    const Outcome outcome = run({"calibrate", "--simulate", "castle:gain=0.5", "--method", "adjustment", "--json", "-"});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_LT(outcome.json()["rms_error_db"], 1.0);
+    EXPECT_EQ(outcome.json()["method"], "adjustment");
+}
+
+TEST_F(CalibrateCommandTest, PhotometersMakeDisplays) {
+    write_text(path("p.csv"), "code,cdm2\n0,0.2\n64,12\n128,50\n192,120\n255,240\n");
+    const Outcome outcome = run({"calibrate", "--photometer", "p.csv", "-o", "display.json"});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_THAT(outcome.out, HasSubstr("peak 240 cd/m2"));
+    const Json display = Json::parse(read_text(path("display.json")));
+    EXPECT_EQ(display["transfer"], "table");
+    EXPECT_NEAR(display["peak_cdm2"], 240, 1e-9);
+    EXPECT_EQ(run({"calibrate", "--display", "display.json", "--simulate", "castle", "--trials", "5"}).status, 0);
+}
+
+TEST_F(CalibrateCommandTest, TheChartIsAPicture) {
+    const Outcome outcome = run({"calibrate", "--chart", "-o", "chart.png"});
+    if (outcome.status == 1 && outcome.err.find("OpenGL") != std::string::npos) GTEST_SKIP() << outcome.err;
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const auto chart = unseen::perception::read_image(path("chart.png"));
+    ASSERT_TRUE(chart) << chart.error().message;
+    EXPECT_EQ(chart->image.width, 1600);
+    EXPECT_EQ(chart->image.height, 1200);
+    const auto spread = [&](int y) {
+        float lo = 1, hi = 0;
+        for (int x = 0; x < 1600; ++x) lo = std::min(lo, chart->image.at(x, y)), hi = std::max(hi, chart->image.at(x, y));
+        return hi - lo;
+    };
+    EXPECT_GT(spread(1199), 0.9f);
+    EXPECT_LT(spread(0), 0.02f);
+}
+
+TEST_F(CalibrateCommandTest, RefusesWhatMakesNoSense) {
+    const std::vector<std::vector<std::string>> wrong = {
+        {"--simulate", "castle", "--trials", "0"},   {"--simulate", "castle", "--trials", "1.5"}, {"--simulate", "castle", "--trials", "nan"},
+        {"--simulate", "castle", "--seed", "-1"},    {"--simulate", "castle", "--method", "3ifc"}, {"--simulate", "castle", "-o", "x.txt"},
+        {"--simulate", "castle", "--chart"},         {"--photometer", "p.csv"},                   {"--chart", "-o", "x.json"},
+        {"--simulate", "castle", "--luminance", "0"}};
+    for (std::vector<std::string> words : wrong) {
+        words.insert(words.begin(), "calibrate");
+        const Outcome outcome = run(words);
+        EXPECT_EQ(outcome.status, 2) << words[1] << " " << words.back();
+        EXPECT_THAT(outcome.err, HasSubstr("unseen: "));
+    }
+    write_text(path("bad.json"), "{\"format\": \"unseen-calibration\", \"version\": 1, \"method\": \"2ifc\"}");
+    const std::vector<std::pair<std::vector<std::string>, const char*>> failing = {
+        {{"--simulate", "nobody"}, "nobody"},
+        {{"--simulate", "castle:age=40"}, "age"},
+        {{"--simulate", "missing.json"}, "missing.json"},
+        {{"--simulate", "castle", "--luminance", "1e5"}, "--luminance"},
+        {{"--simulate", "castle", "--frequencies", "4"}, "--eccentricities"},
+        {{"--simulate", "castle", "--frequencies", "4", "4", "--eccentricities", "0"}, "places[1]"},
+        {{"--simulate", "castle", "--resume", "bad.json"}, "bad.json"},
+        {{"--photometer", "missing.csv", "-o", "d.json"}, "missing.csv"},
+        {{"--simulate", "castle", "--display", "missing.json"}, "missing.json"}};
+    for (const auto& [more, expected] : failing) {
+        std::vector<std::string> words = {"calibrate"};
+        words.insert(words.end(), more.begin(), more.end());
+        const Outcome outcome = run(words);
+        EXPECT_EQ(outcome.status, 1) << expected;
+        EXPECT_THAT(outcome.err, IsAnErrorForPeople());
+        EXPECT_THAT(outcome.err, HasSubstr(expected));
+    }
+}
+
+} // namespace

@@ -1,0 +1,225 @@
+// Gazes: traces and their errors, the statistics of simulated ones, and what a tracker makes of them.
+#include <perception/gaze.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <numbers>
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+namespace unseen::perception {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+class GazeTest : public testing::Test {
+protected:
+    GazeTest() : file_(std::filesystem::path(testing::TempDir()) / ("unseen-gaze-" + std::to_string(::getpid()) + ".csv")) {}
+    ~GazeTest() override { std::filesystem::remove(file_); }
+
+    Result<GazeTrace> read(const std::string& text) const {
+        std::ofstream(file_, std::ios::binary) << text;
+        return read_gaze_trace(file_);
+    }
+    const std::filesystem::path file_;
+};
+
+GazeTrace trace_of(std::vector<GazeSample> samples) {
+    auto trace = GazeTrace::create(std::move(samples));
+    EXPECT_TRUE(trace) << trace.error().message;
+    return *std::move(trace);
+}
+
+TEST_F(GazeTest, ReadsAndInterpolates) {
+    const auto trace = read("# a tracker\ntime_s,x_px,y_px\n0,100,200\r\n\n0.5,200, 100\n1.25,200,-50.5\n");
+    ASSERT_TRUE(trace) << trace.error().message;
+    EXPECT_EQ(trace->samples().size(), 3u);
+    EXPECT_EQ(trace->at(0.25), glm::dvec2(150, 150));
+    EXPECT_EQ(trace->at(-1), glm::dvec2(100, 200));
+    EXPECT_EQ(trace->at(9), glm::dvec2(200, -50.5));
+    EXPECT_EQ(trace->at(0.5), glm::dvec2(200, 100));
+}
+
+TEST_F(GazeTest, BadTracesNameTheFileAndTheLine) {
+    const std::string head = "time_s,x_px,y_px\n";
+    const std::pair<std::string, const char*> cases[] = {
+        {"", "no sample"},
+        {head, "no sample"},
+        {"t,x,y\n0,1,2\n", "line 1: the first line"},
+        {head + "0,1,2\n0.1,1\n", "line 3: must be three numbers"},
+        {head + "0,1,2,3\n", "line 2: must be three numbers"},
+        {head + "0,one,2\n", "line 2"},
+        {head + "0,nan,2\n", "line 2: the sample is not finite"},
+        {head + "0,1,2\n0.1,1,inf\n", "line 3: the sample is not finite"},
+        {head + "0,1,2\n0.2,1,2\n0.1,1,2\n", "line 4: the sample is out of order: 0.1 s comes after 0.2 s"},
+        {head + "0,1,2\n0,1,2\n", "line 3: the sample is out of order"},
+        {head + "0,1,2\n\n1.5,1,2\n", "line 4: the sample follows a gap of 1.5 s"},
+    };
+    for (const auto& [text, expected] : cases) {
+        const auto trace = read(text);
+        ASSERT_FALSE(trace) << text;
+        EXPECT_THAT(trace.error().message, AllOf(HasSubstr(file_.string()), HasSubstr(expected)));
+    }
+    EXPECT_FALSE(read_gaze_trace("/no/such/file.csv"));
+    EXPECT_FALSE(GazeTrace::create({}));
+}
+
+TEST_F(GazeTest, WritesWhatItReads) {
+    const auto simulated = simulate_gaze({.duration_s = 2}, Display());
+    ASSERT_TRUE(simulated);
+    ASSERT_TRUE(write_gaze_trace(file_, *simulated));
+    const auto back = read_gaze_trace(file_);
+    ASSERT_TRUE(back) << back.error().message;
+    EXPECT_EQ(back->samples(), simulated->samples());
+    EXPECT_FALSE(write_gaze_trace("/no/such/folder/file.csv", *simulated));
+}
+
+TEST_F(GazeTest, SimulatedGazesRepeatWithTheirSeed) {
+    const auto a = simulate_gaze({.seed = 5}, Display()), b = simulate_gaze({.seed = 5}, Display()), c = simulate_gaze({.seed = 6}, Display());
+    ASSERT_TRUE(a && b && c);
+    EXPECT_EQ(a->samples(), b->samples());
+    EXPECT_NE(a->samples(), c->samples());
+}
+
+// The statistics that the header claims, found again in the samples.
+TEST_F(GazeTest, SimulatedGazesHaveThePublishedStatistics) {
+    SimulatedGaze options;
+    options.duration_s = 600;
+    options.samples_per_s = 1000;
+    options.width_px = 3000; // 75 degrees, so that the window's edges hardly matter
+    options.height_px = 3000;
+    const Display display;
+    const auto trace = simulate_gaze(options, display);
+    ASSERT_TRUE(trace) << trace.error().message;
+    const auto& s = trace->samples();
+    const auto degrees = [&](glm::dvec2 px) {
+        const glm::dvec2 t = (px - glm::dvec2(1500)) * (0.000254 / 0.5);
+        return glm::dvec2(std::atan(t.x), std::atan(t.y)) * (180 / std::numbers::pi);
+    };
+    std::vector<double> fixations, amplitudes, durations, peaks;
+    for (std::size_t i = 1; i < s.size();) {
+        std::size_t end = i;
+        while (end < s.size() && s[end].px == s[end - 1].px) ++end;
+        if (end == s.size()) break;
+        if (!amplitudes.empty()) fixations.push_back(s[end - 1].time_s - s[i - 1].time_s);
+        std::size_t landed = end;
+        double peak = 0;
+        while (landed < s.size() && s[landed].px != s[landed - 1].px) {
+            const glm::dvec2 step = degrees(s[landed].px) - degrees(s[landed - 1].px);
+            peak = std::max(peak, std::hypot(step.x, step.y) * options.samples_per_s);
+            ++landed;
+        }
+        if (landed == s.size()) break;
+        const glm::dvec2 moved = degrees(s[landed - 1].px) - degrees(s[end - 1].px);
+        amplitudes.push_back(std::hypot(moved.x, moved.y));
+        durations.push_back(s[landed - 1].time_s - s[end - 1].time_s);
+        peaks.push_back(peak);
+        i = landed;
+    }
+    ASSERT_GT(amplitudes.size(), 1500u);
+    std::nth_element(fixations.begin(), fixations.begin() + static_cast<std::ptrdiff_t>(fixations.size() / 2), fixations.end());
+    EXPECT_NEAR(fixations[fixations.size() / 2], 0.25, 0.015);
+    double mean = 0;
+    for (const double a : amplitudes) mean += a / static_cast<double>(amplitudes.size());
+    EXPECT_GT(mean, 4);
+    EXPECT_LT(mean, 7);
+    EXPECT_LT(std::count_if(amplitudes.begin(), amplitudes.end(), [](double a) { return a > 15; }), static_cast<std::ptrdiff_t>(amplitudes.size() / 20));
+    for (std::size_t i = 0; i < amplitudes.size(); ++i) {
+        constexpr double two_samples = 0.002;
+        EXPECT_NEAR(durations[i], 0.0022 * amplitudes[i] + 0.021, two_samples) << i;
+        if (amplitudes[i] < 2) continue;
+        const double main_sequence = 600 * (1 - std::exp(-amplitudes[i] / 6));
+        EXPECT_GT(peaks[i], 0.6 * main_sequence) << amplitudes[i];
+        EXPECT_LT(peaks[i], 1.4 * main_sequence) << amplitudes[i];
+    }
+}
+
+TEST_F(GazeTest, SimulatedGazesStayInTheWindow) {
+    for (const int side : {1, 40, 1024}) {
+        const auto trace = simulate_gaze({.duration_s = 20, .width_px = side, .height_px = side}, Display());
+        ASSERT_TRUE(trace);
+        for (const GazeSample& s : trace->samples()) {
+            EXPECT_GE(std::min(s.px.x, s.px.y), -1e-9);
+            EXPECT_LE(std::max(s.px.x, s.px.y), side + 1e-9);
+        }
+    }
+    EXPECT_FALSE(simulate_gaze({.duration_s = std::nan("")}, Display()));
+    EXPECT_FALSE(simulate_gaze({.duration_s = 1e9}, Display()));
+    EXPECT_FALSE(simulate_gaze({.width_px = 0}, Display()));
+    EXPECT_FALSE(simulate_gaze({.samples_per_s = 0.1}, Display()));
+}
+
+// A fixation, a saccade of 10 degrees in 50 ms, another fixation.
+GazeTrace one_saccade() {
+    const double px = std::tan(10 * std::numbers::pi / 180) * 0.5 / 0.000254;
+    return trace_of({{0, {800, 600}}, {0.5, {800, 600}}, {0.55, {800 + px, 600}}, {1, {800 + px, 600}}});
+}
+
+TEST_F(GazeTest, ErrorAndLatencyWidenTheFovea) {
+    TrackerOptions options;
+    options.error_deg = 0.5;
+    options.latency_s = 0.06;
+    const GazeTracker tracker(one_saccade(), options, Display(), 1600, 1200);
+    EXPECT_EQ(tracker.at(0.4).margin_deg, 0.5);
+    EXPECT_EQ(tracker.at(0.52).px, glm::dvec2(800, 600)) << "what the eye did 60 ms ago";
+    const TrackedGaze amid = tracker.at(0.585);
+    EXPECT_NEAR(amid.speed_deg_s, 200, 1e-6);
+    EXPECT_NEAR(amid.margin_deg, 0.5 + 200 * 0.06, 1e-6);
+    EXPECT_EQ(tracker.at(0.9).margin_deg, 0.5);
+    EXPECT_GT(tracker.at(0.9).px.x, 1100);
+}
+
+TEST_F(GazeTest, SuppressionHoldsTheGazeDuringSaccades) {
+    TrackerOptions options;
+    options.latency_s = 0.02;
+    options.suppression = true;
+    options.suppressed_s = 0.1;
+    const GazeTracker tracker(one_saccade(), options, Display(), 1600, 1200);
+    EXPECT_FALSE(tracker.at(0.51).is_suppressed);
+    for (const double t : {0.53, 0.56, 0.6, 0.61}) {
+        EXPECT_TRUE(tracker.at(t).is_suppressed) << t;
+        EXPECT_NEAR(tracker.at(t).px.x, 800, 1e-6) << t;
+        EXPECT_EQ(tracker.at(t).margin_deg, 0) << t;
+    }
+    EXPECT_FALSE(tracker.at(0.63).is_suppressed);
+    EXPECT_GT(tracker.at(0.63).px.x, 1100);
+}
+
+TEST_F(GazeTest, TrackersThatAreNoneAreRefused) {
+    const double nan = std::nan("");
+    EXPECT_FALSE(validate(TrackerOptions{.error_deg = -1}));
+    EXPECT_FALSE(validate(TrackerOptions{.error_deg = nan}));
+    EXPECT_FALSE(validate(TrackerOptions{.latency_s = nan}));
+    EXPECT_FALSE(validate(TrackerOptions{.latency_s = 100}));
+    EXPECT_FALSE(validate(TrackerOptions{.suppressed_s = -1}));
+    EXPECT_TRUE(validate(TrackerOptions()));
+}
+
+// S'(e) = S(max(0, e - margin)), everywhere.
+TEST_F(GazeTest, WidenedTablesSeeAsTheGazeMightBe) {
+    const CsfTable& table = CsfTable::standard();
+    const CsfTable wide = widened(table, Degrees(4));
+    for (const double f : {0.5, 2.0, 8.0, 20.0})
+        for (const double e : {0.0, 1.0, 3.9, 4.0, 5.0, 9.0, 24.0, 60.0})
+            for (const double l : {0.1, 50.0}) {
+                const double expected = table.sensitivity(CyclesPerDegree(f), Degrees(std::max(0.0, e - 4)), Luminance(l));
+                EXPECT_NEAR(wide.sensitivity(CyclesPerDegree(f), Degrees(e), Luminance(l)) / expected, 1, 1e-9) << f << " " << e;
+                EXPECT_GE(wide.highest_visible_frequency(0.1, Degrees(e), Luminance(l)).value() * (1 + 1e-6),
+                          table.highest_visible_frequency(0.1, Degrees(e), Luminance(l)).value());
+            }
+    WidenedTables tables(table);
+    EXPECT_EQ(tables.at(Degrees(3.5)), tables.at(Degrees(4)));
+    EXPECT_NE(tables.at(Degrees(3.5)), tables.at(Degrees(3)));
+    EXPECT_EQ(tables.at(Degrees(90)), nullptr);
+    EXPECT_EQ(tables.at(Degrees(std::numeric_limits<double>::quiet_NaN())), nullptr);
+    EXPECT_NEAR(tables.at(Degrees(3.5))->sensitivity(CyclesPerDegree(4), Degrees(10), Luminance(50)),
+                table.sensitivity(CyclesPerDegree(4), Degrees(6), Luminance(50)), 1e-9);
+}
+
+} // namespace
+} // namespace unseen::perception
