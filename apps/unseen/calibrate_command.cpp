@@ -191,8 +191,11 @@ void simulate(Procedure& procedure, const SimulatedObserver& observer) {
 }
 
 Result<perception::CsfTable> expected_table(const CalibrateArguments& a) {
-    if (a.display.csf_file.empty()) return perception::CsfTable::standard();
-    return calibration::read_csf(a.display.csf_file);
+    if (a.display.csf.empty()) return perception::CsfTable::standard();
+    auto chosen = choose_csf(a.display.csf);
+    if (!chosen) return chosen.error();
+    if (chosen->model) return perception::CsfTable::from_model(*chosen->model);
+    return std::move(*chosen->table);
 }
 
 Result<Procedure> begin_or_resume(const CalibrateArguments& a, const perception::Display& display) {

@@ -17,6 +17,9 @@
 namespace unseen::app {
 namespace {
 
+// With fewer, an outline that moves by a fiftieth of a pixel changes a whole sample of some pixel: by more than can be seen.
+constexpr int samples_to_judge = 64;
+
 struct RenderArguments {
     std::string model, out, json;
     ViewOptions view;
@@ -132,7 +135,7 @@ Command render_command(CLI::App& app) {
         ->type_name("OUT.png|.pfm|.exr")
         ->check(ending_in({".png", ".pfm", ".exr"}));
     CLI::Option* samples =
-        verb->add_option("--samples", a->draw.samples, "Samples a pixel, 1 to 256 (default: 16; with --path: 1)")
+        verb->add_option("--samples", a->draw.samples, "Samples a pixel, 1 to 256 (default: 16; for PFM and EXR, which are to be judged: 64; with --path: 1)")
             ->type_name("N")
             ->check(within(1, 256));
     verb->add_flag("--wireframe", a->draw.wireframe, "Draw the triangles' edges, too");
@@ -148,7 +151,9 @@ Command render_command(CLI::App& app) {
         if (!frames_a_second->empty() && !a->flight.geomorph_seconds && !is_moving(a->flight.gaze))
             refuse("--fps needs --geomorph, --gaze-trace or --gaze-mode simulated.");
         check(*a);
-        if (!a->flight.path.empty() && samples->empty()) a->draw.samples = 1;
+        if (!samples->empty()) return;
+        if (!a->flight.path.empty()) a->draw.samples = 1;
+        else if (!a->out.ends_with(".png")) a->draw.samples = samples_to_judge;
     });
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
