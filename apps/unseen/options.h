@@ -34,15 +34,15 @@ struct DisplayOptions {
 };
 
 enum class Mode { full, imperceptible, budget, pixels };
-enum class FoldTest { error, luebke_hallen, extent, displacement }; // like perception::fold_test_names
+enum class FoldTest { luebke_hallen, error, extent, displacement }; // like perception::fold_test_names
 
 constexpr bool is_perceptual(FoldTest test) { return test == FoldTest::error || test == FoldTest::luebke_hallen; }
 
 // WHAT.
 struct WhatOptions {
     Mode mode = Mode::imperceptible;
-    FoldTest test = FoldTest::error;
-    std::string fold_test = "error";         // as it was given
+    FoldTest test = FoldTest::luebke_hallen;
+    std::string fold_test = "luebke-hallen"; // as it was given
     std::uint32_t triangles = 0;             // of Mode::budget
     double pixels = 0;                       // of Mode::pixels
     bool fill_budget = false;                // of Mode::budget: go on where nothing more can be seen

@@ -65,7 +65,7 @@ public:
 private:
     // What a criterion depends on, besides the tree, its light and the display.
     struct Key {
-        FoldTest test = FoldTest::error;
+        FoldTest test = FoldTest::luebke_hallen;
         double pixels = 0;
         bool has_gaze = false;
         double farthest_gaze_px = 0;

@@ -136,7 +136,7 @@ private:
     void choose(Mode mode) {
         what_.mode = mode;
         what_.triangles = budget_;
-        if (mode == Mode::imperceptible && !is_perceptual(what_.test)) what_.test = FoldTest::error;
+        if (mode == Mode::imperceptible && !is_perceptual(what_.test)) what_.test = FoldTest::luebke_hallen;
         what_.gaze_px.reset();
         gaze_follows_pointer_ = plays_gaze_ = false;
     }

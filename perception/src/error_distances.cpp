@@ -90,9 +90,8 @@ public:
         const double highest_cpd = csf_.highest_visible_frequency(contrast, eccentricity_, luminance_).value();
         if (highest_cpd <= 0) return 0; // not even at the peak; only from inside
         const double extent_deg = 1 / (2 * highest_cpd);
-        // Smaller than a pixel it counts by the share of the pixel that it covers, and half of what is allowed is left to the shifts
-        // that many together make; see contrast_of_shift().
-        const double share = std::sqrt(1 / (2 * contrast * limit_));
+        // Smaller than a pixel it counts by the share of the pixel that it covers.
+        const double share = std::sqrt(1 / (contrast * limit_));
         const double largest_deg = extent_deg < screen_.pixel_deg ? screen_.pixel_deg * std::min(share, 1.0) : extent_deg;
         const double half = largest_deg / screen_.largest_magnification / degrees_per_radian / 2;
         return half < std::numbers::pi / 2 ? (1 + reach_rounding) / std::sin(half) : 1;
@@ -147,16 +146,11 @@ std::vector<float> fill_table(const std::vector<std::uint8_t>& used, std::size_t
     return reach;
 }
 
-// Patches smaller than a pixel come in great number. What they shift within the pixel, s of its contrast each, adds up; signs that
-// differ at random leave the root of the number, so that it goes with the share's root, theta / pixel. Invisible while
-// 2 s theta / pixel S <= 1: as a patch of this contrast would be, by its whole share. (Signs that do not differ shift the mean.)
-double contrast_of_shift(double s, double sensitivity) { return 2 * s * s * sensitivity; }
-
 bool is_visible(const CsfTable& csf, const Levels& levels, const Level& level) {
     return Levels::contrast(level.contrast) * csf.peak_sensitivity(Degrees(0), Luminance(levels.luminance(level.luminance))) > 1;
 }
 
-// Of the reach of one row to that of another which is nowhere below it, at the eccentricity where it is largest.
+// Of the reach of one row to that of another, at the eccentricity where it is largest; the other is seen wherever the one is.
 float largest_ratio(const DistanceCriterion::Parts& parts, std::uint16_t row, std::uint16_t above) {
     float largest = 0;
     for (std::size_t bin = 0; bin < parts.eccentricity_bins; ++bin) {
@@ -186,6 +180,7 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
     parts.lengths.resize(nodes);
     parts.silhouette_lengths.resize(nodes);
     std::vector<Level> patches(nodes), strips(nodes);
+    std::vector<std::uint16_t> crowds(nodes, 0); // rows of what neighbours shift together
     std::vector<std::uint16_t> shifts(nodes, 0); // rows of means that shift visibly; they may do so over the whole object
     std::vector<std::uint8_t> used(row_count, 0);
     for (NodeId node = nodes; node-- > 0;) { // children before parents
@@ -194,9 +189,9 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
         const double h = errors.distance[node], r1 = tree.bounds()[node].ring.radius;
         const double change = levels.difference_in_cdm2(errors.luminance[node]) + (hi - lo) * (r1 > 0 ? std::min(1.0, h / r1) : 1.0);
         patches[node] = above(patches[node], levels.level(change, middle));
-        const double finest = csf.monotone_sensitivity(CyclesPerDegree(1 / (2 * screen.pixel_deg)), Degrees(0), Luminance(middle));
-        const double own_shift = levels.difference_in_cdm2(errors.shift[node]) / middle;
-        patches[node] = above(patches[node], levels.level(middle * contrast_of_shift(own_shift, finest), middle));
+        const Level own_shift = levels.level(levels.difference_in_cdm2(errors.shift[node]), middle);
+        patches[node] = above(patches[node], own_shift);
+        crowds[node] = row(strip_rows, own_shift);
         const Level shift = levels.level(levels.difference_in_cdm2(errors.mean[node]), middle);
         if (!shift.is_nothing && is_visible(csf, levels, shift)) {
             patches[node] = above(patches[node], shift);
@@ -211,13 +206,17 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
     }
     for (NodeId node = 0; node < nodes; ++node) {
         parts.classes[node] = {row(patch_rows, patches[node]), row(strip_rows, strips[node])};
-        used[parts.classes[node].interior] = used[parts.classes[node].silhouette] = used[shifts[node]] = 1;
+        used[parts.classes[node].interior] = used[parts.classes[node].silhouette] = 1;
+        used[shifts[node]] = used[crowds[node]] = 1;
     }
     parts.reach = fill_table(used, parts.eccentricity_bins, levels, screen, csf);
 
     for (NodeId node = nodes; node-- > 0;) {
         float& length = parts.lengths[node];
-        length = std::max({length, tree.support_spheres()[node].radius, errors.extent[node]});
+        // Patches side by side, each of which shifts the mean luminance of its place, make larger ones: where their signs differ at random,
+        // k times k of them one k times as wide, of 1 / k of the contrast. Largest over all k, that is what a strip of their width shows.
+        const float crowd = 2 * largest_ratio(parts, crowds[node], parts.classes[node].interior);
+        length = std::max(length, std::max(tree.support_spheres()[node].radius, errors.extent[node]) * std::max(1.0f, crowd));
         if (shifts[node] != 0)
             length = std::max(length, object_radius * largest_ratio(parts, shifts[node], parts.classes[node].interior));
         float& width = parts.silhouette_lengths[node];

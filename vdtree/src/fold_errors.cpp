@@ -16,7 +16,7 @@ constexpr Index none = 0xffffffffu;
 constexpr std::size_t witness_count = 4; // of a node, for its parent: the worst in distance, the worst in luminance
 constexpr Index spread_count = 4;        // leaves compared besides, at equal steps through the support
 constexpr Index cells_in_area = 32; // so many folds that shift the mean together count as systematic
-constexpr float much_worse = 2;      // in luminance, than the node: such neighbours fold later
+constexpr int much_more = 2;           // luminance range than the node's: such neighbours fold later
 constexpr std::size_t triangles_compared = 16; // of each surface, at equal steps
 constexpr Index leaves_of_part = 4096;   // of a subtree that one task measures
 
@@ -32,6 +32,44 @@ struct Difference {
 struct Ring {
     Point corner[3];
     unsigned inside = 0; // a bit for each corner in the support
+};
+
+// The directions of normals along the slabs' axes.
+class NormalReach {
+public:
+    void insert(const Ring& t) {
+        const glm::vec3 a = t.corner[0].position;
+        glm::vec3 n = glm::cross(t.corner[1].position - a, t.corner[2].position - a);
+        const float squared = glm::dot(n, n);
+        if (!(squared > 0)) return;
+        n /= std::sqrt(squared);
+        const float along[NormalSlabs::axis_count] = {n.x,
+                                                      n.y,
+                                                      n.z,
+                                                      (n.x + n.y + n.z) * inverse_sqrt3,
+                                                      (-n.x + n.y + n.z) * inverse_sqrt3,
+                                                      (n.x - n.y + n.z) * inverse_sqrt3,
+                                                      (n.x + n.y - n.z) * inverse_sqrt3};
+        for (std::size_t i = 0; i < NormalSlabs::axis_count; ++i) {
+            low_[i] = std::min(low_[i], along[i]);
+            high_[i] = std::max(high_[i], along[i]);
+        }
+    }
+
+    NormalSlabs slabs() const {
+        NormalSlabs slabs;
+        if (low_[0] > high_[0]) return slabs;
+        for (std::size_t i = 0; i < NormalSlabs::axis_count; ++i) {
+            slabs.lo[i] = static_cast<std::int8_t>(std::max(std::floor(low_[i] * units - margin), -units));
+            slabs.hi[i] = static_cast<std::int8_t>(std::min(std::ceil(high_[i] * units + margin), units));
+        }
+        return slabs;
+    }
+
+private:
+    static constexpr float inverse_sqrt3 = 0.57735026918962576f, units = 127;
+    static constexpr float margin = 1e-3f; // units; a hundred times the rounding of a normal
+    std::array<float, NormalSlabs::axis_count> low_{2, 2, 2, 2, 2, 2, 2}, high_{-2, -2, -2, -2, -2, -2, -2};
 };
 
 // Triangles by columns, so that one point is compared with several at once.
@@ -109,8 +147,9 @@ private:
 
 class Measurer {
 public:
-    Measurer(const VertexTree& tree, const FoldErrors* first_guess, FoldErrors& errors)
-        : tree_(tree), first_guess_(first_guess), errors_(errors), first_leaf_(tree.first_leaf()), leaf_end_(tree.leaf_end()), parents_(tree.parents()),
+    Measurer(const VertexTree& tree, FoldErrors& errors)
+        : tree_(tree), errors_(errors), positions_(tree.positions()), luminance_(tree.luminance()), support_luminance_(tree.support_luminance()),
+          first_leaf_(tree.first_leaf()), leaf_end_(tree.leaf_end()), parents_(tree.parents()),
           first_triangle_(tree.first_triangle()), triangles_(tree.triangles()), support_(tree.support_spheres()),
           interior_(tree.interior_count()), crossing_(interior_), witnesses_(interior_), shifts_(interior_) {
         find_triangles_of_leaves();
@@ -129,7 +168,7 @@ public:
         });
         Scratch scratch;
         for (std::size_t i = above.size(); i-- > 0;) measure(above[i], scratch);
-        if (first_guess_) find_means();
+        find_means();
     }
 
 private:
@@ -177,7 +216,7 @@ private:
             for (const Index leaf : triangles_[t]) of_leaf_[next[leaf]++] = t;
     }
 
-    Point point(NodeId node) const { return {tree_.positions()[node], tree_.luminance()[node]}; }
+    Point point(NodeId node) const { return {positions_[node], luminance_[node]}; }
     Point leaf_point(Index leaf) const { return point(interior_ + leaf); }
 
     // Triangles with a corner in the support that the children, folded, leave.
@@ -202,16 +241,14 @@ private:
         return support_[a].radius != support_[b].radius ? support_[a].radius > support_[b].radius : a < b;
     }
 
-    // What stands for a leaf outside the node when it folds: nodes up to its size are folded, as far as they are not much worse.
+    // What stands for a leaf outside the node when it folds: nodes up to its size are folded, as far as they have no more to hide.
     NodeId stand_in(Index leaf, NodeId node) const {
         NodeId at = interior_ + leaf;
-        const float most = first_guess_ ? much_worse * first_guess_->luminance[node] : std::numeric_limits<float>::infinity();
-        for (NodeId up = parents_[at]; up != no_node && is_larger(node, up); up = parents_[at]) {
-            if (first_guess_ && !(first_guess_->luminance[up] <= most)) break;
-            at = up;
-        }
+        const int most = much_more * luminance_span(node);
+        for (NodeId up = parents_[at]; up != no_node && is_larger(node, up) && luminance_span(up) <= most; up = parents_[at]) at = up;
         return at;
     }
+    int luminance_span(NodeId node) const { return support_luminance_[node].hi.value - support_luminance_[node].lo.value; }
 
     void measure(NodeId node, Scratch& scratch) {
         crossing_[node] = crossing(node);
@@ -227,10 +264,10 @@ private:
                                                 [](Index l, const Child& child) { return l < child.first_leaf; });
             return std::prev(after)->node;
         };
-        NormalSlabs facing;
+        NormalReach turned;
         const auto add = [&](std::vector<Ring>& surface, const Ring& t) {
             surface.push_back(t);
-            if (first_guess_) insert_normal(t, facing);
+            turned.insert(t);
         };
         for (const Index t : crossing_[node]) {
             Ring whole, before, after;
@@ -260,7 +297,7 @@ private:
         }
 
         Worst worst;
-        if (first_guess_) shifts_[node] = mean_shift(scratch.whole, scratch.fine);
+        shifts_[node] = mean_shift(scratch.whole, scratch.fine);
         if (scratch.after.empty()) scratch.after.push_back({{proxy, proxy, proxy}, 7}); // all of it vanishes
         scratch.before_surface.assign(scratch.before);
         scratch.after_surface.assign(scratch.after);
@@ -270,10 +307,9 @@ private:
             worst.include(sample.error);
         }
         choose_witnesses(node, scratch.samples);
-        if (first_guess_) {
-            compare(scratch.before, scratch.after_surface, worst);
-            compare(scratch.after, scratch.before_surface, worst);
-        }
+        compare(scratch.before, scratch.after_surface, worst);
+        compare(scratch.after, scratch.before_surface, worst);
+        NormalSlabs facing = turned.slabs();
         float extent = 0;
         tree_.for_each_child(node, [&](NodeId child) {
             if (tree_.is_leaf(child)) return;
@@ -358,13 +394,6 @@ private:
         return {(a.position + b.position) * 0.5f, (a.luminance + b.luminance) * 0.5f};
     }
 
-    static void insert_normal(const Ring& t, NormalSlabs& facing) {
-        const glm::dvec3 a(t.corner[0].position);
-        const glm::dvec3 normal = glm::cross(glm::dvec3(t.corner[1].position) - a, glm::dvec3(t.corner[2].position) - a);
-        const double length = glm::length(normal);
-        if (length > 0) facing.insert(normal / length);
-    }
-
     static void add_area(const Ring& t, double& area, double& luminance) {
         const glm::vec3 a = t.corner[0].position;
         const double own = 0.5 * static_cast<double>(glm::length(glm::cross(t.corner[1].position - a, t.corner[2].position - a)));
@@ -405,8 +434,10 @@ private:
     }
 
     const VertexTree& tree_;
-    const FoldErrors* first_guess_;
     FoldErrors& errors_;
+    std::span<const glm::vec3> positions_;
+    std::span<const Unorm16> luminance_;
+    std::span<const PackedRange> support_luminance_;
     std::span<const Index> first_leaf_, leaf_end_;
     std::span<const NodeId> parents_;
     std::span<const Index> first_triangle_;
@@ -422,23 +453,11 @@ private:
 } // namespace
 
 FoldErrors measure_fold_errors(const VertexTree& tree, int threads) {
-    const auto made = [&] {
-        FoldErrors errors;
-        for (auto* values : {&errors.distance, &errors.luminance, &errors.shift, &errors.mean, &errors.extent}) values->resize(tree.interior_count());
-        errors.facing.resize(tree.interior_count());
-        return errors;
-    };
+    FoldErrors errors;
+    for (auto* values : {&errors.distance, &errors.luminance, &errors.shift, &errors.mean, &errors.extent}) values->resize(tree.interior_count());
+    errors.facing.resize(tree.interior_count());
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
-    FoldErrors guess = made(), errors = made();
-    arena.execute([&] {
-        Measurer(tree, nullptr, guess).run();
-        Measurer(tree, &guess, errors).run();
-    });
-    for (NodeId node = 0; node < tree.interior_count(); ++node) {
-        errors.distance[node] = std::max(errors.distance[node], guess.distance[node]);
-        errors.luminance[node] = std::max(errors.luminance[node], guess.luminance[node]);
-        errors.extent[node] = std::max(errors.extent[node], guess.extent[node]);
-    }
+    arena.execute([&] { Measurer(tree, errors).run(); });
     return errors;
 }
 

@@ -67,13 +67,14 @@ Result<vdtree::DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTr
 //
 // With theta0 = 2 asin(r0 / d) for the support's sphere; h, eY, mY of measure_fold_errors(), in cd/m2 where they are luminances; the
 // ring's range lo1..hi1 and its sphere's r1; L the middle of the range; S the table's conservative form; and by eccentricity:
-//   interior    c = (eY + (hi1 - lo1) min(1, h / r1)) / L:  c S(1 / (2 theta0)) <= 1; below a pixel, with the
-//               ring's shift of mean luminance s = sY / L:  (c theta0 / pixel + s) theta0 / pixel S(1 / (2 pixel)) <= 1
+//   interior    c = (eY + (hi1 - lo1) min(1, h / r1)) / L:  c min(1, (theta0 / pixel)^2) S(1 / (2 max(theta0, pixel))) <= 1
+//   crowd       s = sY / L, the ring's shift of mean luminance: many side by side, of random signs, make wider patches of less
+//               contrast:  s max over rho of min(1, 2 rho theta0) S(rho) <= 1, rho up to the display's limit
 //   mean        mY / L S(1 / (2 theta)) <= 1, theta the whole object's
 //   silhouette  a strip of width w, the angle of h, that changes between the ring's luminance and anything in the scene, with the
 //               contrast cs over the pair's mean:  cs max over rho of min(1, 2 rho w) S(rho) <= 1, rho up to the display's limit
 // Below a pixel a fold counts by the share of the pixel that it covers, so from far enough away everything folds: drawing must be
-// antialiased. Open and irregular rings are silhouettes. Cost: as luebke_hallen_distances().
+// antialiased. Measured, not proven: see docs/perception.md for where it fails. Open and irregular rings are silhouettes. Cost: as luebke_hallen_distances().
 Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree, const vdtree::FoldErrors& errors,
                                                   const vdtree::View& view, const FoldTestOptions& options);
 
@@ -82,6 +83,6 @@ vdtree::Viewpoint viewpoint_of(const vdtree::VertexTree& tree, const vdtree::Vie
                                const vdtree::Similarity& placement = {}, bool window_only = true);
 
 // The names that --fold-test takes.
-inline constexpr std::string_view fold_test_names[] = {"error", "luebke-hallen", "extent", "displacement"};
+inline constexpr std::string_view fold_test_names[] = {"luebke-hallen", "error", "extent", "displacement"};
 
 } // namespace unseen::perception

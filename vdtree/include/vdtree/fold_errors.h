@@ -8,8 +8,8 @@
 namespace unseen::vdtree {
 
 // By interior node, each at least as large as its children's. The mesh's own surface in the node's support is compared with the
-// ring of triangles around the proxy while the neighbours are folded as far as nodes that are no larger than this one: the
-// cut in which nodes fold in the order of their size. Points compared: the children's proxies, leaves spread over the support,
+// ring of triangles around the proxy while the neighbours are folded as far as nodes that are no larger than this one and not much
+// richer in luminance: about the cut in which nodes fold in the order of what they cost. Points compared: the children's proxies, leaves spread over the support,
 // the leaves that were worst in the children, and the centres of the triangles that vanish here; and, the other way, the proxy and the
 // centres of the ring's triangles with the surface before the fold.
 //
