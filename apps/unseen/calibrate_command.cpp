@@ -191,8 +191,10 @@ void simulate(Procedure& procedure, const SimulatedObserver& observer) {
 }
 
 Result<perception::CsfTable> expected_table(const CalibrateArguments& a) {
-    if (a.display.csf_file.empty()) return perception::CsfTable::standard();
-    return calibration::read_csf(a.display.csf_file);
+    if (a.display.csf.empty()) return perception::CsfTable::standard();
+    auto choice = choose_csf(a.display.csf);
+    if (!choice) return choice.error();
+    return choice->model ? perception::CsfTable::from_model(*choice->model) : *std::move(choice->table);
 }
 
 Result<Procedure> begin_or_resume(const CalibrateArguments& a, const perception::Display& display) {
