@@ -192,10 +192,9 @@ void simulate(Procedure& procedure, const SimulatedObserver& observer) {
 
 Result<perception::CsfTable> expected_table(const CalibrateArguments& a) {
     if (a.display.csf.empty()) return perception::CsfTable::standard();
-    auto chosen = choose_csf(a.display.csf);
-    if (!chosen) return chosen.error();
-    if (chosen->model) return perception::CsfTable::from_model(*chosen->model);
-    return std::move(*chosen->table);
+    auto choice = choose_csf(a.display.csf);
+    if (!choice) return choice.error();
+    return choice->model ? perception::CsfTable::from_model(*choice->model) : *std::move(choice->table);
 }
 
 Result<Procedure> begin_or_resume(const CalibrateArguments& a, const perception::Display& display) {

@@ -54,6 +54,7 @@ Result<perception::CsfTable> table_named(const std::string& name) {
     if (name.ends_with(".json")) return read_csf(name);
     const auto model = perception::csf_model(name);
     if (!model) return invalid("observer: '" + name + "' is neither a CSF model nor the file of a profile (.json).");
+    if (!perception::is_achromatic(*model)) return invalid("observer: " + name + " is sensitivity to colour, not to luminance contrast.");
     return perception::CsfTable::from_model(*model);
 }
 

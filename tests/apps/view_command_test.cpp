@@ -144,7 +144,7 @@ TEST_F(ViewCommandTest, ATimeLimitIsGoneOnWithUntilTheCutIsMade) {
     for (int look = 0; look < 100; ++look) {
         title = window().title();
         if (title.find("to be continued") == std::string::npos) break;
-        std::this_thread::sleep_for(pause);
+        std::this_thread::sleep_for(poll_pause);
     }
     EXPECT_THAT(title, ::testing::Not(HasSubstr("to be continued")));
     // All modes can be reached, the full model too, which has no limit.
@@ -166,7 +166,7 @@ TEST_F(ViewCommandTest, GlidesComeToRestByThemselves) {
     while (std::chrono::steady_clock::now() < end) {
         title = window().title();
         if (title.find("glide") == std::string::npos) break;
-        std::this_thread::sleep_for(pause);
+        std::this_thread::sleep_for(poll_pause);
     }
     EXPECT_THAT(title, ::testing::Not(HasSubstr("glide")));
     window().press(XK_s);

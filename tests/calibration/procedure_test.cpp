@@ -292,7 +292,7 @@ TEST_F(ProcedureTest, BadStatesNameTheFileAndThePlace) {
 TEST_F(ProcedureTest, ObserversAreDescribedByNameAndKeys) {
     const SimulatedObserver plain = observer_of("castle", 1), dim = observer_of("castle:gain=0.7,frequency=0.5", 1);
     EXPECT_NEAR(dim.sensitivity({2, 0}, Luminance(50)), 0.7 * plain.sensitivity({4, 0}, Luminance(50)), 1e-9);
-    for (const auto& [text, expected] : {std::pair{"nobody", "neither"}, {"castle:gain", "none of"}, {"castle:gain=0", "gain"},
+    for (const auto& [text, expected] : {std::pair{"nobody", "neither"}, {"castle:gain", "none of"}, {"castle-red-green", "colour"}, {"castle:gain=0", "gain"},
                                          {"castle:gain=nan", "gain"}, {"castle:gain=1x", "gain"}, {"castle:lapse=0.9", "lapse"},
                                          {"castle:age=40", "'age=40' is none of"}, {"missing.json", "missing.json"}}) {
         const auto observer = simulated_observer(text, 1);
