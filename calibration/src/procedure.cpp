@@ -294,7 +294,7 @@ CsfTable Procedure::table(std::string source) const {
     samples.source = std::move(source);
     for (int i = -16; i <= 24; ++i) samples.frequency_cpd.push_back(std::exp2(i / 4.0)); // quarter octaves, 1/16 to 64
     samples.eccentricity_deg = {0, 1, 2, 3, 4, 5, 6, 8, 10, 12.5, 15, 17.5, 20, 25, 30, 40, 50, 60, 80, 100, 120};
-    for (int i = -6; i <= 8; ++i) samples.luminance_cdm2.push_back(std::pow(10, i / 2.0)); // half decades, 1e-3 to 1e4
+    for (int i = -12; i <= 16; ++i) samples.luminance_cdm2.push_back(std::pow(10, i / 4.0)); // quarter decades, 1e-3 to 1e4
 
     GratingPlace least{1e300, 1e300}, most{0, 0}; // of the measured
     for (const GratingPlace& p : plan_.places) {

@@ -77,11 +77,12 @@ struct Case {
     double db_at_200, db_at_400; // root mean square over the runs
 };
 
-// What is owed: 1.5 dB in 400 trials. Where the observer is near a published model, 1 dB in 200.
+// What is owed: 1.5 dB in 400 trials. In 200 the mean over many seeds is below 1 dB for all but the last but one (docs/calibration.md);
+// two runs scatter about it by a quarter.
 TEST_F(ProcedureTest, FindsTheSensitivityOfSimulatedObservers) {
-    const Case cases[] = {{"castle", 1.0, 1.0},
-                          {"stela:gain=0.7", 1.0, 1.0},
-                          {"castle:gain=1.6,frequency=1.3,eccentricity=0.7", 1.1, 1.0},
+    const Case cases[] = {{"castle", 1.25, 1.0},
+                          {"stela:gain=0.7", 1.25, 1.0},
+                          {"castle:gain=1.6,frequency=1.3,eccentricity=0.7", 1.25, 1.0},
                           {"castle:gain=0.35,frequency=0.75,eccentricity=1.5", 2.0, 1.5},
                           {"castle:slope=2,lapse=0.03", 1.3, 1.3}};
     for (const Case& c : cases) {
@@ -194,7 +195,7 @@ TEST_F(ProcedureTest, TheTableAgreesWithTheEstimates) {
     while (!procedure.is_done()) answer(procedure, observer);
     const CsfTable table = procedure.table("me");
     EXPECT_EQ(table.samples().source, "me");
-    constexpr double between_samples = 0.02; // of a quarter octave, a few degrees, half a decade
+    constexpr double between_samples = 0.01; // of a quarter octave, a few degrees, a quarter of a decade
     for (const PlaceEstimate& e : procedure.estimates()) {
         const double value = table.sensitivity(CyclesPerDegree(e.place.frequency_cpd), Degrees(e.place.eccentricity_deg),
                                                procedure.plan().luminance);
