@@ -11,6 +11,7 @@
 #include "budget.h"
 #include "cut_follower.h"
 #include "index_buffer.h"
+#include "prefetch.h"
 
 namespace unseen::vdtree {
 
@@ -23,12 +24,6 @@ constexpr std::size_t batch_size = 1024;
 // Patching the index buffer around one change costs about as much as gathering so many triangles.
 constexpr std::size_t triangles_per_patch = 40;
 std::size_t few_changes(Index triangles) { return std::max<std::size_t>(triangles / triangles_per_patch, 16); }
-
-void prefetch([[maybe_unused]] const void* what) {
-#if defined(__GNUC__)
-    __builtin_prefetch(what);
-#endif
-}
 
 // Revisions of one cut never come to those of another one.
 std::uint64_t first_revision() {

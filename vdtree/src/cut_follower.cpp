@@ -10,6 +10,7 @@
 #include <glm/geometric.hpp>
 
 #include "budget.h"
+#include "prefetch.h"
 
 namespace unseen::vdtree {
 
@@ -73,12 +74,6 @@ std::int32_t bits_of(float deadline) { return std::bit_cast<std::int32_t>(deadli
 std::int32_t deadline(float clock, float slack) {
     const float sum = clock + slack;
     return sum < std::numeric_limits<float>::max() ? std::max(bits_of(sum) - 1, 0) : never;
-}
-
-void prefetch([[maybe_unused]] const void* what) {
-#if defined(__GNUC__)
-    __builtin_prefetch(what);
-#endif
 }
 
 float rounded_down(double clock) { return clock > 0 ? std::nextafter(static_cast<float>(clock), 0.0f) : 0.0f; }

@@ -8,6 +8,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "prefetch.h"
+
 namespace unseen::vdtree {
 
 namespace {
@@ -93,15 +95,13 @@ FoldCandidate FoldTester::candidate(NodeId node) const {
     return candidate;
 }
 
-void FoldTester::prefetch([[maybe_unused]] NodeId node) const {
-#if defined(__GNUC__)
-    __builtin_prefetch(bounds_ + node);
-    if (support_) __builtin_prefetch(support_ + node);
-    if (classes_) __builtin_prefetch(classes_ + node);
-    if (facing_) __builtin_prefetch(facing_ + node);
-    if (lengths_) __builtin_prefetch(lengths_ + node);
-    if (silhouette_lengths_) __builtin_prefetch(silhouette_lengths_ + node);
-#endif
+void FoldTester::prefetch(NodeId node) const {
+    vdtree::prefetch(bounds_ + node);
+    if (support_) vdtree::prefetch(support_ + node);
+    if (classes_) vdtree::prefetch(classes_ + node);
+    if (facing_) vdtree::prefetch(facing_ + node);
+    if (lengths_) vdtree::prefetch(lengths_ + node);
+    if (silhouette_lengths_) vdtree::prefetch(silhouette_lengths_ + node);
 }
 
 void FoldTester::test(std::span<const FoldCandidate> candidates, std::span<const std::uint32_t> which, std::span<Verdict> verdicts) const {

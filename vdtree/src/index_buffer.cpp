@@ -4,6 +4,8 @@
 #include <bit>
 #include <cassert>
 
+#include "prefetch.h"
+
 namespace unseen::vdtree {
 
 namespace {
@@ -15,12 +17,6 @@ constexpr std::uint32_t is_block = 1u << 31;
 
 unsigned log2_size_for(std::uint32_t corners) {
     return std::max<unsigned>(least_log2_size, static_cast<unsigned>(std::bit_width(corners)));
-}
-
-void prefetch([[maybe_unused]] const void* what) {
-#if defined(__GNUC__)
-    __builtin_prefetch(what);
-#endif
 }
 
 template <class F>

@@ -9,9 +9,9 @@ namespace unseen::vdtree {
 
 // By interior node, each at least as large as its children's. The mesh's own surface in the node's support is compared with the
 // ring of triangles around the proxy while the neighbours are folded as far as nodes that are no larger than this one and not much
-// richer in luminance: about the cut in which nodes fold in the order of what they cost. Points compared: the children's proxies, leaves spread over the support,
-// the leaves that were worst in the children, and the centres of the triangles that vanish here; and, the other way, the proxy and the
-// centres of the ring's triangles with the surface before the fold.
+// richer in luminance: about the cut in which nodes fold in the order of what they cost. Points compared: the children's proxies,
+// leaves spread over the support, the leaves that were worst in the children, and the middles of the edges that the fold moves, before
+// it with the surface after it and the other way.
 //
 // A measurement, not a bound over all cuts: neighbours may be finer (then the ring is, too) or coarser than assumed, and the worst
 // point may lie between those compared.
@@ -31,7 +31,7 @@ struct FoldErrors {
     std::vector<float> mean;
 };
 
-// Under the tree's light. Cost: about 2 us a node; in parallel. Results do not depend on the threads. `threads`: 0: all cores.
+// Under the tree's light. Cost: some 20 us a node; in parallel. Results do not depend on the threads. `threads`: 0: all cores.
 FoldErrors measure_fold_errors(const VertexTree& tree, int threads = 0);
 
 } // namespace unseen::vdtree
