@@ -1,10 +1,5 @@
 // unseen calibrate under X, driven by synthetic keys: trials go on with the keys, and what was answered ends in the profile.
-#include "remote_window.h"
-#include "run_command.h"
-#include "virtual_display.h"
-
-#include <csignal>
-#include <memory>
+#include "window_test.h"
 
 #include <perception/image.h>
 
@@ -12,46 +7,17 @@ namespace {
 
 using namespace unseen::app::testing;
 using ::testing::HasSubstr;
-using unseen::render::testing::VirtualDisplay;
 
-class CalibrateWindowTest : public CommandTest {
+class CalibrateWindowTest : public WindowTest {
 protected:
     void SetUp() override {
-        CommandTest::SetUp();
-        screen_ = std::make_unique<VirtualDisplay>();
-        if (!screen_->reason().empty()) GTEST_SKIP() << "no display: " << screen_->reason();
-        display_ = XOpenDisplay(nullptr);
-        if (!display_) GTEST_SKIP() << "the display does not answer";
+        WindowTest::SetUp();
+        if (IsSkipped()) return;
         // Small, so that software rendering keeps up.
         write_text(path("small.json"), R"({"name": "small", "width_px": 360, "height_px": 240, "pixel_pitch_m": 0.0005,
             "viewing_distance_m": 0.5, "peak_cdm2": 100, "black_cdm2": 0.5})");
     }
-    void TearDown() override {
-        if (process_ > 0) {
-            kill(process_, SIGKILL);
-            wait_for(process_);
-        }
-        if (display_) XCloseDisplay(display_);
-        if (screen_ && screen_->reason().empty()) unsetenv("DISPLAY"); // the next test has a screen of its own
-        screen_.reset();
-        CommandTest::TearDown();
-    }
-
-    // False where no window with OpenGL can be opened.
-    bool open(std::vector<std::string> more) {
-        std::vector<std::string> words = {"calibrate", "--display", "small.json"};
-        words.insert(words.end(), more.begin(), more.end());
-        process_ = start(words, path("out.txt"), path("err.txt"));
-        window_ = std::make_unique<RemoteWindow>(display_);
-        return process_ > 0 && window_->find();
-    }
-    int ended() {
-        const int status = wait_for(process_);
-        process_ = -1;
-        return status;
-    }
-    RemoteWindow& window() { return *window_; }
-    std::string errors() const { return read_text(path("err.txt")); }
+    bool open(const std::vector<std::string>& more) { return WindowTest::open({"calibrate", "--display", "small.json"}, more); }
     Json state() const { return Json::parse(read_text(path("state.json")), nullptr, false); }
 
     std::size_t answers() const {
@@ -71,12 +37,6 @@ protected:
         window().press(key);
         EXPECT_THAT(window().title_with(title), HasSubstr(title));
     }
-
-private:
-    std::unique_ptr<VirtualDisplay> screen_;
-    Display* display_ = nullptr;
-    std::unique_ptr<RemoteWindow> window_;
-    pid_t process_ = -1;
 };
 
 TEST_F(CalibrateWindowTest, TwoIntervalsAreAnsweredWithKeysAndTakenUpAgain) {

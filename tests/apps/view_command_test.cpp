@@ -1,10 +1,5 @@
 // unseen view under X, driven by synthetic events: what the window's title says follows the keys and the mouse.
-#include "remote_window.h"
-#include "run_command.h"
-#include "virtual_display.h"
-
-#include <csignal>
-#include <memory>
+#include "window_test.h"
 
 #include <perception/image.h>
 
@@ -12,56 +7,20 @@ namespace {
 
 using namespace unseen::app::testing;
 using ::testing::HasSubstr;
-using unseen::render::testing::VirtualDisplay;
 
-class ViewCommandTest : public CommandTest {
+class ViewCommandTest : public WindowTest {
 protected:
     void SetUp() override {
-        CommandTest::SetUp();
-        screen_ = std::make_unique<VirtualDisplay>();
-        if (!screen_->reason().empty()) GTEST_SKIP() << "no display: " << screen_->reason();
-        display_ = XOpenDisplay(nullptr);
-        if (!display_) GTEST_SKIP() << "the display does not answer";
+        WindowTest::SetUp();
+        if (IsSkipped()) return;
         build_ball();
     }
-    void TearDown() override {
-        if (process_ > 0) {
-            kill(process_, SIGKILL);
-            wait_for(process_);
-        }
-        if (display_) XCloseDisplay(display_);
-        if (screen_ && screen_->reason().empty()) unsetenv("DISPLAY"); // the next test has a screen of its own
-        screen_.reset();
-        CommandTest::TearDown();
-    }
-
-    // False, with the reason, where no window with OpenGL can be opened.
-    bool open(std::vector<std::string> more) {
-        std::vector<std::string> words = {"view", "ball.vdt", "--size", "200x160"};
-        words.insert(words.end(), more.begin(), more.end());
-        process_ = start(words, path("out.txt"), path("err.txt"));
-        window_ = std::make_unique<RemoteWindow>(display_);
-        return process_ > 0 && window_->find();
-    }
-    int ended() {
-        const int status = wait_for(process_);
-        process_ = -1;
-        return status;
-    }
+    bool open(const std::vector<std::string>& more) { return WindowTest::open({"view", "ball.vdt", "--size", "200x160"}, more); }
     // "... budget of 368: ..." -> 368
     static int budget_in(const std::string& title) {
         const std::size_t at = title.find("budget of ");
         return at == std::string::npos ? -1 : std::atoi(title.c_str() + at + 10);
     }
-
-    RemoteWindow& window() { return *window_; }
-    std::string errors() const { return read_text(path("err.txt")); }
-
-private:
-    std::unique_ptr<VirtualDisplay> screen_;
-    Display* display_ = nullptr;
-    std::unique_ptr<RemoteWindow> window_;
-    pid_t process_ = -1;
 };
 
 TEST_F(ViewCommandTest, FollowsKeysAndMouse) {
