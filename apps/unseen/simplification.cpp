@@ -179,7 +179,7 @@ Effect distance_effect(const WhatOptions& what, const Simplification& result) {
 // Whether faces that look away can be folded: they are not drawn, and nothing shows them from outside.
 bool culls_back_faces(const Scene& scene) {
     const PlacedSphere sphere = placed_sphere(scene.tree, scene.placement);
-    return scene.tree.closedness() == vdtree::Closedness::closed_outward &&
+    return scene.tree.closedness() != vdtree::Closedness::open &&
            glm::length(scene.view.eye - sphere.centre) > sphere.radius;
 }
 
@@ -193,8 +193,8 @@ bool is_wholly_in_window(const Scene& scene) {
 
 Effect back_face_effect(const Scene& scene) {
     if (culls_back_faces(scene)) return {"back-face folding", true, "what faces away is not drawn, so it is folded"};
-    if (scene.tree.closedness() != vdtree::Closedness::closed_outward)
-        return {"back-face folding", false, "the surface is open or inside out"};
+    if (scene.tree.closedness() == vdtree::Closedness::open)
+        return {"back-face folding", false, "the surface is open"};
     return {"back-face folding", false, "the eye is in the model"};
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include <glm/geometric.hpp>
 
@@ -35,7 +36,8 @@ void load(std::span<const FoldCandidate* const> lanes, FoldBatch& batch) {
 } // namespace
 
 FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterion, bool cull_back_faces, float threshold, bool least_costs)
-    : tree_(tree), criterion_(criterion), cull_back_faces_(cull_back_faces), has_silhouettes_(criterion.uses_silhouettes()),
+    : tree_(tree), criterion_(criterion), cull_back_faces_(cull_back_faces),
+      is_inside_out_(tree.closedness() == Closedness::closed_inward), has_silhouettes_(criterion.uses_silhouettes()),
       bounds_(tree.bounds().data()) {
     const DistanceCriterion::Parts& parts = criterion.parts();
     support_ = parts.spheres == DistanceCriterion::Spheres::support ? tree.support_spheres().data() : nullptr;
@@ -184,6 +186,7 @@ void FoldTester::find_facings(Lanes candidates, const FoldBatch& batch, bool cos
         float front = gaps.front[k], back = gaps.back[k];
         if (around.flags & irregular_ring) front = back = -infinity;       // an outline from everywhere
         else if (around.slabs.empty()) front = infinity, back = -infinity; // no triangle with an area
+        if (is_inside_out_) std::swap(front, back);
         const bool is_silhouette = !(front > 0) && !(back > 0), is_near = batch.is_near & bit;
         if (cull_back_faces_ && back > 0) {
             findings.away |= bit;
