@@ -5,7 +5,6 @@
 #include <bit>
 #include <cmath>
 #include <cstddef>
-#include <cstring>
 #include <functional>
 #include <numeric>
 #include <utility>
@@ -119,6 +118,26 @@ private:
 
 // ---- around each position
 
+// Which vertices stand for corners: themselves where no two coincide, which needs no look.
+class Places {
+public:
+    explicit Places(std::span<const Index> coincident) : coincident_(coincident) {
+        for (Index v = 0; v < coincident.size() && !any_; ++v) any_ = coincident[v] != v;
+    }
+    Index of(Index vertex) const { return any_ ? coincident_[vertex] : vertex; }
+    Triangle of(const Triangle& t) const { return any_ ? Triangle{coincident_[t[0]], coincident_[t[1]], coincident_[t[2]]} : t; }
+    // Of triangles that use no vertex twice.
+    bool degenerates(const Triangle& t) const {
+        if (!any_) return false;
+        const Triangle w = of(t);
+        return w[0] == w[1] || w[1] == w[2] || w[2] == w[0];
+    }
+
+private:
+    std::span<const Index> coincident_;
+    bool any_ = false;
+};
+
 // By vertex that stands for its position: the triangles there, ascending.
 struct Incidence {
     std::vector<Index> start, triangles;
@@ -127,7 +146,7 @@ struct Incidence {
     }
 };
 
-Incidence find_incidence(const MeshView& mesh, std::span<const Index> coincident) {
+Incidence find_incidence(const MeshView& mesh, const Places& places) {
     Incidence incidence;
     incidence.start.assign(mesh.positions.size() + 1, 0);
     // Each thread looks at all triangles, for a range of the places: they are soon seen, and counting is what takes time.
@@ -137,8 +156,8 @@ Incidence find_incidence(const MeshView& mesh, std::span<const Index> coincident
         tbb::parallel_for(std::size_t{0}, ranges, [&](std::size_t r) {
             const std::size_t begin = mesh.positions.size() * r / ranges, size = mesh.positions.size() * (r + 1) / ranges - begin;
             for (std::size_t t = mesh.triangles.size(); t-- > 0;)
-                for (const Index v : mesh.triangles[t])
-                    if (coincident[v] - begin < size) use(incidence.start[coincident[v]], t);
+                for (const Index v : places.of(mesh.triangles[t]))
+                    if (v - begin < size) use(incidence.start[v], t);
         });
     };
     for_each_use([](Index& count, std::size_t) { ++count; });
@@ -151,53 +170,43 @@ Incidence find_incidence(const MeshView& mesh, std::span<const Index> coincident
 // The ends of the edges around a place: `following` in the triangles there, and `preceding`.
 class Fan {
 public:
-    void clear() { size_ = 0; }
-    void add(Index following, Index preceding) {
-        if (size_ == following_.size()) {
-            following_.resize(2 * size_ + few);
-            preceding_.resize(following_.size());
+    // Of so many triangles at most.
+    void begin(Index place, std::size_t triangles) {
+        if (triangles > preceding_.size()) {
+            following_.resize(2 * triangles);
+            preceding_.resize(2 * triangles);
         }
+        size_ = 0;
+        stamp_ = std::uint64_t{place} << 32;
+    }
+    void add(Index following, Index preceding) {
         following_[size_] = following;
         preceding_[size_++] = preceding;
     }
 
     // Whether every edge has two triangles that run it in opposite ways: each neighbour follows once and precedes once. Sorts what
-    // was added.
+    // was added, if need be.
     bool is_regular() {
-        if (size_ > few) return is_large_regular();
-        constexpr Index no_neighbour = ~Index{0};
-        std::size_t padded = size_;
-        for (; padded % lanes != 0; ++padded) following_[padded] = preceding_[padded] = no_neighbour;
-        Lanes irregular{};
         for (std::size_t i = 0; i < size_; ++i) {
-            const Index one = following_[i];
-            const Lanes same = {one, one, one, one};
-            Lanes followed{}, preceded{}; // less than none, by lane
-            for (std::size_t k = 0; k < padded; k += lanes) {
-                followed += load(following_, k) == same;
-                preceded += load(preceding_, k) == same;
-            }
-            irregular |= (sum_of_lanes(followed) ^ minus_one) | (sum_of_lanes(preceded) ^ minus_one);
+            std::uint64_t& seen = slot(following_[i]);
+            if ((seen & stamp_mask) == stamp_) return is_regular_by_sorting(); // seen twice, or two in one slot
+            seen = stamp_ | following_[i];
         }
-        return irregular[0] == 0;
+        for (std::size_t i = 0; i < size_; ++i) {
+            std::uint64_t& seen = slot(preceding_[i]);
+            if (seen != (stamp_ | preceding_[i])) return false;
+            seen = stamp_ | nobody; // only once
+        }
+        return true;
     }
 
 private:
-    using Lanes = Index __attribute__((vector_size(16)));
-    static constexpr std::size_t lanes = 4, few = 16;
-    static constexpr Lanes minus_one = {~Index{0}, ~Index{0}, ~Index{0}, ~Index{0}};
+    static constexpr unsigned slot_bits = 8; // few neighbours rarely meet in so many
+    static constexpr std::uint64_t nobody = ~Index{0}, stamp_mask = ~nobody;
 
-    static Lanes load(const std::vector<Index>& v, std::size_t i) {
-        Lanes out;
-        std::memcpy(&out, v.data() + i, sizeof(out));
-        return out;
-    }
-    static Lanes sum_of_lanes(Lanes v) {
-        v += __builtin_shuffle(v, Lanes{2, 3, 0, 1});
-        return v + __builtin_shuffle(v, Lanes{1, 0, 3, 2});
-    }
+    std::uint64_t& slot(Index v) { return slots_[v * 0x9e3779b1u >> (32 - slot_bits)]; }
 
-    bool is_large_regular() {
+    bool is_regular_by_sorting() {
         const auto end = static_cast<std::ptrdiff_t>(size_);
         std::sort(following_.begin(), following_.begin() + end);
         std::sort(preceding_.begin(), preceding_.begin() + end);
@@ -207,38 +216,69 @@ private:
 
     std::size_t size_ = 0;
     std::vector<Index> following_, preceding_;
+    // Neighbours in the lower halves, stamped with the place that they were seen at; no place has the stamp of the others.
+    std::array<std::uint64_t, 1 << slot_bits> slots_ = [] {
+        std::array<std::uint64_t, 1 << slot_bits> none;
+        none.fill(~std::uint64_t{0});
+        return none;
+    }();
+    std::uint64_t stamp_ = 0;
 };
+
+// Twice a triangle's area as a vector, and what each corner has of it: found once, and read at each corner.
+struct FaceArea {
+    glm::dvec3 vector{0};
+    double sixth = 0; // of its length
+};
+
+// Nothing for triangles that the welding degenerates.
+std::vector<FaceArea> find_areas(const MeshView& mesh, const Places& places) {
+    std::vector<FaceArea> areas(mesh.triangles.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, areas.size(), grain), [&](const auto& range) {
+        for (std::size_t t = range.begin(); t < range.end(); ++t) {
+            const Triangle& corners = mesh.triangles[t];
+            if (places.degenerates(corners)) continue;
+            const glm::dvec3& a = mesh.positions[corners[0]];
+            const glm::dvec3 vector = glm::cross(mesh.positions[corners[1]] - a, mesh.positions[corners[2]] - a);
+            areas[t] = {vector, glm::length(vector) / 6};
+        }
+    });
+    return areas;
+}
 
 // Looks at one position after another.
 class SurfaceWorker {
 public:
-    SurfaceWorker(const MeshView& mesh, std::span<const Index> coincident, const Incidence& incidence, Surface& surface)
-        : mesh_(mesh), coincident_(coincident), incidence_(incidence), surface_(surface) {}
+    SurfaceWorker(const MeshView& mesh, const Places& places, const Incidence& incidence, std::span<const FaceArea> areas,
+                  Surface& surface)
+        : triangles_(mesh.triangles), places_(places), incidence_(incidence), areas_(areas), vertex_areas_(surface.areas),
+          surface_(surface) {}
 
-    void operator()(std::size_t v) {
-        fan_.clear();
-        const glm::dvec3 here = mesh_.positions[v];
+    void operator()(Index v) {
+        const std::span<const Index> around = incidence_.around(v);
+        fan_.begin(v, around.size());
         glm::dvec3 sum(0);
-        for (const Index t : incidence_.around(v)) {
-            const Triangle& corners = mesh_.triangles[t];
-            const Triangle w = {coincident_[corners[0]], coincident_[corners[1]], coincident_[corners[2]]};
-            if (w[0] == w[1] || w[1] == w[2] || w[2] == w[0]) continue; // it has neither edges nor an area
+        for (const Index t : around) {
+            const Triangle& corners = triangles_[t];
+            if (places_.degenerates(corners)) continue; // it has neither edges nor an area
+            const Triangle w = places_.of(corners);
             const std::size_t k = (w[1] == v) + 2u * (w[2] == v);
             constexpr std::size_t next[] = {1, 2, 0, 1};
-            const std::size_t after = next[k], before = next[k + 1];
-            fan_.add(w[after], w[before]);
-            const glm::dvec3 area = glm::cross(mesh_.positions[corners[after]] - here, mesh_.positions[corners[before]] - here);
-            sum += area;
-            surface_.areas[corners[k]] += glm::length(area) / 6;
+            const FaceArea& area = areas_[t];
+            fan_.add(w[next[k]], w[next[k + 1]]);
+            sum += area.vector;
+            vertex_areas_[corners[k]] += area.sixth;
         }
         surface_.irregular[v] = !fan_.is_regular();
         surface_.normals[v] = glm::vec3(unit(sum));
     }
 
 private:
-    const MeshView& mesh_;
-    std::span<const Index> coincident_;
+    std::span<const Triangle> triangles_;
+    const Places places_;
     const Incidence& incidence_;
+    std::span<const FaceArea> areas_;
+    std::span<double> vertex_areas_;
     Surface& surface_;
     Fan fan_;
 };
@@ -306,11 +346,13 @@ Surface analyse_surface(const MeshView& mesh, std::span<const Index> coincident)
     surface.areas.assign(vertices, 0);
     surface.normals.resize(vertices);
     {
-        const Incidence incidence = find_incidence(mesh, coincident);
+        const Places places(coincident);
+        const Incidence incidence = find_incidence(mesh, places);
+        const std::vector<FaceArea> areas = find_areas(mesh, places);
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices, grain), [&](const auto& range) {
-            SurfaceWorker worker(mesh, coincident, incidence, surface);
+            SurfaceWorker worker(mesh, places, incidence, areas, surface);
             for (std::size_t v = range.begin(); v < range.end(); ++v)
-                if (coincident[v] == v) worker(v);
+                if (coincident[v] == v) worker(static_cast<Index>(v));
         });
     }
     surface.closedness = find_closedness(mesh, coincident, surface);

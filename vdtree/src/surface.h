@@ -24,7 +24,7 @@ struct Surface {
     std::vector<glm::vec3> normals;
 };
 
-// Cost: linear, and 16 bytes a triangle while it lasts.
+// Cost: linear, and 48 bytes a triangle while it lasts.
 Surface analyse_surface(const MeshView& mesh, std::span<const Index> coincident);
 
 } // namespace unseen::vdtree
