@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 namespace unseen::vdtree {
 
@@ -134,16 +135,26 @@ TriangleOrder order_triangles(std::span<const Triangle> triangles, const NodeOrd
         });
     });
     order.first_triangle.assign(shape.interior() + 1, 0);
-    for (const NodeId node : vanishing) ++order.first_triangle[node + 1];
+    // Each thread looks at all triangles, for a range of the nodes: looking is cheap.
+    constexpr int most_ranges = 8;
+    const auto ranges = static_cast<std::size_t>(std::min(tbb::this_task_arena::max_concurrency(), most_ranges));
+    const auto for_each_of_range = [&](auto&& f) {
+        tbb::parallel_for(std::size_t{0}, ranges, [&](std::size_t r) {
+            const std::size_t begin = shape.interior() * r / ranges, size = shape.interior() * (r + 1) / ranges - begin;
+            for (std::size_t t = triangles.size(); t-- > 0;)
+                if (vanishing[t] - begin < size) f(t, order.first_triangle[vanishing[t] + 1]);
+        });
+    };
+    for_each_of_range([](std::size_t, Index& count) { ++count; });
     std::partial_sum(order.first_triangle.begin(), order.first_triangle.end(), order.first_triangle.begin());
     order.triangles.resize(triangles.size());
     order.sources.resize(triangles.size());
     // Each node's triangles are counted down from its end, the last triangle first.
-    for (std::size_t t = triangles.size(); t-- > 0;) {
-        const Index at = --order.first_triangle[vanishing[t] + 1];
+    for_each_of_range([&](std::size_t t, Index& end) {
+        const Index at = --end;
         for (std::size_t k = 0; k < 3; ++k) order.triangles[at][k] = nodes.leaf_of_vertex[triangles[t][k]];
         order.sources[at] = static_cast<Index>(t);
-    }
+    });
     // What was the end of a node is its beginning now, one place too high.
     std::move(order.first_triangle.begin() + 1, order.first_triangle.end(), order.first_triangle.begin());
     order.first_triangle.back() = static_cast<Index>(triangles.size());
