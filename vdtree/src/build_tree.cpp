@@ -223,7 +223,7 @@ public:
     Result<void> help();
 
 private:
-    void analyse();
+    Result<void> analyse();
     std::vector<float> find_luminance() const;
     Result<Clustering> cluster(Clusterer clusterer);
     void order(const Clustering& clustering);
@@ -248,7 +248,7 @@ private:
 
 Result<VertexTree> TreeBuilder::build(Clusterer clusterer) {
     if (reporter_.cancelled(0.0, "analysing")) return cancelled_error();
-    analyse();
+    if (const auto analysed = analyse(); !analysed) return analysed.error();
     if (reporter_.cancelled(clustering_begins, "clustering")) return cancelled_error();
     {
         const Result<Clustering> clustering = cluster(clusterer);
@@ -274,15 +274,22 @@ Result<VertexTree> TreeBuilder::build(Clusterer clusterer) {
 }
 
 Result<void> TreeBuilder::help() {
-    analyse();
+    if (const auto analysed = analyse(); !analysed) return analysed.error();
     const std::vector<float> luminance = find_luminance();
     return help_cluster_quadric({mesh_, luminance, surface_.normals, surface_.areas, coincident_}, *options_.team);
 }
 
-void TreeBuilder::analyse() {
+Result<void> TreeBuilder::analyse() {
     prelit_ = !mesh_.colours.empty();
     coincident_ = find_coincident(mesh_.positions);
-    surface_ = analyse_surface(mesh_, coincident_);
+    if (!options_.team || options_.clusterer != ClustererKind::quadric) { // only quadrics are helped with
+        surface_ = analyse_surface(mesh_, coincident_);
+        return {};
+    }
+    auto together = analyse_surface(mesh_, coincident_, *options_.team);
+    if (!together) return together.error();
+    surface_ = std::move(*together);
+    return {};
 }
 
 std::vector<float> TreeBuilder::find_luminance() const {

@@ -7,6 +7,8 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "prefetch.h"
+
 namespace unseen::vdtree {
 
 namespace {
@@ -20,6 +22,9 @@ struct ClusterPlace {
 };
 
 constexpr Index never = std::numeric_limits<Index>::max();
+
+// Parents lie anywhere: they are asked for so many clusters before they are needed.
+constexpr Index ahead = 16;
 
 } // namespace
 
@@ -46,12 +51,15 @@ NodeOrder order_nodes(const Clustering& clustering, Index vertices, Index lone) 
     // Up: children have lower numbers than their parents.
     std::vector<ClusterPlace> places(clusters - vertices);
     const auto place = [&](Index cluster) -> ClusterPlace& { return places[cluster - vertices]; };
+    const auto expect = [&](Index cluster) { prefetch(&place(parents[cluster])); };
     for (Index v = 0; v < vertices; ++v) {
+        expect(std::min(v + ahead, root));
         ClusterPlace& up = place(parents[v]);
         ++up.children;
         ++up.leaves;
     }
     for (Index c = vertices; c < clusters; ++c) {
+        expect(std::min(c + ahead, root));
         ClusterPlace& here = place(c);
         if (here.children > 1) ++here.nodes;
         if (c == root) break;
@@ -88,6 +96,7 @@ NodeOrder order_nodes(const Clustering& clustering, Index vertices, Index lone) 
 
     // Down: the last child takes the last leaves and nodes of its parent.
     for (Index c = root; c >= vertices; --c) {
+        expect(c - std::min(c, ahead));
         ClusterPlace& here = place(c);
         const NodeId parent = c == root ? top : place(parents[c]).node;
         Index leaf_end = vertices;
@@ -108,6 +117,7 @@ NodeOrder order_nodes(const Clustering& clustering, Index vertices, Index lone) 
         here.nodes = node_end;
     }
     for (Index v = vertices; v-- > 0;) {
+        expect(v - std::min(v, ahead));
         ClusterPlace& up = place(parents[v]);
         put_leaf(v, --up.leaves, up.node);
     }

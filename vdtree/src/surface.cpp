@@ -15,6 +15,7 @@
 #include <tbb/parallel_reduce.h>
 #include <tbb/task_arena.h>
 
+#include "message.h"
 #include "unit_vector.h"
 
 namespace unseen::vdtree {
@@ -138,31 +139,41 @@ private:
     bool any_ = false;
 };
 
-// By vertex that stands for its position: the triangles there, ascending.
+// Some of the vertices.
+struct VertexRange {
+    std::size_t begin, end;
+    std::size_t size() const { return end - begin; }
+    bool has(std::size_t v) const { return v - begin < size(); }
+};
+
+// By vertex of a range that stands for its position: the triangles there, ascending.
 struct Incidence {
+    VertexRange vertices;
     std::vector<Index> start, triangles;
     std::span<const Index> around(std::size_t v) const {
-        return std::span(triangles).subspan(start[v], start[v + 1] - start[v]);
+        const std::size_t at = v - vertices.begin;
+        return std::span(triangles).subspan(start[at], start[at + 1] - start[at]);
     }
 };
 
-Incidence find_incidence(const MeshView& mesh, const Places& places) {
-    Incidence incidence;
-    incidence.start.assign(mesh.positions.size() + 1, 0);
+Incidence find_incidence(const MeshView& mesh, const Places& places, VertexRange vertices) {
+    Incidence incidence{vertices, {}, {}};
+    incidence.start.assign(vertices.size() + 1, 0);
     // Each thread looks at all triangles, for a range of the places: they are soon seen, and counting is what takes time.
     constexpr int most_ranges = 8;
     const auto ranges = static_cast<std::size_t>(std::min(tbb::this_task_arena::max_concurrency(), most_ranges));
     const auto for_each_use = [&](auto&& use) {
         tbb::parallel_for(std::size_t{0}, ranges, [&](std::size_t r) {
-            const std::size_t begin = mesh.positions.size() * r / ranges, size = mesh.positions.size() * (r + 1) / ranges - begin;
+            const auto end_of = [&](std::size_t range) { return vertices.begin + vertices.size() * range / ranges; };
+            const VertexRange own{end_of(r), end_of(r + 1)};
             for (std::size_t t = mesh.triangles.size(); t-- > 0;)
                 for (const Index v : places.of(mesh.triangles[t]))
-                    if (v - begin < size) use(incidence.start[v], t);
+                    if (own.has(v)) use(incidence.start[v - vertices.begin], t);
         });
     };
     for_each_use([](Index& count, std::size_t) { ++count; });
     std::partial_sum(incidence.start.begin(), incidence.start.end(), incidence.start.begin());
-    incidence.triangles.resize(mesh.triangles.size() * 3);
+    incidence.triangles.resize(incidence.start.back());
     for_each_use([&](Index& end, std::size_t t) { incidence.triangles[--end] = static_cast<Index>(t); });
     return incidence;
 }
@@ -231,12 +242,14 @@ struct FaceArea {
     double sixth = 0; // of its length
 };
 
-// Nothing for triangles that the welding degenerates.
-std::vector<FaceArea> find_areas(const MeshView& mesh, const Places& places) {
+// Nothing for triangles that the welding degenerates, or that have no corner among the vertices.
+std::vector<FaceArea> find_areas(const MeshView& mesh, const Places& places, VertexRange vertices) {
     std::vector<FaceArea> areas(mesh.triangles.size());
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, areas.size(), grain), [&](const auto& range) {
         for (std::size_t t = range.begin(); t < range.end(); ++t) {
             const Triangle& corners = mesh.triangles[t];
+            const Triangle at = places.of(corners);
+            if (!vertices.has(at[0]) && !vertices.has(at[1]) && !vertices.has(at[2])) continue;
             if (places.degenerates(corners)) continue;
             const glm::dvec3& a = mesh.positions[corners[0]];
             const glm::dvec3 vector = glm::cross(mesh.positions[corners[1]] - a, mesh.positions[corners[2]] - a);
@@ -307,6 +320,118 @@ Closedness find_closedness(const MeshView& mesh, std::span<const Index> coincide
     return volume > 0 ? Closedness::closed_outward : volume < 0 ? Closedness::closed_inward : Closedness::open;
 }
 
+// What is found around the places of a range: for these, regularity and the sum of the faces; for all vertices there, areas.
+Surface survey(const MeshView& mesh, std::span<const Index> coincident, VertexRange range) {
+    Surface surface;
+    surface.irregular.assign(coincident.size(), 0);
+    surface.areas.assign(coincident.size(), 0);
+    surface.normals.resize(coincident.size());
+    const Places places(coincident);
+    const Incidence incidence = find_incidence(mesh, places, range);
+    const std::vector<FaceArea> areas = find_areas(mesh, places, range);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(range.begin, range.end, grain), [&](const auto& vertices) {
+        SurfaceWorker worker(mesh, places, incidence, areas, surface);
+        for (std::size_t v = vertices.begin(); v < vertices.end(); ++v)
+            if (coincident[v] == v) worker(static_cast<Index>(v));
+    });
+    return surface;
+}
+
+// What a range's survey leaves in a surface; the areas are those of the vertices there, ascending.
+struct SurveyPiece {
+    std::vector<std::uint8_t> irregular;
+    std::vector<glm::vec3> normals;
+    std::vector<double> areas;
+
+    template <class Message>
+    void exchange(Message& message) {
+        message(irregular), message(normals), message(areas);
+    }
+};
+
+SurveyPiece cut_out(const Surface& surface, std::span<const Index> coincident, VertexRange range) {
+    const auto begin = static_cast<std::ptrdiff_t>(range.begin), end = static_cast<std::ptrdiff_t>(range.end);
+    SurveyPiece piece{{surface.irregular.begin() + begin, surface.irregular.begin() + end},
+                      {surface.normals.begin() + begin, surface.normals.begin() + end},
+                      {}};
+    for (std::size_t v = 0; v < coincident.size(); ++v)
+        if (range.has(coincident[v])) piece.areas.push_back(surface.areas[v]);
+    return piece;
+}
+
+bool put_in(Surface& surface, std::span<const Index> coincident, VertexRange range, const SurveyPiece& piece) {
+    if (piece.irregular.size() != range.size() || piece.normals.size() != range.size()) return false;
+    std::copy(piece.irregular.begin(), piece.irregular.end(), surface.irregular.begin() + static_cast<std::ptrdiff_t>(range.begin));
+    std::copy(piece.normals.begin(), piece.normals.end(), surface.normals.begin() + static_cast<std::ptrdiff_t>(range.begin));
+    std::size_t next = 0;
+    for (std::size_t v = 0; v < coincident.size(); ++v) {
+        if (!range.has(coincident[v])) continue;
+        if (next == piece.areas.size()) return false;
+        surface.areas[v] = piece.areas[next++];
+    }
+    return next == piece.areas.size();
+}
+
+// Each member surveys a range, and all get all of it by way of member 0.
+Result<Surface> survey_together(const MeshView& mesh, std::span<const Index> coincident, Team& team) {
+    const auto members = static_cast<std::size_t>(team.size()), rank = static_cast<std::size_t>(team.rank());
+    const auto range_of = [&](std::size_t member) {
+        return VertexRange{coincident.size() * member / members, coincident.size() * (member + 1) / members};
+    };
+    Surface surface = survey(mesh, coincident, range_of(rank));
+    const auto send = [&](std::size_t to, VertexRange range) {
+        MessageWriter message;
+        cut_out(surface, coincident, range).exchange(message);
+        team.send(static_cast<int>(to), message.bytes());
+    };
+    const auto receive = [&](std::size_t from, VertexRange range) {
+        const std::vector<std::byte> bytes = team.receive(static_cast<int>(from));
+        MessageReader message(bytes);
+        SurveyPiece piece;
+        piece.exchange(message);
+        return message.complete() && put_in(surface, coincident, range, piece);
+    };
+    const Error strange{ErrorCode::malformed_data,
+                        "A process of the team sent something else than its part: all must run the same program on the same mesh."};
+    if (rank != 0) {
+        send(0, range_of(rank));
+        for (std::size_t other = 0; other < members; ++other)
+            if (other != rank && !receive(0, range_of(other))) return strange;
+        return surface;
+    }
+    for (std::size_t other = 1; other < members; ++other)
+        if (!receive(other, range_of(other))) return strange;
+    for (std::size_t to = 1; to < members; ++to)
+        for (std::size_t other = 0; other < members; ++other)
+            if (other != to) send(to, range_of(other));
+    return surface;
+}
+
+// From what is known by place to what is known by vertex.
+Surface complete(const MeshView& mesh, std::span<const Index> coincident, Surface surface) {
+    const std::size_t vertices = coincident.size();
+    surface.closedness = find_closedness(mesh, coincident, surface);
+    const bool inward = surface.closedness == Closedness::closed_inward;
+    const float face_sign = inward ? -1 : 1;
+    const double own_sign = inward && agreement_of_own_normals(mesh) > 0 ? -1 : 1;
+    // A vertex is as irregular as the position that it shares. Those that stand for their positions come last, for the others read them.
+    const auto spread = [&](bool standing) {
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices, grain), [&](const auto& range) {
+            for (std::size_t v = range.begin(); v < range.end(); ++v) {
+                const Index place = coincident[v];
+                if ((place == v) != standing) continue;
+                surface.irregular[v] = surface.irregular[place];
+                const bool own = !mesh.normals.empty() && has_length(mesh.normals[v]);
+                surface.normals[v] =
+                    own ? glm::vec3(own_sign * unit(glm::dvec3(mesh.normals[v]))) : face_sign * surface.normals[place];
+            }
+        });
+    };
+    spread(false);
+    spread(true);
+    return surface;
+}
+
 } // namespace
 
 std::vector<Index> find_coincident(std::span<const glm::dvec3> positions) {
@@ -340,41 +465,13 @@ std::vector<Index> find_coincident(std::span<const glm::dvec3> positions) {
 }
 
 Surface analyse_surface(const MeshView& mesh, std::span<const Index> coincident) {
-    const std::size_t vertices = mesh.positions.size();
-    Surface surface;
-    surface.irregular.assign(vertices, 0);
-    surface.areas.assign(vertices, 0);
-    surface.normals.resize(vertices);
-    {
-        const Places places(coincident);
-        const Incidence incidence = find_incidence(mesh, places);
-        const std::vector<FaceArea> areas = find_areas(mesh, places);
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices, grain), [&](const auto& range) {
-            SurfaceWorker worker(mesh, places, incidence, areas, surface);
-            for (std::size_t v = range.begin(); v < range.end(); ++v)
-                if (coincident[v] == v) worker(static_cast<Index>(v));
-        });
-    }
-    surface.closedness = find_closedness(mesh, coincident, surface);
-    const bool inward = surface.closedness == Closedness::closed_inward;
-    const float face_sign = inward ? -1 : 1;
-    const double own_sign = inward && agreement_of_own_normals(mesh) > 0 ? -1 : 1;
-    // A vertex is as irregular as the position that it shares. Those that stand for their positions come last, for the others read them.
-    const auto complete = [&](bool standing) {
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices, grain), [&](const auto& range) {
-            for (std::size_t v = range.begin(); v < range.end(); ++v) {
-                const Index place = coincident[v];
-                if ((place == v) != standing) continue;
-                surface.irregular[v] = surface.irregular[place];
-                const bool own = !mesh.normals.empty() && has_length(mesh.normals[v]);
-                surface.normals[v] =
-                    own ? glm::vec3(own_sign * unit(glm::dvec3(mesh.normals[v]))) : face_sign * surface.normals[place];
-            }
-        });
-    };
-    complete(false);
-    complete(true);
-    return surface;
+    return complete(mesh, coincident, survey(mesh, coincident, {0, coincident.size()}));
+}
+
+Result<Surface> analyse_surface(const MeshView& mesh, std::span<const Index> coincident, Team& team) {
+    auto surface = survey_together(mesh, coincident, team);
+    if (!surface) return surface.error();
+    return complete(mesh, coincident, std::move(*surface));
 }
 
 } // namespace unseen::vdtree
