@@ -249,7 +249,7 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
     std::string& name = o.fold_test;
     CLI::Option* test =
         group.add_option("--fold-test", name)->type_name("NAME")->check(CLI::IsMember(fold_test_list()));
-    test->description("luebke-hallen (perceptual; default), error (perceptual, far fewer triangles, measured and not yet proven), extent or displacement (in pixels; of --pixels: extent)");
+    test->description("luebke-hallen (perceptual; default), luebke-hallen-safe (the same with its known holes closed, more triangles), error (perceptual, far fewer triangles, measured and not yet proven), extent or displacement (in pixels; of --pixels: extent)");
     add_gaze_option(group, o.gaze_px);
     group.callback([=, &o] {
         const std::size_t given = full->count() + imperceptible->count() + triangles->count() + pixels->count();

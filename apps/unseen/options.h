@@ -34,9 +34,9 @@ struct DisplayOptions {
 };
 
 enum class Mode { full, imperceptible, budget, pixels };
-enum class FoldTest { luebke_hallen, error, extent, displacement }; // like perception::fold_test_names
+enum class FoldTest { luebke_hallen, luebke_hallen_safe, error, extent, displacement }; // like perception::fold_test_names
 
-constexpr bool is_perceptual(FoldTest test) { return test == FoldTest::error || test == FoldTest::luebke_hallen; }
+constexpr bool is_perceptual(FoldTest test) { return test != FoldTest::extent && test != FoldTest::displacement; }
 
 // WHAT.
 struct WhatOptions {

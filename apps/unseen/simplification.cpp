@@ -28,6 +28,8 @@ double milliseconds_since(Clock::time_point start) {
 
 bool is_perceptual(const WhatOptions& what) { return what.mode != Mode::full && is_perceptual(what.test); }
 
+bool has_distance_form_only(FoldTest test) { return test == FoldTest::error || test == FoldTest::luebke_hallen_safe; }
+
 // What silhouettes can be seen against.
 perception::SceneLuminance scene_luminance(const Scene& scene) {
     const vdtree::LuminanceRange range = scene.tree.luminance_range();
@@ -67,7 +69,8 @@ vdtree::AdjustStats adjust(vdtree::Cut& cut, const Scene& scene, const WhatOptio
     case FoldTest::displacement:
         return cut.adjust(vdtree::DisplacementCriterion(scene.tree, scene.view, tolerance_px, scene.placement),
                           options);
-    case FoldTest::error: // has the distance form only
+    case FoldTest::luebke_hallen_safe: // these have the distance form only
+    case FoldTest::error:
     case FoldTest::luebke_hallen: break;
     }
     return cut.adjust(
@@ -88,6 +91,10 @@ Effect fold_test_effect(const WhatOptions& what) {
     if (what.mode == Mode::full) return {"fold test", false, "nothing is folded in the full model"};
     if (what.test == FoldTest::error)
         return {"fold test", true, "error: what each fold changes in luminance and outline, against the contrast sensitivity"};
+    if (what.test == FoldTest::luebke_hallen_safe)
+        return {"fold test", true,
+                "luebke-hallen-safe: the worst grating of each fold with any neighbours folded, and the shift of the mean, against the contrast "
+                "sensitivity"};
     if (what.test == FoldTest::luebke_hallen)
         return {"fold test", true, "luebke-hallen: the worst grating of each fold against the contrast sensitivity"};
     return {"fold test", true, name_of(what.test) + ": pixels on the screen, whether they can be seen or not"};
@@ -238,7 +245,7 @@ vdtree::View widened(const vdtree::View& view) {
 } // namespace
 
 Result<Simplification> simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
-    if (what.mode != Mode::full && (what.fill_budget || what.milliseconds || what.test == FoldTest::error)) {
+    if (what.mode != Mode::full && (what.fill_budget || what.milliseconds || has_distance_form_only(what.test))) {
         Follower follower;
         follower.set_hysteresis(1);
         return follower.follow(cut, scene, what, purpose);
@@ -287,6 +294,10 @@ Result<const vdtree::DistanceCriterion*> Follower::criterion_for(const Scene& sc
         if (key.has_gaze)
             options.gaze_px = glm::dvec2(scene.view.width * 0.5 + key.farthest_gaze_px, scene.view.height * 0.5);
         if (what.test == FoldTest::luebke_hallen) return perception::luebke_hallen_distances(scene.tree, scene.view, options);
+        if (what.test == FoldTest::luebke_hallen_safe) {
+            if (!rings_) rings_ = vdtree::bound_cut_rings(scene.tree);
+            return perception::luebke_hallen_safe_distances(scene.tree, *rings_, scene.view, options);
+        }
         if (!errors_) errors_ = vdtree::measure_fold_errors(scene.tree);
         return perception::error_distances(scene.tree, *errors_, scene.view, options);
     }();
