@@ -136,20 +136,45 @@ class AroundSpheres {
 public:
     AroundSpheres(const CsfTable& csf, const Screen& screen) : csf_(csf), screen_(screen) {}
 
-    Visibility operator()(const Seen& seen, float contrast, double eccentricity_deg, double luminance_cdm2) const {
-        if (!seen.is_visible) return {};
-        // Where an extent passes, half of it is all that it comes nearer to the gaze; there the eye sees no less, so that this is
-        // the largest extent in question.
-        float nearer = static_cast<float>(std::max(0.0, eccentricity_deg - seen.largest_extent_deg / 2));
-        float luminance = static_cast<float>(luminance_cdm2), log2_frequency = 0;
-        csf_.highest_visible_log2_frequency({&contrast, 1}, {&nearer, 1}, {&luminance, 1}, {&log2_frequency, 1});
-        const Seen there = seen_at(log2_frequency, screen_);
-        if (!there.is_visible) return {};
-        const double reach = there.half < std::numbers::pi / 2 ? 1 / std::sin(there.half) : 1;
-        return {static_cast<float>(reach * (1 + reach_rounding)), static_cast<float>(screen_.pixel_deg / there.largest_extent_deg)};
+    // Here and where the gaze is.
+    Visibility operator()(const Seen& seen, const Seen& looked_at, double contrast, double eccentricity_deg, double luminance_cdm2) const {
+        if (!looked_at.is_visible) return {};
+        double largest_deg = looked_at.largest_extent_deg;
+        if (eccentricity_deg > 0) {
+            // What is not seen here at all may reach to where it is.
+            const double bound_deg = seen.is_visible ? seen.largest_extent_deg : std::max(2 * eccentricity_deg, looked_at.largest_extent_deg);
+            largest_deg = largest_extent(bound_deg, contrast, eccentricity_deg, luminance_cdm2);
+        }
+        const double half = largest_deg / screen_.largest_magnification / degrees_per_radian / 2;
+        const double reach = half < std::numbers::pi / 2 ? 1 / std::sin(half) : 1;
+        return {static_cast<float>(reach * (1 + reach_rounding)), static_cast<float>(screen_.pixel_deg / largest_deg)};
     }
 
 private:
+    // An extent is nearer to the gaze than what is counted by half of its width at most: the largest that is not seen there. Of a fixed series
+    // of extents, so that more contrast never makes it larger.
+    double largest_extent(double bound_deg, double contrast, double eccentricity_deg, double luminance_cdm2) const {
+        const auto extent = [](int step) { return std::exp2(step / steps_per_octave); };
+        const auto is_unseen = [&](int step) {
+            const double nearer = std::max(0.0, eccentricity_deg - extent(step) / 2);
+            return contrast * csf_.monotone_sensitivity(CyclesPerDegree(1 / (2 * extent(step))), Degrees(nearer), Luminance(luminance_cdm2)) <= 1;
+        };
+        int above = static_cast<int>(std::floor(steps_per_octave * std::log2(bound_deg))) + 1, below = above - 1;
+        for (int stride = 1; !is_unseen(below); stride *= 2) {
+            if (extent(below) < screen_.pixel_deg / smallest_of_a_pixel) return extent(below);
+            above = below;
+            below -= stride;
+        }
+        while (above - below > 1) {
+            const int middle = below + (above - below) / 2;
+            (is_unseen(middle) ? below : above) = middle;
+        }
+        return extent(below);
+    }
+
+    static constexpr double steps_per_octave = 128;
+    static constexpr double smallest_of_a_pixel = 1024; // far below what any fold costs 1 at
+
     const CsfTable& csf_;
     const Screen& screen_;
 };
@@ -164,16 +189,18 @@ void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes
     for (std::size_t bin = 0; bin < bins; ++bin) eccentricity[bin] = static_cast<float>(static_cast<double>(bin) * degrees_per_bin);
     for (std::size_t i = 0; i < rows.levels().size(); ++i) {
         const Level& level = rows.levels()[i];
+        float *const reach = &parts.reach[(i + 1) * bins], *const least_cost = &parts.least_cost[(i + 1) * bins];
         const double in_cdm2 = levels.luminance(level.luminance), shift = Classes::shift(level.shift);
         contrast.fill(static_cast<float>(Classes::contrast(level.contrast)));
         luminance.fill(static_cast<float>(in_cdm2));
         csf.highest_visible_log2_frequency(std::span(contrast).first(bins), std::span(eccentricity).first(bins),
                                            std::span(luminance).first(bins), std::span(log2_frequency).first(bins));
-        float *const reach = &parts.reach[(i + 1) * bins], *const least_cost = &parts.least_cost[(i + 1) * bins];
+        const Seen looked_at = seen_at(log2_frequency[0], screen);
         for (std::size_t bin = 0; bin < bins; ++bin) {
             const Seen seen = seen_at(log2_frequency[bin], screen);
-            const double eccentricity_deg = static_cast<double>(eccentricity[bin]);
-            Visibility here = is_around_spheres ? around_spheres(seen, contrast[bin], eccentricity_deg, in_cdm2) : visibility_of(seen, screen);
+            const auto eccentricity_deg = static_cast<double>(eccentricity[bin]);
+            Visibility here = is_around_spheres ? around_spheres(seen, looked_at, Classes::contrast(level.contrast), eccentricity_deg, in_cdm2)
+                                                : visibility_of(seen, screen);
             if (shift > 0)
                 here.least_cost = std::max(here.least_cost, static_cast<float>(shift * csf.peak_sensitivity(Degrees(eccentricity_deg), Luminance(in_cdm2))));
             // The table's own rounding must not make anything grow with the eccentricity.
