@@ -45,6 +45,7 @@ struct WhatOptions {
     std::string fold_test = "luebke-hallen"; // as it was given
     std::uint32_t triangles = 0;             // of Mode::budget
     double pixels = 0;                       // of Mode::pixels
+    bool chroma = false;                     // look at colour, too
     bool fill_budget = false;                // of Mode::budget: go on where nothing more can be seen
     std::optional<double> milliseconds;      // at most so long for the cut
     std::optional<glm::dvec2> gaze_px;

@@ -41,6 +41,7 @@ perception::FoldTestOptions test_options(const Scene& scene, const WhatOptions& 
     test.display = scene.display;
     test.scene = scene_luminance(scene);
     test.csf = &scene.csf_table();
+    test.chroma = what.chroma;
     if (!what.gaze_px) return test;
     const perception::CsfTable* around_gaze = scene.csf_table(perception::Degrees(what.gaze_margin_deg));
     if (!around_gaze) return test;
@@ -135,6 +136,13 @@ Effect prelit_effect(const Scene& scene) {
             scene.tree.colours().empty() ? "the mesh has no colours" : "--light or --ambient lights the colours"};
 }
 
+Effect chroma_effect(const Scene& scene, const WhatOptions& what) {
+    if (!is_perceptual(what)) return {"chroma", false, "only the perceptual fold test knows it"};
+    if (!what.chroma) return {"chroma", false, "without --chroma only luminance counts"};
+    if (scene.tree.ring_chroma().empty()) return {"chroma", false, "nothing has any colour"};
+    return {"chroma", true, "red-green and yellow-violet contrast count beside that of luminance, by castleCSF"};
+}
+
 Effect light_effect(const Scene& scene) {
     if (scene.is_relit)
         return {"light", true, "luminance and its bounds were computed again for another light than the tree's"};
@@ -183,10 +191,12 @@ Effect distance_effect(const WhatOptions& what, const Simplification& result) {
     return {name, true, "the display's distance times the largest fold cost"};
 }
 
+bool is_translucent(const Scene& scene) { return scene.tree.bounds()[vdtree::VertexTree::root()].flags & vdtree::translucent_ring; }
+
 // Whether faces that look away can be folded: they are not drawn, and nothing shows them from outside.
 bool culls_back_faces(const Scene& scene) {
     const PlacedSphere sphere = placed_sphere(scene.tree, scene.placement);
-    return scene.tree.closedness() == vdtree::Closedness::closed_outward &&
+    return !is_translucent(scene) && scene.tree.closedness() == vdtree::Closedness::closed_outward &&
            glm::length(scene.view.eye - sphere.centre) > sphere.radius;
 }
 
@@ -202,7 +212,15 @@ Effect back_face_effect(const Scene& scene) {
     if (culls_back_faces(scene)) return {"back-face folding", true, "what faces away is not drawn, so it is folded"};
     if (scene.tree.closedness() != vdtree::Closedness::closed_outward)
         return {"back-face folding", false, "the surface is open or inside out"};
+    if (is_translucent(scene)) return {"back-face folding", false, "what faces away may show through"};
     return {"back-face folding", false, "the eye is in the model"};
+}
+
+Effect translucency_effect(const Scene& scene, const WhatOptions& what) {
+    if (!is_perceptual(what)) return {"translucency", false, "only the perceptual fold test knows it"};
+    if (!is_translucent(scene)) return {"translucency", false, "no vertex has an alpha below 1"};
+    if (what.test == FoldTest::error) return {"translucency", false, "the fold test error does not know it"};
+    return {"translucency", true, "where a vertex has an alpha below 1, anything in the scene may show through"};
 }
 
 // Every effect with its reason.
@@ -211,6 +229,8 @@ void add_effects(Simplification& result, const Scene& scene, const WhatOptions& 
                       gaze_effect(what),
                       silhouette_effect(scene, what),
                       csf_effect(scene, what),
+                      chroma_effect(scene, what),
+                      translucency_effect(scene, what),
                       prelit_effect(scene),
                       light_effect(scene),
                       frustum_effect(what, purpose),
@@ -245,7 +265,7 @@ vdtree::View widened(const vdtree::View& view) {
 } // namespace
 
 Result<Simplification> simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
-    if (what.mode != Mode::full && (what.fill_budget || what.milliseconds || has_distance_form_only(what.test))) {
+    if (what.mode != Mode::full && (what.fill_budget || what.milliseconds || what.chroma || has_distance_form_only(what.test))) {
         Follower follower;
         follower.set_hysteresis(1);
         return follower.follow(cut, scene, what, purpose);
@@ -277,6 +297,7 @@ Result<const vdtree::DistanceCriterion*> Follower::criterion_for(const Scene& sc
         const perception::FoldTestOptions options = test_options(scene, what);
         key.has_gaze = options.gaze_px.has_value();
         key.csf = options.csf;
+        key.chroma = options.chroma;
         // A gaze off the window reaches into larger magnifications: one criterion must do for all gazes up to there, so they are
         // rounded up to whole windows.
         if (key.has_gaze) {

@@ -74,6 +74,7 @@ private:
         double fov_y_degrees = 0;
         float background = 0;
         const perception::CsfTable* csf = nullptr;
+        bool chroma = false;
         bool operator==(const Key&) const = default;
     };
     Result<const vdtree::DistanceCriterion*> criterion_for(const Scene& scene, const WhatOptions& what);

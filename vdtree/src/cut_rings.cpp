@@ -4,10 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <type_traits>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <tbb/parallel_for.h>
 
+#include "chroma.h"
 #include "tree_parts.h"
 #include "vertex_tree_data.h"
 
@@ -37,9 +40,11 @@ struct Box {
 
 PackedRange unite(PackedRange a, PackedRange b) { return {std::min(a.lo, b.lo), std::max(a.hi, b.hi)}; }
 
-// An area, and its luminance times the area.
+// An area, and what is drawn there times the area.
+template <class Light> // luminance, or luminance and chroma
 struct Lit {
-    double area = 0, light = 0;
+    double area = 0;
+    Light light = Light(0);
     Lit& operator+=(const Lit& other) {
         area += other.area;
         light += other.light;
@@ -47,10 +52,33 @@ struct Lit {
     }
 };
 
+// Of grey trees.
+struct GreyVertices {
+    using Light = double;
+    explicit GreyVertices(const VertexTree& tree) : luminance(tree.luminance()) {}
+    double operator[](NodeId node) const { return static_cast<double>(luminance[node].value) / Unorm16::largest; }
+    std::span<const Unorm16> luminance;
+};
+
+struct ColouredVertices {
+    using Light = glm::dvec3;
+    explicit ColouredVertices(const VertexTree& tree) : luminance(tree.luminance()), chroma(luminance.size()) {
+        tbb::parallel_for(std::size_t{0}, chroma.size(), [&](std::size_t node) { chroma[node] = drawn_chroma(tree.colours()[node], luminance[node]); });
+    }
+    glm::dvec3 operator[](NodeId node) const { return {static_cast<double>(luminance[node].value) / Unorm16::largest, chroma[node].x, chroma[node].y}; }
+    std::span<const Unorm16> luminance;
+    std::vector<glm::vec2> chroma;
+};
+
+template <class Vertices>
 class RingBounder {
+    using Light = typename Vertices::Light;
+    using Lit = vdtree::Lit<Light>;
+    static constexpr bool has_chroma = !std::is_same_v<Light, double>;
+
 public:
     explicit RingBounder(const VertexTree& tree)
-        : tree_(tree), g_(*tree.data().geometry), l_(tree.data().light), interior_(tree.interior_count()),
+        : tree_(tree), g_(*tree.data().geometry), l_(tree.data().light), interior_(tree.interior_count()), vertices_(tree),
           parts_({g_.parents, g_.first_leaf, g_.leaf_end, g_.subtree_end}), around_(interior_), left_(interior_) {
         parts_.assign_triangles(g_.first_triangle, g_.triangles);
     }
@@ -59,6 +87,10 @@ public:
         rings_.luminance.assign(g_.bounds.size(), {});
         rings_.radius.resize(interior_);
         rings_.mean_shift.assign(interior_, 0);
+        if constexpr (has_chroma) {
+            rings_.chroma.assign(l_.ring_chroma.begin(), l_.ring_chroma.end());
+            rings_.mean_chroma_shift.assign(interior_, glm::vec2(0));
+        }
         for (NodeId node = 0; node < interior_; ++node) {
             rings_.luminance[node] = l_.ring_range[node];
             rings_.radius[node] = g_.bounds[node].ring.radius;
@@ -93,16 +125,19 @@ private:
         NodeId other = parent_of_leaf(neighbour);
         Box places;
         PackedRange lights{{Unorm16::largest}, {0}};
+        ChromaRange colours = no_chroma_yet;
         int steps = 0;
         for (NodeId node = parent_of_leaf(here); node != no_node && !supports(node, neighbour); node = g_.parents[node]) {
             for (; !supports(other, here) && !is_larger(other, node); other = g_.parents[other]) {
                 places.include(g_.positions[other]);
                 lights = unite(lights, {l_.luminance[other], l_.luminance[other]});
+                if constexpr (has_chroma) colours = unite(colours, {vertices_.chroma[other], vertices_.chroma[other]});
                 ++steps;
             }
             if (++steps > most_steps) return reach_everywhere(part, node);
             if (!parts_.owns(part, node) || places.is_empty() || is_coincident(node)) continue;
             rings_.luminance[node] = unite(rings_.luminance[node], lights);
+            if constexpr (has_chroma) rings_.chroma[node] = unite(rings_.chroma[node], colours);
             include(rings_.radius[node], places.farthest_from(g_.bounds[node].ring.centre));
         }
     }
@@ -112,6 +147,7 @@ private:
         while (node != no_node && !parts_.owns(part, node)) node = parts_.is_top(node) ? no_node : g_.parents[node];
         if (node == no_node) return;
         rings_.luminance[node] = {{0}, {Unorm16::largest}};
+        if constexpr (has_chroma) rings_.chroma[node] = l_.ring_chroma[VertexTree::root()];
         rings_.radius[node] = std::numeric_limits<float>::max();
     }
 
@@ -141,8 +177,7 @@ private:
     Lit light_of(NodeId a, NodeId b, NodeId c) const {
         const glm::dvec3 at = g_.positions[a];
         const double area = glm::length(glm::cross(glm::dvec3(g_.positions[b]) - at, glm::dvec3(g_.positions[c]) - at)) / 2;
-        const int sum = l_.luminance[a].value + l_.luminance[b].value + l_.luminance[c].value;
-        return {area, area * sum / (3.0 * Unorm16::largest)};
+        return {area, (vertices_[a] + vertices_[b] + vertices_[c]) * (area / 3)};
     }
 
     // Running sums: over the triangles in their order, and over the leaves of a third of the areas around each.
@@ -167,11 +202,17 @@ private:
         for (NodeId node = 0; node < interior_; ++node) {
             // With two corners or more in the support they vanish somewhere under the node.
             const Lit &first = before_triangle_[g_.first_triangle[node]], &end = before_triangle_[g_.first_triangle[g_.subtree_end[node]]];
-            const double area = around_[node].area + end.area - first.area, light = around_[node].light + end.light - first.light;
+            const double area = around_[node].area + end.area - first.area;
+            const Light light = around_[node].light + end.light - first.light;
             const double own = before_leaf_[g_.leaf_end[node]] - before_leaf_[g_.first_leaf[node]];
             if (!(own > least_share * whole) || !(area > 0)) continue;
-            const double shift = std::abs(left_[node].light - light / area * left_[node].area) / own;
-            rings_.mean_shift[node] = static_cast<float>(std::min(shift, 1.0));
+            const Light shift = glm::abs(left_[node].light - light * (left_[node].area / area)) / own;
+            if constexpr (has_chroma) {
+                rings_.mean_shift[node] = static_cast<float>(std::min(shift.x, 1.0));
+                rings_.mean_chroma_shift[node] = glm::vec2(shift.y, shift.z);
+            } else {
+                rings_.mean_shift[node] = static_cast<float>(std::min(shift, 1.0));
+            }
         }
     }
 
@@ -179,12 +220,17 @@ private:
         rings_.luminance[parent] = unite(rings_.luminance[parent], rings_.luminance[child]);
         rings_.radius[parent] = std::max(rings_.radius[parent], rings_.radius[child]);
         rings_.mean_shift[parent] = std::max(rings_.mean_shift[parent], rings_.mean_shift[child]);
+        if constexpr (has_chroma) {
+            rings_.chroma[parent] = unite(rings_.chroma[parent], rings_.chroma[child]);
+            rings_.mean_chroma_shift[parent] = glm::max(rings_.mean_chroma_shift[parent], rings_.mean_chroma_shift[child]);
+        }
     }
 
     const VertexTree& tree_;
     const TreeGeometry& g_;
     const TreeLuminance& l_;
     NodeId interior_;
+    Vertices vertices_;
     TreeParts parts_;
     CutRings rings_;
     std::vector<Lit> around_, left_; // by node: of the triangles with one corner in the support, before and after its fold
@@ -194,6 +240,8 @@ private:
 
 } // namespace
 
-CutRings bound_cut_rings(const VertexTree& tree) { return RingBounder(tree).run(); }
+CutRings bound_cut_rings(const VertexTree& tree) {
+    return tree.ring_chroma().empty() ? RingBounder<GreyVertices>(tree).run() : RingBounder<ColouredVertices>(tree).run();
+}
 
 } // namespace unseen::vdtree

@@ -26,6 +26,9 @@ struct FoldTestOptions {
     SceneLuminance scene = {};
     std::optional<glm::dvec2> gaze_px = {}; // in the window, from the top left; may lie outside. Default: foveal everywhere
     const CsfTable* csf = nullptr;          // must outlive the criterion; default: CsfTable::standard()
+    // Look at colour, too, where the tree has any: the Luebke-Hallen tests in distance form then fold where sqrt((c S)^2 + (c_rg S_rg)^2 +
+    // (c_yv S_yv)^2) <= 1, with the contrasts of the ring's range in both opponent directions and castleCSF's sensitivities to them.
+    bool chroma = false;
 };
 
 // Luebke and Hallen 2001, section 3.3, in its safe form: extent and luminance range of the ring, facing of the dilated

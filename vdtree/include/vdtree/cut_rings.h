@@ -23,6 +23,10 @@ struct CutRings {
     // different nodes do not overlap: where neighbours fold, their light changes by the mean of these, weighted by their areas, at most. At
     // least as large as the children's.
     std::vector<float> mean_shift;
+
+    // The same of the colours, as they are drawn; empty where the tree's ring_chroma() is.
+    std::vector<ChromaRange> chroma;
+    std::vector<glm::vec2> mean_chroma_shift; // 0 or more
 };
 
 // Under the tree's light. Cost: some microseconds a triangle; in parallel. Results do not depend on the threads.
