@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -38,21 +39,23 @@ struct ClassSeries {
 
 inline constexpr ClassSeries contrasts{12, -9, 9}; // Michelson's
 inline constexpr ClassSeries shifts{3, -9, 10};    // of the mean over the middle of the range
-// Of colour: red-green, or a tenth of yellow-violet, whichever is more. Eyes are about ten times as sensitive to the one as to the other at any
-// frequency, so that little is lost by one number for both.
-inline constexpr ClassSeries chroma_contrasts{3, -13, 16};
-inline constexpr ClassSeries chroma_shifts{1, -13, 16};
-inline constexpr double yellow_violet_per_red_green = 10;
+// Of colour, in both directions.
+inline constexpr ClassSeries chroma_contrasts{3, -13, 18};
+inline constexpr ClassSeries chroma_shifts{1, -13, 18};
 
 inline constexpr std::size_t luminance_count = 16;
 
 struct Level {
-    std::size_t contrast = 0, luminance = 0, shift = 0, chroma = 0, chroma_shift = 0; // classes
+    std::size_t contrast = 0, luminance = 0, shift = 0; // classes
+    std::array<std::size_t, 2> chroma{}, chroma_shift{}; // red-green and yellow-violet
 
-    bool is_nothing() const { return contrast == 0 && chroma == 0; }
+    bool is_nothing() const { return contrast == 0 && chroma[0] == 0 && chroma[1] == 0; }
     std::size_t grey_number() const { return (shift * luminance_count + luminance) * contrasts.count() + contrast; }
     std::uint64_t number() const {
-        return (std::uint64_t{chroma_shift} * chroma_contrasts.count() + chroma) * grey_count + grey_number();
+        std::uint64_t number = 0;
+        for (std::size_t i = 0; i < 2; ++i)
+            number = (number * chroma_shifts.count() + chroma_shift[i]) * chroma_contrasts.count() + chroma[i];
+        return number * grey_count + grey_number();
     }
     static constexpr std::size_t grey_count = shifts.count() * luminance_count * contrasts.count();
 };
@@ -60,10 +63,9 @@ struct Level {
 // What a node's ring may show, before it is put into classes.
 struct RingLooks {
     vdtree::LuminanceRange range;
-    double adaptation = 0;   // relative luminance
-    double shift = 0;        // contrast
-    double chroma = 0;       // contrast
-    double chroma_shift = 0; // contrast
+    double adaptation = 0; // relative luminance
+    double shift = 0;      // contrast, and so on
+    glm::dvec2 chroma = glm::dvec2(0), chroma_shift = glm::dvec2(0);
 };
 
 // The display's luminances and the classes that they fall into.
@@ -77,7 +79,8 @@ public:
         const double lo = in_cdm2(looks.range.lo), hi = in_cdm2(looks.range.hi);
         const double l = std::ceil(std::log2(std::max(in_cdm2(looks.adaptation), lowest()) / lowest()) / log2_step_ - ClassSeries::edge);
         return {contrasts.of((hi - lo) / (hi + lo)), static_cast<std::size_t>(std::clamp(l, 0.0, static_cast<double>(luminance_count - 1))),
-                shifts.of(looks.shift), chroma_contrasts.of(looks.chroma), chroma_shifts.of(looks.chroma_shift)};
+                shifts.of(looks.shift), {chroma_contrasts.of(looks.chroma.x), chroma_contrasts.of(looks.chroma.y)},
+                {chroma_shifts.of(looks.chroma_shift.x), chroma_shifts.of(looks.chroma_shift.y)}};
     }
     double luminance(std::size_t luminance_class) const {
         return lowest() * std::exp2(log2_step_ * static_cast<double>(luminance_class)) * (1 + 2 * ClassSeries::edge);
@@ -87,11 +90,11 @@ public:
     double contrast(double difference, vdtree::LuminanceRange range) const {
         return span_ * difference / std::max((in_cdm2(range.lo) + in_cdm2(range.hi)) / 2, lowest());
     }
-    // Of differences in both directions of colour, for chroma_contrasts.
-    double chroma_contrast(glm::dvec2 difference, vdtree::LuminanceRange range) const {
-        const double largest = std::max(difference.x, difference.y / yellow_violet_per_red_green);
+    // Of differences in both directions of colour.
+    glm::dvec2 chroma_contrast(glm::dvec2 difference, vdtree::LuminanceRange range) const {
         // What a damaged file holds may be no number, or negative: it can always be seen.
-        return difference.x >= 0 && difference.y >= 0 ? contrast(largest, range) : std::numeric_limits<double>::infinity();
+        const auto in = [&](double d) { return d >= 0 ? contrast(d, range) : std::numeric_limits<double>::infinity(); };
+        return {in(difference.x), in(difference.y)};
     }
 
 private:
@@ -130,8 +133,10 @@ private:
         };
         round(level.contrast, contrasts.count());
         round(level.shift, shifts.count());
-        round(level.chroma, chroma_contrasts.count());
-        round(level.chroma_shift, chroma_shifts.count());
+        for (std::size_t i = 0; i < 2; ++i) {
+            round(level.chroma[i], chroma_contrasts.count());
+            round(level.chroma_shift[i], chroma_shifts.count());
+        }
         return level;
     }
 

@@ -42,11 +42,15 @@ Sensitivities sensitivities_for(const FoldTestOptions& options, bool has_chroma)
 
 // A row of the table: how visible its contrasts are.
 struct Row {
-    double contrast, shift, chroma, chroma_shift, luminance_cdm2;
+    double contrast, shift, luminance_cdm2;
+    glm::dvec2 chroma, chroma_shift;
 
     Row(const Level& level, const Classes& classes)
-        : contrast(contrasts.value(level.contrast)), shift(shifts.value(level.shift)), chroma(chroma_contrasts.value(level.chroma)),
-          chroma_shift(chroma_shifts.value(level.chroma_shift)), luminance_cdm2(classes.luminance(level.luminance)) {}
+        : contrast(contrasts.value(level.contrast)), shift(shifts.value(level.shift)), luminance_cdm2(classes.luminance(level.luminance)),
+          chroma(chroma_contrasts.value(level.chroma[0]), chroma_contrasts.value(level.chroma[1])),
+          chroma_shift(chroma_shifts.value(level.chroma_shift[0]), chroma_shifts.value(level.chroma_shift[1])) {}
+
+    bool has_chroma() const { return chroma != glm::dvec2(0); }
 
     // 1 is just visible: of a grating of this frequency in all directions of colour.
     double visibility(const Sensitivities& see, double frequency_cpd, double eccentricity_deg) const {
@@ -54,18 +58,18 @@ struct Row {
         const Degrees eccentricity(eccentricity_deg);
         const Luminance luminance(luminance_cdm2);
         const double grey = contrast > 0 ? contrast * see.luminance.monotone_sensitivity(frequency, eccentricity, luminance) : 0;
-        if (!(chroma > 0)) return grey;
-        return std::hypot(grey, chroma * see.red_green->monotone_sensitivity(frequency, eccentricity, luminance),
-                          yellow_violet_per_red_green * chroma * see.yellow_violet->monotone_sensitivity(frequency, eccentricity, luminance));
+        if (!has_chroma()) return grey;
+        return std::hypot(grey, chroma.x * see.red_green->monotone_sensitivity(frequency, eccentricity, luminance),
+                          chroma.y * see.yellow_violet->monotone_sensitivity(frequency, eccentricity, luminance));
     }
     // Of the shifts of the mean, at whatever frequency they are seen best.
     double shift_visibility(const Sensitivities& see, double eccentricity_deg) const {
         const Degrees eccentricity(eccentricity_deg);
         const Luminance luminance(luminance_cdm2);
         const double grey = shift > 0 ? shift * see.luminance.peak_sensitivity(eccentricity, luminance) : 0;
-        if (!(chroma_shift > 0)) return grey;
-        return std::hypot(grey, chroma_shift * see.red_green->peak_sensitivity(eccentricity, luminance),
-                          yellow_violet_per_red_green * chroma_shift * see.yellow_violet->peak_sensitivity(eccentricity, luminance));
+        if (chroma_shift == glm::dvec2(0)) return grey;
+        return std::hypot(grey, chroma_shift.x * see.red_green->peak_sensitivity(eccentricity, luminance),
+                          chroma_shift.y * see.yellow_violet->peak_sensitivity(eccentricity, luminance));
     }
 };
 
@@ -142,7 +146,7 @@ void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes
     std::array<double, bin_count> extents;
     for (std::size_t i = 0; i < rows.levels().size(); ++i) {
         const Row row(rows.levels()[i], classes);
-        if (is_around_spheres || row.chroma > 0) {
+        if (is_around_spheres || row.has_chroma()) {
             LargestExtents largest(row, see, screen, is_around_spheres);
             for (std::size_t bin = 0; bin < bins; ++bin) extents[bin] = largest.at(static_cast<double>(bin) * degrees_per_bin);
         } else {
@@ -189,8 +193,8 @@ struct Rings {
 void saturate(RingLooks& parent, const RingLooks& child) {
     parent.adaptation = std::max(parent.adaptation, child.adaptation);
     parent.shift = std::max(parent.shift, child.shift);
-    parent.chroma = std::max(parent.chroma, child.chroma);
-    parent.chroma_shift = std::max(parent.chroma_shift, child.chroma_shift);
+    parent.chroma = glm::max(parent.chroma, child.chroma);
+    parent.chroma_shift = glm::max(parent.chroma_shift, child.chroma_shift);
 }
 
 // Puts all nodes into classes. False where there are too many of them for rows so fine.
@@ -210,12 +214,12 @@ bool classify(const vdtree::VertexTree& tree, const Rings& rings, const FoldTest
         if (!rings.mean_shift.empty())
             inside.shift = std::max(inside.shift, classes.contrast(static_cast<double>(rings.mean_shift[node]), rings.luminance[node]));
         if (has_chroma) {
-            inside.chroma = std::max(inside.chroma, classes.chroma_contrast(is_translucent ? of_scene : half_of(rings.chroma[node]), inside.range));
-            outline.chroma = std::max({outline.chroma, inside.chroma, classes.chroma_contrast(of_scene, outline.range)});
+            inside.chroma = glm::max(inside.chroma, classes.chroma_contrast(is_translucent ? of_scene : half_of(rings.chroma[node]), inside.range));
+            outline.chroma = glm::max(glm::max(outline.chroma, inside.chroma), classes.chroma_contrast(of_scene, outline.range));
             if (!rings.mean_chroma_shift.empty())
-                inside.chroma_shift = std::max(inside.chroma_shift, classes.chroma_contrast(rings.mean_chroma_shift[node], rings.luminance[node]));
+                inside.chroma_shift = glm::max(inside.chroma_shift, classes.chroma_contrast(rings.mean_chroma_shift[node], rings.luminance[node]));
         }
-        saturate(outline, {outline.range, std::max(inside.adaptation, middle_of(outline.range)), inside.shift, 0, inside.chroma_shift});
+        saturate(outline, {outline.range, std::max(inside.adaptation, middle_of(outline.range)), inside.shift, glm::dvec2(0), inside.chroma_shift});
         fold_classes[node] = {rows.of(classes.level(inside)), rows.of(classes.level(outline))};
         if (rows.is_full()) return false;
         if (node == 0) break;
