@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <unordered_map>
+#include <vector>
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -143,14 +145,19 @@ void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes
     const bool is_around_spheres = !parts.lengths.empty();
     parts.reach.assign((rows.levels().size() + 1) * bins, DistanceCriterion::never_visible);
     parts.least_cost.assign(parts.reach.size(), 0);
-    std::array<double, bin_count> extents;
+    std::unordered_map<std::uint64_t, std::vector<double>> known; // extents, which do not depend on shifts of the mean
     for (std::size_t i = 0; i < rows.levels().size(); ++i) {
         const Row row(rows.levels()[i], classes);
-        if (is_around_spheres || row.has_chroma()) {
+        Level without_shifts = rows.levels()[i];
+        without_shifts.shift = 0;
+        without_shifts.chroma_shift = {};
+        const auto [found, is_new] = known.try_emplace(without_shifts.number(), bins);
+        std::vector<double>& extents = found->second;
+        if (is_new && (is_around_spheres || row.has_chroma())) {
             LargestExtents largest(row, see, screen, is_around_spheres);
             for (std::size_t bin = 0; bin < bins; ++bin) extents[bin] = largest.at(static_cast<double>(bin) * degrees_per_bin);
-        } else {
-            find_largest_extents(row, see.luminance, std::span(extents).first(bins));
+        } else if (is_new) {
+            find_largest_extents(row, see.luminance, extents);
         }
         float *const reach = &parts.reach[(i + 1) * bins], *const least_cost = &parts.least_cost[(i + 1) * bins];
         for (std::size_t bin = 0; bin < bins; ++bin) {
