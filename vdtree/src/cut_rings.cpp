@@ -63,9 +63,12 @@ struct GreyVertices {
 struct ColouredVertices {
     using Light = glm::dvec3;
     explicit ColouredVertices(const VertexTree& tree) : luminance(tree.luminance()), chroma(luminance.size()) {
-        tbb::parallel_for(std::size_t{0}, chroma.size(), [&](std::size_t node) { chroma[node] = drawn_chroma(tree.colours()[node], luminance[node]); });
+        tbb::parallel_for(std::size_t{0}, chroma.size(),
+                          [&](std::size_t node) { chroma[node] = drawn_chroma(tree.colours()[node], luminance[node]); });
     }
-    glm::dvec3 operator[](NodeId node) const { return {static_cast<double>(luminance[node].value) / Unorm16::largest, chroma[node].x, chroma[node].y}; }
+    glm::dvec3 operator[](NodeId node) const {
+        return {static_cast<double>(luminance[node].value) / Unorm16::largest, chroma[node].x, chroma[node].y};
+    }
     std::span<const Unorm16> luminance;
     std::vector<glm::vec2> chroma;
 };
