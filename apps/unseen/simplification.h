@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <vdtree/cut.h>
+#include <vdtree/cut_rings.h>
 #include <vdtree/fold_errors.h>
 #include <vdtree/geomorph.h>
 
@@ -73,6 +74,7 @@ private:
         double fov_y_degrees = 0;
         float background = 0;
         const perception::CsfTable* csf = nullptr;
+        bool chroma = false;
         bool operator==(const Key&) const = default;
     };
     Result<const vdtree::DistanceCriterion*> criterion_for(const Scene& scene, const WhatOptions& what);
@@ -85,6 +87,7 @@ private:
     Key key_;
     std::optional<vdtree::DistanceCriterion> criterion_;
     std::optional<vdtree::FoldErrors> errors_; // of the scene's tree; made when they are first asked for
+    std::optional<vdtree::CutRings> rings_;    // likewise
     std::optional<vdtree::Geomorph> geomorph_;
     double passed_ = 0; // seconds since its last step
 };

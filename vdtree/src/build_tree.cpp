@@ -230,6 +230,7 @@ private:
     void place_vertices(const Clustering& clustering);
     void bound();
     LeafPlaces find_places() const;
+    std::vector<std::uint8_t> find_translucent(std::span<const Triangle> triangles) const;
 
     const MeshView& source_;
     const MeshView& mesh_;
@@ -360,6 +361,22 @@ LeafPlaces TreeBuilder::find_places() const {
     return places;
 }
 
+// By interior node: whether a corner of its ring has an alpha below 1. Empty where none has.
+std::vector<std::uint8_t> TreeBuilder::find_translucent(std::span<const Triangle> triangles) const {
+    const TreeShape& shape = nodes_.shape;
+    const auto shows_through = [&](Index leaf) { return !(g_->colours[shape.node_of_leaf(leaf)].a >= 1); };
+    const Index leaves = g_->colours.empty() ? 0 : shape.leaves();
+    bool any = false;
+    for (Index leaf = 0; leaf < leaves && !any; ++leaf) any = shows_through(leaf);
+    if (!any) return {};
+    std::vector<std::uint8_t> translucent(shape.interior(), 0);
+    for (const Triangle& t : triangles)
+        if (std::any_of(t.begin(), t.end(), shows_through))
+            for (const Index leaf : t) translucent[shape.parents[shape.node_of_leaf(leaf)]] = 1;
+    for (NodeId node = shape.interior(); node-- > 1;) translucent[shape.parents[node]] |= translucent[node];
+    return translucent;
+}
+
 void TreeBuilder::bound() {
     TreeShape& shape = nodes_.shape;
     const Ancestors ancestors(shape);
@@ -384,10 +401,12 @@ void TreeBuilder::bound() {
     g_->displacement = bound_displacements(input, spheres.support);
     const std::vector<Directions> facing = bound_facing(input, triangles.triangles, places, spheres.support, ancestors);
     g_->support_spheres = std::move(spheres.support);
+    const std::vector<std::uint8_t> is_translucent = find_translucent(triangles.triangles);
     std::vector<NodeBounds> bounds(shape.interior());
     tbb::parallel_for(NodeId{0}, shape.interior(), [&](NodeId node) {
-        const auto flags = static_cast<std::uint8_t>(facing[node].marked() ? irregular_ring : 0);
-        bounds[node] = {spheres.ring[node], facing[node].slabs(), flags, 0};
+        const int irregular = facing[node].marked() ? irregular_ring : 0;
+        const int translucent = is_translucent.empty() || !is_translucent[node] ? 0 : translucent_ring;
+        bounds[node] = {spheres.ring[node], facing[node].slabs(), static_cast<std::uint8_t>(irregular | translucent), 0};
     });
     PooledMasks masks = pool_masks(facing, shape.parents);
     g_->bounds = std::move(bounds);
