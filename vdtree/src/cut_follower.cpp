@@ -20,9 +20,12 @@ constexpr std::int32_t never = std::numeric_limits<std::int32_t>::max();
 
 // Clocks restart when they have run this many times the distance to the tree, so that deadlines in floats stay fine enough.
 constexpr double longest_run = 16;
-// With more than this share of the watched nodes due, testing all of them from the root down is cheaper.
-// (A test from the root down costs about twice one in place, and there are more of them.)
-constexpr double most_due = 0.75;
+// With more than this share of the watched nodes due, deciding anew from the root down is cheaper: there are some more tests, at half of
+// the price.
+constexpr double most_due = 0.6;
+// After larger steps from a cut without deadlines, deadlines would not be worth making. In lengths for a radian, like longest_step.
+constexpr double step_worth_deadlines = 0.03;
+constexpr std::size_t piece_tests = 512; // tests at once while slots are filled: what they read stays in the cache
 // Beyond this step a good part of all verdicts would be due anyway. In lengths for a radian: twice the tree's distance.
 constexpr double longest_step = 0.125;
 // A budget that holds everything has the threshold 0; this stands for it.
@@ -156,7 +159,7 @@ void CutFollower::follow_threshold(Cut& cut, const Viewpoint& viewpoint, const M
     }
     look_from(viewpoint);
     set_clocks(position_clock_ + motion.position, facing_clock_ + motion.facing);
-    step(cut);
+    step(cut, motion);
 }
 
 // ---- budgets
@@ -196,7 +199,7 @@ void CutFollower::start_with_budget(Cut& cut) {
     }
     threshold_ = std::max(decision.threshold, least_threshold);
     tester_->set_threshold(threshold_);
-    watch_all_due(cut);
+    watch_all(cut, Deadlines::now);
 }
 
 // Of the hysteresis, half (as a factor: its root) keeps nodes unfolded, and half of the rest keeps the threshold.
@@ -255,21 +258,34 @@ void CutFollower::forget_slots() {
     free_slots_.clear();
 }
 
+// Deadlines are left to the first frame that needs some: after a jump there may be another one.
 void CutFollower::start_over(Cut& cut) {
     is_tracking_ = true;
     forget_slots();
+    cut.change_to(decide_all(), stats_);
+}
+
+// What unfolds, top-down, by decisions alone.
+std::vector<std::uint64_t> CutFollower::decide_all() {
     std::vector<std::uint64_t> unfolded((std::size_t{tree_.interior_count()} + 63) / 64);
-    // Level by level from the root down to subtrees that fit a core's cache, then one of these after the other: tests want batches,
-    // and memory wants neighbours. The slots lie in the same order, which is what later frames profit from.
-    std::vector<NodeId> subtrees;
-    parents_.clear();
-    test_down(VertexTree::root(), unfolded, &subtrees);
-    std::sort(subtrees.begin(), subtrees.end());
-    for (const NodeId node : subtrees) test_down(node, unfolded, nullptr);
-    if (!watches_ancestors_)
-        for (const NodeId node : parents_)
-            if (has_unfolded_child(node, unfolded)) unwatch(node);
-    cut.change_to(std::move(unfolded), stats_);
+    const auto subtree_end = tree_.subtree_end();
+    wave_.assign(1, VertexTree::root());
+    while (!wave_.empty()) {
+        decisions_.resize((wave_.size() + 63) / 64);
+        tester_->decide(wave_, decisions_.data());
+        stats_.node_tests += wave_.size();
+        next_wave_.clear();
+        for (std::size_t word = 0; word < decisions_.size(); ++word) {
+            for (std::uint64_t bits = decisions_[word]; bits; bits &= bits - 1) {
+                const NodeId node = wave_[word * 64 + static_cast<std::size_t>(std::countr_zero(bits))];
+                if (!tree_.is_sound(node)) continue;
+                unfolded[node >> 6] |= std::uint64_t{1} << (node & 63);
+                for (NodeId child = node + 1; child < subtree_end[node]; child = subtree_end[child]) next_wave_.push_back(child);
+            }
+        }
+        wave_.swap(next_wave_);
+    }
+    return unfolded;
 }
 
 // The worst folds first, as far as the time goes; all live nodes are due at the next call.
@@ -285,78 +301,58 @@ void CutFollower::start_in_time(Cut& cut) {
     stats_.is_complete = decision.is_complete;
     cut.change_to(std::move(decision.unfolded[0]), stats_);
     is_tracking_ = true;
-    watch_all_due(cut);
+    watch_all(cut, Deadlines::now);
 }
 
-void CutFollower::watch_all_due(const Cut& cut) {
+void CutFollower::watch_all(const Cut& cut, Deadlines deadlines) {
     forget_slots();
+    set_clocks(0, 0);
     const auto subtree_end = tree_.subtree_end();
-    for (NodeId node = 0; node < tree_.interior_count();) {
-        const bool is_unfolded = cut.is_unfolded_interior(node);
-        if (!is_unfolded || watches_ancestors_ || !has_unfolded_child(node, cut.unfolded_)) {
-            FoldCandidate candidate = tester_->candidate(node);
-            candidate.is_unfolded = is_unfolded;
-            set_deadlines(watch(candidate), Verdict{});
+    wave_.clear();
+    if (!cut.is_unfolded_interior(VertexTree::root())) wave_.push_back(VertexTree::root());
+    for (std::size_t word = 0; word < cut.unfolded_.size(); ++word) {
+        for (std::uint64_t bits = cut.unfolded_[word]; bits; bits &= bits - 1) {
+            const NodeId node = static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
+            bool is_border = true;
+            for (NodeId child = node + 1; child < subtree_end[node]; child = subtree_end[child]) {
+                if (cut.is_unfolded_interior(child)) is_border = false;
+                else wave_.push_back(child);
+            }
+            if (is_border || watches_ancestors_) wave_.push_back(node);
         }
-        node = is_unfolded ? node + 1 : subtree_end[node];
+    }
+    for (std::size_t first = 0; first < wave_.size(); first += piece_tests) {
+        const auto piece = std::span(wave_).subspan(first, std::min(piece_tests, wave_.size() - first));
+        wave_slots_.clear();
+        for (std::size_t i = 0; i < piece.size(); ++i) {
+            constexpr std::size_t ahead = 16; // nodes between a prefetch and its use
+            if (i + ahead < piece.size()) tester_->prefetch(piece[i + ahead]);
+            wave_slots_.push_back(watch(tester_->candidate(piece[i])));
+            candidates_[wave_slots_.back()].is_unfolded = cut.is_unfolded_interior(piece[i]);
+        }
+        verdicts_.assign(piece.size(), Verdict{});
+        if (deadlines == Deadlines::found) {
+            tester_->test(candidates_, wave_slots_, verdicts_);
+            stats_.node_tests += piece.size();
+        }
+        for (std::size_t i = 0; i < piece.size(); ++i) set_deadlines(wave_slots_[i], verdicts_[i]);
     }
 }
 
 bool CutFollower::is_out_of_time() const { return time_limit_ && std::chrono::steady_clock::now() >= *time_limit_; }
 
-// Tests a subtree as far down as it unfolds. Children with subtrees of cache size are left to the caller where `left` is given, and
-// their parents to parents_.
-void CutFollower::test_down(NodeId top, std::vector<std::uint64_t>& unfolded, std::vector<NodeId>* left) {
-    constexpr NodeId cached_nodes = 4096; // about 200 KB of what is read of them
-    const auto subtree_end = tree_.subtree_end();
-    wave_.assign(1, top);
-    while (!wave_.empty()) {
-        watch_wave();
-        next_wave_.clear();
-        for (const Slot slot : wave_slots_) {
-            if (!candidates_[slot].is_unfolded) continue;
-            const NodeId node = candidates_[slot].node;
-            unfolded[node >> 6] |= std::uint64_t{1} << (node & 63);
-            if (node != top && !watches_ancestors_) unwatch(tree_.parents()[node]);
-            bool leaves_children = false;
-            for (NodeId child = node + 1; child < subtree_end[node]; child = subtree_end[child]) {
-                const bool is_left = left && subtree_end[child] - child <= cached_nodes;
-                (is_left ? *left : next_wave_).push_back(child);
-                leaves_children |= is_left;
-            }
-            if (leaves_children) parents_.push_back(node);
-        }
-        wave_.swap(next_wave_);
-    }
-}
-
-// Watches and tests the nodes of the wave.
-void CutFollower::watch_wave() {
-    constexpr std::size_t ahead = 16; // tests between a node's prefetch and its use
-    wave_slots_.clear();
-    for (std::size_t i = 0; i < wave_.size(); ++i) {
-        if (i + ahead < wave_.size()) tester_->prefetch(wave_[i + ahead]);
-        wave_slots_.push_back(watch(tester_->candidate(wave_[i])));
-    }
-    verdicts_.resize(wave_.size());
-    tester_->test(candidates_, wave_slots_, verdicts_);
-    stats_.node_tests += wave_.size();
-    for (std::size_t i = 0; i < wave_.size(); ++i) {
-        set_deadlines(wave_slots_[i], verdicts_[i]);
-        candidates_[wave_slots_[i]].is_unfolded = verdicts_[i].unfolded && tree_.is_sound(wave_[i]);
-    }
-}
-
 // ---- from frame to frame
 
-void CutFollower::step(Cut& cut) {
+void CutFollower::step(Cut& cut, const Motion& motion) {
+    if (candidates_.empty()) {
+        if (!time_limit_ && !(motion.position < step_worth_deadlines * length_per_radian_)) return start_over(cut);
+        if (!time_limit_) cut.change_to(decide_all(), stats_);
+        watch_all(cut, time_limit_ ? Deadlines::now : Deadlines::found);
+        if (!time_limit_) return;
+    }
     collect_due();
     const std::size_t watched = candidates_.size() - free_slots_.size();
-    if (static_cast<double>(due_.size()) > most_due * static_cast<double>(watched) && !time_limit_) {
-        set_clocks(0, 0);
-        start_over(cut);
-        return;
-    }
+    if (static_cast<double>(due_.size()) > most_due * static_cast<double>(watched) && !time_limit_) return start_over(cut);
     cut.begin_changes();
     settle(cut);
     cut.end_changes(stats_);

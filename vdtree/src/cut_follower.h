@@ -50,10 +50,10 @@ private:
     void start_over(Cut& cut);
     void start_in_time(Cut& cut);
     void forget_slots();
-    void watch_all_due(const Cut& cut);
-    void test_down(NodeId top, std::vector<std::uint64_t>& unfolded, std::vector<NodeId>* left);
-    void watch_wave();
-    void step(Cut& cut);
+    enum class Deadlines { now, found };
+    void watch_all(const Cut& cut, Deadlines deadlines);
+    std::vector<std::uint64_t> decide_all();
+    void step(Cut& cut, const Motion& motion);
     bool is_out_of_time() const;
     void collect_due();
     void settle_due(Cut& cut);
@@ -112,6 +112,7 @@ private:
     std::vector<Slot> due_, kept_, wave_slots_;
     std::vector<FoldCandidate> parent_candidates_;
     std::vector<Verdict> verdicts_;
+    std::vector<std::uint64_t> decisions_;
     std::vector<std::uint32_t> due_blocks_;
     AdjustStats stats_;
 };

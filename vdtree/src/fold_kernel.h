@@ -8,7 +8,9 @@
 #include <span>
 #include <vector>
 
+#include <vdtree/distance_criterion.h>
 #include <vdtree/normal_mask.h>
+#include <vdtree/vertex_tree.h>
 
 namespace unseen::vdtree {
 
@@ -38,6 +40,20 @@ struct KernelView {
     bool everybody = false;       // ... all that the eye is not inside of, or
     bool nobody = false;          // ... none
 };
+
+// What tests read, by interior node; null where a criterion has none of it.
+struct NodeArrays {
+    const NodeBounds* bounds = nullptr;
+    const Sphere* support = nullptr;      // whose distance counts; null: the ring's
+    const FoldClass* classes = nullptr;
+    const NormalSlabs* facing = nullptr;  // null: those of the bounds
+    const float *lengths = nullptr, *silhouette_lengths = nullptr; // null: the radii, and the lengths
+};
+
+// Only whether nodes unfold, bit for bit as the tests with slacks below find it: one bit a node, the first node's lowest, of as many
+// whole words as that takes. Cost: some nanoseconds a node where these are neighbours, and memory's latency overlaps where not.
+void decide(const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes, std::uint64_t* unfolded) noexcept;
+void decide_range(const KernelView& view, const NodeArrays& arrays, NodeId first, std::size_t count, std::uint64_t* unfolded) noexcept;
 
 // Sixteen nodes.
 struct FoldBatch {
