@@ -578,8 +578,75 @@ struct Lanes {
     }
 };
 
+// ---- blocks: a register at a time, then one by one
+
+// The eye has moved by `path`. Seen from a point of the sphere, it has turned by that over the mean distance at most; the distances of
+// the point and of the centre change alike but for that angle times the way between them.
+template <class Floats, class Ints>
+UNSEEN_INLINE Floats error_of(const Floats& before, const Floats& after, const Floats& radius, float path) {
+    const Floats between = before + after - 2 * radius, turned = 2 * path * radius / between;
+    const Floats most = Floats{} + 2 * path;
+    return (between > 0) & (turned < most) ? turned : most;
+}
+
+template <class Vectors>
+UNSEEN_INLINE void move_blocks(const float (&eye_high)[3], const float (&eye_low)[3], float path, BlockSpheres& spheres) {
+    using L = Lanes<Vectors>;
+    using Floats = typename Vectors::Floats;
+    const auto move = [&](const float* x, const float* y, const float* z, const float* r, float* distance, float* error) UNSEEN_INLINE_LAMBDA {
+        const Floats ex = (eye_high[0] - L::load(x)) + eye_low[0], ey = (eye_high[1] - L::load(y)) + eye_low[1],
+                     ez = (eye_high[2] - L::load(z)) + eye_low[2];
+        const Floats after = L::root_of(ex * ex + ey * ey + ez * ez);
+        const Floats more = error_of<Floats, typename Vectors::Ints>(L::load(distance), after, L::load(r), path);
+        constexpr float up = 1 + 5e-7f; // small steps must not be lost in the sum's rounding
+        L::store(error, (L::load(error) + more) * up);
+        L::store(distance, after);
+    };
+    const std::size_t count = spheres.x.size();
+    std::size_t i = 0;
+    for (; i + L::width <= count; i += L::width)
+        move(&spheres.x[i], &spheres.y[i], &spheres.z[i], &spheres.radius[i], &spheres.distance[i], &spheres.error[i]);
+    if (i == count) return;
+    float rest[6][L::width] = {};
+    std::vector<float>* const values[6] = {&spheres.x, &spheres.y, &spheres.z, &spheres.radius, &spheres.distance, &spheres.error};
+    for (std::size_t v = 0; v < 6; ++v) std::copy(values[v]->begin() + static_cast<std::ptrdiff_t>(i), values[v]->end(), rest[v]);
+    move(rest[0], rest[1], rest[2], rest[3], rest[4], rest[5]);
+    for (std::size_t v = 4; v < 6; ++v) std::copy_n(rest[v], count - i, values[v]->begin() + static_cast<std::ptrdiff_t>(i));
+}
+
+template <class Vectors>
+UNSEEN_INLINE void find_due(float position, float facing, const BlockSpheres& spheres, const BlockDeadlines& deadlines, std::uint64_t* due) {
+    using L = Lanes<Vectors>;
+    const std::size_t count = spheres.x.size();
+    for (std::size_t first = 0; first < count; first += 64) {
+        std::uint64_t bits = 0;
+        const std::size_t end = std::min(first + 64, count);
+        std::size_t i = first;
+        for (; i + L::width <= end; i += L::width) {
+            const auto distance = L::load(&spheres.distance[i]), passed = L::load(&spheres.error[i]) + position;
+            const auto is_due = (L::load(&deadlines.recede[i]) <= passed + distance) | (L::load(&deadlines.approach[i]) <= passed - distance) |
+                                (L::load(&deadlines.facing[i]) <= facing);
+            if (L::any(is_due)) bits |= std::uint64_t{L::bits_of(is_due)} << (i - first);
+        }
+        for (; i < end; ++i) {
+            const float distance = spheres.distance[i], passed = spheres.error[i] + position;
+            const bool is_due = deadlines.recede[i] <= passed + distance || deadlines.approach[i] <= passed - distance ||
+                                deadlines.facing[i] <= facing;
+            bits |= std::uint64_t{is_due} << (i - first);
+        }
+        due[first / 64] = bits;
+    }
+}
+
 #if defined(__x86_64__) && defined(__GNUC__)
 
+[[gnu::target("avx2")]] void move_blocks_avx2(const float (&eye_high)[3], const float (&eye_low)[3], float path, BlockSpheres& spheres) {
+    move_blocks<Eight>(eye_high, eye_low, path, spheres);
+}
+[[gnu::target("avx2")]] void find_due_avx2(float position, float facing, const BlockSpheres& spheres, const BlockDeadlines& deadlines,
+                                           std::uint64_t* due) {
+    find_due<Eight>(position, facing, spheres, deadlines, due);
+}
 [[gnu::target("avx2")]] void measure_avx2(const KernelView& view, FoldBatch& batch) { Lanes<Eight>::measure(view, batch); }
 [[gnu::target("avx2")]] void find_slacks_avx2(const KernelView& view, SlackBatch& batch) { Lanes<Eight>::find_slacks(view, batch); }
 [[gnu::target("avx2")]] void finish_slacks_avx2(const KernelView& view, const FoldBatch& batch, Findings& findings) {
@@ -602,6 +669,8 @@ void measure_avx2(const KernelView&, FoldBatch&) {}
 void find_slacks_avx2(const KernelView&, SlackBatch&) {}
 void finish_slacks_avx2(const KernelView&, const FoldBatch&, Findings&) {}
 void facing_gaps_avx2(const FacingBatch&, FacingGaps&) {}
+void move_blocks_avx2(const float (&)[3], const float (&)[3], float, BlockSpheres&) {}
+void find_due_avx2(float, float, const BlockSpheres&, const BlockDeadlines&, std::uint64_t*) {}
 void decide_avx2(const KernelView&, const NodeArrays&, std::span<const NodeId>, std::uint64_t*) {}
 void decide_range_avx2(const KernelView&, const NodeArrays&, NodeId, std::size_t, std::uint64_t*) {}
 
@@ -638,6 +707,17 @@ void decide(const KernelView& view, const NodeArrays& arrays, std::span<const No
 void decide_range(const KernelView& view, const NodeArrays& arrays, NodeId first, std::size_t count, std::uint64_t* unfolded) noexcept {
     if (has_avx2) decide_range_avx2(view, arrays, first, count, unfolded);
     else Lanes<Four>::decide(view, arrays, first, count, unfolded);
+}
+
+void move_blocks(const float (&eye_high)[3], const float (&eye_low)[3], float path, BlockSpheres& spheres) noexcept {
+    if (has_avx2) move_blocks_avx2(eye_high, eye_low, path, spheres);
+    else move_blocks<Four>(eye_high, eye_low, path, spheres);
+}
+
+void find_due(float position_clock, float facing_clock, const BlockSpheres& spheres, const BlockDeadlines& deadlines,
+              std::uint64_t* due) noexcept {
+    if (has_avx2) find_due_avx2(position_clock, facing_clock, spheres, deadlines, due);
+    else find_due<Four>(position_clock, facing_clock, spheres, deadlines, due);
 }
 
 } // namespace unseen::vdtree

@@ -8,6 +8,8 @@
 #include <span>
 #include <vector>
 
+#include <glm/vec3.hpp>
+
 #include <vdtree/distance_criterion.h>
 #include <vdtree/normal_mask.h>
 #include <vdtree/vertex_tree.h>
@@ -126,5 +128,52 @@ struct FacingGaps {
     alignas(64) float back[kernel_lanes];
 };
 void facing_gaps(const FacingBatch& batch, FacingGaps& gaps) noexcept;
+
+// Spheres around the centres of some nodes each, and what the eye's way has made of them.
+struct BlockSpheres {
+    std::vector<float> x, y, z, radius;
+    std::vector<float> distance; // of the sphere's centre from the eye
+    std::vector<float> error;    // how much more than `distance` a node's distance may have changed, in all
+
+    void push_back() {
+        for (auto* values : {&x, &y, &z, &radius, &distance, &error}) values->push_back(0);
+    }
+    void clear() noexcept {
+        for (auto* values : {&x, &y, &z, &radius, &distance, &error}) values->clear();
+    }
+    void reserve(std::size_t blocks) {
+        for (auto* values : {&x, &y, &z, &radius, &distance, &error}) values->reserve(blocks);
+    }
+    void set(std::size_t block, const glm::vec3& centre, float r, float d) noexcept {
+        x[block] = centre.x, y[block] = centre.y, z[block] = centre.z;
+        radius[block] = r, distance[block] = d, error[block] = 0;
+    }
+    glm::vec3 centre(std::size_t block) const noexcept { return {x[block], y[block], z[block]}; }
+    std::uint64_t byte_size() const noexcept { return 6 * sizeof(float) * x.capacity(); }
+};
+// The eye goes by `path` to a new place.
+void move_blocks(const float (&eye_high)[3], const float (&eye_low)[3], float path, BlockSpheres& spheres) noexcept;
+
+// When distances that grow, or shrink, and the facing clock may change something.
+struct BlockDeadlines {
+    std::vector<float> recede, approach, facing;
+
+    void push_back(float value) {
+        for (auto* values : {&recede, &approach, &facing}) values->push_back(value);
+    }
+    void clear() noexcept {
+        for (auto* values : {&recede, &approach, &facing}) values->clear();
+    }
+    void reserve(std::size_t blocks) {
+        for (auto* values : {&recede, &approach, &facing}) values->reserve(blocks);
+    }
+    void set(std::size_t block, float receding, float approaching, float turning) noexcept {
+        recede[block] = receding, approach[block] = approaching, facing[block] = turning;
+    }
+    std::uint64_t byte_size() const noexcept { return 3 * sizeof(float) * recede.capacity(); }
+};
+// One bit a block: a deadline has come.
+void find_due(float position_clock, float facing_clock, const BlockSpheres& spheres, const BlockDeadlines& deadlines,
+              std::uint64_t* due) noexcept;
 
 } // namespace unseen::vdtree

@@ -56,6 +56,8 @@ public:
     // position clock; any positive value will do, and it must be the same for verdicts and motions.
     void look_from(const Viewpoint& viewpoint, double length_per_radian);
 
+    bool uses_gaze() const noexcept { return view_.has_gaze; } // from the current viewpoint
+
     FoldCandidate candidate(NodeId node) const;
     void prefetch(NodeId node) const; // what candidate(node) will read
 
