@@ -324,30 +324,38 @@ bool Cut::is_patching() {
     return false;
 }
 
-// Reads follow from reads: links, lists, and what is drawn. Those of many changes are made to overlap.
+// Reads follow from reads: links, lists, and what is drawn. Those of many changes are made to overlap. Leaves the children in soon_.
 void Cut::prefetch_changes(std::span<const NodeId> nodes, bool folds) {
-    if (!indices_ || !indices_->is_patched) return;
     const auto first_leaf = tree_->first_leaf(), leaf_end = tree_->leaf_end(), first_triangle = tree_->first_triangle();
     const auto subtree_end = tree_->subtree_end();
-    for (const NodeId node : nodes) {
+    const auto prefetch_links = [&](NodeId node) {
         prefetch(&first_leaf[node]);
         prefetch(&leaf_end[node]);
         prefetch(&subtree_end[node]);
-        if (!folds) prefetch(&first_triangle[node]);
+    };
+    for (const NodeId node : nodes) {
+        prefetch_links(node);
+        prefetch(&first_triangle[node]);
     }
+    for (const NodeId node : nodes) // the first child is the node's neighbour; the next one, which most nodes have, is anywhere
+        if (const NodeId child = node + 1; child < subtree_end[node] && subtree_end[child] < subtree_end[node]) prefetch_links(subtree_end[child]);
     soon_.clear();
-    if (folds)
-        for (const NodeId node : nodes) tree_->for_each_child(node, [&](NodeId child) { soon_.push_back(child); });
-    else soon_.assign(nodes.begin(), nodes.end());
+    for (const NodeId node : nodes) {
+        tree_->for_each_child(node, [&](NodeId child) { soon_.push_back(child); });
+        prefetch(&proxy_[first_leaf[node]]);
+        prefetch(&proxy_[leaf_end[node] - 1]);
+    }
+    if (!indices_ || !indices_->is_patched) return;
+    const std::span<const NodeId> active = folds ? std::span<const NodeId>(soon_) : nodes;
     const IndexBuffer& buffer = indices_->buffer;
     buffer.prefetch_places(soon_);
-    if (!folds)
-        for (const NodeId node : nodes) {
-            prefetch(&proxy_[first_leaf[node]]);
+    if (!folds) {
+        buffer.prefetch_places(nodes);
+        for (const NodeId node : nodes)
             if (first_triangle[node] < tree_->triangle_count()) prefetch(&tree_->triangles()[first_triangle[node]]);
-        }
-    buffer.prefetch_lists(soon_);
-    buffer.prefetch_corners(soon_);
+    }
+    buffer.prefetch_lists(active);
+    buffer.prefetch_corners(active);
 }
 
 void Cut::apply_unfold(NodeId node) {

@@ -319,6 +319,7 @@ void CutFollower::settle(Cut& cut) {
     for (std::size_t first = 0; first < due_.size(); first += piece) {
         if (first > 0 && is_out_of_time()) {
             stats_.is_complete = false;
+            for (const Slot slot : std::span(due_).subspan(first)) watched_.stay_due(slot);
             break;
         }
         test_due(std::span(due_).subspan(first, std::min(piece, due_.size() - first)));
@@ -328,7 +329,6 @@ void CutFollower::settle(Cut& cut) {
         test_parents(cut);
     }
     unfold_wave(cut);
-    watched_.refresh();
     watched_.restart_clocks(longest_run * length_per_radian_);
 }
 
@@ -360,13 +360,37 @@ void CutFollower::test_slots(std::span<const Slot> slots) {
     }
 }
 
+// What the follower itself will read and write, too.
+void CutFollower::prefetch_changes(Cut& cut, std::span<const NodeId> nodes, bool folds) {
+    for (const NodeId node : nodes) {
+        watched_.prefetch_slot(node);
+        prefetch(&tree_.parents()[node]);
+    }
+    cut.prefetch_changes(nodes, folds);
+    for (const NodeId node : nodes) {
+        watched_.prefetch_deadlines(node);
+        if (const NodeId parent = tree_.parents()[node]; parent != no_node) watched_.prefetch_slot(parent);
+    }
+    for (const NodeId child : cut.soon_) {
+        if (tree_.is_leaf(child)) continue;
+        watched_.prefetch_slot(child);
+        if (!folds) tester_->prefetch(child);
+    }
+    if (folds) {
+        for (const NodeId child : cut.soon_)
+            if (!tree_.is_leaf(child)) watched_.prefetch_deadlines(child);
+    } else {
+        for (const NodeId node : nodes)
+            if (const NodeId parent = tree_.parents()[node]; parent != no_node) watched_.prefetch_deadlines(parent);
+    }
+}
+
 // Folds with all that is under it what the last tests want folded, the lowest nodes first; what is above may want to fold now.
 void CutFollower::fold_wave(Cut& cut) {
     std::sort(folding_.begin(), folding_.end(), std::greater<>());
     const auto subtree_end = tree_.subtree_end();
     for (std::size_t i = 0; i < folding_.size(); ++i) {
-        if (i % changes_at_once == 0)
-            cut.prefetch_changes(std::span(folding_).subspan(i, std::min(changes_at_once, folding_.size() - i)), true);
+        if (i % changes_at_once == 0) prefetch_changes(cut, std::span(folding_).subspan(i, std::min(changes_at_once, folding_.size() - i)), true);
         const NodeId node = folding_[i];
         if (!cut.is_unfolded_interior(node)) continue;
         cut.fold_below(node, [&](NodeId folded) {
@@ -388,6 +412,10 @@ void CutFollower::test_parents(const Cut& cut) {
     parents_.erase(std::unique(parents_.begin(), parents_.end()), parents_.end());
     std::erase_if(parents_, [&](NodeId node) { return !cut.is_unfolded_interior(node) || watched_.slot_of(node) != no_slot; });
     parent_candidates_.clear();
+    for (const NodeId node : parents_) {
+        tester_->prefetch(node);
+        prefetch(&tree_.subtree_end()[node]);
+    }
     for (const NodeId node : parents_) {
         parent_candidates_.push_back(tester_->candidate(node));
         parent_candidates_.back().is_unfolded = true;
@@ -425,7 +453,7 @@ void CutFollower::unfold_wave(Cut& cut) {
         unfolding_.clear();
         for (std::size_t i = 0; i < wave_.size(); ++i) {
             const NodeId node = wave_[i];
-            if (i % changes_at_once == 0) cut.prefetch_changes(std::span(wave_).subspan(i, std::min(changes_at_once, wave_.size() - i)), false);
+            if (i % changes_at_once == 0) prefetch_changes(cut, std::span(wave_).subspan(i, std::min(changes_at_once, wave_.size() - i)), false);
             if (watched_.slot_of(node) == no_slot) continue; // an ancestor has folded
             if ((++unfolded % times_checked) == 0 && is_out_of_time()) stats_.is_complete = false;
             if (!stats_.is_complete) {
@@ -435,7 +463,6 @@ void CutFollower::unfold_wave(Cut& cut) {
             cut.apply_unfold(node);
             watched_.set_unfolded(watched_.slot_of(node), true);
             if (node != VertexTree::root() && !watches_ancestors_) watched_.remove(tree_.parents()[node]);
-            for (NodeId child = node + 1; child < subtree_end[node]; child = subtree_end[child]) tester_->prefetch(child);
             unfolding_.push_back(node);
         }
         wave_.clear();

@@ -58,6 +58,7 @@ private:
     void settle(Cut& cut);
     void test_due(std::span<const Slot> slots);
     void test_slots(std::span<const Slot> slots);
+    void prefetch_changes(Cut& cut, std::span<const NodeId> nodes, bool folds);
     void fold_wave(Cut& cut);
     void test_parents(const Cut& cut);
     void use_threshold_of(bool unfolded);

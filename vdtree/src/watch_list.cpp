@@ -16,6 +16,7 @@ namespace {
 
 // Of what a deadline for distances is summed from: a dozen roundings of floats, when it is set and when it is compared.
 constexpr float sum_rounding = 4e-6f;
+constexpr float just_less = 1 - std::numeric_limits<float>::epsilon(); // times a number: at least a unit in the last place less
 
 float rounded_down(double clock) { return clock > 0 ? std::nextafter(static_cast<float>(clock), 0.0f) : 0.0f; }
 float rounded_up(double clock) { return std::nextafter(static_cast<float>(clock), std::numeric_limits<float>::infinity()); }
@@ -23,21 +24,24 @@ float rounded_up(double clock) { return std::nextafter(static_cast<float>(clock)
 using Four [[gnu::vector_size(16)]] = float; // in a register of any processor
 using FourBits [[gnu::vector_size(16)]] = std::int32_t;
 
-Four load(const float* from) {
-    Four four;
-    std::memcpy(&four, from, sizeof four);
-    return four;
+// The position deadlines of four slots, and their facing deadlines.
+struct FourDues {
+    Four position, facing;
+    explicit FourDues(const void* from) {
+        Four pairs[2];
+        std::memcpy(pairs, from, sizeof pairs);
+        position = __builtin_shufflevector(pairs[0], pairs[1], 0, 2, 4, 6);
+        facing = __builtin_shufflevector(pairs[0], pairs[1], 1, 3, 5, 7);
+    }
+};
+
+// All bits of the lanes that have one in the first four of these.
+FourBits lanes_of(std::uint32_t bits) {
+    constexpr FourBits places = {1, 2, 4, 8};
+    return ((FourBits{} + static_cast<std::int32_t>(bits)) & places) != 0;
 }
 
-template <std::size_t count>
-float least_of(const std::array<float, count>& values) {
-    Four least = load(values.data());
-    for (std::size_t i = 4; i < count; i += 4) {
-        const Four next = load(&values[i]);
-        least = next < least ? next : least;
-    }
-    return std::min(std::min(least[0], least[1]), std::min(least[2], least[3]));
-}
+float least_of(const Four& values) { return std::min(std::min(values[0], values[1]), std::min(values[2], values[3])); }
 
 } // namespace
 
@@ -55,6 +59,7 @@ void WatchList::clear() {
     candidates_.clear();
     blocks_.clear();
     used_.clear();
+    unfolded_.clear();
     spheres_.clear();
     earliest_.clear();
     free_blocks_.clear();
@@ -70,6 +75,7 @@ void WatchList::reserve(std::size_t nodes) {
     candidates_.reserve(blocks * block_slots);
     blocks_.reserve(blocks);
     used_.reserve(blocks);
+    unfolded_.reserve(blocks);
     spheres_.reserve(blocks);
     earliest_.reserve(blocks);
 }
@@ -82,6 +88,7 @@ WatchList::BlockId WatchList::new_block() {
         block = static_cast<BlockId>(blocks_.size());
         blocks_.emplace_back();
         used_.push_back(0);
+        unfolded_.push_back(0);
         candidates_.resize(candidates_.size() + block_slots);
         spheres_.push_back();
         earliest_.push_back(never);
@@ -89,9 +96,7 @@ WatchList::BlockId WatchList::new_block() {
         block = free_blocks_.back();
         free_blocks_.pop_back();
     }
-    blocks_[block].recede_due.fill(never);
-    blocks_[block].approach_due.fill(never);
-    blocks_[block].facing_due.fill(never);
+    blocks_[block].dues.fill(Due{});
     return block;
 }
 
@@ -138,7 +143,7 @@ void WatchList::remove(NodeId node) {
     slots_of_nodes_[node] = no_slot;
     const BlockId block = static_cast<BlockId>(slot / block_slots);
     const std::size_t place = slot % block_slots;
-    blocks_[block].recede_due[place] = blocks_[block].approach_due[place] = blocks_[block].facing_due[place] = never;
+    blocks_[block].dues[place] = Due{};
     used_[block] = static_cast<std::uint16_t>(used_[block] & ~(1u << place));
     --size_;
     if (used_[block] != 0) return;
@@ -177,24 +182,23 @@ void WatchList::include(BlockId block, const FoldCandidate& candidate) {
     spheres_.radius[block] = std::max(spheres_.radius[block], glm::length(away) + inexact);
 }
 
+// What is left of them now.
+WatchList::Slacks WatchList::slacks_of(Slot slot) const noexcept {
+    const std::size_t block = slot / block_slots, place = slot % block_slots;
+    const Due& due = blocks_[block].dues[place];
+    const bool unfolded = (unfolded_[block] >> place) & 1;
+    const float passed = spheres_.error[block] + position_clock_float_, distance = spheres_.distance[block];
+    const float position = (due.position - passed) + (unfolded ? -distance : distance) - sum_rounding * (passed + distance);
+    return {unfolded, std::max(position, 0.0f), std::max(due.facing - facing_clock_down_, 0.0f)};
+}
+
 void WatchList::split(BlockId block) {
     std::array<Slot, block_slots> slots;
     for (std::size_t i = 0; i < block_slots; ++i) slots[i] = static_cast<Slot>(block * block_slots + i);
     std::ranges::nth_element(slots, slots.begin() + block_slots / 2, {}, [&](Slot slot) { return candidates_[slot].node; });
     const BlockId other = new_block();
-    // What is left of the slacks, by the block as it is.
-    struct Slacks {
-        bool unfolded;
-        float position, facing;
-    };
-    std::array<Slacks, block_slots> left;
-    const float distance = spheres_.distance[block], passed = spheres_.error[block] + position_clock_float_;
-    for (std::size_t i = 0; i < block_slots; ++i) {
-        const std::size_t place = slots[i] % block_slots;
-        const Block& dues = blocks_[block];
-        const float position = std::min(dues.recede_due[place] - distance - passed, dues.approach_due[place] + distance - passed);
-        left[i] = {dues.recede_due[place] < never, std::max(position, 0.0f), std::max(dues.facing_due[place] - facing_clock_down_, 0.0f)};
-    }
+    std::array<Slacks, block_slots> left; // by the block as it is
+    for (std::size_t i = 0; i < block_slots; ++i) left[i] = slacks_of(slots[i]);
     for (std::size_t i = block_slots / 2; i < block_slots; ++i) {
         const FoldCandidate moved = candidates_[slots[i]];
         remove(moved.node);
@@ -213,14 +217,12 @@ void WatchList::set_deadlines(Slot slot, bool unfolded, float position_slack, fl
     const std::size_t place = slot % block_slots;
     const float passed = spheres_.error[block] + position_clock_float_, distance = spheres_.distance[block];
     const float slack = position_slack - sum_rounding * (passed + distance + std::min(position_slack, distance));
-    const float recede = unfolded ? passed + distance + slack : never;
-    const float approach = unfolded ? never : passed - distance + slack;
-    const float facing = std::nextafter(facing_clock_down_ + facing_slack, 0.0f);
-    blocks_[block].recede_due[place] = recede;
-    blocks_[block].approach_due[place] = approach;
-    blocks_[block].facing_due[place] = facing;
-    earliest_.recede[block] = std::min(earliest_.recede[block], recede);
-    earliest_.approach[block] = std::min(earliest_.approach[block], approach);
+    const float position = passed + slack + (unfolded ? distance : -distance);
+    const float facing = (facing_clock_down_ + facing_slack) * just_less;
+    blocks_[block].dues[place] = {position, facing};
+    unfolded_[block] = static_cast<std::uint16_t>((unfolded_[block] & ~(1u << place)) | (std::uint32_t{unfolded} << place));
+    float& earliest = (unfolded ? earliest_.recede : earliest_.approach)[block];
+    earliest = std::min(earliest, position);
     earliest_.facing[block] = std::min(earliest_.facing[block], facing);
 }
 
@@ -246,21 +248,21 @@ void WatchList::move_to(const glm::dvec3& eye, double facing) {
 
 void WatchList::restart_clocks(double longest) {
     if (!(std::max({position_clock_, facing_clock_, path_}) > longest)) return;
-    const float facing = facing_clock_down_, position = position_clock_float_;
+    const double position = position_clock_, facing = facing_clock_;
+    for (BlockId block = 0; block < blocks_.size(); ++block) {
+        std::array<Slacks, block_slots> left;
+        for_each_used(block, [&](Slot slot) { left[slot % block_slots] = slacks_of(slot); });
+        spheres_.error[block] = 0;
+        earliest_.set(block, never, never, never);
+        set_clocks(0, 0);
+        for_each_used(block, [&](Slot slot) {
+            const Slacks& slacks = left[slot % block_slots];
+            set_deadlines(slot, slacks.unfolded, slacks.position, slacks.facing);
+        });
+        set_clocks(position, facing);
+    }
     set_clocks(0, 0);
     path_ = 0;
-    for (BlockId block = 0; block < blocks_.size(); ++block) {
-        if (used_[block] == 0) continue;
-        const float distance = spheres_.distance[block], passed = spheres_.error[block] + position;
-        spheres_.error[block] = 0;
-        for_each_used(block, [&](Slot slot) {
-            const Block& dues = blocks_[block];
-            const std::size_t place = slot % block_slots;
-            const float left = std::min(dues.recede_due[place] - distance - passed, dues.approach_due[place] + distance - passed);
-            set_deadlines(slot, dues.recede_due[place] < never, std::max(left - sum_rounding * (passed + distance), 0.0f), std::max(dues.facing_due[place] - facing, 0.0f));
-        });
-        refresh(block);
-    }
 }
 
 void WatchList::collect_due(std::vector<Slot>& due) {
@@ -268,28 +270,35 @@ void WatchList::collect_due(std::vector<Slot>& due) {
     // In floats the clock may be a little late.
     const float facing = rounded_up(facing_clock_), position = position_clock_float_;
     find_due(position, facing, spheres_, earliest_, due_blocks_.data());
-    const std::size_t first = looked_at_.size();
+    looked_at_.clear();
     for (std::size_t word = 0; word < due_blocks_.size(); ++word) {
         for (std::uint64_t bits = due_blocks_[word]; bits; bits &= bits - 1) {
             const auto block = static_cast<BlockId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
-            prefetch(&blocks_[block].recede_due);
-            prefetch(&blocks_[block].approach_due);
-            prefetch(&blocks_[block].facing_due);
+            prefetch(&blocks_[block].dues[0]);
+            prefetch(&blocks_[block].dues[block_slots / 2]);
             looked_at_.push_back(block);
         }
     }
-    for (std::size_t at = first; at < looked_at_.size(); ++at) {
-        const BlockId block = looked_at_[at];
-        const Block& dues = blocks_[block];
+    constexpr FourBits places = {1, 2, 4, 8};
+    for (const BlockId block : looked_at_) {
         const float passed = spheres_.error[block] + position;
-        const float recede = passed + spheres_.distance[block], approach = passed - spheres_.distance[block];
+        const Four recede = Four{} + (passed + spheres_.distance[block]), approach = Four{} + (passed - spheres_.distance[block]);
+        const std::uint32_t unfolded = unfolded_[block];
+        // The earliest of those that are left; the others come back when their deadlines are set.
+        Four next_recede = Four{} + never, next_approach = next_recede, next_facing = next_recede;
         std::uint32_t bits = 0;
-        constexpr FourBits places = {1, 2, 4, 8};
         for (std::size_t i = 0; i < block_slots; i += 4) {
-            const FourBits is_due = ((load(&dues.recede_due[i]) <= recede) | (load(&dues.approach_due[i]) <= approach) |
-                                     (load(&dues.facing_due[i]) <= facing)) & places;
-            bits |= static_cast<std::uint32_t>(is_due[0] | is_due[1] | is_due[2] | is_due[3]) << i;
+            const FourDues dues(&blocks_[block].dues[i]);
+            const FourBits recedes = lanes_of(unfolded >> i);
+            const FourBits is_due = (dues.position <= (recedes ? recede : approach)) | (dues.facing <= facing);
+            const FourBits due_places = is_due & places;
+            bits |= static_cast<std::uint32_t>((due_places[0] | due_places[1]) | (due_places[2] | due_places[3])) << i;
+            const Four left = is_due ? Four{} + never : dues.position, left_facing = is_due ? Four{} + never : dues.facing;
+            next_recede = (left < next_recede) & recedes ? left : next_recede;
+            next_approach = (left < next_approach) & ~recedes ? left : next_approach;
+            next_facing = left_facing < next_facing ? left_facing : next_facing;
         }
+        earliest_.set(block, least_of(next_recede), least_of(next_approach), least_of(next_facing));
         for (; bits; bits &= bits - 1) {
             const std::size_t slot = block * block_slots + static_cast<std::size_t>(std::countr_zero(bits));
             prefetch(&candidates_[slot]);
@@ -298,19 +307,11 @@ void WatchList::collect_due(std::vector<Slot>& due) {
     }
 }
 
-void WatchList::refresh(BlockId block) {
-    const Block& dues = blocks_[block];
-    earliest_.set(block, least_of(dues.recede_due), least_of(dues.approach_due), least_of(dues.facing_due));
-}
-
-void WatchList::refresh() {
-    for (const BlockId block : looked_at_) refresh(block);
-    looked_at_.clear();
-}
+void WatchList::stay_due(Slot slot) { set_deadlines(slot, (unfolded_[slot / block_slots] >> (slot % block_slots)) & 1, 0, 0); }
 
 std::uint64_t WatchList::byte_size() const noexcept {
     return sizeof(FoldCandidate) * candidates_.capacity() + sizeof(Slot) * slots_of_nodes_.capacity() + sizeof(Block) * blocks_.capacity() +
-           sizeof(std::uint16_t) * used_.capacity() + spheres_.byte_size() + earliest_.byte_size();
+           2 * sizeof(std::uint16_t) * used_.capacity() + spheres_.byte_size() + earliest_.byte_size();
 }
 
 } // namespace unseen::vdtree

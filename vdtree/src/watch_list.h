@@ -11,6 +11,7 @@
 
 #include "fold_kernel.h"
 #include "fold_tester.h"
+#include "prefetch.h"
 
 namespace unseen::vdtree {
 
@@ -18,7 +19,7 @@ namespace unseen::vdtree {
 // change as that of the sphere's centre does, but for the radius times the angle by which the eye has moved around it. So blocks know
 // on which side of them the eye comes nearer, and by how much, far better than a bound on the eye's path would tell.
 //
-// Every slot has three deadlines: for the distance when it grows (where the node is unfolded) or shrinks (where it is folded), and for
+// Every slot has two deadlines: for the distance when it grows (where the node is unfolded) or shrinks (where it is folded), and for
 // the facing clock; every block knows the earliest ones. A full block is split in two, by node numbers, which keeps neighbours together.
 class WatchList {
 public:
@@ -39,6 +40,13 @@ public:
     std::span<const FoldCandidate> candidates() const noexcept { return candidates_; }
     void set_unfolded(Slot slot, bool is_unfolded) noexcept { candidates_[slot].is_unfolded = is_unfolded; }
 
+    // For what happens to nodes next: first these, for some nodes at once, then those.
+    void prefetch_slot(NodeId node) const noexcept { prefetch(&slots_of_nodes_[node]); }
+    void prefetch_deadlines(NodeId node) const noexcept {
+        const Slot slot = slots_of_nodes_[node];
+        if (slot != no_slot) prefetch(&blocks_[slot / block_slots].dues[slot % block_slots]);
+    }
+
     // A node that is not watched yet, into the block of `near` (or one of its own, where that is no_slot). Its deadlines are set next.
     Slot insert(const FoldCandidate& candidate, Slot near);
     // The same for many nodes in the order of their numbers, into blocks of their own; end_append() before deadlines are set.
@@ -57,9 +65,9 @@ public:
     // Sets back what has grown beyond `longest`, so that deadlines in floats stay fine enough.
     void restart_clocks(double longest);
 
-    // Appends the slots that are due. refresh() when they have new deadlines.
+    // Appends the slots that are due. These get new deadlines, or stay_due().
     void collect_due(std::vector<Slot>& due);
-    void refresh();
+    void stay_due(Slot slot);
 
     std::uint64_t byte_size() const noexcept;
 
@@ -69,16 +77,23 @@ private:
     static constexpr std::uint16_t full = 0xffff;
     static constexpr float never = std::numeric_limits<float>::infinity();
 
-    struct Block {
-        std::array<float, block_slots> recede_due, approach_due, facing_due;
+    struct Due {
+        float position = never, facing = never;
+    };
+    struct alignas(64) Block {
+        std::array<Due, block_slots> dues; // of slots that are not used: never
+    };
+    struct Slacks {
+        bool unfolded;
+        float position, facing;
     };
 
     BlockId new_block();
     void place(BlockId block);
     void split(BlockId block);
+    Slacks slacks_of(Slot slot) const noexcept;
     Slot take(BlockId block, const FoldCandidate& candidate);
     void include(BlockId block, const FoldCandidate& candidate);
-    void refresh(BlockId block);
     float distance_to(const glm::vec3& point) const noexcept;
     void set_clocks(double position, double facing);
     template <class F>
@@ -90,6 +105,7 @@ private:
     // By block.
     std::vector<Block> blocks_;
     std::vector<std::uint16_t> used_;      // a bit a slot
+    std::vector<std::uint16_t> unfolded_;  // likewise: growing distances change the verdict
     BlockSpheres spheres_;
     BlockDeadlines earliest_;              // not later than any slot's
     std::vector<BlockId> free_blocks_, looked_at_;
