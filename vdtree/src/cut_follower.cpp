@@ -11,6 +11,7 @@
 
 #include "budget.h"
 #include "prefetch.h"
+#include "walk_children.h"
 
 namespace unseen::vdtree {
 
@@ -211,21 +212,23 @@ void CutFollower::start_over(Cut& cut) {
 // What unfolds, top-down, by decisions alone.
 std::vector<std::uint64_t> CutFollower::decide_all() {
     std::vector<std::uint64_t> unfolded((std::size_t{tree_.interior_count()} + 63) / 64);
-    const auto subtree_end = tree_.subtree_end();
     wave_.assign(1, VertexTree::root());
     while (!wave_.empty()) {
         decisions_.resize((wave_.size() + 63) / 64);
         tester_->decide(wave_, decisions_.data());
         stats_.node_tests += wave_.size();
-        next_wave_.clear();
+        unfolding_.clear();
         for (std::size_t word = 0; word < decisions_.size(); ++word) {
             for (std::uint64_t bits = decisions_[word]; bits; bits &= bits - 1) {
                 const NodeId node = wave_[word * 64 + static_cast<std::size_t>(std::countr_zero(bits))];
                 if (!tree_.is_sound(node)) continue;
                 unfolded[node >> 6] |= std::uint64_t{1} << (node & 63);
-                for (NodeId child = node + 1; child < subtree_end[node]; child = subtree_end[child]) next_wave_.push_back(child);
+                unfolding_.push_back(node);
             }
         }
+        next_wave_.clear();
+        walk_children(tree_, unfolding_.size(), [&](std::size_t i) { return unfolding_[i]; },
+                      [&](std::size_t, NodeId child) { next_wave_.push_back(child); });
         wave_.swap(next_wave_);
     }
     return unfolded;
@@ -249,20 +252,24 @@ void CutFollower::start_in_time(Cut& cut) {
 
 void CutFollower::watch_all(const Cut& cut, Deadlines deadlines) {
     watched_.clear();
-    const auto subtree_end = tree_.subtree_end();
+    unfolding_.clear();
+    for (std::size_t word = 0; word < cut.unfolded_.size(); ++word)
+        for (std::uint64_t bits = cut.unfolded_[word]; bits; bits &= bits - 1)
+            unfolding_.push_back(static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))));
     wave_.clear();
-    if (!cut.is_unfolded_interior(VertexTree::root())) wave_.push_back(VertexTree::root());
-    for (std::size_t word = 0; word < cut.unfolded_.size(); ++word) {
-        for (std::uint64_t bits = cut.unfolded_[word]; bits; bits &= bits - 1) {
-            const NodeId node = static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
-            bool is_border = true;
-            for (NodeId child = node + 1; child < subtree_end[node]; child = subtree_end[child]) {
-                if (cut.is_unfolded_interior(child)) is_border = false;
-                else wave_.push_back(child);
-            }
-            if (is_border || watches_ancestors_) wave_.push_back(node);
-        }
-    }
+    if (unfolding_.empty()) wave_.push_back(VertexTree::root());
+    std::size_t at = 0;
+    bool is_border = true;
+    const auto go_to = [&](std::size_t next) {
+        for (; at < next; ++at, is_border = true)
+            if (is_border || watches_ancestors_) wave_.push_back(unfolding_[at]);
+    };
+    walk_children(tree_, unfolding_.size(), [&](std::size_t i) { return unfolding_[i]; }, [&](std::size_t i, NodeId child) {
+        go_to(i);
+        if (cut.is_unfolded_interior(child)) is_border = false;
+        else wave_.push_back(child);
+    });
+    go_to(unfolding_.size());
     watched_.reserve(wave_.size());
     for (std::size_t first = 0; first < wave_.size(); first += piece_tests) {
         const auto piece = std::span(wave_).subspan(first, std::min(piece_tests, wave_.size() - first));

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstring>
+#include <limits>
 #include <numbers>
 
 #include "prefetch.h"
@@ -161,14 +162,15 @@ struct Lanes {
         return ((Ints{} + static_cast<std::int32_t>(bits >> first)) & lane_bits()) != 0;
     }
 
-    // The distances of rows at bins. Lookups go lane by lane.
+    // Of a table, at rows and bins. Lookups go lane by lane.
+    static UNSEEN_INLINE Floats entries(const KernelView& view, const float* table, const Ints& rows, const Ints& bins) {
+        const Ints at = view.bins == 1 ? rows : rows * view.bins + bins;
+        return collect<Floats>([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return table[static_cast<std::uint32_t>(at[lane])]; });
+    }
+    // The distances of rows at bins.
     static UNSEEN_INLINE Floats distances(const KernelView& view, const Ints& rows, const Ints& bins, const Floats& lengths) {
-        const Ints entries = view.bins == 1 ? rows : rows * view.bins + bins;
-        const float* const table = view.reach.data();
-        const Floats reach =
-            collect<Floats>([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return table[static_cast<std::uint32_t>(entries[lane])]; });
         // A length of 0 times infinity is no number.
-        return max_of(lengths, all(least_length)) * view.inverse_threshold * reach;
+        return max_of(lengths, all(least_length)) * view.inverse_threshold * entries(view, view.reach.data(), rows, bins);
     }
 
     // What a register's lanes are, and how they look.
@@ -463,7 +465,7 @@ struct Lanes {
 
     // `at(lane)` is a lane's node.
     template <class At>
-    static UNSEEN_INLINE Measures measure(const KernelView& view, const NodeArrays& arrays, At at) {
+    static UNSEEN_INLINE Nodes load_nodes(const NodeArrays& arrays, At at) {
         Nodes nodes;
         if (arrays.support) load_sphere([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return &arrays.support[at(lane)]; }, nodes);
         else load_sphere([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return &arrays.bounds[at(lane)].ring; }, nodes);
@@ -478,7 +480,7 @@ struct Lanes {
                 return static_cast<std::int32_t>(arrays.classes[at(lane)].silhouette);
             });
         }
-        return measure(view, nodes);
+        return nodes;
     }
 
     struct Facings {
@@ -524,7 +526,7 @@ struct Lanes {
                 for (std::size_t i = first; i < end; i += width) {
                     node_at.prefetch(start + i);
                     const auto at = [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return node_at(start + i + lane); };
-                    const Measures m = measure(view, arrays, at);
+                    const Measures m = measure(view, load_nodes(arrays, at));
                     near_bits |= std::uint64_t{bits_of(m.is_near)} << (i - first);
                     seen_bits |= std::uint64_t{bits_of(m.is_near & m.is_inside)} << (i - first);
                     if (any(m.is_asked)) asked_bits |= std::uint64_t{bits_of(m.is_asked)} << (i - first);
@@ -549,17 +551,17 @@ struct Lanes {
         }
     }
 
+    struct Listed {
+        const NodeArrays& arrays;
+        const NodeId* nodes;
+        std::size_t last;
+        UNSEEN_INLINE NodeId operator()(std::size_t i) const { return nodes[std::min(i, last)]; }
+        UNSEEN_INLINE void prefetch(std::size_t i) const {
+            constexpr std::size_t ahead = 32; // nodes between a prefetch and its use
+            for (std::size_t lane = 0; lane < width; ++lane) prefetch_node(arrays, (*this)(i + ahead + lane));
+        }
+    };
     static UNSEEN_INLINE void decide(const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes, std::uint64_t* unfolded) {
-        struct Listed {
-            const NodeArrays& arrays;
-            const NodeId* nodes;
-            std::size_t last;
-            UNSEEN_INLINE NodeId operator()(std::size_t i) const { return nodes[std::min(i, last)]; }
-            UNSEEN_INLINE void prefetch(std::size_t i) const {
-                constexpr std::size_t ahead = 32; // nodes between a prefetch and its use
-                for (std::size_t lane = 0; lane < width; ++lane) prefetch_node(arrays, (*this)(i + ahead + lane));
-            }
-        };
         decide_all(view, arrays, nodes.size(), Listed{arrays, nodes.data(), nodes.size() - 1}, unfolded);
     }
     static UNSEEN_INLINE void decide(const KernelView& view, const NodeArrays& arrays, NodeId start, std::size_t count, std::uint64_t* unfolded) {
@@ -575,6 +577,78 @@ struct Lanes {
         NodeId rest[64];
         for (std::size_t i = 0; i < count - whole; ++i) rest[i] = static_cast<NodeId>(start + whole + i);
         decide(view, arrays, std::span(rest, count - whole), unfolded + whole / 64);
+    }
+
+    struct Costs {
+        Floats cost, seen;
+    };
+    // By one row. See FoldTester::set_costs().
+    static UNSEEN_INLINE Costs costs_of(const KernelView& view, const CostTables& tables, const Ints& row, const Measures& m, const Floats& unit) {
+        const Floats reach = entries(view, tables.reach, row, m.bin), length = unit * reach;
+        const Ints seldom = (reach < 0) | ((length <= 0) & (m.gap > 0)); // from nowhere, or from inside only
+        const Ints always = (reach >= DistanceCriterion::always_visible) | (m.gap <= 0);
+        const Floats cost = always ? all(std::numeric_limits<float>::infinity()) : length / m.gap;
+        Costs costs{seldom ? all(0) : cost, {}};
+        costs.seen = costs.cost;
+        if (tables.least_cost) costs.seen = seldom ? all(0) : max_of(cost, entries(view, tables.least_cost, row, m.bin));
+        return costs;
+    }
+
+    // Like decide_all().
+    static UNSEEN_INLINE void find_costs(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
+                                         std::span<const NodeId> nodes, const NodeCosts& out) {
+        constexpr std::size_t piece = 256;
+        const Listed listed{arrays, nodes.data(), nodes.size() - 1};
+        for (std::size_t start = 0; start < nodes.size(); start += piece) {
+            const std::size_t size = std::min(piece, nodes.size() - start);
+            // Of the interior; of the outline, where it is one; whether they unfold as the one and as the other.
+            alignas(64) float cost[piece + width], seen[piece + width], outline_cost[piece + width], outline_seen[piece + width];
+            std::uint8_t interior_unfolds[piece + width], outline_unfolds[piece + width];
+            std::uint16_t asked[piece + width];
+            std::size_t asked_count = 0;
+            for (std::size_t i = 0; i < size; i += width) {
+                listed.prefetch(start + i);
+                const Nodes of = load_nodes(arrays, [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return listed(start + i + lane); });
+                const Measures m = measure(view, of);
+                const Costs inner = costs_of(view, tables, of.interior_row, m, of.length);
+                Costs outline = costs_of(view, tables, of.silhouette_row, m, of.silhouette_length);
+                outline = {max_of(inner.cost, outline.cost), max_of(inner.seen, outline.seen)};
+                const Ints as_outline = ~m.is_asked & ~m.is_near; // the eye is inside, and it does not matter
+                store(cost + i, m.is_inside ? (as_outline ? outline.cost : inner.cost) : all(0));
+                store(seen + i, m.is_inside ? (as_outline ? outline.seen : inner.seen) : all(0));
+                store(outline_cost + i, outline.cost);
+                store(outline_seen + i, outline.seen);
+                const std::uint32_t near = bits_of(m.is_near & m.is_inside), within = bits_of(m.gap < m.silhouette);
+                const std::uint32_t asked_bits = bits_of(m.is_asked);
+                for (std::size_t lane = 0; lane < width; ++lane) {
+                    interior_unfolds[i + lane] = (near >> lane) & 1;
+                    outline_unfolds[i + lane] = ((near | within) >> lane) & 1;
+                    asked[asked_count] = static_cast<std::uint16_t>(i + lane);
+                    asked_count += (asked_bits >> lane) & 1 & (i + lane < size);
+                }
+            }
+            std::fill_n(asked + asked_count, width, asked_count > 0 ? asked[0] : std::uint16_t{0});
+            for (std::size_t first = 0; first < asked_count; first += width) {
+                const auto at = [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return listed(start + asked[first + lane]); };
+                const Facings f = find_facings(view, arrays, at);
+                const std::uint32_t silhouettes = bits_of(f.silhouette), away = bits_of(f.away);
+                for (std::size_t lane = 0; lane < std::min(width, asked_count - first); ++lane) {
+                    const std::size_t i = asked[first + lane];
+                    if ((away >> lane) & 1) cost[i] = seen[i] = 0, interior_unfolds[i] = 0;
+                    else if ((silhouettes >> lane) & 1) {
+                        cost[i] = outline_cost[i], seen[i] = outline_seen[i];
+                        interior_unfolds[i] = outline_unfolds[i];
+                    }
+                }
+            }
+            std::copy_n(cost, size, out.cost + start);
+            std::copy_n(seen, size, out.seen_cost + start);
+            for (std::size_t first = 0; first < size; first += 64) {
+                std::uint64_t bits = 0;
+                for (std::size_t i = first; i < std::min(first + 64, size); ++i) bits |= std::uint64_t{interior_unfolds[i]} << (i - first);
+                out.unfolded[(start + first) / 64] = bits;
+            }
+        }
     }
 };
 
@@ -656,6 +730,10 @@ UNSEEN_INLINE void find_due(float position, float facing, const BlockSpheres& sp
 [[gnu::target("avx2")]] void decide_avx2(const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes, std::uint64_t* unfolded) {
     Lanes<Eight>::decide(view, arrays, nodes, unfolded);
 }
+[[gnu::target("avx2")]] void find_costs_avx2(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
+                                             std::span<const NodeId> nodes, const NodeCosts& costs) {
+    Lanes<Eight>::find_costs(view, arrays, tables, nodes, costs);
+}
 [[gnu::target("avx2")]] void decide_range_avx2(const KernelView& view, const NodeArrays& arrays, NodeId first, std::size_t count,
                                                std::uint64_t* unfolded) {
     Lanes<Eight>::decide(view, arrays, first, count, unfolded);
@@ -672,6 +750,7 @@ void facing_gaps_avx2(const FacingBatch&, FacingGaps&) {}
 void move_blocks_avx2(const float (&)[3], const float (&)[3], float, BlockSpheres&) {}
 void find_due_avx2(float, float, const BlockSpheres&, const BlockDeadlines&, std::uint64_t*) {}
 void decide_avx2(const KernelView&, const NodeArrays&, std::span<const NodeId>, std::uint64_t*) {}
+void find_costs_avx2(const KernelView&, const NodeArrays&, const CostTables&, std::span<const NodeId>, const NodeCosts&) {}
 void decide_range_avx2(const KernelView&, const NodeArrays&, NodeId, std::size_t, std::uint64_t*) {}
 
 #endif
@@ -702,6 +781,12 @@ void facing_gaps(const FacingBatch& batch, FacingGaps& gaps) noexcept {
 void decide(const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes, std::uint64_t* unfolded) noexcept {
     if (has_avx2) decide_avx2(view, arrays, nodes, unfolded);
     else Lanes<Four>::decide(view, arrays, nodes, unfolded);
+}
+
+void find_costs(const KernelView& view, const NodeArrays& arrays, const CostTables& tables, std::span<const NodeId> nodes,
+                const NodeCosts& costs) noexcept {
+    if (has_avx2) find_costs_avx2(view, arrays, tables, nodes, costs);
+    else Lanes<Four>::find_costs(view, arrays, tables, nodes, costs);
 }
 
 void decide_range(const KernelView& view, const NodeArrays& arrays, NodeId first, std::size_t count, std::uint64_t* unfolded) noexcept {

@@ -57,6 +57,19 @@ struct NodeArrays {
 void decide(const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes, std::uint64_t* unfolded) noexcept;
 void decide_range(const KernelView& view, const NodeArrays& arrays, NodeId first, std::size_t count, std::uint64_t* unfolded) noexcept;
 
+// What the costs of folds are looked up in: a criterion's own tables, [row * bins + bin]; the second one may be null.
+struct CostTables {
+    const float *reach = nullptr, *least_cost = nullptr;
+};
+// The thresholds at which nodes would just fold, without and with their least costs, and whether they unfold at the view's. `view` must
+// ask for the facing of everybody.
+struct NodeCosts {
+    float *cost, *seen_cost;  // by place in `nodes`
+    std::uint64_t* unfolded;  // like decide()'s
+};
+void find_costs(const KernelView& view, const NodeArrays& arrays, const CostTables& tables, std::span<const NodeId> nodes,
+                const NodeCosts& costs) noexcept;
+
 // Sixteen nodes.
 struct FoldBatch {
     alignas(64) float centre[3][kernel_lanes];

@@ -123,6 +123,11 @@ void FoldTester::test(std::span<const NodeId> nodes, std::span<Verdict> verdicts
 
 void FoldTester::test_costs(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const { test_nodes(nodes, verdicts, true); }
 
+void FoldTester::find_costs(std::span<const NodeId> nodes, const NodeCosts& costs) const {
+    const DistanceCriterion::Parts& parts = criterion_.parts();
+    vdtree::find_costs(costs_view_, arrays_, {parts.reach.data(), parts.least_cost.empty() ? nullptr : parts.least_cost.data()}, nodes, costs);
+}
+
 void FoldTester::test_nodes(std::span<const NodeId> nodes, std::span<Verdict> verdicts, bool costs) const {
     std::array<FoldCandidate, kernel_lanes> candidates;
     std::array<const FoldCandidate*, kernel_lanes> lanes;

@@ -70,6 +70,8 @@ public:
     void decide_range(NodeId first, std::size_t count, std::uint64_t* unfolded) const {
         vdtree::decide_range(view_, arrays_, first, count, unfolded);
     }
+    // Both costs of nodes, and whether they unfold; the same as those of test_costs().
+    void find_costs(std::span<const NodeId> nodes, const NodeCosts& costs) const;
     // The same where costs count, not only what is above the threshold: what nodes face is always found out. (In the above, the
     // costs of nodes that are far from the threshold may be those of another facing.)
     void test_costs(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const;
