@@ -193,7 +193,9 @@ struct Cut::Indices {
     IndexBuffer buffer;
     bool is_stale = true;
     bool is_patched = false;      // writes are the whole difference to the buffer before the last change
-    bool few_changes_last = false;
+    unsigned quiet_frames = 0;    // in a row, of few changes
+
+    void count_changes(std::size_t changes, Index triangles) { quiet_frames = changes < few_changes(triangles) ? quiet_frames + 1 : 0; }
     std::uint64_t version = 0, writes_from = 0; // of the buffer, and before the last writes
 
     void change_version() {
@@ -250,7 +252,7 @@ void Cut::make_stale() {
     if (!indices_) return;
     indices_->is_stale = true;
     indices_->is_patched = false;
-    indices_->few_changes_last = false;
+    indices_->quiet_frames = 0;
     indices_->buffer.drop_lists();
 }
 
@@ -393,7 +395,7 @@ void Cut::end_changes(AdjustStats& stats) {
     for (const FoldChange& change : changes_) ++(change.folded ? stats.folds : stats.unfolds);
     stats.triangles = triangle_count_;
     if (!indices_) return;
-    indices_->few_changes_last = changes_.size() < few_changes(triangle_count_);
+    indices_->count_changes(changes_.size(), triangle_count_);
     if (indices_->is_patched) {
         indices_->buffer.end_patch();
         if (!indices_->buffer.writes().empty()) indices_->change_version();
@@ -459,7 +461,7 @@ void Cut::become(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
     if (!indices_ || changes_.empty()) return;
     indices_->is_stale = true;
     indices_->is_patched = false;
-    indices_->few_changes_last = changes_.size() < few_changes(triangle_count_);
+    indices_->count_changes(changes_.size(), triangle_count_);
     indices_->buffer.drop_lists();
 }
 
@@ -551,8 +553,8 @@ std::span<const NodeId> Cut::indices() const {
         indices_->buffer.gather(unfolded_, proxy_, triangle_count_);
         indices_->is_stale = false;
         indices_->change_version();
-        // When little changed last, little will change next.
-        if (indices_->few_changes_last) indices_->buffer.make_lists(unfolded_);
+        // When little has changed twice, little will change next; a frame after a jump has enough to do.
+        if (indices_->quiet_frames > 1) indices_->buffer.make_lists(unfolded_);
     }
     return indices_->buffer.indices();
 }

@@ -250,29 +250,13 @@ void CutFollower::start_in_time(Cut& cut) {
     watch_all(cut, Deadlines::now);
 }
 
+// What can change next, from a cut of which nothing is watched: all due, or tested, with what folds and unfolds for it.
 void CutFollower::watch_all(const Cut& cut, Deadlines deadlines) {
     watched_.clear();
-    unfolding_.clear();
-    for (std::size_t word = 0; word < cut.unfolded_.size(); ++word)
-        for (std::uint64_t bits = cut.unfolded_[word]; bits; bits &= bits - 1)
-            unfolding_.push_back(static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))));
-    wave_.clear();
-    if (unfolding_.empty()) wave_.push_back(VertexTree::root());
-    std::size_t at = 0;
-    bool is_border = true;
-    const auto go_to = [&](std::size_t next) {
-        for (; at < next; ++at, is_border = true)
-            if (is_border || watches_ancestors_) wave_.push_back(unfolding_[at]);
-    };
-    walk_children(tree_, unfolding_.size(), [&](std::size_t i) { return unfolding_[i]; }, [&](std::size_t i, NodeId child) {
-        go_to(i);
-        if (cut.is_unfolded_interior(child)) is_border = false;
-        else wave_.push_back(child);
-    });
-    go_to(unfolding_.size());
-    watched_.reserve(wave_.size());
-    for (std::size_t first = 0; first < wave_.size(); first += piece_tests) {
-        const auto piece = std::span(wave_).subspan(first, std::min(piece_tests, wave_.size() - first));
+    find_border(cut);
+    watched_.reserve(next_wave_.size());
+    for (std::size_t first = 0; first < next_wave_.size(); first += piece_tests) {
+        const auto piece = std::span(next_wave_).subspan(first, std::min(piece_tests, next_wave_.size() - first));
         wave_slots_.clear();
         for (std::size_t i = 0; i < piece.size(); ++i) {
             constexpr std::size_t ahead = 16; // nodes between a prefetch and its use
@@ -282,13 +266,31 @@ void CutFollower::watch_all(const Cut& cut, Deadlines deadlines) {
             wave_slots_.push_back(watched_.append(candidate));
         }
         watched_.end_append();
-        verdicts_.assign(piece.size(), Verdict{});
-        if (deadlines == Deadlines::found) {
-            tester_->test(watched_.candidates(), wave_slots_, verdicts_);
-            stats_.node_tests += piece.size();
-        }
-        for (std::size_t i = 0; i < piece.size(); ++i) set_deadlines(wave_slots_[i], verdicts_[i]);
+        if (deadlines == Deadlines::found) test_slots(wave_slots_);
+        else for (const Slot slot : wave_slots_) set_deadlines(slot, Verdict{});
     }
+}
+
+// The nodes to watch, in about their order, as the next wave.
+void CutFollower::find_border(const Cut& cut) {
+    unfolding_.clear();
+    for (std::size_t word = 0; word < cut.unfolded_.size(); ++word)
+        for (std::uint64_t bits = cut.unfolded_[word]; bits; bits &= bits - 1)
+            unfolding_.push_back(static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))));
+    next_wave_.clear();
+    if (unfolding_.empty()) next_wave_.push_back(VertexTree::root());
+    std::size_t at = 0;
+    bool is_border = true;
+    const auto go_to = [&](std::size_t next) {
+        for (; at < next; ++at, is_border = true)
+            if (is_border || watches_ancestors_) next_wave_.push_back(unfolding_[at]);
+    };
+    walk_children(tree_, unfolding_.size(), [&](std::size_t i) { return unfolding_[i]; }, [&](std::size_t i, NodeId child) {
+        go_to(i);
+        if (cut.is_unfolded_interior(child)) is_border = false;
+        else next_wave_.push_back(child);
+    });
+    go_to(unfolding_.size());
 }
 
 bool CutFollower::is_out_of_time() const { return time_limit_ && std::chrono::steady_clock::now() >= *time_limit_; }
@@ -296,12 +298,16 @@ bool CutFollower::is_out_of_time() const { return time_limit_ && std::chrono::st
 // ---- from frame to frame
 
 void CutFollower::step(Cut& cut, const Motion& motion) {
-    if (watched_.empty()) {
-        if (!time_limit_ && !(motion.position < step_worth_deadlines * length_per_radian_)) return start_over(cut);
-        if (!time_limit_) cut.change_to(decide_all(), stats_);
-        watch_all(cut, time_limit_ ? Deadlines::now : Deadlines::found);
-        if (!time_limit_) return;
+    if (watched_.empty() && !time_limit_) {
+        if (!(motion.position < step_worth_deadlines * length_per_radian_)) return start_over(cut);
+        cut.begin_changes();
+        begin_settling();
+        watch_all(cut, Deadlines::found);
+        end_settling(cut);
+        cut.end_changes(stats_);
+        return;
     }
+    if (watched_.empty()) watch_all(cut, Deadlines::now);
     due_.clear();
     watched_.collect_due(due_);
     if (static_cast<double>(due_.size()) > most_due * static_cast<double>(watched_.size()) && !time_limit_) return start_over(cut);
@@ -318,9 +324,7 @@ void CutFollower::settle_due(Cut& cut) {
 
 // Tests what is due, folds what has to go, and unfolds what has to come, with all that follows above and under it.
 void CutFollower::settle(Cut& cut) {
-    folding_.clear();
-    parents_.clear();
-    wave_.clear();
+    begin_settling();
     // In pieces, between which the clock is looked at; what is not reached stays due.
     constexpr std::size_t piece = 2048;
     for (std::size_t first = 0; first < due_.size(); first += piece) {
@@ -331,6 +335,16 @@ void CutFollower::settle(Cut& cut) {
         }
         test_due(std::span(due_).subspan(first, std::min(piece, due_.size() - first)));
     }
+    end_settling(cut);
+}
+
+void CutFollower::begin_settling() {
+    folding_.clear();
+    parents_.clear();
+    wave_.clear();
+}
+
+void CutFollower::end_settling(Cut& cut) {
     while (!folding_.empty() || !parents_.empty()) {
         fold_wave(cut);
         test_parents(cut);

@@ -51,11 +51,14 @@ private:
     void start_in_time(Cut& cut);
     enum class Deadlines { now, found };
     void watch_all(const Cut& cut, Deadlines deadlines);
+    void find_border(const Cut& cut);
     std::vector<std::uint64_t> decide_all();
     void step(Cut& cut, const Motion& motion);
     bool is_out_of_time() const;
     void settle_due(Cut& cut);
     void settle(Cut& cut);
+    void begin_settling();
+    void end_settling(Cut& cut);
     void test_due(std::span<const Slot> slots);
     void test_slots(std::span<const Slot> slots);
     void prefetch_changes(Cut& cut, std::span<const NodeId> nodes, bool folds);

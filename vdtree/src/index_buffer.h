@@ -59,6 +59,8 @@ private:
 
     Entry* entries(Block block) { return pool_.data()->entries + block; }
     const Entry* entries(Block block) const { return pool_.data()->entries + block; }
+    template <class F>
+    void for_each_unfolded(std::span<const std::uint64_t> unfolded, F&& f);
     void write(Index corner, NodeId node);
     void append(NodeId node, Entry entry);
     void remove(NodeId node, Index corner);
@@ -76,6 +78,7 @@ private:
     std::vector<Line> pool_;             // of entries; blocks are whole lines
     std::vector<Block> free_blocks_[28]; // by log2 of the size
     std::vector<Index> holes_;           // triangles without corners
+    std::vector<NodeId> nodes_;          // scratch
     std::vector<Entry> scratch_;
     std::vector<Index> vanished_;
     std::vector<IndexWrite> writes_;
