@@ -518,6 +518,17 @@ Result<AdjustStats> Cut::follow(const DistanceCriterion& criterion, const Viewpo
     return follower_->follow(*this, criterion, viewpoint, options);
 }
 
+Result<std::vector<std::uint64_t>> test_every_node(const VertexTree& tree, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
+                                                   const FollowOptions& options) {
+    if (const auto valid = check(viewpoint); !valid) return valid.error();
+    if (const auto valid = check(options); !valid) return valid.error();
+    FoldTester tester(tree, criterion, options.cull_back_faces, options.threshold);
+    tester.look_from(viewpoint, 1);
+    std::vector<std::uint64_t> unfolded((std::size_t{tree.interior_count()} + 63) / 64);
+    tester.decide_range(0, tree.interior_count(), unfolded.data());
+    return unfolded;
+}
+
 Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objects, Index triangle_budget) {
     std::vector<const VertexTree*> trees;
     std::vector<std::unique_ptr<FoldTester>> testers;

@@ -170,6 +170,12 @@ struct SceneObject {
 // Fails, and changes nothing, where a viewpoint is not finite or a cut is named twice.
 Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objects, Index triangle_budget);
 
+// Which interior nodes the criterion unfolds from a viewpoint, each tested by itself, whatever is above it: one bit a node, the first
+// node's lowest. Of the options, the threshold and back faces count. Fails where the viewpoint is not finite. What it says of damaged nodes
+// (see VertexTree::is_sound) means nothing. Cost: some ten nanoseconds a node.
+Result<std::vector<std::uint64_t>> test_every_node(const VertexTree& tree, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
+                                                   const FollowOptions& options = {});
+
 // The cut as a mesh of its own: only the vertices in use, in double precision, with the tree's attributes.
 Mesh extract_mesh(const Cut& cut);
 
