@@ -357,7 +357,20 @@ void Cut::prefetch_changes(std::span<const NodeId> nodes, bool folds) {
             if (first_triangle[node] < tree_->triangle_count()) prefetch(&tree_->triangles()[first_triangle[node]]);
     }
     buffer.prefetch_lists(active);
+    // The third corners of the triangles that come.
+    const auto for_each_third = [&](auto&& f) {
+        for (const NodeId node : nodes)
+            for (Index t = first_triangle[node]; t < first_triangle[node + 1]; ++t)
+                for (const Index leaf : tree_->triangles()[t])
+                    if (leaf < first_leaf[node] || leaf >= leaf_end[node]) f(leaf);
+    };
+    if (!folds) for_each_third([&](Index leaf) { prefetch(&proxy_[leaf]); });
     buffer.prefetch_corners(active);
+    others_.clear();
+    if (folds) buffer.find_others(soon_, others_);
+    else for_each_third([&](Index leaf) { others_.push_back(proxy_[leaf]); });
+    buffer.prefetch_places(others_);
+    buffer.prefetch_lists(others_);
 }
 
 void Cut::apply_unfold(NodeId node) {

@@ -260,6 +260,22 @@ void IndexBuffer::prefetch_corners(std::span<const NodeId> active) const {
     }
 }
 
+void IndexBuffer::find_others(std::span<const NodeId> children, std::vector<NodeId>& others) const {
+    for (std::size_t i = 0; i + 1 < children.size(); ++i) {
+        const Block block = block_of_node_[children[i]];
+        if (block == no_block) continue;
+        const NodeId neighbour = children[i + 1];
+        const Entry* const head = entries(block);
+        const std::uint32_t count = std::min<std::uint32_t>(head->leaf, (1u << least_log2_size) - 1);
+        for (std::uint32_t e = 1; e <= count; ++e) {
+            const NodeId* const shown = &indices_[head[e].corner / 3 * 3];
+            if (shown[0] != neighbour && shown[1] != neighbour && shown[2] != neighbour) continue;
+            for (int k = 0; k < 3; ++k)
+                if (shown[k] != neighbour && shown[k] != children[i]) others.push_back(shown[k]);
+        }
+    }
+}
+
 void IndexBuffer::end_patch() {
     std::size_t end = indices_.size() / 3;
     for (const Index hole : holes_) {

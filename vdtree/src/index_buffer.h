@@ -38,6 +38,8 @@ public:
     void prefetch_places(std::span<const NodeId> active) const;
     void prefetch_lists(std::span<const NodeId> active) const;
     void prefetch_corners(std::span<const NodeId> active) const;
+    // What the triangles that vanish when neighbours in `children` become one show besides: appends to `others`.
+    void find_others(std::span<const NodeId> children, std::vector<NodeId>& others) const;
     // Closes the holes with triangles from the end.
     void end_patch();
 

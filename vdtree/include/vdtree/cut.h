@@ -151,7 +151,7 @@ private:
     Index triangle_count_ = 0;
     std::vector<FoldChange> changes_;
     std::uint64_t revision_;               // of the state: one more for what changes_ tells, two for what nobody knows
-    std::vector<NodeId> children_, soon_;  // scratch
+    std::vector<NodeId> children_, soon_, others_; // scratch
     std::unique_ptr<CutFollower> follower_;
     struct Indices;
     mutable std::unique_ptr<Indices> indices_; // made when it is first asked for
