@@ -447,25 +447,46 @@ void Cut::replay(std::span<const std::uint64_t> unfolded, AdjustStats& stats) {
 void Cut::become(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
     changes_.clear();
     ++revision_;
-    const auto first = tree_->first_triangle();
-    for (std::size_t word = 0; word < unfolded.size(); ++word) {
-        for (std::uint64_t bits = unfolded[word] & ~unfolded_[word]; bits; bits &= bits - 1) {
-            const NodeId node = static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
-            triangle_count_ += first[node + 1] - first[node];
-            changes_.push_back({node, false});
-            tree_->for_each_child(node, [&](NodeId child) {
-                if (tree_->is_leaf(child) || !test_bit(unfolded, child)) assign(child);
-            });
-        }
-    }
+    for (std::size_t word = 0; word < unfolded.size(); ++word)
+        for (std::uint64_t bits = unfolded[word] & ~unfolded_[word]; bits; bits &= bits - 1)
+            changes_.push_back({static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))), false});
     for (std::size_t word = unfolded.size(); word-- > 0;) {
         for (std::uint64_t bits = unfolded_[word] & ~unfolded[word]; bits;) {
             const int highest = 63 - std::countl_zero(bits);
-            const NodeId node = static_cast<NodeId>(word * 64 + static_cast<std::size_t>(highest));
             bits &= ~(std::uint64_t{1} << highest);
-            triangle_count_ -= first[node + 1] - first[node];
-            changes_.push_back({node, true});
-            if (node == VertexTree::root() || test_bit(unfolded, tree_->parents()[node])) assign(node);
+            changes_.push_back({static_cast<NodeId>(word * 64 + static_cast<std::size_t>(highest)), true});
+        }
+    }
+    const auto first = tree_->first_triangle(), first_leaf = tree_->first_leaf(), leaf_end = tree_->leaf_end();
+    const auto subtree_end = tree_->subtree_end();
+    const auto parents = tree_->parents();
+    const auto prefetch_links = [&](NodeId node) {
+        prefetch(&first_leaf[node]);
+        prefetch(&leaf_end[node]);
+        prefetch(&subtree_end[node]);
+    };
+    constexpr std::size_t far = 32, near = 16; // changes between a prefetch and its use
+    for (std::size_t i = 0; i < changes_.size(); ++i) {
+        if (i + far < changes_.size()) {
+            const FoldChange& soon = changes_[i + far];
+            prefetch_links(soon.node);
+            prefetch(&first[soon.node]);
+            if (soon.folded) prefetch(&parents[soon.node]);
+        }
+        if (i + near < changes_.size() && !changes_[i + near].folded) {
+            const NodeId soon = changes_[i + near].node, child = soon + 1;
+            if (child < subtree_end[soon] && subtree_end[child] < subtree_end[soon]) prefetch_links(subtree_end[child]);
+        }
+        const auto [node, folded] = changes_[i];
+        const Index triangles = first[node + 1] - first[node];
+        if (folded) {
+            triangle_count_ -= triangles;
+            if (node == VertexTree::root() || test_bit(unfolded, parents[node])) assign(node);
+        } else {
+            triangle_count_ += triangles;
+            tree_->for_each_child(node, [&](NodeId child) {
+                if (tree_->is_leaf(child) || !test_bit(unfolded, child)) assign(child);
+            });
         }
     }
     for (const FoldChange& change : changes_) ++(change.folded ? stats.folds : stats.unfolds);

@@ -71,6 +71,7 @@ void WatchList::clear() {
 }
 
 void WatchList::reserve(std::size_t nodes) {
+    if (slots_of_nodes_.empty()) slots_of_nodes_.assign(interior_count_, no_slot);
     const std::size_t blocks = nodes / appended_slots + nodes / (8 * appended_slots) + 1; // an eighth for what comes later
     candidates_.reserve(blocks * block_slots);
     blocks_.reserve(blocks);

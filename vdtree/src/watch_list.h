@@ -27,14 +27,14 @@ public:
     static constexpr Slot no_slot = 0xffffffffu;
     static constexpr std::size_t block_slots = 16;
 
-    explicit WatchList(NodeId interior_count) : slots_of_nodes_(interior_count, no_slot) {}
+    explicit WatchList(NodeId interior_count) : interior_count_(interior_count) {}
 
     bool empty() const noexcept { return size_ == 0; }
     std::size_t size() const noexcept { return size_; }
     void clear();
     void reserve(std::size_t nodes);
 
-    // Slots hold until the next insert().
+    // Slots hold until the next insert(). Nothing has one before the first reserve().
     Slot slot_of(NodeId node) const noexcept { return slots_of_nodes_[node]; }
     const FoldCandidate& operator[](Slot slot) const noexcept { return candidates_[slot]; }
     std::span<const FoldCandidate> candidates() const noexcept { return candidates_; }
@@ -99,6 +99,7 @@ private:
     template <class F>
     void for_each_used(BlockId block, F&& f) const;
 
+    NodeId interior_count_;
     std::vector<FoldCandidate> candidates_; // by slot
     std::vector<Slot> slots_of_nodes_;
     std::size_t size_ = 0;
