@@ -226,6 +226,32 @@ TEST_P(Follow, EqualsTheCutFromScratchOnRandomPaths) {
     EXPECT_LT(incremental_tests, 4 * all_tests);
 }
 
+// Straight at the model, past it and away from it, by steps of all sizes, with a gaze that goes its own way.
+TEST_P(Follow, EqualsTheCutFromScratchOnStraightWays) {
+    const VertexTree tree = built(GetParam().make());
+    const Sphere sphere = tree.bounding_sphere();
+    std::mt19937_64 random(29);
+    for (const bool with_gaze : {false, true}) {
+        const DistanceCriterion criterion = rich_criterion(tree, 4, with_gaze);
+        Cut cut(tree);
+        for (int way = 0; way < 30; ++way) {
+            glm::dvec3 eye = glm::dvec3(sphere.centre) + (1.5 + 6 * random_unit(random)) * sphere.radius * random_direction(random);
+            const glm::dvec3 target = glm::dvec3(sphere.centre) + sphere.radius * random_unit(random) * random_direction(random);
+            const glm::dvec3 step = (target - eye) * std::pow(10.0, -1 - 2 * random_unit(random)) * (way % 3 == 0 ? -1.0 : 1.0);
+            glm::dvec3 gaze = glm::normalize(target - eye);
+            const glm::dvec3 turn = 1e-3 * random_unit(random) * random_direction(random);
+            for (int frame = 0; frame < 30; ++frame) {
+                Viewpoint viewpoint{.eye = eye};
+                if (with_gaze) viewpoint.gaze = gaze;
+                ASSERT_TRUE(cut.follow(criterion, viewpoint));
+                ASSERT_EQ(state_of(cut), from_scratch(tree, criterion, viewpoint, {})) << "way " << way << ", frame " << frame;
+                eye += step;
+                gaze = glm::normalize(gaze + turn);
+            }
+        }
+    }
+}
+
 #ifdef NDEBUG // else an assertion tells
 TEST_P(Follow, EqualsTheCutFromScratchUnderACriterionThatIsNotMonotone) {
     const VertexTree tree = built(GetParam().make());

@@ -97,8 +97,9 @@ void CutFollower::start_at(const Viewpoint& viewpoint) {
 
 void CutFollower::move_to(const Viewpoint& viewpoint, const Motion& motion) {
     look_from(viewpoint);
-    watched_.move_to(viewpoint.eye, motion.facing);
-    if (tester_->uses_gaze()) watched_.advance(motion.position); // directions count, too
+    // With a gaze, directions count, too: coming nearer does not make up for them.
+    if (tester_->uses_gaze()) watched_.advance(motion.position, motion.facing);
+    else watched_.move_to(viewpoint.eye, motion.facing);
 }
 
 void CutFollower::look_from(const Viewpoint& viewpoint) {
@@ -196,7 +197,7 @@ void CutFollower::change_threshold(Cut& cut, float factor) {
     threshold_ = std::max(threshold_ * factor, least_threshold);
     tester_->set_threshold(threshold_);
     const double share = factor > 1 ? factor - 1 : 1 / factor - 1;
-    watched_.advance(2 * share * farthest_);
+    watched_.advance(2 * share * farthest_, 0);
     settle_due(cut);
 }
 

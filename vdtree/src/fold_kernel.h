@@ -1,5 +1,5 @@
-// The arithmetic of fold tests, sixteen nodes at once: where their spheres are, seen from the eye, and how far the eye is from
-// where their rings would face it otherwise.
+// The arithmetic of fold tests, many nodes at once: where their spheres are, seen from the eye, how far the eye is from where their rings
+// would face it otherwise, and what follows from both; and of what tells when to test again.
 #pragma once
 
 #include <array>

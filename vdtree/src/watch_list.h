@@ -58,10 +58,10 @@ public:
     // change; else only shrinking ones.
     void set_deadlines(Slot slot, bool unfolded, float position_slack, float facing_slack);
 
-    // The eye goes to a place, and the facing clock on.
+    // The eye goes to a place, and the facing clock on. In place of that, or besides:
     void move_to(const glm::dvec3& eye, double facing);
-    // All distances may have changed by so much, in any direction.
-    void advance(double position) { set_clocks(position_clock_ + position, facing_clock_); }
+    // All distances, and what else slacks for them cover, may have changed by so much, whichever way; the facing clock goes on.
+    void advance(double position, double facing) { set_clocks(position_clock_ + position, facing_clock_ + facing); }
     // Sets back what has grown beyond `longest`, so that deadlines in floats stay fine enough.
     void restart_clocks(double longest);
 
