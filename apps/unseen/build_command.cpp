@@ -28,6 +28,7 @@ struct BuildArguments {
     vdtree::ColourEncoding colours = vdtree::ColourEncoding::srgb;
     int threads = 0;
     double memory_gib = 0; // 0: no limit
+    bool fold_errors = false;
 };
 
 constexpr int most_threads = 1024;
@@ -151,6 +152,11 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
     const auto start = std::chrono::steady_clock::now();
     auto tree = build(a, std::move(source->read), team);
     if (!tree) return tree.error();
+    if (a.fold_errors) {
+        print_note("measuring what folds change ...");
+        tree = vdtree::with_fold_errors(*tree, a.threads);
+        if (!tree) return tree.error();
+    }
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
     JsonReport& report = source->report;
@@ -200,6 +206,9 @@ Command build_command(CLI::App& app) {
     verb->add_option("--threads", a->threads, "Threads of each process; the tree is the same (default: all cores)")
         ->type_name("N")
         ->check(within(1, most_threads));
+    verb->add_flag("--fold-errors", a->fold_errors,
+                   "Measure what every fold changes, for the fold test 'error' (else that is done at each start), and give proxies the luminance "
+                   "that keeps the surface's light");
     verb->add_option("--memory", a->memory_gib,
                      "Memory that each process aims to keep to; the rest waits in a temporary file beside the tree")
         ->type_name("GIB")

@@ -37,6 +37,7 @@ bool is_for_people(const std::string& file) {
 Result<int> run_flight(RenderArguments& a) {
     auto scene = load_scene(a.model, a.view, a.display);
     if (!scene) return scene.error();
+    if (const auto ready = measure_folds(*scene, a.what); !ready) return ready.error();
     a.flight.pictures = a.out;
     a.flight.json = a.json;
     a.flight.what = a.what;
@@ -53,8 +54,9 @@ Result<int> run(RenderArguments& a) {
                      "'" + a.out + "' is the model itself: give the picture another name."};
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
-    const auto scene = load_scene(a.model, a.view, a.display);
+    auto scene = load_scene(a.model, a.view, a.display);
     if (!scene) return scene.error();
+    if (const auto ready = measure_folds(*scene, a.what); !ready) return ready.error();
     auto context = render::Context::headless();
     if (!context) return context.error();
     auto renderer = render::Renderer::create(*context, scene->tree);

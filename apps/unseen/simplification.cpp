@@ -264,6 +264,15 @@ vdtree::View widened(const vdtree::View& view) {
 
 } // namespace
 
+Result<void> measure_folds(Scene& scene, const WhatOptions& what) {
+    if (what.mode == Mode::full || what.test != FoldTest::error || !scene.tree.fold_errors().empty()) return {};
+    print_note("measuring what folds change (unseen build --fold-errors keeps that in the tree) ...");
+    auto measured = vdtree::with_fold_errors(scene.tree);
+    if (!measured) return measured.error();
+    scene.tree = std::move(*measured);
+    return {};
+}
+
 Result<Simplification> simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
     if (what.mode != Mode::full && (what.fill_budget || what.milliseconds || what.chroma || has_distance_form_only(what.test))) {
         Follower follower;
@@ -319,8 +328,7 @@ Result<const vdtree::DistanceCriterion*> Follower::criterion_for(const Scene& sc
             if (!rings_) rings_ = vdtree::bound_cut_rings(scene.tree);
             return perception::luebke_hallen_safe_distances(scene.tree, *rings_, scene.view, options);
         }
-        if (!errors_) errors_ = vdtree::measure_fold_errors(scene.tree);
-        return perception::error_distances(scene.tree, *errors_, scene.view, options);
+        return perception::error_distances(scene.tree, scene.view, options);
     }();
     if (!made) return made.error();
     criterion_ = std::move(*made);

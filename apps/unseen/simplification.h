@@ -43,6 +43,9 @@ enum class Purpose {
 // Adjusts `cut`, which must be of the scene's tree. Cost: about a microsecond for each node test.
 Result<Simplification> simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose);
 
+// Measures the errors of the tree's folds where the fold test asks for them and the tree's file does not have them.
+Result<void> measure_folds(Scene& scene, const WhatOptions& what);
+
 // Keeps a cut at what moving views of a scene ask for. In the modes imperceptible and pixels the cost goes with what changes from
 // one call to the next; the others begin anew each time (full: once).
 class Follower {
@@ -86,7 +89,6 @@ private:
     float hysteresis_ = 1.1f;
     Key key_;
     std::optional<vdtree::DistanceCriterion> criterion_;
-    std::optional<vdtree::FoldErrors> errors_; // of the scene's tree; made when they are first asked for
     std::optional<vdtree::CutRings> rings_;    // likewise
     std::optional<vdtree::Geomorph> geomorph_;
     double passed_ = 0; // seconds since its last step

@@ -29,8 +29,9 @@ Result<int> run(const SimplifyArguments& a) {
         return Error{ErrorCode::invalid_argument, "'" + a.out + "' is the model itself: give the result another name."};
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
-    const auto scene = load_scene(a.model, a.view, a.display);
+    auto scene = load_scene(a.model, a.view, a.display);
     if (!scene) return scene.error();
+    if (const auto ready = measure_folds(*scene, a.what); !ready) return ready.error();
 
     vdtree::Cut cut(scene->tree);
     auto simplified = simplify(cut, *scene, a.what, Purpose::mesh);

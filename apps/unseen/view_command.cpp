@@ -4,6 +4,7 @@
 
 #include "command.h"
 #include "options.h"
+#include "simplification.h"
 #include "viewer.h"
 
 namespace unseen::app {
@@ -19,6 +20,7 @@ struct ViewArguments {
 Result<int> run(ViewArguments& a) {
     auto scene = load_scene(a.model, a.view, a.display);
     if (!scene) return scene.error();
+    if (const auto ready = measure_folds(*scene, a.viewer.what); !ready) return ready.error();
     a.viewer.has_fixed_field = a.view.fov_degrees.has_value();
     if (auto ended = run_viewer(*scene, a.viewer); !ended) return ended.error();
     return exit_done;

@@ -334,8 +334,10 @@ void cover(Reaches& reaches, Shown& a, const Shown& b) {
 
 } // namespace
 
-Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree, const vdtree::FoldErrors& errors,
-                                                  const vdtree::View& view, const FoldTestOptions& options) {
+Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options) {
+    const std::span<const vdtree::FoldError> errors = tree.fold_errors();
+    if (errors.empty())
+        return Error{ErrorCode::invalid_argument, "The errors of the tree's folds have not been measured (vdtree::with_fold_errors)."};
     const NodeId nodes = tree.interior_count();
     const Screen screen(view, options);
     const Levels levels(options.display);
@@ -346,13 +348,14 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
     parts.spheres = DistanceCriterion::Spheres::ring;
     parts.eccentricity_bins = options.gaze_px ? bin_count : 1;
     parts.bin_degrees = degrees_per_bin / screen.least_magnification;
-    parts.facing = errors.facing;
+    parts.facing.resize(nodes);
     parts.classes.resize(nodes);
     parts.lengths.resize(nodes);
     parts.silhouette_lengths.resize(nodes);
     const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
-    const double whole = levels.in_cdm2(static_cast<double>(errors.drift_luminance));
-    const double whole_peak = csf.peak_sensitivity(Degrees(0), Luminance(levels.luminance(levels.luminance_level(whole))));
+    const vdtree::LuminanceRange all = tree.ring_luminance()[vdtree::VertexTree::root()];
+    const int whole = levels.luminance_level(levels.in_cdm2(static_cast<double>(all.lo + all.hi) / 2));
+    const double whole_peak = csf.peak_sensitivity(Degrees(0), Luminance(levels.luminance(whole)));
     Reaches reaches(levels, screen, csf, parts.eccentricity_bins);
     std::vector<Shown> patches(nodes), strips(nodes);
     for (NodeId node = nodes; node-- > 0;) { // children before parents
@@ -364,16 +367,16 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
         };
         Shown patch;
         patch.pattern.luminance = levels.luminance_level(middle);
-        patch.pattern.largest = levels.contrast_level(change(errors.luminance[node], errors.distance[node]), middle);
-        const int typical = levels.contrast_level(amplitude_of_mean * change(errors.mean_luminance[node], errors.mean_distance[node]), middle);
+        patch.pattern.largest = levels.contrast_level(change(errors[node].luminance, errors[node].distance), middle);
+        const int typical = levels.contrast_level(amplitude_of_mean * change(errors[node].mean_luminance, errors[node].mean_distance), middle);
         if (patch.pattern.largest != no_contrast)
             patch.pattern.typical = std::clamp(typical, std::max(patch.pattern.largest - steepest_spike, 0), patch.pattern.largest);
-        const vdtree::Drift drift = errors.drift[node];
-        patch.length = std::max(tree.support_spheres()[node].radius, errors.extent[node]);
-        const int drifting = levels.contrast_level(levels.difference_in_cdm2(drift.amount), whole);
-        if (drifting != no_contrast && Levels::contrast(drifting) * whole_peak > 1) {
-            patch.pattern.luminance = std::max(patch.pattern.luminance, levels.luminance_level(whole));
-            patch.pattern.drift = drifting, patch.pattern.fading = drift.fading, patch.pattern.quarters = static_cast<int>(std::ceil(4 * std::log2(std::max(object_radius / patch.length, 1.0f))));
+        patch.length = std::max(tree.support_spheres()[node].radius, errors[node].extent);
+        const int drift = levels.contrast_level(static_cast<double>(errors[node].drift), 1);
+        if (drift != no_contrast && Levels::contrast(drift) * whole_peak > 1) {
+            patch.pattern.luminance = std::max(patch.pattern.luminance, whole);
+            patch.pattern.drift = drift, patch.pattern.fading = errors[node].fading;
+            patch.pattern.quarters = static_cast<int>(std::ceil(4 * std::log2(std::max(object_radius / patch.length, 1.0f))));
         }
         patch.pattern = reaches.simplified(rounded(patch.pattern));
         patch.row = reaches.row(patch.pattern);
@@ -386,7 +389,7 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
             const Pattern own{.luminance = levels.luminance_level(mean), .largest = levels.contrast_level(bright - dark, mean), .is_strip = true};
             strip.pattern = above(strip.pattern, own);
         }
-        strip.length = std::max(strip.length, moved_by_neighbours * errors.distance[node]);
+        strip.length = std::max(strip.length, moved_by_neighbours * errors[node].distance);
         strip.row = reaches.row(strip.pattern);
         strips[node] = strip;
         if (node == 0) break;
@@ -399,6 +402,7 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
     }
     for (NodeId node = 0; node < nodes; ++node) {
         parts.classes[node] = {patches[node].row, strips[node].row};
+        parts.facing[node] = errors[node].facing;
         parts.lengths[node] = patches[node].length;
         parts.silhouette_lengths[node] = strips[node].length;
     }

@@ -14,7 +14,6 @@ namespace unseen::vdtree {
 
 namespace {
 
-constexpr Index none = 0xffffffffu;
 constexpr float levels_per_octave = 1;   // of the order in which nodes fold
 constexpr int most_levels = 40;
 constexpr float flat_share = 0.5f; // of a surface's area that its vector area must come to; else its parts count without cancelling
@@ -22,20 +21,20 @@ constexpr float spread = 1;        // standard deviations by which what is folde
 constexpr float least_contrast = 1e-3f; // relative luminance: below, errors do not order the folds any more
 constexpr float darkest = 0.01f; // relative luminance of areas; about a display's black
 constexpr float least_side = 0.25f; // of a surface's area, as seen: less is not what the mean is taken of
-constexpr int most_fading = 3;
+constexpr std::size_t most_fading = 3;
 
 class DriftFinder {
 public:
-    DriftFinder(const VertexTree& tree, const FoldErrors& errors)
+    DriftFinder(const VertexTree& tree, std::span<FoldError> errors)
         : tree_(tree), errors_(errors), interior_(tree.interior_count()), positions_(tree.positions()), luminance_(tree.luminance()),
-          parents_(tree.parents()), drift_(interior_), surfaces_(interior_), light_(interior_), found_(interior_) {}
+          parents_(tree.parents()), surfaces_(interior_), light_(interior_), found_(interior_) {}
 
-    std::vector<Drift> run() {
+    void run() {
         order();
         collect_surfaces();
         fold_all();
         const float first = order_[0];
-        if (!(first > 0) || !std::isfinite(first)) return std::move(drift_);
+        if (!(first > 0) || !std::isfinite(first)) return;
         float finest = first;
         for (const float o : order_)
             if (o > 0) finest = std::min(finest, o);
@@ -50,17 +49,14 @@ public:
             std::erase_if(nodes_, [&](NodeId node) { return is_below(node, up_to); });
             below = up_to;
         }
-        return std::move(drift_);
     }
-
-    float luminance() const { return surfaces_[VertexTree::root()].luminance(); }
 
 private:
     // Wide nodes fold after narrow ones, and those that go wrong after those that do not.
     void order() {
         order_.resize(interior_);
         for (NodeId node = interior_; node-- > 0;) {
-            const float own = changed_radius(tree_, errors_, node) * std::sqrt(errors_.mean_luminance[node] + least_contrast);
+            const float own = changed_radius(tree_, errors_, node) * std::sqrt(errors_[node].mean_luminance + least_contrast);
             order_[node] = std::max(order_[node], own);
             if (node > 0) order_[parents_[node]] = std::max(order_[parents_[node]], order_[node]);
         }
@@ -153,37 +149,29 @@ private:
     // The nodes that fold between the last level and this one.
     void note(float below, float up_to) {
         for (const NodeId node : nodes_)
-            if (order_[node] > below && order_[node] <= up_to) drift_[node] = drift_of(node, up_to);
+            if (order_[node] > below && order_[node] <= up_to) find(node, up_to);
     }
 
-    Drift drift_of(NodeId node, float up_to) const {
-        const float radius = changed_radius(tree_, errors_, node), whole = surfaces_[VertexTree::root()].luminance();
-        if (!(radius > 0)) return {};
+    void find(NodeId node, float up_to) {
+        const float radius = changed_radius(tree_, errors_, node);
+        if (!(radius > 0)) return;
         std::array<float, most_fading + 1> amounts{};
         float sum = 0, count = 0;
         for (NodeId up = parents_[node]; up != no_node; up = parents_[up]) {
             const float octaves = std::log2(tree_.support_spheres()[up].radius / radius);
             if (order_[up] <= up_to || !(octaves >= 1)) continue;
-            const Found& there = found_[up];
-            // As it would be in a surface of the whole's luminance.
-            const float shift = there.shift * whole / std::max(surfaces_[up].luminance(), darkest);
-            for (int fading = 0; fading <= most_fading; ++fading)
-                amounts[static_cast<std::size_t>(fading)] =
-                    std::max(amounts[static_cast<std::size_t>(fading)], shift * std::exp2(octaves * static_cast<float>(fading) / 2));
+            const float shift = found_[up].shift / std::max(surfaces_[up].luminance(), darkest);
+            for (std::size_t fading = 0; fading <= most_fading; ++fading)
+                amounts[fading] = std::max(amounts[fading], shift * std::exp2(octaves * static_cast<float>(fading) / 2));
             sum += octaves, count += 1;
         }
+        if (!(amounts[0] > 0)) return;
         // The fading that exceeds what was found least.
-        const float octaves = std::log2(tree_.support_spheres()[VertexTree::root()].radius / radius);
-        Drift best;
-        best.octaves = static_cast<std::uint8_t>(std::clamp(std::ceil(octaves), 0.0f, 255.0f));
-        if (!(amounts[0] > 0)) return best;
         float least = std::numeric_limits<float>::infinity();
-        for (int fading = 0; fading <= most_fading; ++fading) {
-            const float amount = amounts[static_cast<std::size_t>(fading)];
-            const float excess = count * std::log2(amount) - sum * static_cast<float>(fading) / 2;
-            if (excess < least) least = excess, best.amount = amount, best.fading = static_cast<std::uint8_t>(fading);
+        for (std::size_t fading = 0; fading <= most_fading; ++fading) {
+            const float excess = count * std::log2(amounts[fading]) - sum * static_cast<float>(fading) / 2;
+            if (excess < least) least = excess, errors_[node].drift = amounts[fading], errors_[node].fading = static_cast<std::uint8_t>(fading);
         }
-        return best;
     }
 
     struct Surface {
@@ -230,13 +218,12 @@ private:
     };
 
     const VertexTree& tree_;
-    const FoldErrors& errors_;
+    std::span<FoldError> errors_;
     NodeId interior_;
     std::span<const glm::vec3> positions_;
     std::span<const Unorm16> luminance_;
     std::span<const NodeId> parents_;
     std::vector<float> order_;
-    std::vector<Drift> drift_;
     std::vector<Surface> surfaces_; // the mesh's
     std::vector<glm::vec3> light_; // luminance times vector area that the folds of the subtree add
     std::vector<Found> found_;
@@ -245,10 +232,6 @@ private:
 
 } // namespace
 
-void find_drift(const VertexTree& tree, FoldErrors& errors) {
-    DriftFinder finder(tree, errors);
-    errors.drift = finder.run();
-    errors.drift_luminance = finder.luminance();
-}
+void find_drift(const VertexTree& tree, std::span<FoldError> errors) { DriftFinder(tree, errors).run(); }
 
 } // namespace unseen::vdtree

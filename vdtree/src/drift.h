@@ -2,17 +2,19 @@
 #pragma once
 
 #include <algorithm>
+#include <span>
 
 #include <vdtree/fold_errors.h>
+#include <vdtree/vertex_tree.h>
 
 namespace unseen::vdtree {
 
 // Reads the luminance errors and extents, and adds the drift. Cost: as of folding the mesh once, one node after the other.
-void find_drift(const VertexTree& tree, FoldErrors& errors);
+void find_drift(const VertexTree& tree, std::span<FoldError> errors);
 
 // The radius of what a fold of the node changes, in mesh units.
-inline float changed_radius(const VertexTree& tree, const FoldErrors& errors, NodeId node) {
-    return std::max(tree.support_spheres()[node].radius, errors.extent[node]);
+inline float changed_radius(const VertexTree& tree, std::span<const FoldError> errors, NodeId node) {
+    return std::max(tree.support_spheres()[node].radius, errors[node].extent);
 }
 
 } // namespace unseen::vdtree

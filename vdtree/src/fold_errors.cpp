@@ -9,6 +9,8 @@
 #include <tbb/task_arena.h>
 
 #include "drift.h"
+#include "keep_light.h"
+#include "vertex_tree_data.h"
 
 namespace unseen::vdtree {
 
@@ -149,7 +151,7 @@ private:
 
 class Measurer {
 public:
-    Measurer(const VertexTree& tree, FoldErrors& errors)
+    Measurer(const VertexTree& tree, std::vector<FoldError>& errors)
         : tree_(tree), errors_(errors), positions_(tree.positions()), luminance_(tree.luminance()), support_luminance_(tree.support_luminance()),
           first_leaf_(tree.first_leaf()), leaf_end_(tree.leaf_end()), parents_(tree.parents()),
           first_triangle_(tree.first_triangle()), triangles_(tree.triangles()), support_(tree.support_spheres()),
@@ -345,16 +347,16 @@ private:
         float extent = 0;
         tree_.for_each_child(node, [&](NodeId child) {
             if (tree_.is_leaf(child)) return;
-            worst.include({errors_.distance[child], errors_.luminance[child]});
-            facing |= errors_.facing[child];
-            extent = std::max(extent, errors_.extent[child]);
+            worst.include({errors_[child].distance, errors_[child].luminance});
+            facing |= errors_[child].facing;
+            extent = std::max(extent, errors_[child].extent);
         });
-        errors_.distance[node] = worst.distance;
-        errors_.luminance[node] = worst.luminance;
-        errors_.mean_distance[node] = mean.distance;
-        errors_.mean_luminance[node] = mean.luminance;
-        errors_.facing[node] = facing;
-        errors_.extent[node] = std::max(mean_reach(scratch.after, proxy) / 2, extent);
+        errors_[node].distance = worst.distance;
+        errors_[node].luminance = worst.luminance;
+        errors_[node].mean_distance = mean.distance;
+        errors_[node].mean_luminance = mean.luminance;
+        errors_[node].facing = facing;
+        errors_[node].extent = std::max(mean_reach(scratch.after, proxy) / 2, extent);
     }
 
     // The mean distance of the ring's other corners from the proxy.
@@ -429,7 +431,7 @@ private:
     }
 
     const VertexTree& tree_;
-    FoldErrors& errors_;
+    std::vector<FoldError>& errors_;
     std::span<const glm::vec3> positions_;
     std::span<const Unorm16> luminance_;
     std::span<const PackedRange> support_luminance_;
@@ -444,19 +446,49 @@ private:
     std::vector<Witnesses> witnesses_;
 };
 
+void include_proxies(const VertexTree& tree, std::span<const Unorm16> luminance, std::span<PackedRange> support) {
+    for (NodeId node = tree.interior_count(); node-- > 0;) {
+        PackedRange& own = support[node];
+        own = {std::min(own.lo, luminance[node]), std::max(own.hi, luminance[node])};
+        if (node == 0) break;
+        PackedRange& parent = support[tree.parents()[node]];
+        parent = {std::min(parent.lo, own.lo), std::max(parent.hi, own.hi)};
+    }
+}
+
 } // namespace
 
-FoldErrors measure_fold_errors(const VertexTree& tree, int threads) {
-    FoldErrors errors;
-    for (auto* values : {&errors.distance, &errors.mean_distance, &errors.luminance, &errors.mean_luminance, &errors.extent})
-        values->resize(tree.interior_count());
-    errors.facing.resize(tree.interior_count());
+Result<VertexTree> with_fold_errors(const VertexTree& tree, int threads) {
+    if (const auto sound = tree.check(); !sound) return sound.error();
+    const auto copy_of = [](const auto& values) { return std::vector(values.begin(), values.end()); };
+    const VertexTree::Data& given = tree.data();
+    const auto with = [&](std::vector<Unorm16> luminance, std::vector<FoldError> errors) {
+        auto data = std::make_shared<VertexTree::Data>();
+        data->geometry = given.geometry;
+        data->checks = given.checks;
+        TreeLuminance& light = data->light;
+        std::vector<PackedRange> support = copy_of(given.light.support_range);
+        include_proxies(tree, luminance, support);
+        light.luminance = std::move(luminance);
+        light.support_range = std::move(support);
+        light.ring_range = copy_of(given.light.ring_range);
+        light.adaptation = copy_of(given.light.adaptation);
+        light.ring_chroma = copy_of(given.light.ring_chroma);
+        light.fold_errors = std::move(errors);
+        light.light = given.light.light;
+        light.prelit = given.light.prelit;
+        light.range = given.light.range;
+        return VertexTree(std::move(data));
+    };
+    std::vector<Unorm16> luminance = light_keeping_luminance(tree);
+    std::vector<FoldError> errors(tree.interior_count());
+    const VertexTree relit = with(luminance, {});
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
     arena.execute([&] {
-        Measurer(tree, errors).run();
-        find_drift(tree, errors);
+        Measurer(relit, errors).run();
+        find_drift(relit, errors);
     });
-    return errors;
+    return with(std::move(luminance), std::move(errors));
 }
 
 } // namespace unseen::vdtree

@@ -76,6 +76,10 @@ void swap_components(std::byte* data, std::size_t bytes, std::size_t component) 
 
 // Turns a whole number of a section's elements into the other byte order.
 void swap_elements(std::byte* data, std::size_t bytes, const Section& s) {
+    if (s.element_bytes == sizeof(FoldError)) {
+        for (std::size_t at = 0; at < bytes; at += sizeof(FoldError)) swap_components(data + at, offsetof(FoldError, facing), s.component_bytes);
+        return;
+    }
     if (s.element_bytes != sizeof(NodeBounds)) return swap_components(data, bytes, s.component_bytes);
     for (std::size_t at = 0; at < bytes; at += sizeof(NodeBounds)) // all else in it are single bytes
         swap_components(data + at, sizeof(Sphere), s.component_bytes);
@@ -103,13 +107,14 @@ void for_each_array(Geometry& g, Luminance& l, F&& f) {
     f("ring_range", l.ring_range);
     f("adaptation", l.adaptation);
     f("ring_chroma", l.ring_chroma);
+    f("fold_errors", l.fold_errors);
     f("triangles", g.triangles);
     f("source_triangles", g.source_triangles);
     f("source_vertices", g.source_vertices);
 }
 
 // Sections that are there only where they have elements.
-bool is_optional(std::string_view name) { return name == "ring_chroma"; }
+bool is_optional(std::string_view name) { return name == "ring_chroma" || name == "fold_errors"; }
 
 enum class OpenMode { read, map };
 
@@ -450,6 +455,7 @@ Result<void> Reader::check_counts(const TreeGeometry& g, const TreeLuminance& l)
         {l.ring_range.size() == interior, "ring_range"},
         {l.adaptation.size() == interior, "adaptation"},
         {l.ring_chroma.empty() || (l.ring_chroma.size() == interior && !g.colours.empty()), "ring_chroma"},
+        {l.fold_errors.empty() || l.fold_errors.size() == interior, "fold_errors"},
         {g.source_triangles.size() == (g.ranges.empty() ? 0 : triangles), "source_triangles"},
         {g.source_vertices.size() == leaves, "source_vertices"}};
     for (const auto& [holds, name] : checks)
@@ -501,6 +507,9 @@ Result<void> Reader::check_values(const TreeGeometry& g, const TreeLuminance& l)
             if (!(r.lo <= r.hi)) return fail("A luminance range ends before it begins.");
     for (const ChromaRange& r : l.ring_chroma)
         if (!(r.lo.x <= r.hi.x && r.lo.y <= r.hi.y)) return fail("A range of chroma ends before it begins.");
+    for (const FoldError& e : l.fold_errors)
+        for (const float value : {e.distance, e.mean_distance, e.luminance, e.mean_luminance, e.extent, e.drift})
+            if (!(value >= 0) || !std::isfinite(value)) return fail("An error of a fold is negative or not finite.");
     for (const float moved : g.displacement)
         if (!(moved >= 0)) return fail("A displacement is negative.");
     return {};

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include <vdtree/fold_errors.h>
 #include <vdtree/vertex_tree.h>
 
 #include "array.h"
@@ -61,6 +62,7 @@ struct LuminanceArrays {
     Storage<PackedRange> ring_range;
     Storage<Unorm16> adaptation;
     Storage<ChromaRange> ring_chroma; // empty where all is grey
+    Storage<FoldError> fold_errors; // empty: not measured
 };
 
 // What depends on the light.

@@ -77,20 +77,22 @@ Result<vdtree::DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTr
 Result<vdtree::DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree& tree, const vdtree::CutRings& rings,
                                                                const vdtree::View& view, const FoldTestOptions& options);
 
-// The test by errors: what a fold changes in fact, not what could change within its ring. In distance form, like the above.
+// The test by errors: what a fold changes in fact, not what could change within its ring. In distance form, like the above. The tree
+// needs fold_errors() (vdtree::with_fold_errors).
 //
-// With theta0 = 2 asin(r0 / d) for the support's sphere; h, eY, mY of measure_fold_errors(), in cd/m2 where they are luminances; the
-// ring's range lo1..hi1 and its sphere's r1; L the middle of the range; S the table's conservative form; and by eccentricity:
-//   interior    c = (eY + (hi1 - lo1) min(1, h / r1)) / L:  c min(1, (theta0 / pixel)^2) S(1 / (2 max(theta0, pixel))) <= 1
-//   crowd       s = sY / L, the ring's shift of mean luminance: many side by side, of random signs, make wider patches of less
-//               contrast:  s max over rho of min(1, 2 rho theta0) S(rho) <= 1, rho up to the display's limit
-//   mean        mY / L S(1 / (2 theta)) <= 1, theta the whole object's
-//   silhouette  a strip of width w, the angle of h, that changes between the ring's luminance and anything in the scene, with the
-//               contrast cs over the pair's mean:  cs max over rho of min(1, 2 rho w) S(rho) <= 1, rho up to the display's limit
-// Below a pixel a fold counts by the share of the pixel that it covers, so from far enough away everything folds: drawing must be
-// antialiased. Measured, not proven: see docs/perception.md for where it fails. Open and irregular rings are silhouettes. Cost: as luebke_hallen_distances().
-Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree, const vdtree::FoldErrors& errors,
-                                                  const vdtree::View& view, const FoldTestOptions& options);
+// With D the angular width of what changes: twice the larger of the support's radius and the extent; h, eY and their means hm, em of
+// FoldError, in cd/m2 where they are luminances; the ring's range lo1..hi1 and its sphere's r1; L the middle of the range; S the
+// table's conservative form; and by eccentricity. A pattern is invisible where what the bands of an octave each see of it, c(rho) S(rho),
+// comes to less than 1 in their sum of powers of 3.5:
+//   patch       c = 1.6 (em + (hi1 - lo1) min(1, hm / r1)) / L, and in parts half as wide four times that, up to the largest,
+//               (eY + (hi1 - lo1) min(1, h / r1)) / L;  c(rho) = c max over n = 1, 2, 4 of min(1, (n D rho)^2) / n
+//   drift       of areas 2^k times as wide, k = 1 up to the mesh's size:  c = drift / 2^(k fading / 2), as a patch of that width
+//   silhouette  a strip of width w, the angle of 1.35 h, that changes between the ring's luminance and anything in the scene, with the
+//               contrast cs over the pair's mean:  c(rho) = cs min(1, 2 rho w)
+// rho goes up to the display's limit: below a pixel a fold counts by the share of the pixel that it covers, so from far enough away
+// everything folds, and drawing must be antialiased. Measured, not proven: see docs/perception.md for where it fails. Open and
+// irregular rings are silhouettes. Cost: as luebke_hallen_distances().
+Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options);
 
 // Where the eye and the gaze are in the tree's frame. With the view's frustum if `window_only`: what lies outside folds.
 vdtree::Viewpoint viewpoint_of(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options,

@@ -27,6 +27,7 @@
 #include <glm/vec4.hpp>
 
 #include <vdtree/chroma.h>
+#include <vdtree/fold_errors.h>
 #include <vdtree/mesh.h>
 #include <vdtree/normal_mask.h>
 #include <vdtree/packed.h>
@@ -132,6 +133,7 @@ public:
     std::span<const PackedRange> ring_luminance() const noexcept;
     std::span<const ChromaRange> ring_chroma() const noexcept; // as drawn; empty where all vertices are grey
     std::span<const Unorm16> adaptation_luminance() const noexcept; // middle of ring_luminance, saturated up the tree
+    std::span<const FoldError> fold_errors() const noexcept; // of with_fold_errors(); else empty
     std::span<const float> displacement() const noexcept; // largest distance of a supported leaf from the proxy
 
     // The mesh. By leaf: the input vertex. The input's ranges (groups, materials), over its triangles, and by triangle
