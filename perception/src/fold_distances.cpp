@@ -3,11 +3,13 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numbers>
 
 #include <glm/geometric.hpp>
 
 #include <perception/criterion.h>
+#include <vdtree/contrast_classes.h>
 
 #include "fold_screen.h"
 
@@ -17,49 +19,12 @@ namespace {
 
 using vdtree::DistanceCriterion;
 
-// Classes. Row 0 is for folds without any contrast; then contrasts from `least_contrast` up, within luminances.
-constexpr int contrasts_per_octave = 12, contrast_octaves = 9;
-constexpr std::size_t contrast_count = contrasts_per_octave * contrast_octaves + 1;
-constexpr std::size_t luminance_count = 16;
-constexpr std::size_t row_count = 1 + contrast_count * luminance_count;
+using vdtree::ContrastClasses;
 
-// The display's luminances and the classes that they fall into.
-class Classes {
-public:
-    explicit Classes(const Display& display)
-        : black_(black_level(display).value()), span_(to_luminance(display, 1).value() - black_),
-          log2_step_(std::log2((black_ + span_) / lowest()) / (luminance_count - 1)) {}
-
-    double in_cdm2(double relative) const { return black_ + span_ * relative; }
-
-    std::uint16_t row(vdtree::LuminanceRange range, double adaptation) const {
-        const double lo = in_cdm2(range.lo), hi = in_cdm2(range.hi);
-        const double contrast = (hi - lo) / (hi + lo);
-        if (!(contrast > 0)) return 0;
-        const double c = std::ceil(contrast_octaves * contrasts_per_octave + contrasts_per_octave * std::log2(contrast) - edge);
-        const double l = std::ceil(std::log2(std::max(in_cdm2(adaptation), lowest()) / lowest()) / log2_step_ - edge);
-        const auto index = [](double x, std::size_t count) {
-            return static_cast<std::size_t>(std::clamp(x, 0.0, static_cast<double>(count - 1)));
-        };
-        return static_cast<std::uint16_t>(1 + index(l, luminance_count) * contrast_count + index(c, contrast_count));
-    }
-
-    static double contrast(std::size_t row) {
-        const double steps = static_cast<double>((row - 1) % contrast_count);
-        return std::exp2(steps / contrasts_per_octave - contrast_octaves) * (1 + 2 * edge);
-    }
-    double luminance(std::size_t row) const {
-        return lowest() * std::exp2(log2_step_ * static_cast<double>((row - 1) / contrast_count)) * (1 + 2 * edge);
-    }
-
-private:
-    // Values on a class's edge stay in it; far below a class's width.
-    static constexpr double edge = 1e-7;
-    // Where the display is black: a four-thousandth of its peak, in place of 0.
-    double lowest() const { return std::max(black_, (black_ + span_) / 4096); }
-
-    double black_, span_, log2_step_;
-};
+ContrastClasses classes_of(const Display& display) {
+    const double black = black_level(display).value();
+    return {black, to_luminance(display, 1).value() - black};
+}
 
 // What a class comes to at an eccentricity.
 struct Visibility {
@@ -75,17 +40,23 @@ Visibility visibility_of(float log2_frequency, const Screen& screen) {
     return {static_cast<float>(reach * (1 + reach_rounding)), static_cast<float>(screen.pixel_deg / largest_extent_deg)};
 }
 
-void fill_table(DistanceCriterion::Parts& parts, const Classes& levels, const Screen& screen, const CsfTable& csf) {
-    const std::size_t bins = parts.eccentricity_bins;
-    std::vector<std::uint8_t> used(row_count, 0);
+// By row, whether a node has it.
+std::vector<std::uint8_t> rows_in_use(const DistanceCriterion::Parts& parts) {
+    std::vector<std::uint8_t> used(ContrastClasses::row_count, parts.lit ? 1 : 0); // lights may lead to any
     for (const vdtree::FoldClass c : parts.classes) used[c.interior] = used[c.silhouette] = 1;
-    parts.reach.assign(row_count * bins, DistanceCriterion::never_visible);
-    parts.least_cost.assign(row_count * bins, 0);
+    return used;
+}
+
+void fill_table(DistanceCriterion::Parts& parts, const ContrastClasses& levels, const Screen& screen, const CsfTable& csf) {
+    const std::size_t bins = parts.eccentricity_bins;
+    const std::vector<std::uint8_t> used = rows_in_use(parts);
+    parts.reach.assign(ContrastClasses::row_count * bins, DistanceCriterion::never_visible);
+    parts.least_cost.assign(ContrastClasses::row_count * bins, 0);
     std::array<float, bin_count> contrast, eccentricity, luminance, log2_frequency;
     for (std::size_t bin = 0; bin < bins; ++bin) eccentricity[bin] = static_cast<float>(static_cast<double>(bin) * degrees_per_bin);
-    for (std::size_t row = 1; row < row_count; ++row) {
+    for (std::size_t row = 1; row < ContrastClasses::row_count; ++row) {
         if (!used[row]) continue;
-        contrast.fill(static_cast<float>(Classes::contrast(row)));
+        contrast.fill(static_cast<float>(ContrastClasses::contrast(row)));
         luminance.fill(static_cast<float>(levels.luminance(row)));
         csf.highest_visible_log2_frequency(std::span(contrast).first(bins), std::span(eccentricity).first(bins),
                                            std::span(luminance).first(bins), std::span(log2_frequency).first(bins));
@@ -99,20 +70,42 @@ void fill_table(DistanceCriterion::Parts& parts, const Classes& levels, const Sc
     }
 }
 
+// Nothing falls with the contrast or the luminance; the table's own rounding must not make it.
+void make_growing(DistanceCriterion::Parts& parts) {
+    const std::size_t bins = parts.eccentricity_bins;
+    const auto raise = [&](std::size_t row, std::size_t to) {
+        for (std::vector<float>* values : {&parts.reach, &parts.least_cost})
+            for (std::size_t bin = 0; bin < bins; ++bin) {
+                float& value = (*values)[row * bins + bin];
+                value = std::max(value, (*values)[to * bins + bin]);
+            }
+    };
+    for (std::size_t l = 0; l < ContrastClasses::luminance_count; ++l)
+        for (std::size_t c = 0; c < ContrastClasses::contrast_count; ++c) {
+            if (c > 0) raise(ContrastClasses::row_of(l, c), ContrastClasses::row_of(l, c - 1));
+            if (l > 0) raise(ContrastClasses::row_of(l, c), ContrastClasses::row_of(l - 1, c));
+        }
+}
+
+DistanceCriterion::Parts parts_for(const Screen& screen, const FoldTestOptions& options) {
+    DistanceCriterion::Parts parts;
+    parts.spheres = DistanceCriterion::Spheres::ring;
+    parts.eccentricity_bins = options.gaze_px ? bin_count : 1;
+    parts.bin_degrees = degrees_per_bin / screen.least_magnification;
+    return parts;
+}
+
 } // namespace
 
 Result<vdtree::DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTree& tree, const vdtree::View& view,
                                                           const FoldTestOptions& options) {
     const Screen screen(view, options);
-    const Classes levels(options.display);
+    const ContrastClasses levels = classes_of(options.display);
     const CsfTable& csf = options.csf ? *options.csf : CsfTable::standard();
     const auto ranges = tree.ring_luminance();
     const auto adaptations = tree.adaptation_luminance();
 
-    DistanceCriterion::Parts parts;
-    parts.spheres = DistanceCriterion::Spheres::ring;
-    parts.eccentricity_bins = options.gaze_px ? bin_count : 1;
-    parts.bin_degrees = degrees_per_bin / screen.least_magnification;
+    DistanceCriterion::Parts parts = parts_for(screen, options);
     parts.classes.resize(tree.interior_count());
     for (vdtree::NodeId node = 0; node < tree.interior_count(); ++node) {
         const vdtree::LuminanceRange range = ranges[node];
@@ -125,6 +118,27 @@ Result<vdtree::DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTr
     }
     fill_table(parts, levels, screen, csf);
     return DistanceCriterion::create(tree, std::move(parts));
+}
+
+Result<vdtree::DistanceCriterion> lit_distances(const vdtree::VertexTree& tree, std::shared_ptr<const vdtree::LightBounds> bounds,
+                                                const vdtree::View& view, const FoldTestOptions& options) {
+    const Screen screen(view, options);
+    const ContrastClasses levels = classes_of(options.display);
+    const SceneLuminance scene = options.scene;
+    DistanceCriterion::Parts parts = parts_for(screen, options);
+    parts.lit = vdtree::LitClasses{std::move(bounds), levels,
+                                   levels.row({scene.darkest, scene.brightest}, static_cast<double>(scene.brightest))};
+    fill_table(parts, levels, screen, options.csf ? *options.csf : CsfTable::standard());
+    make_growing(parts);
+    return DistanceCriterion::create(tree, std::move(parts));
+}
+
+SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBounds& bounds, const vdtree::Lighting& lighting,
+                         glm::dvec3 eye, float background) {
+    const vdtree::NodeId root = vdtree::VertexTree::root();
+    const vdtree::LuminanceRange range = vdtree::lit_range(lighting, bounds.cones()[root], tree.bounds()[root].ring, eye);
+    constexpr float steps = 32;
+    return {std::floor(steps * std::min(range.lo, background)) / steps, std::ceil(steps * std::max(range.hi, background)) / steps};
 }
 
 vdtree::Viewpoint viewpoint_of(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options,

@@ -111,8 +111,11 @@ AdjustStats CutFollower::follow(Cut& cut, const DistanceCriterion& criterion, co
     const bool is_same = is_same_request(criterion, options);
     if (!is_same) prepare(criterion, options);
     else if (tested_ != &criterion) make_tester(criterion);
-    const Motion motion = is_same ? FoldTester::motion(tree_, viewpoint_, viewpoint, length_per_radian_)
-                                  : Motion{std::numeric_limits<double>::infinity(), 0};
+    Motion motion = is_same ? FoldTester::motion(tree_, viewpoint_, viewpoint, length_per_radian_)
+                            : Motion{std::numeric_limits<double>::infinity(), 0};
+    if (criterion.parts().lit)
+        motion.position += light_weight * length_per_radian_ *
+                           light_motion(tree_, viewpoint_.lighting, viewpoint_.eye, viewpoint.lighting, viewpoint.eye);
     if (is_same && was_complete_ && motion.position == 0 && motion.facing == 0) { // nothing can have changed
         cut.begin_changes();
         cut.end_changes(stats_);

@@ -56,6 +56,7 @@ FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterio
     view_.inverse_threshold = 1 / threshold;
     view_.near_ones_too = cull_back_faces;
     view_.nobody = !cull_back_faces && !has_silhouettes_;
+    if (parts.lit) lit_.emplace(tree, *parts.lit);
 }
 
 void FoldTester::look_from(const Viewpoint& viewpoint, double length_per_radian) {
@@ -79,6 +80,7 @@ void FoldTester::look_from(const Viewpoint& viewpoint, double length_per_radian)
     view_.turn_per_length = static_cast<float>(1 / length_per_radian);
     costs_view_ = view_;
     costs_view_.everybody = true;
+    if (lit_) lit_->look_from(viewpoint, length_per_radian);
 }
 
 FoldCandidate FoldTester::candidate(NodeId node) const {
@@ -99,6 +101,7 @@ void FoldTester::prefetch(NodeId node) const {
     vdtree::prefetch(bounds_ + node);
     if (support_) vdtree::prefetch(support_ + node);
     if (classes_) vdtree::prefetch(classes_ + node);
+    if (lit_) lit_->prefetch(node);
     if (facing_) vdtree::prefetch(facing_ + node);
     if (lengths_) vdtree::prefetch(lengths_ + node);
     if (silhouette_lengths_) vdtree::prefetch(silhouette_lengths_ + node);
@@ -201,9 +204,42 @@ void FoldTester::find_facings(Lanes candidates, const FoldBatch& batch, bool cos
     }
 }
 
+// The rows that lights give.
+void FoldTester::light(Lanes lanes, FoldBatch& batch, LitFindings& lit) const {
+    std::array<NodeId, kernel_lanes> nodes;
+    for (std::size_t i = 0; i < kernel_lanes; ++i) nodes[i] = lanes[std::min(i, lanes.size() - 1)]->node;
+    lit_->find_rows(nodes, bounds_, lit);
+    std::copy_n(lit.row, kernel_lanes, batch.interior_row);
+    std::fill_n(batch.silhouette_row, kernel_lanes, lit_->silhouette_row());
+}
+
+// Parts what is left between a verdict and its contrary among the lights' motion and the eye's: the rows from here on are those that the
+// lights may lead to within their slack.
+void FoldTester::leave_room_for_lights(LitFindings& lit, FoldBatch& batch, const Findings& findings) const {
+    for (std::size_t i = 0; i < kernel_lanes; ++i) {
+        const std::uint32_t bit = 1u << i;
+        const bool is_near = batch.is_near & bit, unfolded = findings.unfolded & bit;
+        const bool is_out = !(batch.is_inside & bit) || (findings.away & bit);
+        if (is_out || (unfolded && !is_near)) { // not by its luminance
+            lit.slack[i] = infinity;
+            continue;
+        }
+        const auto distance = [&](std::int32_t row, float length) {
+            const float reach = view_.reach[static_cast<std::size_t>(row * view_.bins + batch.bin[i])];
+            return std::max(length, least_length) * view_.inverse_threshold * reach;
+        };
+        const auto unfolds_at = [&](std::int32_t row) { return batch.gap[i] < distance(row, batch.length[i]); };
+        batch.interior_row[i] = lit_->leave_room(i, is_near, unfolds_at, lit);
+        batch.interior[i] = distance(batch.interior_row[i], batch.length[i]);
+        batch.silhouette[i] = std::max(batch.interior[i], distance(batch.silhouette_row[i], batch.silhouette_length[i]));
+    }
+}
+
 void FoldTester::test_batch(Lanes lanes, Verdict* verdicts, bool costs) const {
     FoldBatch batch;
     load(lanes, batch);
+    LitFindings lit;
+    if (lit_) light(lanes, batch, lit);
     measure(costs ? costs_view_ : view_, batch);
     batch.is_asked &= (1u << lanes.size()) - 1; // unused lanes are nobody's
     Findings findings;
@@ -211,14 +247,18 @@ void FoldTester::test_batch(Lanes lanes, Verdict* verdicts, bool costs) const {
     findings.silhouettes = ~batch.is_near;
     std::fill_n(findings.facing_slack, kernel_lanes, infinity);
     if (batch.is_asked) find_facings(lanes, batch, costs, findings);
+    if (lit_) leave_room_for_lights(lit, batch, findings);
     if (view_.has_gaze) find_position_slacks(batch, findings);
     finish_slacks(view_, batch, findings);
+    if (lit_)
+        for (std::size_t i = 0; i < lanes.size(); ++i) findings.position_slack[i] = std::min(findings.position_slack[i], lit.slack[i]);
     for (std::size_t i = 0; i < lanes.size(); ++i) {
         verdicts[i].position_slack = findings.position_slack[i];
         verdicts[i].facing_slack = findings.facing_slack[i];
         verdicts[i].unfolded = (findings.unfolded >> i) & 1;
     }
     if (!costs) return;
+    if (lit_) std::copy_n(lit.row, kernel_lanes, batch.interior_row);
     for (std::size_t i = 0; i < lanes.size(); ++i) {
         verdicts[i].cost = verdicts[i].seen_cost = 0;
         const std::uint32_t bit = 1u << i;

@@ -2,6 +2,7 @@
 // change.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include <vdtree/vertex_tree.h>
 
 #include "fold_kernel.h"
+#include "lit_tester.h"
 
 namespace unseen::vdtree {
 
@@ -77,6 +79,8 @@ private:
     void test_batch(Lanes lanes, Verdict* verdicts, bool costs) const;
     void find_facings(Lanes lanes, const FoldBatch& batch, bool costs, Findings& findings) const;
     void find_position_slacks(const FoldBatch& batch, Findings& findings) const;
+    void light(Lanes lanes, FoldBatch& batch, LitFindings& lit) const;
+    void leave_room_for_lights(LitFindings& lit, FoldBatch& batch, const Findings& findings) const;
     void set_costs(Verdict& verdict, const FoldBatch& batch, std::size_t lane, bool is_silhouette) const;
     void set_costs(Verdict& verdict, std::int32_t row, std::int32_t bin, float unit, float gap) const;
 
@@ -91,6 +95,7 @@ private:
     const float *lengths_, *silhouette_lengths_;
     std::vector<float> reach_; // of the criterion; infinite where the fold is seen from everywhere
     KernelView view_, costs_view_;
+    std::optional<LitTester> lit_; // where lights give the classes
 };
 
 } // namespace unseen::vdtree

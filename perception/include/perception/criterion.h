@@ -1,6 +1,7 @@
 // The perceptual fold test: a fold's worst-case grating against the contrast sensitivity table.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string_view>
 
@@ -11,6 +12,7 @@
 #include <vdtree/criteria.h>
 #include <vdtree/distance_criterion.h>
 #include <vdtree/fold_errors.h>
+#include <vdtree/lighting.h>
 
 namespace unseen::perception {
 
@@ -62,6 +64,17 @@ private:
 // alone. Cost: 10 ns a node, and 90 ns for every class in use and eccentricity.
 Result<vdtree::DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTree& tree, const vdtree::View& view,
                                                           const FoldTestOptions& options);
+
+// The same under lights that may move: ranges are what they can make of the normals, albedos and places in a ring, and follow the
+// lighting of the viewpoint; silhouettes are those of `options.scene`, which must hold for all of it (see lit_scene()). Adaptation is to
+// the brightest luminance of a range. `bounds`: of the tree. Cost: some 20 ms with a gaze, less without; not by node.
+Result<vdtree::DistanceCriterion> lit_distances(const vdtree::VertexTree& tree, std::shared_ptr<const vdtree::LightBounds> bounds,
+                                                const vdtree::View& view, const FoldTestOptions& options);
+
+// Between which luminances everything under the lights is, and the background; rounded outward to steps of 1/32, so that it mostly
+// stays while lights move. `eye`: in the tree's frame.
+SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBounds& bounds, const vdtree::Lighting& lighting,
+                         glm::dvec3 eye, float background);
 
 // The test by errors: what a fold changes in fact, not what could change within its ring. In distance form, like the above.
 //
