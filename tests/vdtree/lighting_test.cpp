@@ -335,9 +335,11 @@ TEST(LightBounds, ChangeNoFasterThanTheySay) {
                 ASSERT_LE(std::abs(d1 - d0), allowed) << s.name << ", trial " << trial << ", node " << nodes[i] << ", motion " << motion;
                 const double s0 = static_cast<double>(before.hi[i]) + static_cast<double>(before.lo[i]),
                              s1 = static_cast<double>(after.hi[i]) + static_cast<double>(after.lo[i]);
-                ASSERT_LE(std::abs(s1 - s0), 2 * static_cast<double>(before.jump[i]) + full_rate * motion + 4e-6) << s.name << ", trial " << trial;
+                ASSERT_LE(std::abs(s1 - s0), 2 * static_cast<double>(before.jump[i]) + static_cast<double>(before.fine_sum_rate[i]) * fine +
+                                                 full_rate * (motion - fine) + 4e-6)
+                    << s.name << ", trial " << trial;
                 ASSERT_LE(std::abs(static_cast<double>(after.hi[i]) - static_cast<double>(before.hi[i])),
-                          static_cast<double>(before.jump[i]) + full_rate * motion + 4e-6)
+                          static_cast<double>(before.jump[i]) + static_cast<double>(before.rise_rate[i]) * motion + 4e-6)
                     << s.name << ", trial " << trial;
             }
         }

@@ -40,6 +40,7 @@ private:
     bool is_same_request(const DistanceCriterion& criterion, const FollowOptions& options) const;
     void prepare(const DistanceCriterion& criterion, const FollowOptions& options);
     void make_tester(const DistanceCriterion& criterion);
+    Motion with_lights(Motion motion, const Viewpoint& viewpoint) const;
     void place_clocks(const Viewpoint& viewpoint);
     void look_from(const Viewpoint& viewpoint);
     void follow_threshold(Cut& cut, const Viewpoint& viewpoint, const Motion& motion);

@@ -112,6 +112,9 @@ void FoldTester::test(std::span<const FoldCandidate> candidates, std::span<const
     for (std::size_t first = 0; first < which.size(); first += kernel_lanes) {
         const std::size_t count = std::min(kernel_lanes, which.size() - first);
         for (std::size_t i = 0; i < count; ++i) lanes[i] = &candidates[which[first + i]];
+        if (lit_)
+            for (std::size_t i = first + kernel_lanes; i < std::min(first + 2 * kernel_lanes, which.size()); ++i)
+                lit_->prefetch(candidates[which[i]].node);
         test_batch({lanes.data(), count}, &verdicts[first], false);
     }
 }
@@ -206,9 +209,11 @@ void FoldTester::find_facings(Lanes candidates, const FoldBatch& batch, bool cos
 
 // The rows that lights give.
 void FoldTester::light(Lanes lanes, FoldBatch& batch, LitFindings& lit) const {
-    std::array<NodeId, kernel_lanes> nodes;
-    for (std::size_t i = 0; i < kernel_lanes; ++i) nodes[i] = lanes[std::min(i, lanes.size() - 1)]->node;
-    lit_->find_rows(nodes, bounds_, lit);
+    for (std::size_t i = 0; i < kernel_lanes; ++i) {
+        const FoldCandidate& of = *lanes[std::min(i, lanes.size() - 1)];
+        lit_->set(i, of.node, of.ring, lit);
+    }
+    lit_->find_rows(lit);
     std::copy_n(lit.row, kernel_lanes, batch.interior_row);
     std::fill_n(batch.silhouette_row, kernel_lanes, lit_->silhouette_row());
 }
@@ -251,7 +256,7 @@ void FoldTester::test_batch(Lanes lanes, Verdict* verdicts, bool costs) const {
     if (view_.has_gaze) find_position_slacks(batch, findings);
     finish_slacks(view_, batch, findings);
     if (lit_)
-        for (std::size_t i = 0; i < lanes.size(); ++i) findings.position_slack[i] = std::min(findings.position_slack[i], lit.slack[i]);
+        for (std::size_t i = 0; i < lanes.size(); ++i) findings.facing_slack[i] = std::min(findings.facing_slack[i], lit.slack[i]);
     for (std::size_t i = 0; i < lanes.size(); ++i) {
         verdicts[i].position_slack = findings.position_slack[i];
         verdicts[i].facing_slack = findings.facing_slack[i];

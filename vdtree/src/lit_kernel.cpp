@@ -76,6 +76,7 @@ UNSEEN_INLINE float step_of(float cosine, float outer, float inner) {
 }
 
 // One light on one lane.
+template <LightSource::Kind kind, bool shines>
 UNSEEN_INLINE void add(const KernelLights& all, const KernelLights::Light& light, LitBatch& b, std::size_t i) {
     const float centre[3] = {b.centre[0][i], b.centre[1][i], b.centre[2][i]};
     const float at_centre = std::abs(centre[0]) + std::abs(centre[1]) + std::abs(centre[2]);
@@ -85,7 +86,7 @@ UNSEEN_INLINE void add(const KernelLights& all, const KernelLights::Light& light
     // Where it is, how bright it is there, and how fast that changes.
     Direction l;
     float most, least, most_rate, least_rate, spread_rate, cap, growth, fade_rate = 0;
-    if (light.kind == LightSource::Kind::directional) {
+    if constexpr (kind == LightSource::Kind::directional) {
         l = {light.direction[0], light.direction[1], light.direction[2], 0, 1, 1, 0, false};
         most = least = light.intensity;
         most_rate = least_rate = intensity_rate;
@@ -103,7 +104,7 @@ UNSEEN_INLINE void add(const KernelLights& all, const KernelLights::Light& light
         spread_rate = 2 * all.radius * (cube_growth * most * ah / near - least * al / far) + intensity_rate * (most * ah - least * al);
         cap = l.sine > steepest_sine ? 0.0f : longest_step * near / all.radius;
         growth = step_growth;
-        if (light.kind == LightSource::Kind::spot) {
+        if constexpr (kind == LightSource::Kind::spot) {
             const float c = -(l.x * light.direction[0] + l.y * light.direction[1] + l.z * light.direction[2]);
             const float s = angle_sine(l.x, l.y, l.z, light.direction[0], light.direction[1], light.direction[2]);
             const Window w = window(c, s, l.anywhere ? -1.0f : l.cosine, l.anywhere ? -1.0f : l.sine);
@@ -129,19 +130,23 @@ UNSEEN_INLINE void add(const KernelLights& all, const KernelLights::Light& light
     const float moves = l.turn + l.widen;
     b.hi[i] += most * u * ah;
     b.lo[i] += least * w * al;
-    const bool is_dark = facing.beyond > 0;
-    const float full = growth * (most * ah + least * al) * moves + most_rate * most * ah + least_rate * least * al + 2 * fade_rate * ah;
-    // Where all of it faces the light, u - w changes by less than 2 sin gamma a radian; where all of it faces away, not at all.
-    const float fine = growth * (least * al * (2 * std::max(sg, 0.0f) * l.turn + 2 * l.widen) + (most * ah - least * al) * moves) +
-                       least_rate * least * al * (u - w) + spread_rate + 2 * fade_rate * ah;
-    const float fine_cap = (is_dark ? facing.beyond : w) / moves;
-    b.fine_rate[i] += is_dark ? 0.0f : fine;
+    const float rise = growth * most * ah * moves + most_rate * most * ah + fade_rate * ah;
+    const float full = rise + growth * least * al * moves + least_rate * least * al + fade_rate * ah;
+    // Where all of it faces the light, u - w changes by less than 2 sin gamma a radian; where some of it faces away, by u alone, and where
+    // all of it does, not at all.
+    const float facing_rate = growth * (least * al * (2 * std::max(sg, 0.0f) * l.turn + 2 * l.widen) + (most * ah - least * al) * moves) +
+                              least_rate * least * al * (u - w) + spread_rate + 2 * fade_rate * ah;
+    const bool is_dark = facing.beyond > 0, faces = facing.least > 0;
+    b.fine_rate[i] += is_dark ? 0.0f : faces ? facing_rate : rise;
+    b.fine_sum_rate[i] += is_dark ? 0.0f : faces ? full : rise;
+    const float fine_cap = (is_dark ? facing.beyond : std::abs(facing.least)) / moves;
     b.full_rate[i] += full;
+    b.rise_rate[i] += rise;
     b.fine_cap[i] = std::min(b.fine_cap[i], fine_cap);
     b.cap[i] = std::min(b.cap[i], l.anywhere ? 0.0f : cap);
 
     // The highlight.
-    if (all.specular == 0) return;
+    if constexpr (!shines) return;
     float near_eye, far_eye;
     const Direction v = towards(centre, radius + all.eye_inexact, all.eye, all.radius, near_eye, far_eye);
     const float x = l.x + v.x, y = l.y + v.y, z = l.z + v.z;
@@ -168,19 +173,37 @@ UNSEEN_INLINE void add(const KernelLights& all, const KernelLights::Light& light
     b.jump[i] += all.specular * most * step_growth * highlight(chords + (moves + v.turn + v.widen) * window_cap, true);
 }
 
+template <bool shines>
+UNSEEN_INLINE void add(const KernelLights& all, const KernelLights::Light& light, LitBatch& b) {
+    using Kind = LightSource::Kind;
+    switch (light.kind) {
+    case Kind::directional:
+        for (std::size_t i = 0; i < kernel_lanes; ++i) add<Kind::directional, shines>(all, light, b, i);
+        break;
+    case Kind::point:
+        for (std::size_t i = 0; i < kernel_lanes; ++i) add<Kind::point, shines>(all, light, b, i);
+        break;
+    case Kind::spot:
+        for (std::size_t i = 0; i < kernel_lanes; ++i) add<Kind::spot, shines>(all, light, b, i);
+        break;
+    }
+}
+
 UNSEEN_INLINE void run(const KernelLights& all, LitBatch& b) {
     for (std::size_t i = 0; i < kernel_lanes; ++i) {
         b.lo[i] = all.ambient * b.least_albedo[i];
         b.hi[i] = all.ambient * b.largest_albedo[i];
         b.cap[i] = b.fine_cap[i] = 1e30f;
-        b.fine_rate[i] = b.full_rate[i] = b.jump[i] = 0;
+        b.fine_rate[i] = b.fine_sum_rate[i] = b.full_rate[i] = b.rise_rate[i] = b.jump[i] = 0;
     }
-    for (const KernelLights::Light& light : all.lights)
-        for (std::size_t i = 0; i < kernel_lanes; ++i) add(all, light, b, i);
+    for (const KernelLights::Light& light : all.lights) {
+        if (all.specular > 0) add<true>(all, light, b);
+        else add<false>(all, light, b);
+    }
     for (std::size_t i = 0; i < kernel_lanes; ++i) {
         const float hi = b.hi[i] * (1 + range_rounding) + range_rounding;
         // Cut off at 1, the upper end stands still while the lower one moves.
-        b.fine_cap[i] = std::min(b.fine_cap[i], std::max(0.0f, 1 - hi) / std::max(b.full_rate[i], tiny));
+        b.fine_cap[i] = std::min(b.fine_cap[i], std::max(0.0f, 1 - hi) / std::max(b.rise_rate[i], tiny));
         b.hi[i] = std::min(hi, 1.0f);
         b.lo[i] = std::min(std::max(b.lo[i] * (1 - range_rounding) - range_rounding, 0.0f), 1.0f);
     }
