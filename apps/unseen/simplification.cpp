@@ -30,6 +30,9 @@ bool is_perceptual(const WhatOptions& what) { return what.mode != Mode::full && 
 
 // What silhouettes can be seen against.
 perception::SceneLuminance scene_luminance(const Scene& scene) {
+    if (scene.lighting)
+        return perception::lit_scene(scene.tree, *scene.light_bounds, *scene.lighting,
+                                     vdtree::eye_in_tree(scene.tree, scene.view, scene.placement), scene.background);
     const vdtree::LuminanceRange range = scene.tree.luminance_range();
     return {std::min(range.lo, scene.background), std::max(range.hi, scene.background)};
 }
@@ -123,12 +126,18 @@ Effect csf_effect(const Scene& scene, const WhatOptions& what) {
 }
 
 Effect prelit_effect(const Scene& scene) {
+    if (scene.lighting && !scene.tree.colours().empty()) return {"pre-lit colours", false, "--lights lights the colours"};
     if (scene.tree.is_prelit()) return {"pre-lit colours", true, "the mesh's colours are taken as lit"};
     return {"pre-lit colours", false,
             scene.tree.colours().empty() ? "the mesh has no colours" : "--light or --ambient lights the colours"};
 }
 
-Effect light_effect(const Scene& scene) {
+Effect light_effect(const Scene& scene, const WhatOptions& what) {
+    if (scene.lighting)
+        return {"light", true,
+                scene.rig->description() +
+                    (is_perceptual(what) ? ": folds are tested against what these can make of the normals and places in their rings"
+                                         : "; drawn, for the fold test does not look at luminance")};
     if (scene.is_relit)
         return {"light", true, "luminance and its bounds were computed again for another light than the tree's"};
     return {"light", false,
@@ -205,7 +214,7 @@ void add_effects(Simplification& result, const Scene& scene, const WhatOptions& 
                       silhouette_effect(scene, what),
                       csf_effect(scene, what),
                       prelit_effect(scene),
-                      light_effect(scene),
+                      light_effect(scene, what),
                       frustum_effect(what, purpose),
                       culling_effect(scene, purpose),
                       magnification_effect(scene, what),
@@ -238,7 +247,8 @@ vdtree::View widened(const vdtree::View& view) {
 } // namespace
 
 Result<Simplification> simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
-    if (what.mode != Mode::full && (what.fill_budget || what.milliseconds || what.test == FoldTest::error)) {
+    const bool is_lit = scene.lighting && is_perceptual(what); // likewise in the distance form only
+    if (what.mode != Mode::full && (what.fill_budget || what.milliseconds || what.test == FoldTest::error || is_lit)) {
         Follower follower;
         follower.set_hysteresis(1);
         return follower.follow(cut, scene, what, purpose);
@@ -264,10 +274,11 @@ Result<const vdtree::DistanceCriterion*> Follower::criterion_for(const Scene& sc
     const bool perceptual = is_perceptual(what);
     // A budget goes by the order of the costs alone, for which any tolerance will do.
     const double tolerance_px = what.mode == Mode::pixels ? what.pixels : 1;
-    Key key{what.test, perceptual ? 0 : tolerance_px, false, 0, scene.view.width, scene.view.height, scene.view.fov_y_degrees, 0, nullptr};
+    Key key{what.test, perceptual ? 0 : tolerance_px, false, 0, scene.view.width, scene.view.height, scene.view.fov_y_degrees, {0, 0}, false, nullptr};
     if (perceptual) {
-        key.background = scene.background;
         const perception::FoldTestOptions options = test_options(scene, what);
+        key.scene = options.scene;
+        key.is_lit = scene.lighting.has_value();
         key.has_gaze = options.gaze_px.has_value();
         key.csf = options.csf;
         // A gaze off the window reaches into larger magnifications: one criterion must do for all gazes up to there, so they are
@@ -286,6 +297,10 @@ Result<const vdtree::DistanceCriterion*> Follower::criterion_for(const Scene& sc
         perception::FoldTestOptions options = test_options(scene, what);
         if (key.has_gaze)
             options.gaze_px = glm::dvec2(scene.view.width * 0.5 + key.farthest_gaze_px, scene.view.height * 0.5);
+        if (scene.lighting && what.test == FoldTest::error)
+            return Error{ErrorCode::invalid_argument, "--fold-test error knows only the light that the tree was built for: with --lights, use "
+                                                      "--fold-test luebke-hallen."};
+        if (scene.lighting) return perception::lit_distances(scene.tree, scene.light_bounds, scene.view, options);
         if (what.test == FoldTest::luebke_hallen) return perception::luebke_hallen_distances(scene.tree, scene.view, options);
         if (!errors_) errors_ = vdtree::measure_fold_errors(scene.tree);
         return perception::error_distances(scene.tree, *errors_, scene.view, options);
@@ -309,6 +324,7 @@ vdtree::Viewpoint Follower::viewpoint_for(const Scene& scene, const WhatOptions&
     const bool window_only = purpose == Purpose::picture && !is_wholly_in_window(scene);
     vdtree::Viewpoint viewpoint =
         perception::viewpoint_of(scene.tree, scene.view, test_options(scene, what), scene.placement, window_only);
+    if (scene.lighting) viewpoint.lighting = *scene.lighting;
     // What comes into the window shall not glide there any more.
     if (window_only && geomorph_) viewpoint.frusta = {vdtree::frustum_of(scene.tree, widened(scene.view), scene.placement)};
     return viewpoint;

@@ -17,6 +17,8 @@ struct ViewArguments {
 };
 
 Result<int> run(ViewArguments& a) {
+    if (!a.view.lights.empty() && a.viewer.geomorph_seconds)
+        return Error{ErrorCode::invalid_argument, "--geomorph and --lights exclude each other: vertices that glide are not lit."};
     auto scene = load_scene(a.model, a.view, a.display);
     if (!scene) return scene.error();
     a.viewer.has_fixed_field = a.view.fov_degrees.has_value();

@@ -20,6 +20,7 @@ namespace unseen::perception {
 struct SceneLuminance {
     float darkest = 0;
     float brightest = 1;
+    bool operator==(const SceneLuminance&) const = default;
 };
 
 struct FoldTestOptions {
