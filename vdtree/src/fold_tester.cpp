@@ -56,7 +56,7 @@ FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterio
     view_.inverse_threshold = 1 / threshold;
     view_.near_ones_too = cull_back_faces;
     view_.nobody = !cull_back_faces && !has_silhouettes_;
-    if (parts.lit) lit_.emplace(tree, *parts.lit);
+    if (parts.lit) lit_.emplace(tree, *parts.lit, reach_, parts.eccentricity_bins);
 }
 
 void FoldTester::look_from(const Viewpoint& viewpoint, double length_per_radian) {
@@ -233,8 +233,10 @@ void FoldTester::leave_room_for_lights(LitFindings& lit, FoldBatch& batch, const
             const float reach = view_.reach[static_cast<std::size_t>(row * view_.bins + batch.bin[i])];
             return std::max(length, least_length) * view_.inverse_threshold * reach;
         };
-        const auto unfolds_at = [&](std::int32_t row) { return batch.gap[i] < distance(row, batch.length[i]); };
-        batch.interior_row[i] = lit_->leave_room(i, is_near, unfolds_at, lit);
+        // In lengths, with the rounding of the comparison that the verdict comes from.
+        constexpr float rounding = 1e-6f;
+        const float gap = batch.gap[i] / (std::max(batch.length[i], least_length) * view_.inverse_threshold) * (is_near ? 1 + rounding : 1 - rounding);
+        batch.interior_row[i] = lit_->leave_room(i, is_near, gap, static_cast<std::size_t>(batch.bin[i]), lit);
         batch.interior[i] = distance(batch.interior_row[i], batch.length[i]);
         batch.silhouette[i] = std::max(batch.interior[i], distance(batch.silhouette_row[i], batch.silhouette_length[i]));
     }
