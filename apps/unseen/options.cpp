@@ -220,7 +220,7 @@ void add_view_options(CLI::App& verb, ViewOptions& o) {
     group
         .add_option("--lights", o.lights,
                     "Lights instead of these two: directional, point, spot, headlight, ambient, with highlights; with --path, and in the "
-                    "viewer, they may move (keys in the docs of `dynamic light`)")
+                    "viewer, they may move (the keys: docs/perception.md, Dynamic light)")
         ->type_name("FILE.json");
     add_number(group, "--background", o.background_cdm2, not_negative(), "CDM2", "Background luminance (default: 20)");
     group.add_option("--unit", o.unit_metres, "Metres a mesh unit (default: 1)")
