@@ -17,6 +17,7 @@ namespace {
 
 // Nodes with at most so many leaves look at each normal; larger ones at their children's cones.
 constexpr Index looked_at_each = 32;
+constexpr float widest_box = 1; // radians; beyond, a cone holds little that its box does not
 // Radians: normals and axes in floats, and the angle's own way there.
 constexpr float cone_rounding = 1e-5f;
 
@@ -50,6 +51,8 @@ private:
         float squared_chord = 0, angle = 0;
         bool everywhere = false;
         float lo = 1, hi = 0;
+        glm::vec3 across[2];
+        float least_across[2] = {2, 2}, largest_across[2] = {-2, -2};
     };
 
     bool is_small(NodeId node) const { return tree_.leaf_end()[node] - tree_.first_leaf()[node] <= looked_at_each; }
@@ -73,6 +76,7 @@ private:
         Seen seen;
         if (length > 1e-6) seen.axis = glm::vec3(sum / length);
         else seen.everywhere = true;
+        across_axis(seen.axis, seen.across[0], seen.across[1]);
         return seen;
     }
 
@@ -82,6 +86,11 @@ private:
         const glm::vec3 normal = normals_[node], apart = normal - seen.axis;
         if (normal == glm::vec3(0)) seen.everywhere = true;
         seen.squared_chord = std::max(seen.squared_chord, glm::dot(apart, apart));
+        for (int k = 0; k < 2; ++k) {
+            const float along = glm::dot(normal, seen.across[k]);
+            seen.least_across[k] = std::min(seen.least_across[k], along);
+            seen.largest_across[k] = std::max(seen.largest_across[k], along);
+        }
     }
     void see_leaf(Index leaf, Seen& seen) const {
         see(interior_ + leaf, seen);
@@ -99,6 +108,11 @@ private:
         cone.cosine = all ? -1 : std::cos(angle);
         cone.sine = all ? 0 : std::sin(angle);
         cone.albedo = {seen.lo, seen.hi};
+        if (!(angle < widest_box) || !is_small(node)) return;
+        for (int k = 0; k < 2; ++k) {
+            cone.least_across[k] = seen.least_across[k] - cone_rounding;
+            cone.largest_across[k] = seen.largest_across[k] + cone_rounding;
+        }
     }
 
     void measure_each(NodeId node) {

@@ -50,6 +50,25 @@ UNSEEN_INLINE Window window(float c, float s, float cg, float sg) {
     return w;
 }
 
+// The same for directions whose coordinates lie in the lane's box, and which differ from the one given by no more than a chord.
+struct BoxBounds {
+    float largest, least;
+};
+UNSEEN_INLINE BoxBounds box_bounds(const LitBatch& b, std::size_t i, float x, float y, float z, float chord) {
+    const float along = b.axis[0][i] * x + b.axis[1][i] * y + b.axis[2][i] * z;
+    float hi = std::max(along, along * b.cosine[i]), lo = std::min(along, along * b.cosine[i]);
+    for (std::size_t k = 0; k < 2; ++k) {
+        const float t = b.across[k][0][i] * x + b.across[k][1][i] * y + b.across[k][2][i] * z;
+        hi += std::max(t * b.least_across[k][i], t * b.largest_across[k][i]);
+        lo += std::min(t * b.least_across[k][i], t * b.largest_across[k][i]);
+    }
+    constexpr float rounding = 2e-6f;
+    const bool has_box = b.steepness[i] > 0;
+    return {has_box ? hi + chord + rounding : 2.0f, has_box ? lo - chord - rounding : -2.0f};
+}
+// Between unit vectors at an angle.
+UNSEEN_INLINE float chord_of(float sine, float cosine) { return sine / std::sqrt(std::max((1 + cosine) * 0.5f, 1e-6f)); }
+
 UNSEEN_INLINE float angle_sine(float ax, float ay, float az, float bx, float by, float bz) {
     return std::sqrt(squared(ay * bz - az * by) + squared(az * bx - ax * bz) + squared(ax * by - ay * bx));
 }
@@ -125,16 +144,20 @@ UNSEEN_INLINE void add(const KernelLights& all, const KernelLights::Light& light
     const float c = ax * l.x + ay * l.y + az * l.z, s = angle_sine(ax, ay, az, l.x, l.y, l.z);
     const float cg = l.anywhere ? -1.0f : b.cosine[i] * l.cosine - b.sine[i] * l.sine;
     const float sg = l.anywhere ? -1.0f : b.sine[i] * l.cosine + b.cosine[i] * l.sine;
-    const Window facing = window(c, s, cg, sg);
+    Window facing = window(c, s, cg, sg);
+    const BoxBounds box = box_bounds(b, i, l.x, l.y, l.z, l.anywhere ? 4.0f : chord_of(l.sine, l.cosine));
+    facing.largest = std::min(facing.largest, box.largest);
+    facing.least = std::max(facing.least, box.least);
+    facing.beyond = std::max(-facing.largest, 0.0f);
     const float u = std::max(facing.largest, 0.0f), w = std::max(facing.least, 0.0f);
-    const float moves = l.turn + l.widen;
+    const float moves = (l.turn + l.widen) * std::max(b.steepness[i], 1.0f);
     b.hi[i] += most * u * ah;
     b.lo[i] += least * w * al;
     const float rise = growth * most * ah * moves + most_rate * most * ah + fade_rate * ah;
     const float full = rise + growth * least * al * moves + least_rate * least * al + fade_rate * ah;
-    // Where all of it faces the light, u - w changes by less than 2 sin gamma a radian; where some of it faces away, by u alone, and where
+    // Where all of it faces the light, u - w changes by less than 2 sin gamma a radian, or the spread of the box; where some of it faces away, by u alone, and where
     // all of it does, not at all.
-    const float facing_rate = growth * (least * al * (2 * std::max(sg, 0.0f) * l.turn + 2 * l.widen) + (most * ah - least * al) * moves) +
+    const float facing_rate = growth * (least * al * (std::max(2 * std::max(sg, 0.0f), b.spread[i]) * l.turn + 2 * l.widen) + (most * ah - least * al) * moves) +
                               least_rate * least * al * (u - w) + spread_rate + 2 * fade_rate * ah;
     const bool is_dark = facing.beyond > 0, faces = facing.least > 0;
     b.fine_rate[i] += is_dark ? 0.0f : faces ? facing_rate : rise;
@@ -152,7 +175,7 @@ UNSEEN_INLINE void add(const KernelLights& all, const KernelLights::Light& light
     const float x = l.x + v.x, y = l.y + v.y, z = l.z + v.z;
     const float length = std::sqrt(x * x + y * y + z * z), inverse = 1 / std::max(length, tiny);
     // How far from their sum's direction the sum of two directions can be that differ by these chords from the centre's.
-    const auto chord = [](const Direction& d) { return d.anywhere ? 2.0f : d.sine / std::sqrt((1 + d.cosine) * 0.5f); };
+    const auto chord = [](const Direction& d) { return d.anywhere ? 2.0f : chord_of(d.sine, d.cosine); };
     const float chords = chord(l) + chord(v) + 1e-6f;
     const float hc = (ax * x + ay * y + az * z) * inverse, hs = angle_sine(ax, ay, az, x, y, z) * inverse;
     const auto highlight = [&](float total, bool largest) {
@@ -161,7 +184,8 @@ UNSEEN_INLINE void add(const KernelLights& all, const KernelLights::Light& light
         const float cosine = std::sqrt(1 - sine * sine);
         const Window h = window(hc, hs, b.cosine[i] * cosine - b.sine[i] * sine, b.sine[i] * cosine + b.cosine[i] * sine);
         // A float's cosine near 1 is good to a millionth, and the exponent makes more of it.
-        const float base = largest ? std::min(h.largest + 2e-7f, 1.0f) : h.least - 2e-7f;
+        const BoxBounds within = box_bounds(b, i, x * inverse, y * inverse, z * inverse, chord_of(sine, cosine));
+        const float base = largest ? std::min(std::min(h.largest, within.largest) + 2e-7f, 1.0f) : std::max(h.least, within.least) - 2e-7f;
         return base > 0 ? std::pow(base, all.shininess) : 0.0f;
     };
     b.hi[i] += all.specular * most * u * highlight(chords, true);
@@ -259,6 +283,23 @@ void LitBatch::set(std::size_t lane, const VertexCone& cone, const Sphere& spher
     least_albedo[lane] = cone.albedo.lo, largest_albedo[lane] = cone.albedo.hi;
     centre[0][lane] = sphere.centre.x, centre[1][lane] = sphere.centre.y, centre[2][lane] = sphere.centre.z;
     radius[lane] = sphere.radius;
+
+    glm::vec3 directions[2];
+    across_axis(cone.axis, directions[0], directions[1]);
+    float farthest = 0, widths = squared(1 - cone.cosine); // squared: of the box's corners from the axis' end, and its diagonal
+    float corner = 1;
+    for (std::size_t k = 0; k < 2; ++k) {
+        for (int j = 0; j < 3; ++j) across[k][static_cast<std::size_t>(j)][lane] = directions[k][j];
+        least_across[k][lane] = cone.least_across[k], largest_across[k][lane] = cone.largest_across[k];
+        const float most = squared(std::max(-cone.least_across[k], cone.largest_across[k]));
+        farthest += most;
+        corner += most;
+        widths += squared(cone.largest_across[k] - cone.least_across[k]);
+    }
+    // One bound may be the cone's, whose normals are within a chord of the axis, and the other the box's.
+    const float mixed = std::sqrt(2 - 2 * cone.cosine) + std::sqrt(farthest + squared(1 - cone.cosine));
+    steepness[lane] = cone.has_box() ? std::sqrt(corner) : 0.0f;
+    spread[lane] = cone.has_box() ? std::max(std::sqrt(widths), mixed) : 0.0f;
 }
 
 // Neither has fused operations, so both give the same bits.

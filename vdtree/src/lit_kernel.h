@@ -37,6 +37,9 @@ struct KernelLights {
 struct LitBatch {
     alignas(64) float axis[3][kernel_lanes];
     alignas(64) float cosine[kernel_lanes], sine[kernel_lanes];
+    // Across the axis, from one normal to all others: least and largest coordinates along two directions. Without a box: beyond any normal's.
+    alignas(64) float across[2][3][kernel_lanes], least_across[2][kernel_lanes], largest_across[2][kernel_lanes];
+    alignas(64) float steepness[kernel_lanes], spread[kernel_lanes]; // of the box's bounds: most change in a radian; of their difference
     alignas(64) float least_albedo[kernel_lanes], largest_albedo[kernel_lanes];
     alignas(64) float centre[3][kernel_lanes], radius[kernel_lanes];
     void set(std::size_t lane, const VertexCone& cone, const Sphere& sphere) noexcept;

@@ -8,6 +8,7 @@
 // without a normal has the ambient light alone. In between, luminance is interpolated linearly.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -61,9 +62,20 @@ struct VertexCone {
     glm::vec3 axis = glm::vec3(0, 0, 1); // unit; all normals are within the angle from it
     float cosine = 1, sine = 0;          // of the angle; -1 and 0 where they point anywhere, or one of them is zero
     LuminanceRange albedo;
+    // Coordinates of the normals along two directions across the axis, across_axis(); of no account where `largest` is not above `least`.
+    // Normals differ more along a ridge's curvature than across it, and seldom by as much as the cone allows.
+    float least_across[2] = {0, 0}, largest_across[2] = {0, 0};
+    bool has_box() const noexcept { return largest_across[0] > least_across[0]; }
 };
 
-// Needed where lights are, and only there: 28 bytes an interior node.
+// Two unit vectors that make an orthonormal frame with a unit vector (Duff and others 2017, "Building an Orthonormal Basis, Revisited").
+inline void across_axis(const glm::vec3& axis, glm::vec3& first, glm::vec3& second) noexcept {
+    const float sign = std::copysign(1.0f, axis.z), a = -1 / (sign + axis.z), b = axis.x * axis.y * a;
+    first = {1 + sign * axis.x * axis.x * a, sign * b, -sign * axis.x};
+    second = {b, sign + axis.y * axis.y * a, -axis.y};
+}
+
+// Needed where lights are, and only there: 44 bytes an interior node.
 class LightBounds {
 public:
     // Fails where VertexTree::check() does. Cost: about 1 us a triangle, in parallel; does not depend on the threads.
@@ -75,7 +87,8 @@ private:
     std::vector<VertexCone> cones_;
 };
 
-// Contains lit_luminance() of every vertex in the sphere whose normal and albedo are in the cone. Larger for larger spheres and cones.
+// Contains lit_luminance() of every vertex in the sphere whose normal and albedo are in the cone. Larger for larger spheres and cones
+// without boxes.
 // Cost: some ten nanoseconds a light.
 LuminanceRange lit_range(const Lighting& lighting, const VertexCone& cone, const Sphere& sphere, glm::dvec3 eye);
 
