@@ -213,7 +213,24 @@ UNSEEN_INLINE void add(const KernelLights& all, const KernelLights::Light& light
     }
 }
 
+// What the box's bounds need of it; see across_axis().
+UNSEEN_INLINE void prepare_box(LitBatch& b, std::size_t i) {
+    const float x = b.axis[0][i], y = b.axis[1][i], z = b.axis[2][i];
+    const float sign = z < 0 ? -1.0f : 1.0f, a = -1 / (sign + z), xya = x * y * a;
+    b.across[0][0][i] = 1 + sign * x * x * a, b.across[0][1][i] = sign * xya, b.across[0][2][i] = -sign * x;
+    b.across[1][0][i] = xya, b.across[1][1][i] = sign + y * y * a, b.across[1][2][i] = -y;
+    const float short_by = squared(1 - b.cosine[i]);
+    const float far0 = squared(std::max(-b.least_across[0][i], b.largest_across[0][i])), far1 = squared(std::max(-b.least_across[1][i], b.largest_across[1][i]));
+    const float width0 = b.largest_across[0][i] - b.least_across[0][i], width1 = b.largest_across[1][i] - b.least_across[1][i];
+    // One bound may be the cone's, whose normals are within a chord of the axis, and the other the box's.
+    const float mixed = std::sqrt(2 - 2 * b.cosine[i]) + std::sqrt(far0 + far1 + short_by);
+    const bool has_box = width0 > 0;
+    b.steepness[i] = has_box ? std::sqrt(1 + far0 + far1) : 0.0f;
+    b.spread[i] = has_box ? std::max(std::sqrt(squared(width0) + squared(width1) + short_by), mixed) : 0.0f;
+}
+
 UNSEEN_INLINE void run(const KernelLights& all, LitBatch& b) {
+    for (std::size_t i = 0; i < kernel_lanes; ++i) prepare_box(b, i);
     for (std::size_t i = 0; i < kernel_lanes; ++i) {
         b.lo[i] = all.ambient * b.least_albedo[i];
         b.hi[i] = all.ambient * b.largest_albedo[i];
@@ -284,22 +301,7 @@ void LitBatch::set(std::size_t lane, const VertexCone& cone, const Sphere& spher
     centre[0][lane] = sphere.centre.x, centre[1][lane] = sphere.centre.y, centre[2][lane] = sphere.centre.z;
     radius[lane] = sphere.radius;
 
-    glm::vec3 directions[2];
-    across_axis(cone.axis, directions[0], directions[1]);
-    float farthest = 0, widths = squared(1 - cone.cosine); // squared: of the box's corners from the axis' end, and its diagonal
-    float corner = 1;
-    for (std::size_t k = 0; k < 2; ++k) {
-        for (int j = 0; j < 3; ++j) across[k][static_cast<std::size_t>(j)][lane] = directions[k][j];
-        least_across[k][lane] = cone.least_across[k], largest_across[k][lane] = cone.largest_across[k];
-        const float most = squared(std::max(-cone.least_across[k], cone.largest_across[k]));
-        farthest += most;
-        corner += most;
-        widths += squared(cone.largest_across[k] - cone.least_across[k]);
-    }
-    // One bound may be the cone's, whose normals are within a chord of the axis, and the other the box's.
-    const float mixed = std::sqrt(2 - 2 * cone.cosine) + std::sqrt(farthest + squared(1 - cone.cosine));
-    steepness[lane] = cone.has_box() ? std::sqrt(corner) : 0.0f;
-    spread[lane] = cone.has_box() ? std::max(std::sqrt(widths), mixed) : 0.0f;
+    for (std::size_t k = 0; k < 2; ++k) least_across[k][lane] = cone.least_across[k], largest_across[k][lane] = cone.largest_across[k];
 }
 
 // Neither has fused operations, so both give the same bits.

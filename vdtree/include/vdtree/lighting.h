@@ -8,7 +8,6 @@
 // without a normal has the ambient light alone. In between, luminance is interpolated linearly.
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -70,7 +69,7 @@ struct VertexCone {
 
 // Two unit vectors that make an orthonormal frame with a unit vector (Duff and others 2017, "Building an Orthonormal Basis, Revisited").
 inline void across_axis(const glm::vec3& axis, glm::vec3& first, glm::vec3& second) noexcept {
-    const float sign = std::copysign(1.0f, axis.z), a = -1 / (sign + axis.z), b = axis.x * axis.y * a;
+    const float sign = axis.z < 0 ? -1.0f : 1.0f, a = -1 / (sign + axis.z), b = axis.x * axis.y * a;
     first = {1 + sign * axis.x * axis.x * a, sign * b, -sign * axis.x};
     second = {b, sign + axis.y * axis.y * a, -axis.y};
 }
