@@ -13,6 +13,7 @@
 #include "memory_plan.h"
 #include "model_file.h"
 #include "options.h"
+#include "paged_memory.h"
 #include "process_team.h"
 #include "progress_bar.h"
 #include "report.h"
@@ -103,7 +104,10 @@ Result<vdtree::ReadResult> read_source(const BuildArguments& a, ProcessTeam* tea
     const auto limit = MemoryLimit::set(a.memory_gib, a.out, threads(a, team));
     if (!limit) return limit.error();
     Result<vdtree::ReadResult> read = read_file(a.mesh, reading(a));
-    if (!read) return read;
+    if (!read) {
+        const std::string disk_full = disk_full_complaint(); // to a reader, that is memory as well
+        return disk_full.empty() ? read.error() : Error{ErrorCode::io_failure, disk_full};
+    }
     if (const auto ok = vdtree::check_buildable(read->mesh.view()); !ok) return ok.error();
     if (const auto ok = limit->plan_for(read->mesh.view(), a.clusterer); !ok) return ok.error();
     return read;

@@ -1,4 +1,5 @@
 // The command `unseen`: finds the verb, runs it, and says in one sentence what went wrong.
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <new>
@@ -55,6 +56,7 @@ int run(const std::vector<Command>& commands) {
 } // namespace
 
 int main(int argc, char** argv) {
+    std::signal(SIGXFSZ, SIG_IGN); // a file beyond the user's limit is an error like a full disk, and not the end without a word
     CLI::App app(about, "unseen");
     app.footer(examples);
     app.set_version_flag("--version", "unseen " UNSEEN_VERSION);

@@ -35,9 +35,9 @@ struct DisplayOptions {
 };
 
 enum class Mode { full, imperceptible, budget, pixels };
-enum class FoldTest { luebke_hallen, error, extent, displacement }; // like perception::fold_test_names
+enum class FoldTest { luebke_hallen, luebke_hallen_safe, error, extent, displacement }; // like perception::fold_test_names
 
-constexpr bool is_perceptual(FoldTest test) { return test == FoldTest::error || test == FoldTest::luebke_hallen; }
+constexpr bool is_perceptual(FoldTest test) { return test != FoldTest::extent && test != FoldTest::displacement; }
 
 // WHAT.
 struct WhatOptions {
@@ -46,6 +46,7 @@ struct WhatOptions {
     std::string fold_test = "luebke-hallen"; // as it was given
     std::uint32_t triangles = 0;             // of Mode::budget
     double pixels = 0;                       // of Mode::pixels
+    bool chroma = false;                     // look at colour, too
     bool fill_budget = false;                // of Mode::budget: go on where nothing more can be seen
     std::optional<double> milliseconds;      // at most so long for the cut
     std::optional<glm::dvec2> gaze_px;

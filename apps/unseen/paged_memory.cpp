@@ -84,6 +84,12 @@ public:
         return begin_ + at;
     }
 
+    // What the last DiskFull said.
+    std::string complaint() {
+        const std::lock_guard lock(mutex_);
+        return complaint_;
+    }
+
     void release(void* block) noexcept {
         const std::size_t at = static_cast<std::size_t>(static_cast<std::byte*>(block) - begin_);
         const std::lock_guard lock(mutex_);
@@ -119,8 +125,9 @@ private:
         while (failed == EINTR) failed = ::posix_fallocate(file_, static_cast<off_t>(at), static_cast<off_t>(size));
         if (failed == 0) return;
         give_up(at, size);
-        throw DiskFull("there is no room for " + std::to_string(size >> 20) + " MiB more of temporary data in '" + folder_ +
-                       "' (" + std::generic_category().message(failed) + "): free some, or write the tree to another disk.");
+        complaint_ = "there is no room for " + std::to_string(size >> 20) + " MiB more of temporary data in '" + folder_ + "' (" +
+                     std::generic_category().message(failed) + "): free some, or write the tree to another disk.";
+        throw DiskFull(complaint_);
     }
 
     // Disk space and pages go back to the system.
@@ -188,6 +195,7 @@ private:
     std::map<std::size_t, std::size_t> free_;      // likewise
     std::multimap<std::size_t, std::size_t> kept_; // place by size
     std::size_t kept_bytes_ = 0;
+    std::string complaint_;
 };
 
 // Both are set once. `giving_pager` becomes null when nothing more is to be paged.
@@ -241,6 +249,11 @@ Result<void> start_paging(const fs::path& folder_or_none, std::uint64_t limit) {
 }
 
 void page_no_more() { giving_pager = nullptr; }
+
+std::string disk_full_complaint() {
+    Pager* asked = pager.load(std::memory_order_acquire);
+    return asked ? asked->complaint() : std::string();
+}
 
 void* allocate_paged(std::size_t size) {
     Pager* giving = giving_pager.load(std::memory_order_acquire);

@@ -40,6 +40,9 @@ Result<void> start_paging(const std::filesystem::path& folder, std::uint64_t lim
 // Further blocks come from memory as usual. Those that were handed out stay as they are.
 void page_no_more();
 
+// What the last DiskFull said; empty where there was none. For who only learns that there was no memory.
+std::string disk_full_complaint();
+
 // For operator new and delete. Null where nothing is paged; false for what is no paged block.
 void* allocate_paged(std::size_t size);
 bool release_paged(void* block) noexcept;

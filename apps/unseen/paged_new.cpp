@@ -1,8 +1,12 @@
-// The command's own operator new and delete: large blocks are paged where that is asked for. The forms for arrays, and those that do
-// not throw, use these.
+// The command's own operator new and delete: large blocks are paged where that is asked for, else they get large pages. The forms for
+// arrays, and those that do not throw, use these.
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <cstdlib>
 #include <new>
+
+#include <sys/mman.h>
 
 #include "paged_memory.h"
 
@@ -21,6 +25,21 @@ void* from_memory(Allocate&& allocate) {
     }
 }
 
+// Of a page of the larger kind, on most machines.
+constexpr std::size_t large_page = std::size_t{2} << 20;
+
+// Asks for large pages for what lies within the block: a build walks its arrays in several orders at once, and looking up small pages
+// takes a tenth of its time and more. Nothing depends on whether the system grants it.
+void* with_large_pages(void* block, std::size_t size) {
+#ifdef MADV_HUGEPAGE
+    if (!block || size < 2 * large_page) return block;
+    const auto begin = reinterpret_cast<std::uintptr_t>(block), inside = (begin + large_page - 1) / large_page * large_page;
+    const std::uintptr_t end = (begin + size) / large_page * large_page;
+    ::madvise(static_cast<std::byte*>(block) + (inside - begin), end - inside, MADV_HUGEPAGE);
+#endif
+    return block;
+}
+
 void give_back(void* block) noexcept {
     if (!release_paged(block)) std::free(block);
 }
@@ -30,7 +49,7 @@ void give_back(void* block) noexcept {
 void* operator new(std::size_t size) {
     if (size >= least_paged_block)
         if (void* block = allocate_paged(size)) return block;
-    return from_memory([=] { return std::malloc(std::max<std::size_t>(size, 1)); });
+    return from_memory([=] { return with_large_pages(std::malloc(std::max<std::size_t>(size, 1)), size); });
 }
 
 void* operator new(std::size_t size, std::align_val_t alignment) {
@@ -39,7 +58,7 @@ void* operator new(std::size_t size, std::align_val_t alignment) {
         if (void* block = allocate_paged(size)) return block;
     const std::size_t rounded = (std::max<std::size_t>(size, 1) + align - 1) / align * align;
     if (rounded < size) throw std::bad_alloc();
-    return from_memory([=] { return std::aligned_alloc(align, rounded); });
+    return from_memory([=] { return with_large_pages(std::aligned_alloc(align, rounded), rounded); });
 }
 
 void operator delete(void* block) noexcept { give_back(block); }

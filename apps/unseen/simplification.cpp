@@ -28,6 +28,8 @@ double milliseconds_since(Clock::time_point start) {
 
 bool is_perceptual(const WhatOptions& what) { return what.mode != Mode::full && is_perceptual(what.test); }
 
+bool has_distance_form_only(FoldTest test) { return test == FoldTest::error || test == FoldTest::luebke_hallen_safe; }
+
 // What silhouettes can be seen against.
 perception::SceneLuminance scene_luminance(const Scene& scene) {
     if (scene.lighting)
@@ -42,6 +44,7 @@ perception::FoldTestOptions test_options(const Scene& scene, const WhatOptions& 
     test.display = scene.display;
     test.scene = scene_luminance(scene);
     test.csf = &scene.csf_table();
+    test.chroma = what.chroma;
     if (!what.gaze_px) return test;
     const perception::CsfTable* around_gaze = scene.csf_table(perception::Degrees(what.gaze_margin_deg));
     if (!around_gaze) return test;
@@ -70,7 +73,8 @@ vdtree::AdjustStats adjust(vdtree::Cut& cut, const Scene& scene, const WhatOptio
     case FoldTest::displacement:
         return cut.adjust(vdtree::DisplacementCriterion(scene.tree, scene.view, tolerance_px, scene.placement),
                           options);
-    case FoldTest::error: // has the distance form only
+    case FoldTest::luebke_hallen_safe: // these have the distance form only
+    case FoldTest::error:
     case FoldTest::luebke_hallen: break;
     }
     return cut.adjust(
@@ -91,6 +95,10 @@ Effect fold_test_effect(const WhatOptions& what) {
     if (what.mode == Mode::full) return {"fold test", false, "nothing is folded in the full model"};
     if (what.test == FoldTest::error)
         return {"fold test", true, "error: what each fold changes in luminance and outline, against the contrast sensitivity"};
+    if (what.test == FoldTest::luebke_hallen_safe)
+        return {"fold test", true,
+                "luebke-hallen-safe: the worst grating of each fold with any neighbours folded, and the shift of the mean, against the contrast "
+                "sensitivity"};
     if (what.test == FoldTest::luebke_hallen)
         return {"fold test", true, "luebke-hallen: the worst grating of each fold against the contrast sensitivity"};
     return {"fold test", true, name_of(what.test) + ": pixels on the screen, whether they can be seen or not"};
@@ -130,6 +138,13 @@ Effect prelit_effect(const Scene& scene) {
     if (scene.tree.is_prelit()) return {"pre-lit colours", true, "the mesh's colours are taken as lit"};
     return {"pre-lit colours", false,
             scene.tree.colours().empty() ? "the mesh has no colours" : "--light or --ambient lights the colours"};
+}
+
+Effect chroma_effect(const Scene& scene, const WhatOptions& what) {
+    if (!is_perceptual(what)) return {"chroma", false, "only the perceptual fold test knows it"};
+    if (!what.chroma) return {"chroma", false, "without --chroma only luminance counts"};
+    if (scene.tree.ring_chroma().empty()) return {"chroma", false, "nothing has any colour"};
+    return {"chroma", true, "red-green and yellow-violet contrast count beside that of luminance, by castleCSF"};
 }
 
 Effect light_effect(const Scene& scene, const WhatOptions& what) {
@@ -185,10 +200,12 @@ Effect distance_effect(const WhatOptions& what, const Simplification& result) {
     return {name, true, "the display's distance times the largest fold cost"};
 }
 
+bool is_translucent(const Scene& scene) { return scene.tree.bounds()[vdtree::VertexTree::root()].flags & vdtree::translucent_ring; }
+
 // Whether faces that look away can be folded: they are not drawn, and nothing shows them from outside.
 bool culls_back_faces(const Scene& scene) {
     const PlacedSphere sphere = placed_sphere(scene.tree, scene.placement);
-    return scene.tree.closedness() == vdtree::Closedness::closed_outward &&
+    return !is_translucent(scene) && scene.tree.closedness() != vdtree::Closedness::open &&
            glm::length(scene.view.eye - sphere.centre) > sphere.radius;
 }
 
@@ -202,9 +219,17 @@ bool is_wholly_in_window(const Scene& scene) {
 
 Effect back_face_effect(const Scene& scene) {
     if (culls_back_faces(scene)) return {"back-face folding", true, "what faces away is not drawn, so it is folded"};
-    if (scene.tree.closedness() != vdtree::Closedness::closed_outward)
-        return {"back-face folding", false, "the surface is open or inside out"};
+    if (scene.tree.closedness() == vdtree::Closedness::open)
+        return {"back-face folding", false, "the surface is open"};
+    if (is_translucent(scene)) return {"back-face folding", false, "what faces away may show through"};
     return {"back-face folding", false, "the eye is in the model"};
+}
+
+Effect translucency_effect(const Scene& scene, const WhatOptions& what) {
+    if (!is_perceptual(what)) return {"translucency", false, "only the perceptual fold test knows it"};
+    if (!is_translucent(scene)) return {"translucency", false, "no vertex has an alpha below 1"};
+    if (what.test == FoldTest::error) return {"translucency", false, "the fold test error does not know it"};
+    return {"translucency", true, "where a vertex has an alpha below 1, anything in the scene may show through"};
 }
 
 // Every effect with its reason.
@@ -213,6 +238,8 @@ void add_effects(Simplification& result, const Scene& scene, const WhatOptions& 
                       gaze_effect(what),
                       silhouette_effect(scene, what),
                       csf_effect(scene, what),
+                      chroma_effect(scene, what),
+                      translucency_effect(scene, what),
                       prelit_effect(scene),
                       light_effect(scene, what),
                       frustum_effect(what, purpose),
@@ -248,7 +275,7 @@ vdtree::View widened(const vdtree::View& view) {
 
 Result<Simplification> simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
     const bool is_lit = scene.lighting && is_perceptual(what); // likewise in the distance form only
-    if (what.mode != Mode::full && (what.fill_budget || what.milliseconds || what.test == FoldTest::error || is_lit)) {
+    if (what.mode != Mode::full && (what.fill_budget || what.milliseconds || what.chroma || is_lit || has_distance_form_only(what.test))) {
         Follower follower;
         follower.set_hysteresis(1);
         return follower.follow(cut, scene, what, purpose);
@@ -281,6 +308,7 @@ Result<const vdtree::DistanceCriterion*> Follower::criterion_for(const Scene& sc
         key.is_lit = scene.lighting.has_value();
         key.has_gaze = options.gaze_px.has_value();
         key.csf = options.csf;
+        key.chroma = options.chroma;
         // A gaze off the window reaches into larger magnifications: one criterion must do for all gazes up to there, so they are
         // rounded up to whole windows.
         if (key.has_gaze) {
@@ -297,11 +325,17 @@ Result<const vdtree::DistanceCriterion*> Follower::criterion_for(const Scene& sc
         perception::FoldTestOptions options = test_options(scene, what);
         if (key.has_gaze)
             options.gaze_px = glm::dvec2(scene.view.width * 0.5 + key.farthest_gaze_px, scene.view.height * 0.5);
-        if (scene.lighting && what.test == FoldTest::error)
-            return Error{ErrorCode::invalid_argument, "--fold-test error knows only the light that the tree was built for: with --lights, use "
-                                                      "--fold-test luebke-hallen."};
+        if (scene.lighting && what.test != FoldTest::luebke_hallen)
+            return Error{ErrorCode::invalid_argument, "--fold-test " + name_of(what.test) + " knows only the light that the tree was built for: "
+                                                      "with --lights, use --fold-test luebke-hallen."};
+        if (scene.lighting && what.chroma)
+            return Error{ErrorCode::invalid_argument, "--chroma and --lights exclude each other: ranges of colour are those of the tree's own light."};
         if (scene.lighting) return perception::lit_distances(scene.tree, scene.light_bounds, scene.view, options);
         if (what.test == FoldTest::luebke_hallen) return perception::luebke_hallen_distances(scene.tree, scene.view, options);
+        if (what.test == FoldTest::luebke_hallen_safe) {
+            if (!rings_) rings_ = vdtree::bound_cut_rings(scene.tree);
+            return perception::luebke_hallen_safe_distances(scene.tree, *rings_, scene.view, options);
+        }
         if (!errors_) errors_ = vdtree::measure_fold_errors(scene.tree);
         return perception::error_distances(scene.tree, *errors_, scene.view, options);
     }();

@@ -7,6 +7,7 @@
 
 #include <perception/criterion.h>
 #include <vdtree/cut.h>
+#include <vdtree/cut_rings.h>
 #include <vdtree/fold_errors.h>
 #include <vdtree/geomorph.h>
 
@@ -75,6 +76,7 @@ private:
         perception::SceneLuminance scene = {0, 0};
         bool is_lit = false;
         const perception::CsfTable* csf = nullptr;
+        bool chroma = false;
         bool operator==(const Key&) const = default;
     };
     Result<const vdtree::DistanceCriterion*> criterion_for(const Scene& scene, const WhatOptions& what);
@@ -87,6 +89,7 @@ private:
     Key key_;
     std::optional<vdtree::DistanceCriterion> criterion_;
     std::optional<vdtree::FoldErrors> errors_; // of the scene's tree; made when they are first asked for
+    std::optional<vdtree::CutRings> rings_;    // likewise
     std::optional<vdtree::Geomorph> geomorph_;
     double passed_ = 0; // seconds since its last step
 };

@@ -107,9 +107,9 @@ void LuebkeHallenCriterion::operator()(const vdtree::VertexTree& tree, std::span
             }
             eccentricity[i] = static_cast<float>(eccentricity_deg);
 
-            // Silhouettes may uncover anything in the scene.
+            // Silhouettes may uncover anything in the scene, and so may what is translucent.
             const bool silhouette =
-                (around.flags & vdtree::irregular_ring) ||
+                (around.flags & (vdtree::irregular_ring | vdtree::translucent_ring)) ||
                 vdtree::facing(around.slabs, [&] { return tree.mask(node); }, glm::vec3(-direction),
                                static_cast<float>(distance), sphere.radius) == vdtree::Facing::mixed;
             vdtree::LuminanceRange range = ranges[node];

@@ -3,6 +3,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <span>
 #include <vector>
 
 #include <perception/criterion.h>
@@ -16,30 +18,24 @@ namespace {
 using vdtree::DistanceCriterion;
 using vdtree::NodeId;
 
-// Row 0 is for what changes nothing; then contrasts (of a difference over a mean luminance) in ascending order, once for each of
-// some luminances, first for patches, then for strips.
+// Contrasts (of a difference over a mean luminance) and luminances in classes.
 constexpr int contrasts_per_octave = 8, least_octave = -10, most_octave = 8; // 2^8: beyond any display's peak over its black
-constexpr std::size_t contrast_count = contrasts_per_octave * (most_octave - least_octave) + 1;
-constexpr std::size_t luminance_count = 16;
-constexpr std::size_t patch_rows = 1, strip_rows = patch_rows + contrast_count * luminance_count;
-constexpr std::size_t row_count = strip_rows + contrast_count * luminance_count;
+constexpr int contrast_count = contrasts_per_octave * (most_octave - least_octave) + 1;
+constexpr int luminance_count = 16;
+constexpr int no_contrast = -1;
 constexpr double class_edge = 1e-7; // values on a class's edge stay in it; far below a class's width
 
 // Where patterns are looked for that a strip may hold: from the lowest frequency that a table must know up to the display's limit.
 constexpr double lowest_cpd = 0.5;
 constexpr double frequency_step = 1.0905077326652577; // an eighth of an octave
 
-struct Level {
-    std::size_t contrast = 0, luminance = 0; // indices of classes
-    bool is_nothing = true;                  // no contrast at all
-};
+constexpr int steepest_spike = 8 * contrasts_per_octave; // sharper ones count as this: a sixteenth of the width
 
-// The larger of both in each respect.
-Level above(const Level& a, const Level& b) {
-    if (a.is_nothing) return b;
-    if (b.is_nothing) return a;
-    return {std::max(a.contrast, b.contrast), std::max(a.luminance, b.luminance), false};
-}
+// Of a sine, whose mean is 2 / pi of it.
+constexpr double amplitude_of_mean = 1.6;
+
+// An outline moves with the folds beside it, too. Found by comparing pictures.
+constexpr float moved_by_neighbours = 1.35f;
 
 class Levels {
 public:
@@ -51,59 +47,92 @@ public:
     double in_cdm2(double relative) const { return black_ + span_ * relative; }
     double difference_in_cdm2(double relative) const { return span_ * relative; }
 
-    // Of a difference against a mean luminance, both in cd/m2; rounded up.
-    Level level(double difference, double mean) const {
-        if (!(difference > 0)) return {};
-        const double base = std::max(mean, lowest_);
-        return {index(contrasts_per_octave * (std::log2(difference / base) - least_octave), contrast_count),
-                index(std::log2(base / lowest_) / log2_step_, luminance_count), false};
+    // Of a contrast, and of a luminance in cd/m2; rounded up.
+    int contrast_level(double difference, double base) const {
+        if (!(difference > 0)) return no_contrast;
+        return index(contrasts_per_octave * (std::log2(difference / std::max(base, lowest_)) - least_octave), contrast_count);
     }
-    static double contrast(std::size_t level) {
+    int luminance_level(double base) const { return index(std::log2(std::max(base, lowest_) / lowest_) / log2_step_, luminance_count); }
+    static double contrast(int level) {
         return std::exp2(least_octave + static_cast<double>(level) / contrasts_per_octave) * (1 + 2 * class_edge);
     }
-    double luminance(std::size_t level) const { return lowest_ * std::exp2(log2_step_ * static_cast<double>(level)) * (1 + 2 * class_edge); }
+    double luminance(int level) const { return lowest_ * std::exp2(log2_step_ * level) * (1 + 2 * class_edge); }
 
 private:
-    static std::size_t index(double x, std::size_t count) {
-        return static_cast<std::size_t>(std::clamp(std::ceil(x - class_edge), 0.0, static_cast<double>(count - 1)));
+    static int index(double x, int count) {
+        return static_cast<int>(std::clamp(std::ceil(x - class_edge), 0.0, static_cast<double>(count - 1)));
     }
     double black_, span_, lowest_, log2_step_;
 };
 
-std::uint16_t row(std::size_t first, const Level& level) {
-    return level.is_nothing ? 0 : static_cast<std::uint16_t>(first + level.luminance * contrast_count + level.contrast);
+// What a node's fold shows, as far as that decides from where it can be seen: levels of contrast at widths relative to the node's.
+struct Pattern {
+    int luminance = 0;
+    int typical = no_contrast; // over the whole width
+    int largest = no_contrast; // in a small part of it
+    int drift = no_contrast;   // of what many such nodes shift together
+    int fading = 0, quarters = 0; // of octaves, from the node's width to the mesh's
+    bool is_strip = false;
+
+    auto operator<=>(const Pattern&) const = default;
+    bool is_nothing() const { return largest == no_contrast && drift == no_contrast; }
+};
+
+// At least as visible as both.
+Pattern above(const Pattern& a, const Pattern& b) {
+    if (a.is_nothing()) return b;
+    if (b.is_nothing()) return a;
+    Pattern all{std::max(a.luminance, b.luminance), std::max(a.typical, b.typical), std::max(a.largest, b.largest),
+                std::max(a.drift, b.drift), 0, std::max(a.quarters, b.quarters), a.is_strip};
+    all.fading = a.drift == no_contrast ? b.fading : b.drift == no_contrast ? a.fading : std::min(a.fading, b.fading);
+    return all;
 }
 
-// What can be seen at one luminance and eccentricity.
+// Few patterns are to stand for many: rounded up, onto one grid, so that what is above two of them is there, too.
+Pattern rounded(Pattern p) {
+    constexpr int typical_step = contrasts_per_octave / 4, spike_step = contrasts_per_octave, drift_step = contrasts_per_octave / 4;
+    const auto up = [](int value, int step) { return std::min((value + step - 1) / step * step, contrast_count - 1); };
+    if (p.typical != no_contrast) {
+        p.typical = up(p.typical, typical_step);
+        p.largest = p.largest > p.typical ? up(p.largest, spike_step) : p.typical;
+    }
+    if (p.drift != no_contrast) {
+        p.drift = up(p.drift, drift_step);
+    } else {
+        p.fading = p.quarters = 0;
+    }
+    return p;
+}
+
+// What can be seen at one luminance and eccentricity. Bands of frequency an octave apart look for a pattern; what they see of it is
+// pooled as the eye pools its channels; wherever the bands' octaves begin.
 class Eye {
 public:
-    Eye(const CsfTable& csf, double eccentricity_deg, double luminance_cdm2, const Screen& screen)
-        : csf_(csf), eccentricity_(eccentricity_deg), luminance_(luminance_cdm2), screen_(screen),
-          limit_(csf.monotone_sensitivity(CyclesPerDegree(1 / (2 * screen.pixel_deg)), eccentricity_, luminance_)) {
-        for (double low = lowest_cpd; low < 1 / (2 * screen.pixel_deg); low *= frequency_step)
-            bands_.push_back({std::min(low * frequency_step, 1 / (2 * screen.pixel_deg)),
-                              csf.monotone_sensitivity(CyclesPerDegree(low), eccentricity_, luminance_)});
+    Eye(const CsfTable& csf, double eccentricity_deg, double luminance_cdm2, const Screen& screen) : screen_(screen) {
+        const double highest_cpd = 1 / (2 * screen.pixel_deg);
+        std::vector<Band> bands;
+        for (double low = lowest_cpd; low < highest_cpd; low *= frequency_step)
+            bands.push_back({std::min(low * frequency_step, highest_cpd),
+                             csf.monotone_sensitivity(CyclesPerDegree(low), Degrees(eccentricity_deg), Luminance(luminance_cdm2))});
+        for (std::size_t i = 0; i < width_count; ++i) {
+            patches_[i] = 1 / visibility(bands, width(i), 2);
+            strips_[i] = 1 / visibility(bands, width(i), 1);
+        }
     }
 
-    // The distance, in radii, from which a round patch is invisible.
+    // The distance, in radii, from which a round patch is invisible. What a band of frequency rho sees of a patch of width D is
+    // the share of the band's own patches that it covers, (D rho)^2.
     double patch_reach(double contrast) const {
-        const double highest_cpd = csf_.highest_visible_frequency(contrast, eccentricity_, luminance_).value();
-        if (highest_cpd <= 0) return 0; // not even at the peak; only from inside
-        const double extent_deg = 1 / (2 * highest_cpd);
-        // Smaller than a pixel it counts by the share of the pixel that it covers.
-        const double share = std::sqrt(1 / (contrast * limit_));
-        const double largest_deg = extent_deg < screen_.pixel_deg ? screen_.pixel_deg * std::min(share, 1.0) : extent_deg;
-        const double half = largest_deg / screen_.largest_magnification / degrees_per_radian / 2;
+        const double width_deg = least_visible_width(patches_, contrast);
+        if (!std::isfinite(width_deg)) return 0; // from inside only
+        const double half = width_deg / screen_.largest_magnification / degrees_per_radian / 2;
         return half < std::numbers::pi / 2 ? (1 + reach_rounding) / std::sin(half) : 1;
     }
 
-    // The distance, in widths, from which a long strip is invisible.
+    // The distance, in widths, from which a long strip is invisible: a band sees 2 w rho of it.
     double strip_reach(double contrast) const {
-        if (contrast * bands_.front().sensitivity <= 1) return 0;
-        // For each frequency alone: contrast 2 rho w S = 1. Within a band, its highest frequency and its largest sensitivity.
-        double width_deg = std::numeric_limits<double>::infinity();
-        for (const Band& band : bands_)
-            if (contrast * band.sensitivity > 1) width_deg = std::min(width_deg, 1 / (2 * band.highest_cpd * contrast * band.sensitivity));
+        const double width_deg = 0.5 * least_visible_width(strips_, contrast);
+        if (!std::isfinite(width_deg)) return 0;
         return (1 + reach_rounding) * degrees_per_radian * screen_.largest_magnification / width_deg;
     }
 
@@ -111,53 +140,196 @@ private:
     struct Band {
         double highest_cpd, sensitivity;
     };
-    const CsfTable& csf_;
-    Degrees eccentricity_;
-    Luminance luminance_;
+    static constexpr std::size_t bands_per_octave = 8;
+    static constexpr double pooling = 3.5; // Minkowski's exponent of probability summation
+    // Widths from far below any that can be seen up to the lowest frequency's.
+    static constexpr double widest_deg = 1 / lowest_cpd, width_step = 0.91700404320467122; // an eighth of an octave
+    static constexpr std::size_t width_count = 160;
+    static double width(std::size_t i) { return widest_deg * std::pow(width_step, static_cast<double>(i)); }
+    using Thresholds = std::array<double, width_count>; // contrasts, by width
+
+    // What is seen of patches of which so many lie side by side in one of the band's: of one, the share that it covers; of several
+    // whose signs differ at random, more of the band's patch, in 1 / n of the contrast for n times the width. Beyond, drift says more.
+    static double share_of_patches(double waves) {
+        constexpr double most_side_by_side = 4;
+        double most = 0;
+        for (double side = 1; side <= most_side_by_side; side *= 2) most = std::max(most, std::min(1.0, side * side * waves * waves) / side);
+        return most;
+    }
+
+    // Of unit contrast, in thresholds.
+    static double visibility(const std::vector<Band>& bands, double width_deg, int power) {
+        double most = 0;
+        for (std::size_t first = 0; first < std::min(bands_per_octave, bands.size()); ++first) {
+            double sum = 0;
+            for (std::size_t i = first; i < bands.size(); i += bands_per_octave) {
+                const double waves = width_deg * bands[i].highest_cpd;
+                const double seen = (power == 2 ? share_of_patches(waves) : std::min(1.0, waves)) * bands[i].sensitivity;
+                sum += seen * seen * seen * std::sqrt(seen);
+            }
+            most = std::max(most, sum);
+        }
+        return std::pow(most, 1 / pooling);
+    }
+
+    // The widest that is invisible; infinite where all are.
+    static double least_visible_width(const Thresholds& thresholds, double contrast) {
+        // Thresholds rise as widths fall.
+        const auto first = std::lower_bound(thresholds.begin(), thresholds.end(), contrast);
+        if (first == thresholds.begin()) return std::numeric_limits<double>::infinity();
+        if (first == thresholds.end()) return width(width_count - 1);
+        const auto above = static_cast<std::size_t>(first - thresholds.begin());
+        const double t0 = thresholds[above - 1], t1 = thresholds[above]; // visible, invisible
+        const double share = t1 > t0 ? std::log(contrast / t0) / std::log(t1 / t0) : 1;
+        return widest_deg * std::pow(width_step, static_cast<double>(above - 1) + share);
+    }
+
     const Screen& screen_;
-    double limit_; // sensitivity at the display's limit
-    std::vector<Band> bands_;
+    Thresholds patches_, strips_;
 };
 
-std::vector<float> fill_table(const std::vector<std::uint8_t>& used, std::size_t bins, const Levels& levels, const Screen& screen,
-                              const CsfTable& csf) {
-    std::vector<float> reach(row_count * bins, DistanceCriterion::never_visible);
-    for (std::size_t luminance = 0; luminance < luminance_count; ++luminance) {
-        const auto is_used = [&](std::size_t first) {
-            const auto begin = used.begin() + static_cast<std::ptrdiff_t>(first + luminance * contrast_count);
-            return std::find(begin, begin + contrast_count, 1) != begin + contrast_count;
+// The reach of patterns by eccentricity, computed when they are first asked for.
+class Reaches {
+public:
+    Reaches(const Levels& levels, const Screen& screen, const CsfTable& csf, std::size_t bins)
+        : levels_(levels), screen_(screen), csf_(csf), bins_(bins), patches_(luminance_count), eyes_(luminance_count) {
+        reach_.assign(bins, DistanceCriterion::never_visible); // row 0: what changes nothing
+    }
+
+    std::uint16_t row(const Pattern& pattern) { // rounded
+        if (pattern.is_nothing()) return 0;
+        const auto [at, is_new] = rows_.try_emplace(pattern, static_cast<std::uint16_t>(rows_.size() + 1));
+        if (is_new) pattern.is_strip ? add_strip(pattern) : add_patch(pattern);
+        return at->second;
+    }
+    // Without drift that can nowhere be seen from as far as the rest.
+    Pattern simplified(Pattern p) {
+        if (p.drift == no_contrast || p.typical == no_contrast) return p;
+        const float* const one = patches(p.luminance).data();
+        const float* const typical = one + static_cast<std::size_t>(p.typical) * bins_;
+        bool is_needed = false;
+        for_each_drift(p, [&](int contrast, float width) {
+            const float* const from = one + static_cast<std::size_t>(contrast) * bins_;
+            for (std::size_t bin = 0; bin < bins_; ++bin) is_needed |= width * from[bin] > typical[bin];
+        });
+        if (is_needed) return p;
+        p.drift = no_contrast;
+        return rounded(p);
+    }
+    std::span<const float> reach(std::uint16_t row) const { return std::span(reach_).subspan(row * bins_, bins_); }
+    std::vector<float> take() { return std::move(reach_); }
+    std::size_t size() const { return rows_.size(); }
+
+private:
+    const Eye& eye(int luminance, std::size_t bin) {
+        auto& eyes = eyes_[static_cast<std::size_t>(luminance)];
+        if (eyes.empty())
+            for (std::size_t b = 0; b < bins_; ++b)
+                eyes.emplace_back(csf_, static_cast<double>(b) * degrees_per_bin, levels_.luminance(luminance), screen_);
+        return eyes[bin];
+    }
+
+    // [contrast * bins + bin], in radii.
+    std::span<const float> patches(int luminance) {
+        auto& table = patches_[static_cast<std::size_t>(luminance)];
+        if (table.empty()) {
+            for (int contrast = 0; contrast < contrast_count; ++contrast)
+                for (std::size_t bin = 0; bin < bins_; ++bin)
+                    table.push_back(static_cast<float>(eye(luminance, bin).patch_reach(Levels::contrast(contrast))));
+        }
+        return table;
+    }
+
+    void add_patch(const Pattern& p) {
+        const std::size_t first = reach_.size();
+        reach_.resize(first + bins_, 0);
+        const std::span<const float> one = patches(p.luminance);
+        const auto include = [&](int contrast, float width) {
+            const float* const from = &one[static_cast<std::size_t>(contrast) * bins_];
+            for (std::size_t bin = 0; bin < bins_; ++bin) reach_[first + bin] = std::max(reach_[first + bin], width * from[bin]);
         };
-        if (!is_used(patch_rows) && !is_used(strip_rows)) continue;
-        for (std::size_t bin = 0; bin < bins; ++bin) {
-            const Eye eye(csf, static_cast<double>(bin) * degrees_per_bin, levels.luminance(luminance), screen);
-            for (std::size_t contrast = 0; contrast < contrast_count; ++contrast) {
-                for (const std::size_t first : {patch_rows, strip_rows}) {
-                    const std::size_t at = first + luminance * contrast_count + contrast;
-                    if (!used[at]) continue;
-                    const double c = Levels::contrast(contrast);
-                    float& value = reach[at * bins + bin];
-                    value = static_cast<float>(first == patch_rows ? eye.patch_reach(c) : eye.strip_reach(c));
-                    // The table's own rounding must not make anything grow with the eccentricity.
-                    if (bin > 0) value = std::min(value, reach[at * bins + bin - 1]);
-                }
+        if (p.typical != no_contrast) {
+            // The same light in a part half as wide has four times the contrast; but nowhere more than the largest.
+            constexpr int per_halving = 2 * contrasts_per_octave;
+            float width = 1;
+            for (int contrast = std::min(p.typical, p.largest);; contrast = std::min(contrast + per_halving, p.largest), width /= 2) {
+                include(contrast, width);
+                if (contrast == p.largest) break;
             }
         }
+        if (p.drift != no_contrast)
+            for_each_drift(p, include);
+        make_monotone(first);
     }
-    return reach;
+
+    // Calls f(contrast, width) for areas an octave apart from the mesh's down to twice the node's width.
+    template <class F>
+    static void for_each_drift(const Pattern& p, F&& f) {
+        for (int quarters = p.quarters; quarters >= 4; quarters -= 4) {
+            const int contrast = p.drift - (quarters * p.fading * contrasts_per_octave / 2 + 3) / 4;
+            if (contrast >= 0) f(contrast, std::exp2(static_cast<float>(quarters) / 4));
+        }
+    }
+
+    void add_strip(const Pattern& p) {
+        const std::size_t first = reach_.size();
+        for (std::size_t bin = 0; bin < bins_; ++bin)
+            reach_.push_back(static_cast<float>(eye(p.luminance, bin).strip_reach(Levels::contrast(p.largest))));
+        make_monotone(first);
+    }
+
+    // The table's own rounding must not make anything grow with the eccentricity.
+    void make_monotone(std::size_t first) {
+        for (std::size_t i = first + 1; i < reach_.size(); ++i) reach_[i] = std::min(reach_[i], reach_[i - 1]);
+    }
+
+    const Levels& levels_;
+    const Screen& screen_;
+    const CsfTable& csf_;
+    std::size_t bins_;
+    std::vector<std::vector<float>> patches_;
+    std::vector<std::vector<Eye>> eyes_; // by luminance; by bin
+    std::map<Pattern, std::uint16_t> rows_;
+    std::vector<float> reach_;
+};
+
+// A pattern of a width, and what it comes to.
+struct Shown {
+    Pattern pattern;
+    float length = 0;
+    std::uint16_t row = 0;
+};
+
+// By how much the one must be wider to be seen from as far as the other everywhere.
+float shortfall(const Reaches& reaches, const Shown& a, const Shown& b) {
+    if (b.row == 0 || !(b.length > 0)) return 1;
+    if (a.row == b.row) return a.length > 0 ? std::max(b.length / a.length, 1.0f) : std::numeric_limits<float>::infinity();
+    const std::span<const float> of_a = reaches.reach(a.row), of_b = reaches.reach(b.row);
+    float factor = 1;
+    for (std::size_t bin = 0; bin < of_a.size(); ++bin)
+        if (of_b[bin] > 0) factor = std::max(factor, of_a[bin] > 0 ? b.length * of_b[bin] / (a.length * of_a[bin]) : std::numeric_limits<float>::infinity());
+    constexpr float rounding = 4e-6f; // of the products, when the criterion is checked
+    return factor > 1 ? factor * (1 + rounding) : 1;
 }
 
-bool is_visible(const CsfTable& csf, const Levels& levels, const Level& level) {
-    return Levels::contrast(level.contrast) * csf.peak_sensitivity(Degrees(0), Luminance(levels.luminance(level.luminance))) > 1;
+// From how far it is seen, in all.
+float weight(const Reaches& reaches, const Shown& shown) {
+    float sum = 0;
+    const std::span<const float> reach = reaches.reach(shown.row);
+    for (std::size_t bin = 0; bin < reach.size(); bin += 8) sum += std::log2(1 + std::max(reach[bin], 0.0f) * shown.length);
+    return sum;
 }
 
-// Of the reach of one row to that of another, at the eccentricity where it is largest; the other is seen wherever the one is.
-float largest_ratio(const DistanceCriterion::Parts& parts, std::uint16_t row, std::uint16_t above) {
-    float largest = 0;
-    for (std::size_t bin = 0; bin < parts.eccentricity_bins; ++bin) {
-        const float reach = parts.reach[row * parts.eccentricity_bins + bin];
-        if (reach > 0) largest = std::max(largest, reach / parts.reach[above * parts.eccentricity_bins + bin]);
-    }
-    return largest;
+// Makes `a` be seen from as far as `b`: wider, or of more contrast, whichever adds less.
+void cover(Reaches& reaches, Shown& a, const Shown& b) {
+    const float factor = shortfall(reaches, a, b);
+    if (factor <= 1) return;
+    Shown wider = a, richer = a;
+    wider.length *= factor;
+    richer.pattern = above(a.pattern, b.pattern);
+    richer.row = reaches.row(richer.pattern);
+    richer.length = std::max(a.length, b.length);
+    a = std::isfinite(wider.length) && weight(reaches, wider) <= weight(reaches, richer) ? wider : richer;
 }
 
 } // namespace
@@ -169,7 +341,6 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
     const Levels levels(options.display);
     const CsfTable& csf = options.csf ? *options.csf : CsfTable::standard();
     const double darkest = levels.in_cdm2(options.scene.darkest), brightest = levels.in_cdm2(options.scene.brightest);
-    const float object_radius = tree.bounds()[vdtree::VertexTree::root()].ring.radius;
 
     DistanceCriterion::Parts parts;
     parts.spheres = DistanceCriterion::Spheres::ring;
@@ -179,53 +350,59 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
     parts.classes.resize(nodes);
     parts.lengths.resize(nodes);
     parts.silhouette_lengths.resize(nodes);
-    std::vector<Level> patches(nodes), strips(nodes);
-    std::vector<std::uint16_t> crowds(nodes, 0); // rows of what neighbours shift together
-    std::vector<std::uint16_t> shifts(nodes, 0); // rows of means that shift visibly; they may do so over the whole object
-    std::vector<std::uint8_t> used(row_count, 0);
+    const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
+    const double whole = levels.in_cdm2(static_cast<double>(errors.drift_luminance));
+    const double whole_peak = csf.peak_sensitivity(Degrees(0), Luminance(levels.luminance(levels.luminance_level(whole))));
+    Reaches reaches(levels, screen, csf, parts.eccentricity_bins);
+    std::vector<Shown> patches(nodes), strips(nodes);
     for (NodeId node = nodes; node-- > 0;) { // children before parents
         const vdtree::LuminanceRange range = tree.ring_luminance()[node];
         const double lo = levels.in_cdm2(range.lo), hi = levels.in_cdm2(range.hi), middle = (lo + hi) / 2;
-        const double h = errors.distance[node], r1 = tree.bounds()[node].ring.radius;
-        const double change = levels.difference_in_cdm2(errors.luminance[node]) + (hi - lo) * (r1 > 0 ? std::min(1.0, h / r1) : 1.0);
-        patches[node] = above(patches[node], levels.level(change, middle));
-        const Level own_shift = levels.level(levels.difference_in_cdm2(errors.shift[node]), middle);
-        patches[node] = above(patches[node], own_shift);
-        crowds[node] = row(strip_rows, own_shift);
-        const Level shift = levels.level(levels.difference_in_cdm2(errors.mean[node]), middle);
-        if (!shift.is_nothing && is_visible(csf, levels, shift)) {
-            patches[node] = above(patches[node], shift);
-            shifts[node] = row(patch_rows, shift);
+        const double r1 = tree.bounds()[node].ring.radius;
+        const auto change = [&](float luminance, float distance) {
+            return levels.difference_in_cdm2(luminance) + (hi - lo) * (r1 > 0 ? std::min(1.0, distance / r1) : 1.0);
+        };
+        Shown patch;
+        patch.pattern.luminance = levels.luminance_level(middle);
+        patch.pattern.largest = levels.contrast_level(change(errors.luminance[node], errors.distance[node]), middle);
+        const int typical = levels.contrast_level(amplitude_of_mean * change(errors.mean_luminance[node], errors.mean_distance[node]), middle);
+        if (patch.pattern.largest != no_contrast)
+            patch.pattern.typical = std::clamp(typical, std::max(patch.pattern.largest - steepest_spike, 0), patch.pattern.largest);
+        const vdtree::Drift drift = errors.drift[node];
+        patch.length = std::max(tree.support_spheres()[node].radius, errors.extent[node]);
+        const int drifting = levels.contrast_level(levels.difference_in_cdm2(drift.amount), whole);
+        if (drifting != no_contrast && Levels::contrast(drifting) * whole_peak > 1) {
+            patch.pattern.luminance = std::max(patch.pattern.luminance, levels.luminance_level(whole));
+            patch.pattern.drift = drifting, patch.pattern.fading = drift.fading, patch.pattern.quarters = static_cast<int>(std::ceil(4 * std::log2(std::max(object_radius / patch.length, 1.0f))));
         }
-        for (const auto& [bright, dark] : {std::pair(brightest, lo), std::pair(hi, darkest)})
-            strips[node] = above(strips[node], levels.level(bright - dark, (bright + dark) / 2));
+        patch.pattern = reaches.simplified(rounded(patch.pattern));
+        patch.row = reaches.row(patch.pattern);
+        if (patches[node].row != 0) cover(reaches, patch, patches[node]); // the children's
+        patches[node] = patch;
+
+        Shown strip = strips[node];
+        for (const auto& [bright, dark] : {std::pair(brightest, lo), std::pair(hi, darkest)}) {
+            const double mean = (bright + dark) / 2;
+            const Pattern own{.luminance = levels.luminance_level(mean), .largest = levels.contrast_level(bright - dark, mean), .is_strip = true};
+            strip.pattern = above(strip.pattern, own);
+        }
+        strip.length = std::max(strip.length, moved_by_neighbours * errors.distance[node]);
+        strip.row = reaches.row(strip.pattern);
+        strips[node] = strip;
         if (node == 0) break;
         const NodeId parent = tree.parents()[node];
-        patches[parent] = above(patches[parent], patches[node]);
-        strips[parent] = above(strips[parent], strips[node]);
+        Shown& above_it = patches[parent];
+        if (above_it.row == 0) above_it = patch;
+        else cover(reaches, above_it, patch);
+        strips[parent].pattern = above(strips[parent].pattern, strip.pattern);
+        strips[parent].length = std::max(strips[parent].length, strip.length);
     }
     for (NodeId node = 0; node < nodes; ++node) {
-        parts.classes[node] = {row(patch_rows, patches[node]), row(strip_rows, strips[node])};
-        used[parts.classes[node].interior] = used[parts.classes[node].silhouette] = 1;
-        used[shifts[node]] = used[crowds[node]] = 1;
+        parts.classes[node] = {patches[node].row, strips[node].row};
+        parts.lengths[node] = patches[node].length;
+        parts.silhouette_lengths[node] = strips[node].length;
     }
-    parts.reach = fill_table(used, parts.eccentricity_bins, levels, screen, csf);
-
-    for (NodeId node = nodes; node-- > 0;) {
-        float& length = parts.lengths[node];
-        // Patches side by side, each of which shifts the mean luminance of its place, make larger ones: where their signs differ at random,
-        // k times k of them one k times as wide, of 1 / k of the contrast. Largest over all k, that is what a strip of their width shows.
-        const float crowd = 2 * largest_ratio(parts, crowds[node], parts.classes[node].interior);
-        length = std::max(length, std::max(tree.support_spheres()[node].radius, errors.extent[node]) * std::max(1.0f, crowd));
-        if (shifts[node] != 0)
-            length = std::max(length, object_radius * largest_ratio(parts, shifts[node], parts.classes[node].interior));
-        float& width = parts.silhouette_lengths[node];
-        width = std::max(width, errors.distance[node]);
-        if (node == 0) break;
-        const NodeId parent = tree.parents()[node];
-        parts.lengths[parent] = std::max(parts.lengths[parent], length);
-        parts.silhouette_lengths[parent] = std::max(parts.silhouette_lengths[parent], width);
-    }
+    parts.reach = reaches.take();
     return DistanceCriterion::create(tree, std::move(parts));
 }
 

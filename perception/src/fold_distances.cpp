@@ -1,144 +1,283 @@
-// The perceptual fold test in distance form: a table of reaches by class and eccentricity.
+// The fold tests after Luebke and Hallen in distance form: a table of reaches by class and eccentricity.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-#include <memory>
 #include <numbers>
+#include <unordered_map>
+#include <vector>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include <perception/criterion.h>
-#include <vdtree/contrast_classes.h>
 
+#include "fold_classes.h"
 #include "fold_screen.h"
 
 namespace unseen::perception {
 
 namespace {
 
+using vdtree::ChromaRange;
 using vdtree::DistanceCriterion;
+using vdtree::NodeId;
 
-using vdtree::ContrastClasses;
+constexpr float length_rounding = 1e-6f; // covers that of a mean of two floats
 
-ContrastClasses classes_of(const Display& display) {
-    const double black = black_level(display).value();
-    return {black, to_luminance(display, 1).value() - black};
-}
-
-// What a class comes to at an eccentricity.
-struct Visibility {
-    float reach = 0;      // the distance, in radii of the ring's sphere, at which the extent is no longer seen
-    float least_cost = 0; // that of a pixel, below which nothing is drawn
+// The sensitivities that a test uses: to colour only where it looks at colour.
+struct Sensitivities {
+    const CsfTable& luminance;
+    const CsfTable* red_green = nullptr;
+    const CsfTable* yellow_violet = nullptr;
 };
 
-Visibility visibility_of(float log2_frequency, const Screen& screen) {
-    if (std::isinf(log2_frequency) && log2_frequency < 0) return {}; // not even at the peak; only from inside
-    const double largest_extent_deg = 1 / (2 * std::exp2(static_cast<double>(log2_frequency)));
-    const double half = largest_extent_deg / screen.largest_magnification / degrees_per_radian / 2;
-    const double reach = half < std::numbers::pi / 2 ? 1 / std::sin(half) - 1 : 0;
-    return {static_cast<float>(reach * (1 + reach_rounding)), static_cast<float>(screen.pixel_deg / largest_extent_deg)};
+Sensitivities sensitivities_for(const FoldTestOptions& options, bool has_chroma) {
+    Sensitivities all{options.csf ? *options.csf : CsfTable::standard()};
+    if (!has_chroma) return all;
+    static const CsfTable red_green = CsfTable::from_model(CsfModel::castle_red_green);
+    static const CsfTable yellow_violet = CsfTable::from_model(CsfModel::castle_yellow_violet);
+    all.red_green = &red_green;
+    all.yellow_violet = &yellow_violet;
+    return all;
 }
 
-// By row, whether a node has it.
-std::vector<std::uint8_t> rows_in_use(const DistanceCriterion::Parts& parts) {
-    std::vector<std::uint8_t> used(ContrastClasses::row_count, parts.lit ? 1 : 0); // lights may lead to any
-    for (const vdtree::FoldClass c : parts.classes) used[c.interior] = used[c.silhouette] = 1;
-    return used;
-}
+// A row of the table: how visible its contrasts are.
+struct Row {
+    double contrast, shift, luminance_cdm2;
+    glm::dvec2 chroma, chroma_shift;
 
-void fill_table(DistanceCriterion::Parts& parts, const ContrastClasses& levels, const Screen& screen, const CsfTable& csf) {
-    const std::size_t bins = parts.eccentricity_bins;
-    const std::vector<std::uint8_t> used = rows_in_use(parts);
-    parts.reach.assign(ContrastClasses::row_count * bins, DistanceCriterion::never_visible);
-    parts.least_cost.assign(ContrastClasses::row_count * bins, 0);
+    Row(const Level& level, const Classes& classes)
+        : contrast(contrasts.value(level.contrast)), shift(shifts.value(level.shift)), luminance_cdm2(classes.luminance(level.luminance)),
+          chroma(chroma_contrasts.value(level.chroma[0]), chroma_contrasts.value(level.chroma[1])),
+          chroma_shift(chroma_shifts.value(level.chroma_shift[0]), chroma_shifts.value(level.chroma_shift[1])) {}
+
+    bool has_chroma() const { return chroma != glm::dvec2(0); }
+
+    // 1 is just visible: of a grating of this frequency in all directions of colour.
+    double visibility(const Sensitivities& see, double frequency_cpd, double eccentricity_deg) const {
+        const CyclesPerDegree frequency(frequency_cpd);
+        const Degrees eccentricity(eccentricity_deg);
+        const Luminance luminance(luminance_cdm2);
+        const double grey = contrast > 0 ? contrast * see.luminance.monotone_sensitivity(frequency, eccentricity, luminance) : 0;
+        if (!has_chroma()) return grey;
+        return std::hypot(grey, chroma.x * see.red_green->monotone_sensitivity(frequency, eccentricity, luminance),
+                          chroma.y * see.yellow_violet->monotone_sensitivity(frequency, eccentricity, luminance));
+    }
+    // Of the shifts of the mean, at whatever frequency they are seen best.
+    double shift_visibility(const Sensitivities& see, double eccentricity_deg) const {
+        const Degrees eccentricity(eccentricity_deg);
+        const Luminance luminance(luminance_cdm2);
+        const double grey = shift > 0 ? shift * see.luminance.peak_sensitivity(eccentricity, luminance) : 0;
+        if (chroma_shift == glm::dvec2(0)) return grey;
+        return std::hypot(grey, chroma_shift.x * see.red_green->peak_sensitivity(eccentricity, luminance),
+                          chroma_shift.y * see.yellow_violet->peak_sensitivity(eccentricity, luminance));
+    }
+};
+
+// The largest extents, in degrees on the screen, of which a row shows nothing; infinite where it does at no extent. Smaller is what comes first:
+// bins in ascending eccentricity.
+class LargestExtents {
+public:
+    // Extents around the spheres are larger than these, from whose nearest points eccentricity is counted: they reach nearer to the gaze, by
+    // half of their width at most.
+    LargestExtents(const Row& row, const Sensitivities& see, const Screen& screen, bool is_around_spheres)
+        : row_(row), see_(see), is_around_spheres_(is_around_spheres), step_(step_of(screen.pixel_deg / smallest_of_a_pixel)) {}
+
+    double at(double eccentricity_deg) {
+        // Of a fixed series of extents, so that more contrast never makes them larger.
+        if (step_ == last_step || is_unseen(last_step, eccentricity_deg)) {
+            step_ = last_step;
+            return std::numeric_limits<double>::infinity();
+        }
+        int above = step_ + 1;
+        for (int stride = 1; above < last_step && is_unseen(above, eccentricity_deg); stride *= 2) {
+            step_ = above;
+            above = std::min(above + stride, last_step);
+        }
+        while (above - step_ > 1) {
+            const int middle = step_ + (above - step_) / 2;
+            (is_unseen(middle, eccentricity_deg) ? step_ : above) = middle;
+        }
+        return extent(step_);
+    }
+
+private:
+    static constexpr double steps_per_octave = 128;
+    static constexpr int last_step = 9 * 128;           // 512 degrees: all that is seen
+    static constexpr double smallest_of_a_pixel = 1024; // far below what any fold costs 1 at
+
+    static double extent(int step) { return std::exp2(step / steps_per_octave); }
+    static int step_of(double extent_deg) { return static_cast<int>(std::floor(steps_per_octave * std::log2(extent_deg))); }
+    bool is_unseen(int step, double eccentricity_deg) const {
+        const double nearest = is_around_spheres_ ? std::max(0.0, eccentricity_deg - extent(step) / 2) : eccentricity_deg;
+        return row_.visibility(see_, 1 / (2 * extent(step)), nearest) <= 1;
+    }
+
+    const Row& row_;
+    const Sensitivities& see_;
+    bool is_around_spheres_;
+    int step_; // not seen, or smaller than anything that matters
+};
+
+// Of grey rows whose extents are the spheres' own, all at once.
+void find_largest_extents(const Row& row, const CsfTable& csf, std::span<double> extents) {
     std::array<float, bin_count> contrast, eccentricity, luminance, log2_frequency;
-    for (std::size_t bin = 0; bin < bins; ++bin) eccentricity[bin] = static_cast<float>(static_cast<double>(bin) * degrees_per_bin);
-    for (std::size_t row = 1; row < ContrastClasses::row_count; ++row) {
-        if (!used[row]) continue;
-        contrast.fill(static_cast<float>(ContrastClasses::contrast(row)));
-        luminance.fill(static_cast<float>(levels.luminance(row)));
-        csf.highest_visible_log2_frequency(std::span(contrast).first(bins), std::span(eccentricity).first(bins),
-                                           std::span(luminance).first(bins), std::span(log2_frequency).first(bins));
-        float *const reach = &parts.reach[row * bins], *const least_cost = &parts.least_cost[row * bins];
+    for (std::size_t bin = 0; bin < extents.size(); ++bin) eccentricity[bin] = static_cast<float>(static_cast<double>(bin) * degrees_per_bin);
+    contrast.fill(static_cast<float>(row.contrast));
+    luminance.fill(static_cast<float>(row.luminance_cdm2));
+    csf.highest_visible_log2_frequency(std::span(contrast).first(extents.size()), std::span(eccentricity).first(extents.size()),
+                                       std::span(luminance).first(extents.size()), std::span(log2_frequency).first(extents.size()));
+    // Infinite where not even the peak is seen.
+    for (std::size_t bin = 0; bin < extents.size(); ++bin) extents[bin] = 1 / (2 * std::exp2(static_cast<double>(log2_frequency[bin])));
+}
+
+// The distance, in lengths, from which an extent is no larger than this on the screen.
+float reach_of(double extent_deg, const Screen& screen, bool is_around_spheres) {
+    if (std::isinf(extent_deg)) return 0; // only from inside
+    const double half = extent_deg / screen.largest_magnification / degrees_per_radian / 2;
+    const double in_lengths = half < std::numbers::pi / 2 ? 1 / std::sin(half) : 1; // from the centre
+    return static_cast<float>((is_around_spheres ? in_lengths : in_lengths - 1) * (1 + reach_rounding));
+}
+
+void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes& classes, const Screen& screen, const Sensitivities& see) {
+    const std::size_t bins = parts.eccentricity_bins;
+    const bool is_around_spheres = !parts.lengths.empty();
+    parts.reach.assign((rows.levels().size() + 1) * bins, DistanceCriterion::never_visible);
+    parts.least_cost.assign(parts.reach.size(), 0);
+    std::unordered_map<std::uint64_t, std::vector<double>> known; // extents, which do not depend on shifts of the mean
+    for (std::size_t i = 0; i < rows.levels().size(); ++i) {
+        const Row row(rows.levels()[i], classes);
+        Level without_shifts = rows.levels()[i];
+        without_shifts.shift = 0;
+        without_shifts.chroma_shift = {};
+        const auto [found, is_new] = known.try_emplace(without_shifts.number(), bins);
+        std::vector<double>& extents = found->second;
+        if (is_new && (is_around_spheres || row.has_chroma())) {
+            LargestExtents largest(row, see, screen, is_around_spheres);
+            for (std::size_t bin = 0; bin < bins; ++bin) extents[bin] = largest.at(static_cast<double>(bin) * degrees_per_bin);
+        } else if (is_new) {
+            find_largest_extents(row, see.luminance, extents);
+        }
+        float *const reach = &parts.reach[(i + 1) * bins], *const least_cost = &parts.least_cost[(i + 1) * bins];
         for (std::size_t bin = 0; bin < bins; ++bin) {
-            const Visibility here = visibility_of(log2_frequency[bin], screen);
+            // No fold is drawn smaller than a pixel, and a shift of the mean shows from whatever distance.
+            const double eccentricity_deg = static_cast<double>(bin) * degrees_per_bin;
+            reach[bin] = reach_of(extents[bin], screen, is_around_spheres);
+            least_cost[bin] = static_cast<float>(std::max(screen.pixel_deg / extents[bin], row.shift_visibility(see, eccentricity_deg)));
             // The table's own rounding must not make anything grow with the eccentricity.
-            reach[bin] = bin == 0 ? here.reach : std::min(here.reach, reach[bin - 1]);
-            least_cost[bin] = bin == 0 ? here.least_cost : std::min(here.least_cost, least_cost[bin - 1]);
+            if (bin == 0) continue;
+            reach[bin] = std::min(reach[bin], reach[bin - 1]);
+            least_cost[bin] = std::min(least_cost[bin], least_cost[bin - 1]);
         }
     }
 }
 
-// Nothing falls with the contrast or the luminance; the table's own rounding must not make it.
-void make_growing(DistanceCriterion::Parts& parts) {
-    const std::size_t bins = parts.eccentricity_bins;
-    const auto raise = [&](std::size_t row, std::size_t to) {
-        for (std::vector<float>* values : {&parts.reach, &parts.least_cost})
-            for (std::size_t bin = 0; bin < bins; ++bin) {
-                float& value = (*values)[row * bins + bin];
-                value = std::max(value, (*values)[to * bins + bin]);
-            }
-    };
-    for (std::size_t l = 0; l < ContrastClasses::luminance_count; ++l)
-        for (std::size_t c = 0; c < ContrastClasses::contrast_count; ++c) {
-            if (c > 0) raise(ContrastClasses::row_of(l, c), ContrastClasses::row_of(l, c - 1));
-            if (l > 0) raise(ContrastClasses::row_of(l, c), ContrastClasses::row_of(l - 1, c));
-        }
+// Silhouettes may uncover anything in the scene.
+vdtree::LuminanceRange outline_of(vdtree::LuminanceRange range, const SceneLuminance& scene) {
+    return {std::min(range.lo, scene.darkest), std::max(range.hi, scene.brightest)};
 }
 
-DistanceCriterion::Parts parts_for(const Screen& screen, const FoldTestOptions& options) {
+double middle_of(vdtree::LuminanceRange range) { return 0.5 * (static_cast<double>(range.lo) + static_cast<double>(range.hi)); }
+
+glm::dvec2 half_of(const ChromaRange& range) { return (glm::dvec2(range.hi) - glm::dvec2(range.lo)) * 0.5; }
+
+// The object's colours, and the background, which is grey.
+ChromaRange scene_chroma(std::span<const ChromaRange> rings) {
+    const ChromaRange& all = rings[vdtree::VertexTree::root()];
+    return {glm::min(all.lo, glm::vec2(0)), glm::max(all.hi, glm::vec2(0))};
+}
+
+// What a test takes of the tree.
+struct Rings {
+    std::span<const vdtree::PackedRange> luminance;
+    std::span<const ChromaRange> chroma;             // none: not looked at
+    std::span<const float> mean_shift = {};          // likewise
+    std::span<const glm::vec2> mean_chroma_shift = {};
+};
+
+// All that grows up the tree stays so: contrasts against a middle would not.
+void saturate(RingLooks& parent, const RingLooks& child) {
+    parent.adaptation = std::max(parent.adaptation, child.adaptation);
+    parent.shift = std::max(parent.shift, child.shift);
+    parent.chroma = glm::max(parent.chroma, child.chroma);
+    parent.chroma_shift = glm::max(parent.chroma_shift, child.chroma_shift);
+}
+
+// Puts all nodes into classes. False where there are too many of them for rows so fine.
+bool classify(const vdtree::VertexTree& tree, const Rings& rings, const FoldTestOptions& options, const Classes& classes, Rows& rows,
+              std::vector<vdtree::FoldClass>& fold_classes) {
+    const bool has_chroma = !rings.chroma.empty();
+    const glm::dvec2 of_scene = has_chroma ? half_of(scene_chroma(rings.chroma)) : glm::dvec2(0);
+    std::vector<RingLooks> interior(tree.interior_count()), outlines(tree.interior_count());
+    fold_classes.resize(tree.interior_count());
+    for (NodeId node = tree.interior_count(); node-- > 0;) { // children before parents
+        RingLooks &inside = interior[node], &outline = outlines[node];
+        outline.range = outline_of(rings.luminance[node], options.scene);
+        // Anything in the scene may show through.
+        const bool is_translucent = tree.bounds()[node].flags & vdtree::translucent_ring;
+        inside.range = is_translucent ? outline.range : vdtree::LuminanceRange(rings.luminance[node]);
+        inside.adaptation = std::max({inside.adaptation, static_cast<double>(tree.adaptation_luminance()[node]), middle_of(inside.range)});
+        if (!rings.mean_shift.empty())
+            inside.shift = std::max(inside.shift, classes.contrast(static_cast<double>(rings.mean_shift[node]), rings.luminance[node]));
+        if (has_chroma) {
+            inside.chroma = glm::max(inside.chroma, classes.chroma_contrast(is_translucent ? of_scene : half_of(rings.chroma[node]), inside.range));
+            outline.chroma = glm::max(glm::max(outline.chroma, inside.chroma), classes.chroma_contrast(of_scene, outline.range));
+            if (!rings.mean_chroma_shift.empty())
+                inside.chroma_shift = glm::max(inside.chroma_shift, classes.chroma_contrast(rings.mean_chroma_shift[node], rings.luminance[node]));
+        }
+        saturate(outline, {outline.range, std::max(inside.adaptation, middle_of(outline.range)), inside.shift, glm::dvec2(0), inside.chroma_shift});
+        fold_classes[node] = {rows.of(classes.level(inside)), rows.of(classes.level(outline))};
+        if (rows.is_full()) return false;
+        if (node == 0) break;
+        saturate(interior[tree.parents()[node]], inside);
+        saturate(outlines[tree.parents()[node]], outline);
+    }
+    return true;
+}
+
+Result<DistanceCriterion> make_criterion(const vdtree::VertexTree& tree, const Rings& rings, std::vector<float> lengths, const vdtree::View& view,
+                                         const FoldTestOptions& options) {
+    const Screen screen(view, options);
+    const Classes classes(options.display);
+    const bool has_chroma = !rings.chroma.empty();
     DistanceCriterion::Parts parts;
     parts.spheres = DistanceCriterion::Spheres::ring;
     parts.eccentricity_bins = options.gaze_px ? bin_count : 1;
     parts.bin_degrees = degrees_per_bin / screen.least_magnification;
-    return parts;
+    parts.lengths = std::move(lengths);
+    for (std::size_t coarseness = 1;; coarseness *= 2) {
+        Rows rows(has_chroma, coarseness);
+        if (!classify(tree, rings, options, classes, rows, parts.classes)) continue;
+        fill_table(parts, rows, classes, screen, sensitivities_for(options, has_chroma));
+        return DistanceCriterion::create(tree, std::move(parts));
+    }
 }
 
 } // namespace
 
-Result<vdtree::DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTree& tree, const vdtree::View& view,
-                                                          const FoldTestOptions& options) {
-    const Screen screen(view, options);
-    const ContrastClasses levels = classes_of(options.display);
-    const CsfTable& csf = options.csf ? *options.csf : CsfTable::standard();
-    const auto ranges = tree.ring_luminance();
-    const auto adaptations = tree.adaptation_luminance();
+Result<DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTree& tree, const vdtree::View& view,
+                                                  const FoldTestOptions& options) {
+    Rings rings{tree.ring_luminance(), {}};
+    if (options.chroma) rings.chroma = tree.ring_chroma();
+    return make_criterion(tree, rings, {}, view, options);
+}
 
-    DistanceCriterion::Parts parts = parts_for(screen, options);
-    parts.classes.resize(tree.interior_count());
-    for (vdtree::NodeId node = 0; node < tree.interior_count(); ++node) {
-        const vdtree::LuminanceRange range = ranges[node];
-        // Silhouettes may uncover anything in the scene.
-        const vdtree::LuminanceRange outline = {std::min(range.lo, options.scene.darkest), std::max(range.hi, options.scene.brightest)};
-        const float adaptation = adaptations[node];
-        parts.classes[node].interior = levels.row(range, static_cast<double>(adaptation));
-        parts.classes[node].silhouette =
-            levels.row(outline, static_cast<double>(std::max(adaptation, 0.5f * (outline.lo + outline.hi))));
+Result<DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree& tree, const vdtree::CutRings& cut_rings,
+                                                       const vdtree::View& view, const FoldTestOptions& options) {
+    Rings rings{cut_rings.luminance, {}, cut_rings.mean_shift};
+    if (options.chroma) {
+        rings.chroma = cut_rings.chroma;
+        rings.mean_chroma_shift = cut_rings.mean_chroma_shift;
     }
-    fill_table(parts, levels, screen, csf);
-    return DistanceCriterion::create(tree, std::move(parts));
-}
-
-Result<vdtree::DistanceCriterion> lit_distances(const vdtree::VertexTree& tree, std::shared_ptr<const vdtree::LightBounds> bounds,
-                                                const vdtree::View& view, const FoldTestOptions& options) {
-    const Screen screen(view, options);
-    const ContrastClasses levels = classes_of(options.display);
-    const SceneLuminance scene = options.scene;
-    DistanceCriterion::Parts parts = parts_for(screen, options);
-    parts.lit = vdtree::LitClasses{std::move(bounds), levels,
-                                   levels.row({scene.darkest, scene.brightest}, static_cast<double>(scene.brightest))};
-    fill_table(parts, levels, screen, options.csf ? *options.csf : CsfTable::standard());
-    make_growing(parts);
-    return DistanceCriterion::create(tree, std::move(parts));
-}
-
-SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBounds& bounds, const vdtree::Lighting& lighting,
-                         glm::dvec3 eye, float background) {
-    const vdtree::NodeId root = vdtree::VertexTree::root();
-    const vdtree::LuminanceRange range = vdtree::lit_range(lighting, bounds.cones()[root], tree.bounds()[root].ring, eye);
-    constexpr float steps = 32;
-    return {std::floor(steps * std::min(range.lo, background)) / steps, std::ceil(steps * std::max(range.hi, background)) / steps};
+    std::vector<float> lengths(tree.interior_count(), 0.0f);
+    for (NodeId node = tree.interior_count(); node-- > 0;) {
+        // The change is largest within the support and fades to nothing at the ring's border.
+        const float around = 0.5f * (tree.support_spheres()[node].radius + cut_rings.radius[node]) * (1 + length_rounding);
+        lengths[node] = std::max({lengths[node], tree.bounds()[node].ring.radius, around});
+        if (node > 0) lengths[tree.parents()[node]] = std::max(lengths[tree.parents()[node]], lengths[node]);
+    }
+    return make_criterion(tree, rings, std::move(lengths), view, options);
 }
 
 vdtree::Viewpoint viewpoint_of(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options,

@@ -96,6 +96,9 @@ TEST_F(UsageTest, WrongUsageIsStatusTwoAndLeavesNothing) {
         {"simplify", "ball.obj", "-o", "out.ply", "--fold-test", "extent"},
         {"simplify", "ball.obj", "-o", "out.ply", "--fold-test", "guess"},
         {"simplify", "ball.obj", "-o", "out.ply", "--gaze", "1"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--full", "--chroma"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--fold-test", "error", "--chroma"},
+        {"simplify", "ball.obj", "-o", "out.ply", "--pixels", "2", "--chroma"},
         {"compare", "a.png"},
         {"compare", "a.png", "b.png", "--model", "rpg99", "--gaze", "1", "1"},
         {"compare", "a.png", "b.png", "--profile", "perceptualdiff"},
@@ -318,6 +321,57 @@ TEST_F(SimplifyTest, ImperceptibleCutsKeepMoreNearTheGaze) {
     const Json beside = simplify({"--gaze", "3000", "512"});
     EXPECT_EQ(effect_named(beside, "gaze")["on"], true);
     EXPECT_LT(beside["triangles"], anywhere["triangles"]);
+}
+
+TEST_F(SimplifyTest, TheSafeTestKeepsNoLess) {
+    const Json plain = simplify({"--fold-test", "luebke-hallen"}), safe = simplify({"--fold-test", "luebke-hallen-safe"});
+    EXPECT_GE(safe["triangles"], plain["triangles"]);
+    EXPECT_THAT(effect_named(safe, "fold test")["why"], HasSubstr("luebke-hallen-safe"));
+    EXPECT_TRUE(safe["max_fold_cost"] <= 1);
+}
+
+// The ball in red and green of one luminance, with an alpha for all vertices.
+class PaintedBallTest : public SimplifyTest {
+protected:
+    void paint(float alpha) {
+        std::istringstream grey(read_text(write_ball("ball.obj")));
+        std::string painted;
+        int vertex = 0;
+        for (std::string line; std::getline(grey, line);) {
+            const bool is_red = (vertex / 4) % 2 == 0;
+            if (line.rfind("v ", 0) == 0) {
+                ++vertex;
+                // sRGB of linear (0.44, 0.2586, 0.24) and (0.16, 0.3297, 0.36): both of the luminance 0.296
+                line += (is_red ? " 0.6944 0.5455 0.5271 " : " 0.4366 0.6095 0.6343 ") + std::to_string(alpha);
+            }
+            painted += line + "\n";
+        }
+        write_text(path("ball.obj"), painted);
+        const Outcome built = run({"build", "ball.obj", "-o", "ball.vdt", "--threads", "1"});
+        ASSERT_EQ(built.status, 0) << built.err;
+    }
+};
+
+TEST_F(PaintedBallTest, ChromaKeepsWhatLuminanceFolds) {
+    EXPECT_EQ(effect_named(simplify({"--chroma"}), "chroma")["on"], false); // of the ball as it was
+    paint(1);
+    const Json grey = simplify({"--fold-test", "luebke-hallen"});
+    EXPECT_EQ(effect_named(grey, "chroma")["on"], false);
+    for (const std::string test : {"luebke-hallen", "luebke-hallen-safe"}) {
+        const Json coloured = simplify({"--fold-test", test, "--chroma"});
+        EXPECT_EQ(effect_named(coloured, "chroma")["on"], true);
+        EXPECT_GT(coloured["triangles"].get<int>(), grey["triangles"].get<int>() * 5 / 4);
+    }
+}
+
+TEST_F(PaintedBallTest, KeepsWhatTheSceneMayShowThrough) {
+    paint(1);
+    const Json opaque = simplify({});
+    EXPECT_EQ(effect_named(opaque, "translucency")["on"], false);
+    paint(0.5f);
+    const Json translucent = simplify({});
+    EXPECT_EQ(effect_named(translucent, "translucency")["on"], true);
+    EXPECT_GT(translucent["triangles"].get<int>(), opaque["triangles"].get<int>() * 5 / 4);
 }
 
 TEST_F(SimplifyTest, PixelTestsKnowNoDistance) {

@@ -82,4 +82,19 @@ TEST_F(TeamTest, AMemberThatDiesLeavesNoTree) {
     }
 }
 
+TEST_F(TeamTest, WhatADeadTeamLeavesIsRemovedAtTheNextStart) {
+    write_parts();
+    // Member 0 is killed sooner or later, perhaps while it writes.
+    for (const std::string seconds : {"0.1", "0.4", "0.6"}) {
+        const Outcome built = run_team(2, "if [ $OMPI_COMM_WORLD_RANK = 0 ]; then exec timeout -s KILL " + seconds + " " UNSEEN_COMMAND
+                                          " build large.obj -o team.vdt --memory 0.1; else exec " UNSEEN_COMMAND
+                                          " build large.obj -o team.vdt --memory 0.1; fi");
+        EXPECT_EQ(built.status == 0, fs::exists(path("team.vdt"))) << built.err;
+        fs::remove(path("team.vdt"));
+    }
+    const Outcome built = run({"build", "large.obj", "-o", "team.vdt"});
+    ASSERT_EQ(built.status, 0) << built.err;
+    EXPECT_THAT(files(), ::testing::UnorderedElementsAre("large.obj", "team.vdt"));
+}
+
 } // namespace

@@ -123,6 +123,14 @@ TEST_P(FoldOracleRuns, SeeNothingOfWhatLuebkeAndHallensTestFolds) {
         [](const perception::Judgement& judged) { EXPECT_EQ(judged.visible_pixels, 0u); });
 }
 
+TEST_P(FoldOracleRuns, SeeNothingOfWhatTheSafeTestFolds) {
+    const VertexTree tree = built(GetParam().make());
+    const vdtree::CutRings rings = vdtree::bound_cut_rings(tree);
+    run(
+        tree, [&](const View& view, const perception::FoldTestOptions& options) { return perception::luebke_hallen_safe_distances(tree, rings, view, options); },
+        [](const perception::Judgement& judged) { EXPECT_EQ(judged.visible_pixels, 0u); });
+}
+
 // It is measured, not proven: differences may come up to a few times the threshold (see docs/perception.md), but no more.
 TEST_P(FoldOracleRuns, SeeLittleOfWhatTheErrorTestFolds) {
     const VertexTree tree = built(GetParam().make());

@@ -4,6 +4,7 @@
 
 #include <vdtree/criteria.h>
 #include <vdtree/cut.h>
+#include <vdtree/cut_rings.h>
 #include <vdtree/vertex_tree.h>
 
 namespace unseen::support {
@@ -12,6 +13,7 @@ namespace unseen::support {
 inline bool use_everything(const vdtree::VertexTree& tree) {
     using namespace vdtree;
     (void)verify(tree).has_value();
+    if (tree.check()) (void)bound_cut_rings(tree);
     bool valid = true;
     Cut cut(tree);
     const auto extract = [&] { valid &= validate(extract_mesh(cut).view()).has_value(); };

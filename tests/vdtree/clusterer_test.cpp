@@ -23,6 +23,7 @@
 #include "help_cluster.h"
 #include "quadric_contraction.h"
 #include "shapes.h"
+#include "surface.h"
 
 namespace unseen::vdtree {
 namespace {
@@ -143,7 +144,8 @@ TEST(Clusterers, AreWholeAndFastOnHardMeshesWhateverTheThreads) {
     }
 }
 
-// Members of a team that live in threads of this process. A message waits in the box of its two members.
+// Members of a team that live in threads of this process. A message waits in the box of its two members, and who sends it waits, too:
+// whatever the order that they take turns in, none may wait for each other.
 class Mailboxes {
 public:
     void put(int from, int to, std::span<const std::byte> message) {
@@ -151,12 +153,20 @@ public:
         boxes_[{from, to}].emplace_back(message.begin(), message.end());
         arrived_.notify_all();
     }
+    // Waits until the other one has taken everything; false where it does not.
+    bool hand_over(int from, int to, std::span<const std::byte> message) {
+        put(from, to, message);
+        std::unique_lock lock(mutex_);
+        constexpr std::chrono::seconds long_enough{120};
+        return taken_.wait_for(lock, long_enough, [&] { return boxes_[{from, to}].empty(); });
+    }
     std::vector<std::byte> take(int from, int to) {
         std::unique_lock lock(mutex_);
         auto& box = boxes_[{from, to}];
         arrived_.wait(lock, [&] { return !box.empty(); });
         std::vector<std::byte> message = std::move(box.front());
         box.pop_front();
+        taken_.notify_all();
         return message;
     }
     bool all_empty() const {
@@ -165,7 +175,7 @@ public:
 
 private:
     std::mutex mutex_;
-    std::condition_variable arrived_;
+    std::condition_variable arrived_, taken_;
     std::map<std::pair<int, int>, std::deque<std::vector<std::byte>>> boxes_;
 };
 
@@ -175,8 +185,7 @@ public:
     int rank() const override { return rank_; }
     int size() const override { return size_; }
     void send(int to, std::span<const std::byte> message) override {
-        EXPECT_LT(to, rank_);
-        mail_.put(rank_, to, message);
+        EXPECT_TRUE(mail_.hand_over(rank_, to, message)) << "members wait for each other: " << rank_ << " for " << to;
     }
     std::vector<std::byte> receive(int from) override { return mail_.take(from, rank_); }
 
@@ -206,6 +215,46 @@ TEST(Clusterers, MakeTheSameWithATeamOfAnySize) {
             EXPECT_TRUE(equal(alone, *together)) << members << " members";
             EXPECT_TRUE(mail.all_empty());
         }
+    }
+}
+
+TEST(SurfaceAnalysis, IsTheSameWithATeamOfAnySize) {
+    for (const Hard& hard : hard_meshes) {
+        SCOPED_TRACE(hard.name);
+        const Mesh mesh = hard.make();
+        const std::vector<Index> coincident = find_coincident(mesh.positions);
+        const Surface alone = analyse_surface(mesh.view(), coincident);
+        const auto expect_same = [&](const Result<Surface>& surface) {
+            ASSERT_TRUE(surface) << surface.error().message;
+            EXPECT_EQ(surface->closedness, alone.closedness);
+            EXPECT_EQ(surface->irregular, alone.irregular);
+            EXPECT_EQ(surface->areas, alone.areas);
+            EXPECT_EQ(surface->normals, alone.normals);
+        };
+        for (const int members : {1, 2, 5}) {
+            Mailboxes mail;
+            std::vector<std::thread> others;
+            const auto analyse = [&](int rank) {
+                ThreadTeam team(mail, rank, members);
+                expect_same(analyse_surface(mesh.view(), coincident, team));
+            };
+            for (int rank = 1; rank < members; ++rank) others.emplace_back(analyse, rank);
+            analyse(0);
+            for (std::thread& other : others) other.join();
+            EXPECT_TRUE(mail.all_empty());
+        }
+    }
+}
+
+TEST(SurfaceAnalysis, RefusesWhatIsNoMessageOfTheTeam) {
+    const Mesh mesh = shapes::bumpy_sphere(3);
+    for (const std::size_t length : {0u, 7u, 8u, 100u}) {
+        Mailboxes mail;
+        mail.put(1, 0, std::vector<std::byte>(length, std::byte{0xff}));
+        ThreadTeam team(mail, 0, 2);
+        const auto surface = analyse_surface(mesh.view(), find_coincident(mesh.positions), team);
+        ASSERT_FALSE(surface);
+        EXPECT_EQ(surface.error().code, ErrorCode::malformed_data);
     }
 }
 

@@ -1,6 +1,7 @@
 // Tree files: what is written is read again; what is damaged, cut short or lying is refused.
 #include <vdtree/tree_io.h>
 
+#include <algorithm>
 #include <csignal>
 #include <filesystem>
 #include <functional>
@@ -303,6 +304,9 @@ std::vector<Lie> lies() {
         {"the facts: a bounding sphere of negative radius", set("facts", 9, -1.0f)},
         {"the facts: a light that is no number", set("facts", 10, nan)},
         {"the facts: a luminance that is no number", set("facts", 14, nan)},
+        {"a chroma that is no number", set("ring_chroma", 2, nan)},
+        {"a range of chroma in reverse", [](TreeFile& f) { f["ring_chroma"].set(4, 5.0f), f["ring_chroma"].set(6, 4.0f); }},
+        {"chroma without colours", [](TreeFile& f) { f["colours"].data.clear(); }},
         {"the facts: luminances in reverse", [](TreeFile& f) { f["facts"].set(14, 0.9f), f["facts"].set(15, 0.1f); }},
         {"the facts: no closedness", set("facts", 18, 3u)},
         {"the facts: twice", [](TreeFile& f) { f["facts"].data += f["facts"].data; }},
@@ -328,7 +332,7 @@ std::vector<Lie> lies() {
     for (const char* section : {"parents",          "positions",      "normals",    "colours",     "uvs",
                                 "luminance",        "first_leaf",     "leaf_end",   "subtree_end", "first_triangle",
                                 "bounds",           "support_spheres", "mask_at",
-                                "displacement",     "support_range",  "ring_range", "adaptation",  "triangles",
+                                "displacement",     "support_range",  "ring_range", "adaptation",  "ring_chroma", "triangles",
                                 "source_triangles", "source_vertices"})
         all.push_back({section, drop_last(section)});
     return all;
@@ -361,6 +365,21 @@ TEST_F(TreeIo, MissesNoSection) {
         file.sections.erase(file.sections.begin() + static_cast<std::ptrdiff_t>(i));
         expect_refused(file.bytes(), name);
     }
+}
+
+// What a tree has not takes no place in its file.
+TEST_F(TreeIo, WritesChromaOnlyOfColours) {
+    const auto has_chroma = [&](const Mesh& mesh) {
+        const TreeFile file = TreeFile::parse(bytes_of(built(mesh)));
+        return std::any_of(file.sections.begin(), file.sections.end(), [](const auto& s) { return s.name == "ring_chroma"; });
+    };
+    Mesh mesh = shapes::cube(2);
+    EXPECT_FALSE(has_chroma(mesh));
+    mesh.colours.assign(mesh.positions.size(), glm::vec4(0.5f, 0.5f, 0.5f, 1));
+    mesh.colours[3] = glm::vec4(0.2f, 0.2f, 0.2f, 1);
+    EXPECT_FALSE(has_chroma(mesh));
+    mesh.colours[3] = glm::vec4(0.5f, 0.4f, 0.5f, 1);
+    EXPECT_TRUE(has_chroma(mesh));
 }
 
 // Random values in random places, all checksums right: an error, or a tree with which everything can be done.

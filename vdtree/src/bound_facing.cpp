@@ -87,32 +87,22 @@ private:
         }
     };
 
-    // With all three in the part, until two meet or one leaves it. Which corner moves is as good as random: the processor is not
-    // left to guess.
+    // With all three in the part, until two meet or one leaves it. Which corner moves is as good as random: it is an index, for the
+    // processor is not to guess.
     template <class See>
     void follow_all(Corners& c, See&& see) {
-        using Mask = int __attribute__((vector_size(16)));
         for (;;) {
             const Index now = std::min(c.next[0], std::min(c.next[1], c.next[2]));
-            if ((c.next[0] == now) + (c.next[1] == now) + (c.next[2] == now) != 1) return;
-            NodeId node = 0;
-            Index moves[3]; // all bits or none
-            for (std::size_t k = 0; k < 3; ++k) {
-                moves[k] = Index{0} - (c.next[k] == now);
-                node |= c.above[k] & moves[k];
-            }
+            const unsigned first = c.next[0] == now, second = c.next[1] == now, third = c.next[2] == now;
+            if (first + second + third != 1) return;
+            const std::size_t k = second + 2 * third;
+            const NodeId node = c.above[k];
             const Step& step = steps_[node];
             if (border_[node] > most_border_triangles || step.next == never) return follow_some(c, see);
-            Corner at;
-            std::memcpy(&at, &step, sizeof(at));
-            for (std::size_t k = 0; k < 3; ++k) {
-                const int bits = static_cast<int>(moves[k]);
-                const Mask mask = {bits, bits, bits, bits};
-                c.at[k] = std::bit_cast<Corner>((std::bit_cast<Mask>(at) & mask) | (std::bit_cast<Mask>(c.at[k]) & ~mask));
-                c.nodes[k] ^= (c.nodes[k] ^ node) & moves[k];
-                c.above[k] ^= (c.above[k] ^ step.above) & moves[k];
-                c.next[k] ^= (c.next[k] ^ step.next) & moves[k];
-            }
+            std::memcpy(&c.at[k], &step, sizeof(Corner));
+            c.nodes[k] = node;
+            c.above[k] = step.above;
+            c.next[k] = step.next;
             ++border_[node];
             see(node, c.at);
         }

@@ -25,35 +25,37 @@ constexpr double node_slack = 1e-3;
 // Bounds one node after another, children first. Leaves are seen as points, interior children as their spheres.
 class SphereWorker {
 public:
-    SphereWorker(const BoundInput& input, float scale, NodeSpheres& out)
-        : in_(input), out_(out), support_(scale), ring_(scale) {}
+    SphereWorker(const BoundInput& input, float scale, NodeSpheres& out) : in_(input), out_(out), balls_(scale) {}
 
     void operator()(NodeId node) {
-        support_.clear(), ring_.clear();
-        const glm::vec3 proxy = in_.positions[node];
-        support_.add(proxy);
-        ring_.add(proxy);
+        const NodeId first_leaf = in_.shape.node_of_leaf(0);
+        balls_.begin(in_.positions[node]);
+        children_.clear(), leaves_.clear();
         in_.shape.for_each_child(
             node,
             [&](NodeId child) {
-                support_.add(out_.support[child]);
-                ring_.add(out_.ring[child]);
+                balls_.add(out_.support[child]);
+                children_.push_back(child);
             },
             [&](Index leaf) {
-                const glm::vec3 p = in_.positions[in_.shape.node_of_leaf(leaf)];
-                support_.add(p);
-                ring_.add(p);
-                for (const Index neighbour : in_.rings.around(leaf))
-                    ring_.add(in_.positions[in_.shape.node_of_leaf(neighbour)]);
+                balls_.add(in_.positions[first_leaf + leaf]);
+                leaves_.push_back(leaf);
             });
-        out_.support[node] = round_outward(support_.enclose(node_slack));
-        out_.ring[node] = round_outward(ring_.enclose(node_slack));
+        out_.support[node] = round_outward(balls_.enclose(node_slack));
+        // The ring has all these points, too.
+        balls_.forget_spheres();
+        for (const NodeId child : children_) balls_.add(out_.ring[child]);
+        for (const Index leaf : leaves_)
+            for (const Index neighbour : in_.rings.around(leaf)) balls_.add(in_.positions[first_leaf + neighbour]);
+        out_.ring[node] = round_outward(balls_.enclose(node_slack));
     }
 
 private:
     const BoundInput& in_;
     NodeSpheres& out_;
-    BallSet support_, ring_;
+    BallSet balls_;
+    std::vector<NodeId> children_;
+    std::vector<Index> leaves_;
 };
 
 // A power of two that brings the positions' extent to between a half and 1.

@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <limits>
 
@@ -57,7 +58,7 @@ public:
         Best best;
         for (int i = 0; i < count_ && !best.found; ++i) {
             const glm::dvec3 half = (at(i) - p) * 0.5;
-            consider(best, {p + half, glm::length(half)}, {i});
+            consider(best, {p + half, squared(half)}, {i});
         }
         // A pair's sphere that contains the others is the smallest, but one of more points need not be.
         if (!best.found) {
@@ -80,7 +81,7 @@ public:
         kept[static_cast<std::size_t>(count++)] = p;
         points_ = kept;
         count_ = count;
-        sphere_ = best.sphere;
+        sphere_ = {best.sphere.centre, std::sqrt(best.sphere.squared_radius)};
     }
 
 private:
@@ -88,17 +89,22 @@ private:
         std::array<int, 3> with{-1, -1, -1};
         Subset(std::initializer_list<int> which) { std::copy(which.begin(), which.end(), with.begin()); }
     };
+    // Roots are only taken of the best.
+    struct Candidate {
+        glm::dvec3 centre = glm::dvec3(0);
+        double squared_radius = -1; // negative: none
+    };
     struct Best {
         bool found = false;
-        DSphere sphere;
+        Candidate sphere;
         std::array<int, 3> with{-1, -1, -1};
     };
 
     glm::dvec3 at(int i) const { return points_[static_cast<std::size_t>(i)]; }
 
-    void consider(Best& best, const DSphere& sphere, const Subset& subset) const {
-        if (!(sphere.radius >= 0) || (best.found && sphere.radius >= best.sphere.radius)) return;
-        const double limit = sphere.radius * sphere.radius * (1 + 2 * containment_slack);
+    void consider(Best& best, const Candidate& sphere, const Subset& subset) const {
+        if (!(sphere.squared_radius >= 0) || (best.found && sphere.squared_radius >= best.sphere.squared_radius)) return;
+        const double limit = sphere.squared_radius * (1 + 2 * containment_slack);
         for (int i = 0; i < count_; ++i) {
             if (i == subset.with[0] || i == subset.with[1] || i == subset.with[2]) continue;
             if (!(squared(at(i) - sphere.centre) <= limit)) return;
@@ -107,19 +113,19 @@ private:
     }
 
     // The smallest spheres with three and with four points on them.
-    static DSphere around(glm::dvec3 p, glm::dvec3 q, glm::dvec3 r) {
+    static Candidate around(glm::dvec3 p, glm::dvec3 q, glm::dvec3 r) {
         const glm::dvec3 a = q - p, b = r - p, normal = glm::cross(a, b);
         const double aa = squared(a), bb = squared(b), flat = squared(normal);
         if (!(flat > least_flatness * aa * bb)) return {};
         const glm::dvec3 offset = glm::cross(aa * b - bb * a, normal) / (2 * flat);
-        return {p + offset, glm::length(offset)};
+        return {p + offset, squared(offset)};
     }
-    static DSphere around(glm::dvec3 p, glm::dvec3 q, glm::dvec3 r, glm::dvec3 s) {
+    static Candidate around(glm::dvec3 p, glm::dvec3 q, glm::dvec3 r, glm::dvec3 s) {
         const glm::dvec3 a = q - p, b = r - p, c = s - p, bc = glm::cross(b, c);
         const double aa = squared(a), bb = squared(b), cc = squared(c), volume = glm::dot(a, bc);
         if (!(volume * volume > least_flatness * aa * bb * cc)) return {};
         const glm::dvec3 offset = (aa * bc + bb * glm::cross(c, a) + cc * glm::cross(a, b)) / (2 * volume);
-        return {p + offset, glm::length(offset)};
+        return {p + offset, squared(offset)};
     }
 
     std::array<glm::dvec3, 4> points_;
@@ -173,7 +179,7 @@ private:
 // Grows a basis by what sticks out farthest until nothing does by more than `slack`, a share of the radius. For balls the
 // points of the basis are cutting planes: their smallest sphere is never larger than the one looked for.
 template <class AnyBalls>
-DSphere grow_basis(const AnyBalls& balls, double slack) {
+DSphere grow_basis(AnyBalls& balls, double slack) {
     // A pair far apart is a good beginning.
     const DSphere one = balls.farthest(balls.first().centre).ball;
     const DSphere other = balls.farthest(one.centre).ball;
@@ -193,7 +199,7 @@ DSphere grow_basis(const AnyBalls& balls, double slack) {
 DSphere enclose(std::span<const glm::dvec3> points, std::span<const DSphere> spheres, double slack) {
     while (!spheres.empty() && spheres.front().radius < 0) spheres = spheres.subspan(1);
     if (points.empty() && spheres.empty()) return {};
-    const Balls balls(points, spheres);
+    Balls balls(points, spheres);
     const DSphere sphere = grow_basis(balls, slack);
     return {sphere.centre + balls.origin(), sphere.radius};
 }
@@ -220,6 +226,7 @@ Floats load(const std::vector<float>& v, std::size_t i) {
     std::memcpy(&out, v.data() + i, sizeof out);
     return out;
 }
+void store(std::vector<float>& v, std::size_t i, Floats values) { std::memcpy(v.data() + i, &values, sizeof values); }
 Floats larger(Floats a, Floats b) { return a > b ? a : b; }
 float largest(Floats v) {
     const Floats two = larger(v, __builtin_shuffle(v, Ints{2, 3, 0, 1}));
@@ -234,85 +241,97 @@ constexpr float least_square = 1e-30f;
 
 } // namespace
 
-// The view of a BallSet that a basis grows in.
+// The view of a BallSet that a basis grows in: relative to the first point, scaled.
 class BallSet::Scaled {
 public:
     explicit Scaled(const BallSet& set) : set_(set) {}
 
     DSphere first() const { return {glm::dvec3(0), 0}; }
-    // Of points nearly as far as each other, any one.
-    Farthest farthest(glm::dvec3 from) const {
+
+    // Measured from `from` rounded to floats. Of points nearly as far as each other, any one.
+    Farthest farthest(glm::dvec3 from) {
+        middle_ = glm::vec3(from);
+        const glm::dvec3 centre(middle_);
+        most_squared_ = 0;
         Farthest out{{glm::dvec3(0), 0}, -1};
-        for (std::size_t begin = 0; begin < set_.count_; begin += block) {
-            const glm::dvec3 point = farthest_in_block(begin, glm::vec3(from));
-            const double reach = glm::distance(point, from);
-            if (reach > out.reach) out = {{point, 0}, reach};
-        }
+        for (std::size_t begin = 0; begin < set_.count_; begin += block) look_at_block(begin, out);
         for (const DSphere& s : set_.scaled_spheres_) {
-            const double reach = glm::distance(s.centre, from) + s.radius;
+            const double reach = glm::distance(s.centre, centre) + s.radius;
             if (reach > out.reach) out = {s, reach};
         }
         return out;
     }
 
+    // Of the last call: where it measured from, and the largest squared distance of a point.
+    glm::vec3 middle() const { return middle_; }
+    float most_squared() const { return most_squared_; }
+
 private:
     // The last digits of the squared distances make room for the points' numbers: one comparison brings both.
-    static constexpr std::size_t block = 256;
-    glm::dvec3 farthest_in_block(std::size_t begin, glm::vec3 from) const {
+    static constexpr std::size_t block = 64;
+    static constexpr int number_bits = block - 1;
+    void look_at_block(std::size_t begin, Farthest& out) {
         const auto& [x, y, z] = set_.relative_;
         const std::size_t end = std::min(begin + block, set_.count_);
-        Floats farthest = {0, 0, 0, 0};
         Ints number = {0, 1, 2, 3};
+        Floats farthest = {0, 0, 0, 0}, largest_squares = {0, 0, 0, 0};
         for (std::size_t i = begin; i < end; i += lanes) {
-            const Floats dx = load(x, i) - from.x, dy = load(y, i) - from.y, dz = load(z, i) - from.z;
+            const Floats dx = load(x, i) - middle_.x, dy = load(y, i) - middle_.y, dz = load(z, i) - middle_.z;
             const Floats squared = dx * dx + dy * dy + dz * dz;
-            const Ints numbered = (std::bit_cast<Ints>(squared) & ~static_cast<int>(block - 1)) | number;
+            largest_squares = larger(largest_squares, squared);
+            const Ints numbered = (std::bit_cast<Ints>(squared) & ~number_bits) | number;
             farthest = larger(farthest, std::bit_cast<Floats>(numbered));
             number += static_cast<int>(lanes);
         }
-        const std::size_t i = begin + (std::bit_cast<unsigned>(largest(farthest)) & (block - 1));
-        return {x[i], y[i], z[i]};
+        const float most = largest(largest_squares);
+        if (most <= most_squared_ && out.reach >= 0) return;
+        most_squared_ = most;
+        const std::size_t i = begin + static_cast<std::size_t>(std::bit_cast<int>(largest(farthest)) & number_bits);
+        const glm::dvec3 point(x[i], y[i], z[i]);
+        out = {{point, 0}, most >= least_square ? std::sqrt(static_cast<double>(most)) : glm::distance(point, glm::dvec3(middle_))};
     }
 
     const BallSet& set_;
+    glm::vec3 middle_{0};
+    float most_squared_ = 0;
 };
 
 void BallSet::grow() {
     constexpr std::size_t least = 64;
-    for (auto& axis : points_) axis.resize(std::max(least, 2 * count_));
-    for (auto& axis : relative_) axis.resize(points_[0].size());
+    points_.resize(std::max(least, 2 * count_));
+    for (auto& axis : relative_) axis.resize(points_.size());
 }
 
+// Those that are new, and what fills up the last vector: the first point again.
 void BallSet::make_relative() {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-        std::vector<float>& from = points_[axis];
-        for (std::size_t i = count_; i % lanes != 0; ++i) from[i] = from[0]; // the first point again
-        for (std::size_t i = 0; i < count_; i += lanes) {
-            const Floats scaled = (load(from, i) - from[0]) * scale_;
-            std::memcpy(relative_[axis].data() + i, &scaled, sizeof scaled);
-        }
+    for (std::size_t i = count_; i % lanes != 0; ++i) points_[i] = points_[0];
+    const Floats origin = points_[0];
+    for (std::size_t i = relative_count_ / lanes * lanes; i < count_; i += lanes) {
+        const Floats a = (points_[i] - origin) * scale_, b = (points_[i + 1] - origin) * scale_;
+        const Floats c = (points_[i + 2] - origin) * scale_, d = (points_[i + 3] - origin) * scale_;
+        const Floats low_ab = __builtin_shuffle(a, b, Ints{0, 4, 1, 5}), low_cd = __builtin_shuffle(c, d, Ints{0, 4, 1, 5});
+        const Floats high_ab = __builtin_shuffle(a, b, Ints{2, 6, 3, 7}), high_cd = __builtin_shuffle(c, d, Ints{2, 6, 3, 7});
+        store(relative_[0], i, __builtin_shuffle(low_ab, low_cd, Ints{0, 1, 4, 5}));
+        store(relative_[1], i, __builtin_shuffle(low_ab, low_cd, Ints{2, 3, 6, 7}));
+        store(relative_[2], i, __builtin_shuffle(high_ab, high_cd, Ints{0, 1, 4, 5}));
     }
+    relative_count_ = count_;
 }
 
 DSphere BallSet::enclose(double slack) {
     make_relative();
-    const auto point = [&](std::size_t i) { return glm::dvec3(points_[0][i], points_[1][i], points_[2][i]); };
+    const auto point = [&](std::size_t i) { return glm::dvec3(points_[i][0], points_[i][1], points_[i][2]); };
     const glm::dvec3 origin = point(0);
     const double scale = scale_;
     scaled_spheres_.clear();
     for (const Sphere& s : spheres_)
         scaled_spheres_.push_back({(glm::dvec3(s.centre) - origin) * scale, s.radius * scale});
-    const glm::vec3 middle(grow_basis(Scaled(*this), slack).centre);
-    const glm::dvec3 centre = glm::dvec3(middle) / scale + origin;
-    Floats most = {0, 0, 0, 0};
-    for (std::size_t i = 0; i < count_; i += lanes) {
-        const Floats dx = load(relative_[0], i) - middle.x, dy = load(relative_[1], i) - middle.y,
-                     dz = load(relative_[2], i) - middle.z;
-        most = larger(most, dx * dx + dy * dy + dz * dz);
-    }
+    Scaled scaled(*this);
+    grow_basis(scaled, slack); // the last that it asks for is the farthest from where it ends
+    const glm::dvec3 centre = glm::dvec3(scaled.middle()) * (1 / scale) + origin;
     double reach = 0;
-    if (const float squared_reach = largest(most); squared_reach >= least_square) {
-        reach = std::sqrt(static_cast<double>(squared_reach)) * (1 + float_slack) / scale;
+    if (const float squared = scaled.most_squared(); squared >= least_square) {
+        reach = std::sqrt(static_cast<double>(squared)) * (1 + float_slack) * (1 / scale);
     } else {
         for (std::size_t i = 0; i < count_; ++i) reach = std::max(reach, glm::distance(point(i), centre));
     }
@@ -329,8 +348,8 @@ Sphere round_outward(const DSphere& sphere) {
     // Doubles carry the sum and the distances of the containment test; a few units in their last place cover them.
     const double needed = (sphere.radius + moved) * (1 + 8 * std::numeric_limits<double>::epsilon());
     out.radius = static_cast<float>(needed);
-    if (static_cast<double>(out.radius) < needed)
-        out.radius = std::nextafter(out.radius, std::numeric_limits<float>::infinity());
+    if (static_cast<double>(out.radius) < needed) // the next float; of the largest, infinity
+        out.radius = std::bit_cast<float>(std::bit_cast<std::uint32_t>(out.radius) + 1);
     return out;
 }
 

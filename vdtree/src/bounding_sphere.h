@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstring>
 #include <span>
 #include <vector>
 
@@ -29,35 +30,37 @@ DSphere enclosing_sphere(std::span<const glm::dvec3> points, std::span<const DSp
 // per instruction.
 class BallSet {
 public:
-    // `scale` brings the tree's extent to about 1, so that squares in floats neither overflow nor vanish.
+    // `scale`, a power of two, brings the tree's extent to about 1, so that squares in floats neither overflow nor vanish.
     explicit BallSet(float scale) : scale_(scale) {}
 
-    void clear() {
-        count_ = 0;
+    // Begins with a point, which the others are measured from.
+    void begin(glm::vec3 point) {
+        count_ = relative_count_ = 0;
         spheres_.clear();
+        add(point);
     }
     void add(glm::vec3 point) {
-        if (count_ == points_[0].size()) grow();
-        for (int axis = 0; axis < 3; ++axis) points_[static_cast<std::size_t>(axis)][count_] = point[axis];
-        ++count_;
+        if (count_ == points_.size()) grow();
+        std::memcpy(&points_[count_++], &point, sizeof(point));
     }
     void add(const Sphere& sphere) { spheres_.push_back(sphere); }
+    void forget_spheres() { spheres_.clear(); }
 
     // Contains everything; the radius exceeds the smallest one by a relative `slack` at most, but for the rounding of
-    // positions relative to each other. There must be a point.
+    // positions relative to each other.
     DSphere enclose(double slack);
 
 private:
     class Scaled;
-
-    using Axes = std::array<std::vector<float>, 3>;
+    using Point = float __attribute__((vector_size(16))); // the fourth number does not matter
 
     void grow();
     void make_relative();
 
     float scale_;
-    std::size_t count_ = 0; // of the points; there is room for more, in whole vectors
-    Axes points_, relative_; // to the first, scaled
+    std::size_t count_ = 0, relative_count_ = 0; // there is room for more, in whole vectors
+    std::vector<Point> points_;
+    std::array<std::vector<float>, 3> relative_; // to the first, scaled
     std::vector<Sphere> spheres_;
     std::vector<DSphere> scaled_spheres_;
 };

@@ -2,6 +2,7 @@
 #include <vdtree/builder.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -9,8 +10,10 @@
 #include <string>
 
 #include <glm/geometric.hpp>
+#include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 
 #include "bound_facing.h"
 #include "bound_spheres.h"
@@ -66,13 +69,31 @@ Error cancelled_error() { return {ErrorCode::cancelled, "Building the tree was c
 // The input less what cannot be built on: triangles that use a vertex twice, and vertices that no triangle uses
 // (these come back as leaves of a subtree of their own).
 struct CleanMesh {
-    Mesh storage; // used where something had to go
-    MeshView view;
+    Mesh storage; // used where something had to go, like the next
     std::vector<Index> source_vertices;  // by clean vertex
-    std::vector<Index> unreferenced;     // source vertices
     std::vector<Index> source_triangles; // by clean triangle
+    std::vector<Index> unreferenced;     // source vertices
+    MeshView view;
     std::uint64_t dropped = 0;
+
+    Index source_vertex(Index v) const { return source_vertices.empty() ? v : source_vertices[v]; }
+    Index source_triangle(Index t) const { return source_triangles.empty() ? t : source_triangles[t]; }
 };
+
+bool uses_a_vertex_twice(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
+
+// Whether there is nothing to be cleaned.
+bool is_clean(const MeshView& mesh) {
+    std::vector<std::uint8_t> used(mesh.positions.size(), 0);
+    std::atomic<bool> whole = true;
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 1 << 14), [&](const auto& range) {
+        for (std::size_t t = range.begin(); t < range.end(); ++t) {
+            if (uses_a_vertex_twice(mesh.triangles[t])) whole = false;
+            for (const Index v : mesh.triangles[t]) std::atomic_ref(used[v]).store(1, std::memory_order_relaxed);
+        }
+    });
+    return whole && std::find(used.begin(), used.end(), 0) == used.end();
+}
 
 template <class T>
 std::vector<T> select(std::span<const T> values, std::span<const Index> which) {
@@ -85,24 +106,23 @@ std::vector<T> select(std::span<const T> values, std::span<const Index> which) {
 
 CleanMesh clean(const MeshView& mesh) {
     CleanMesh out;
+    if (is_clean(mesh)) {
+        out.view = mesh;
+        return out;
+    }
     std::vector<std::uint8_t> used(mesh.positions.size(), 0);
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-        const Triangle& tri = mesh.triangles[t];
-        if (tri[0] == tri[1] || tri[1] == tri[2] || tri[2] == tri[0]) {
+        if (uses_a_vertex_twice(mesh.triangles[t])) {
             ++out.dropped;
             continue;
         }
         out.source_triangles.push_back(static_cast<Index>(t));
-        for (const Index v : tri) used[v] = 1;
+        for (const Index v : mesh.triangles[t]) used[v] = 1;
     }
     std::vector<Index> clean_number(mesh.positions.size(), 0);
     for (std::size_t v = 0; v < used.size(); ++v) {
         clean_number[v] = static_cast<Index>(out.source_vertices.size());
         (used[v] ? out.source_vertices : out.unreferenced).push_back(static_cast<Index>(v));
-    }
-    if (out.dropped == 0 && out.unreferenced.empty()) {
-        out.view = mesh;
-        return out;
     }
     Mesh& m = out.storage;
     m.positions = select(mesh.positions, out.source_vertices);
@@ -203,13 +223,14 @@ public:
     Result<void> help();
 
 private:
-    void analyse();
+    Result<void> analyse();
     std::vector<float> find_luminance() const;
     Result<Clustering> cluster(Clusterer clusterer);
     void order(const Clustering& clustering);
     void place_vertices(const Clustering& clustering);
     void bound();
     LeafPlaces find_places() const;
+    std::vector<std::uint8_t> find_translucent(std::span<const Triangle> triangles) const;
 
     const MeshView& source_;
     const MeshView& mesh_;
@@ -228,7 +249,7 @@ private:
 
 Result<VertexTree> TreeBuilder::build(Clusterer clusterer) {
     if (reporter_.cancelled(0.0, "analysing")) return cancelled_error();
-    analyse();
+    if (const auto analysed = analyse(); !analysed) return analysed.error();
     if (reporter_.cancelled(clustering_begins, "clustering")) return cancelled_error();
     {
         const Result<Clustering> clustering = cluster(clusterer);
@@ -254,15 +275,22 @@ Result<VertexTree> TreeBuilder::build(Clusterer clusterer) {
 }
 
 Result<void> TreeBuilder::help() {
-    analyse();
+    if (const auto analysed = analyse(); !analysed) return analysed.error();
     const std::vector<float> luminance = find_luminance();
     return help_cluster_quadric({mesh_, luminance, surface_.normals, surface_.areas, coincident_}, *options_.team);
 }
 
-void TreeBuilder::analyse() {
+Result<void> TreeBuilder::analyse() {
     prelit_ = !mesh_.colours.empty();
     coincident_ = find_coincident(mesh_.positions);
-    surface_ = analyse_surface(mesh_, coincident_);
+    if (!options_.team || options_.clusterer != ClustererKind::quadric) { // only quadrics are helped with
+        surface_ = analyse_surface(mesh_, coincident_);
+        return {};
+    }
+    auto together = analyse_surface(mesh_, coincident_, *options_.team);
+    if (!together) return together.error();
+    surface_ = std::move(*together);
+    return {};
 }
 
 std::vector<float> TreeBuilder::find_luminance() const {
@@ -286,8 +314,9 @@ void TreeBuilder::order(const Clustering& clustering) {
     const Index vertices = static_cast<Index>(mesh_.positions.size());
     nodes_ = order_nodes(clustering, vertices, static_cast<Index>(clean_.unreferenced.size()));
     std::vector<Index> source_vertices(nodes_.leaf_of_vertex.size());
-    for (Index v = 0; v < nodes_.leaf_of_vertex.size(); ++v)
-        source_vertices[nodes_.leaf_of_vertex[v]] = v < vertices ? clean_.source_vertices[v] : clean_.unreferenced[v - vertices];
+    tbb::parallel_for(Index{0}, static_cast<Index>(source_vertices.size()), [&](Index v) {
+        source_vertices[nodes_.leaf_of_vertex[v]] = v < vertices ? clean_.source_vertex(v) : clean_.unreferenced[v - vertices];
+    });
     g_->source_vertices = std::move(source_vertices);
     parts_.emplace(nodes_.shape.links());
 }
@@ -298,17 +327,17 @@ void TreeBuilder::place_vertices(const Clustering& clustering) {
     // By leaf: weights, and normals of the leaves.
     std::vector<double> weights(nodes_.shape.leaves(), 0);
     std::vector<glm::vec3> normals(nodes_.shape.leaves(), glm::vec3(0));
-    for (Index v = 0; v < vertices; ++v) {
+    tbb::parallel_for(Index{0}, vertices, [&](Index v) {
         weights[nodes_.leaf_of_vertex[v]] = surface_.areas[v];
         normals[nodes_.leaf_of_vertex[v]] = surface_.normals[v];
-    }
+    });
     const TreeParts& parts = *parts_;
     ProxyVertices proxies =
         place_proxies(nodes_.shape, parts, {source_, g_->source_vertices, weights, normals, g_->origin});
-    for (std::size_t i = 0; i < clustering.positions.size(); ++i) {
+    tbb::parallel_for(std::size_t{0}, clustering.positions.size(), [&](std::size_t i) {
         const NodeId node = nodes_.node_of_cluster[i];
         if (node != no_node) proxies.positions[node] = glm::vec3(clustering.positions[i] - g_->origin);
-    }
+    });
     keep_coincident_proxies(nodes_.shape, parts, proxies.positions);
     g_->positions = std::move(proxies.positions);
     g_->normals = std::move(proxies.normals);
@@ -332,12 +361,28 @@ LeafPlaces TreeBuilder::find_places() const {
     return places;
 }
 
+// By interior node: whether a corner of its ring has an alpha below 1. Empty where none has.
+std::vector<std::uint8_t> TreeBuilder::find_translucent(std::span<const Triangle> triangles) const {
+    const TreeShape& shape = nodes_.shape;
+    const auto shows_through = [&](Index leaf) { return !(g_->colours[shape.node_of_leaf(leaf)].a >= 1); };
+    const Index leaves = g_->colours.empty() ? 0 : shape.leaves();
+    bool any = false;
+    for (Index leaf = 0; leaf < leaves && !any; ++leaf) any = shows_through(leaf);
+    if (!any) return {};
+    std::vector<std::uint8_t> translucent(shape.interior(), 0);
+    for (const Triangle& t : triangles)
+        if (std::any_of(t.begin(), t.end(), shows_through))
+            for (const Index leaf : t) translucent[shape.parents[shape.node_of_leaf(leaf)]] = 1;
+    for (NodeId node = shape.interior(); node-- > 1;) translucent[shape.parents[node]] |= translucent[node];
+    return translucent;
+}
+
 void TreeBuilder::bound() {
     TreeShape& shape = nodes_.shape;
     const Ancestors ancestors(shape);
     TriangleOrder triangles = order_triangles(mesh_.triangles, nodes_, ancestors);
     if (!source_.ranges.empty()) {
-        for (Index& t : triangles.sources) t = clean_.source_triangles[t];
+        for (Index& t : triangles.sources) t = clean_.source_triangle(t);
         g_->source_triangles = std::move(triangles.sources);
     }
     release(triangles.sources);
@@ -351,15 +396,17 @@ void TreeBuilder::bound() {
     const LeafRings rings = find_rings(triangles.triangles, places, parts);
     const BoundInput input{shape, parts, rings, g_->positions};
 
-    NodeSpheres spheres = bound_spheres(input);
-    g_->bounding_sphere = bound_corners(input);
+    NodeSpheres spheres;
+    tbb::parallel_invoke([&] { spheres = bound_spheres(input); }, [&] { g_->bounding_sphere = bound_corners(input); });
     g_->displacement = bound_displacements(input, spheres.support);
     const std::vector<Directions> facing = bound_facing(input, triangles.triangles, places, spheres.support, ancestors);
     g_->support_spheres = std::move(spheres.support);
+    const std::vector<std::uint8_t> is_translucent = find_translucent(triangles.triangles);
     std::vector<NodeBounds> bounds(shape.interior());
     tbb::parallel_for(NodeId{0}, shape.interior(), [&](NodeId node) {
-        const auto flags = static_cast<std::uint8_t>(facing[node].marked() ? irregular_ring : 0);
-        bounds[node] = {spheres.ring[node], facing[node].slabs(), flags, 0};
+        const int irregular = facing[node].marked() ? irregular_ring : 0;
+        const int translucent = is_translucent.empty() || !is_translucent[node] ? 0 : translucent_ring;
+        bounds[node] = {spheres.ring[node], facing[node].slabs(), static_cast<std::uint8_t>(irregular | translucent), 0};
     });
     PooledMasks masks = pool_masks(facing, shape.parents);
     g_->bounds = std::move(bounds);
@@ -380,7 +427,7 @@ Result<Value> with_builder(const MeshView& mesh, const BuildOptions& options, Wo
     ThreadLimit limit;
     limit.set(options.threads);
     const CleanMesh cleaned = clean(mesh);
-    if (cleaned.source_triangles.empty())
+    if (cleaned.view.triangles.empty())
         return Error{ErrorCode::malformed_data, "The mesh has no triangle with three different vertices."};
     Reporter reporter(options.progress);
     TreeBuilder builder(mesh, cleaned, options, reporter, limit);

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -71,7 +72,12 @@ public:
     KdPartition(std::span<const glm::dvec3> positions, std::span<Index> slots, std::size_t parts)
         : positions_(positions), slots_(slots), keys_(slots.size()), scratch_(slots.size()), parts_(parts) {}
 
-    void run() { split(0, parts_); }
+    // Puts the slots of parts `first` .. `end` - 1 in order; all slots of these, and perhaps not yet the others, are where they belong.
+    void run(std::size_t first, std::size_t end) {
+        wanted_first_ = first;
+        wanted_end_ = end;
+        split(0, parts_);
+    }
 
 private:
     struct Box {
@@ -88,6 +94,7 @@ private:
 
     // Halves along the longest side of the bounding box, until there is one part; ties by vertex number.
     void split(std::size_t first_part, std::size_t parts) {
+        if (first_part >= wanted_end_ || first_part + parts <= wanted_first_) return;
         const Index begin = part_begin(first_part, parts_, slots_.size());
         const Index end = part_begin(first_part + parts, parts_, slots_.size());
         const Box bounds = box(begin, end);
@@ -117,17 +124,75 @@ private:
     std::span<const glm::dvec3> positions_;
     std::span<Index> slots_;
     std::vector<CodedIndex> keys_, scratch_;
-    std::size_t parts_;
+    std::size_t parts_, wanted_first_ = 0, wanted_end_ = 0;
 };
 
-SpatialNumbering number_by_space(std::span<const glm::dvec3> positions, std::span<const Index> coincident) {
+// Which member of a team works on which parts: each on a run of them.
+struct Members {
+    Team* team = nullptr; // none: the only member
+    std::size_t parts = 1;
+
+    std::size_t count() const { return team ? std::min<std::size_t>(static_cast<std::size_t>(team->size()), parts) : 1; }
+    std::size_t rank() const { return team ? static_cast<std::size_t>(team->rank()) : 0; }
+    bool has_part() const { return rank() < count(); } // there may be more members than parts
+    std::size_t first_part(std::size_t member) const { return member * parts / count(); }
+    // Of node `i` of the level of so many of the kd-tree: the member that has its first part.
+    std::size_t owner(std::size_t i, std::size_t level) const { return ((i * (parts / level) + 1) * count() - 1) / parts; }
+};
+
+Error strange_message() {
+    return {ErrorCode::malformed_data,
+            "A process of the team sent something else than its part: all must run the same program on the same mesh."};
+}
+
+// Each member has put its own slots in order: all get those of all, by way of member 0.
+Result<void> share_slots(std::vector<Index>& slots, const Members& members) {
+    const auto own_slots = [&](std::size_t member) {
+        const Index begin = part_begin(members.first_part(member), members.parts, slots.size());
+        return std::span(slots).subspan(begin, part_begin(members.first_part(member + 1), members.parts, slots.size()) - begin);
+    };
+    const auto receive = [&](std::size_t member, std::span<Index> to) {
+        const std::vector<std::byte> bytes = members.team->receive(static_cast<int>(member));
+        if (bytes.size() != to.size_bytes()) return false;
+        std::memcpy(to.data(), bytes.data(), bytes.size());
+        return true;
+    };
+    if (members.rank() != 0) {
+        members.team->send(0, std::as_bytes(own_slots(members.rank())));
+        if (!receive(0, slots)) return strange_message();
+        return {};
+    }
+    for (std::size_t member = 1; member < members.count(); ++member)
+        if (!receive(member, own_slots(member))) return strange_message();
+    for (std::size_t member = 1; member < members.count(); ++member)
+        members.team->send(static_cast<int>(member), std::as_bytes(std::span(slots)));
+    return {};
+}
+
+// How many parts: a power of two.
+std::size_t part_count(std::size_t slots) {
+    std::size_t parts = 1;
+    while (parts * largest_part < slots) parts *= 2;
+    return parts;
+}
+
+std::size_t slot_count(std::span<const Index> coincident) {
+    std::size_t slots = 0;
+    for (std::size_t v = 0; v < coincident.size(); ++v) slots += coincident[v] == v;
+    return slots;
+}
+
+Result<SpatialNumbering> number_by_space(std::span<const glm::dvec3> positions, std::span<const Index> coincident,
+                                         const Members& members) {
     SpatialNumbering n;
+    n.parts = members.parts;
     const Index vertices = static_cast<Index>(positions.size());
     for (Index v = 0; v < vertices; ++v)
         if (coincident[v] == v) n.vertex_of_slot.push_back(v);
     const std::size_t slots = n.vertex_of_slot.size();
-    while (n.parts * largest_part < slots) n.parts *= 2;
-    KdPartition(positions, n.vertex_of_slot, n.parts).run();
+    KdPartition(positions, n.vertex_of_slot, n.parts).run(members.first_part(members.rank()), members.first_part(members.rank() + 1));
+    if (members.count() > 1)
+        if (const auto shared = share_slots(n.vertex_of_slot, members); !shared) return shared.error();
 
     n.first_member.assign(slots + 1, 0);
     n.place.resize(vertices);
@@ -362,10 +427,8 @@ using Level = std::vector<MergeRecord>;
 // and so nobody waits in a circle.
 class PartContractor {
 public:
-    PartContractor(const PartMaker& maker, std::size_t parts, ProgressCounter& counter, Team* team)
-        : maker_(maker), parts_(parts), counter_(counter), team_(team),
-          members_(team ? std::min<std::size_t>(static_cast<std::size_t>(team->size()), parts) : 1),
-          rank_(team ? static_cast<std::size_t>(team->rank()) : 0) {}
+    PartContractor(const PartMaker& maker, const Members& members, ProgressCounter& counter)
+        : maker_(maker), members_(members), parts_(members.parts), rank_(members.rank()), counter_(counter) {}
 
     // Member 0 returns all merges; the others' levels hold only their own, which have been sent.
     Result<std::vector<Level>> run() {
@@ -381,10 +444,7 @@ public:
     }
 
 private:
-    // Member of node `i` of the level of so many; member m begins with part m * parts_ / members_.
-    std::size_t owner(std::size_t i, std::size_t count) const {
-        return ((i * (parts_ / count) + 1) * members_ - 1) / parts_;
-    }
+    std::size_t owner(std::size_t i, std::size_t count) const { return members_.owner(i, count); }
     bool is_ours(std::size_t i, std::size_t count) const { return owner(i, count) == rank_; }
 
     std::vector<Contraction> work_on_level(std::vector<Contraction> current, std::size_t count) {
@@ -413,17 +473,17 @@ private:
 
     // Before a level is worked on: the right halves go to the members that have the left ones.
     Result<void> gather_neighbours(std::vector<Contraction>& halves, std::size_t count) {
-        if (members_ == 1 || count == parts_) return {};
+        if (members_.count() == 1 || count == parts_) return {};
         for (std::size_t i = 0; i < count; ++i) {
             if (is_ours(i, count) || !is_ours(2 * i + 1, 2 * count)) continue;
             MessageWriter message;
             exchange_joinable(std::as_const(halves[2 * i + 1]), message);
-            team_->send(static_cast<int>(owner(i, count)), message.bytes());
+            members_.team->send(static_cast<int>(owner(i, count)), message.bytes());
             halves[2 * i + 1] = {};
         }
         for (std::size_t i = 0; i < count; ++i) {
             if (!is_ours(i, count) || is_ours(2 * i + 1, 2 * count)) continue;
-            const std::vector<std::byte> bytes = team_->receive(static_cast<int>(owner(2 * i + 1, 2 * count)));
+            const std::vector<std::byte> bytes = members_.team->receive(static_cast<int>(owner(2 * i + 1, 2 * count)));
             MessageReader message(bytes);
             exchange_joinable(halves[2 * i + 1], message);
             if (!message.complete() || halves[2 * i + 1].first_slot != halves[2 * i].end_slot) return strange_message();
@@ -432,17 +492,17 @@ private:
     }
 
     Result<void> gather_records() {
-        if (members_ == 1) return {};
+        if (members_.count() == 1) return {};
         for (Level& level : levels_) {
             for (std::size_t i = 0; i < level.size(); ++i) {
                 const std::size_t from = owner(i, level.size());
                 if (rank_ != 0 && from == rank_) {
                     MessageWriter message;
                     exchange_record(std::as_const(level[i]), message);
-                    team_->send(0, message.bytes());
+                    members_.team->send(0, message.bytes());
                     level[i] = {};
                 } else if (rank_ == 0 && from != 0) {
-                    const std::vector<std::byte> bytes = team_->receive(static_cast<int>(from));
+                    const std::vector<std::byte> bytes = members_.team->receive(static_cast<int>(from));
                     MessageReader message(bytes);
                     exchange_record(level[i], message);
                     if (!message.complete()) return strange_message();
@@ -459,16 +519,10 @@ private:
         if (last != no_merge) levels_.back()[0].vanishings.push_back({last, whole_extent});
     }
 
-    static Error strange_message() {
-        return {ErrorCode::malformed_data,
-                "A process of the team sent something else than its part: all must run the same program on the same mesh."};
-    }
-
     const PartMaker& maker_;
-    std::size_t parts_;
+    const Members members_;
+    std::size_t parts_, rank_;
     ProgressCounter& counter_;
-    Team* team_;
-    std::size_t members_, rank_;
     std::vector<Level> levels_;
 };
 
@@ -479,50 +533,76 @@ public:
         : input_(input), numbering_(numbering), maker_(maker) {}
 
     Clustering write(std::vector<Level>& levels) {
-        result_.parents.resize(input_.mesh.positions.size());
-        const std::size_t most = input_.mesh.positions.size() + numbering_.vertex_of_slot.size();
-        result_.parents.reserve(most);
-        result_.positions.reserve(most - input_.mesh.positions.size());
-        result_.deviations.reserve(most - input_.mesh.positions.size());
         join_coincident();
+        const std::size_t clusters = result_.parents.size() + merges_of(levels);
+        result_.parents.resize(clusters);
+        result_.positions.resize(clusters - vertices());
+        result_.deviations.resize(clusters - vertices());
         for (Level& level : levels) {
-            std::size_t rounds = 0;
-            for (const MergeRecord& record : level) rounds = std::max(rounds, record.round_ends.size());
-            for (std::size_t round = 0; round < rounds; ++round)
-                for (const MergeRecord& record : level)
-                    if (round < record.round_ends.size()) write_round(record, round);
-            for (const MergeRecord& record : level)
-                for (const auto& vanishing : record.vanishings)
-                    raise(made_by_joining_[vanishing.joined], maker_.length_from_unit_box(vanishing.deviation));
-            level.clear();
+            number_rounds(level);
+            tbb::parallel_for(std::size_t{0}, level.size(), [&](std::size_t i) {
+                write_record(level[i], i);
+                level[i] = {};
+            });
         }
+        result_.parents.back() = static_cast<Index>(clusters - 1);
         for (Index c = 0; c < result_.deviations.size(); ++c) raise(result_.parents[vertices() + c], result_.deviations[c]);
         return std::move(result_);
     }
 
 private:
-    // Coincident vertices are joined first, whatever their attributes: above them, everything moves together, without cracks.
-    void join_coincident() {
-        const auto& first_member = numbering_.first_member;
-        cluster_.resize(numbering_.vertex_of_slot.size());
-        made_by_joining_.resize(cluster_.size());
-        for (Index s = 0; s < cluster_.size(); ++s) {
-            cluster_[s] = numbering_.vertex_of_slot[s];
-            if (first_member[s + 1] - first_member[s] == 1) continue;
-            const Index parent = push_cluster(input_.mesh.positions[cluster_[s]], 0);
-            for (Index i = first_member[s]; i < first_member[s + 1]; ++i) result_.parents[numbering_.members[i]] = parent;
-            cluster_[s] = parent;
+    static std::size_t merges_of(const std::vector<Level>& levels) {
+        std::size_t merges = 0;
+        for (const Level& level : levels)
+            for (const MergeRecord& record : level) merges += record.merges.size();
+        return merges;
+    }
+
+    // Round by round, and in a round record by record.
+    void number_rounds(const Level& level) {
+        first_of_round_.assign(level.size(), {});
+        std::size_t rounds = 0;
+        for (const MergeRecord& record : level) rounds = std::max(rounds, record.round_ends.size());
+        for (std::size_t round = 0; round < rounds; ++round) {
+            for (std::size_t i = 0; i < level.size(); ++i) {
+                if (round >= level[i].round_ends.size()) continue;
+                first_of_round_[i].push_back(end_);
+                end_ += level[i].round_ends[round] - (round == 0 ? 0 : level[i].round_ends[round - 1]);
+            }
         }
     }
 
-    void write_round(const MergeRecord& record, std::size_t round) {
-        for (Index i = round == 0 ? 0 : record.round_ends[round - 1]; i < record.round_ends[round]; ++i) {
-            const Merge& merge = record.merges[i];
-            const Index parent = push_cluster(maker_.from_unit_box(record.places[i]),
-                                              maker_.length_from_unit_box(record.deviations[i]));
-            result_.parents[cluster_[merge.kept]] = result_.parents[cluster_[merge.joined]] = parent;
-            cluster_[merge.kept] = made_by_joining_[merge.joined] = parent;
+    // Records of one level have no vertex in common.
+    void write_record(const MergeRecord& record, std::size_t number) {
+        for (std::size_t round = 0; round < record.round_ends.size(); ++round) {
+            Index parent = first_of_round_[number][round];
+            for (Index i = round == 0 ? 0 : record.round_ends[round - 1]; i < record.round_ends[round]; ++i, ++parent) {
+                const Merge& merge = record.merges[i];
+                result_.positions[parent - vertices()] = maker_.from_unit_box(record.places[i]);
+                result_.deviations[parent - vertices()] = maker_.length_from_unit_box(record.deviations[i]);
+                result_.parents[cluster_[merge.kept]] = result_.parents[cluster_[merge.joined]] = parent;
+                cluster_[merge.kept] = made_by_joining_[merge.joined] = parent;
+            }
         }
+        for (const auto& vanishing : record.vanishings)
+            raise(made_by_joining_[vanishing.joined], maker_.length_from_unit_box(vanishing.deviation));
+    }
+
+    // Coincident vertices are joined first, whatever their attributes: above them, everything moves together, without cracks.
+    void join_coincident() {
+        const auto& first_member = numbering_.first_member;
+        result_.parents.resize(vertices());
+        cluster_ = numbering_.vertex_of_slot;
+        made_by_joining_.resize(cluster_.size());
+        for (Index s = 0; s < cluster_.size(); ++s) {
+            if (first_member[s + 1] - first_member[s] == 1) continue;
+            const Index parent = static_cast<Index>(result_.parents.size());
+            result_.positions.push_back(input_.mesh.positions[cluster_[s]]);
+            result_.parents.push_back(parent);
+            for (Index i = first_member[s]; i < first_member[s + 1]; ++i) result_.parents[numbering_.members[i]] = parent;
+            cluster_[s] = parent;
+        }
+        end_ = static_cast<Index>(result_.parents.size());
     }
 
     void raise(Index cluster, float deviation) {
@@ -531,41 +611,40 @@ private:
     }
     Index vertices() const { return static_cast<Index>(input_.mesh.positions.size()); }
 
-    Index push_cluster(glm::dvec3 position, float deviation) {
-        const Index number = static_cast<Index>(result_.parents.size());
-        result_.parents.push_back(number);
-        result_.positions.push_back(position);
-        result_.deviations.push_back(deviation);
-        return number;
-    }
-
     const ClusterInput& input_;
     const SpatialNumbering& numbering_;
     const PartMaker& maker_;
     Clustering result_;
     std::vector<Index> cluster_;         // by slot: the cluster that is known under its name
     std::vector<Index> made_by_joining_; // by slot: the cluster that was made when the one of this name was joined to another
+    Index end_ = 0;                      // of the clusters that have a number
+    std::vector<std::vector<Index>> first_of_round_; // by record of a level, by round: the first cluster made
 };
 
 } // namespace
 
 Result<Clustering> cluster_quadric(const ClusterInput& input, const Progress& progress, Team* team) {
-    const SpatialNumbering numbering = number_by_space(input.mesh.positions, input.coincident);
-    const PartMaker maker(input, numbering);
-    const std::size_t members = team ? static_cast<std::size_t>(team->size()) : 1; // each counts its own merges
-    ProgressCounter counter(progress, (numbering.vertex_of_slot.size() - 1) / members);
+    const std::size_t slots = slot_count(input.coincident);
+    const Members members{team, part_count(slots)};
+    ProgressCounter counter(progress, (slots - 1) / members.count()); // each counts its own merges
     if (!counter.add(0)) return Error{ErrorCode::cancelled, "Clustering was cancelled."};
-    auto levels = PartContractor(maker, numbering.parts, counter, team).run();
+    const auto numbering = number_by_space(input.mesh.positions, input.coincident, members);
+    if (!numbering) return numbering.error();
+    const PartMaker maker(input, *numbering);
+    auto levels = PartContractor(maker, members, counter).run();
     if (!levels) return levels.error();
-    return ClusteringWriter(input, numbering, maker).write(*levels);
+    return ClusteringWriter(input, *numbering, maker).write(*levels);
 }
 
 Result<void> help_cluster_quadric(const ClusterInput& input, Team& team) {
-    const SpatialNumbering numbering = number_by_space(input.mesh.positions, input.coincident);
-    if (static_cast<std::size_t>(team.rank()) >= numbering.parts) return {}; // more members than parts
-    const PartMaker maker(input, numbering);
-    ProgressCounter counter({}, numbering.vertex_of_slot.size() - 1);
-    const auto levels = PartContractor(maker, numbering.parts, counter, &team).run();
+    const std::size_t slots = slot_count(input.coincident);
+    const Members members{&team, part_count(slots)};
+    if (!members.has_part()) return {};
+    const auto numbering = number_by_space(input.mesh.positions, input.coincident, members);
+    if (!numbering) return numbering.error();
+    const PartMaker maker(input, *numbering);
+    ProgressCounter counter({}, slots - 1);
+    const auto levels = PartContractor(maker, members, counter).run();
     if (!levels) return levels.error();
     return {};
 }

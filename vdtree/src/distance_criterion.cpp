@@ -4,7 +4,9 @@
 #include <atomic>
 #include <cassert>
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <span>
 #include <string>
 
 #include <glm/geometric.hpp>
@@ -84,33 +86,44 @@ Result<void> check(const VertexTree& tree, const DistanceCriterion::Parts& p) {
     return {};
 }
 
-// Whether one row of a table is nowhere above another. Few pairs of rows come again and again.
-class RowOrder {
+// By how much longer a node of one row must be than one of another to be seen from as far everywhere: few pairs of rows come again and
+// again.
+class RowRatios {
 public:
-    explicit RowOrder(const DistanceCriterion::Parts& parts) : parts_(parts), known_(1u << known_bits) {}
+    explicit RowRatios(const DistanceCriterion::Parts& parts) : parts_(parts), known_(1u << known_bits) {}
 
-    bool is_within(std::uint16_t row, std::uint16_t of) {
-        if (row == of) return true;
+    // Infinite where no length makes up for the row.
+    float largest(std::uint16_t row, std::uint16_t of) {
+        if (row == of) return 1;
         const std::uint32_t pair = row * 0x10000u + of;
         Known& known = known_[(pair * 0x9e3779b1u) >> (32 - known_bits)];
         if (known.pair != pair) known = {pair, compare(row, of)};
-        return known.is_within;
+        return known.ratio;
     }
 
 private:
-    bool compare(std::uint16_t row, std::uint16_t of) const {
+    // A few roundings of the products of lengths and reaches.
+    static constexpr float rounding = 1e-6f;
+    static constexpr float infinity = std::numeric_limits<float>::infinity();
+
+    float compare(std::uint16_t row, std::uint16_t of) const {
         const std::size_t bins = parts_.eccentricity_bins, a = row * bins, b = of * bins;
+        float ratio = 0;
         for (std::size_t bin = 0; bin < bins; ++bin) {
-            if (parts_.reach[a + bin] > parts_.reach[b + bin]) return false;
-            if (!parts_.least_cost.empty() && parts_.least_cost[a + bin] > parts_.least_cost[b + bin]) return false;
+            const float needed = parts_.reach[a + bin], given = parts_.reach[b + bin];
+            if (!parts_.least_cost.empty() && parts_.least_cost[a + bin] > parts_.least_cost[b + bin]) return infinity;
+            if (needed <= DistanceCriterion::never_visible) continue;
+            if (!(given >= 0) || (!(given > 0) && needed > 0)) return infinity;
+            const bool is_everywhere = given >= DistanceCriterion::always_visible;
+            if (needed > 0 && !is_everywhere) ratio = std::max(ratio, needed / given);
         }
-        return true;
+        return ratio == 1 ? 1 : ratio * (1 + rounding);
     }
 
-    static constexpr unsigned known_bits = 12;
+    static constexpr unsigned known_bits = 14;
     struct Known {
         std::uint32_t pair = 0; // of row 0 and itself, which is not asked about
-        bool is_within = true;
+        float ratio = 1;
     };
     const DistanceCriterion::Parts& parts_;
     std::vector<Known> known_;
@@ -119,16 +132,19 @@ private:
 // Spheres nest in every tree.
 bool is_monotone_in(const VertexTree& tree, const DistanceCriterion::Parts& p) {
     const auto parents = tree.parents();
-    RowOrder order(p);
+    RowRatios ratios(p);
+    const auto is_within = [](std::span<const float> lengths, NodeId node, NodeId parent, float ratio) {
+        if (lengths.empty()) return ratio <= 1; // spheres' radii
+        return lengths[node] * ratio <= lengths[parent]; // false where the ratio is infinite and the length 0
+    };
     for (NodeId node = 1; node < tree.interior_count(); ++node) {
         const NodeId parent = parents[node];
         if (!(parent < node)) return false; // in a damaged file
-        if (!p.lengths.empty() && p.lengths[node] > p.lengths[parent]) return false;
-        if (!p.silhouette_lengths.empty() && p.silhouette_lengths[node] > p.silhouette_lengths[parent]) return false;
         if (!p.facing.empty() && !p.facing[parent].includes(p.facing[node])) return false;
-        if (p.classes.empty()) continue;
-        const FoldClass a = p.classes[node], b = p.classes[parent];
-        if (!order.is_within(a.interior, b.interior) || !order.is_within(a.silhouette, b.silhouette)) return false;
+        const FoldClass a = p.classes.empty() ? FoldClass{} : p.classes[node], b = p.classes.empty() ? FoldClass{} : p.classes[parent];
+        const auto& outlines = p.silhouette_lengths.empty() ? p.lengths : p.silhouette_lengths;
+        if (!is_within(p.lengths, node, parent, ratios.largest(a.interior, b.interior))) return false;
+        if (!is_within(outlines, node, parent, ratios.largest(a.silhouette, b.silhouette))) return false;
     }
     return true;
 }

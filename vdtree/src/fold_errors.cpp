@@ -8,16 +8,18 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "drift.h"
+
 namespace unseen::vdtree {
 
 namespace {
 
 constexpr Index none = 0xffffffffu;
 constexpr std::size_t witness_count = 4; // of a node, for its parent: the worst in distance, the worst in luminance
-constexpr Index spread_count = 4;        // leaves compared besides, at equal steps through the support
-constexpr Index cells_in_area = 32; // so many folds that shift the mean together count as systematic
+constexpr Index spread_count = 8;        // leaves compared besides, at equal steps through the support
 constexpr int much_more = 2;           // luminance range than the node's: such neighbours fold later
 constexpr std::size_t triangles_compared = 16; // of each surface, at equal steps
+constexpr std::size_t most_fine_triangles = 64; // in rings of more, some neighbours are folded
 constexpr Index leaves_of_part = 4096;   // of a subtree that one task measures
 
 struct Point {
@@ -151,7 +153,7 @@ public:
         : tree_(tree), errors_(errors), positions_(tree.positions()), luminance_(tree.luminance()), support_luminance_(tree.support_luminance()),
           first_leaf_(tree.first_leaf()), leaf_end_(tree.leaf_end()), parents_(tree.parents()),
           first_triangle_(tree.first_triangle()), triangles_(tree.triangles()), support_(tree.support_spheres()),
-          interior_(tree.interior_count()), crossing_(interior_), witnesses_(interior_), shifts_(interior_) {
+          interior_(tree.interior_count()), crossing_(interior_), witnesses_(interior_) {
         find_triangles_of_leaves();
     }
 
@@ -168,37 +170,47 @@ public:
         });
         Scratch scratch;
         for (std::size_t i = above.size(); i-- > 0;) measure(above[i], scratch);
-        find_means();
     }
 
 private:
-    struct Shift {
-        double total = 0, area = 0; // of luminance times area, and area
-    };
     struct Worst : Difference {
         void include(const Difference& other) {
             distance = std::max(distance, other.distance);
             luminance = std::max(luminance, other.luminance);
         }
     };
+    struct Mean {
+        Difference sum;
+        int count = 0;
+        void include(const Difference& other) {
+            sum.distance += other.distance;
+            sum.luminance += other.luminance;
+            ++count;
+        }
+        Difference value() const {
+            const float share = 1 / static_cast<float>(std::max(count, 1));
+            return {sum.distance * share, sum.luminance * share};
+        }
+    };
     struct Sample {
         Point point;
         Index leaf; // none for points that are no leaves
+        bool is_typical; // not chosen for its error
         Difference error;
     };
     struct Child {
         Index first_leaf;
         NodeId node;
     };
-    // Triangles that touch the support: the mesh's; the same before and after the fold, with folded neighbours; after it, with unfolded.
+    // Triangles that touch the support, before and after the fold: with folded neighbours, and with none folded.
     struct Scratch {
-        std::vector<Ring> whole, before, after, fine;
+        std::vector<Ring> before, after, fine_before, fine_after;
         Surface before_surface, after_surface;
         std::vector<Sample> samples;
         std::vector<Child> children;
 
         void clear() {
-            for (auto* surface : {&whole, &before, &after, &fine}) surface->clear();
+            for (auto* surface : {&before, &after, &fine_before, &fine_after}) surface->clear();
             samples.clear();
             children.clear();
         }
@@ -286,29 +298,49 @@ private:
                 before.corner[k] = point(shown_before[k]);
                 after.corner[k] = point(shown[k]);
             }
-            add(scratch.whole, whole);
+            turned.insert(whole);
             if (are_distinct(shown_before)) add(scratch.before, before);
+            Ring fine_before = whole;
+            std::array<NodeId, 3> shown_fine = shown_before;
+            for (std::size_t k = 0; k < 3; ++k) {
+                if ((whole.inside >> k) & 1) fine_before.corner[k] = before.corner[k];
+                else shown_fine[k] = interior_ + triangles_[t][k];
+            }
+            if (are_distinct(shown_fine)) scratch.fine_before.push_back(fine_before);
             if (t >= first_triangle_[node] && t < first_triangle_[node + 1]) continue; // vanishes here
             Ring fine = whole;
             for (std::size_t k = 0; k < 3; ++k)
                 if ((whole.inside >> k) & 1) fine.corner[k] = proxy;
-            add(scratch.fine, fine);
+            add(scratch.fine_after, fine);
             if (are_distinct(shown)) add(scratch.after, after);
         }
 
-        Worst worst;
-        shifts_[node] = mean_shift(scratch.whole, scratch.fine);
         if (scratch.after.empty()) scratch.after.push_back({{proxy, proxy, proxy}, 7}); // all of it vanishes
         scratch.before_surface.assign(scratch.before);
         scratch.after_surface.assign(scratch.after);
         add_samples(node, scratch);
+        Worst worst;
+        Mean over_leaves, over_before, over_after;
         for (Sample& sample : scratch.samples) {
             sample.error = scratch.after_surface.compare(sample.point);
             worst.include(sample.error);
+            if (sample.is_typical) over_leaves.include(sample.error);
         }
         choose_witnesses(node, scratch.samples);
-        compare(scratch.before, scratch.after_surface, worst);
-        compare(scratch.after, scratch.before_surface, worst);
+        compare(scratch.before, scratch.after_surface, worst, over_before);
+        compare(scratch.after, scratch.before_surface, worst, over_after);
+        Worst mean = {over_leaves.value()};
+        mean.include(over_before.value());
+        mean.include(over_after.value());
+        if (scratch.fine_before.size() <= most_fine_triangles) {
+            Mean over_fine_before, over_fine_after;
+            scratch.before_surface.assign(scratch.fine_before);
+            scratch.after_surface.assign(scratch.fine_after);
+            compare(scratch.fine_before, scratch.after_surface, worst, over_fine_before);
+            compare(scratch.fine_after, scratch.before_surface, worst, over_fine_after);
+            mean.include(over_fine_before.value());
+            mean.include(over_fine_after.value());
+        }
         NormalSlabs facing = turned.slabs();
         float extent = 0;
         tree_.for_each_child(node, [&](NodeId child) {
@@ -319,6 +351,8 @@ private:
         });
         errors_.distance[node] = worst.distance;
         errors_.luminance[node] = worst.luminance;
+        errors_.mean_distance[node] = mean.distance;
+        errors_.mean_luminance[node] = mean.luminance;
         errors_.facing[node] = facing;
         errors_.extent[node] = std::max(mean_reach(scratch.after, proxy) / 2, extent);
     }
@@ -337,52 +371,19 @@ private:
         return count > 0 ? sum / static_cast<float>(count) : 0;
     }
 
-    static Shift mean_shift(std::span<const Ring> before, std::span<const Ring> after) {
-        double area[2] = {}, luminance[2] = {};
-        for (const Ring& t : before) add_area(t, area[0], luminance[0]);
-        for (const Ring& t : after) add_area(t, area[1], luminance[1]);
-        if (!(area[0] > 0 && area[1] > 0)) return {};
-        return {(luminance[1] / area[1] - luminance[0] / area[0]) * area[1], area[1]};
-    }
-
-    // Shifts of cells that have the same sign show over an area of many; those of random signs cancel.
-    void find_means() {
-        std::vector<Shift> sums(interior_);
-        const auto leaves = [&](NodeId node) { return leaf_end_[node] - first_leaf_[node]; };
-        // Calls f for each node whose cells, its largest descendants with at most a share of its leaves, include this one.
-        const auto for_each_area = [&](NodeId cell, auto&& f) {
-            const std::uint64_t most = std::uint64_t{cells_in_area} * (cell == 0 ? 0 : leaves(parents_[cell]));
-            for (NodeId up = cell; up != no_node && leaves(up) < most; up = parents_[up])
-                if (leaves(up) >= std::uint64_t{cells_in_area} * leaves(cell)) f(up);
-        };
-        for (NodeId cell = 0; cell < interior_; ++cell) {
-            for_each_area(cell, [&](NodeId area) {
-                sums[area].total += shifts_[cell].total;
-                sums[area].area += shifts_[cell].area;
-            });
-        }
-        const auto mean = [](const Shift& shift) { return shift.area > 0 ? static_cast<float>(std::abs(shift.total) / shift.area) : 0.0f; };
-        for (NodeId node = interior_; node-- > 0;) {
-            float& own = errors_.mean[node];
-            const bool has_areas = std::uint64_t{cells_in_area} * leaves(node) <= tree_.leaf_count();
-            errors_.shift[node] = std::max(errors_.shift[node], mean(shifts_[node]));
-            if (!has_areas) own = std::max(own, mean(shifts_[node]));
-            for_each_area(node, [&](NodeId area) { own = std::max(own, mean(sums[area])); });
-            if (node == 0) break;
-            errors_.mean[parents_[node]] = std::max(errors_.mean[parents_[node]], own);
-            errors_.shift[parents_[node]] = std::max(errors_.shift[parents_[node]], errors_.shift[node]);
-        }
-    }
-
     // Where two such surfaces differ most, they do so at a vertex or where two edges cross: looked at are the middles of the edges
     // that move. The vertices are among the samples.
-    static void compare(std::span<const Ring> surface, Surface& with, Worst& worst) {
+    static void compare(std::span<const Ring> surface, Surface& with, Worst& worst, Mean& mean) {
         if (with.empty()) return;
         const std::size_t count = std::min(surface.size(), triangles_compared);
         for (std::size_t i = 0; i < count; ++i) {
             const Ring& t = surface[i * surface.size() / count];
             for (std::size_t k = 0; k < 3; ++k)
-                if ((t.inside >> k) & 1) worst.include(with.compare(middle_of(t.corner[k], t.corner[(k + 1) % 3])));
+                if ((t.inside >> k) & 1) {
+                    const Difference here = with.compare(middle_of(t.corner[k], t.corner[(k + 1) % 3]));
+                    worst.include(here);
+                    mean.include(here);
+                }
         }
     }
 
@@ -394,27 +395,21 @@ private:
         return {(a.position + b.position) * 0.5f, (a.luminance + b.luminance) * 0.5f};
     }
 
-    static void add_area(const Ring& t, double& area, double& luminance) {
-        const glm::vec3 a = t.corner[0].position;
-        const double own = 0.5 * static_cast<double>(glm::length(glm::cross(t.corner[1].position - a, t.corner[2].position - a)));
-        area += own;
-        luminance += own * static_cast<double>(t.corner[0].luminance + t.corner[1].luminance + t.corner[2].luminance) / 3;
-    }
-
     void add_samples(NodeId node, Scratch& scratch) const {
-        const auto add_leaf = [&](Index leaf) { scratch.samples.push_back({leaf_point(leaf), leaf, {}}); };
+        const auto add_leaf = [&](Index leaf, bool is_typical) { scratch.samples.push_back({leaf_point(leaf), leaf, is_typical, {}}); };
         tree_.for_each_child(node, [&](NodeId child) {
             if (tree_.is_leaf(child)) {
-                add_leaf(child - interior_);
+                add_leaf(child - interior_, false);
                 return;
             }
-            scratch.samples.push_back({point(child), none, {}});
+            scratch.samples.push_back({point(child), none, false, {}});
             for (const Index leaf : witnesses_[child])
-                if (leaf != none) add_leaf(leaf);
+                if (leaf != none) add_leaf(leaf, false);
         });
         const Index leaves = leaf_end_[node] - first_leaf_[node];
-        for (Index i = 0; i < std::min(spread_count, leaves); ++i)
-            add_leaf(first_leaf_[node] + static_cast<Index>((std::uint64_t{leaves} * (2 * i + 1)) / (2 * spread_count)));
+        const Index count = std::min(spread_count, leaves);
+        for (Index i = 0; i < count; ++i)
+            add_leaf(first_leaf_[node] + static_cast<Index>((std::uint64_t{leaves} * (2 * i + 1)) / (2 * count)), true);
     }
 
     void choose_witnesses(NodeId node, std::span<Sample> samples) {
@@ -447,17 +442,20 @@ private:
     std::vector<Index> first_of_leaf_, of_leaf_;
     std::vector<std::vector<Index>> crossing_; // of nodes whose parent has not been measured yet
     std::vector<Witnesses> witnesses_;
-    std::vector<Shift> shifts_; // of the mean luminance, with unfolded neighbours
 };
 
 } // namespace
 
 FoldErrors measure_fold_errors(const VertexTree& tree, int threads) {
     FoldErrors errors;
-    for (auto* values : {&errors.distance, &errors.luminance, &errors.shift, &errors.mean, &errors.extent}) values->resize(tree.interior_count());
+    for (auto* values : {&errors.distance, &errors.mean_distance, &errors.luminance, &errors.mean_luminance, &errors.extent})
+        values->resize(tree.interior_count());
     errors.facing.resize(tree.interior_count());
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
-    arena.execute([&] { Measurer(tree, errors).run(); });
+    arena.execute([&] {
+        Measurer(tree, errors).run();
+        find_drift(tree, errors);
+    });
     return errors;
 }
 

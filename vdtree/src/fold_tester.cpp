@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include <glm/geometric.hpp>
 
@@ -35,7 +36,8 @@ void load(std::span<const FoldCandidate* const> lanes, FoldBatch& batch) {
 } // namespace
 
 FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterion, bool cull_back_faces, float threshold, bool least_costs)
-    : tree_(tree), criterion_(criterion), cull_back_faces_(cull_back_faces), has_silhouettes_(criterion.uses_silhouettes()),
+    : tree_(tree), criterion_(criterion), cull_back_faces_(cull_back_faces),
+      is_inside_out_(tree.closedness() == Closedness::closed_inward), has_silhouettes_(criterion.uses_silhouettes()),
       bounds_(tree.bounds().data()) {
     const DistanceCriterion::Parts& parts = criterion.parts();
     support_ = parts.spheres == DistanceCriterion::Spheres::support ? tree.support_spheres().data() : nullptr;
@@ -190,6 +192,7 @@ void FoldTester::find_facings(Lanes candidates, const FoldBatch& batch, bool cos
         float front = gaps.front[k], back = gaps.back[k];
         if (around.flags & irregular_ring) front = back = -infinity;       // an outline from everywhere
         else if (around.slabs.empty()) front = infinity, back = -infinity; // no triangle with an area
+        if (is_inside_out_) std::swap(front, back);
         const bool is_silhouette = !(front > 0) && !(back > 0), is_near = batch.is_near & bit;
         if (cull_back_faces_ && back > 0) {
             findings.away |= bit;
@@ -214,6 +217,11 @@ void FoldTester::light(Lanes lanes, FoldBatch& batch, LitFindings& lit) const {
         lit_->set(i, of.node, of.ring, lit);
     }
     lit_->find_rows(lit);
+    for (std::size_t i = 0; i < lanes.size(); ++i) {
+        if (!(lanes[i]->flags & translucent_ring)) continue;
+        lit.translucent |= 1u << i;
+        lit.row[i] = lit_->silhouette_row();
+    }
     std::copy_n(lit.row, kernel_lanes, batch.interior_row);
     std::fill_n(batch.silhouette_row, kernel_lanes, lit_->silhouette_row());
 }
@@ -225,7 +233,7 @@ void FoldTester::leave_room_for_lights(LitFindings& lit, FoldBatch& batch, const
         const std::uint32_t bit = 1u << i;
         const bool is_near = batch.is_near & bit, unfolded = findings.unfolded & bit;
         const bool is_out = !(batch.is_inside & bit) || (findings.away & bit);
-        if (is_out || (unfolded && !is_near)) { // not by its luminance
+        if (is_out || (unfolded && !is_near) || (lit.translucent & bit)) { // not by its luminance
             lit.slack[i] = infinity;
             continue;
         }

@@ -86,7 +86,7 @@ private:
 
     const VertexTree& tree_;
     const DistanceCriterion& criterion_;
-    bool cull_back_faces_, has_silhouettes_;
+    bool cull_back_faces_, is_inside_out_, has_silhouettes_;
     // Of the tree and the criterion, by node; null where they have none.
     const NodeBounds* bounds_;
     const Sphere* support_;

@@ -25,6 +25,7 @@ struct LitFindings {
     LitBatch ranges;
     std::int32_t row[kernel_lanes];
     std::size_t contrast[kernel_lanes], luminance[kernel_lanes]; // indices of classes
+    std::uint32_t translucent = 0;         // a bit a lane: anything may show there, whatever the light
     alignas(64) float slack[kernel_lanes]; // out of leave_room(): of the facing clock
 };
 

@@ -5,6 +5,9 @@
 #include <numeric>
 
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include "prefetch.h"
 
 namespace unseen::vdtree {
 
@@ -19,6 +22,9 @@ struct ClusterPlace {
 };
 
 constexpr Index never = std::numeric_limits<Index>::max();
+
+// Parents lie anywhere: they are asked for so many clusters before they are needed.
+constexpr Index ahead = 16;
 
 } // namespace
 
@@ -45,12 +51,15 @@ NodeOrder order_nodes(const Clustering& clustering, Index vertices, Index lone) 
     // Up: children have lower numbers than their parents.
     std::vector<ClusterPlace> places(clusters - vertices);
     const auto place = [&](Index cluster) -> ClusterPlace& { return places[cluster - vertices]; };
+    const auto expect = [&](Index cluster) { prefetch(&place(parents[cluster])); };
     for (Index v = 0; v < vertices; ++v) {
+        expect(std::min(v + ahead, root));
         ClusterPlace& up = place(parents[v]);
         ++up.children;
         ++up.leaves;
     }
     for (Index c = vertices; c < clusters; ++c) {
+        expect(std::min(c + ahead, root));
         ClusterPlace& here = place(c);
         if (here.children > 1) ++here.nodes;
         if (c == root) break;
@@ -87,6 +96,7 @@ NodeOrder order_nodes(const Clustering& clustering, Index vertices, Index lone) 
 
     // Down: the last child takes the last leaves and nodes of its parent.
     for (Index c = root; c >= vertices; --c) {
+        expect(c - std::min(c, ahead));
         ClusterPlace& here = place(c);
         const NodeId parent = c == root ? top : place(parents[c]).node;
         Index leaf_end = vertices;
@@ -107,6 +117,7 @@ NodeOrder order_nodes(const Clustering& clustering, Index vertices, Index lone) 
         here.nodes = node_end;
     }
     for (Index v = vertices; v-- > 0;) {
+        expect(v - std::min(v, ahead));
         ClusterPlace& up = place(parents[v]);
         put_leaf(v, --up.leaves, up.node);
     }
@@ -134,16 +145,26 @@ TriangleOrder order_triangles(std::span<const Triangle> triangles, const NodeOrd
         });
     });
     order.first_triangle.assign(shape.interior() + 1, 0);
-    for (const NodeId node : vanishing) ++order.first_triangle[node + 1];
+    // Each thread looks at all triangles, for a range of the nodes: looking is cheap.
+    constexpr int most_ranges = 8;
+    const auto ranges = static_cast<std::size_t>(std::min(tbb::this_task_arena::max_concurrency(), most_ranges));
+    const auto for_each_of_range = [&](auto&& f) {
+        tbb::parallel_for(std::size_t{0}, ranges, [&](std::size_t r) {
+            const std::size_t begin = shape.interior() * r / ranges, size = shape.interior() * (r + 1) / ranges - begin;
+            for (std::size_t t = triangles.size(); t-- > 0;)
+                if (vanishing[t] - begin < size) f(t, order.first_triangle[vanishing[t] + 1]);
+        });
+    };
+    for_each_of_range([](std::size_t, Index& count) { ++count; });
     std::partial_sum(order.first_triangle.begin(), order.first_triangle.end(), order.first_triangle.begin());
     order.triangles.resize(triangles.size());
     order.sources.resize(triangles.size());
     // Each node's triangles are counted down from its end, the last triangle first.
-    for (std::size_t t = triangles.size(); t-- > 0;) {
-        const Index at = --order.first_triangle[vanishing[t] + 1];
+    for_each_of_range([&](std::size_t t, Index& end) {
+        const Index at = --end;
         for (std::size_t k = 0; k < 3; ++k) order.triangles[at][k] = nodes.leaf_of_vertex[triangles[t][k]];
         order.sources[at] = static_cast<Index>(t);
-    }
+    });
     // What was the end of a node is its beginning now, one place too high.
     std::move(order.first_triangle.begin() + 1, order.first_triangle.end(), order.first_triangle.begin());
     order.first_triangle.back() = static_cast<Index>(triangles.size());

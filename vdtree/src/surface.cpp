@@ -5,7 +5,6 @@
 #include <bit>
 #include <cmath>
 #include <cstddef>
-#include <cstring>
 #include <functional>
 #include <numeric>
 #include <utility>
@@ -16,6 +15,7 @@
 #include <tbb/parallel_reduce.h>
 #include <tbb/task_arena.h>
 
+#include "message.h"
 #include "unit_vector.h"
 
 namespace unseen::vdtree {
@@ -119,31 +119,61 @@ private:
 
 // ---- around each position
 
-// By vertex that stands for its position: the triangles there, ascending.
+// Which vertices stand for corners: themselves where no two coincide, which needs no look.
+class Places {
+public:
+    explicit Places(std::span<const Index> coincident) : coincident_(coincident) {
+        for (Index v = 0; v < coincident.size() && !any_; ++v) any_ = coincident[v] != v;
+    }
+    Index of(Index vertex) const { return any_ ? coincident_[vertex] : vertex; }
+    Triangle of(const Triangle& t) const { return any_ ? Triangle{coincident_[t[0]], coincident_[t[1]], coincident_[t[2]]} : t; }
+    // Of triangles that use no vertex twice.
+    bool degenerates(const Triangle& t) const {
+        if (!any_) return false;
+        const Triangle w = of(t);
+        return w[0] == w[1] || w[1] == w[2] || w[2] == w[0];
+    }
+
+private:
+    std::span<const Index> coincident_;
+    bool any_ = false;
+};
+
+// Some of the vertices.
+struct VertexRange {
+    std::size_t begin, end;
+    std::size_t size() const { return end - begin; }
+    bool has(std::size_t v) const { return v - begin < size(); }
+};
+
+// By vertex of a range that stands for its position: the triangles there, ascending.
 struct Incidence {
+    VertexRange vertices;
     std::vector<Index> start, triangles;
     std::span<const Index> around(std::size_t v) const {
-        return std::span(triangles).subspan(start[v], start[v + 1] - start[v]);
+        const std::size_t at = v - vertices.begin;
+        return std::span(triangles).subspan(start[at], start[at + 1] - start[at]);
     }
 };
 
-Incidence find_incidence(const MeshView& mesh, std::span<const Index> coincident) {
-    Incidence incidence;
-    incidence.start.assign(mesh.positions.size() + 1, 0);
+Incidence find_incidence(const MeshView& mesh, const Places& places, VertexRange vertices) {
+    Incidence incidence{vertices, {}, {}};
+    incidence.start.assign(vertices.size() + 1, 0);
     // Each thread looks at all triangles, for a range of the places: they are soon seen, and counting is what takes time.
     constexpr int most_ranges = 8;
     const auto ranges = static_cast<std::size_t>(std::min(tbb::this_task_arena::max_concurrency(), most_ranges));
     const auto for_each_use = [&](auto&& use) {
         tbb::parallel_for(std::size_t{0}, ranges, [&](std::size_t r) {
-            const std::size_t begin = mesh.positions.size() * r / ranges, size = mesh.positions.size() * (r + 1) / ranges - begin;
+            const auto end_of = [&](std::size_t range) { return vertices.begin + vertices.size() * range / ranges; };
+            const VertexRange own{end_of(r), end_of(r + 1)};
             for (std::size_t t = mesh.triangles.size(); t-- > 0;)
-                for (const Index v : mesh.triangles[t])
-                    if (coincident[v] - begin < size) use(incidence.start[coincident[v]], t);
+                for (const Index v : places.of(mesh.triangles[t]))
+                    if (own.has(v)) use(incidence.start[v - vertices.begin], t);
         });
     };
     for_each_use([](Index& count, std::size_t) { ++count; });
     std::partial_sum(incidence.start.begin(), incidence.start.end(), incidence.start.begin());
-    incidence.triangles.resize(mesh.triangles.size() * 3);
+    incidence.triangles.resize(incidence.start.back());
     for_each_use([&](Index& end, std::size_t t) { incidence.triangles[--end] = static_cast<Index>(t); });
     return incidence;
 }
@@ -151,53 +181,43 @@ Incidence find_incidence(const MeshView& mesh, std::span<const Index> coincident
 // The ends of the edges around a place: `following` in the triangles there, and `preceding`.
 class Fan {
 public:
-    void clear() { size_ = 0; }
-    void add(Index following, Index preceding) {
-        if (size_ == following_.size()) {
-            following_.resize(2 * size_ + few);
-            preceding_.resize(following_.size());
+    // Of so many triangles at most.
+    void begin(Index place, std::size_t triangles) {
+        if (triangles > preceding_.size()) {
+            following_.resize(2 * triangles);
+            preceding_.resize(2 * triangles);
         }
+        size_ = 0;
+        stamp_ = std::uint64_t{place} << 32;
+    }
+    void add(Index following, Index preceding) {
         following_[size_] = following;
         preceding_[size_++] = preceding;
     }
 
     // Whether every edge has two triangles that run it in opposite ways: each neighbour follows once and precedes once. Sorts what
-    // was added.
+    // was added, if need be.
     bool is_regular() {
-        if (size_ > few) return is_large_regular();
-        constexpr Index no_neighbour = ~Index{0};
-        std::size_t padded = size_;
-        for (; padded % lanes != 0; ++padded) following_[padded] = preceding_[padded] = no_neighbour;
-        Lanes irregular{};
         for (std::size_t i = 0; i < size_; ++i) {
-            const Index one = following_[i];
-            const Lanes same = {one, one, one, one};
-            Lanes followed{}, preceded{}; // less than none, by lane
-            for (std::size_t k = 0; k < padded; k += lanes) {
-                followed += load(following_, k) == same;
-                preceded += load(preceding_, k) == same;
-            }
-            irregular |= (sum_of_lanes(followed) ^ minus_one) | (sum_of_lanes(preceded) ^ minus_one);
+            std::uint64_t& seen = slot(following_[i]);
+            if ((seen & stamp_mask) == stamp_) return is_regular_by_sorting(); // seen twice, or two in one slot
+            seen = stamp_ | following_[i];
         }
-        return irregular[0] == 0;
+        for (std::size_t i = 0; i < size_; ++i) {
+            std::uint64_t& seen = slot(preceding_[i]);
+            if (seen != (stamp_ | preceding_[i])) return false;
+            seen = stamp_ | nobody; // only once
+        }
+        return true;
     }
 
 private:
-    using Lanes = Index __attribute__((vector_size(16)));
-    static constexpr std::size_t lanes = 4, few = 16;
-    static constexpr Lanes minus_one = {~Index{0}, ~Index{0}, ~Index{0}, ~Index{0}};
+    static constexpr unsigned slot_bits = 8; // few neighbours rarely meet in so many
+    static constexpr std::uint64_t nobody = ~Index{0}, stamp_mask = ~nobody;
 
-    static Lanes load(const std::vector<Index>& v, std::size_t i) {
-        Lanes out;
-        std::memcpy(&out, v.data() + i, sizeof(out));
-        return out;
-    }
-    static Lanes sum_of_lanes(Lanes v) {
-        v += __builtin_shuffle(v, Lanes{2, 3, 0, 1});
-        return v + __builtin_shuffle(v, Lanes{1, 0, 3, 2});
-    }
+    std::uint64_t& slot(Index v) { return slots_[v * 0x9e3779b1u >> (32 - slot_bits)]; }
 
-    bool is_large_regular() {
+    bool is_regular_by_sorting() {
         const auto end = static_cast<std::ptrdiff_t>(size_);
         std::sort(following_.begin(), following_.begin() + end);
         std::sort(preceding_.begin(), preceding_.begin() + end);
@@ -207,38 +227,71 @@ private:
 
     std::size_t size_ = 0;
     std::vector<Index> following_, preceding_;
+    // Neighbours in the lower halves, stamped with the place that they were seen at; no place has the stamp of the others.
+    std::array<std::uint64_t, 1 << slot_bits> slots_ = [] {
+        std::array<std::uint64_t, 1 << slot_bits> none;
+        none.fill(~std::uint64_t{0});
+        return none;
+    }();
+    std::uint64_t stamp_ = 0;
 };
+
+// Twice a triangle's area as a vector, and what each corner has of it: found once, and read at each corner.
+struct FaceArea {
+    glm::dvec3 vector{0};
+    double sixth = 0; // of its length
+};
+
+// Nothing for triangles that the welding degenerates, or that have no corner among the vertices.
+std::vector<FaceArea> find_areas(const MeshView& mesh, const Places& places, VertexRange vertices) {
+    std::vector<FaceArea> areas(mesh.triangles.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, areas.size(), grain), [&](const auto& range) {
+        for (std::size_t t = range.begin(); t < range.end(); ++t) {
+            const Triangle& corners = mesh.triangles[t];
+            const Triangle at = places.of(corners);
+            if (!vertices.has(at[0]) && !vertices.has(at[1]) && !vertices.has(at[2])) continue;
+            if (places.degenerates(corners)) continue;
+            const glm::dvec3& a = mesh.positions[corners[0]];
+            const glm::dvec3 vector = glm::cross(mesh.positions[corners[1]] - a, mesh.positions[corners[2]] - a);
+            areas[t] = {vector, glm::length(vector) / 6};
+        }
+    });
+    return areas;
+}
 
 // Looks at one position after another.
 class SurfaceWorker {
 public:
-    SurfaceWorker(const MeshView& mesh, std::span<const Index> coincident, const Incidence& incidence, Surface& surface)
-        : mesh_(mesh), coincident_(coincident), incidence_(incidence), surface_(surface) {}
+    SurfaceWorker(const MeshView& mesh, const Places& places, const Incidence& incidence, std::span<const FaceArea> areas,
+                  Surface& surface)
+        : triangles_(mesh.triangles), places_(places), incidence_(incidence), areas_(areas), vertex_areas_(surface.areas),
+          surface_(surface) {}
 
-    void operator()(std::size_t v) {
-        fan_.clear();
-        const glm::dvec3 here = mesh_.positions[v];
+    void operator()(Index v) {
+        const std::span<const Index> around = incidence_.around(v);
+        fan_.begin(v, around.size());
         glm::dvec3 sum(0);
-        for (const Index t : incidence_.around(v)) {
-            const Triangle& corners = mesh_.triangles[t];
-            const Triangle w = {coincident_[corners[0]], coincident_[corners[1]], coincident_[corners[2]]};
-            if (w[0] == w[1] || w[1] == w[2] || w[2] == w[0]) continue; // it has neither edges nor an area
+        for (const Index t : around) {
+            const Triangle& corners = triangles_[t];
+            if (places_.degenerates(corners)) continue; // it has neither edges nor an area
+            const Triangle w = places_.of(corners);
             const std::size_t k = (w[1] == v) + 2u * (w[2] == v);
             constexpr std::size_t next[] = {1, 2, 0, 1};
-            const std::size_t after = next[k], before = next[k + 1];
-            fan_.add(w[after], w[before]);
-            const glm::dvec3 area = glm::cross(mesh_.positions[corners[after]] - here, mesh_.positions[corners[before]] - here);
-            sum += area;
-            surface_.areas[corners[k]] += glm::length(area) / 6;
+            const FaceArea& area = areas_[t];
+            fan_.add(w[next[k]], w[next[k + 1]]);
+            sum += area.vector;
+            vertex_areas_[corners[k]] += area.sixth;
         }
         surface_.irregular[v] = !fan_.is_regular();
         surface_.normals[v] = glm::vec3(unit(sum));
     }
 
 private:
-    const MeshView& mesh_;
-    std::span<const Index> coincident_;
+    std::span<const Triangle> triangles_;
+    const Places places_;
     const Incidence& incidence_;
+    std::span<const FaceArea> areas_;
+    std::span<double> vertex_areas_;
     Surface& surface_;
     Fan fan_;
 };
@@ -265,6 +318,118 @@ Closedness find_closedness(const MeshView& mesh, std::span<const Index> coincide
     if (!has_edges) return Closedness::open;
     const double volume = signed_volume(mesh);
     return volume > 0 ? Closedness::closed_outward : volume < 0 ? Closedness::closed_inward : Closedness::open;
+}
+
+// What is found around the places of a range: for these, regularity and the sum of the faces; for all vertices there, areas.
+Surface survey(const MeshView& mesh, std::span<const Index> coincident, VertexRange range) {
+    Surface surface;
+    surface.irregular.assign(coincident.size(), 0);
+    surface.areas.assign(coincident.size(), 0);
+    surface.normals.resize(coincident.size());
+    const Places places(coincident);
+    const Incidence incidence = find_incidence(mesh, places, range);
+    const std::vector<FaceArea> areas = find_areas(mesh, places, range);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(range.begin, range.end, grain), [&](const auto& vertices) {
+        SurfaceWorker worker(mesh, places, incidence, areas, surface);
+        for (std::size_t v = vertices.begin(); v < vertices.end(); ++v)
+            if (coincident[v] == v) worker(static_cast<Index>(v));
+    });
+    return surface;
+}
+
+// What a range's survey leaves in a surface; the areas are those of the vertices there, ascending.
+struct SurveyPiece {
+    std::vector<std::uint8_t> irregular;
+    std::vector<glm::vec3> normals;
+    std::vector<double> areas;
+
+    template <class Message>
+    void exchange(Message& message) {
+        message(irregular), message(normals), message(areas);
+    }
+};
+
+SurveyPiece cut_out(const Surface& surface, std::span<const Index> coincident, VertexRange range) {
+    const auto begin = static_cast<std::ptrdiff_t>(range.begin), end = static_cast<std::ptrdiff_t>(range.end);
+    SurveyPiece piece{{surface.irregular.begin() + begin, surface.irregular.begin() + end},
+                      {surface.normals.begin() + begin, surface.normals.begin() + end},
+                      {}};
+    for (std::size_t v = 0; v < coincident.size(); ++v)
+        if (range.has(coincident[v])) piece.areas.push_back(surface.areas[v]);
+    return piece;
+}
+
+bool put_in(Surface& surface, std::span<const Index> coincident, VertexRange range, const SurveyPiece& piece) {
+    if (piece.irregular.size() != range.size() || piece.normals.size() != range.size()) return false;
+    std::copy(piece.irregular.begin(), piece.irregular.end(), surface.irregular.begin() + static_cast<std::ptrdiff_t>(range.begin));
+    std::copy(piece.normals.begin(), piece.normals.end(), surface.normals.begin() + static_cast<std::ptrdiff_t>(range.begin));
+    std::size_t next = 0;
+    for (std::size_t v = 0; v < coincident.size(); ++v) {
+        if (!range.has(coincident[v])) continue;
+        if (next == piece.areas.size()) return false;
+        surface.areas[v] = piece.areas[next++];
+    }
+    return next == piece.areas.size();
+}
+
+// Each member surveys a range, and all get all of it by way of member 0.
+Result<Surface> survey_together(const MeshView& mesh, std::span<const Index> coincident, Team& team) {
+    const auto members = static_cast<std::size_t>(team.size()), rank = static_cast<std::size_t>(team.rank());
+    const auto range_of = [&](std::size_t member) {
+        return VertexRange{coincident.size() * member / members, coincident.size() * (member + 1) / members};
+    };
+    Surface surface = survey(mesh, coincident, range_of(rank));
+    const auto send = [&](std::size_t to, VertexRange range) {
+        MessageWriter message;
+        cut_out(surface, coincident, range).exchange(message);
+        team.send(static_cast<int>(to), message.bytes());
+    };
+    const auto receive = [&](std::size_t from, VertexRange range) {
+        const std::vector<std::byte> bytes = team.receive(static_cast<int>(from));
+        MessageReader message(bytes);
+        SurveyPiece piece;
+        piece.exchange(message);
+        return message.complete() && put_in(surface, coincident, range, piece);
+    };
+    const Error strange{ErrorCode::malformed_data,
+                        "A process of the team sent something else than its part: all must run the same program on the same mesh."};
+    if (rank != 0) {
+        send(0, range_of(rank));
+        for (std::size_t other = 0; other < members; ++other)
+            if (other != rank && !receive(0, range_of(other))) return strange;
+        return surface;
+    }
+    for (std::size_t other = 1; other < members; ++other)
+        if (!receive(other, range_of(other))) return strange;
+    for (std::size_t to = 1; to < members; ++to)
+        for (std::size_t other = 0; other < members; ++other)
+            if (other != to) send(to, range_of(other));
+    return surface;
+}
+
+// From what is known by place to what is known by vertex.
+Surface complete(const MeshView& mesh, std::span<const Index> coincident, Surface surface) {
+    const std::size_t vertices = coincident.size();
+    surface.closedness = find_closedness(mesh, coincident, surface);
+    const bool inward = surface.closedness == Closedness::closed_inward;
+    const float face_sign = inward ? -1 : 1;
+    const double own_sign = inward && agreement_of_own_normals(mesh) > 0 ? -1 : 1;
+    // A vertex is as irregular as the position that it shares. Those that stand for their positions come last, for the others read them.
+    const auto spread = [&](bool standing) {
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices, grain), [&](const auto& range) {
+            for (std::size_t v = range.begin(); v < range.end(); ++v) {
+                const Index place = coincident[v];
+                if ((place == v) != standing) continue;
+                surface.irregular[v] = surface.irregular[place];
+                const bool own = !mesh.normals.empty() && has_length(mesh.normals[v]);
+                surface.normals[v] =
+                    own ? glm::vec3(own_sign * unit(glm::dvec3(mesh.normals[v]))) : face_sign * surface.normals[place];
+            }
+        });
+    };
+    spread(false);
+    spread(true);
+    return surface;
 }
 
 } // namespace
@@ -300,39 +465,13 @@ std::vector<Index> find_coincident(std::span<const glm::dvec3> positions) {
 }
 
 Surface analyse_surface(const MeshView& mesh, std::span<const Index> coincident) {
-    const std::size_t vertices = mesh.positions.size();
-    Surface surface;
-    surface.irregular.assign(vertices, 0);
-    surface.areas.assign(vertices, 0);
-    surface.normals.resize(vertices);
-    {
-        const Incidence incidence = find_incidence(mesh, coincident);
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices, grain), [&](const auto& range) {
-            SurfaceWorker worker(mesh, coincident, incidence, surface);
-            for (std::size_t v = range.begin(); v < range.end(); ++v)
-                if (coincident[v] == v) worker(v);
-        });
-    }
-    surface.closedness = find_closedness(mesh, coincident, surface);
-    const bool inward = surface.closedness == Closedness::closed_inward;
-    const float face_sign = inward ? -1 : 1;
-    const double own_sign = inward && agreement_of_own_normals(mesh) > 0 ? -1 : 1;
-    // A vertex is as irregular as the position that it shares. Those that stand for their positions come last, for the others read them.
-    const auto complete = [&](bool standing) {
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices, grain), [&](const auto& range) {
-            for (std::size_t v = range.begin(); v < range.end(); ++v) {
-                const Index place = coincident[v];
-                if ((place == v) != standing) continue;
-                surface.irregular[v] = surface.irregular[place];
-                const bool own = !mesh.normals.empty() && has_length(mesh.normals[v]);
-                surface.normals[v] =
-                    own ? glm::vec3(own_sign * unit(glm::dvec3(mesh.normals[v]))) : face_sign * surface.normals[place];
-            }
-        });
-    };
-    complete(false);
-    complete(true);
-    return surface;
+    return complete(mesh, coincident, survey(mesh, coincident, {0, coincident.size()}));
+}
+
+Result<Surface> analyse_surface(const MeshView& mesh, std::span<const Index> coincident, Team& team) {
+    auto surface = survey_together(mesh, coincident, team);
+    if (!surface) return surface.error();
+    return complete(mesh, coincident, std::move(*surface));
 }
 
 } // namespace unseen::vdtree

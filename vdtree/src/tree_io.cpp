@@ -102,10 +102,14 @@ void for_each_array(Geometry& g, Luminance& l, F&& f) {
     f("support_range", l.support_range);
     f("ring_range", l.ring_range);
     f("adaptation", l.adaptation);
+    f("ring_chroma", l.ring_chroma);
     f("triangles", g.triangles);
     f("source_triangles", g.source_triangles);
     f("source_vertices", g.source_vertices);
 }
+
+// Sections that are there only where they have elements.
+bool is_optional(std::string_view name) { return name == "ring_chroma"; }
 
 enum class OpenMode { read, map };
 
@@ -412,6 +416,7 @@ Result<void> Reader::map_section(std::string_view name, Array<T>& out) {
 
 template <class T>
 Result<void> Reader::open_section(std::string_view name, Array<T>& out) {
+    if (is_optional(name) && !find(name)) return {};
     if (mode_ == OpenMode::map) return map_section(name, out);
     std::vector<T> values;
     const auto r = read_section(name, values);
@@ -444,6 +449,7 @@ Result<void> Reader::check_counts(const TreeGeometry& g, const TreeLuminance& l)
         {l.support_range.size() == interior, "support_range"},
         {l.ring_range.size() == interior, "ring_range"},
         {l.adaptation.size() == interior, "adaptation"},
+        {l.ring_chroma.empty() || (l.ring_chroma.size() == interior && !g.colours.empty()), "ring_chroma"},
         {g.source_triangles.size() == (g.ranges.empty() ? 0 : triangles), "source_triangles"},
         {g.source_vertices.size() == leaves, "source_vertices"}};
     for (const auto& [holds, name] : checks)
@@ -477,7 +483,8 @@ Result<void> Reader::check_values(const TreeGeometry& g, const TreeLuminance& l)
         {all_finite(g.colours), "colours"},
         {all_finite(g.uvs), "uvs"},
         {all_finite(g.support_spheres), "support_spheres"},
-        {all_finite(g.displacement), "displacement"}};
+        {all_finite(g.displacement), "displacement"},
+        {all_finite(l.ring_chroma), "ring_chroma"}};
     for (const auto& [holds, name] : finite)
         if (!holds) return fail("Section " + std::string(name) + " has a value that is not finite.");
     for (const NodeBounds& b : g.bounds) {
@@ -492,6 +499,8 @@ Result<void> Reader::check_values(const TreeGeometry& g, const TreeLuminance& l)
     for (const auto* ranges : {&l.support_range, &l.ring_range})
         for (const PackedRange& r : *ranges)
             if (!(r.lo <= r.hi)) return fail("A luminance range ends before it begins.");
+    for (const ChromaRange& r : l.ring_chroma)
+        if (!(r.lo.x <= r.hi.x && r.lo.y <= r.hi.y)) return fail("A range of chroma ends before it begins.");
     for (const float moved : g.displacement)
         if (!(moved >= 0)) return fail("A displacement is negative.");
     return {};
@@ -595,6 +604,7 @@ Result<void> write_tree(const std::filesystem::path& file, const VertexTree& tre
     Writer writer;
     for_each_array(g, l, [&](std::string_view name, const auto& values) {
         using T = typename std::remove_cvref_t<decltype(values)>::value_type;
+        if (is_optional(name) && values.empty()) return;
         writer.add(name, std::span<const T>(values), component_bytes<T>());
     });
     Facts facts = facts_of(g, l);

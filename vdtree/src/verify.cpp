@@ -5,6 +5,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "chroma.h"
 #include "vertex_tree_data.h"
 
 namespace unseen::vdtree {
@@ -21,6 +22,10 @@ bool contains(const Sphere& outer, glm::vec3 point, double radius) {
 }
 
 bool contains(PackedRange outer, PackedRange inner) { return outer.lo <= inner.lo && inner.hi <= outer.hi; }
+
+bool contains(const ChromaRange& outer, const ChromaRange& inner) {
+    return outer.lo.x <= inner.lo.x && outer.lo.y <= inner.lo.y && inner.hi.x <= outer.hi.x && inner.hi.y <= outer.hi.y;
+}
 
 class Verifier {
 public:
@@ -57,6 +62,7 @@ private:
         expect(contains(g_.bounds[node].ring, proxy, 0), "the ring's sphere does not contain the proxy.");
         const Unorm16 y = l_.luminance[node];
         expect(contains(l_.support_range[node], {y, y}), "the support's luminance does not contain the proxy's.");
+        expect(!has_chroma_ || contains(l_.ring_chroma[node], chroma_of(node)), "the ring's chroma does not contain the proxy's.");
         const Index measured = std::min<Index>(g_.leaf_end[node], g_.first_leaf[node] + most_leaves_measured);
         for (Index leaf = g_.first_leaf[node]; leaf < measured; ++leaf) {
             const glm::vec3 p = g_.positions[tree_.interior_count() + leaf];
@@ -84,6 +90,7 @@ private:
             expect(l_.adaptation[node] >= l_.adaptation[child], "a child's adaptation luminance is higher.");
             expect(contains(l_.support_range[node], l_.support_range[child]), "a child's support luminance sticks out.");
             expect(contains(l_.ring_range[node], l_.ring_range[child]), "a child's ring luminance sticks out.");
+            expect(!has_chroma_ || contains(l_.ring_chroma[node], l_.ring_chroma[child]), "a child's ring chroma sticks out.");
         });
     }
 
@@ -94,10 +101,13 @@ private:
                          c = g_.positions[interior + t[2]];
         const glm::dvec3 normal = glm::cross(b - a, c - a);
         const int cell = normal_cell(normal);
+        const bool shows_through =
+            !g_.colours.empty() && std::any_of(t.begin(), t.end(), [&](Index leaf) { return !(g_.colours[interior + leaf].a >= 1); });
         for (const Index leaf : t) {
             NodeId node = g_.parents[interior + leaf];
             while (node != no_node && g_.support_spheres[node].radius == 0) node = g_.parents[node];
             if (node == no_node) continue; // everything is at one point
+            expect(!shows_through || (g_.bounds[node].flags & translucent_ring), "a corner's parent does not know of an alpha below 1.");
             expect(cell < 0 || tree_.mask(node).contains(cell), "a normal is missing in the mask of a corner's parent.");
             for (const Index corner : t) {
                 const Unorm16 y = l_.luminance[interior + corner];
@@ -105,8 +115,15 @@ private:
                        "a corner is outside of the ring sphere of another corner's parent.");
                 expect(contains(l_.ring_range[node], {y, y}),
                        "a corner's luminance is outside of the ring's of another corner's parent.");
+                expect(!has_chroma_ || contains(l_.ring_chroma[node], chroma_of(interior + corner)),
+                       "a corner's chroma is outside of the ring's of another corner's parent.");
             }
         }
+    }
+
+    ChromaRange chroma_of(NodeId node) const {
+        const glm::vec2 chroma = drawn_chroma(g_.colours[node], l_.luminance[node]);
+        return {chroma, chroma};
     }
 
     NodeId vanishing_node(const Triangle& t) const {
@@ -129,6 +146,7 @@ private:
     const VertexTree& tree_;
     const TreeGeometry& g_;
     const TreeLuminance& l_;
+    const bool has_chroma_ = !l_.ring_chroma.empty() && !g_.colours.empty();
     std::string fault_;
 };
 

@@ -8,6 +8,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "chroma.h"
 #include "mask_pool.h"
 #include "node_check.h"
 #include "tree_parts.h"
@@ -173,8 +174,9 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
             out.adaptation[node] = std::max(adaptation, middle(ring));
         };
     });
+    std::vector<ChromaRange> chroma = derive_ring_chroma(g, parts, out.luminance);
     TreeLuminance done{{std::move(out.luminance), std::move(out.support_range), std::move(out.ring_range),
-                        std::move(out.adaptation)},
+                        std::move(out.adaptation), std::move(chroma)},
                        light, prelit, leaf.corners};
     return done;
 }
@@ -210,6 +212,7 @@ NormalMask VertexTree::mask(NodeId node) const noexcept {
 std::span<const Sphere> VertexTree::support_spheres() const noexcept { return data_->geometry->support_spheres; }
 std::span<const PackedRange> VertexTree::support_luminance() const noexcept { return data_->light.support_range; }
 std::span<const PackedRange> VertexTree::ring_luminance() const noexcept { return data_->light.ring_range; }
+std::span<const ChromaRange> VertexTree::ring_chroma() const noexcept { return data_->light.ring_chroma; }
 std::span<const Unorm16> VertexTree::adaptation_luminance() const noexcept { return data_->light.adaptation; }
 std::span<const float> VertexTree::displacement() const noexcept { return data_->geometry->displacement; }
 
@@ -255,7 +258,7 @@ std::uint64_t VertexTree::byte_size() const noexcept {
            bytes_of(g.bounds) + bytes_of(g.support_spheres) + bytes_of(g.mask_at) + bytes_of(g.mask_records) +
            bytes_of(g.displacement) + bytes_of(g.triangles) + bytes_of(g.source_triangles) +
            bytes_of(g.source_vertices) + g.ranges.capacity() * sizeof(MeshRange) + bytes_of(l.luminance) + bytes_of(l.support_range) +
-           bytes_of(l.ring_range) + bytes_of(l.adaptation);
+           bytes_of(l.ring_range) + bytes_of(l.adaptation) + bytes_of(l.ring_chroma);
 }
 
 } // namespace unseen::vdtree

@@ -60,6 +60,7 @@ struct LuminanceArrays {
     Storage<PackedRange> support_range; // by interior node, and so on
     Storage<PackedRange> ring_range;
     Storage<Unorm16> adaptation;
+    Storage<ChromaRange> ring_chroma; // empty where all is grey
 };
 
 // What depends on the light.

@@ -10,6 +10,7 @@
 #include <perception/csf.h>
 #include <perception/display.h>
 #include <vdtree/criteria.h>
+#include <vdtree/cut_rings.h>
 #include <vdtree/distance_criterion.h>
 #include <vdtree/fold_errors.h>
 #include <vdtree/lighting.h>
@@ -28,6 +29,9 @@ struct FoldTestOptions {
     SceneLuminance scene = {};
     std::optional<glm::dvec2> gaze_px = {}; // in the window, from the top left; may lie outside. Default: foveal everywhere
     const CsfTable* csf = nullptr;          // must outlive the criterion; default: CsfTable::standard()
+    // Look at colour, too, where the tree has any: the Luebke-Hallen tests in distance form then fold where sqrt((c S)^2 + (c_rg S_rg)^2 +
+    // (c_yv S_yv)^2) <= 1, with the contrasts of the ring's range in both opponent directions and castleCSF's sensitivities to them.
+    bool chroma = false;
 };
 
 // Luebke and Hallen 2001, section 3.3, in its safe form: extent and luminance range of the ring, facing of the dilated
@@ -66,7 +70,17 @@ private:
 Result<vdtree::DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTree& tree, const vdtree::View& view,
                                                           const FoldTestOptions& options);
 
-// The same under lights that may move: ranges are what they can make of the normals, albedos and places in a ring, and follow the
+// The same with the holes closed that are left: what is tested is not the mesh's ring but all that the ring can be in any cut, and the mean.
+// With hat R and hat r the luminances and the radius of bound_cut_rings() (they contain the ring's), r0 the support's radius and m the shift
+// of the mean:
+//   theta' = max(2 asin(max(r1, (r0 + hat r) / 2) / d), one pixel),  r1 the ring's radius
+//   c      = Michelson contrast of hat R, for silhouettes united with the scene's range
+//   folds where  c S(1 / (2 theta')) <= 1  and  m / L S_peak <= 1, L the middle of hat R
+// Costs at least what the above does for every node. Cost: as the above.
+Result<vdtree::DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree& tree, const vdtree::CutRings& rings,
+                                                               const vdtree::View& view, const FoldTestOptions& options);
+
+// luebke_hallen_distances() under lights that may move: ranges are what they can make of the normals, albedos and places in a ring, and follow the
 // lighting of the viewpoint; silhouettes are those of `options.scene`, which must hold for all of it (see lit_scene()). Adaptation is to
 // the brightest luminance of a range. `bounds`: of the tree. Cost: some 20 ms with a gaze, less without; not by node.
 Result<vdtree::DistanceCriterion> lit_distances(const vdtree::VertexTree& tree, std::shared_ptr<const vdtree::LightBounds> bounds,
@@ -97,6 +111,6 @@ vdtree::Viewpoint viewpoint_of(const vdtree::VertexTree& tree, const vdtree::Vie
                                const vdtree::Similarity& placement = {}, bool window_only = true);
 
 // The names that --fold-test takes.
-inline constexpr std::string_view fold_test_names[] = {"luebke-hallen", "error", "extent", "displacement"};
+inline constexpr std::string_view fold_test_names[] = {"luebke-hallen", "luebke-hallen-safe", "error", "extent", "displacement"};
 
 } // namespace unseen::perception

@@ -58,8 +58,8 @@ struct BuildOptions {
     int threads = 0; // 0: as many as there are cores. The tree does not depend on it.
     std::uint64_t dropped_before = 0; // triangles that a reader has dropped; counted with the tree's
     Progress progress = {};
-    // Other processes that help with the clustering, by help_build_tree() with the same mesh and options; this is member 0. Only the
-    // quadric clusterer has work for them. The tree does not depend on it. Do not cancel then: the others would wait for ever.
+    // Other processes that help to analyse the mesh and to cluster it, by help_build_tree() with the same mesh and options; this is
+    // member 0. Only where `clusterer` is quadric is there work for them. The tree does not depend on it. Do not cancel then: the others would wait for ever.
     Team* team = nullptr;
     int threads_alone = 0; // like `threads`, for what comes after the clustering, when the team's others have gone
 };

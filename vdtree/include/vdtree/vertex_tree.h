@@ -26,6 +26,7 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
+#include <vdtree/chroma.h>
 #include <vdtree/mesh.h>
 #include <vdtree/normal_mask.h>
 #include <vdtree/packed.h>
@@ -66,7 +67,8 @@ struct Light {
 inline constexpr float default_albedo = 0.8f;
 
 enum NodeFlags : std::uint8_t {
-    irregular_ring = 1, // the ring has a boundary, non-manifold or inconsistently oriented edge
+    irregular_ring = 1,   // the ring has a boundary, non-manifold or inconsistently oriented edge
+    translucent_ring = 2, // a corner of the ring has an alpha below 1: anything behind may show there
 };
 
 // What a fold test reads of an interior node, in one piece.
@@ -128,6 +130,7 @@ public:
     std::span<const Sphere> support_spheres() const noexcept; // leaves and proxies of the subtree
     std::span<const PackedRange> support_luminance() const noexcept;
     std::span<const PackedRange> ring_luminance() const noexcept;
+    std::span<const ChromaRange> ring_chroma() const noexcept; // as drawn; empty where all vertices are grey
     std::span<const Unorm16> adaptation_luminance() const noexcept; // middle of ring_luminance, saturated up the tree
     std::span<const float> displacement() const noexcept; // largest distance of a supported leaf from the proxy
 

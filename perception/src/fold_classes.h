@@ -1,0 +1,150 @@
+// What a fold can be taken for at the worst, in classes, and the rows of the table that the classes in use get.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <unordered_map>
+#include <vector>
+
+#include <glm/common.hpp>
+
+#include <perception/display.h>
+#include <vdtree/chroma.h>
+#include <vdtree/vertex_tree.h>
+
+namespace unseen::perception {
+
+// A series of classes: none, then values in equal steps of their logarithm from 2^least on. Values are rounded up, and what is no number is the
+// largest.
+struct ClassSeries {
+    int per_octave, least_octave, octaves;
+
+    constexpr std::size_t count() const { return static_cast<std::size_t>(per_octave * octaves) + 2; }
+    std::size_t of(double value) const {
+        if (value <= 0) return 0;
+        const double steps = std::ceil(per_octave * (std::log2(value) - least_octave) - edge);
+        const double last = static_cast<double>(count() - 1);
+        return steps + 1 <= last ? static_cast<std::size_t>(std::max(steps + 1, 1.0)) : count() - 1;
+    }
+    double value(std::size_t index) const {
+        if (index == 0) return 0;
+        return std::exp2(static_cast<double>(index - 1) / per_octave + least_octave) * (1 + 2 * edge);
+    }
+    // Values on a class's edge stay in it; far below a class's width.
+    static constexpr double edge = 1e-7;
+};
+
+inline constexpr ClassSeries contrasts{12, -9, 9}; // Michelson's
+inline constexpr ClassSeries shifts{3, -9, 10};    // of the mean over the middle of the range
+// Of colour, in both directions.
+inline constexpr ClassSeries chroma_contrasts{3, -13, 18};
+inline constexpr ClassSeries chroma_shifts{1, -13, 18};
+
+inline constexpr std::size_t luminance_count = 16;
+
+struct Level {
+    std::size_t contrast = 0, luminance = 0, shift = 0; // classes
+    std::array<std::size_t, 2> chroma{}, chroma_shift{}; // red-green and yellow-violet
+
+    bool is_nothing() const { return contrast == 0 && chroma[0] == 0 && chroma[1] == 0; }
+    std::size_t grey_number() const { return (shift * luminance_count + luminance) * contrasts.count() + contrast; }
+    std::uint64_t number() const {
+        std::uint64_t number = 0;
+        for (std::size_t i = 0; i < 2; ++i)
+            number = (number * chroma_shifts.count() + chroma_shift[i]) * chroma_contrasts.count() + chroma[i];
+        return number * grey_count + grey_number();
+    }
+    static constexpr std::size_t grey_count = shifts.count() * luminance_count * contrasts.count();
+};
+
+// What a node's ring may show, before it is put into classes.
+struct RingLooks {
+    vdtree::LuminanceRange range;
+    double adaptation = 0; // relative luminance
+    double shift = 0;      // contrast, and so on
+    glm::dvec2 chroma = glm::dvec2(0), chroma_shift = glm::dvec2(0);
+};
+
+// The display's luminances and the classes that they fall into.
+class Classes {
+public:
+    explicit Classes(const Display& display)
+        : black_(black_level(display).value()), span_(to_luminance(display, 1).value() - black_),
+          log2_step_(std::log2((black_ + span_) / lowest()) / (luminance_count - 1)) {}
+
+    Level level(const RingLooks& looks) const {
+        const double lo = in_cdm2(looks.range.lo), hi = in_cdm2(looks.range.hi);
+        const double l = std::ceil(std::log2(std::max(in_cdm2(looks.adaptation), lowest()) / lowest()) / log2_step_ - ClassSeries::edge);
+        return {contrasts.of((hi - lo) / (hi + lo)), static_cast<std::size_t>(std::clamp(l, 0.0, static_cast<double>(luminance_count - 1))),
+                shifts.of(looks.shift), {chroma_contrasts.of(looks.chroma.x), chroma_contrasts.of(looks.chroma.y)},
+                {chroma_shifts.of(looks.chroma_shift.x), chroma_shifts.of(looks.chroma_shift.y)}};
+    }
+    double luminance(std::size_t luminance_class) const {
+        return lowest() * std::exp2(log2_step_ * static_cast<double>(luminance_class)) * (1 + 2 * ClassSeries::edge);
+    }
+
+    // Of a difference in relative luminance against the middle of a range.
+    double contrast(double difference, vdtree::LuminanceRange range) const {
+        return span_ * difference / std::max((in_cdm2(range.lo) + in_cdm2(range.hi)) / 2, lowest());
+    }
+    // Of differences in both directions of colour.
+    glm::dvec2 chroma_contrast(glm::dvec2 difference, vdtree::LuminanceRange range) const {
+        // What a damaged file holds may be no number, or negative: it can always be seen.
+        const auto in = [&](double d) { return d >= 0 ? contrast(d, range) : std::numeric_limits<double>::infinity(); };
+        return {in(difference.x), in(difference.y)};
+    }
+
+private:
+    double in_cdm2(double relative) const { return black_ + span_ * relative; }
+    // Where the display is black: a four-thousandth of its peak, in place of 0.
+    double lowest() const { return std::max(black_, (black_ + span_) / 4096); }
+
+    double black_, span_, log2_step_;
+};
+
+// Gives the classes in use their rows of the table, row 0 to what changes nothing. Where they are too many for the rows' numbers, all classes are
+// rounded up to fewer: then begin again with coarser rows.
+class Rows {
+public:
+    Rows(bool has_chroma, std::size_t coarseness) : has_chroma_(has_chroma), coarseness_(coarseness) {
+        if (!has_chroma) grey_rows_.assign(Level::grey_count, 0);
+    }
+
+    std::uint16_t of(const Level& fine) {
+        if (fine.is_nothing()) return 0;
+        const Level level = coarser(fine);
+        std::uint16_t& row = has_chroma_ ? rows_[level.number()] : grey_rows_[level.grey_number()];
+        if (row == 0 && !is_full()) {
+            levels_.push_back(level);
+            row = static_cast<std::uint16_t>(levels_.size());
+        }
+        return row;
+    }
+    bool is_full() const { return levels_.size() == 0xffff; }
+    const std::vector<Level>& levels() const { return levels_; } // of row 1 and so on
+
+private:
+    Level coarser(Level level) const {
+        const auto round = [&](std::size_t& index, std::size_t count) {
+            index = std::min((index + coarseness_ - 1) / coarseness_ * coarseness_, count - 1);
+        };
+        round(level.contrast, contrasts.count());
+        round(level.shift, shifts.count());
+        for (std::size_t i = 0; i < 2; ++i) {
+            round(level.chroma[i], chroma_contrasts.count());
+            round(level.chroma_shift[i], chroma_shifts.count());
+        }
+        return level;
+    }
+
+    bool has_chroma_;
+    std::size_t coarseness_;
+    std::vector<std::uint16_t> grey_rows_;
+    std::unordered_map<std::uint64_t, std::uint16_t> rows_;
+    std::vector<Level> levels_;
+};
+
+} // namespace unseen::perception

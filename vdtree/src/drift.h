@@ -1,0 +1,18 @@
+// What the errors of many folds add up to.
+#pragma once
+
+#include <algorithm>
+
+#include <vdtree/fold_errors.h>
+
+namespace unseen::vdtree {
+
+// Reads the luminance errors and extents, and adds the drift. Cost: as of folding the mesh once, one node after the other.
+void find_drift(const VertexTree& tree, FoldErrors& errors);
+
+// The radius of what a fold of the node changes, in mesh units.
+inline float changed_radius(const VertexTree& tree, const FoldErrors& errors, NodeId node) {
+    return std::max(tree.support_spheres()[node].radius, errors.extent[node]);
+}
+
+} // namespace unseen::vdtree
