@@ -226,6 +226,32 @@ TEST_P(Follow, EqualsTheCutFromScratchOnRandomPaths) {
     EXPECT_LT(incremental_tests, 4 * all_tests);
 }
 
+// Straight at the model, past it and away from it, by steps of all sizes, with a gaze that goes its own way.
+TEST_P(Follow, EqualsTheCutFromScratchOnStraightWays) {
+    const VertexTree tree = built(GetParam().make());
+    const Sphere sphere = tree.bounding_sphere();
+    std::mt19937_64 random(29);
+    for (const bool with_gaze : {false, true}) {
+        const DistanceCriterion criterion = rich_criterion(tree, 4, with_gaze);
+        Cut cut(tree);
+        for (int way = 0; way < 30; ++way) {
+            glm::dvec3 eye = glm::dvec3(sphere.centre) + (1.5 + 6 * random_unit(random)) * sphere.radius * random_direction(random);
+            const glm::dvec3 target = glm::dvec3(sphere.centre) + sphere.radius * random_unit(random) * random_direction(random);
+            const glm::dvec3 step = (target - eye) * std::pow(10.0, -1 - 2 * random_unit(random)) * (way % 3 == 0 ? -1.0 : 1.0);
+            glm::dvec3 gaze = glm::normalize(target - eye);
+            const glm::dvec3 turn = 1e-3 * random_unit(random) * random_direction(random);
+            for (int frame = 0; frame < 30; ++frame) {
+                Viewpoint viewpoint{.eye = eye};
+                if (with_gaze) viewpoint.gaze = gaze;
+                ASSERT_TRUE(cut.follow(criterion, viewpoint));
+                ASSERT_EQ(state_of(cut), from_scratch(tree, criterion, viewpoint, {})) << "way " << way << ", frame " << frame;
+                eye += step;
+                gaze = glm::normalize(gaze + turn);
+            }
+        }
+    }
+}
+
 #ifdef NDEBUG // else an assertion tells
 TEST_P(Follow, EqualsTheCutFromScratchUnderACriterionThatIsNotMonotone) {
     const VertexTree tree = built(GetParam().make());
@@ -246,6 +272,51 @@ TEST_P(Follow, EqualsTheCutFromScratchUnderACriterionThatIsNotMonotone) {
     }
 }
 #endif
+
+// Decisions and costs of many nodes at once are those of the tests one by one.
+TEST_P(Follow, DecidesAndWeighsManyNodesAsOneByOne) {
+    const VertexTree tree = built(GetParam().make());
+    std::vector<NodeId> nodes(tree.interior_count()), shuffled;
+    for (NodeId node = 0; node < nodes.size(); ++node) nodes[node] = node;
+    shuffled = nodes;
+    std::mt19937_64 random(23);
+    std::shuffle(shuffled.begin(), shuffled.end(), random);
+    const auto bit = [](const std::vector<std::uint64_t>& bits, std::size_t i) { return ((bits[i / 64] >> (i % 64)) & 1) != 0; };
+    for (int variant = 0; variant < 24; ++variant) {
+        const bool with_gaze = variant & 1, with_frustum = variant & 2, cull = variant & 4;
+        DistanceCriterion::Parts parts = rich_criterion(tree, 3 + static_cast<std::uint64_t>(variant & 8 ? 1 : 0), with_gaze).parts();
+        if (variant >= 12) { // other spheres, directions of its own, least costs
+            parts.spheres = DistanceCriterion::Spheres::support;
+            for (const NodeBounds& bounds : tree.bounds()) parts.facing.push_back(bounds.slabs);
+            parts.least_cost.assign(parts.reach.size(), 0.5f);
+        }
+        const auto criterion = DistanceCriterion::create(tree, std::move(parts));
+        ASSERT_TRUE(criterion);
+        Path path(tree, 31 + static_cast<std::uint64_t>(variant), with_gaze, with_frustum);
+        for (int frame = 0; frame < 12; ++frame) {
+            const Viewpoint viewpoint = path.next();
+            const FollowOptions options{.threshold = 0.7f, .cull_back_faces = cull};
+            const auto every = test_every_node(tree, *criterion, viewpoint, options);
+            ASSERT_TRUE(every);
+            FoldTester tester(tree, *criterion, cull, options.threshold);
+            tester.look_from(viewpoint, 1);
+            std::vector<Verdict> verdicts(nodes.size()), costs(nodes.size());
+            tester.test(shuffled, verdicts);
+            tester.test_costs(shuffled, costs);
+            std::vector<std::uint64_t> decided((nodes.size() + 63) / 64), unfolded(decided.size());
+            std::vector<float> cost(nodes.size()), seen_cost(nodes.size());
+            tester.decide(shuffled, decided.data());
+            tester.find_costs(shuffled, {cost.data(), seen_cost.data(), unfolded.data()});
+            for (std::size_t i = 0; i < shuffled.size(); ++i) {
+                ASSERT_EQ(bit(decided, i), verdicts[i].unfolded) << "variant " << variant << ", node " << shuffled[i];
+                ASSERT_EQ(bit(*every, shuffled[i]), verdicts[i].unfolded) << "variant " << variant << ", node " << shuffled[i];
+                ASSERT_EQ(bit(unfolded, i), costs[i].unfolded) << "variant " << variant << ", node " << shuffled[i];
+                ASSERT_EQ(cost[i], costs[i].cost) << "variant " << variant << ", node " << shuffled[i];
+                ASSERT_EQ(seen_cost[i], costs[i].seen_cost) << "variant " << variant << ", node " << shuffled[i];
+            }
+        }
+    }
+}
 
 TEST_P(Follow, PatchesTheIndexBufferThatACopyKeepsUpWith) {
     const VertexTree tree = built(GetParam().make());

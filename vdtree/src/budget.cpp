@@ -6,6 +6,9 @@
 #include <limits>
 #include <queue>
 
+#include "prefetch.h"
+#include "walk_children.h"
+
 namespace unseen::vdtree {
 
 namespace {
@@ -66,22 +69,30 @@ private:
         asked_[tree].push_back(node);
         above_[tree].push_back(parents_cost);
     }
-    void ask_children(const Entry& e) {
-        const auto subtree_end = trees_[e.tree]->subtree_end();
-        for (NodeId child = e.node + 1; child < subtree_end[e.node]; child = subtree_end[child]) ask(e.tree, child, e.cost);
+    void ask_children(std::span<const Entry> entries) {
+        for (std::size_t first = 0; first < entries.size();) { // nearly always of one tree
+            std::size_t end = first + 1;
+            while (end < entries.size() && entries[end].tree == entries[first].tree) ++end;
+            const auto of_tree = entries.subspan(first, end - first);
+            const std::uint32_t tree = of_tree.front().tree;
+            walk_children(*trees_[tree], of_tree.size(), [&](std::size_t i) { return of_tree[i].node; },
+                          [&](std::size_t i, NodeId child) { ask(tree, child, of_tree[i].cost); });
+            first = end;
+        }
     }
     template <class F>
     void answer(F&& f) {
         for (std::uint32_t tree = 0; tree < trees_.size(); ++tree) {
             auto& nodes = asked_[tree];
-            verdicts_.resize(nodes.size());
-            testers_[tree]->test_costs(nodes, verdicts_);
+            costs_.resize(nodes.size());
+            seen_costs_.resize(nodes.size());
+            unfolded_.resize((nodes.size() + 63) / 64);
+            testers_[tree]->find_costs(nodes, {costs_.data(), seen_costs_.data(), unfolded_.data()});
             decision_.node_tests += nodes.size();
             for (std::size_t i = 0; i < nodes.size(); ++i) {
-                const Verdict& v = verdicts_[i];
-                const float cost = v.cost >= 0 ? v.cost : std::numeric_limits<float>::infinity();
-                const Entry entry{std::min(cost, above_[tree][i]), v.seen_cost, tree, nodes[i]};
-                const bool wanted = limits_.only_unfolding ? v.unfolded : entry.cost > 0 || limits_.fill;
+                const float cost = costs_[i] >= 0 ? costs_[i] : std::numeric_limits<float>::infinity();
+                const Entry entry{std::min(cost, above_[tree][i]), seen_costs_[i], tree, nodes[i]};
+                const bool wanted = limits_.only_unfolding ? (unfolded_[i / 64] >> (i % 64)) & 1 : entry.cost > 0 || limits_.fill;
                 if (wanted && trees_[tree]->is_sound(nodes[i])) f(entry);
                 else leave(entry);
             }
@@ -100,13 +111,17 @@ private:
         std::vector<Entry> all, fresh = waiting, below;
         std::uint64_t sum = triangles_;
         while (!fresh.empty()) {
-            for (const Entry& entry : fresh) sum += triangles_of(entry);
+            constexpr std::size_t ahead = 16; // entries between a prefetch and its use
+            for (std::size_t i = 0; i < fresh.size(); ++i) {
+                if (i + ahead < fresh.size()) prefetch(&trees_[fresh[i + ahead].tree]->first_triangle()[fresh[i + ahead].node]);
+                sum += triangles_of(fresh[i]);
+            }
             all.insert(all.end(), fresh.begin(), fresh.end());
             if (sum > limits_.triangles && all.size() > most) {
                 finish_one_by_one(waiting);
                 return false;
             }
-            for (const Entry& entry : fresh) ask_children(entry);
+            ask_children(fresh);
             fresh.clear();
             answer([&](const Entry& entry) { (bucket_of(entry.cost) == bucket ? fresh : below).push_back(entry); });
         }
@@ -149,7 +164,7 @@ private:
             queue.pop();
             triangles_ += triangles_of(entry);
             take(entry);
-            ask_children(entry);
+            ask_children({&entry, 1});
             answer([&](const Entry& child) { queue.push(child); });
         }
         for (; !queue.empty(); queue.pop()) leave(queue.top());
@@ -162,7 +177,8 @@ private:
     std::array<std::vector<Entry>, bucket_count> buckets_;
     std::vector<std::vector<NodeId>> asked_;
     std::vector<std::vector<float>> above_;
-    std::vector<Verdict> verdicts_;
+    std::vector<float> costs_, seen_costs_;
+    std::vector<std::uint64_t> unfolded_;
     BudgetDecision decision_;
 };
 

@@ -193,7 +193,9 @@ struct Cut::Indices {
     IndexBuffer buffer;
     bool is_stale = true;
     bool is_patched = false;      // writes are the whole difference to the buffer before the last change
-    bool few_changes_last = false;
+    unsigned quiet_frames = 0;    // in a row, of few changes
+
+    void count_changes(std::size_t changes, Index triangles) { quiet_frames = changes < few_changes(triangles) ? quiet_frames + 1 : 0; }
     std::uint64_t version = 0, writes_from = 0; // of the buffer, and before the last writes
 
     void change_version() {
@@ -250,7 +252,7 @@ void Cut::make_stale() {
     if (!indices_) return;
     indices_->is_stale = true;
     indices_->is_patched = false;
-    indices_->few_changes_last = false;
+    indices_->quiet_frames = 0;
     indices_->buffer.drop_lists();
 }
 
@@ -324,30 +326,51 @@ bool Cut::is_patching() {
     return false;
 }
 
-// Reads follow from reads: links, lists, and what is drawn. Those of many changes are made to overlap.
+// Reads follow from reads: links, lists, and what is drawn. Those of many changes are made to overlap. Leaves the children in soon_.
 void Cut::prefetch_changes(std::span<const NodeId> nodes, bool folds) {
-    if (!indices_ || !indices_->is_patched) return;
     const auto first_leaf = tree_->first_leaf(), leaf_end = tree_->leaf_end(), first_triangle = tree_->first_triangle();
     const auto subtree_end = tree_->subtree_end();
-    for (const NodeId node : nodes) {
+    const auto prefetch_links = [&](NodeId node) {
         prefetch(&first_leaf[node]);
         prefetch(&leaf_end[node]);
         prefetch(&subtree_end[node]);
-        if (!folds) prefetch(&first_triangle[node]);
+    };
+    for (const NodeId node : nodes) {
+        prefetch_links(node);
+        prefetch(&first_triangle[node]);
     }
+    for (const NodeId node : nodes) // the first child is the node's neighbour; the next one, which most nodes have, is anywhere
+        if (const NodeId child = node + 1; child < subtree_end[node] && subtree_end[child] < subtree_end[node]) prefetch_links(subtree_end[child]);
     soon_.clear();
-    if (folds)
-        for (const NodeId node : nodes) tree_->for_each_child(node, [&](NodeId child) { soon_.push_back(child); });
-    else soon_.assign(nodes.begin(), nodes.end());
+    for (const NodeId node : nodes) {
+        tree_->for_each_child(node, [&](NodeId child) { soon_.push_back(child); });
+        prefetch(&proxy_[first_leaf[node]]);
+        prefetch(&proxy_[leaf_end[node] - 1]);
+    }
+    if (!indices_ || !indices_->is_patched) return;
+    const std::span<const NodeId> active = folds ? std::span<const NodeId>(soon_) : nodes;
     const IndexBuffer& buffer = indices_->buffer;
     buffer.prefetch_places(soon_);
-    if (!folds)
-        for (const NodeId node : nodes) {
-            prefetch(&proxy_[first_leaf[node]]);
+    if (!folds) {
+        buffer.prefetch_places(nodes);
+        for (const NodeId node : nodes)
             if (first_triangle[node] < tree_->triangle_count()) prefetch(&tree_->triangles()[first_triangle[node]]);
-        }
-    buffer.prefetch_lists(soon_);
-    buffer.prefetch_corners(soon_);
+    }
+    buffer.prefetch_lists(active);
+    // The third corners of the triangles that come.
+    const auto for_each_third = [&](auto&& f) {
+        for (const NodeId node : nodes)
+            for (Index t = first_triangle[node]; t < first_triangle[node + 1]; ++t)
+                for (const Index leaf : tree_->triangles()[t])
+                    if (leaf < first_leaf[node] || leaf >= leaf_end[node]) f(leaf);
+    };
+    if (!folds) for_each_third([&](Index leaf) { prefetch(&proxy_[leaf]); });
+    buffer.prefetch_corners(active);
+    others_.clear();
+    if (folds) buffer.find_others(soon_, others_);
+    else for_each_third([&](Index leaf) { others_.push_back(proxy_[leaf]); });
+    buffer.prefetch_places(others_);
+    buffer.prefetch_lists(others_);
 }
 
 void Cut::apply_unfold(NodeId node) {
@@ -385,7 +408,7 @@ void Cut::end_changes(AdjustStats& stats) {
     for (const FoldChange& change : changes_) ++(change.folded ? stats.folds : stats.unfolds);
     stats.triangles = triangle_count_;
     if (!indices_) return;
-    indices_->few_changes_last = changes_.size() < few_changes(triangle_count_);
+    indices_->count_changes(changes_.size(), triangle_count_);
     if (indices_->is_patched) {
         indices_->buffer.end_patch();
         if (!indices_->buffer.writes().empty()) indices_->change_version();
@@ -424,25 +447,46 @@ void Cut::replay(std::span<const std::uint64_t> unfolded, AdjustStats& stats) {
 void Cut::become(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
     changes_.clear();
     ++revision_;
-    const auto first = tree_->first_triangle();
-    for (std::size_t word = 0; word < unfolded.size(); ++word) {
-        for (std::uint64_t bits = unfolded[word] & ~unfolded_[word]; bits; bits &= bits - 1) {
-            const NodeId node = static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
-            triangle_count_ += first[node + 1] - first[node];
-            changes_.push_back({node, false});
-            tree_->for_each_child(node, [&](NodeId child) {
-                if (tree_->is_leaf(child) || !test_bit(unfolded, child)) assign(child);
-            });
-        }
-    }
+    for (std::size_t word = 0; word < unfolded.size(); ++word)
+        for (std::uint64_t bits = unfolded[word] & ~unfolded_[word]; bits; bits &= bits - 1)
+            changes_.push_back({static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))), false});
     for (std::size_t word = unfolded.size(); word-- > 0;) {
         for (std::uint64_t bits = unfolded_[word] & ~unfolded[word]; bits;) {
             const int highest = 63 - std::countl_zero(bits);
-            const NodeId node = static_cast<NodeId>(word * 64 + static_cast<std::size_t>(highest));
             bits &= ~(std::uint64_t{1} << highest);
-            triangle_count_ -= first[node + 1] - first[node];
-            changes_.push_back({node, true});
-            if (node == VertexTree::root() || test_bit(unfolded, tree_->parents()[node])) assign(node);
+            changes_.push_back({static_cast<NodeId>(word * 64 + static_cast<std::size_t>(highest)), true});
+        }
+    }
+    const auto first = tree_->first_triangle(), first_leaf = tree_->first_leaf(), leaf_end = tree_->leaf_end();
+    const auto subtree_end = tree_->subtree_end();
+    const auto parents = tree_->parents();
+    const auto prefetch_links = [&](NodeId node) {
+        prefetch(&first_leaf[node]);
+        prefetch(&leaf_end[node]);
+        prefetch(&subtree_end[node]);
+    };
+    constexpr std::size_t far = 32, near = 16; // changes between a prefetch and its use
+    for (std::size_t i = 0; i < changes_.size(); ++i) {
+        if (i + far < changes_.size()) {
+            const FoldChange& soon = changes_[i + far];
+            prefetch_links(soon.node);
+            prefetch(&first[soon.node]);
+            if (soon.folded) prefetch(&parents[soon.node]);
+        }
+        if (i + near < changes_.size() && !changes_[i + near].folded) {
+            const NodeId soon = changes_[i + near].node, child = soon + 1;
+            if (child < subtree_end[soon] && subtree_end[child] < subtree_end[soon]) prefetch_links(subtree_end[child]);
+        }
+        const auto [node, folded] = changes_[i];
+        const Index triangles = first[node + 1] - first[node];
+        if (folded) {
+            triangle_count_ -= triangles;
+            if (node == VertexTree::root() || test_bit(unfolded, parents[node])) assign(node);
+        } else {
+            triangle_count_ += triangles;
+            tree_->for_each_child(node, [&](NodeId child) {
+                if (tree_->is_leaf(child) || !test_bit(unfolded, child)) assign(child);
+            });
         }
     }
     for (const FoldChange& change : changes_) ++(change.folded ? stats.folds : stats.unfolds);
@@ -451,7 +495,7 @@ void Cut::become(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
     if (!indices_ || changes_.empty()) return;
     indices_->is_stale = true;
     indices_->is_patched = false;
-    indices_->few_changes_last = changes_.size() < few_changes(triangle_count_);
+    indices_->count_changes(changes_.size(), triangle_count_);
     indices_->buffer.drop_lists();
 }
 
@@ -509,6 +553,17 @@ Result<AdjustStats> Cut::follow(const DistanceCriterion& criterion, const Viewpo
     return follower_->follow(*this, criterion, viewpoint, options);
 }
 
+Result<std::vector<std::uint64_t>> test_every_node(const VertexTree& tree, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
+                                                   const FollowOptions& options) {
+    if (const auto valid = check(viewpoint, criterion); !valid) return valid.error();
+    if (const auto valid = check(options); !valid) return valid.error();
+    FoldTester tester(tree, criterion, options.cull_back_faces, options.threshold);
+    tester.look_from(viewpoint, 1);
+    std::vector<std::uint64_t> unfolded((std::size_t{tree.interior_count()} + 63) / 64);
+    tester.decide_range(0, tree.interior_count(), unfolded.data());
+    return unfolded;
+}
+
 Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objects, Index triangle_budget) {
     std::vector<const VertexTree*> trees;
     std::vector<std::unique_ptr<FoldTester>> testers;
@@ -544,8 +599,8 @@ std::span<const NodeId> Cut::indices() const {
         indices_->buffer.gather(unfolded_, proxy_, triangle_count_);
         indices_->is_stale = false;
         indices_->change_version();
-        // When little changed last, little will change next.
-        if (indices_->few_changes_last) indices_->buffer.make_lists(unfolded_);
+        // When little has changed twice, little will change next; a frame after a jump has enough to do.
+        if (indices_->quiet_frames > 1) indices_->buffer.make_lists(unfolded_);
     }
     return indices_->buffer.indices();
 }

@@ -1,7 +1,13 @@
 #include "fold_kernel.h"
 
+#include <algorithm>
+#include <bit>
+#include <cstddef>
 #include <cstring>
+#include <limits>
 #include <numbers>
+
+#include "prefetch.h"
 
 // GCC tells of an old change in how such vectors are passed; none is passed but inlined.
 #if defined(__GNUC__) && !defined(__clang__)
@@ -33,14 +39,55 @@ constexpr float widest_reach = 1.25f;                // of the parallelepipeds t
 // Rounding of the products and their sums, in shares of the distance: a dozen roundings of terms of a few times its size.
 constexpr float rounding = 1e-5f;
 
+UNSEEN_INLINE void prefetch_node(const NodeArrays& arrays, NodeId node) {
+    prefetch(arrays.bounds + node);
+    if (arrays.support) prefetch(arrays.support + node);
+    if (arrays.classes) prefetch(arrays.classes + node);
+    if (arrays.facing) prefetch(arrays.facing + node);
+    if (arrays.lengths) prefetch(arrays.lengths + node);
+    if (arrays.silhouette_lengths) prefetch(arrays.silhouette_lengths + node);
+}
+
 // Vector registers of 4 and of 8 floats. (GCC 12 takes selections in registers of 16 apart.)
 struct Four {
     using Floats = float __attribute__((vector_size(16)));
     using Ints = std::int32_t __attribute__((vector_size(16)));
+    using Pairs = std::uint64_t __attribute__((vector_size(16)));
+
+    // Four floats of each lane's record become four registers, one of each record's first floats, and so on.
+    template <class At>
+    static UNSEEN_INLINE void load_columns(At at, Floats* columns) {
+        Floats rows[4];
+        for (std::size_t lane = 0; lane < 4; ++lane) std::memcpy(&rows[lane], at(lane), sizeof(Floats));
+        const Floats a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 1, 5), b = __builtin_shufflevector(rows[0], rows[1], 2, 6, 3, 7);
+        const Floats c = __builtin_shufflevector(rows[2], rows[3], 0, 4, 1, 5), d = __builtin_shufflevector(rows[2], rows[3], 2, 6, 3, 7);
+        columns[0] = __builtin_shufflevector(a, c, 0, 1, 4, 5), columns[1] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
+        columns[2] = __builtin_shufflevector(b, d, 0, 1, 4, 5), columns[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
+    }
 };
 struct Eight {
     using Floats = float __attribute__((vector_size(32)));
     using Ints = std::int32_t __attribute__((vector_size(32)));
+    using Pairs = std::uint64_t __attribute__((vector_size(32)));
+
+    template <class At>
+    static UNSEEN_INLINE void load_columns(At at, Floats* columns) {
+        Floats rows[4];
+        for (std::size_t lane = 0; lane < 4; ++lane) {
+            Four::Floats low, high;
+            std::memcpy(&low, at(lane), sizeof low);
+            std::memcpy(&high, at(lane + 4), sizeof high);
+            rows[lane] = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
+        }
+        const Floats a = __builtin_shufflevector(rows[0], rows[1], 0, 8, 1, 9, 4, 12, 5, 13);
+        const Floats b = __builtin_shufflevector(rows[0], rows[1], 2, 10, 3, 11, 6, 14, 7, 15);
+        const Floats c = __builtin_shufflevector(rows[2], rows[3], 0, 8, 1, 9, 4, 12, 5, 13);
+        const Floats d = __builtin_shufflevector(rows[2], rows[3], 2, 10, 3, 11, 6, 14, 7, 15);
+        columns[0] = __builtin_shufflevector(a, c, 0, 1, 8, 9, 4, 5, 12, 13);
+        columns[1] = __builtin_shufflevector(a, c, 2, 3, 10, 11, 6, 7, 14, 15);
+        columns[2] = __builtin_shufflevector(b, d, 0, 1, 8, 9, 4, 5, 12, 13);
+        columns[3] = __builtin_shufflevector(b, d, 2, 3, 10, 11, 6, 7, 14, 15);
+    }
 };
 // The arithmetic on one register's lanes at once.
 template <class Vectors>
@@ -53,6 +100,13 @@ struct Lanes {
     static UNSEEN_INLINE Floats max_of(const Floats& a, const Floats& b) { return a > b ? a : b; }
     static UNSEEN_INLINE Floats abs_of(const Floats& a) { return max_of(a, -a); }
     static UNSEEN_INLINE Floats all(float a) { return Floats{} + a; }
+
+    // A register of what the lanes have. (By way of an array, the processor would wait for its stores.)
+    template <class Register, class Of>
+    static UNSEEN_INLINE Register collect(Of of) {
+        if constexpr (width == 4) return Register{of(0), of(1), of(2), of(3)};
+        else return Register{of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7)};
+    }
 
     static UNSEEN_INLINE Floats load(const float* from) {
         Floats v;
@@ -92,78 +146,94 @@ struct Lanes {
         std::memcpy(&bits, values, sizeof bits);
         return bits;
     }
+    // What all lanes have, those of even and of odd number apart.
+    static UNSEEN_INLINE std::uint64_t united(const Ints& lanes) {
+        const auto pairs = reinterpret_cast<typename Vectors::Pairs>(lanes);
+        if constexpr (width == 4) return pairs[0] | pairs[1];
+        else return (pairs[0] | pairs[1]) | (pairs[2] | pairs[3]);
+    }
     // One bit a lane, the first lane's lowest.
     static UNSEEN_INLINE std::uint32_t bits_of(const Ints& mask) {
-        const Ints bits = mask & lane_bits();
-        std::int32_t lanes[width], sum = 0;
-        std::memcpy(lanes, &bits, sizeof lanes);
-        for (const std::int32_t lane : lanes) sum |= lane;
-        return static_cast<std::uint32_t>(sum);
+        const std::uint64_t sum = united(mask & lane_bits());
+        return static_cast<std::uint32_t>(sum | (sum >> 32));
     }
     static UNSEEN_INLINE Ints mask_of(std::uint32_t bits, std::size_t first) {
         return ((Ints{} + static_cast<std::int32_t>(bits >> first)) & lane_bits()) != 0;
     }
 
-    // The distances of rows at bins. Lookups go lane by lane.
+    // Of a table, at rows and bins. Lookups go lane by lane.
+    static UNSEEN_INLINE Floats entries(const KernelView& view, const float* table, const Ints& rows, const Ints& bins) {
+        const Ints at = view.bins == 1 ? rows : rows * view.bins + bins;
+        return collect<Floats>([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return table[static_cast<std::uint32_t>(at[lane])]; });
+    }
+    // The distances of rows at bins.
     static UNSEEN_INLINE Floats distances(const KernelView& view, const Ints& rows, const Ints& bins, const Floats& lengths) {
-        const Ints entries = rows * view.bins + bins;
-        std::int32_t at[width];
-        std::memcpy(at, &entries, sizeof at);
-        float reach[width];
-        for (std::size_t lane = 0; lane < width; ++lane) reach[lane] = view.reach[static_cast<std::size_t>(at[lane])];
         // A length of 0 times infinity is no number.
-        return max_of(lengths, all(least_length)) * view.inverse_threshold * load(reach);
+        return max_of(lengths, all(least_length)) * view.inverse_threshold * entries(view, view.reach.data(), rows, bins);
     }
 
-    static UNSEEN_INLINE void measure(const KernelView& view, FoldBatch& batch, std::size_t first) {
-        Floats e[3];
-        for (int k = 0; k < 3; ++k) {
-            e[k] = (view.eye_high[k] - load(batch.centre[k] + first)) + view.eye_low[k];
-            store(batch.to_eye[k] + first, e[k]);
-        }
-        const Floats radius = load(batch.radius + first), length = load(batch.length + first);
-        const Floats distance = root_of(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
-        store(batch.distance + first, distance);
-        store(batch.gap + first, distance - radius);
-        Ints bin = {};
+    // What a register's lanes are, and how they look.
+    struct Nodes {
+        Floats centre[3], radius, length, silhouette_length;
+        Ints interior_row, silhouette_row;
+    };
+    struct Measures {
+        Floats to_eye[3], distance, gap, eccentricity, interior, silhouette, height;
+        Ints bin, is_inside, is_near, is_asked;
+    };
+    static UNSEEN_INLINE Measures measure(const KernelView& view, const Nodes& of) {
+        Measures m;
+        Floats* const e = m.to_eye;
+        for (int k = 0; k < 3; ++k) e[k] = (view.eye_high[k] - of.centre[k]) + view.eye_low[k];
+        m.distance = root_of(e[0] * e[0] + e[1] * e[1] + e[2] * e[2]);
+        m.gap = m.distance - of.radius;
+        m.bin = Ints{};
+        m.eccentricity = all(0);
         if (view.has_gaze) {
-            const Floats inverse = 1 / max_of(distance, all(least_length));
+            const Floats inverse = 1 / max_of(m.distance, all(least_length));
             const Floats towards = -(e[0] * view.gaze[0] + e[1] * view.gaze[1] + e[2] * view.gaze[2]) * inverse;
-            const Floats half_angle = pi / 2 - angle_of_cosine(radius * inverse);
-            Floats eccentricity = max_of(angle_of_cosine(towards) - half_angle, all(0));
-            eccentricity = distance > radius ? eccentricity : all(0);
-            store(batch.eccentricity + first, eccentricity);
-            bin = __builtin_convertvector(min_of(eccentricity * view.bins_per_radian, all(static_cast<float>(view.bins - 1))), Ints);
-        } else {
-            store(batch.eccentricity + first, all(0));
+            const Floats half_angle = pi / 2 - angle_of_cosine(of.radius * inverse);
+            const Floats eccentricity = max_of(angle_of_cosine(towards) - half_angle, all(0));
+            m.eccentricity = m.distance > of.radius ? eccentricity : all(0);
+            m.bin = __builtin_convertvector(min_of(m.eccentricity * view.bins_per_radian, all(static_cast<float>(view.bins - 1))), Ints);
         }
-        std::memcpy(batch.bin + first, &bin, sizeof bin);
-        const Floats gap = distance - radius;
-        const Floats interior = distances(view, load(batch.interior_row + first), bin, length);
-        const Floats silhouette =
-            view.nobody ? interior
-                        : max_of(interior, distances(view, load(batch.silhouette_row + first), bin, load(batch.silhouette_length + first)));
-        store(batch.interior + first, interior);
-        store(batch.silhouette + first, silhouette);
+        m.interior = distances(view, of.interior_row, m.bin, of.length);
+        m.silhouette = view.nobody ? m.interior : max_of(m.interior, distances(view, of.silhouette_row, m.bin, of.silhouette_length));
 
-        Floats best = all(view.planes.empty() ? huge : -huge);
+        m.height = all(view.planes.empty() ? huge : -huge);
         for (std::size_t f = 0; f + 1 < view.first_plane.size(); ++f) {
             Floats lowest = all(huge);
             for (std::size_t p = view.first_plane[f]; p < view.first_plane[f + 1]; ++p) {
                 const KernelView::Plane& plane = view.planes[p];
                 lowest = min_of(lowest, plane.offset - (e[0] * plane.normal[0] + e[1] * plane.normal[1] + e[2] * plane.normal[2]));
             }
-            best = max_of(best, lowest + radius);
+            m.height = max_of(m.height, lowest + of.radius);
         }
-        store(batch.height + first, best);
 
-        const Ints is_inside = best >= 0, is_near = gap < interior;
-        Ints is_asked = is_inside & (view.everybody ? gap > 0 : gap < silhouette);
-        if (!view.near_ones_too && !view.everybody) is_asked &= ~is_near;
-        if (view.nobody) is_asked = Ints{};
-        batch.is_inside |= bits_of(is_inside) << first;
-        batch.is_near |= bits_of(is_near) << first;
-        batch.is_asked |= bits_of(is_asked) << first;
+        m.is_inside = m.height >= 0;
+        m.is_near = m.gap < m.interior;
+        m.is_asked = m.is_inside & (view.everybody ? m.gap > 0 : m.gap < m.silhouette);
+        if (!view.near_ones_too && !view.everybody) m.is_asked &= ~m.is_near;
+        if (view.nobody) m.is_asked = Ints{};
+        return m;
+    }
+
+    static UNSEEN_INLINE void measure(const KernelView& view, FoldBatch& batch, std::size_t first) {
+        const Nodes nodes = {{load(batch.centre[0] + first), load(batch.centre[1] + first), load(batch.centre[2] + first)},
+                             load(batch.radius + first), load(batch.length + first), load(batch.silhouette_length + first),
+                             load(batch.interior_row + first), load(batch.silhouette_row + first)};
+        const Measures m = measure(view, nodes);
+        for (int k = 0; k < 3; ++k) store(batch.to_eye[k] + first, m.to_eye[k]);
+        store(batch.distance + first, m.distance);
+        store(batch.gap + first, m.gap);
+        store(batch.eccentricity + first, m.eccentricity);
+        std::memcpy(batch.bin + first, &m.bin, sizeof m.bin);
+        store(batch.interior + first, m.interior);
+        store(batch.silhouette + first, m.silhouette);
+        store(batch.height + first, m.height);
+        batch.is_inside |= bits_of(m.is_inside) << first;
+        batch.is_near |= bits_of(m.is_near) << first;
+        batch.is_asked |= bits_of(m.is_asked) << first;
     }
     static UNSEEN_INLINE void measure(const KernelView& view, FoldBatch& batch) {
         batch.is_inside = batch.is_near = batch.is_asked = 0;
@@ -171,10 +241,7 @@ struct Lanes {
     }
 
     static UNSEEN_INLINE bool any(const Ints& mask) {
-        std::int32_t lanes[width], sum = 0;
-        std::memcpy(lanes, &mask, sizeof lanes);
-        for (const std::int32_t lane : lanes) sum |= lane;
-        return sum != 0;
+        return united(mask) != 0;
     }
 
     // The farther the bins that are looked at, the more the gaze may turn, and the less path is left: the best of a few.
@@ -299,9 +366,21 @@ struct Lanes {
     }
 
     static UNSEEN_INLINE void run(const FacingBatch& batch, const Slabs& slabs, FacingGaps& gaps, std::size_t first) {
-        const Floats e[3] = {load(batch.to_eye[0] + first), load(batch.to_eye[1] + first),
-                             load(batch.to_eye[2] + first)};
-        const Interval slab[3] = {slabs(0, first), slabs(1, first), slabs(2, first)};
+        const Floats e[3] = {load(batch.to_eye[0] + first), load(batch.to_eye[1] + first), load(batch.to_eye[2] + first)};
+        const Gaps found = find_gaps<false>(e, load(batch.radius + first), Ints{}, [&](std::size_t axis) UNSEEN_INLINE_LAMBDA {
+            return slabs(axis, first);
+        });
+        store(gaps.front + first, found.front);
+        store(gaps.back + first, found.back);
+    }
+
+    struct Gaps {
+        Floats front, back;
+    };
+    // With `signs_only` as soon as one of both is positive for all of the `asked` lanes; then only that counts.
+    template <bool signs_only, class SlabOf>
+    static UNSEEN_INLINE Gaps find_gaps(const Floats (&e)[3], const Floats& radius, const Ints& asked, SlabOf slab_of) {
+        const Interval slab[3] = {slab_of(0), slab_of(1), slab_of(2)};
         const Floats distance = abs_of(e[0]) + abs_of(e[1]) + abs_of(e[2]); // an upper bound
         const Floats limit = all(widest_reach * widest_reach * slab_units * slab_units);
         Floats squared[3];
@@ -314,20 +393,24 @@ struct Lanes {
         Best best{all(-1e30f), all(1e30f)};
         best.offer(along[0].lo + along[1].lo + along[2].lo, along[0].hi + along[1].hi + along[2].hi,
                    squared[0] + squared[1] + squared[2] <= limit);
-        const Floats radius = load(batch.radius + first);
         const Floats needed = radius + distance * rounding;
-        // Where the box alone proves everything, with much to spare, the rest would only add to that.
         constexpr float scale = 1 / (slab_units * widest_reach), plenty = 0.125f; // of the distance
-        const Floats spare = needed + distance * plenty;
-        if (!any(~((best.least * scale > spare) | (-best.largest * scale > spare)))) {
-            store(gaps.front + first, best.least * scale - needed);
-            store(gaps.back + first, -best.largest * scale - needed);
-            return;
+        const auto gaps = [&]() UNSEEN_INLINE_LAMBDA { return Gaps{best.least * scale - needed, -best.largest * scale - needed}; };
+        const auto is_proved = [&](const Gaps& found) UNSEEN_INLINE_LAMBDA {
+            return !any(asked & ~((found.front > 0) | (found.back > 0)));
+        };
+        if constexpr (signs_only) {
+            const Gaps found = gaps();
+            if (is_proved(found)) return found;
+        } else {
+            // Where the box alone proves everything, with much to spare, the rest would only add to that.
+            const Floats spare = needed + distance * plenty;
+            if (!any(~((best.least * scale > spare) | (-best.largest * scale > spare)))) return gaps();
         }
         constexpr float signs[4][3] = {{1, 1, 1}, {-1, 1, 1}, {1, -1, 1}, {1, 1, -1}};
 #pragma GCC unroll 4
         for (std::size_t d = 0; d < 4; ++d) {
-            const Interval diagonal = slabs(3 + d, first);
+            const Interval diagonal = slab_of(3 + d);
 #pragma GCC unroll 3
             for (int k = 0; k < 3; ++k) {
                 // The diagonal in place of axis k: e = weight * diagonal + rest along i and j.
@@ -342,22 +425,319 @@ struct Lanes {
                 const Floats reach = max_of(abs_of(low), abs_of(high));
                 best.offer(a.lo + b.lo + c.lo, a.hi + b.hi + c.hi, reach * reach + squared[i] + squared[j] <= limit);
             }
+            if constexpr (signs_only) {
+                const Gaps found = gaps();
+                if (is_proved(found)) return found;
+            }
         }
-        const Floats front = best.least * scale - needed;
-        const Floats back = -best.largest * scale - needed;
-        store(gaps.front + first, front);
-        store(gaps.back + first, back);
+        return gaps();
+    }
+
+    // ---- decisions without slacks
+
+    // The bytes of the lanes' bounds after the sphere, four to an int: what find_gaps() and flags ask for.
+    struct Words {
+        Ints four[4];
+        template <std::size_t at>
+        UNSEEN_INLINE Ints byte() const { // as a signed number
+            return (four[at / 4] << (24 - 8 * (at % 4))) >> 24;
+        }
+        UNSEEN_INLINE Interval slab(std::size_t axis) const {
+            const auto byte_at = [&](std::size_t at) UNSEEN_INLINE_LAMBDA {
+                return __builtin_convertvector((four[at / 4] << static_cast<int>(24 - 8 * (at % 4))) >> 24, Floats);
+            };
+            return {byte_at(axis), byte_at(NormalSlabs::axis_count + axis)};
+        }
+    };
+    template <class Of>
+    static UNSEEN_INLINE void load_sphere(Of sphere_of, Nodes& nodes) {
+        static_assert(sizeof(Sphere) == sizeof(float) * 4);
+        Floats columns[4];
+        Vectors::load_columns(sphere_of, columns);
+        for (int k = 0; k < 3; ++k) nodes.centre[k] = columns[k];
+        nodes.radius = columns[3];
+    }
+    template <class At>
+    static UNSEEN_INLINE Floats load_values(const float* from, At at) {
+        return collect<Floats>([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return from[at(lane)]; });
+    }
+
+    // `at(lane)` is a lane's node.
+    template <class At>
+    static UNSEEN_INLINE Nodes load_nodes(const NodeArrays& arrays, At at) {
+        Nodes nodes;
+        if (arrays.support) load_sphere([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return &arrays.support[at(lane)]; }, nodes);
+        else load_sphere([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return &arrays.bounds[at(lane)].ring; }, nodes);
+        nodes.length = arrays.lengths ? load_values(arrays.lengths, at) : nodes.radius;
+        nodes.silhouette_length = arrays.silhouette_lengths ? load_values(arrays.silhouette_lengths, at) : nodes.length;
+        nodes.interior_row = nodes.silhouette_row = Ints{};
+        if (arrays.classes) {
+            nodes.interior_row = collect<Ints>([&](std::size_t lane) UNSEEN_INLINE_LAMBDA {
+                return static_cast<std::int32_t>(arrays.classes[at(lane)].interior);
+            });
+            nodes.silhouette_row = collect<Ints>([&](std::size_t lane) UNSEEN_INLINE_LAMBDA {
+                return static_cast<std::int32_t>(arrays.classes[at(lane)].silhouette);
+            });
+        }
+        return nodes;
+    }
+
+    struct Facings {
+        Ints silhouette, away;
+    };
+    template <class At>
+    static UNSEEN_INLINE Facings find_facings(const KernelView& view, const NodeArrays& arrays, At at) {
+        Nodes nodes;
+        load_sphere([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return &arrays.bounds[at(lane)].ring; }, nodes);
+        Floats towards[3], columns[4];
+        for (int k = 0; k < 3; ++k) towards[k] = (view.eye_high[k] - nodes.centre[k]) + view.eye_low[k];
+        Vectors::load_columns([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return &arrays.bounds[at(lane)].slabs; }, columns);
+        static_assert(offsetof(NodeBounds, slabs) == 16 && offsetof(NodeBounds, flags) == 30 && sizeof(NodeBounds) == 32);
+        Words words;
+        std::memcpy(words.four, columns, sizeof columns);
+        const Ints irregular = (words.template byte<14>() & std::int32_t{irregular_ring}) != 0;
+        if (arrays.facing) {
+            float slabs[width][4] = {}; // the last two bytes are of no slab
+            for (std::size_t lane = 0; lane < width; ++lane) std::memcpy(slabs[lane], &arrays.facing[at(lane)], sizeof(NormalSlabs));
+            Vectors::load_columns([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return slabs[lane]; }, columns);
+            std::memcpy(words.four, columns, sizeof columns);
+        }
+        const Gaps gaps = find_gaps<true>(towards, nodes.radius, ~irregular,
+                                          [&](std::size_t axis) UNSEEN_INLINE_LAMBDA { return words.slab(axis); });
+        const Ints empty = words.template byte<0>() > words.template byte<NormalSlabs::axis_count>();
+        const Floats &shown = view.is_inside_out ? gaps.back : gaps.front, &hidden = view.is_inside_out ? gaps.front : gaps.back;
+        const Ints front = ~irregular & (empty | (shown > 0)), back = ~irregular & ~empty & (hidden > 0);
+        return {~front & ~back, view.near_ones_too ? back : Ints{}};
+    }
+
+    // Those of a piece of the nodes whose facing matters are looked at together, so that all lanes are of use.
+    template <class NodeAt>
+    static UNSEEN_INLINE void decide_all(const KernelView& view, const NodeArrays& arrays, std::size_t count, NodeAt node_at,
+                                         std::uint64_t* unfolded) {
+        constexpr std::size_t piece = 512, words = piece / 64;
+        for (std::size_t start = 0; start < count; start += piece, unfolded += words) {
+            const std::size_t size = std::min(piece, count - start);
+            std::uint64_t near[words];
+            std::uint16_t asked[piece + width];
+            std::size_t asked_count = 0;
+            for (std::size_t first = 0; first < size; first += 64) {
+                const std::size_t end = std::min(first + 64, size);
+                std::uint64_t seen_bits = 0, near_bits = 0, asked_bits = 0;
+                for (std::size_t i = first; i < end; i += width) {
+                    node_at.prefetch(start + i);
+                    const auto at = [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return node_at(start + i + lane); };
+                    const Measures m = measure(view, load_nodes(arrays, at));
+                    near_bits |= std::uint64_t{bits_of(m.is_near)} << (i - first);
+                    seen_bits |= std::uint64_t{bits_of(m.is_near & m.is_inside)} << (i - first);
+                    if (any(m.is_asked)) asked_bits |= std::uint64_t{bits_of(m.is_asked)} << (i - first);
+                }
+                const std::uint64_t used = end - first < 64 ? (std::uint64_t{1} << (end - first)) - 1 : ~std::uint64_t{0};
+                near[first / 64] = near_bits;
+                unfolded[first / 64] = seen_bits & used;
+                for (asked_bits &= used; asked_bits; asked_bits &= asked_bits - 1)
+                    asked[asked_count++] = static_cast<std::uint16_t>(first + static_cast<std::size_t>(std::countr_zero(asked_bits)));
+            }
+            std::fill_n(asked + asked_count, width, asked_count > 0 ? asked[0] : std::uint16_t{0});
+            for (std::size_t first = 0; first < asked_count; first += width) {
+                const auto at = [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return node_at(start + asked[first + lane]); };
+                const Facings f = find_facings(view, arrays, at);
+                const std::uint32_t silhouettes = bits_of(f.silhouette), away = bits_of(f.away);
+                for (std::size_t lane = 0; lane < std::min(width, asked_count - first); ++lane) {
+                    const std::size_t i = asked[first + lane], word = i / 64, bit = i % 64;
+                    const std::uint64_t seen = ((near[word] >> bit) | (silhouettes >> lane)) & ~std::uint64_t{away >> lane} & 1;
+                    unfolded[word] = (unfolded[word] & ~(std::uint64_t{1} << bit)) | (seen << bit);
+                }
+            }
+        }
+    }
+
+    struct Listed {
+        const NodeArrays& arrays;
+        const NodeId* nodes;
+        std::size_t last;
+        UNSEEN_INLINE NodeId operator()(std::size_t i) const { return nodes[std::min(i, last)]; }
+        UNSEEN_INLINE void prefetch(std::size_t i) const {
+            constexpr std::size_t ahead = 32; // nodes between a prefetch and its use
+            for (std::size_t lane = 0; lane < width; ++lane) prefetch_node(arrays, (*this)(i + ahead + lane));
+        }
+    };
+    static UNSEEN_INLINE void decide(const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes, std::uint64_t* unfolded) {
+        decide_all(view, arrays, nodes.size(), Listed{arrays, nodes.data(), nodes.size() - 1}, unfolded);
+    }
+    static UNSEEN_INLINE void decide(const KernelView& view, const NodeArrays& arrays, NodeId start, std::size_t count, std::uint64_t* unfolded) {
+        struct Range {
+            std::size_t start;
+            UNSEEN_INLINE std::size_t operator()(std::size_t i) const { return start + i; }
+            UNSEEN_INLINE void prefetch(std::size_t) const {}
+        };
+        // Whole registers only; what is left goes node by node.
+        const std::size_t whole = count / 64 * 64;
+        decide_all(view, arrays, whole, Range{start}, unfolded);
+        if (whole == count) return;
+        NodeId rest[64];
+        for (std::size_t i = 0; i < count - whole; ++i) rest[i] = static_cast<NodeId>(start + whole + i);
+        decide(view, arrays, std::span(rest, count - whole), unfolded + whole / 64);
+    }
+
+    struct Costs {
+        Floats cost, seen;
+    };
+    // By one row. See FoldTester::set_costs().
+    static UNSEEN_INLINE Costs costs_of(const KernelView& view, const CostTables& tables, const Ints& row, const Measures& m, const Floats& unit) {
+        const Floats reach = entries(view, tables.reach, row, m.bin), length = unit * reach;
+        const Ints seldom = (reach < 0) | ((length <= 0) & (m.gap > 0)); // from nowhere, or from inside only
+        const Ints always = (reach >= DistanceCriterion::always_visible) | (m.gap <= 0);
+        const Floats cost = always ? all(std::numeric_limits<float>::infinity()) : length / m.gap;
+        Costs costs{seldom ? all(0) : cost, {}};
+        costs.seen = costs.cost;
+        if (tables.least_cost) costs.seen = seldom ? all(0) : max_of(cost, entries(view, tables.least_cost, row, m.bin));
+        return costs;
+    }
+
+    // Like decide_all().
+    static UNSEEN_INLINE void find_costs(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
+                                         std::span<const NodeId> nodes, const NodeCosts& out) {
+        constexpr std::size_t piece = 256;
+        const Listed listed{arrays, nodes.data(), nodes.size() - 1};
+        for (std::size_t start = 0; start < nodes.size(); start += piece) {
+            const std::size_t size = std::min(piece, nodes.size() - start);
+            // Of the interior; of the outline, where it is one; whether they unfold as the one and as the other.
+            alignas(64) float cost[piece + width], seen[piece + width], outline_cost[piece + width], outline_seen[piece + width];
+            std::uint8_t interior_unfolds[piece + width], outline_unfolds[piece + width];
+            std::uint16_t asked[piece + width];
+            std::size_t asked_count = 0;
+            for (std::size_t i = 0; i < size; i += width) {
+                listed.prefetch(start + i);
+                const Nodes of = load_nodes(arrays, [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return listed(start + i + lane); });
+                const Measures m = measure(view, of);
+                const Costs inner = costs_of(view, tables, of.interior_row, m, of.length);
+                Costs outline = costs_of(view, tables, of.silhouette_row, m, of.silhouette_length);
+                outline = {max_of(inner.cost, outline.cost), max_of(inner.seen, outline.seen)};
+                const Ints as_outline = ~m.is_asked & ~m.is_near; // the eye is inside, and it does not matter
+                store(cost + i, m.is_inside ? (as_outline ? outline.cost : inner.cost) : all(0));
+                store(seen + i, m.is_inside ? (as_outline ? outline.seen : inner.seen) : all(0));
+                store(outline_cost + i, outline.cost);
+                store(outline_seen + i, outline.seen);
+                const std::uint32_t near = bits_of(m.is_near & m.is_inside), within = bits_of(m.gap < m.silhouette);
+                const std::uint32_t asked_bits = bits_of(m.is_asked);
+                for (std::size_t lane = 0; lane < width; ++lane) {
+                    interior_unfolds[i + lane] = (near >> lane) & 1;
+                    outline_unfolds[i + lane] = ((near | within) >> lane) & 1;
+                    asked[asked_count] = static_cast<std::uint16_t>(i + lane);
+                    asked_count += (asked_bits >> lane) & 1 & (i + lane < size);
+                }
+            }
+            std::fill_n(asked + asked_count, width, asked_count > 0 ? asked[0] : std::uint16_t{0});
+            for (std::size_t first = 0; first < asked_count; first += width) {
+                const auto at = [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return listed(start + asked[first + lane]); };
+                const Facings f = find_facings(view, arrays, at);
+                const std::uint32_t silhouettes = bits_of(f.silhouette), away = bits_of(f.away);
+                for (std::size_t lane = 0; lane < std::min(width, asked_count - first); ++lane) {
+                    const std::size_t i = asked[first + lane];
+                    if ((away >> lane) & 1) cost[i] = seen[i] = 0, interior_unfolds[i] = 0;
+                    else if ((silhouettes >> lane) & 1) {
+                        cost[i] = outline_cost[i], seen[i] = outline_seen[i];
+                        interior_unfolds[i] = outline_unfolds[i];
+                    }
+                }
+            }
+            std::copy_n(cost, size, out.cost + start);
+            std::copy_n(seen, size, out.seen_cost + start);
+            for (std::size_t first = 0; first < size; first += 64) {
+                std::uint64_t bits = 0;
+                for (std::size_t i = first; i < std::min(first + 64, size); ++i) bits |= std::uint64_t{interior_unfolds[i]} << (i - first);
+                out.unfolded[(start + first) / 64] = bits;
+            }
+        }
     }
 };
 
+// ---- blocks: a register at a time, then one by one
+
+// The eye has moved by `path`. Seen from a point of the sphere, it has turned by that over the mean distance at most; the distances of
+// the point and of the centre change alike but for that angle times the way between them.
+template <class Floats, class Ints>
+UNSEEN_INLINE Floats error_of(const Floats& before, const Floats& after, const Floats& radius, float path) {
+    const Floats between = before + after - 2 * radius, turned = 2 * path * radius / between;
+    const Floats most = Floats{} + 2 * path;
+    return (between > 0) & (turned < most) ? turned : most;
+}
+
+template <class Vectors>
+UNSEEN_INLINE void move_blocks(const float (&eye_high)[3], const float (&eye_low)[3], float path, BlockSpheres& spheres) {
+    using L = Lanes<Vectors>;
+    using Floats = typename Vectors::Floats;
+    const auto move = [&](const float* x, const float* y, const float* z, const float* r, float* distance, float* error) UNSEEN_INLINE_LAMBDA {
+        const Floats ex = (eye_high[0] - L::load(x)) + eye_low[0], ey = (eye_high[1] - L::load(y)) + eye_low[1],
+                     ez = (eye_high[2] - L::load(z)) + eye_low[2];
+        const Floats after = L::root_of(ex * ex + ey * ey + ez * ez);
+        const Floats more = error_of<Floats, typename Vectors::Ints>(L::load(distance), after, L::load(r), path);
+        constexpr float up = 1 + 5e-7f; // small steps must not be lost in the sum's rounding
+        L::store(error, (L::load(error) + more) * up);
+        L::store(distance, after);
+    };
+    const std::size_t count = spheres.x.size();
+    std::size_t i = 0;
+    for (; i + L::width <= count; i += L::width)
+        move(&spheres.x[i], &spheres.y[i], &spheres.z[i], &spheres.radius[i], &spheres.distance[i], &spheres.error[i]);
+    if (i == count) return;
+    float rest[6][L::width] = {};
+    std::vector<float>* const values[6] = {&spheres.x, &spheres.y, &spheres.z, &spheres.radius, &spheres.distance, &spheres.error};
+    for (std::size_t v = 0; v < 6; ++v) std::copy(values[v]->begin() + static_cast<std::ptrdiff_t>(i), values[v]->end(), rest[v]);
+    move(rest[0], rest[1], rest[2], rest[3], rest[4], rest[5]);
+    for (std::size_t v = 4; v < 6; ++v) std::copy_n(rest[v], count - i, values[v]->begin() + static_cast<std::ptrdiff_t>(i));
+}
+
+template <class Vectors>
+UNSEEN_INLINE void find_due(float position, float facing, const BlockSpheres& spheres, const BlockDeadlines& deadlines, std::uint64_t* due) {
+    using L = Lanes<Vectors>;
+    const std::size_t count = spheres.x.size();
+    for (std::size_t first = 0; first < count; first += 64) {
+        std::uint64_t bits = 0;
+        const std::size_t end = std::min(first + 64, count);
+        std::size_t i = first;
+        for (; i + L::width <= end; i += L::width) {
+            const auto distance = L::load(&spheres.distance[i]), passed = L::load(&spheres.error[i]) + position;
+            const auto is_due = (L::load(&deadlines.recede[i]) <= passed + distance) | (L::load(&deadlines.approach[i]) <= passed - distance) |
+                                (L::load(&deadlines.facing[i]) <= facing);
+            if (L::any(is_due)) bits |= std::uint64_t{L::bits_of(is_due)} << (i - first);
+        }
+        for (; i < end; ++i) {
+            const float distance = spheres.distance[i], passed = spheres.error[i] + position;
+            const bool is_due = deadlines.recede[i] <= passed + distance || deadlines.approach[i] <= passed - distance ||
+                                deadlines.facing[i] <= facing;
+            bits |= std::uint64_t{is_due} << (i - first);
+        }
+        due[first / 64] = bits;
+    }
+}
+
 #if defined(__x86_64__) && defined(__GNUC__)
 
+[[gnu::target("avx2")]] void move_blocks_avx2(const float (&eye_high)[3], const float (&eye_low)[3], float path, BlockSpheres& spheres) {
+    move_blocks<Eight>(eye_high, eye_low, path, spheres);
+}
+[[gnu::target("avx2")]] void find_due_avx2(float position, float facing, const BlockSpheres& spheres, const BlockDeadlines& deadlines,
+                                           std::uint64_t* due) {
+    find_due<Eight>(position, facing, spheres, deadlines, due);
+}
 [[gnu::target("avx2")]] void measure_avx2(const KernelView& view, FoldBatch& batch) { Lanes<Eight>::measure(view, batch); }
 [[gnu::target("avx2")]] void find_slacks_avx2(const KernelView& view, SlackBatch& batch) { Lanes<Eight>::find_slacks(view, batch); }
 [[gnu::target("avx2")]] void finish_slacks_avx2(const KernelView& view, const FoldBatch& batch, Findings& findings) {
     Lanes<Eight>::finish_slacks(view, batch, findings);
 }
 [[gnu::target("avx2")]] void facing_gaps_avx2(const FacingBatch& batch, FacingGaps& gaps) { Lanes<Eight>::run(batch, gaps); }
+[[gnu::target("avx2")]] void decide_avx2(const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes, std::uint64_t* unfolded) {
+    Lanes<Eight>::decide(view, arrays, nodes, unfolded);
+}
+[[gnu::target("avx2")]] void find_costs_avx2(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
+                                             std::span<const NodeId> nodes, const NodeCosts& costs) {
+    Lanes<Eight>::find_costs(view, arrays, tables, nodes, costs);
+}
+[[gnu::target("avx2")]] void decide_range_avx2(const KernelView& view, const NodeArrays& arrays, NodeId first, std::size_t count,
+                                               std::uint64_t* unfolded) {
+    Lanes<Eight>::decide(view, arrays, first, count, unfolded);
+}
 const bool has_avx2 = __builtin_cpu_supports("avx2");
 
 #else
@@ -367,6 +747,11 @@ void measure_avx2(const KernelView&, FoldBatch&) {}
 void find_slacks_avx2(const KernelView&, SlackBatch&) {}
 void finish_slacks_avx2(const KernelView&, const FoldBatch&, Findings&) {}
 void facing_gaps_avx2(const FacingBatch&, FacingGaps&) {}
+void move_blocks_avx2(const float (&)[3], const float (&)[3], float, BlockSpheres&) {}
+void find_due_avx2(float, float, const BlockSpheres&, const BlockDeadlines&, std::uint64_t*) {}
+void decide_avx2(const KernelView&, const NodeArrays&, std::span<const NodeId>, std::uint64_t*) {}
+void find_costs_avx2(const KernelView&, const NodeArrays&, const CostTables&, std::span<const NodeId>, const NodeCosts&) {}
+void decide_range_avx2(const KernelView&, const NodeArrays&, NodeId, std::size_t, std::uint64_t*) {}
 
 #endif
 
@@ -391,6 +776,33 @@ void finish_slacks(const KernelView& view, const FoldBatch& batch, Findings& fin
 void facing_gaps(const FacingBatch& batch, FacingGaps& gaps) noexcept {
     if (has_avx2) facing_gaps_avx2(batch, gaps);
     else Lanes<Four>::run(batch, gaps);
+}
+
+void decide(const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes, std::uint64_t* unfolded) noexcept {
+    if (has_avx2) decide_avx2(view, arrays, nodes, unfolded);
+    else Lanes<Four>::decide(view, arrays, nodes, unfolded);
+}
+
+void find_costs(const KernelView& view, const NodeArrays& arrays, const CostTables& tables, std::span<const NodeId> nodes,
+                const NodeCosts& costs) noexcept {
+    if (has_avx2) find_costs_avx2(view, arrays, tables, nodes, costs);
+    else Lanes<Four>::find_costs(view, arrays, tables, nodes, costs);
+}
+
+void decide_range(const KernelView& view, const NodeArrays& arrays, NodeId first, std::size_t count, std::uint64_t* unfolded) noexcept {
+    if (has_avx2) decide_range_avx2(view, arrays, first, count, unfolded);
+    else Lanes<Four>::decide(view, arrays, first, count, unfolded);
+}
+
+void move_blocks(const float (&eye_high)[3], const float (&eye_low)[3], float path, BlockSpheres& spheres) noexcept {
+    if (has_avx2) move_blocks_avx2(eye_high, eye_low, path, spheres);
+    else move_blocks<Four>(eye_high, eye_low, path, spheres);
+}
+
+void find_due(float position_clock, float facing_clock, const BlockSpheres& spheres, const BlockDeadlines& deadlines,
+              std::uint64_t* due) noexcept {
+    if (has_avx2) find_due_avx2(position_clock, facing_clock, spheres, deadlines, due);
+    else find_due<Four>(position_clock, facing_clock, spheres, deadlines, due);
 }
 
 } // namespace unseen::vdtree

@@ -1,5 +1,5 @@
-// The arithmetic of fold tests, sixteen nodes at once: where their spheres are, seen from the eye, and how far the eye is from
-// where their rings would face it otherwise.
+// The arithmetic of fold tests, many nodes at once: where their spheres are, seen from the eye, how far the eye is from where their rings
+// would face it otherwise, and what follows from both; and of what tells when to test again.
 #pragma once
 
 #include <array>
@@ -8,7 +8,11 @@
 #include <span>
 #include <vector>
 
+#include <glm/vec3.hpp>
+
+#include <vdtree/distance_criterion.h>
 #include <vdtree/normal_mask.h>
+#include <vdtree/vertex_tree.h>
 
 namespace unseen::vdtree {
 
@@ -38,7 +42,36 @@ struct KernelView {
     bool near_ones_too = false;   // ... nodes within the interior's, too, or
     bool everybody = false;       // ... all that the eye is not inside of, or
     bool nobody = false;          // ... none
+
+    bool is_inside_out = false;   // the surface: the side that is seen is the one that its normals point away from
 };
+
+// What tests read, by interior node; null where a criterion has none of it.
+struct NodeArrays {
+    const NodeBounds* bounds = nullptr;
+    const Sphere* support = nullptr;      // whose distance counts; null: the ring's
+    const FoldClass* classes = nullptr;
+    const NormalSlabs* facing = nullptr;  // null: those of the bounds
+    const float *lengths = nullptr, *silhouette_lengths = nullptr; // null: the radii, and the lengths
+};
+
+// Only whether nodes unfold, bit for bit as the tests with slacks below find it: one bit a node, the first node's lowest, of as many
+// whole words as that takes. Cost: some nanoseconds a node where these are neighbours, and memory's latency overlaps where not.
+void decide(const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes, std::uint64_t* unfolded) noexcept;
+void decide_range(const KernelView& view, const NodeArrays& arrays, NodeId first, std::size_t count, std::uint64_t* unfolded) noexcept;
+
+// What the costs of folds are looked up in: a criterion's own tables, [row * bins + bin]; the second one may be null.
+struct CostTables {
+    const float *reach = nullptr, *least_cost = nullptr;
+};
+// The thresholds at which nodes would just fold, without and with their least costs, and whether they unfold at the view's. `view` must
+// ask for the facing of everybody.
+struct NodeCosts {
+    float *cost, *seen_cost;  // by place in `nodes`
+    std::uint64_t* unfolded;  // like decide()'s
+};
+void find_costs(const KernelView& view, const NodeArrays& arrays, const CostTables& tables, std::span<const NodeId> nodes,
+                const NodeCosts& costs) noexcept;
 
 // Sixteen nodes.
 struct FoldBatch {
@@ -111,5 +144,52 @@ struct FacingGaps {
     alignas(64) float back[kernel_lanes];
 };
 void facing_gaps(const FacingBatch& batch, FacingGaps& gaps) noexcept;
+
+// Spheres around the centres of some nodes each, and what the eye's way has made of them.
+struct BlockSpheres {
+    std::vector<float> x, y, z, radius;
+    std::vector<float> distance; // of the sphere's centre from the eye
+    std::vector<float> error;    // how much more than `distance` a node's distance may have changed, in all
+
+    void push_back() {
+        for (auto* values : {&x, &y, &z, &radius, &distance, &error}) values->push_back(0);
+    }
+    void clear() noexcept {
+        for (auto* values : {&x, &y, &z, &radius, &distance, &error}) values->clear();
+    }
+    void reserve(std::size_t blocks) {
+        for (auto* values : {&x, &y, &z, &radius, &distance, &error}) values->reserve(blocks);
+    }
+    void set(std::size_t block, const glm::vec3& centre, float r, float d) noexcept {
+        x[block] = centre.x, y[block] = centre.y, z[block] = centre.z;
+        radius[block] = r, distance[block] = d, error[block] = 0;
+    }
+    glm::vec3 centre(std::size_t block) const noexcept { return {x[block], y[block], z[block]}; }
+    std::uint64_t byte_size() const noexcept { return 6 * sizeof(float) * x.capacity(); }
+};
+// The eye goes by `path` to a new place.
+void move_blocks(const float (&eye_high)[3], const float (&eye_low)[3], float path, BlockSpheres& spheres) noexcept;
+
+// When distances that grow, or shrink, and the facing clock may change something.
+struct BlockDeadlines {
+    std::vector<float> recede, approach, facing;
+
+    void push_back(float value) {
+        for (auto* values : {&recede, &approach, &facing}) values->push_back(value);
+    }
+    void clear() noexcept {
+        for (auto* values : {&recede, &approach, &facing}) values->clear();
+    }
+    void reserve(std::size_t blocks) {
+        for (auto* values : {&recede, &approach, &facing}) values->reserve(blocks);
+    }
+    void set(std::size_t block, float receding, float approaching, float turning) noexcept {
+        recede[block] = receding, approach[block] = approaching, facing[block] = turning;
+    }
+    std::uint64_t byte_size() const noexcept { return 3 * sizeof(float) * recede.capacity(); }
+};
+// One bit a block: a deadline has come.
+void find_due(float position_clock, float facing_clock, const BlockSpheres& spheres, const BlockDeadlines& deadlines,
+              std::uint64_t* due) noexcept;
 
 } // namespace unseen::vdtree

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 #include <glm/geometric.hpp>
@@ -36,15 +37,11 @@ void load(std::span<const FoldCandidate* const> lanes, FoldBatch& batch) {
 } // namespace
 
 FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterion, bool cull_back_faces, float threshold, bool least_costs)
-    : tree_(tree), criterion_(criterion), cull_back_faces_(cull_back_faces),
-      is_inside_out_(tree.closedness() == Closedness::closed_inward), has_silhouettes_(criterion.uses_silhouettes()),
-      bounds_(tree.bounds().data()) {
+    : tree_(tree), criterion_(criterion), cull_back_faces_(cull_back_faces), has_silhouettes_(criterion.uses_silhouettes()) {
     const DistanceCriterion::Parts& parts = criterion.parts();
-    support_ = parts.spheres == DistanceCriterion::Spheres::support ? tree.support_spheres().data() : nullptr;
-    classes_ = parts.classes.empty() ? nullptr : parts.classes.data();
-    facing_ = parts.facing.empty() ? nullptr : parts.facing.data();
-    lengths_ = parts.lengths.empty() ? nullptr : parts.lengths.data();
-    silhouette_lengths_ = parts.silhouette_lengths.empty() ? nullptr : parts.silhouette_lengths.data();
+    const auto data_of = [](const auto& values) { return values.empty() ? nullptr : values.data(); };
+    arrays_ = {tree.bounds().data(), parts.spheres == DistanceCriterion::Spheres::support ? tree.support_spheres().data() : nullptr,
+               data_of(parts.classes), data_of(parts.facing), data_of(parts.lengths), data_of(parts.silhouette_lengths)};
     const bool has_least_costs = least_costs && !parts.least_cost.empty();
     reach_.resize(parts.reach.size());
     for (std::size_t i = 0; i < reach_.size(); ++i) {
@@ -57,6 +54,7 @@ FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterio
     view_.bins_per_radian = static_cast<float>(180 / (std::numbers::pi * parts.bin_degrees));
     view_.inverse_threshold = 1 / threshold;
     view_.near_ones_too = cull_back_faces;
+    view_.is_inside_out = tree.closedness() == Closedness::closed_inward;
     view_.nobody = !cull_back_faces && !has_silhouettes_;
     if (parts.lit) lit_.emplace(tree, *parts.lit, reach_, parts.eccentricity_bins);
 }
@@ -86,27 +84,27 @@ void FoldTester::look_from(const Viewpoint& viewpoint, double length_per_radian)
 }
 
 FoldCandidate FoldTester::candidate(NodeId node) const {
-    const NodeBounds& around = bounds_[node];
+    const NodeBounds& around = arrays_.bounds[node];
     FoldCandidate candidate;
-    candidate.sphere = support_ ? support_[node] : around.ring;
-    candidate.length = lengths_ ? lengths_[node] : candidate.sphere.radius;
-    candidate.silhouette_length = silhouette_lengths_ ? silhouette_lengths_[node] : candidate.length;
-    if (classes_) candidate.rows = classes_[node];
+    candidate.sphere = arrays_.support ? arrays_.support[node] : around.ring;
+    candidate.length = arrays_.lengths ? arrays_.lengths[node] : candidate.sphere.radius;
+    candidate.silhouette_length = arrays_.silhouette_lengths ? arrays_.silhouette_lengths[node] : candidate.length;
+    if (arrays_.classes) candidate.rows = arrays_.classes[node];
     candidate.ring = around.ring;
-    candidate.slabs = facing_ ? facing_[node] : around.slabs;
+    candidate.slabs = arrays_.facing ? arrays_.facing[node] : around.slabs;
     candidate.flags = around.flags;
     candidate.node = node;
     return candidate;
 }
 
 void FoldTester::prefetch(NodeId node) const {
-    vdtree::prefetch(bounds_ + node);
-    if (support_) vdtree::prefetch(support_ + node);
-    if (classes_) vdtree::prefetch(classes_ + node);
+    vdtree::prefetch(arrays_.bounds + node);
+    if (arrays_.support) vdtree::prefetch(arrays_.support + node);
+    if (arrays_.classes) vdtree::prefetch(arrays_.classes + node);
+    if (arrays_.facing) vdtree::prefetch(arrays_.facing + node);
+    if (arrays_.lengths) vdtree::prefetch(arrays_.lengths + node);
+    if (arrays_.silhouette_lengths) vdtree::prefetch(arrays_.silhouette_lengths + node);
     if (lit_) lit_->prefetch(node);
-    if (facing_) vdtree::prefetch(facing_ + node);
-    if (lengths_) vdtree::prefetch(lengths_ + node);
-    if (silhouette_lengths_) vdtree::prefetch(silhouette_lengths_ + node);
 }
 
 void FoldTester::test(std::span<const FoldCandidate> candidates, std::span<const std::uint32_t> which, std::span<Verdict> verdicts) const {
@@ -133,6 +131,41 @@ void FoldTester::test(std::span<const FoldCandidate> candidates, std::span<Verdi
 void FoldTester::test(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const { test_nodes(nodes, verdicts, false); }
 
 void FoldTester::test_costs(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const { test_nodes(nodes, verdicts, true); }
+
+// Lights have no short cuts: what they make of nodes is found with all the rest.
+void FoldTester::decide(std::span<const NodeId> nodes, std::uint64_t* unfolded) const {
+    if (!lit_) return vdtree::decide(view_, arrays_, nodes, unfolded);
+    std::array<Verdict, 64> verdicts;
+    for (std::size_t first = 0; first < nodes.size(); first += verdicts.size()) {
+        const std::size_t count = std::min(verdicts.size(), nodes.size() - first);
+        test_nodes(nodes.subspan(first, count), std::span(verdicts).first(count), false);
+        std::uint64_t& word = unfolded[first / 64] = 0;
+        for (std::size_t i = 0; i < count; ++i) word |= std::uint64_t{verdicts[i].unfolded} << i;
+    }
+}
+
+void FoldTester::decide_range(NodeId first, std::size_t count, std::uint64_t* unfolded) const {
+    if (!lit_) return vdtree::decide_range(view_, arrays_, first, count, unfolded);
+    std::vector<NodeId> nodes(count);
+    std::iota(nodes.begin(), nodes.end(), first);
+    decide(nodes, unfolded);
+}
+
+void FoldTester::find_costs(std::span<const NodeId> nodes, const NodeCosts& costs) const {
+    if (lit_) {
+        std::vector<Verdict> verdicts(nodes.size());
+        test_nodes(nodes, verdicts, true);
+        std::fill_n(costs.unfolded, (nodes.size() + 63) / 64, 0);
+        for (std::size_t i = 0; i < nodes.size(); ++i) {
+            costs.cost[i] = verdicts[i].cost;
+            costs.seen_cost[i] = verdicts[i].seen_cost;
+            costs.unfolded[i / 64] |= std::uint64_t{verdicts[i].unfolded} << (i % 64);
+        }
+        return;
+    }
+    const DistanceCriterion::Parts& parts = criterion_.parts();
+    vdtree::find_costs(costs_view_, arrays_, {parts.reach.data(), parts.least_cost.empty() ? nullptr : parts.least_cost.data()}, nodes, costs);
+}
 
 void FoldTester::test_nodes(std::span<const NodeId> nodes, std::span<Verdict> verdicts, bool costs) const {
     std::array<FoldCandidate, kernel_lanes> candidates;
@@ -174,7 +207,7 @@ void FoldTester::find_facings(Lanes candidates, const FoldBatch& batch, bool cos
     for (std::uint32_t left = batch.is_asked; left; left &= left - 1) {
         const auto i = static_cast<std::size_t>(std::countr_zero(left));
         const FoldCandidate& of = *candidates[i];
-        if (!support_) {
+        if (!arrays_.support) {
             facing.set(count, of.slabs, batch.to_eye[0][i], batch.to_eye[1][i], batch.to_eye[2][i], of.ring.radius);
         } else { // another sphere than the one measured
             const auto towards = [&](int k) { return (view_.eye_high[k] - of.ring.centre[k]) + view_.eye_low[k]; };
@@ -190,9 +223,9 @@ void FoldTester::find_facings(Lanes candidates, const FoldBatch& batch, bool cos
         const std::uint32_t bit = 1u << i;
         const FoldCandidate& around = *candidates[i];
         float front = gaps.front[k], back = gaps.back[k];
+        if (view_.is_inside_out) std::swap(front, back);
         if (around.flags & irregular_ring) front = back = -infinity;       // an outline from everywhere
         else if (around.slabs.empty()) front = infinity, back = -infinity; // no triangle with an area
-        if (is_inside_out_) std::swap(front, back);
         const bool is_silhouette = !(front > 0) && !(back > 0), is_near = batch.is_near & bit;
         if (cull_back_faces_ && back > 0) {
             findings.away |= bit;

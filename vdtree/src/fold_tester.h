@@ -58,6 +58,8 @@ public:
     // position clock; any positive value will do, and it must be the same for verdicts and motions.
     void look_from(const Viewpoint& viewpoint, double length_per_radian);
 
+    bool uses_gaze() const noexcept { return view_.has_gaze; } // from the current viewpoint
+
     FoldCandidate candidate(NodeId node) const;
     void prefetch(NodeId node) const; // what candidate(node) will read
 
@@ -65,6 +67,11 @@ public:
     void test(std::span<const FoldCandidate> candidates, std::span<const std::uint32_t> which, std::span<Verdict> verdicts) const;
     void test(std::span<const FoldCandidate> candidates, std::span<Verdict> verdicts) const;
     void test(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const;
+    // Only whether they unfold, one bit each; the same verdicts.
+    void decide(std::span<const NodeId> nodes, std::uint64_t* unfolded) const;
+    void decide_range(NodeId first, std::size_t count, std::uint64_t* unfolded) const;
+    // Both costs of nodes, and whether they unfold; the same as those of test_costs().
+    void find_costs(std::span<const NodeId> nodes, const NodeCosts& costs) const;
     // The same where costs count, not only what is above the threshold: what nodes face is always found out. (In the above, the
     // costs of nodes that are far from the threshold may be those of another facing.)
     void test_costs(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const;
@@ -86,13 +93,8 @@ private:
 
     const VertexTree& tree_;
     const DistanceCriterion& criterion_;
-    bool cull_back_faces_, is_inside_out_, has_silhouettes_;
-    // Of the tree and the criterion, by node; null where they have none.
-    const NodeBounds* bounds_;
-    const Sphere* support_;
-    const FoldClass* classes_;
-    const NormalSlabs* facing_;
-    const float *lengths_, *silhouette_lengths_;
+    bool cull_back_faces_, has_silhouettes_;
+    NodeArrays arrays_;        // of the tree and the criterion
     std::vector<float> reach_; // of the criterion; infinite where the fold is seen from everywhere
     KernelView view_, costs_view_;
     std::optional<LitTester> lit_; // where lights give the classes

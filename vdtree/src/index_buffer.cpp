@@ -12,8 +12,8 @@ namespace {
 
 constexpr unsigned least_log2_size = 3; // a cache line: the head and the seven corners that nearly every vertex makes do with
 constexpr unsigned most_log2_size = 27;
-// While lists are made, what a node has is a count, then a block with this bit.
-constexpr std::uint32_t is_block = 1u << 31;
+// While lists are made, what a node has is a count with this bit, then a block.
+constexpr std::uint32_t is_count = 1u << 31;
 
 unsigned log2_size_for(std::uint32_t corners) {
     return std::max<unsigned>(least_log2_size, static_cast<unsigned>(std::bit_width(corners)));
@@ -28,13 +28,28 @@ void for_each_set(std::span<const std::uint64_t> bits, F&& f) {
 
 } // namespace
 
+// Calls f(node) for the nodes that have triangles to show, in order, with their triangles on the way.
+template <class F>
+void IndexBuffer::for_each_unfolded(std::span<const std::uint64_t> unfolded, F&& f) {
+    nodes_.clear();
+    for_each_set(unfolded, [&](NodeId node) { nodes_.push_back(node); });
+    const auto first = tree_->first_triangle();
+    const auto triangles = tree_->triangles();
+    constexpr std::size_t far = 16, near = 8; // nodes between a prefetch and its use
+    for (std::size_t i = 0; i < nodes_.size(); ++i) {
+        if (i + far < nodes_.size()) prefetch(&first[nodes_[i + far]]);
+        if (i + near < nodes_.size()) prefetch(triangles.data() + first[nodes_[i + near]]);
+        f(nodes_[i]);
+    }
+}
+
 void IndexBuffer::gather(std::span<const std::uint64_t> unfolded, std::span<const NodeId> proxies, Index triangles) {
     drop_lists();
     indices_.resize(std::size_t{3} * triangles);
     const auto first = tree_->first_triangle();
     const auto corners = tree_->triangles();
     NodeId* out = indices_.data();
-    for_each_set(unfolded, [&](NodeId node) {
+    for_each_unfolded(unfolded, [&](NodeId node) {
         for (Index t = first[node]; t < first[node + 1]; ++t)
             for (const Index leaf : corners[t]) *out++ = proxies[leaf];
     });
@@ -43,48 +58,52 @@ void IndexBuffer::gather(std::span<const std::uint64_t> unfolded, std::span<cons
 void IndexBuffer::make_lists(std::span<const std::uint64_t> unfolded) {
     // Only what is shown is touched, so that the cost does not go with the tree.
     if (block_of_node_.empty()) block_of_node_.assign(tree_->node_count(), no_block);
-    for (const NodeId node : indices_) block_of_node_[node] = 0;
-    for (const NodeId node : indices_) ++block_of_node_[node];
-    // Counts become blocks, in the order in which the buffer first shows the nodes, so that neighbours lie together.
+    constexpr std::size_t ahead = 16; // corners between a prefetch and its use
+    const auto prefetch_ahead = [&](std::size_t corner) {
+        if (corner + ahead < indices_.size()) prefetch(&block_of_node_[indices_[corner + ahead]]);
+    };
+    // First counts, and what lists of them take.
     std::uint64_t all_entries = 0;
     std::uint32_t longest = 0;
-    for (const NodeId node : indices_) {
-        std::uint32_t& count = block_of_node_[node];
-        if (count & is_block) continue;
-        longest = std::max(longest, count);
-        all_entries += std::uint64_t{1} << log2_size_for(count);
-        count |= is_block; // still the count: seen
+    for (std::size_t corner = 0; corner < indices_.size(); ++corner) {
+        prefetch_ahead(corner);
+        std::uint32_t& counted = block_of_node_[indices_[corner]];
+        const std::uint32_t count = counted == no_block ? 0 : counted & ~is_count;
+        if (count == 0) all_entries += std::uint64_t{1} << least_log2_size;
+        else if (log2_size_for(count + 1) > log2_size_for(count)) all_entries += std::uint64_t{1} << log2_size_for(count);
+        longest = std::max(longest, count + 1);
+        counted = (count + 1) | is_count;
     }
     has_lists_ = true;
-    if (log2_size_for(longest) > most_log2_size || all_entries >= is_block) {
+    if (log2_size_for(longest) > most_log2_size || all_entries >= is_count) {
         drop_lists();
         return;
     }
-    for (const NodeId node : indices_) block_of_node_[node] &= ~is_block;
     for (auto& blocks : free_blocks_) blocks.clear();
     holes_.clear();
     pool_.clear();
     pool_.resize(all_entries / std::size(Line{}.entries));
+    // Counts become blocks, in the order in which the buffer first shows the nodes, so that neighbours lie together.
     Block end = 0;
     Index corner = 0;
     const auto first = tree_->first_triangle();
     const auto triangles = tree_->triangles();
-    for_each_set(unfolded, [&](NodeId at) {
+    for_each_unfolded(unfolded, [&](NodeId at) {
         for (Index t = first[at]; t < first[at + 1]; ++t) {
             for (const Index leaf : triangles[t]) {
+                prefetch_ahead(corner);
                 std::uint32_t& block = block_of_node_[indices_[corner]];
-                if (!(block & is_block)) {
-                    const unsigned log2_size = log2_size_for(block);
+                if (block & is_count) {
+                    const unsigned log2_size = log2_size_for(block & ~is_count);
                     *entries(end) = {log2_size, 0};
-                    block = end | is_block;
+                    block = end;
                     end += Block{1} << log2_size;
                 }
-                Entry* const head = entries(block & ~is_block);
+                Entry* const head = entries(block);
                 head[++head->leaf] = {corner++, leaf};
             }
         }
     });
-    for (const NodeId node : indices_) block_of_node_[node] &= ~is_block;
 }
 
 // A node has a list only while a corner shows it.
@@ -238,6 +257,22 @@ void IndexBuffer::prefetch_corners(std::span<const NodeId> active) const {
         const Entry* const head = entries(block);
         const std::uint32_t count = std::min<std::uint32_t>(head->leaf, (1u << least_log2_size) - 1);
         for (std::uint32_t i = 1; i <= count; ++i) prefetch(&indices_[head[i].corner]);
+    }
+}
+
+void IndexBuffer::find_others(std::span<const NodeId> children, std::vector<NodeId>& others) const {
+    for (std::size_t i = 0; i + 1 < children.size(); ++i) {
+        const Block block = block_of_node_[children[i]];
+        if (block == no_block) continue;
+        const NodeId neighbour = children[i + 1];
+        const Entry* const head = entries(block);
+        const std::uint32_t count = std::min<std::uint32_t>(head->leaf, (1u << least_log2_size) - 1);
+        for (std::uint32_t e = 1; e <= count; ++e) {
+            const NodeId* const shown = &indices_[head[e].corner / 3 * 3];
+            if (shown[0] != neighbour && shown[1] != neighbour && shown[2] != neighbour) continue;
+            for (int k = 0; k < 3; ++k)
+                if (shown[k] != neighbour && shown[k] != children[i]) others.push_back(shown[k]);
+        }
     }
 }
 

@@ -38,6 +38,8 @@ public:
     void prefetch_places(std::span<const NodeId> active) const;
     void prefetch_lists(std::span<const NodeId> active) const;
     void prefetch_corners(std::span<const NodeId> active) const;
+    // What the triangles that vanish when neighbours in `children` become one show besides: appends to `others`.
+    void find_others(std::span<const NodeId> children, std::vector<NodeId>& others) const;
     // Closes the holes with triangles from the end.
     void end_patch();
 
@@ -59,6 +61,8 @@ private:
 
     Entry* entries(Block block) { return pool_.data()->entries + block; }
     const Entry* entries(Block block) const { return pool_.data()->entries + block; }
+    template <class F>
+    void for_each_unfolded(std::span<const std::uint64_t> unfolded, F&& f);
     void write(Index corner, NodeId node);
     void append(NodeId node, Entry entry);
     void remove(NodeId node, Index corner);
@@ -76,6 +80,7 @@ private:
     std::vector<Line> pool_;             // of entries; blocks are whole lines
     std::vector<Block> free_blocks_[28]; // by log2 of the size
     std::vector<Index> holes_;           // triangles without corners
+    std::vector<NodeId> nodes_;          // scratch
     std::vector<Entry> scratch_;
     std::vector<Index> vanished_;
     std::vector<IndexWrite> writes_;

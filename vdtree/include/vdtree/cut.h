@@ -50,8 +50,8 @@ struct FollowOptions {
     // first. Results then depend on the machine's speed.
     std::optional<double> milliseconds = {};
 
-    // Nodes whose ring faces away fold at no cost. Only for surfaces that are closed and consistently oriented, drawn with back
-    // faces culled, and seen from outside.
+    // Nodes whose ring faces away fold at no cost. Only for surfaces that are closed and consistently oriented (inside out or not: the
+    // tree knows), drawn with back faces culled, and seen from outside.
     bool cull_back_faces = false;
 };
 
@@ -151,7 +151,7 @@ private:
     Index triangle_count_ = 0;
     std::vector<FoldChange> changes_;
     std::uint64_t revision_;               // of the state: one more for what changes_ tells, two for what nobody knows
-    std::vector<NodeId> children_, soon_;  // scratch
+    std::vector<NodeId> children_, soon_, others_; // scratch
     std::unique_ptr<CutFollower> follower_;
     struct Indices;
     mutable std::unique_ptr<Indices> indices_; // made when it is first asked for
@@ -169,6 +169,12 @@ struct SceneObject {
 // earlier object and then by node number, down to cost 0. Returns one entry an object; max_fold_cost is the scene's.
 // Fails, and changes nothing, where a viewpoint is not finite or a cut is named twice.
 Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objects, Index triangle_budget);
+
+// Which interior nodes the criterion unfolds from a viewpoint, each tested by itself, whatever is above it: one bit a node, the first
+// node's lowest. Of the options, the threshold and back faces count. Fails where the viewpoint is not finite. What it says of damaged nodes
+// (see VertexTree::is_sound) means nothing. Cost: some ten nanoseconds a node.
+Result<std::vector<std::uint64_t>> test_every_node(const VertexTree& tree, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
+                                                   const FollowOptions& options = {});
 
 // The cut as a mesh of its own: only the vertices in use, in double precision, with the tree's attributes.
 Mesh extract_mesh(const Cut& cut);

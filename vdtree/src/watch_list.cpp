@@ -1,0 +1,318 @@
+#include "watch_list.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include "prefetch.h"
+
+namespace unseen::vdtree {
+
+namespace {
+
+// Of what a deadline for distances is summed from: a dozen roundings of floats, when it is set and when it is compared.
+constexpr float sum_rounding = 4e-6f;
+constexpr float just_less = 1 - std::numeric_limits<float>::epsilon(); // times a number: at least a unit in the last place less
+
+float rounded_down(double clock) { return clock > 0 ? std::nextafter(static_cast<float>(clock), 0.0f) : 0.0f; }
+float rounded_up(double clock) { return std::nextafter(static_cast<float>(clock), std::numeric_limits<float>::infinity()); }
+
+using Four [[gnu::vector_size(16)]] = float; // in a register of any processor
+using FourBits [[gnu::vector_size(16)]] = std::int32_t;
+
+// The position deadlines of four slots, and their facing deadlines.
+struct FourDues {
+    Four position, facing;
+    explicit FourDues(const void* from) {
+        Four pairs[2];
+        std::memcpy(pairs, from, sizeof pairs);
+        position = __builtin_shufflevector(pairs[0], pairs[1], 0, 2, 4, 6);
+        facing = __builtin_shufflevector(pairs[0], pairs[1], 1, 3, 5, 7);
+    }
+};
+
+// All bits of the lanes that have one in the first four of these.
+FourBits lanes_of(std::uint32_t bits) {
+    constexpr FourBits places = {1, 2, 4, 8};
+    return ((FourBits{} + static_cast<std::int32_t>(bits)) & places) != 0;
+}
+
+float least_of(const Four& values) { return std::min(std::min(values[0], values[1]), std::min(values[2], values[3])); }
+
+} // namespace
+
+template <class F>
+void WatchList::for_each_used(BlockId block, F&& f) const {
+    for (std::uint32_t left = used_[block]; left; left &= left - 1)
+        f(static_cast<Slot>(block * block_slots + static_cast<std::size_t>(std::countr_zero(left))));
+}
+
+void WatchList::clear() {
+    // Node by node where these are few, so that the cost does not go with the tree.
+    if (size_ > slots_of_nodes_.size() / 32) std::ranges::fill(slots_of_nodes_, no_slot);
+    else for (BlockId block = 0; block < blocks_.size(); ++block)
+        for_each_used(block, [&](Slot slot) { slots_of_nodes_[candidates_[slot].node] = no_slot; });
+    candidates_.clear();
+    blocks_.clear();
+    used_.clear();
+    unfolded_.clear();
+    spheres_.clear();
+    earliest_.clear();
+    free_blocks_.clear();
+    looked_at_.clear();
+    size_ = 0;
+    first_unplaced_ = 0;
+    path_ = 0;
+    set_clocks(0, 0);
+}
+
+void WatchList::reserve(std::size_t nodes) {
+    if (slots_of_nodes_.empty()) slots_of_nodes_.assign(interior_count_, no_slot);
+    const std::size_t blocks = nodes / appended_slots + nodes / (8 * appended_slots) + 1; // an eighth for what comes later
+    candidates_.reserve(blocks * block_slots);
+    blocks_.reserve(blocks);
+    used_.reserve(blocks);
+    unfolded_.reserve(blocks);
+    spheres_.reserve(blocks);
+    earliest_.reserve(blocks);
+}
+
+// ---- slots
+
+WatchList::BlockId WatchList::new_block() {
+    BlockId block;
+    if (free_blocks_.empty()) {
+        block = static_cast<BlockId>(blocks_.size());
+        blocks_.emplace_back();
+        used_.push_back(0);
+        unfolded_.push_back(0);
+        candidates_.resize(candidates_.size() + block_slots);
+        spheres_.push_back();
+        earliest_.push_back(never);
+    } else {
+        block = free_blocks_.back();
+        free_blocks_.pop_back();
+    }
+    blocks_[block].dues.fill(Due{});
+    return block;
+}
+
+WatchList::Slot WatchList::take(BlockId block, const FoldCandidate& candidate) {
+    const auto place = static_cast<std::size_t>(std::countr_one(used_[block]));
+    const Slot slot = static_cast<Slot>(block * block_slots + place);
+    used_[block] = static_cast<std::uint16_t>(used_[block] | (1u << place));
+    candidates_[slot] = candidate;
+    slots_of_nodes_[candidate.node] = slot;
+    ++size_;
+    return slot;
+}
+
+WatchList::Slot WatchList::append(const FoldCandidate& candidate) {
+    if (first_unplaced_ == blocks_.size() || std::popcount(used_.back()) == appended_slots) new_block();
+    return take(static_cast<BlockId>(blocks_.size() - 1), candidate);
+}
+
+void WatchList::end_append() {
+    for (; first_unplaced_ < blocks_.size(); ++first_unplaced_) place(first_unplaced_);
+}
+
+WatchList::Slot WatchList::insert(const FoldCandidate& candidate, Slot near) {
+    if (near == no_slot) {
+        const BlockId block = new_block();
+        const Slot slot = take(block, candidate);
+        place(block);
+        first_unplaced_ = static_cast<BlockId>(blocks_.size());
+        return slot;
+    }
+    BlockId block = static_cast<BlockId>(near / block_slots);
+    if (used_[block] == full) {
+        const NodeId neighbour = candidates_[near].node;
+        split(block);
+        block = static_cast<BlockId>(slots_of_nodes_[neighbour] / block_slots);
+    }
+    include(block, candidate);
+    return take(block, candidate);
+}
+
+void WatchList::remove(NodeId node) {
+    const Slot slot = slots_of_nodes_[node];
+    if (slot == no_slot) return;
+    slots_of_nodes_[node] = no_slot;
+    const BlockId block = static_cast<BlockId>(slot / block_slots);
+    const std::size_t place = slot % block_slots;
+    blocks_[block].dues[place] = Due{};
+    used_[block] = static_cast<std::uint16_t>(used_[block] & ~(1u << place));
+    --size_;
+    if (used_[block] != 0) return;
+    earliest_.set(block, never, never, never);
+    free_blocks_.push_back(block);
+}
+
+// ---- spheres
+
+float WatchList::distance_to(const glm::vec3& point) const noexcept {
+    float square = 0;
+    for (int k = 0; k < 3; ++k) {
+        const float e = (eye_high_[k] - point[k]) + eye_low_[k];
+        square += e * e;
+    }
+    return std::sqrt(square);
+}
+
+// Around the nodes that the block has.
+void WatchList::place(BlockId block) {
+    glm::vec3 lowest(std::numeric_limits<float>::infinity()), highest(-lowest);
+    for_each_used(block, [&](Slot slot) {
+        const glm::vec3& c = candidates_[slot].sphere.centre;
+        lowest = glm::min(lowest, c);
+        highest = glm::max(highest, c);
+    });
+    const glm::vec3 centre = 0.5f * lowest + 0.5f * highest;
+    spheres_.set(block, centre, 0, distance_to(centre));
+    for_each_used(block, [&](Slot slot) { include(block, candidates_[slot]); });
+}
+
+void WatchList::include(BlockId block, const FoldCandidate& candidate) {
+    const glm::vec3 away = candidate.sphere.centre - spheres_.centre(block);
+    // Rounding of the differences in floats, of coordinates about as far from the origin as the centre and the radius are.
+    const float inexact = sum_rounding * (glm::length(spheres_.centre(block)) + glm::length(away));
+    spheres_.radius[block] = std::max(spheres_.radius[block], glm::length(away) + inexact);
+}
+
+// What is left of them now.
+WatchList::Slacks WatchList::slacks_of(Slot slot) const noexcept {
+    const std::size_t block = slot / block_slots, place = slot % block_slots;
+    const Due& due = blocks_[block].dues[place];
+    const bool unfolded = (unfolded_[block] >> place) & 1;
+    const float passed = spheres_.error[block] + position_clock_float_, distance = spheres_.distance[block];
+    const float position = (due.position - passed) + (unfolded ? -distance : distance) - sum_rounding * (passed + distance);
+    return {unfolded, std::max(position, 0.0f), std::max(due.facing - facing_clock_down_, 0.0f)};
+}
+
+void WatchList::split(BlockId block) {
+    std::array<Slot, block_slots> slots;
+    for (std::size_t i = 0; i < block_slots; ++i) slots[i] = static_cast<Slot>(block * block_slots + i);
+    std::ranges::nth_element(slots, slots.begin() + block_slots / 2, {}, [&](Slot slot) { return candidates_[slot].node; });
+    const BlockId other = new_block();
+    std::array<Slacks, block_slots> left; // by the block as it is
+    for (std::size_t i = 0; i < block_slots; ++i) left[i] = slacks_of(slots[i]);
+    for (std::size_t i = block_slots / 2; i < block_slots; ++i) {
+        const FoldCandidate moved = candidates_[slots[i]];
+        remove(moved.node);
+        slots[i] = take(other, moved);
+    }
+    place(block);
+    place(other);
+    earliest_.set(block, never, never, never);
+    for (std::size_t i = 0; i < block_slots; ++i) set_deadlines(slots[i], left[i].unfolded, left[i].position, left[i].facing);
+}
+
+// ---- deadlines
+
+void WatchList::set_deadlines(Slot slot, bool unfolded, float position_slack, float facing_slack) {
+    const BlockId block = static_cast<BlockId>(slot / block_slots);
+    const std::size_t place = slot % block_slots;
+    const float passed = spheres_.error[block] + position_clock_float_, distance = spheres_.distance[block];
+    const float slack = position_slack - sum_rounding * (passed + distance + std::min(position_slack, distance));
+    const float position = passed + slack + (unfolded ? distance : -distance);
+    const float facing = (facing_clock_down_ + facing_slack) * just_less;
+    blocks_[block].dues[place] = {position, facing};
+    unfolded_[block] = static_cast<std::uint16_t>((unfolded_[block] & ~(1u << place)) | (std::uint32_t{unfolded} << place));
+    float& earliest = (unfolded ? earliest_.recede : earliest_.approach)[block];
+    earliest = std::min(earliest, position);
+    earliest_.facing[block] = std::min(earliest_.facing[block], facing);
+}
+
+void WatchList::set_clocks(double position, double facing) {
+    position_clock_ = position;
+    facing_clock_ = facing;
+    position_clock_float_ = static_cast<float>(position);
+    facing_clock_down_ = rounded_down(facing);
+}
+
+void WatchList::move_to(const glm::dvec3& eye, double facing) {
+    const double path = glm::length(eye - eye_);
+    eye_ = eye;
+    for (int k = 0; k < 3; ++k) {
+        eye_high_[k] = static_cast<float>(eye[k]);
+        eye_low_[k] = static_cast<float>(eye[k] - static_cast<double>(eye_high_[k]));
+    }
+    set_clocks(position_clock_, facing_clock_ + facing);
+    if (blocks_.empty() || path == 0) return;
+    path_ += path;
+    move_blocks(eye_high_, eye_low_, rounded_up(path), spheres_);
+}
+
+void WatchList::restart_clocks(double longest) {
+    if (!(std::max({position_clock_, facing_clock_, path_}) > longest)) return;
+    const double position = position_clock_, facing = facing_clock_;
+    for (BlockId block = 0; block < blocks_.size(); ++block) {
+        std::array<Slacks, block_slots> left;
+        for_each_used(block, [&](Slot slot) { left[slot % block_slots] = slacks_of(slot); });
+        spheres_.error[block] = 0;
+        earliest_.set(block, never, never, never);
+        set_clocks(0, 0);
+        for_each_used(block, [&](Slot slot) {
+            const Slacks& slacks = left[slot % block_slots];
+            set_deadlines(slot, slacks.unfolded, slacks.position, slacks.facing);
+        });
+        set_clocks(position, facing);
+    }
+    set_clocks(0, 0);
+    path_ = 0;
+}
+
+void WatchList::collect_due(std::vector<Slot>& due) {
+    due_blocks_.resize((blocks_.size() + 63) / 64);
+    // In floats the clock may be a little late.
+    const float facing = rounded_up(facing_clock_), position = position_clock_float_;
+    find_due(position, facing, spheres_, earliest_, due_blocks_.data());
+    looked_at_.clear();
+    for (std::size_t word = 0; word < due_blocks_.size(); ++word) {
+        for (std::uint64_t bits = due_blocks_[word]; bits; bits &= bits - 1) {
+            const auto block = static_cast<BlockId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
+            prefetch(&blocks_[block].dues[0]);
+            prefetch(&blocks_[block].dues[block_slots / 2]);
+            looked_at_.push_back(block);
+        }
+    }
+    constexpr FourBits places = {1, 2, 4, 8};
+    for (const BlockId block : looked_at_) {
+        const float passed = spheres_.error[block] + position;
+        const Four recede = Four{} + (passed + spheres_.distance[block]), approach = Four{} + (passed - spheres_.distance[block]);
+        const std::uint32_t unfolded = unfolded_[block];
+        // The earliest of those that are left; the others come back when their deadlines are set.
+        Four next_recede = Four{} + never, next_approach = next_recede, next_facing = next_recede;
+        std::uint32_t bits = 0;
+        for (std::size_t i = 0; i < block_slots; i += 4) {
+            const FourDues dues(&blocks_[block].dues[i]);
+            const FourBits recedes = lanes_of(unfolded >> i);
+            const FourBits is_due = (dues.position <= (recedes ? recede : approach)) | (dues.facing <= facing);
+            const FourBits due_places = is_due & places;
+            bits |= static_cast<std::uint32_t>((due_places[0] | due_places[1]) | (due_places[2] | due_places[3])) << i;
+            const Four left = is_due ? Four{} + never : dues.position, left_facing = is_due ? Four{} + never : dues.facing;
+            next_recede = (left < next_recede) & recedes ? left : next_recede;
+            next_approach = (left < next_approach) & ~recedes ? left : next_approach;
+            next_facing = left_facing < next_facing ? left_facing : next_facing;
+        }
+        earliest_.set(block, least_of(next_recede), least_of(next_approach), least_of(next_facing));
+        for (; bits; bits &= bits - 1) {
+            const std::size_t slot = block * block_slots + static_cast<std::size_t>(std::countr_zero(bits));
+            prefetch(&candidates_[slot]);
+            due.push_back(static_cast<Slot>(slot));
+        }
+    }
+}
+
+void WatchList::stay_due(Slot slot) { set_deadlines(slot, (unfolded_[slot / block_slots] >> (slot % block_slots)) & 1, 0, 0); }
+
+std::uint64_t WatchList::byte_size() const noexcept {
+    return sizeof(FoldCandidate) * candidates_.capacity() + sizeof(Slot) * slots_of_nodes_.capacity() + sizeof(Block) * blocks_.capacity() +
+           2 * sizeof(std::uint16_t) * used_.capacity() + spheres_.byte_size() + earliest_.byte_size();
+}
+
+} // namespace unseen::vdtree
