@@ -198,6 +198,8 @@ public:
         for (std::size_t i = 0; i < poses.size(); ++i) {
             bar(static_cast<double>(i) / static_cast<double>(poses.size()), "frames");
             take(poses[i]);
+            if (auto lit = light_at(scene_, static_cast<double>(i) * frame_s); !lit)
+                return Error{lit.error().code, "Frame " + std::to_string(i) + ": " + lit.error().message};
             gaze->apply(what_, scene_, static_cast<double>(i) * frame_s);
             auto frame = next(*drawing);
             if (!frame) return Error{frame.error().code, "Frame " + std::to_string(i) + ": " + frame.error().message};
@@ -237,6 +239,7 @@ private:
         if (drawing) {
             render::DrawOptions draw = options_.draw;
             draw.background = scene_.background;
+            draw.lighting = scene_.lights();
             render::Renderer& renderer = drawing->renderer;
             frame = follower_.geomorph() ? renderer.draw(*follower_.geomorph(), scene_.view, draw, scene_.placement)
                                          : renderer.draw(cut_, scene_.view, draw, scene_.placement);

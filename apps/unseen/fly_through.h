@@ -18,7 +18,7 @@ struct FlyThroughOptions {
     double threshold = 1; // fold costs up to it
     bool draws = true;
     std::optional<double> geomorph_seconds; // that vertices glide for; none: they do not
-    double frames_a_second = 60;            // of the glides and of moving gazes
+    double frames_a_second = 60;            // of the glides, moving gazes and moving lights
     WhatOptions what;
     GazeOptions gaze;
     render::DrawOptions draw;

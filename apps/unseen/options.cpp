@@ -77,6 +77,8 @@ void check(const ViewOptions& view) {
     if (view.target && !view.eye) refuse("--target needs --eye; without an eye the whole model is framed.");
     if (view.direction && *view.direction == glm::dvec3(0)) refuse("--direction must not be 0 0 0.");
     if (view.light && *view.light == glm::dvec3(0)) refuse("--light must not be 0 0 0.");
+    if (!view.lights.empty() && (view.light || view.ambient))
+        refuse("--lights excludes --light and --ambient: say all of it in the file.");
     if (view.up && *view.up == glm::dvec3(0)) refuse("--up must not be 0 0 0.");
     if (view.eye && view.target && *view.eye == *view.target) refuse("--eye and --target are the same point.");
 }
@@ -218,6 +220,11 @@ void add_view_options(CLI::App& verb, ViewOptions& o) {
         ->type_name("WxH");
     add_vector(group, "--light", o.light, "Direction towards the light (default: 0.4 0.7 0.6; colours come pre-lit)");
     add_number(group, "--ambient", o.ambient, within(0, 1), "A", "Share of light from everywhere, 0..1 (default: 0.2)");
+    group
+        .add_option("--lights", o.lights,
+                    "Lights instead of these two: directional, point, spot, headlight, ambient, with highlights; with --path, and in the "
+                    "viewer, they may move (the keys: docs/perception.md, Dynamic light)")
+        ->type_name("FILE.json");
     add_number(group, "--background", o.background_cdm2, not_negative(), "CDM2", "Background luminance (default: 20)");
     group.add_option("--unit", o.unit_metres, "Metres a mesh unit (default: 1)")
         ->type_name("METRES")

@@ -71,6 +71,7 @@ Result<int> run(RenderArguments& a) {
     const Simplification& result = *simplified;
     render::DrawOptions options = a.draw;
     options.background = scene->background;
+    options.lighting = scene->lights();
     const auto frame = renderer->draw(cut, scene->view, options, scene->placement);
     if (!frame) return frame.error();
 
@@ -104,7 +105,7 @@ void add_path_options(CLI::App& verb, FlyThroughOptions& o) {
         ->type_name("X")
         ->check(positive());
     add_geomorph_option(group, o.geomorph_seconds);
-    group.add_option("--fps", o.frames_a_second, "With --geomorph and moving gazes: frames a second of the path (default: 60)")
+    group.add_option("--fps", o.frames_a_second, "With --geomorph, --lights and moving gazes: frames a second of the path (default: 60)")
         ->type_name("N")
         ->check(within(1, 1e6));
     group.add_flag("!--no-draw", o.draws, "Only cut: draw nothing");
@@ -116,6 +117,7 @@ void check(const RenderArguments& a) {
     const FlyThroughOptions& o = a.flight;
     if (o.path.empty() && is_moving(o.gaze)) refuse("--gaze-trace and --gaze-mode simulated need --path.");
     if (a.what.gaze_px && o.gaze.source != GazeSource::none) refuse("--gaze excludes --gaze-trace and --gaze-mode.");
+    if (!a.view.lights.empty() && o.geomorph_seconds) refuse("--geomorph and --lights exclude each other: vertices that glide are not lit.");
     if (o.path.empty()) {
         if (a.out.empty()) refuse("-o is required (or --path).");
         if (!o.csv.empty() || !o.plot.empty() || o.threshold != 1 || !o.draws || o.geomorph_seconds)
@@ -150,8 +152,8 @@ Command render_command(CLI::App& app) {
     add_path_options(*verb, a->flight);
     CLI::Option* frames_a_second = verb->get_option("--fps");
     verb->callback([a, samples, frames_a_second] {
-        if (!frames_a_second->empty() && !a->flight.geomorph_seconds && !is_moving(a->flight.gaze))
-            refuse("--fps needs --geomorph, --gaze-trace or --gaze-mode simulated.");
+        if (!frames_a_second->empty() && !a->flight.geomorph_seconds && a->view.lights.empty() && !is_moving(a->flight.gaze))
+            refuse("--fps needs --geomorph, --lights, --gaze-trace or --gaze-mode simulated.");
         check(*a);
         if (!samples->empty()) return;
         if (!a->flight.path.empty()) a->draw.samples = 1;
@@ -167,6 +169,8 @@ Command render_command(CLI::App& app) {
                  "  unseen render dragon.vdt --path orbit:1 --gaze-mode simulated --seed 7 --gaze-error 0.5 --gaze-latency 50\n"
                  "  unseen render dragon.vdt --path orbit:1 --csv orbit.csv --plot orbit.png\n"
                  "  unseen render dragon.vdt --path flight.csv -o frames/%04d.png --threshold 2\n"
+                 "  unseen render dragon.vdt -o lit.png --lights lights.json\n"
+                 "  unseen render dragon.vdt --path orbit:0:240 --lights lights.json --fps 60 --csv light.csv\n"
                  "  unseen render dragon.vdt --path orbit:1 -o frames/%04d.png --triangles 20000 --geomorph 0.25 --fps 60");
     return {verb, [a] { return run(*a); }};
 }

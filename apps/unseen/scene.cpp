@@ -72,7 +72,25 @@ vdtree::View make_view(const Scene& scene, const ViewOptions& options) {
     return view;
 }
 
+Result<void> set_up_lights(Scene& scene, std::optional<calibration::LightRig> rig) {
+    if (!rig) return {};
+    scene.rig = std::move(rig);
+    auto bounds = vdtree::LightBounds::measure(scene.tree);
+    if (!bounds) return bounds.error();
+    scene.light_bounds = std::make_shared<vdtree::LightBounds>(std::move(*bounds));
+    return light_at(scene, 0);
+}
+
 } // namespace
+
+Result<void> light_at(Scene& scene, double seconds) {
+    if (!scene.rig) return {};
+    vdtree::Lighting lighting = scene.rig->at(seconds, scene.tree, scene.view, scene.placement);
+    if (auto ok = vdtree::check_lights(scene.tree, lighting); !ok)
+        return Error{ok.error().code, scene.rig->file().string() + ": " + ok.error().message};
+    scene.lighting = std::move(lighting);
+    return {};
+}
 
 Result<perception::Display> make_display(const DisplayOptions& options) {
     perception::Display display;
@@ -128,14 +146,21 @@ Result<Scene> load_scene(const std::filesystem::path& model, const ViewOptions& 
         if (!choice) return choice.error();
         csf = choice->model ? perception::CsfTable::from_model(*choice->model) : *std::move(choice->table);
     }
+    std::optional<calibration::LightRig> rig;
+    if (!view.lights.empty()) {
+        auto read = calibration::LightRig::read(view.lights);
+        if (!read) return read.error();
+        rig = std::move(*read);
+    }
     auto tree = open_tree(model);
     if (!tree) return tree.error();
 
-    Scene scene{std::move(*tree), {}, *shown_on, std::move(csf), {}, *background, false, {}};
+    Scene scene{std::move(*tree), {}, *shown_on, std::move(csf), {}, *background, false, {}, {}, {}, {}};
     scene.placement.scale = view.unit_metres;
     if (const auto lit = light(scene, view); !lit) return lit.error();
     scene.view = make_view(scene, view);
     if (auto valid = vdtree::validate(scene.view); !valid) return valid.error();
+    if (auto lit = set_up_lights(scene, std::move(rig)); !lit) return lit.error();
     return scene;
 }
 

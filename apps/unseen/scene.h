@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include <calibration/light_rig.h>
 #include <perception/csf.h>
 #include <perception/display.h>
 #include <perception/gaze.h>
@@ -25,6 +26,12 @@ struct Scene {
     float background = 0;  // relative luminance
     bool is_relit = false; // the light is not the one that the tree was built for
 
+    // With --lights.
+    std::optional<calibration::LightRig> rig;
+    std::optional<vdtree::Lighting> lighting;                 // as of the view and the time of light_at()
+    std::shared_ptr<const vdtree::LightBounds> light_bounds;
+    const vdtree::Lighting* lights() const { return lighting ? &*lighting : nullptr; } // to draw with
+
     const perception::CsfTable& csf_table() const { return csf ? *csf : perception::CsfTable::standard(); }
     // For gazes that are known to a margin only; null where the margin is so wide that everything may be looked at.
     const perception::CsfTable* csf_table(perception::Degrees margin) const;
@@ -43,6 +50,10 @@ Result<CsfChoice> choose_csf(const std::string& model_or_file);
 
 // Fails on a file that cannot be read, and on options that contradict the model or the display.
 Result<Scene> load_scene(const std::filesystem::path& model, const ViewOptions& view, const DisplayOptions& display);
+
+// Puts the lights of --lights, if there are any, where they are at a time; to be called when the view has changed, too. Fails where one
+// is at a vertex or inside of the model.
+Result<void> light_at(Scene& scene, double seconds);
 
 // The model's bounding sphere in the world.
 struct PlacedSphere {

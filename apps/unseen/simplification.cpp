@@ -32,6 +32,9 @@ bool has_distance_form_only(FoldTest test) { return test == FoldTest::error || t
 
 // What silhouettes can be seen against.
 perception::SceneLuminance scene_luminance(const Scene& scene) {
+    if (scene.lighting)
+        return perception::lit_scene(scene.tree, *scene.light_bounds, *scene.lighting,
+                                     vdtree::eye_in_tree(scene.tree, scene.view, scene.placement), scene.background);
     const vdtree::LuminanceRange range = scene.tree.luminance_range();
     return {std::min(range.lo, scene.background), std::max(range.hi, scene.background)};
 }
@@ -131,6 +134,7 @@ Effect csf_effect(const Scene& scene, const WhatOptions& what) {
 }
 
 Effect prelit_effect(const Scene& scene) {
+    if (scene.lighting && !scene.tree.colours().empty()) return {"pre-lit colours", false, "--lights lights the colours"};
     if (scene.tree.is_prelit()) return {"pre-lit colours", true, "the mesh's colours are taken as lit"};
     return {"pre-lit colours", false,
             scene.tree.colours().empty() ? "the mesh has no colours" : "--light or --ambient lights the colours"};
@@ -143,7 +147,12 @@ Effect chroma_effect(const Scene& scene, const WhatOptions& what) {
     return {"chroma", true, "red-green and yellow-violet contrast count beside that of luminance, by castleCSF"};
 }
 
-Effect light_effect(const Scene& scene) {
+Effect light_effect(const Scene& scene, const WhatOptions& what) {
+    if (scene.lighting)
+        return {"light", true,
+                scene.rig->description() +
+                    (is_perceptual(what) ? ": folds are tested against what these can make of the normals and places in their rings"
+                                         : "; drawn, for the fold test does not look at luminance")};
     if (scene.is_relit)
         return {"light", true, "luminance and its bounds were computed again for another light than the tree's"};
     return {"light", false,
@@ -219,7 +228,6 @@ Effect back_face_effect(const Scene& scene) {
 Effect translucency_effect(const Scene& scene, const WhatOptions& what) {
     if (!is_perceptual(what)) return {"translucency", false, "only the perceptual fold test knows it"};
     if (!is_translucent(scene)) return {"translucency", false, "no vertex has an alpha below 1"};
-    if (what.test == FoldTest::error) return {"translucency", false, "the fold test error does not know it"};
     return {"translucency", true, "where a vertex has an alpha below 1, anything in the scene may show through"};
 }
 
@@ -232,7 +240,7 @@ void add_effects(Simplification& result, const Scene& scene, const WhatOptions& 
                       chroma_effect(scene, what),
                       translucency_effect(scene, what),
                       prelit_effect(scene),
-                      light_effect(scene),
+                      light_effect(scene, what),
                       frustum_effect(what, purpose),
                       culling_effect(scene, purpose),
                       magnification_effect(scene, what),
@@ -274,7 +282,8 @@ Result<void> measure_folds(Scene& scene, const WhatOptions& what) {
 }
 
 Result<Simplification> simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
-    if (what.mode != Mode::full && (what.fill_budget || what.milliseconds || what.chroma || has_distance_form_only(what.test))) {
+    const bool is_lit = scene.lighting && is_perceptual(what); // likewise in the distance form only
+    if (what.mode != Mode::full && (what.fill_budget || what.milliseconds || what.chroma || is_lit || has_distance_form_only(what.test))) {
         Follower follower;
         follower.set_hysteresis(1);
         return follower.follow(cut, scene, what, purpose);
@@ -300,10 +309,11 @@ Result<const vdtree::DistanceCriterion*> Follower::criterion_for(const Scene& sc
     const bool perceptual = is_perceptual(what);
     // A budget goes by the order of the costs alone, for which any tolerance will do.
     const double tolerance_px = what.mode == Mode::pixels ? what.pixels : 1;
-    Key key{what.test, perceptual ? 0 : tolerance_px, false, 0, scene.view.width, scene.view.height, scene.view.fov_y_degrees, 0, nullptr};
+    Key key{what.test, perceptual ? 0 : tolerance_px, false, 0, scene.view.width, scene.view.height, scene.view.fov_y_degrees, {0, 0}, false, nullptr};
     if (perceptual) {
-        key.background = scene.background;
         const perception::FoldTestOptions options = test_options(scene, what);
+        key.scene = options.scene;
+        key.is_lit = scene.lighting.has_value();
         key.has_gaze = options.gaze_px.has_value();
         key.csf = options.csf;
         key.chroma = options.chroma;
@@ -323,6 +333,12 @@ Result<const vdtree::DistanceCriterion*> Follower::criterion_for(const Scene& sc
         perception::FoldTestOptions options = test_options(scene, what);
         if (key.has_gaze)
             options.gaze_px = glm::dvec2(scene.view.width * 0.5 + key.farthest_gaze_px, scene.view.height * 0.5);
+        if (scene.lighting && what.test != FoldTest::luebke_hallen)
+            return Error{ErrorCode::invalid_argument, "--fold-test " + name_of(what.test) + " knows only the light that the tree was built for: "
+                                                      "with --lights, use --fold-test luebke-hallen."};
+        if (scene.lighting && what.chroma)
+            return Error{ErrorCode::invalid_argument, "--chroma and --lights exclude each other: ranges of colour are those of the tree's own light."};
+        if (scene.lighting) return perception::lit_distances(scene.tree, scene.light_bounds, scene.view, options);
         if (what.test == FoldTest::luebke_hallen) return perception::luebke_hallen_distances(scene.tree, scene.view, options);
         if (what.test == FoldTest::luebke_hallen_safe) {
             if (!rings_) rings_ = vdtree::bound_cut_rings(scene.tree);
@@ -349,6 +365,7 @@ vdtree::Viewpoint Follower::viewpoint_for(const Scene& scene, const WhatOptions&
     const bool window_only = purpose == Purpose::picture && !is_wholly_in_window(scene);
     vdtree::Viewpoint viewpoint =
         perception::viewpoint_of(scene.tree, scene.view, test_options(scene, what), scene.placement, window_only);
+    if (scene.lighting) viewpoint.lighting = *scene.lighting;
     // What comes into the window shall not glide there any more.
     if (window_only && geomorph_) viewpoint.frusta = {vdtree::frustum_of(scene.tree, widened(scene.view), scene.placement)};
     return viewpoint;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include <perception/criterion.h>
 #include <vdtree/cut.h>
 #include <vdtree/cut_rings.h>
 #include <vdtree/fold_errors.h>
@@ -75,7 +76,8 @@ private:
         double farthest_gaze_px = 0;
         int width = 0, height = 0;
         double fov_y_degrees = 0;
-        float background = 0;
+        perception::SceneLuminance scene = {0, 0};
+        bool is_lit = false;
         const perception::CsfTable* csf = nullptr;
         bool chroma = false;
         bool operator==(const Key&) const = default;

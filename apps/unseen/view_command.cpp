@@ -18,6 +18,8 @@ struct ViewArguments {
 };
 
 Result<int> run(ViewArguments& a) {
+    if (!a.view.lights.empty() && a.viewer.geomorph_seconds)
+        return Error{ErrorCode::invalid_argument, "--geomorph and --lights exclude each other: vertices that glide are not lit."};
     auto scene = load_scene(a.model, a.view, a.display);
     if (!scene) return scene.error();
     if (const auto ready = measure_folds(*scene, a.viewer.what); !ready) return ready.error();

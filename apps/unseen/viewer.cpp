@@ -206,6 +206,8 @@ private:
         const auto start = Clock::now();
         follower_.let_pass(std::chrono::duration<double>(start - std::exchange(last_frame_, start)).count());
         if (plays_gaze_) gaze_->apply(what_, scene_, std::chrono::duration<double>(start - first_frame_).count());
+        if (auto lit = light_at(scene_, std::chrono::duration<double>(start - first_frame_).count()); !lit) return lit;
+        draw_.lighting = scene_.lights();
         const auto result = follower_.follow(cut_, scene_, what_);
         if (!result) return result.error();
         const vdtree::Geomorph* const geomorph = follower_.geomorph();
@@ -214,7 +216,8 @@ private:
         if (!drawn) return drawn;
         glfwSwapBuffers(window_);
         // What the time limit has left to do, and what glides, goes on in the next frame.
-        needs_frame_ = !result->stats.is_complete || result->gliding > 0 || (plays_gaze_ && gaze_->is_moving());
+        needs_frame_ = !result->stats.is_complete || result->gliding > 0 || (plays_gaze_ && gaze_->is_moving()) ||
+                       (scene_.rig && scene_.rig->moves());
         show_title(*result, milliseconds_since(start));
         return {};
     }

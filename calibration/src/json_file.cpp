@@ -183,13 +183,28 @@ Result<JsonObject> JsonObject::read(const std::filesystem::path& file,
     result.file_ = file;
     result.object_ = *std::move(parsed);
     if (!result.object_.is_object()) return result.error("must hold a JSON object, { ... }");
-    for (const auto& [key, value] : result.object_.items()) {
+    if (auto known = result.check_keys(known_keys); !known) return known.error();
+    return result;
+}
+
+Result<JsonObject> JsonObject::child(const json& value, std::string place, std::initializer_list<std::string_view> known_keys) const {
+    if (!value.is_object()) return key_error(place, "must be an object, { ... }, but is " + excerpt(value));
+    JsonObject result;
+    result.file_ = file_;
+    result.place_ = place_ + place + ".";
+    result.object_ = value;
+    if (auto known = result.check_keys(known_keys); !known) return known.error();
+    return result;
+}
+
+Result<void> JsonObject::check_keys(std::initializer_list<std::string_view> known_keys) const {
+    for (const auto& [key, value] : object_.items()) {
         if (std::ranges::find(known_keys, key) != known_keys.end()) continue;
         std::string list;
         for (const std::string_view known : known_keys) list.append(list.empty() ? "" : ", ").append(known);
-        return result.key_error(key, "is unknown: use " + list);
+        return key_error(key, "is unknown: use " + list);
     }
-    return result;
+    return {};
 }
 
 Result<void> JsonObject::get(std::string_view key, std::string& value) const {
@@ -239,7 +254,7 @@ Result<void> JsonObject::append_numbers(const json& array, const std::string& pl
 }
 
 Error JsonObject::key_error(std::string_view key, std::string_view problem) const {
-    return error("key " + in_quotes(key).append(" ").append(problem));
+    return error("key " + in_quotes(place_ + std::string(key)).append(" ").append(problem));
 }
 
 Error JsonObject::error(std::string_view problem) const {

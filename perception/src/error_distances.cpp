@@ -363,6 +363,7 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
         const double lo = levels.in_cdm2(range.lo), hi = levels.in_cdm2(range.hi), middle = (lo + hi) / 2;
         const double r1 = tree.bounds()[node].ring.radius;
         const auto change = [&](float luminance, float distance) {
+            if (tree.bounds()[node].flags & vdtree::translucent_ring) return brightest - darkest; // anything may show through
             return levels.difference_in_cdm2(luminance) + (hi - lo) * (r1 > 0 ? std::min(1.0, distance / r1) : 1.0);
         };
         Shown patch;

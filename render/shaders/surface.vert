@@ -1,8 +1,60 @@
-// The surface's vertices, in the unit ball around the model.
+// The surface's vertices, in the unit ball around the model. LIT: under lights, by the formula of <vdtree/lighting.h>.
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec4 vertex_shade; // linear RGB; relative luminance in a
 
 layout(location = 0) uniform mat4 clip_from_unit;
+
+#ifdef LIT
+layout(location = 2) in ivec2 packed_normal; // octahedral, as in <vdtree/packed.h>
+layout(location = 3) in float albedo;
+
+const int none = -32768;
+layout(location = 4) uniform vec4 material;  // ambient light, specular with its normalisation, shininess, the number of lights
+layout(location = 5) uniform vec4 eye;
+// Three a light. Direction (directional: towards it; spot: where it shines) and intensity (point and spot: at distance 1); position,
+// and 0 for directional, 1 for point, 2 for spot; the cosines of the outer and the inner angle.
+layout(location = 6) uniform vec4 lights[3 * 16];
+
+vec3 normal() {
+    if (packed_normal.x == none || packed_normal.y == none)
+        return vec3(0);
+    vec2 p = vec2(packed_normal) / 32767.0;
+    float z = 1.0 - abs(p.x) - abs(p.y);
+    if (z < 0.0)
+        p = (1.0 - abs(p.yx)) * mix(vec2(1), vec2(-1), lessThan(p, vec2(0)));
+    return normalize(vec3(p, z));
+}
+
+float lit_luminance() {
+    vec3 n = normal();
+    float sum = material.x * albedo;
+    for (int i = 0; i < int(material.w); ++i) {
+        vec3 direction = lights[3 * i].xyz;
+        float intensity = lights[3 * i].w;
+        float kind = lights[3 * i + 1].w;
+        vec3 towards = direction;
+        if (kind > 0.5) {
+            vec3 offset = lights[3 * i + 1].xyz - position;
+            float distance = max(length(offset), 1e-20);
+            towards = offset / distance;
+            intensity /= distance * distance;
+            if (kind > 1.5)
+                intensity *= smoothstep(lights[3 * i + 2].x, lights[3 * i + 2].y, -dot(towards, direction));
+        }
+        float facing = dot(n, towards);
+        if (!(facing > 0.0))
+            continue;
+        float share = albedo;
+        if (material.y > 0.0) {
+            vec3 sum_of_both = towards + normalize(eye.xyz - position);
+            vec3 half_way = sum_of_both / max(length(sum_of_both), 1e-20);
+            share += material.y * pow(max(dot(n, half_way), 1e-20), material.z);
+        }
+        sum += intensity * facing * share;
+    }
+    return min(sum, 1.0);
+}
+#endif
 
 layout(location = 0) out vec4 shade;
 
@@ -12,4 +64,8 @@ invariant gl_Position;
 void main() {
     gl_Position = clip_from_unit * vec4(position, 1.0);
     shade = vertex_shade;
+#ifdef LIT
+    float luminance = lit_luminance();
+    shade = vec4(vertex_shade.a > 0.0 ? vertex_shade.rgb * (luminance / vertex_shade.a) : vec3(luminance), luminance);
+#endif
 }

@@ -122,6 +122,10 @@ void Program::set(int location, const glm::vec4& value) const {
     glProgramUniform4fv(id(), location, 1, glm::value_ptr(value));
 }
 
+void Program::set(int location, std::span<const glm::vec4> values) const {
+    glProgramUniform4fv(id(), location, static_cast<GLsizei>(values.size()), glm::value_ptr(values.front()));
+}
+
 void Program::set(int location, const glm::mat4& value) const {
     glProgramUniformMatrix4fv(id(), location, 1, GL_FALSE, glm::value_ptr(value));
 }

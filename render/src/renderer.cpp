@@ -85,6 +85,31 @@ Frame frame_of(std::span<const glm::vec4> pixels, int width, int height) {
     return frame;
 }
 
+// In the unit frame.
+LightUniforms uniforms_of(const vdtree::Lighting& lighting, glm::dvec3 eye, const UnitFrame& frame) {
+    using Kind = vdtree::LightSource::Kind;
+    const auto in_frame = [&](glm::dvec3 p) { return (p - frame.centre) / frame.unit; };
+    LightUniforms uniforms;
+    uniforms.material = glm::dvec4(lighting.ambient, lighting.specular * (lighting.shininess + 8) / 8, lighting.shininess,
+                                   static_cast<double>(lighting.lights.size()));
+    uniforms.eye = glm::dvec4(in_frame(eye), 0);
+    for (const vdtree::LightSource& light : lighting.lights) {
+        const double distance = light.kind == Kind::directional ? 1 : light.distance / frame.unit;
+        uniforms.lights.push_back(glm::dvec4(light.direction, light.intensity * distance * distance));
+        uniforms.lights.push_back(glm::dvec4(in_frame(light.position), static_cast<int>(light.kind)));
+        uniforms.lights.push_back(glm::dvec4(light.outer_cosine, light.inner_cosine, 0, 0));
+    }
+    return uniforms;
+}
+
+std::vector<LitVertex> lit_vertices_of(const vdtree::VertexTree& tree) {
+    std::vector<LitVertex> vertices;
+    vertices.reserve(tree.node_count());
+    for (vdtree::NodeId node = 0; node < tree.node_count(); ++node)
+        vertices.push_back({tree.normals()[node], vdtree::albedo_of(tree, node)});
+    return vertices;
+}
+
 } // namespace
 
 struct Renderer::Impl {
@@ -116,6 +141,12 @@ Result<Camera> Renderer::Impl::prepare(const vdtree::Cut& cut, Moved moved, cons
         return valid.error();
     if (auto valid = check(placement); !valid)
         return valid.error();
+    if (options.lighting) {
+        if (auto valid = vdtree::validate(*options.lighting); !valid)
+            return valid.error();
+        if (!moved.empty())
+            return invalid("Vertices that glide cannot be lit: draw the cut instead of the geomorph, or without lights.");
+    }
     if (std::addressof(cut.tree().data()) != tree)
         return invalid("The cut belongs to another tree than the renderer's; make a renderer for that tree.");
     const Camera camera = camera_for(view, placement, origin, frame);
@@ -127,7 +158,10 @@ Result<Camera> Renderer::Impl::prepare(const vdtree::Cut& cut, Moved moved, cons
     const auto indices = cut.indices(); // first: the rest is about what it returned
     const auto set = drawer.set_triangles(
         {indices, cut.index_version(), cut.index_writes_from(), cut.index_writes()});
-    const auto put = set ? drawer.set_moved(arrays_of(cut.tree(), frame), moved) : set;
+    auto put = set ? drawer.set_moved(arrays_of(cut.tree(), frame), moved) : set;
+    if (put && options.lighting)
+        put = drawer.set_lights(uniforms_of(*options.lighting, vdtree::eye_in_tree(cut.tree(), view, placement), frame),
+                                [&] { return lit_vertices_of(cut.tree()); });
     if (!put) {
         static_cast<void>(context->errors.take_new()); // the drawer's error says it better
         return put.error();
@@ -136,7 +170,8 @@ Result<Camera> Renderer::Impl::prepare(const vdtree::Cut& cut, Moved moved, cons
 }
 
 SurfaceStyle Renderer::Impl::style(const DrawOptions& options, const Camera& camera) const {
-    return {options.shading, options.wireframe, cull_for(closedness, camera.eye_inside), options.background};
+    return {options.shading, options.wireframe, cull_for(closedness, camera.eye_inside), options.background,
+            options.lighting != nullptr};
 }
 
 Result<void> Renderer::Impl::gl_result(const char* what) {

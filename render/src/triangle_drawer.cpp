@@ -22,6 +22,9 @@ enum UniformLocation {
     clip_from_unit_location = 0,
     lowest_shade_location = 1,
     highest_shade_location = 2,
+    material_location = 4,
+    eye_location = 5,
+    lights_location = 6,
     background_location = 0,
 };
 
@@ -54,6 +57,16 @@ void describe_vertices(GLuint arrays, GLuint vertices) {
     glEnableVertexArrayAttrib(arrays, 1);
     glVertexArrayAttribFormat(arrays, 1, 4, GL_FLOAT, GL_FALSE, offsetof(Vertex, shade));
     glVertexArrayAttribBinding(arrays, 1, 0);
+}
+
+void describe_lit_vertices(GLuint arrays, GLuint vertices) {
+    glVertexArrayVertexBuffer(arrays, 1, vertices, 0, sizeof(LitVertex));
+    glEnableVertexArrayAttrib(arrays, 2);
+    glVertexArrayAttribIFormat(arrays, 2, 2, GL_SHORT, offsetof(LitVertex, normal));
+    glVertexArrayAttribBinding(arrays, 2, 1);
+    glEnableVertexArrayAttrib(arrays, 3);
+    glVertexArrayAttribFormat(arrays, 3, 1, GL_FLOAT, GL_FALSE, offsetof(LitVertex, albedo));
+    glVertexArrayAttribBinding(arrays, 3, 1);
 }
 
 // Everything that drawing depends on is set each time: a window's other users may have changed it.
@@ -170,6 +183,7 @@ Result<void> TriangleDrawer::upload(const VertexArrays& vertices) {
         for (const Vertex& vertex : batch) {
             lowest_shade_ = glm::min(lowest_shade_, vertex.shade);
             highest_shade_ = glm::max(highest_shade_, vertex.shade);
+            if (vertex.shade.a > 0) highest_hue_ = glm::max(highest_hue_, vertex.shade / vertex.shade.a);
         }
         glNamedBufferSubData(vertices_.id(), static_cast<GLintptr>(first * sizeof(Vertex)),
                              static_cast<GLsizeiptr>(batch.size() * sizeof(Vertex)), batch.data());
@@ -208,6 +222,21 @@ Result<void> TriangleDrawer::set_moved(const VertexArrays& vertices, std::span<c
     }
     moved_.swap(now);
     mover_->move(vertices_.id(), vertex_count_, moves_);
+    return {};
+}
+
+Result<void> TriangleDrawer::set_lights(LightUniforms lights, FunctionRef<std::vector<LitVertex>()> vertices) {
+    lights_ = std::move(lights);
+    if (lit_vertices_)
+        return {};
+    const std::vector<LitVertex> made = vertices();
+    Buffer buffer = Buffer::create("vertices under lights");
+    glNamedBufferStorage(buffer.id(), static_cast<GLsizeiptr>(std::max<std::size_t>(made.size(), 1) * sizeof(LitVertex)), made.data(), 0);
+    if (glGetError() == GL_OUT_OF_MEMORY)
+        return Error{ErrorCode::unsupported, "The graphics memory does not hold the normals of the tree's " + std::to_string(made.size()) +
+                                                 " vertices, which lights need."};
+    lit_vertices_ = std::move(buffer);
+    describe_lit_vertices(surface_arrays_.id(), lit_vertices_->id());
     return {};
 }
 
@@ -278,7 +307,7 @@ Result<void> TriangleDrawer::fit_targets(int width, int height) {
 
 Result<const Program*> TriangleDrawer::program_for(const SurfaceStyle& style, Target target) {
     const bool flat = style.shading == Shading::flat;
-    auto& program = programs_[static_cast<std::size_t>(target) * 4 + (flat ? 2u : 0u) + (style.wireframe ? 1u : 0u)];
+    auto& program = programs_[static_cast<std::size_t>(target) * 8 + (style.is_lit ? 4u : 0u) + (flat ? 2u : 0u) + (style.wireframe ? 1u : 0u)];
     if (program)
         return &*program;
 
@@ -287,6 +316,8 @@ Result<const Program*> TriangleDrawer::program_for(const SurfaceStyle& style, Ta
         defines.push_back("FLAT");
     if (style.wireframe)
         defines.push_back("WIREFRAME");
+    if (style.is_lit)
+        defines.push_back("LIT");
     if (target != Target::image)
         defines.push_back("WINDOW");
     if (target == Target::window_to_encode)
@@ -309,8 +340,14 @@ void TriangleDrawer::draw_surface(const Program& program, const glm::mat4& clip_
         return;
     set_surface_state(style.cull);
     program.set(clip_from_unit_location, clip_from_unit);
-    program.set(lowest_shade_location, lowest_shade_);
-    program.set(highest_shade_location, highest_shade_);
+    program.set(lowest_shade_location, style.is_lit ? glm::vec4(0) : lowest_shade_);
+    program.set(highest_shade_location, style.is_lit ? highest_hue_ : highest_shade_);
+    if (style.is_lit) {
+        program.set(material_location, lights_.material);
+        program.set(eye_location, lights_.eye);
+        if (!lights_.lights.empty())
+            program.set(lights_location, lights_.lights);
+    }
     program.use();
     glBindVertexArray(surface_arrays_.id());
     for (std::uint64_t first = 0; first < indices_.count(); first += most_indices_a_call) {

@@ -15,10 +15,12 @@
 #include <render/gl_object.h>
 #include <render/program.h>
 #include <render/renderer.h>
+#include <vdtree/function_ref.h>
 #include <vdtree/geomorph.h>
 
 #include "camera.h"
 #include "gpu_indices.h"
+#include "vertex.h"
 #include "vertex_mover.h"
 
 namespace unseen::render {
@@ -40,6 +42,13 @@ struct SurfaceStyle {
     bool wireframe = false;
     Cull cull = Cull::nothing;
     float background = 0; // relative luminance, grey
+    bool is_lit = false;  // by set_lights()
+};
+
+// Lights as the shader wants them: see surface.vert.
+struct LightUniforms {
+    glm::vec4 material = glm::vec4(0), eye = glm::vec4(0);
+    std::vector<glm::vec4> lights; // three each
 };
 
 // Move-only; needs a current context for everything. GL errors are left for the caller to ask for.
@@ -54,6 +63,9 @@ public:
     // Until the next call the `moved` vertices have these values, all others those of `vertices`, which are the ones that the drawer was
     // made with. Nothing at all is done, or made, while no vertex is, or was, moved.
     Result<void> set_moved(const VertexArrays& vertices, std::span<const vdtree::MovedVertex> moved);
+
+    // For all lit draws until the next call. `vertices`: as many as the drawer has; called when lights are first set.
+    Result<void> set_lights(LightUniforms lights, FunctionRef<std::vector<LitVertex>()> vertices);
 
     // By the last set_triangles() and set_moved().
     std::uint64_t uploaded_bytes() const noexcept { return indices_.uploaded_bytes() + moves_.size() * sizeof(VertexMove); }
@@ -86,7 +98,10 @@ private:
     VertexArray no_arrays_; // for the full-screen triangle, which comes from nowhere
     glm::vec4 lowest_shade_ = glm::vec4(std::numeric_limits<float>::max()); // of all vertices
     glm::vec4 highest_shade_ = glm::vec4(std::numeric_limits<float>::lowest());
-    std::array<std::optional<Program>, 12> programs_; // 3 targets x shading x wireframe, made when first used
+    glm::vec4 highest_hue_ = glm::vec4(1); // of all vertices: the shade over its luminance
+    std::optional<Buffer> lit_vertices_;   // made when lights are first set
+    LightUniforms lights_;
+    std::array<std::optional<Program>, 24> programs_; // 3 targets x lit x shading x wireframe, made when first used
     std::optional<Program> accumulate_;
     Framebuffer sample_;
     Framebuffer sum_;

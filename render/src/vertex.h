@@ -4,6 +4,8 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
+#include <vdtree/packed.h>
+
 namespace unseen::render {
 
 struct Vertex {
@@ -11,5 +13,12 @@ struct Vertex {
     glm::vec4 shade;    // linear RGB; relative luminance in a
 };
 static_assert(sizeof(Vertex) == 28, "the vertex layout and move.comp count on it");
+
+// What lights want to know of it, in a buffer of its own that is made when there are some.
+struct LitVertex {
+    vdtree::PackedNormal normal;
+    float albedo;
+};
+static_assert(sizeof(LitVertex) == 8);
 
 } // namespace unseen::render

@@ -325,6 +325,55 @@ TEST_F(RenderCommandTest, WrongUsageIsStatusTwo) {
     }
 }
 
+TEST_F(RenderCommandTest, FollowsLightsThatMove) {
+    write_text(path("lights.json"), R"({"ambient": 0.1, "lights": [{"type": "directional", "direction": [1, 1, 1], "intensity": 0.8,
+                             "orbit": {"axis": [0, 1, 0], "degrees_per_second": 60}}]})");
+    const Json still = render({"--lights", "lights.json"}, "lit.png");
+    const auto effect = [](const Json& report, const std::string& name) {
+        for (const Json& e : report["effects"])
+            if (e["name"] == name) return e;
+        return Json();
+    };
+    EXPECT_TRUE(effect(still, "light")["on"]);
+    EXPECT_THAT(effect(still, "light")["why"].get<std::string>(), HasSubstr("1 directional, ambient 0.1"));
+    const Outcome flown = run({"render", "ball.vdt", "--path", "orbit:0:30", "--lights", "lights.json", "--fps", "60", "-o", "f%02d.png",
+                               "--size", "96x96", "--json", "-"});
+    ASSERT_EQ(flown.status, 0) << flown.err;
+    EXPECT_GT(flown.json()["node_tests"]["largest"].get<double>(), 0);
+    const auto first = read_image(path("f00.png")), last = read_image(path("f29.png"));
+    ASSERT_TRUE(first && last);
+    EXPECT_NE(first->image.values, last->image.values) << "the camera stands still, the light does not";
+    EXPECT_EQ(run({"simplify", "ball.vdt", "-o", "lit.ply", "--lights", "lights.json"}).status, 0);
+}
+
+TEST_F(RenderCommandTest, NamesFileAndFieldOfBadLights) {
+    const auto complaint = [&](const std::string& text) {
+        write_text(path("bad.json"), text);
+        const Outcome outcome = run({"render", "ball.vdt", "-o", "o.png", "--lights", "bad.json"});
+        EXPECT_EQ(outcome.status, 1) << text;
+        EXPECT_THAT(outcome.err, IsAnErrorForPeople());
+        EXPECT_THAT(outcome.err, HasSubstr("bad.json"));
+        return outcome.err;
+    };
+    const auto point_at = [](const std::string& where) {
+        return "{\"lights\": [{\"type\": \"point\", \"intensity\": 1, \"distance\": 1, \"position\": " + where + "}]}";
+    };
+    EXPECT_THAT(complaint("{\"lights\": []}"), HasSubstr("black"));
+    EXPECT_THAT(complaint(point_at("[0, 0, 0.1]")), HasSubstr("lights[0].position is inside"));
+    EXPECT_THAT(complaint(point_at("[0, 0]")), HasSubstr("lights[0].position"));
+    EXPECT_THAT(complaint("{\"lights\": [{\"type\": \"directional\", \"intensity\": 1, \"direction\": [0, 0, 0]}]}"),
+                HasSubstr("lights[0].direction"));
+    write_text(path("good.json"), point_at("[9, 9, 9]"));
+    for (const std::vector<std::string>& more : std::vector<std::vector<std::string>>{{"--light", "0", "0", "1"}, {"--ambient", "0.5"}}) {
+        std::vector<std::string> words = {"render", "ball.vdt", "-o", "o.png", "--lights", "good.json"};
+        words.insert(words.end(), more.begin(), more.end());
+        EXPECT_EQ(run(words).status, 2);
+    }
+    const Outcome by_errors = run({"render", "ball.vdt", "-o", "o.png", "--lights", "good.json", "--fold-test", "error"});
+    EXPECT_EQ(by_errors.status, 1);
+    EXPECT_THAT(by_errors.err, HasSubstr("--fold-test luebke-hallen"));
+}
+
 TEST_F(RenderCommandTest, VerbsThatDrawHaveHelpWithExamples) {
     for (const std::string verb : {"render", "sheet", "view"}) {
         const Outcome help = run({verb, "--help"});

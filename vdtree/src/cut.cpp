@@ -518,7 +518,7 @@ bool is_finite(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) &
 // Far enough away that squares of distances still fit floats.
 constexpr double farthest_eye = 1e18; // mesh units
 
-Result<void> check(const Viewpoint& viewpoint) {
+Result<void> check(const Viewpoint& viewpoint, const DistanceCriterion& criterion) {
     const auto invalid = [](const char* what) { return Error{ErrorCode::invalid_argument, what}; };
     if (!is_finite(viewpoint.eye)) return invalid("The eye's position is not finite.");
     if (!(glm::length(viewpoint.eye) <= farthest_eye)) return invalid("The eye is more than 1e18 mesh units away.");
@@ -529,6 +529,7 @@ Result<void> check(const Viewpoint& viewpoint) {
         for (const Plane& plane : frustum.planes)
             if (!(std::abs(glm::length(plane.normal) - 1) <= unit_slack) || !std::isfinite(plane.offset))
                 return invalid("A frustum's plane needs a normal of length 1 and a finite offset.");
+    if (criterion.parts().lit) return validate(viewpoint.lighting);
     return {};
 }
 
@@ -546,7 +547,7 @@ Result<void> check(const FollowOptions& options) {
 } // namespace
 
 Result<AdjustStats> Cut::follow(const DistanceCriterion& criterion, const Viewpoint& viewpoint, const FollowOptions& options) {
-    if (const auto valid = check(viewpoint); !valid) return valid.error();
+    if (const auto valid = check(viewpoint, criterion); !valid) return valid.error();
     if (const auto valid = check(options); !valid) return valid.error();
     if (!follower_) follower_ = std::make_unique<CutFollower>(*tree_);
     return follower_->follow(*this, criterion, viewpoint, options);
@@ -554,7 +555,7 @@ Result<AdjustStats> Cut::follow(const DistanceCriterion& criterion, const Viewpo
 
 Result<std::vector<std::uint64_t>> test_every_node(const VertexTree& tree, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
                                                    const FollowOptions& options) {
-    if (const auto valid = check(viewpoint); !valid) return valid.error();
+    if (const auto valid = check(viewpoint, criterion); !valid) return valid.error();
     if (const auto valid = check(options); !valid) return valid.error();
     FoldTester tester(tree, criterion, options.cull_back_faces, options.threshold);
     tester.look_from(viewpoint, 1);
@@ -569,7 +570,7 @@ Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objec
     std::vector<const FoldTester*> tests;
     for (std::size_t i = 0; i < objects.size(); ++i) {
         const SceneObject& object = objects[i];
-        if (const auto valid = check(object.viewpoint); !valid)
+        if (const auto valid = check(object.viewpoint, object.criterion); !valid)
             return Error{valid.error().code, "Object " + std::to_string(i) + ": " + valid.error().message};
         for (std::size_t other = 0; other < i; ++other)
             if (&objects[other].cut == &object.cut)

@@ -27,6 +27,7 @@ constexpr double step_worth_deadlines = 0.03;
 constexpr std::size_t piece_tests = 512; // tests at once while slots are filled: what they read stays in the cache
 // Beyond this step a good part of all verdicts would be due anyway. In lengths for a radian: twice the tree's distance.
 constexpr double longest_step = 0.125;
+constexpr double longest_light_step = 0.5; // radians; likewise
 // A budget that holds everything has the threshold 0; this stands for it.
 constexpr float least_threshold = 1e-30f;
 // What so many changes read is fetched ahead: some hundred cache lines, of which the first-level cache holds several times as many.
@@ -66,8 +67,9 @@ AdjustStats CutFollower::follow(Cut& cut, const DistanceCriterion& criterion, co
     const bool is_same = is_same_request(criterion, options);
     if (!is_same) prepare(criterion, options);
     else if (tested_ != &criterion) make_tester(criterion);
-    const Motion motion = is_same ? FoldTester::motion(tree_, viewpoint_, viewpoint, length_per_radian_)
-                                  : Motion{std::numeric_limits<double>::infinity(), 0};
+    Motion motion = is_same ? FoldTester::motion(tree_, viewpoint_, viewpoint, length_per_radian_)
+                            : Motion{std::numeric_limits<double>::infinity(), 0};
+    if (criterion.parts().lit) motion = with_lights(motion, viewpoint);
     if (is_same && was_complete_ && motion.position == 0 && motion.facing == 0) { // nothing can have changed
         cut.begin_changes();
         cut.end_changes(stats_);
@@ -80,6 +82,14 @@ AdjustStats CutFollower::follow(Cut& cut, const DistanceCriterion& criterion, co
     was_complete_ = stats_.is_complete;
     stats_.max_fold_cost = options.triangle_budget ? max_fold_cost_ : options.threshold;
     return stats_;
+}
+
+// Lights count on the facing clock: they stand still more often than the eye does.
+Motion CutFollower::with_lights(Motion motion, const Viewpoint& viewpoint) const {
+    const double turn = light_motion(tree_, viewpoint_.lighting, viewpoint_.eye, viewpoint.lighting, viewpoint.eye);
+    motion.facing += light_weight * length_per_radian_ * turn;
+    if (!(turn < longest_light_step)) motion.position = std::numeric_limits<double>::infinity();
+    return motion;
 }
 
 // For a fresh start: nothing watched, and a length for turns of the gaze.

@@ -39,6 +39,7 @@ private:
     bool is_same_request(const DistanceCriterion& criterion, const FollowOptions& options) const;
     void prepare(const DistanceCriterion& criterion, const FollowOptions& options);
     void make_tester(const DistanceCriterion& criterion);
+    Motion with_lights(Motion motion, const Viewpoint& viewpoint) const;
     void start_at(const Viewpoint& viewpoint);
     void move_to(const Viewpoint& viewpoint, const Motion& motion);
     void look_from(const Viewpoint& viewpoint);

@@ -24,11 +24,31 @@ std::uint64_t next_id() {
 
 Error invalid(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
 
+// With lights, rows are compared by their contrasts and luminances.
+Result<void> check_growth(const DistanceCriterion::Parts& p) {
+    const std::size_t bins = p.eccentricity_bins;
+    const auto grows = [&](std::size_t from, std::size_t to) {
+        for (std::size_t bin = 0; bin < bins; ++bin) {
+            if (!(p.reach[from * bins + bin] <= p.reach[to * bins + bin])) return false;
+            if (!p.least_cost.empty() && !(p.least_cost[from * bins + bin] <= p.least_cost[to * bins + bin])) return false;
+        }
+        return true;
+    };
+    for (std::size_t l = 0; l < ContrastClasses::luminance_count; ++l)
+        for (std::size_t c = 0; c < ContrastClasses::contrast_count; ++c)
+            if ((c > 0 && !grows(ContrastClasses::row_of(l, c - 1), ContrastClasses::row_of(l, c))) ||
+                (l > 0 && !grows(ContrastClasses::row_of(l - 1, c), ContrastClasses::row_of(l, c))))
+                return invalid("The reaches of a criterion with lights must not fall with the contrast or the luminance.");
+    return {};
+}
+
 Result<void> check(const VertexTree& tree, const DistanceCriterion::Parts& p) {
     const std::size_t nodes = tree.interior_count();
     if (!p.classes.empty() && p.classes.size() != nodes)
         return invalid("A criterion has " + std::to_string(p.classes.size()) + " classes for " + std::to_string(nodes) +
                        " interior nodes.");
+    if (p.lit && (!p.lit->bounds || p.lit->bounds->cones().size() != nodes || !p.classes.empty()))
+        return invalid("A criterion with lights needs bounds of its tree's normals, and no other classes.");
     if (!p.facing.empty() && p.facing.size() != nodes)
         return invalid("A criterion has " + std::to_string(p.facing.size()) + " sets of directions for " + std::to_string(nodes) +
                        " interior nodes.");
@@ -51,6 +71,10 @@ Result<void> check(const VertexTree& tree, const DistanceCriterion::Parts& p) {
     if (!(p.bin_degrees > 0) || !std::isfinite(p.bin_degrees))
         return invalid("The bins of eccentricity need a positive width.");
     const std::size_t rows = p.reach.size() / p.eccentricity_bins;
+    if (p.lit && (rows < ContrastClasses::row_count || p.lit->silhouette >= rows))
+        return invalid("A criterion with lights needs a row for each class of contrasts.");
+    if (p.lit)
+        if (const auto grows = check_growth(p); !grows) return grows.error();
     for (std::size_t i = 0; i < p.classes.size(); ++i)
         if (p.classes[i].interior >= rows || p.classes[i].silhouette >= rows)
             return invalid("Node " + std::to_string(i) + " has a class beyond the " + std::to_string(rows) + " rows of the table.");
@@ -132,15 +156,16 @@ double radians_of_pixels(const View& view, double pixels) { return pixels / pixe
 DistanceCriterion::DistanceCriterion(Parts parts) : parts_(std::move(parts)), id_(next_id()) {
     uses_silhouettes_ = std::any_of(parts_.classes.begin(), parts_.classes.end(),
                                     [](FoldClass c) { return c.interior != c.silhouette; }) ||
-                        (!parts_.classes.empty() && !parts_.silhouette_lengths.empty());
+                        (!parts_.classes.empty() && !parts_.silhouette_lengths.empty()) || parts_.lit;
 }
 
 Result<DistanceCriterion> DistanceCriterion::create(const VertexTree& tree, Parts parts) {
     if (const auto valid = check(tree, parts); !valid) return valid.error();
     for (float& reach : parts.reach) reach = std::clamp(reach, never_visible, always_visible);
     DistanceCriterion criterion(std::move(parts));
-    criterion.is_monotone_ = is_monotone_in(tree, criterion.parts_);
-    assert(criterion.is_monotone_);
+    // With lights the ranges nest but for rounding, which may lift a child by a class.
+    criterion.is_monotone_ = !criterion.parts_.lit && is_monotone_in(tree, criterion.parts_);
+    assert(criterion.is_monotone_ || criterion.parts_.lit);
     return criterion;
 }
 

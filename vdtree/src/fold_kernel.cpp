@@ -23,7 +23,6 @@ namespace {
 
 constexpr float pi = std::numbers::pi_v<float>;
 constexpr float huge = 1e30f;
-constexpr float least_length = 1e-30f; // mesh units; stands for 0 where a division or an infinite reach would make no number of it
 // With a gaze, a node is tested again after this share of its gap at the latest; see find_slacks().
 constexpr float longest_path = 0.125f;
 constexpr float shift_per_gap = 1.16f; // asin(x) / x / (1 - longest_path) for x up to longest_path / (1 - longest_path)

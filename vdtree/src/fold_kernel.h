@@ -17,6 +17,7 @@
 namespace unseen::vdtree {
 
 inline constexpr std::size_t kernel_lanes = 16;
+inline constexpr float least_length = 1e-30f; // mesh units; stands for 0 where a division or an infinite reach would make no number of it
 
 // What all nodes are measured from, and by.
 struct KernelView {

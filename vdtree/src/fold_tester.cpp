@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 #include <glm/geometric.hpp>
@@ -55,6 +56,7 @@ FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterio
     view_.near_ones_too = cull_back_faces;
     view_.is_inside_out = tree.closedness() == Closedness::closed_inward;
     view_.nobody = !cull_back_faces && !has_silhouettes_;
+    if (parts.lit) lit_.emplace(tree, *parts.lit, reach_, parts.eccentricity_bins);
 }
 
 void FoldTester::look_from(const Viewpoint& viewpoint, double length_per_radian) {
@@ -78,6 +80,7 @@ void FoldTester::look_from(const Viewpoint& viewpoint, double length_per_radian)
     view_.turn_per_length = static_cast<float>(1 / length_per_radian);
     costs_view_ = view_;
     costs_view_.everybody = true;
+    if (lit_) lit_->look_from(viewpoint, length_per_radian);
 }
 
 FoldCandidate FoldTester::candidate(NodeId node) const {
@@ -101,6 +104,7 @@ void FoldTester::prefetch(NodeId node) const {
     if (arrays_.facing) vdtree::prefetch(arrays_.facing + node);
     if (arrays_.lengths) vdtree::prefetch(arrays_.lengths + node);
     if (arrays_.silhouette_lengths) vdtree::prefetch(arrays_.silhouette_lengths + node);
+    if (lit_) lit_->prefetch(node);
 }
 
 void FoldTester::test(std::span<const FoldCandidate> candidates, std::span<const std::uint32_t> which, std::span<Verdict> verdicts) const {
@@ -108,6 +112,9 @@ void FoldTester::test(std::span<const FoldCandidate> candidates, std::span<const
     for (std::size_t first = 0; first < which.size(); first += kernel_lanes) {
         const std::size_t count = std::min(kernel_lanes, which.size() - first);
         for (std::size_t i = 0; i < count; ++i) lanes[i] = &candidates[which[first + i]];
+        if (lit_)
+            for (std::size_t i = first + kernel_lanes; i < std::min(first + 2 * kernel_lanes, which.size()); ++i)
+                lit_->prefetch(candidates[which[i]].node);
         test_batch({lanes.data(), count}, &verdicts[first], false);
     }
 }
@@ -125,7 +132,37 @@ void FoldTester::test(std::span<const NodeId> nodes, std::span<Verdict> verdicts
 
 void FoldTester::test_costs(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const { test_nodes(nodes, verdicts, true); }
 
+// Lights have no short cuts: what they make of nodes is found with all the rest.
+void FoldTester::decide(std::span<const NodeId> nodes, std::uint64_t* unfolded) const {
+    if (!lit_) return vdtree::decide(view_, arrays_, nodes, unfolded);
+    std::array<Verdict, 64> verdicts;
+    for (std::size_t first = 0; first < nodes.size(); first += verdicts.size()) {
+        const std::size_t count = std::min(verdicts.size(), nodes.size() - first);
+        test_nodes(nodes.subspan(first, count), std::span(verdicts).first(count), false);
+        std::uint64_t& word = unfolded[first / 64] = 0;
+        for (std::size_t i = 0; i < count; ++i) word |= std::uint64_t{verdicts[i].unfolded} << i;
+    }
+}
+
+void FoldTester::decide_range(NodeId first, std::size_t count, std::uint64_t* unfolded) const {
+    if (!lit_) return vdtree::decide_range(view_, arrays_, first, count, unfolded);
+    std::vector<NodeId> nodes(count);
+    std::iota(nodes.begin(), nodes.end(), first);
+    decide(nodes, unfolded);
+}
+
 void FoldTester::find_costs(std::span<const NodeId> nodes, const NodeCosts& costs) const {
+    if (lit_) {
+        std::vector<Verdict> verdicts(nodes.size());
+        test_nodes(nodes, verdicts, true);
+        std::fill_n(costs.unfolded, (nodes.size() + 63) / 64, 0);
+        for (std::size_t i = 0; i < nodes.size(); ++i) {
+            costs.cost[i] = verdicts[i].cost;
+            costs.seen_cost[i] = verdicts[i].seen_cost;
+            costs.unfolded[i / 64] |= std::uint64_t{verdicts[i].unfolded} << (i % 64);
+        }
+        return;
+    }
     const DistanceCriterion::Parts& parts = criterion_.parts();
     vdtree::find_costs(costs_view_, arrays_, {parts.reach.data(), parts.least_cost.empty() ? nullptr : parts.least_cost.data()}, nodes, costs);
 }
@@ -206,9 +243,51 @@ void FoldTester::find_facings(Lanes candidates, const FoldBatch& batch, bool cos
     }
 }
 
+// The rows that lights give.
+void FoldTester::light(Lanes lanes, FoldBatch& batch, LitFindings& lit) const {
+    for (std::size_t i = 0; i < kernel_lanes; ++i) {
+        const FoldCandidate& of = *lanes[std::min(i, lanes.size() - 1)];
+        lit_->set(i, of.node, of.ring, lit);
+    }
+    lit_->find_rows(lit);
+    for (std::size_t i = 0; i < lanes.size(); ++i) {
+        if (!(lanes[i]->flags & translucent_ring)) continue;
+        lit.translucent |= 1u << i;
+        lit.row[i] = lit_->silhouette_row();
+    }
+    std::copy_n(lit.row, kernel_lanes, batch.interior_row);
+    std::fill_n(batch.silhouette_row, kernel_lanes, lit_->silhouette_row());
+}
+
+// Parts what is left between a verdict and its contrary among the lights' motion and the eye's: the rows from here on are those that the
+// lights may lead to within their slack.
+void FoldTester::leave_room_for_lights(LitFindings& lit, FoldBatch& batch, const Findings& findings) const {
+    for (std::size_t i = 0; i < kernel_lanes; ++i) {
+        const std::uint32_t bit = 1u << i;
+        const bool is_near = batch.is_near & bit, unfolded = findings.unfolded & bit;
+        const bool is_out = !(batch.is_inside & bit) || (findings.away & bit);
+        if (is_out || (unfolded && !is_near) || (lit.translucent & bit)) { // not by its luminance
+            lit.slack[i] = infinity;
+            continue;
+        }
+        const auto distance = [&](std::int32_t row, float length) {
+            const float reach = view_.reach[static_cast<std::size_t>(row * view_.bins + batch.bin[i])];
+            return std::max(length, least_length) * view_.inverse_threshold * reach;
+        };
+        // In lengths, with the rounding of the comparison that the verdict comes from.
+        constexpr float rounding = 1e-6f;
+        const float gap = batch.gap[i] / (std::max(batch.length[i], least_length) * view_.inverse_threshold) * (is_near ? 1 + rounding : 1 - rounding);
+        batch.interior_row[i] = lit_->leave_room(i, is_near, gap, static_cast<std::size_t>(batch.bin[i]), lit);
+        batch.interior[i] = distance(batch.interior_row[i], batch.length[i]);
+        batch.silhouette[i] = std::max(batch.interior[i], distance(batch.silhouette_row[i], batch.silhouette_length[i]));
+    }
+}
+
 void FoldTester::test_batch(Lanes lanes, Verdict* verdicts, bool costs) const {
     FoldBatch batch;
     load(lanes, batch);
+    LitFindings lit;
+    if (lit_) light(lanes, batch, lit);
     measure(costs ? costs_view_ : view_, batch);
     batch.is_asked &= (1u << lanes.size()) - 1; // unused lanes are nobody's
     Findings findings;
@@ -216,14 +295,18 @@ void FoldTester::test_batch(Lanes lanes, Verdict* verdicts, bool costs) const {
     findings.silhouettes = ~batch.is_near;
     std::fill_n(findings.facing_slack, kernel_lanes, infinity);
     if (batch.is_asked) find_facings(lanes, batch, costs, findings);
+    if (lit_) leave_room_for_lights(lit, batch, findings);
     if (view_.has_gaze) find_position_slacks(batch, findings);
     finish_slacks(view_, batch, findings);
+    if (lit_)
+        for (std::size_t i = 0; i < lanes.size(); ++i) findings.facing_slack[i] = std::min(findings.facing_slack[i], lit.slack[i]);
     for (std::size_t i = 0; i < lanes.size(); ++i) {
         verdicts[i].position_slack = findings.position_slack[i];
         verdicts[i].facing_slack = findings.facing_slack[i];
         verdicts[i].unfolded = (findings.unfolded >> i) & 1;
     }
     if (!costs) return;
+    if (lit_) std::copy_n(lit.row, kernel_lanes, batch.interior_row);
     for (std::size_t i = 0; i < lanes.size(); ++i) {
         verdicts[i].cost = verdicts[i].seen_cost = 0;
         const std::uint32_t bit = 1u << i;

@@ -2,6 +2,7 @@
 // change.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include <vdtree/vertex_tree.h>
 
 #include "fold_kernel.h"
+#include "lit_tester.h"
 
 namespace unseen::vdtree {
 
@@ -66,10 +68,8 @@ public:
     void test(std::span<const FoldCandidate> candidates, std::span<Verdict> verdicts) const;
     void test(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const;
     // Only whether they unfold, one bit each; the same verdicts.
-    void decide(std::span<const NodeId> nodes, std::uint64_t* unfolded) const { vdtree::decide(view_, arrays_, nodes, unfolded); }
-    void decide_range(NodeId first, std::size_t count, std::uint64_t* unfolded) const {
-        vdtree::decide_range(view_, arrays_, first, count, unfolded);
-    }
+    void decide(std::span<const NodeId> nodes, std::uint64_t* unfolded) const;
+    void decide_range(NodeId first, std::size_t count, std::uint64_t* unfolded) const;
     // Both costs of nodes, and whether they unfold; the same as those of test_costs().
     void find_costs(std::span<const NodeId> nodes, const NodeCosts& costs) const;
     // The same where costs count, not only what is above the threshold: what nodes face is always found out. (In the above, the
@@ -86,6 +86,8 @@ private:
     void test_batch(Lanes lanes, Verdict* verdicts, bool costs) const;
     void find_facings(Lanes lanes, const FoldBatch& batch, bool costs, Findings& findings) const;
     void find_position_slacks(const FoldBatch& batch, Findings& findings) const;
+    void light(Lanes lanes, FoldBatch& batch, LitFindings& lit) const;
+    void leave_room_for_lights(LitFindings& lit, FoldBatch& batch, const Findings& findings) const;
     void set_costs(Verdict& verdict, const FoldBatch& batch, std::size_t lane, bool is_silhouette) const;
     void set_costs(Verdict& verdict, std::int32_t row, std::int32_t bin, float unit, float gap) const;
 
@@ -95,6 +97,7 @@ private:
     NodeArrays arrays_;        // of the tree and the criterion
     std::vector<float> reach_; // of the criterion; infinite where the fold is seen from everywhere
     KernelView view_, costs_view_;
+    std::optional<LitTester> lit_; // where lights give the classes
 };
 
 } // namespace unseen::vdtree

@@ -1,6 +1,7 @@
 // The perceptual fold test: a fold's worst-case grating against the contrast sensitivity table.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string_view>
 
@@ -12,6 +13,7 @@
 #include <vdtree/cut_rings.h>
 #include <vdtree/distance_criterion.h>
 #include <vdtree/fold_errors.h>
+#include <vdtree/lighting.h>
 
 namespace unseen::perception {
 
@@ -19,6 +21,7 @@ namespace unseen::perception {
 struct SceneLuminance {
     float darkest = 0;
     float brightest = 1;
+    bool operator==(const SceneLuminance&) const = default;
 };
 
 struct FoldTestOptions {
@@ -76,6 +79,17 @@ Result<vdtree::DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTr
 // Costs at least what the above does for every node. Cost: as the above.
 Result<vdtree::DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree& tree, const vdtree::CutRings& rings,
                                                                const vdtree::View& view, const FoldTestOptions& options);
+
+// luebke_hallen_distances() under lights that may move: ranges are what they can make of the normals, albedos and places in a ring, and follow the
+// lighting of the viewpoint; silhouettes are those of `options.scene`, which must hold for all of it (see lit_scene()). Adaptation is to
+// the brightest luminance of a range. `bounds`: of the tree. Cost: some 20 ms with a gaze, less without; not by node.
+Result<vdtree::DistanceCriterion> lit_distances(const vdtree::VertexTree& tree, std::shared_ptr<const vdtree::LightBounds> bounds,
+                                                const vdtree::View& view, const FoldTestOptions& options);
+
+// Between which luminances everything under the lights is, and the background; rounded outward to steps of 1/32, so that it mostly
+// stays while lights move. `eye`: in the tree's frame.
+SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBounds& bounds, const vdtree::Lighting& lighting,
+                         glm::dvec3 eye, float background);
 
 // The test by errors: what a fold changes in fact, not what could change within its ring. In distance form, like the above. The tree
 // needs fold_errors() (vdtree::with_fold_errors).

@@ -34,6 +34,7 @@ public:
     void set(int location, float value) const;
     void set(int location, unsigned value) const;
     void set(int location, const glm::vec4& value) const;
+    void set(int location, std::span<const glm::vec4> values) const; // an array's first elements; not empty
     void set(int location, const glm::mat4& value) const;
 
 private:

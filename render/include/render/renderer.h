@@ -12,6 +12,7 @@
 #include <render/context.h>
 #include <vdtree/cut.h>
 #include <vdtree/geomorph.h>
+#include <vdtree/lighting.h>
 #include <vdtree/view.h>
 
 namespace unseen::render {
@@ -27,6 +28,9 @@ struct DrawOptions {
     int samples = 16;                     // N-rooks samples a pixel, 1..256
     std::uint32_t seed = 1;               // of the sample pattern: equal for images that are compared
     float background = 0.19597990f;       // relative luminance; 20 cd/m2 on the default display
+    // Lights the vertices, in the tree's frame; null: their luminance is the tree's. Not with geomorphs. What it needs on the GPU, 8
+    // bytes a vertex, is made when it is first given.
+    const vdtree::Lighting* lighting = nullptr;
 };
 
 // A drawn frame. Row-major from the top left.
@@ -46,7 +50,7 @@ public:
     Renderer& operator=(Renderer&&) noexcept;
     ~Renderer();
 
-    // Draws off screen and reads back. Fails on an invalid view or when the GPU has too little memory, or on a GL
+    // Draws off screen and reads back. Fails on an invalid view or lights, or when the GPU has too little memory, or on a GL
     // error.
     Result<Frame> draw(const vdtree::Cut& cut, const vdtree::View& view, const DrawOptions& options = {},
                        const vdtree::Similarity& placement = {});

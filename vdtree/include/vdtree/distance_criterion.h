@@ -13,12 +13,15 @@
 
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include <glm/vec3.hpp>
 
+#include <vdtree/contrast_classes.h>
+#include <vdtree/lighting.h>
 #include <vdtree/result.h>
 #include <vdtree/vertex_tree.h>
 #include <vdtree/view.h>
@@ -29,6 +32,14 @@ namespace unseen::vdtree {
 struct FoldClass {
     std::uint16_t interior = 0;   // all of the ring faces the eye, or faces away
     std::uint16_t silhouette = 0; // the ring is, or may be, an outline, also where it has an irregular edge
+};
+
+// Where lights that may move light the tree, classes follow from what they make of a node, as of the viewpoint's lighting: interior
+// ones by the range of its vertices' luminances, adapted to the brightest of these.
+struct LitClasses {
+    std::shared_ptr<const LightBounds> bounds; // of the tree
+    ContrastClasses levels;
+    std::uint16_t silhouette = 0;              // the class of all outlines
 };
 
 class DistanceCriterion {
@@ -44,6 +55,7 @@ public:
         std::vector<float> reach = {};         // [class * eccentricity_bins + bin]: distance in lengths; not growing with the bin
         std::vector<float> least_cost = {};    // of the same shape: no fold of this class costs less, from however far (drawn, it is at
                                           // least a pixel); empty: 0 for all
+        std::optional<LitClasses> lit = {};    // with lights, in place of `classes`; reaches are to grow with contrasts and luminances
         std::size_t eccentricity_bins = 1;
         double bin_degrees = 1;           // bin b holds b * bin_degrees up to the next; the last one everything beyond
     };
@@ -90,6 +102,7 @@ struct Viewpoint {
     glm::dvec3 eye = glm::dvec3(0);
     std::optional<glm::dvec3> gaze = {}; // unit direction from the eye; none: everything counts as looked at
     std::vector<Frustum> frusta = {};    // nodes outside all of them fold; none: everything counts as seen
+    Lighting lighting = {};              // for criteria with lit classes; a valid one there
 };
 
 // Node extent by one tolerance: the support's angular diameter, seen from its sphere's nearest point on, in pixels.

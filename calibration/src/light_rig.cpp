@@ -1,0 +1,280 @@
+// Reads files of lights, and moves the lights.
+#include <calibration/light_rig.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+
+#include "json_file.h"
+
+namespace unseen::calibration {
+namespace {
+
+using Kind = vdtree::LightSource::Kind;
+using nlohmann::json;
+
+constexpr double unbounded = std::numeric_limits<double>::max();
+constexpr Range positive{.minimum = 0, .maximum = unbounded, .minimum_allowed = false};
+constexpr Range not_negative{.minimum = 0, .maximum = unbounded};
+constexpr Range share{.minimum = 0, .maximum = 1};
+constexpr Range any_number{.minimum = -unbounded, .maximum = unbounded};
+constexpr Range half_angle{.minimum = 0, .maximum = 180};
+constexpr double fastest_deg_per_s = 360000; // a thousand turns a second
+// Directions that are opposite but for so many radians have no shorter arc between them.
+constexpr double opposite = 1e-6;
+
+double radians(double degrees) { return degrees * std::numbers::pi / 180; }
+
+Result<glm::dvec3> vector(const JsonObject& object, std::string_view key) {
+    if (!object.has(key)) return object.key_error(key, "is missing: it must be an array of three numbers");
+    std::vector<double> v;
+    if (auto ok = object.append_numbers(object[key], std::string(key), 3, v); !ok) return ok.error();
+    for (const double x : v)
+        if (!std::isfinite(x)) return object.key_error(key, "must have finite numbers");
+    return glm::dvec3(v[0], v[1], v[2]);
+}
+
+// Scaled first, so that neither tiny nor huge directions under- or overflow when squared.
+Result<glm::dvec3> direction(const JsonObject& object, std::string_view key) {
+    const auto v = vector(object, key);
+    if (!v) return v;
+    const double largest = std::max({std::abs(v->x), std::abs(v->y), std::abs(v->z)});
+    if (!(largest > 0)) return object.key_error(key, "must not be 0, 0, 0: that is no direction");
+    return glm::normalize(*v / largest);
+}
+
+double angle_between(glm::dvec3 a, glm::dvec3 b) { return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)); }
+
+glm::dvec3 along_arc(glm::dvec3 a, glm::dvec3 b, double share_of_way) {
+    const glm::dvec3 axis = glm::cross(a, b);
+    const double sine = glm::length(axis);
+    if (!(sine > 0)) return a;
+    return glm::angleAxis(share_of_way * angle_between(a, b), axis / sine) * a;
+}
+
+} // namespace
+
+struct LightRig::Reader {
+    LightRig rig;
+
+    Result<void> read(const std::filesystem::path& file) {
+        rig.file_ = file;
+        const auto object = JsonObject::read(file, {"ambient", "material", "lights"});
+        if (!object) return object.error();
+        if (auto ok = object->get("ambient", rig.ambient_, share); !ok) return ok;
+        if (object->has("material"))
+            if (auto ok = read_material(*object); !ok) return ok;
+        const auto lights = object->array("lights");
+        if (!lights) return lights.error();
+        if ((*lights)->size() > vdtree::most_lights)
+            return object->key_error("lights", "has " + std::to_string((*lights)->size()) + " lights, but at most " +
+                                                   std::to_string(vdtree::most_lights) + " can be drawn");
+        bool any = rig.ambient_ > 0;
+        for (const json& value : **lights) {
+            if (auto ok = read_light(*object, value); !ok) return ok;
+            const Light& light = rig.lights_.back();
+            any = any || light.at_rest.intensity > 0 ||
+                  std::any_of(light.keys.begin(), light.keys.end(), [](const Key& key) { return key.intensity > 0; });
+        }
+        if (!any)
+            return object->error("the scene is black: give key \"ambient\" or the \"intensity\" of one of the lights a value above 0");
+        return {};
+    }
+
+private:
+    Result<void> read_material(const JsonObject& file) {
+        const auto material = file.child(file["material"], "material", {"specular", "shininess"});
+        if (!material) return material.error();
+        const auto specular = material->number("specular", share);
+        if (!specular) return specular.error();
+        const auto shininess = material->number("shininess", {.minimum = 1, .maximum = vdtree::most_shininess});
+        if (!shininess) return shininess.error();
+        rig.specular_ = *specular;
+        rig.shininess_ = *shininess;
+        return {};
+    }
+
+    // The keys that each type has, all of them wanted, but for the motions.
+    Result<JsonObject> object_of(const JsonObject& file, const json& value, const std::string& place, std::string& type) {
+        if (!value.is_object() || !value.contains("type") || !value["type"].is_string())
+            return file.key_error(place, "must be an object with a key \"type\": directional, point, spot or headlight");
+        type = value["type"].get<std::string>();
+        if (type == "directional") return file.child(value, place, {"type", "direction", "intensity", "orbit", "keyframes"});
+        if (type == "point") return file.child(value, place, {"type", "position", "intensity", "distance", "orbit", "keyframes"});
+        if (type == "spot")
+            return file.child(value, place, {"type", "position", "direction", "intensity", "distance", "inner_degrees", "outer_degrees",
+                                             "orbit", "keyframes"});
+        if (type == "headlight") return file.child(value, place, {"type", "intensity"});
+        return file.key_error(place + ".type", "must be directional, point, spot or headlight, but is " + to_json(type));
+    }
+
+    Result<void> read_light(const JsonObject& file, const json& value) {
+        std::string type;
+        const auto object = object_of(file, value, "lights[" + std::to_string(rig.lights_.size()) + "]", type);
+        if (!object) return object.error();
+        Light light;
+        vdtree::LightSource& source = light.at_rest;
+        light.is_headlight = type == "headlight";
+        source.kind = type == "point" ? Kind::point : type == "spot" ? Kind::spot : Kind::directional;
+        const auto intensity = object->number("intensity", not_negative);
+        if (!intensity) return intensity.error();
+        source.intensity = *intensity;
+        if (type == "directional" || type == "spot") {
+            const auto v = direction(*object, "direction");
+            if (!v) return v.error();
+            source.direction = *v;
+        }
+        if (source.kind != Kind::directional) {
+            const auto v = vector(*object, "position");
+            if (!v) return v.error();
+            source.position = *v;
+            const auto distance = object->number("distance", positive);
+            if (!distance) return distance.error();
+            source.distance = *distance;
+        }
+        if (source.kind == Kind::spot)
+            if (auto ok = read_angles(*object, source); !ok) return ok;
+        if (auto ok = read_motion(*object, light); !ok) return ok;
+        rig.moves_ = rig.moves_ || light.degrees_per_second != 0 || light.keys.size() > 1;
+        rig.follows_camera_ = rig.follows_camera_ || light.is_headlight;
+        rig.lights_.push_back(std::move(light));
+        return {};
+    }
+
+    Result<void> read_angles(const JsonObject& object, vdtree::LightSource& source) {
+        const auto inner = object.number("inner_degrees", half_angle), outer = object.number("outer_degrees", half_angle);
+        if (!inner) return inner.error();
+        if (!outer) return outer.error();
+        source.inner_cosine = std::cos(radians(*inner));
+        source.outer_cosine = std::cos(radians(*outer));
+        constexpr double least_edge_deg = 0.5;
+        if (!(*outer - *inner >= least_edge_deg)) return object.key_error("inner_degrees", "must be half a degree less than outer_degrees, at least");
+        return {};
+    }
+
+    Result<void> read_motion(const JsonObject& object, Light& light) {
+        if (object.has("orbit") && object.has("keyframes")) return object.key_error("orbit", "and \"keyframes\" exclude each other: remove one");
+        if (object.has("orbit")) return read_orbit(object, light);
+        if (object.has("keyframes")) return read_keys(object, light);
+        return {};
+    }
+
+    Result<void> read_orbit(const JsonObject& object, Light& light) {
+        const bool has_position = light.at_rest.kind != Kind::directional;
+        const auto orbit = has_position ? object.child(object["orbit"], "orbit", {"axis", "degrees_per_second", "centre"})
+                                        : object.child(object["orbit"], "orbit", {"axis", "degrees_per_second"});
+        if (!orbit) return orbit.error();
+        const auto axis = direction(*orbit, "axis");
+        if (!axis) return axis.error();
+        const auto speed = orbit->number("degrees_per_second", {.minimum = -fastest_deg_per_s, .maximum = fastest_deg_per_s});
+        if (!speed) return speed.error();
+        light.axis = *axis;
+        light.degrees_per_second = *speed;
+        light.has_centre = orbit->has("centre");
+        if (!light.has_centre) return {};
+        const auto centre = vector(*orbit, "centre");
+        if (!centre) return centre.error();
+        light.centre = *centre;
+        return {};
+    }
+
+    Result<void> read_keys(const JsonObject& object, Light& light) {
+        const auto keys = object.array("keyframes");
+        if (!keys) return keys.error();
+        if ((*keys)->empty()) return object.key_error("keyframes", "is empty");
+        const bool has_position = light.at_rest.kind != Kind::directional, has_direction = light.at_rest.kind != Kind::point;
+        const json* first = nullptr;
+        for (const json& value : **keys) {
+            const std::string place = "keyframes[" + std::to_string(light.keys.size()) + "]";
+            const auto frame = object.child(value, place, {"time_s", "position", "direction", "intensity"});
+            if (!frame) return frame.error();
+            if (!first) first = &value;
+            for (const char* key : {"position", "direction", "intensity"})
+                if (frame->has(key) != first->contains(key)) return frame->key_error(key, "must be in all keyframes of the light, or in none");
+            if (frame->has("position") && !has_position) return frame->key_error("position", "is nothing that a directional light has");
+            if (frame->has("direction") && !has_direction) return frame->key_error("direction", "is nothing that a point light has");
+            Key key{0, light.at_rest.position, light.at_rest.direction, light.at_rest.intensity};
+            const auto seconds = frame->number("time_s", any_number);
+            if (!seconds) return seconds.error();
+            key.seconds = *seconds;
+            if (!light.keys.empty() && !(key.seconds > light.keys.back().seconds))
+                return frame->key_error("time_s", "must be later than that of the keyframe before");
+            if (auto ok = frame->get("intensity", key.intensity, not_negative); !ok) return ok;
+            if (frame->has("position")) {
+                const auto v = vector(*frame, "position");
+                if (!v) return v.error();
+                key.position = *v;
+            }
+            if (frame->has("direction")) {
+                const auto v = direction(*frame, "direction");
+                if (!v) return v.error();
+                key.direction = *v;
+                if (!light.keys.empty() && angle_between(light.keys.back().direction, key.direction) > std::numbers::pi - opposite)
+                    return frame->key_error("direction", "is opposite to the one before: put a keyframe between them that says which way round");
+            }
+            light.keys.push_back(key);
+        }
+        return {};
+    }
+};
+
+Result<LightRig> LightRig::read(const std::filesystem::path& file) {
+    Reader reader;
+    if (auto ok = reader.read(file); !ok) return ok.error();
+    return std::move(reader.rig);
+}
+
+vdtree::Lighting LightRig::at(double seconds, const vdtree::VertexTree& tree, const vdtree::View& view,
+                              const vdtree::Similarity& placement) const {
+    vdtree::Lighting lighting;
+    lighting.ambient = ambient_;
+    lighting.specular = specular_;
+    lighting.shininess = shininess_;
+    for (const Light& light : lights_) {
+        vdtree::LightSource source = light.at_rest;
+        if (light.is_headlight) source.direction = vdtree::camera_frame(view).back;
+        if (!light.keys.empty()) {
+            const auto next = std::upper_bound(light.keys.begin(), light.keys.end(), seconds, [](double s, const Key& key) { return s < key.seconds; });
+            const Key& to = next == light.keys.end() ? light.keys.back() : *next;
+            const Key& from = next == light.keys.begin() ? light.keys.front() : *std::prev(next);
+            const double way = to.seconds > from.seconds ? (seconds - from.seconds) / (to.seconds - from.seconds) : 0;
+            source.position = from.position + way * (to.position - from.position);
+            source.direction = along_arc(from.direction, to.direction, way);
+            source.intensity = from.intensity + way * (to.intensity - from.intensity);
+        }
+        if (light.degrees_per_second != 0) {
+            const glm::dvec3 model = placement.to_world(tree.origin() + glm::dvec3(tree.bounding_sphere().centre));
+            const glm::dvec3 centre = light.has_centre ? light.centre : model;
+            const glm::dquat turn = glm::angleAxis(radians(std::fmod(light.degrees_per_second * seconds, 360)), light.axis);
+            source.position = centre + turn * (source.position - centre);
+            source.direction = turn * source.direction;
+        }
+        source.position = placement.to_mesh(source.position) - tree.origin();
+        source.direction = glm::normalize(placement.direction_to_mesh(source.direction));
+        source.distance /= placement.scale;
+        if (source.kind == Kind::directional) source.position = glm::dvec3(0), source.distance = 1;
+        if (source.kind == Kind::point) source.direction = glm::dvec3(0, 0, 1);
+        lighting.lights.push_back(source);
+    }
+    return lighting;
+}
+
+std::string LightRig::description() const {
+    std::map<std::string, int> counts;
+    for (const Light& light : lights_) {
+        const Kind kind = light.at_rest.kind;
+        ++counts[light.is_headlight ? "headlight" : kind == Kind::point ? "point" : kind == Kind::spot ? "spot" : "directional"];
+    }
+    std::string text;
+    for (const auto& [name, count] : counts) text += (text.empty() ? "" : ", ") + std::to_string(count) + " " + name;
+    if (ambient_ > 0) text += (text.empty() ? "ambient " : ", ambient ") + to_text(ambient_);
+    if (specular_ > 0) text += ", highlights of " + to_text(specular_);
+    return text;
+}
+
+} // namespace unseen::calibration

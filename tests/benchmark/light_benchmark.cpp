@@ -1,0 +1,112 @@
+// Lights that move while the eye stands still: what one frame of the cut takes with its index buffer, 100,000 triangles active or half
+// of the mesh where it is smaller.
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
+
+#include <glm/geometric.hpp>
+
+#include <perception/criterion.h>
+#include <vdtree/cut.h>
+
+#include "bench_mesh.h"
+
+namespace unseen::bench {
+namespace {
+
+using vdtree::Cut;
+using vdtree::LightSource;
+
+enum class Lights { directional, point, highlights };
+
+vdtree::Lighting lighting_at(Lights kind, double degrees) {
+    const double angle = degrees * std::numbers::pi / 180;
+    const glm::dvec3 direction = glm::normalize(glm::dvec3(std::sin(angle), 0.7, std::cos(angle)));
+    const vdtree::Sphere around = tree().bounding_sphere();
+    LightSource light;
+    light.intensity = 0.8;
+    light.direction = direction;
+    if (kind == Lights::point) {
+        light.kind = LightSource::Kind::point;
+        light.direction = {0, 0, 1};
+        light.distance = 3 * static_cast<double>(around.radius);
+        light.position = glm::dvec3(around.centre) + light.distance * direction;
+    }
+    vdtree::Lighting lighting;
+    lighting.lights = {light};
+    lighting.ambient = 0.2;
+    if (kind == Lights::highlights) lighting.specular = 0.04;
+    return lighting;
+}
+
+struct Subject {
+    explicit Subject(Lights kind_)
+        : kind(kind_), bounds(std::make_shared<vdtree::LightBounds>(*vdtree::LightBounds::measure(tree()))), criterion(make()) {
+        const double wanted = std::min(1e5, 0.5 * tree().triangle_count());
+        Cut cut(tree());
+        double low = -20, high = 20; // log2 of the threshold
+        for (int step = 0; step < 20; ++step) {
+            threshold = static_cast<float>(std::exp2((low + high) / 2));
+            (follow(cut, 0).triangles > wanted ? low : high) = std::log2(static_cast<double>(threshold));
+        }
+    }
+    vdtree::AdjustStats follow(Cut& cut, double degrees) const {
+        vdtree::Viewpoint viewpoint = perception::viewpoint_of(tree(), orbit(0), {}, {}, false);
+        viewpoint.lighting = lighting_at(kind, degrees);
+        vdtree::FollowOptions following;
+        following.threshold = threshold;
+        return *cut.follow(criterion, viewpoint, following);
+    }
+
+    Lights kind;
+    std::shared_ptr<const vdtree::LightBounds> bounds;
+    vdtree::DistanceCriterion criterion;
+    float threshold = 1;
+
+private:
+    vdtree::DistanceCriterion make() const {
+        perception::FoldTestOptions options;
+        const glm::dvec3 eye = perception::viewpoint_of(tree(), orbit(0), {}).eye;
+        options.scene = perception::lit_scene(tree(), *bounds, lighting_at(kind, 0), eye, 0.2f);
+        return *perception::lit_distances(tree(), bounds, orbit(0), options);
+    }
+};
+
+const Subject& subject(Lights kind) {
+    static const Subject directional(Lights::directional), point(Lights::point), highlights(Lights::highlights);
+    return kind == Lights::directional ? directional : kind == Lights::point ? point : highlights;
+}
+
+void moving_light(benchmark::State& state, Lights kind) {
+    const Subject& s = subject(kind);
+    Cut cut(tree());
+    double degrees = 0, changes = 0, tests = 0, triangles = 0;
+    const double step = static_cast<double>(state.range(0)) / 10;
+    const auto next = [&] {
+        const auto stats = s.follow(cut, degrees += step);
+        benchmark::DoNotOptimize(cut.indices().data());
+        changes += static_cast<double>(stats.folds + stats.unfolds);
+        tests += static_cast<double>(stats.node_tests);
+        triangles = stats.triangles;
+    };
+    for (int warm_up = 0; warm_up < 20; ++warm_up) next();
+    changes = tests = 0;
+    for (auto _ : state) next();
+    state.counters["changes"] = benchmark::Counter(changes, benchmark::Counter::kAvgIterations);
+    state.counters["tests"] = benchmark::Counter(tests, benchmark::Counter::kAvgIterations);
+    state.counters["triangles"] = triangles;
+}
+BENCHMARK_CAPTURE(moving_light, directional, Lights::directional)->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(moving_light, point, Lights::point)->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(moving_light, highlights, Lights::highlights)->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
+
+void light_bounds(benchmark::State& state) {
+    for (auto _ : state) benchmark::DoNotOptimize(vdtree::LightBounds::measure(tree()));
+}
+BENCHMARK(light_bounds)->Unit(benchmark::kMillisecond);
+
+} // namespace
+} // namespace unseen::bench
