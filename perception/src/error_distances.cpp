@@ -115,21 +115,17 @@ public:
             bands.push_back({std::min(low * frequency_step, highest_cpd),
                              csf.monotone_sensitivity(CyclesPerDegree(low), Degrees(eccentricity_deg), Luminance(luminance_cdm2))});
         for (std::size_t i = 0; i < width_count; ++i) {
-            patches_[i] = 1 / visibility(bands, width(i), 2);
-            strips_[i] = 1 / visibility(bands, width(i), 1);
+            patches_[i] = 1 / visibility(bands, width(i), share_of_patches);
+            areas_[i] = 1 / visibility(bands, width(i), share_of_area);
+            strips_[i] = 1 / visibility(bands, width(i), share_of_strip);
         }
     }
 
-    // The distance, in radii, from which a round patch is invisible. What a band of frequency rho sees of a patch of width D is
-    // the share of the band's own patches that it covers, (D rho)^2.
-    double patch_reach(double contrast) const {
-        const double width_deg = least_visible_width(patches_, contrast);
-        if (!std::isfinite(width_deg)) return 0; // from inside only
-        const double half = width_deg / screen_.largest_magnification / degrees_per_radian / 2;
-        return half < std::numbers::pi / 2 ? (1 + reach_rounding) / std::sin(half) : 1;
-    }
+    // The distances, in radii, from which a round patch among others like it is invisible, and an area on its own.
+    double patch_reach(double contrast) const { return reach(patches_, contrast); }
+    double area_reach(double contrast) const { return reach(areas_, contrast); }
 
-    // The distance, in widths, from which a long strip is invisible: a band sees 2 w rho of it.
+    // The distance, in widths, from which a long strip is invisible.
     double strip_reach(double contrast) const {
         const double width_deg = 0.5 * least_visible_width(strips_, contrast);
         if (!std::isfinite(width_deg)) return 0;
@@ -148,28 +144,39 @@ private:
     static double width(std::size_t i) { return widest_deg * std::pow(width_step, static_cast<double>(i)); }
     using Thresholds = std::array<double, width_count>; // contrasts, by width
 
-    // What is seen of patches of which so many lie side by side in one of the band's: of one, the share that it covers; of several
-    // whose signs differ at random, more of the band's patch, in 1 / n of the contrast for n times the width. Beyond, drift says more.
+    // What a band sees of a pattern, as a share of its contrast, by the pattern's width in the band's waves. Of an area: the share of the
+    // band's own patches that it covers.
+    static double share_of_area(double waves) { return std::min(1.0, waves * waves); }
+    // Of patches side by side whose signs differ at random, also: more of the band's patch, in 1 / n of the contrast for n times the
+    // width. What more of them come to, drift says.
     static double share_of_patches(double waves) {
         constexpr double most_side_by_side = 4;
         double most = 0;
-        for (double side = 1; side <= most_side_by_side; side *= 2) most = std::max(most, std::min(1.0, side * side * waves * waves) / side);
+        for (double side = 1; side <= most_side_by_side; side *= 2) most = std::max(most, share_of_area(side * waves) / side);
         return most;
     }
+    // Of a strip whose width is half of this.
+    static double share_of_strip(double waves) { return std::min(1.0, waves); }
 
     // Of unit contrast, in thresholds.
-    static double visibility(const std::vector<Band>& bands, double width_deg, int power) {
+    static double visibility(const std::vector<Band>& bands, double width_deg, double (*share)(double)) {
         double most = 0;
         for (std::size_t first = 0; first < std::min(bands_per_octave, bands.size()); ++first) {
             double sum = 0;
             for (std::size_t i = first; i < bands.size(); i += bands_per_octave) {
-                const double waves = width_deg * bands[i].highest_cpd;
-                const double seen = (power == 2 ? share_of_patches(waves) : std::min(1.0, waves)) * bands[i].sensitivity;
+                const double seen = share(width_deg * bands[i].highest_cpd) * bands[i].sensitivity;
                 sum += seen * seen * seen * std::sqrt(seen);
             }
             most = std::max(most, sum);
         }
         return std::pow(most, 1 / pooling);
+    }
+
+    double reach(const Thresholds& thresholds, double contrast) const {
+        const double width_deg = least_visible_width(thresholds, contrast);
+        if (!std::isfinite(width_deg)) return 0; // from inside only
+        const double half = width_deg / screen_.largest_magnification / degrees_per_radian / 2;
+        return half < std::numbers::pi / 2 ? (1 + reach_rounding) / std::sin(half) : 1;
     }
 
     // The widest that is invisible; infinite where all are.
@@ -185,14 +192,14 @@ private:
     }
 
     const Screen& screen_;
-    Thresholds patches_, strips_;
+    Thresholds patches_, areas_, strips_;
 };
 
 // The reach of patterns by eccentricity, computed when they are first asked for.
 class Reaches {
 public:
     Reaches(const Levels& levels, const Screen& screen, const CsfTable& csf, std::size_t bins)
-        : levels_(levels), screen_(screen), csf_(csf), bins_(bins), patches_(luminance_count), eyes_(luminance_count) {
+        : levels_(levels), screen_(screen), csf_(csf), bins_(bins), discs_(luminance_count), eyes_(luminance_count) {
         reach_.assign(bins, DistanceCriterion::never_visible); // row 0: what changes nothing
     }
 
@@ -205,11 +212,11 @@ public:
     // Without drift that can nowhere be seen from as far as the rest.
     Pattern simplified(Pattern p) {
         if (p.drift == no_contrast || p.typical == no_contrast) return p;
-        const float* const one = patches(p.luminance).data();
-        const float* const typical = one + static_cast<std::size_t>(p.typical) * bins_;
+        const Discs& tables = discs(p.luminance);
+        const float* const typical = &tables.patches[static_cast<std::size_t>(p.typical) * bins_];
         bool is_needed = false;
         for_each_drift(p, [&](int contrast, float width) {
-            const float* const from = one + static_cast<std::size_t>(contrast) * bins_;
+            const float* const from = &tables.areas[static_cast<std::size_t>(contrast) * bins_];
             for (std::size_t bin = 0; bin < bins_; ++bin) is_needed |= width * from[bin] > typical[bin];
         });
         if (is_needed) return p;
@@ -229,22 +236,27 @@ private:
         return eyes[bin];
     }
 
-    // [contrast * bins + bin], in radii.
-    std::span<const float> patches(int luminance) {
-        auto& table = patches_[static_cast<std::size_t>(luminance)];
-        if (table.empty()) {
-            for (int contrast = 0; contrast < contrast_count; ++contrast)
-                for (std::size_t bin = 0; bin < bins_; ++bin)
-                    table.push_back(static_cast<float>(eye(luminance, bin).patch_reach(Levels::contrast(contrast))));
+    struct Discs {
+        std::vector<float> patches, areas; // [contrast * bins + bin], in radii
+    };
+    const Discs& discs(int luminance) {
+        Discs& tables = discs_[static_cast<std::size_t>(luminance)];
+        if (tables.patches.empty()) {
+            for (int contrast = 0; contrast < contrast_count; ++contrast) {
+                for (std::size_t bin = 0; bin < bins_; ++bin) {
+                    tables.patches.push_back(static_cast<float>(eye(luminance, bin).patch_reach(Levels::contrast(contrast))));
+                    tables.areas.push_back(static_cast<float>(eye(luminance, bin).area_reach(Levels::contrast(contrast))));
+                }
+            }
         }
-        return table;
+        return tables;
     }
 
     void add_patch(const Pattern& p) {
         const std::size_t first = reach_.size();
         reach_.resize(first + bins_, 0);
-        const std::span<const float> one = patches(p.luminance);
-        const auto include = [&](int contrast, float width) {
+        const Discs& tables = discs(p.luminance);
+        const auto include = [&](const std::vector<float>& one, int contrast, float width) {
             const float* const from = &one[static_cast<std::size_t>(contrast) * bins_];
             for (std::size_t bin = 0; bin < bins_; ++bin) reach_[first + bin] = std::max(reach_[first + bin], width * from[bin]);
         };
@@ -253,19 +265,19 @@ private:
             constexpr int per_halving = 2 * contrasts_per_octave;
             float width = 1;
             for (int contrast = std::min(p.typical, p.largest);; contrast = std::min(contrast + per_halving, p.largest), width /= 2) {
-                include(contrast, width);
+                include(tables.patches, contrast, width);
                 if (contrast == p.largest) break;
             }
         }
         if (p.drift != no_contrast)
-            for_each_drift(p, include);
+            for_each_drift(p, [&](int contrast, float width) { include(tables.areas, contrast, width); });
         make_monotone(first);
     }
 
-    // Calls f(contrast, width) for areas an octave apart from the mesh's down to twice the node's width.
+    // Calls f(contrast, width) for the mesh and for areas down to twice the node's width, at whole octaves.
     template <class F>
     static void for_each_drift(const Pattern& p, F&& f) {
-        for (int quarters = p.quarters; quarters >= 4; quarters -= 4) {
+        for (int quarters = p.quarters; quarters >= 4; quarters = (quarters - 1) / 4 * 4) {
             const int contrast = p.drift - (quarters * p.fading * contrasts_per_octave / 2 + 3) / 4;
             if (contrast >= 0) f(contrast, std::exp2(static_cast<float>(quarters) / 4));
         }
@@ -287,7 +299,7 @@ private:
     const Screen& screen_;
     const CsfTable& csf_;
     std::size_t bins_;
-    std::vector<std::vector<float>> patches_;
+    std::vector<Discs> discs_;
     std::vector<std::vector<Eye>> eyes_; // by luminance; by bin
     std::map<Pattern, std::uint16_t> rows_;
     std::vector<float> reach_;
@@ -302,14 +314,18 @@ struct Shown {
 
 // By how much the one must be wider to be seen from as far as the other everywhere.
 float shortfall(const Reaches& reaches, const Shown& a, const Shown& b) {
-    if (b.row == 0 || !(b.length > 0)) return 1;
-    if (a.row == b.row) return a.length > 0 ? std::max(b.length / a.length, 1.0f) : std::numeric_limits<float>::infinity();
+    constexpr float infinity = std::numeric_limits<float>::infinity();
+    if (b.row == 0) return 1;
+    if (a.row == b.row) return a.length > 0 ? std::max(b.length / a.length, 1.0f) : b.length > 0 ? infinity : 1;
     const std::span<const float> of_a = reaches.reach(a.row), of_b = reaches.reach(b.row);
-    float factor = 1;
-    for (std::size_t bin = 0; bin < of_a.size(); ++bin)
-        if (of_b[bin] > 0) factor = std::max(factor, of_a[bin] > 0 ? b.length * of_b[bin] / (a.length * of_a[bin]) : std::numeric_limits<float>::infinity());
+    float factor = 0;
+    for (std::size_t bin = 0; bin < of_a.size(); ++bin) {
+        if (!(of_b[bin] > 0)) continue;
+        if (!(of_a[bin] > 0)) return infinity;
+        factor = std::max(factor, b.length > 0 ? b.length * of_b[bin] / (a.length * of_a[bin]) : 0.0f);
+    }
     constexpr float rounding = 4e-6f; // of the products, when the criterion is checked
-    return factor > 1 ? factor * (1 + rounding) : 1;
+    return std::max(factor * (1 + rounding), 1.0f);
 }
 
 // From how far it is seen, in all.
@@ -322,14 +338,27 @@ float weight(const Reaches& reaches, const Shown& shown) {
 
 // Makes `a` be seen from as far as `b`: wider, or of more contrast, whichever adds less.
 void cover(Reaches& reaches, Shown& a, const Shown& b) {
+    if (a.row == 0) {
+        if (b.row != 0) a = {b.pattern, std::max(a.length, b.length), b.row};
+        return;
+    }
+    if (a.row == b.row) a.length = std::max(a.length, b.length);
     const float factor = shortfall(reaches, a, b);
     if (factor <= 1) return;
     Shown wider = a, richer = a;
     wider.length *= factor;
     richer.pattern = above(a.pattern, b.pattern);
-    richer.row = reaches.row(richer.pattern);
     richer.length = std::max(a.length, b.length);
-    a = std::isfinite(wider.length) && weight(reaches, wider) <= weight(reaches, richer) ? wider : richer;
+    richer.row = reaches.row(richer.pattern);
+    // Drifts of different widths are told at different octaves.
+    richer.length *= std::max(shortfall(reaches, richer, a), shortfall(reaches, richer, b));
+    if (!std::isfinite(wider.length) && !std::isfinite(richer.length)) {
+        richer.pattern.fading = 0; // then the larger drift is above both everywhere
+        richer.length = std::max(a.length, b.length);
+        richer.row = reaches.row(richer.pattern);
+    }
+    const bool is_wider_less = !std::isfinite(richer.length) || weight(reaches, wider) <= weight(reaches, richer);
+    a = std::isfinite(wider.length) && is_wider_less ? wider : richer;
 }
 
 } // namespace
@@ -381,25 +410,23 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
         }
         patch.pattern = reaches.simplified(rounded(patch.pattern));
         patch.row = reaches.row(patch.pattern);
-        if (patches[node].row != 0) cover(reaches, patch, patches[node]); // the children's
+        cover(reaches, patch, patches[node]); // the children's
         patches[node] = patch;
 
-        Shown strip = strips[node];
+        Shown strip;
         for (const auto& [bright, dark] : {std::pair(brightest, lo), std::pair(hi, darkest)}) {
             const double mean = (bright + dark) / 2;
             const Pattern own{.luminance = levels.luminance_level(mean), .largest = levels.contrast_level(bright - dark, mean), .is_strip = true};
             strip.pattern = above(strip.pattern, own);
         }
-        strip.length = std::max(strip.length, moved_by_neighbours * errors[node].distance);
+        strip.length = moved_by_neighbours * errors[node].distance;
         strip.row = reaches.row(strip.pattern);
+        cover(reaches, strip, strips[node]);
         strips[node] = strip;
         if (node == 0) break;
         const NodeId parent = tree.parents()[node];
-        Shown& above_it = patches[parent];
-        if (above_it.row == 0) above_it = patch;
-        else cover(reaches, above_it, patch);
-        strips[parent].pattern = above(strips[parent].pattern, strip.pattern);
-        strips[parent].length = std::max(strips[parent].length, strip.length);
+        cover(reaches, patches[parent], patch);
+        cover(reaches, strips[parent], strip);
     }
     for (NodeId node = 0; node < nodes; ++node) {
         parts.classes[node] = {patches[node].row, strips[node].row};

@@ -44,7 +44,7 @@ TEST(FoldErrors, OfAFlatEvenSquareAreNoneInLuminance) {
     const VertexTree tree = built(painted_square(12, [](glm::dvec3) { return 0.5; }));
     for (const FoldError& error : tree.fold_errors()) {
         EXPECT_EQ(error.luminance, 0);
-        EXPECT_LT(error.drift, 1e-5f); // sums of many areas in floats
+        EXPECT_LT(error.drift, 0.01f); // along the border, folds change the area
     }
 }
 

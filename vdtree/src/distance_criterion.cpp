@@ -117,7 +117,8 @@ private:
             const bool is_everywhere = given >= DistanceCriterion::always_visible;
             if (needed > 0 && !is_everywhere) ratio = std::max(ratio, needed / given);
         }
-        return ratio == 1 ? 1 : ratio * (1 + rounding);
+        // Products of lengths and reaches that are both no larger are exactly so.
+        return ratio <= 1 ? std::min(ratio * (1 + rounding), 1.0f) : ratio * (1 + rounding);
     }
 
     static constexpr unsigned known_bits = 14;

@@ -100,7 +100,7 @@ SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBoun
 // comes to less than 1 in their sum of powers of 3.5:
 //   patch       c = 1.6 (em + (hi1 - lo1) min(1, hm / r1)) / L, and in parts half as wide four times that, up to the largest,
 //               (eY + (hi1 - lo1) min(1, h / r1)) / L;  c(rho) = c max over n = 1, 2, 4 of min(1, (n D rho)^2) / n
-//   drift       of areas 2^k times as wide, k = 1 up to the mesh's size:  c = drift / 2^(k fading / 2), as a patch of that width
+//   drift       of areas 2^k times as wide, k = 1 up to the mesh's size, W:  c = drift / 2^(k fading / 2);  c(rho) = c min(1, (W rho)^2)
 //   silhouette  a strip of width w, the angle of 1.35 h, that changes between the ring's luminance and anything in the scene, with the
 //               contrast cs over the pair's mean:  c(rho) = cs min(1, 2 rho w)
 // rho goes up to the display's limit: below a pixel a fold counts by the share of the pixel that it covers, so from far enough away
