@@ -137,12 +137,12 @@ TEST_P(FoldOracleRuns, SeeNothingOfWhatTheSafeTestFolds) {
         [](const perception::Judgement& judged) { EXPECT_EQ(judged.visible_pixels, 0u); });
 }
 
-// It is measured, not proven: differences may come up to a few times the threshold (see docs/perception.md), but no more.
+// It is measured, not proven: differences may exceed the threshold a little (see docs/perception.md), but no more.
 TEST_P(FoldOracleRuns, SeeLittleOfWhatTheErrorTestFolds) {
     const VertexTree tree = measured(GetParam().make());
     run(
         tree, [&](const View& view, const perception::FoldTestOptions& options) { return perception::error_distances(tree, view, options); },
-        [](const perception::Judgement& judged) { EXPECT_EQ(judged.visible_pixels, 0u); });
+        [](const perception::Judgement& judged) { EXPECT_LT(judged.max_ratio, 2); });
 }
 
 // From far away everything folds to a few triangles, and in the corner of the eye sooner.

@@ -3,11 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
 #include <vdtree/builder.h>
+#include <vdtree/criteria.h>
+#include <vdtree/cut.h>
+#include <vdtree/view.h>
 
 #include "shapes.h"
 
@@ -42,10 +46,50 @@ bool includes(const NormalSlabs& all, const NormalSlabs& one) {
 
 TEST(FoldErrors, OfAFlatEvenSquareAreNoneInLuminance) {
     const VertexTree tree = built(painted_square(12, [](glm::dvec3) { return 0.5; }));
-    for (const FoldError& error : tree.fold_errors()) {
-        EXPECT_EQ(error.luminance, 0);
-        EXPECT_LT(error.drift, 0.01f); // along the border, folds change the area
-    }
+    for (const FoldError& error : tree.fold_errors()) EXPECT_EQ(error.luminance, 0);
+}
+
+// The vector areas of a ring add up to the same whatever is in it: an even surface sends out as much light however it is folded.
+TEST(FoldErrors, OfAnEvenClosedSurfaceShiftNoMean) {
+    Mesh mesh = shapes::torus(32, 16);
+    mesh.colours.assign(mesh.positions.size(), {0.5f, 0.5f, 0.5f, 1});
+    const VertexTree tree = built(mesh);
+    for (const FoldError& error : tree.fold_errors()) EXPECT_LT(error.drift, 1e-4f); // sums of many areas in floats
+    EXPECT_GT(tree.fold_errors()[VertexTree::root()].distance, 0);
+}
+
+// Proxies brighter than the mean of their leaves make good for what a curved surface loses.
+TEST(FoldErrors, KeepTheLightOfACurvedSurface) {
+    const Mesh mesh = shapes::icosphere(5);
+    const Result<VertexTree> plain = build_tree(mesh.view(), {.threads = 1});
+    ASSERT_TRUE(plain);
+    const VertexTree kept = built(mesh);
+    const auto mean_light = [](const VertexTree& tree, std::span<const Index> corners, glm::dvec3 direction) {
+        double light = 0, area = 0;
+        for (std::size_t i = 0; i < corners.size(); i += 3) {
+            const auto at = [&](std::size_t k) { return glm::dvec3(tree.positions()[corners[i + k]]); };
+            const auto grey = [&](std::size_t k) { return static_cast<double>(tree.luminance()[corners[i + k]]); };
+            const double facing = 0.5 * glm::dot(glm::cross(at(1) - at(0), at(2) - at(0)), direction);
+            if (facing <= 0) continue;
+            area += facing;
+            light += facing * (grey(0) + grey(1) + grey(2)) / 3;
+        }
+        return light / area;
+    };
+    const auto light_towards = [&](const VertexTree& tree, glm::dvec3 direction) {
+        Cut cut(tree);
+        cut.adjust(ExtentCriterion(tree, frame_sphere({0, 0, 0}, 1, direction, 0.1, View{}), 16));
+        return mean_light(tree, cut.indices(), direction);
+    };
+    const auto whole_towards = [&](glm::dvec3 direction) {
+        Cut cut(*plain);
+        cut.unfold_all();
+        return mean_light(*plain, cut.indices(), direction);
+    };
+    const glm::dvec3 lit(plain->light().direction);
+    const double whole = whole_towards(lit);
+    EXPECT_GT(whole - light_towards(*plain, lit), 2e-3);
+    EXPECT_LT(std::abs(whole - light_towards(kept, lit)), 0.7 * std::abs(whole - light_towards(*plain, lit)));
 }
 
 // A step in luminance: nodes on it have all of it as their error, nodes far from it nothing.
