@@ -11,9 +11,11 @@
 #include <vdtree/builder.h>
 #include <vdtree/criteria.h>
 #include <vdtree/cut.h>
+#include <vdtree/tree_io.h>
 #include <vdtree/view.h>
 
 #include "shapes.h"
+#include "temp_folder.h"
 
 namespace unseen::vdtree {
 namespace {
@@ -153,6 +155,23 @@ TEST(FoldErrors, AreFiniteForHardMeshes) {
             for (const float value : {e.distance, e.mean_distance, e.luminance, e.mean_luminance, e.extent, e.drift})
                 ASSERT_TRUE(std::isfinite(value) && value >= 0);
     }
+}
+
+TEST(FoldErrors, AreKeptInTheFile) {
+    const support::TempFolder folder;
+    const VertexTree tree = built(shapes::bumpy_sphere(3, 0.02));
+    const auto file = folder / "tree.vdt";
+    ASSERT_TRUE(write_tree(file, tree));
+    for (const auto& open : {read_tree(file), map_tree(file)}) {
+        ASSERT_TRUE(open) << open.error().message;
+        EXPECT_TRUE(std::ranges::equal(open->fold_errors(), tree.fold_errors()));
+        EXPECT_TRUE(verify(*open));
+    }
+    const Result<VertexTree> plain = build_tree(shapes::bumpy_sphere(3, 0.02).view(), {.threads = 1});
+    ASSERT_TRUE(plain && write_tree(file, *plain));
+    const auto read = read_tree(file);
+    ASSERT_TRUE(read);
+    EXPECT_TRUE(read->fold_errors().empty());
 }
 
 } // namespace

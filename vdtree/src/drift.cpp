@@ -10,6 +10,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "fold_sequence.h"
+
 namespace unseen::vdtree {
 
 namespace {
@@ -26,8 +28,8 @@ constexpr std::size_t most_fading = 3;
 class DriftFinder {
 public:
     DriftFinder(const VertexTree& tree, std::span<FoldError> errors)
-        : tree_(tree), errors_(errors), interior_(tree.interior_count()), positions_(tree.positions()), luminance_(tree.luminance()),
-          parents_(tree.parents()), surfaces_(interior_), light_(interior_), found_(interior_) {}
+        : tree_(tree), errors_(errors), interior_(tree.interior_count()), luminance_(tree.luminance()),
+          parents_(tree.parents()), mesh_(tree), surfaces_(interior_), light_(interior_), found_(interior_) {}
 
     void run() {
         order();
@@ -62,16 +64,13 @@ private:
         }
     }
 
-    glm::vec3 vector_area(const Triangle& t) const {
-        return 0.5f * glm::cross(positions_[t[1]] - positions_[t[0]], positions_[t[2]] - positions_[t[0]]);
-    }
     float mean_luminance(const Triangle& t) const { return (luminance_[t[0]] + luminance_[t[1]] + luminance_[t[2]]) / 3; }
 
     // A third of each triangle belongs to each corner.
     void collect_surfaces() {
         for (const Triangle& corners : tree_.triangles()) {
             const Triangle t = {corners[0] + interior_, corners[1] + interior_, corners[2] + interior_};
-            for (const NodeId leaf : t) surfaces_[parents_[leaf]].add(vector_area(t) / 3.0f, mean_luminance(t));
+            for (const NodeId leaf : t) surfaces_[parents_[leaf]].add(mesh_.vector_area(t) / 3.0f, mean_luminance(t));
         }
         for (NodeId node = interior_; node-- > 1;) surfaces_[parents_[node]].add(surfaces_[node]);
     }
@@ -81,35 +80,16 @@ private:
         std::vector<NodeId> sequence(interior_);
         for (NodeId n = 0; n < interior_; ++n) sequence[n] = n;
         std::sort(sequence.begin(), sequence.end(), [&](NodeId a, NodeId b) { return order_[a] != order_[b] ? order_[a] < order_[b] : a > b; });
-        std::vector<Triangle> corners(tree_.triangles().begin(), tree_.triangles().end());
-        std::vector<std::vector<Index>> around(tree_.node_count()); // triangles at the nodes that are shown
-        for (Index t = 0; t < corners.size(); ++t)
-            for (NodeId& corner : corners[t]) around[corner += interior_].push_back(t);
         for (const NodeId node : sequence) {
-            std::vector<Index>& ring = around[node];
-            glm::vec3 before(0), after(0);
-            tree_.for_each_child(node, [&](NodeId child) {
-                for (const Index t : around[child]) {
-                    Triangle& at = corners[t];
-                    // With the first of its corners that folds.
-                    if (at[0] != node && at[1] != node && at[2] != node && are_distinct(at)) before += light_of(at);
-                    for (NodeId& corner : at)
-                        if (corner == child) corner = node;
-                }
-                ring.insert(ring.end(), around[child].begin(), around[child].end());
-                std::vector<Index>().swap(around[child]);
-            });
-            std::sort(ring.begin(), ring.end());
-            ring.erase(std::unique(ring.begin(), ring.end()), ring.end());
-            std::erase_if(ring, [&](Index t) { return !are_distinct(corners[t]); });
-            for (const Index t : ring) after += light_of(corners[t]);
-            light_[node] = after - before;
+            glm::vec3 light(0);
+            mesh_.fold(node, [&](const Triangle& t) { light -= light_of(t); });
+            for (const Index t : mesh_.ring(node)) light += light_of(mesh_.corners(t));
+            light_[node] = light;
         }
         for (NodeId node = interior_; node-- > 1;) light_[parents_[node]] += light_[node];
     }
 
-    static bool are_distinct(const Triangle& t) { return t[0] != t[1] && t[1] != t[2] && t[2] != t[0]; }
-    glm::vec3 light_of(const Triangle& t) const { return mean_luminance(t) * vector_area(t); }
+    glm::vec3 light_of(const Triangle& t) const { return mean_luminance(t) * mesh_.vector_area(t); }
 
     // What the folds up to here make of every node that is not below one of them.
     void compare(float up_to) {
@@ -220,9 +200,9 @@ private:
     const VertexTree& tree_;
     std::span<FoldError> errors_;
     NodeId interior_;
-    std::span<const glm::vec3> positions_;
     std::span<const Unorm16> luminance_;
     std::span<const NodeId> parents_;
+    FoldSequence mesh_;
     std::vector<float> order_;
     std::vector<Surface> surfaces_; // the mesh's
     std::vector<glm::vec3> light_; // luminance times vector area that the folds of the subtree add

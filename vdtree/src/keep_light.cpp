@@ -8,6 +8,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "fold_sequence.h"
+
 namespace unseen::vdtree {
 
 namespace {
@@ -18,11 +20,8 @@ constexpr float least_facing = 0.2f;
 class LightKeeper {
 public:
     explicit LightKeeper(const VertexTree& tree)
-        : tree_(tree), interior_(tree.interior_count()), positions_(tree.positions()), luminance_(tree.luminance().begin(), tree.luminance().end()),
-          corners_(tree.triangles().begin(), tree.triangles().end()), around_(tree.node_count()), missing_(interior_) {
-        for (Index t = 0; t < corners_.size(); ++t)
-            for (NodeId& corner : corners_[t]) around_[corner += interior_].push_back(t);
-    }
+        : tree_(tree), interior_(tree.interior_count()), luminance_(tree.luminance().begin(), tree.luminance().end()), mesh_(tree),
+          missing_(interior_) {}
 
     std::vector<Unorm16> run() {
         const auto support = tree_.support_spheres();
@@ -40,35 +39,23 @@ public:
 
 private:
     void fold(NodeId node) {
-        std::vector<Index>& ring = around_[node];
         glm::vec3 light(0); // to be kept
         tree_.for_each_child(node, [&](NodeId child) {
             if (!tree_.is_leaf(child)) light += missing_[child];
-            for (const Index t : around_[child]) {
-                Triangle& at = corners_[t];
-                const bool is_new = at[0] != node && at[1] != node && at[2] != node; // another child's, too
-                if (is_new && are_distinct(at)) light += luminance_of(at) * vector_area(at);
-                for (NodeId& corner : at)
-                    if (corner == child) corner = node;
-            }
-            ring.insert(ring.end(), around_[child].begin(), around_[child].end());
-            std::vector<Index>().swap(around_[child]);
         });
-        std::sort(ring.begin(), ring.end());
-        ring.erase(std::unique(ring.begin(), ring.end()), ring.end());
-        std::erase_if(ring, [&](Index t) { return !are_distinct(corners_[t]); });
+        mesh_.fold(node, [&](const Triangle& t) { light += luminance_of(t) * mesh_.vector_area(t); });
         if (tree_.support_spheres()[node].radius > 0) choose(node, light);
         glm::vec3 kept(0);
-        for (const Index t : ring) kept += luminance_of(corners_[t]) * vector_area(corners_[t]);
+        for (const Index t : mesh_.ring(node)) kept += luminance_of(mesh_.corners(t)) * mesh_.vector_area(mesh_.corners(t));
         missing_[node] = light - kept;
     }
 
     void choose(NodeId node, const glm::vec3& light) {
         glm::vec3 area(0), others(0); // vector area; light of the other corners
         float total = 0;
-        for (const Index t : around_[node]) {
-            const Triangle& at = corners_[t];
-            const glm::vec3 of_triangle = vector_area(at);
+        for (const Index t : mesh_.ring(node)) {
+            const Triangle& at = mesh_.corners(t);
+            const glm::vec3 of_triangle = mesh_.vector_area(at);
             area += of_triangle;
             total += glm::length(of_triangle);
             float sum = 0;
@@ -83,18 +70,12 @@ private:
         luminance_[node] = std::clamp(wanted, ring.lo, ring.hi);
     }
 
-    static bool are_distinct(const Triangle& t) { return t[0] != t[1] && t[1] != t[2] && t[2] != t[0]; }
-    glm::vec3 vector_area(const Triangle& t) const {
-        return 0.5f * glm::cross(positions_[t[1]] - positions_[t[0]], positions_[t[2]] - positions_[t[0]]);
-    }
     float luminance_of(const Triangle& t) const { return (luminance_[t[0]] + luminance_[t[1]] + luminance_[t[2]]) / 3; }
 
     const VertexTree& tree_;
     NodeId interior_;
-    std::span<const glm::vec3> positions_;
     std::vector<float> luminance_;
-    std::vector<Triangle> corners_; // nodes that are shown
-    std::vector<std::vector<Index>> around_; // triangles at the nodes that are shown
+    FoldSequence mesh_;
     std::vector<glm::vec3> missing_; // light that the luminances of the ring could not make good
 };
 
