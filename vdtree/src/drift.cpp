@@ -70,7 +70,9 @@ private:
     void collect_surfaces() {
         for (const Triangle& corners : tree_.triangles()) {
             const Triangle t = {corners[0] + interior_, corners[1] + interior_, corners[2] + interior_};
-            for (const NodeId leaf : t) surfaces_[parents_[leaf]].add(mesh_.vector_area(t) / 3.0f, mean_luminance(t));
+            Surface third;
+            third.add(mesh_.vector_area(t) / 3.0f, mean_luminance(t));
+            for (const NodeId leaf : t) surfaces_[parents_[leaf]].add(third);
         }
         for (NodeId node = interior_; node-- > 1;) surfaces_[parents_[node]].add(surfaces_[node]);
     }
@@ -172,7 +174,7 @@ private:
         std::array<Side, 6> sides; // by the main direction, of parts that are flat: -x, x, -y, y, -z, z
         glm::vec3 light = glm::vec3(0);
         float variance = 0; // of the light
-        float shift = 0;           // of the mean luminance, from where it is largest
+        float shift = 0;    // of the mean luminance, from where it is largest
 
         void take_up(const Found& part) {
             for (std::size_t i = 0; i < sides.size(); ++i) sides[i].light += part.sides[i].light, sides[i].area += part.sides[i].area;
