@@ -462,33 +462,31 @@ Result<VertexTree> with_fold_errors(const VertexTree& tree, int threads) {
     if (const auto sound = tree.check(); !sound) return sound.error();
     const auto copy_of = [](const auto& values) { return std::vector(values.begin(), values.end()); };
     const VertexTree::Data& given = tree.data();
-    const auto with = [&](std::vector<Unorm16> luminance, std::vector<FoldError> errors) {
-        auto data = std::make_shared<VertexTree::Data>();
-        data->geometry = given.geometry;
-        data->checks = given.checks;
-        TreeLuminance& light = data->light;
-        std::vector<PackedRange> support = copy_of(given.light.support_range);
-        include_proxies(tree, luminance, support);
-        light.luminance = std::move(luminance);
-        light.support_range = std::move(support);
-        light.ring_range = copy_of(given.light.ring_range);
-        light.adaptation = copy_of(given.light.adaptation);
-        light.ring_chroma = copy_of(given.light.ring_chroma);
-        light.fold_errors = std::move(errors);
-        light.light = given.light.light;
-        light.prelit = given.light.prelit;
-        light.range = given.light.range;
-        return VertexTree(std::move(data));
-    };
     std::vector<Unorm16> luminance = light_keeping_luminance(tree);
+    std::vector<PackedRange> support = copy_of(given.light.support_range);
+    include_proxies(tree, luminance, support);
+    const auto data = std::make_shared<VertexTree::Data>();
+    data->geometry = given.geometry;
+    data->checks = given.checks;
+    TreeLuminance& light = data->light;
+    light.luminance = std::move(luminance);
+    light.support_range = std::move(support);
+    light.ring_range = copy_of(given.light.ring_range);
+    light.adaptation = copy_of(given.light.adaptation);
+    light.ring_chroma = copy_of(given.light.ring_chroma);
+    light.light = given.light.light;
+    light.prelit = given.light.prelit;
+    light.range = given.light.range;
+
+    VertexTree measured(data);
     std::vector<FoldError> errors(tree.interior_count());
-    const VertexTree relit = with(luminance, {});
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
     arena.execute([&] {
-        Measurer(relit, errors).run();
-        find_drift(relit, errors);
+        Measurer(measured, errors).run();
+        find_drift(measured, errors);
     });
-    return with(std::move(luminance), std::move(errors));
+    light.fold_errors = std::move(errors); // nobody else has the tree yet
+    return measured;
 }
 
 } // namespace unseen::vdtree
