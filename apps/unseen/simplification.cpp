@@ -225,6 +225,19 @@ Effect back_face_effect(const Scene& scene) {
     return {"back-face folding", false, "the eye is in the model"};
 }
 
+// Whether what a solid's inside hides can be folded. Extent and displacement look at supports, which do not contain all that a fold changes.
+bool folds_hidden(const Scene& scene, const WhatOptions& what, Purpose purpose) {
+    return purpose == Purpose::picture && is_perceptual(what) && culls_back_faces(scene);
+}
+
+Effect hidden_effect(const Scene& scene, const WhatOptions& what, Purpose purpose, std::size_t occluders) {
+    const std::string name = "hidden folding";
+    if (!folds_hidden(scene, what, purpose))
+        return {name, false, is_perceptual(what) ? "nothing solid is looked at from outside" : "only the perceptual fold tests know what a fold changes"};
+    if (occluders == 0) return {name, false, "no sphere fits into the solid"};
+    return {name, true, "what is behind one of " + std::to_string(occluders) + " spheres inside the solid is folded"};
+}
+
 Effect translucency_effect(const Scene& scene, const WhatOptions& what) {
     if (!is_perceptual(what)) return {"translucency", false, "only the perceptual fold test knows it"};
     if (!is_translucent(scene)) return {"translucency", false, "no vertex has an alpha below 1"};
@@ -360,12 +373,16 @@ Result<void> Follower::set_geomorph(const Scene& scene, double seconds) {
     return {};
 }
 
-vdtree::Viewpoint Follower::viewpoint_for(const Scene& scene, const WhatOptions& what, Purpose purpose) const {
+vdtree::Viewpoint Follower::viewpoint_for(const Scene& scene, const WhatOptions& what, Purpose purpose) {
     // Where all is seen, a turning window must not cost anything.
     const bool window_only = purpose == Purpose::picture && !is_wholly_in_window(scene);
     vdtree::Viewpoint viewpoint =
         perception::viewpoint_of(scene.tree, scene.view, test_options(scene, what), scene.placement, window_only);
     if (scene.lighting) viewpoint.lighting = *scene.lighting;
+    if (folds_hidden(scene, what, purpose)) {
+        if (!inner_spheres_) inner_spheres_ = vdtree::inner_spheres(scene.tree);
+        viewpoint.occluders = *inner_spheres_;
+    }
     // What comes into the window shall not glide there any more.
     if (window_only && geomorph_) viewpoint.frusta = {vdtree::frustum_of(scene.tree, widened(scene.view), scene.placement)};
     return viewpoint;
@@ -378,6 +395,7 @@ Result<Simplification> Follower::change(vdtree::Cut& cut, const Scene& scene, co
     result.source_triangles = scene.tree.triangle_count();
     result.dropped = scene.tree.dropped_triangles();
     result.stats.triangles = cut.triangle_count();
+    vdtree::Viewpoint viewpoint;
     if (!is_full) {
         const auto criterion = criterion_for(scene, what);
         if (!criterion) return criterion.error();
@@ -390,7 +408,7 @@ Result<Simplification> Follower::change(vdtree::Cut& cut, const Scene& scene, co
             options.fill_budget = what.fill_budget;
             options.hysteresis = hysteresis_;
         }
-        const vdtree::Viewpoint viewpoint = viewpoint_for(scene, what, purpose);
+        viewpoint = viewpoint_for(scene, what, purpose);
         const auto start = Clock::now();
         const auto stats = cut.follow(**criterion, viewpoint, options);
         result.adapt_ms = milliseconds_since(start);
@@ -401,6 +419,7 @@ Result<Simplification> Follower::change(vdtree::Cut& cut, const Scene& scene, co
     add_effects(result, scene, what, purpose);
     if (is_full) return result;
     result.effects.push_back(back_face_effect(scene));
+    result.effects.push_back(hidden_effect(scene, what, purpose, viewpoint.occluders.size()));
     result.effects.push_back(time_limit_effect(what, result));
     if (is_perceptual(what) && what.mode != Mode::budget)
         for (Effect& effect : result.effects)

@@ -10,6 +10,7 @@
 #include <vdtree/cut_rings.h>
 #include <vdtree/fold_errors.h>
 #include <vdtree/geomorph.h>
+#include <vdtree/occluders.h>
 
 #include "report.h"
 #include "scene.h"
@@ -83,7 +84,7 @@ private:
         bool operator==(const Key&) const = default;
     };
     Result<const vdtree::DistanceCriterion*> criterion_for(const Scene& scene, const WhatOptions& what);
-    vdtree::Viewpoint viewpoint_for(const Scene& scene, const WhatOptions& what, Purpose purpose) const;
+    vdtree::Viewpoint viewpoint_for(const Scene& scene, const WhatOptions& what, Purpose purpose);
     Result<Simplification> change(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose);
     Result<void> glide(const vdtree::Cut& cut, Simplification& result);
 
@@ -92,6 +93,7 @@ private:
     Key key_;
     std::optional<vdtree::DistanceCriterion> criterion_;
     std::optional<vdtree::CutRings> rings_;    // likewise
+    std::optional<std::vector<vdtree::Sphere>> inner_spheres_; // likewise
     std::optional<vdtree::Geomorph> geomorph_;
     double passed_ = 0; // seconds since its last step
 };

@@ -35,7 +35,7 @@ constexpr int steepest_spike = 8 * contrasts_per_octave; // sharper ones count a
 constexpr double amplitude_of_mean = 1.6;
 
 // An outline moves with the folds beside it, too. Found by comparing pictures.
-constexpr float moved_by_neighbours = 1.35f;
+constexpr float moved_by_neighbours = 1.5f;
 
 class Levels {
 public:

@@ -136,7 +136,16 @@ public:
             if (validate(view)) viewpoint.frusta.push_back(frustum_of(tree_, view));
             else viewpoint.frusta.push_back({{Plane{{0, 0, 1}, 0}}});
         }
+        for (const Sphere& occluder : occluders_)
+            if (glm::length(glm::dvec3(occluder.centre) - eye_) > static_cast<double>(occluder.radius)) viewpoint.occluders.push_back(occluder);
         return viewpoint;
+    }
+
+    // Spheres in the model, be it solid or not; near enough to the eye to be in its way, and others.
+    void put_occluders() {
+        const auto r = static_cast<float>(radius_);
+        for (const auto& [offset, radius] : {std::pair(0.0f, 0.5f), std::pair(0.4f, 0.3f), std::pair(-0.6f, 0.1f)})
+            occluders_.push_back({glm::vec3(centre_) + offset * r * glm::vec3(0.6f, 0.64f, 0.48f), radius * r});
     }
 
 private:
@@ -151,6 +160,7 @@ private:
     bool with_gaze_, with_frustum_;
     glm::dvec3 centre_, eye_{0}, velocity_{0}, gaze_{0, 0, 1}, turn_{0, 1, 0};
     double radius_;
+    std::vector<Sphere> occluders_;
 };
 
 // Independent of the follower: top-down by single tests.
@@ -207,6 +217,8 @@ TEST_P(Follow, EqualsTheCutFromScratchOnRandomPaths) {
         for (const bool with_frustum : {false, true}) {
             const DistanceCriterion criterion = rich_criterion(tree, 3, with_gaze);
             Path path(tree, 11, with_gaze, with_frustum);
+            const bool has_rings = criterion.parts().spheres == DistanceCriterion::Spheres::ring;
+            if (has_rings && with_gaze == with_frustum) path.put_occluders();
             Cut cut(tree);
             FollowOptions options;
             options.cull_back_faces = with_gaze && with_frustum && tree.closedness() != Closedness::open;

@@ -529,6 +529,14 @@ Result<void> check(const Viewpoint& viewpoint, const DistanceCriterion& criterio
         for (const Plane& plane : frustum.planes)
             if (!(std::abs(glm::length(plane.normal) - 1) <= unit_slack) || !std::isfinite(plane.offset))
                 return invalid("A frustum's plane needs a normal of length 1 and a finite offset.");
+    if (!viewpoint.occluders.empty() && criterion.parts().spheres != DistanceCriterion::Spheres::ring)
+        return invalid("Occluders need a criterion of ring spheres.");
+    for (const Sphere& occluder : viewpoint.occluders) {
+        const glm::dvec3 centre(occluder.centre);
+        if (!is_finite(centre) || !(occluder.radius >= 0) || !std::isfinite(occluder.radius))
+            return invalid("An occluder needs a finite centre and a finite radius of 0 or more.");
+        if (!(glm::length(centre - viewpoint.eye) > static_cast<double>(occluder.radius))) return invalid("The eye is inside an occluder.");
+    }
     if (criterion.parts().lit) return validate(viewpoint.lighting);
     return {};
 }

@@ -36,6 +36,9 @@ constexpr float angle_rounding = 1e-3f;
 constexpr float slab_units = 127;                    // of NormalSlabs in 1
 constexpr float sqrt3 = 1.7320508075688772f;         // of the diagonals' coordinates
 constexpr float widest_reach = 1.25f;                // of the parallelepipeds tried
+// A node counts as hidden where a sphere of so many radii of its ring is: triangles that it shares with neighbours reach beyond the ring
+// where these are folded, too, by no more than their own size.
+constexpr float occluded_radii = 2;
 // Rounding of the products and their sums, in shares of the distance: a dozen roundings of terms of a few times its size.
 constexpr float rounding = 1e-5f;
 
@@ -181,6 +184,28 @@ struct Lanes {
         Floats to_eye[3], distance, gap, eccentricity, interior, silhouette, height;
         Ints bin, is_inside, is_near, is_asked;
     };
+    // By how much nodes stand out from behind the occluder that hides most of them. A sphere around c is hidden by one of radius R around b
+    // where, for some point q on the way from the eye to c, a share t of it, |q - b| + t r <= R: on the way to each of its points a point
+    // as near to q lies in the occluder. The least excess over R, over all t, changes by no more than the eye's path, and
+    // grows with spheres that nest.
+    static UNSEEN_INLINE Floats uncovered(const KernelView& view, const Measures& m, const Floats& node_radius) {
+        const Floats distance = max_of(m.distance, all(least_length)), inverse = 1 / distance;
+        const Floats ray[3] = {-m.to_eye[0] * inverse, -m.to_eye[1] * inverse, -m.to_eye[2] * inverse};
+        const Floats sine = occluded_radii * node_radius * inverse; // t r over the way to q
+        const Floats slope = sine / root_of(max_of(1 - sine * sine, all(least_length)));
+        Floats least = all(huge);
+        for (const KernelView::Occluder& o : view.occluders) {
+            const float(&b)[3] = o.towards;
+            const Floats along = b[0] * ray[0] + b[1] * ray[1] + b[2] * ray[2];
+            const Floats x = b[1] * ray[2] - b[2] * ray[1], y = b[2] * ray[0] - b[0] * ray[2], z = b[0] * ray[1] - b[1] * ray[0];
+            const Floats beside_squared = x * x + y * y + z * z;
+            const Floats way = min_of(max_of(along - root_of(beside_squared) * slope, all(0)), m.distance); // to the best q
+            const Floats off = along - way;
+            least = min_of(least, root_of(off * off + beside_squared) + way * sine - o.radius);
+        }
+        return least;
+    }
+
     static UNSEEN_INLINE Measures measure(const KernelView& view, const Nodes& of) {
         Measures m;
         Floats* const e = m.to_eye;
@@ -209,6 +234,7 @@ struct Lanes {
             }
             m.height = max_of(m.height, lowest + of.radius);
         }
+        if (!view.occluders.empty()) m.height = min_of(m.height, uncovered(view, m, of.radius));
 
         m.is_inside = m.height >= 0;
         m.is_near = m.gap < m.interior;

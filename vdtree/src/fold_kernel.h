@@ -31,6 +31,11 @@ struct KernelView {
     };
     std::vector<Plane> planes;
     std::vector<std::size_t> first_plane;
+    // Spheres that hide what is behind them, relative to the eye, which is outside of all.
+    struct Occluder {
+        float towards[3], radius;
+    };
+    std::vector<Occluder> occluders;
 
     std::span<const float> reach; // [row * bins + bin], in lengths; infinite: from everywhere; minus infinity: from nowhere
     std::int32_t bins = 1;
@@ -86,10 +91,10 @@ struct FoldBatch {
     alignas(64) float gap[kernel_lanes];       // of the sphere: distance - radius
     alignas(64) float eccentricity[kernel_lanes]; // radians, of the sphere's nearest point; 0 from inside, and without gaze
     alignas(64) std::int32_t bin[kernel_lanes];
-    alignas(64) float height[kernel_lanes];    // of the sphere's top over the lowest plane of the best frustum; negative: outside
-                                               // of all; without frusta huge
+    alignas(64) float height[kernel_lanes];    // of the sphere's top over the lowest plane of the best frustum, or what stands out from
+                                               // behind the best occluder, where that is less; negative: out of sight
     alignas(64) float interior[kernel_lanes], silhouette[kernel_lanes]; // the distances within which the node unfolds
-    // A bit a lane: inside a frustum; within the interior's distance; facing has to be found out.
+    // A bit a lane: in sight; within the interior's distance; facing has to be found out.
     std::uint32_t is_inside = 0, is_near = 0, is_asked = 0;
 };
 void measure(const KernelView& view, FoldBatch& batch) noexcept;

@@ -77,6 +77,11 @@ void FoldTester::look_from(const Viewpoint& viewpoint, double length_per_radian)
         }
     }
     view_.first_plane.push_back(view_.planes.size());
+    view_.occluders.clear();
+    for (const Sphere& occluder : viewpoint.occluders) {
+        const glm::vec3 towards(glm::dvec3(occluder.centre) - viewpoint.eye);
+        view_.occluders.push_back({{towards.x, towards.y, towards.z}, occluder.radius});
+    }
     view_.turn_per_length = static_cast<float>(1 / length_per_radian);
     costs_view_ = view_;
     costs_view_.everybody = true;
@@ -334,7 +339,8 @@ void FoldTester::set_costs(Verdict& verdict, std::int32_t row, std::int32_t bin,
 
 Motion FoldTester::motion(const VertexTree& tree, const Viewpoint& from, const Viewpoint& to, double length_per_radian) {
     constexpr Motion jump{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
-    if (from.gaze.has_value() != to.gaze.has_value() || from.frusta.size() != to.frusta.size()) return jump;
+    if (from.gaze.has_value() != to.gaze.has_value() || from.frusta.size() != to.frusta.size() || from.occluders != to.occluders)
+        return jump;
     const Sphere& root = tree.bounds()[VertexTree::root()].ring; // contains the centres of all spheres
     const glm::dvec3 centre(root.centre);
     const double radius = root.radius;

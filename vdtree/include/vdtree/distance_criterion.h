@@ -102,6 +102,9 @@ struct Viewpoint {
     glm::dvec3 eye = glm::dvec3(0);
     std::optional<glm::dvec3> gaze = {}; // unit direction from the eye; none: everything counts as looked at
     std::vector<Frustum> frusta = {};    // nodes outside all of them fold; none: everything counts as seen
+    // Nodes wholly behind one of these fold, also where a frustum shows them: spheres that nothing can be seen through from the eye, as those of
+    // inner_spheres(). The eye is outside of all. Not for criteria of support spheres, which do not contain all that a fold changes.
+    std::vector<Sphere> occluders = {};
     Lighting lighting = {};              // for criteria with lit classes; a valid one there
 };
 

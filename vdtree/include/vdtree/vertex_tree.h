@@ -43,6 +43,7 @@ inline constexpr NodeId no_node = 0xffffffffu;
 struct Sphere {
     glm::vec3 centre = glm::vec3(0); // relative to VertexTree::origin()
     float radius = 0;
+    bool operator==(const Sphere&) const = default;
 };
 
 // Relative luminance, 0..1, linear, before the display's mapping.
