@@ -6,6 +6,7 @@
 #include <limits>
 #include <span>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <tbb/parallel_for.h>
 
@@ -16,6 +17,7 @@ namespace {
 using Corners = std::array<glm::vec3, 3>;
 
 constexpr float near_share = 0.25f; // of a triangle's size: no triangles of a smooth surface come so near but neighbours
+constexpr int most_nodes = 4000; // looked at for one triangle: amid more than that, it counts as touching one
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
 float unit(float part, float whole) { return whole > 0 ? std::clamp(part / whole, 0.0f, 1.0f) : 0.0f; }
@@ -63,11 +65,26 @@ float distance_between(const Corners& a, const Corners& b) {
     return least;
 }
 
+struct Box {
+    glm::vec3 lo = glm::vec3(infinity), hi = glm::vec3(-infinity);
+
+    void include(const Box& other) { lo = glm::min(lo, other.lo), hi = glm::max(hi, other.hi); }
+    Box wider(float by) const { return {lo - by, hi + by}; }
+    bool meets(const Box& other) const {
+        return lo.x <= other.hi.x && lo.y <= other.hi.y && lo.z <= other.hi.z && hi.x >= other.lo.x && hi.y >= other.lo.y && hi.z >= other.lo.z;
+    }
+};
+
+// Looks for near triangles down the tree, by boxes around those that vanish at a node or below.
 class ContactFinder {
 public:
     explicit ContactFinder(const VertexTree& tree)
-        : tree_(tree), triangles_(tree.triangles()), positions_(tree.positions().subspan(tree.interior_count())), bounds_(tree.bounds()),
-          first_triangle_(tree.first_triangle()) {
+        : tree_(tree), interior_(tree.interior_count()), triangles_(tree.triangles()), positions_(tree.positions().subspan(interior_)),
+          first_triangle_(tree.first_triangle()), boxes_(interior_) {
+        for (NodeId node = interior_; node-- > 0;) {
+            for (Index t = first_triangle_[node]; t < first_triangle_[node + 1]; ++t) boxes_[node].include(box_of(corners(t)));
+            if (node > 0) boxes_[tree.parents()[node]].include(boxes_[node]);
+        }
         first_of_leaf_.assign(std::size_t{tree.leaf_count()} + 1, 0);
         for (const Triangle& t : triangles_)
             for (const Index leaf : t) ++first_of_leaf_[leaf + 1];
@@ -78,7 +95,7 @@ public:
             for (const Index leaf : triangles_[t]) of_leaf_[next[leaf]++] = t;
     }
 
-    std::vector<float> run() {
+    std::vector<float> run() const {
         std::vector<float> gaps(triangles_.size(), infinity);
         constexpr Index piece = 1024;
         tbb::parallel_for(Index{0}, static_cast<Index>((triangles_.size() + piece - 1) / piece), [&](Index i) {
@@ -98,6 +115,7 @@ private:
         const Triangle& t = triangles_[triangle];
         return {positions_[t[0]], positions_[t[1]], positions_[t[2]]};
     }
+    static Box box_of(const Corners& c) { return {glm::min(c[0], glm::min(c[1], c[2])), glm::max(c[0], glm::max(c[1], c[2]))}; }
 
     void collect_neighbours(Index triangle, std::vector<Index>& leaves) const {
         leaves.clear();
@@ -111,44 +129,38 @@ private:
     float find(Index triangle, Scratch& scratch) const {
         const Corners own = corners(triangle);
         const glm::vec3 centre = (own[0] + own[1] + own[2]) / 3.0f;
-        const float radius = std::max({glm::length(own[0] - centre), glm::length(own[1] - centre), glm::length(own[2] - centre)});
-        float least = near_share * radius;
+        float least = near_share * std::max({glm::length(own[0] - centre), glm::length(own[1] - centre), glm::length(own[2] - centre)});
         if (!(least > 0)) return infinity;
-        const auto may_be_nearer = [&](const glm::vec3& c, float r) { return glm::length(c - centre) - r - radius < least; };
-        bool has_neighbours = false;
+        const Box around = box_of(own).wider(least);
         bool is_found = false;
+        int nodes = 0;
+        collect_neighbours(triangle, scratch.neighbours);
+        const auto is_neighbour = [&](Index leaf) { return std::binary_search(scratch.neighbours.begin(), scratch.neighbours.end(), leaf); };
         scratch.waiting.assign(1, VertexTree::root());
         while (!scratch.waiting.empty()) {
             const NodeId node = scratch.waiting.back();
             scratch.waiting.pop_back();
-            const Sphere& ring = bounds_[node].ring; // contains all triangles that touch the support
-            if (!may_be_nearer(ring.centre, ring.radius)) continue;
+            if (least == 0 || ++nodes > most_nodes) return 0;
             for (Index other = first_triangle_[node]; other < first_triangle_[node + 1]; ++other) {
-                const Corners its = corners(other);
-                const glm::vec3 middle = (its[0] + its[1] + its[2]) / 3.0f;
-                const float reach = std::max({glm::length(its[0] - middle), glm::length(its[1] - middle), glm::length(its[2] - middle)});
-                if (other == triangle || !may_be_nearer(middle, reach)) continue;
-                if (!has_neighbours) collect_neighbours(triangle, scratch.neighbours), has_neighbours = true;
                 const Triangle& t = triangles_[other];
-                const bool is_neighbour = std::any_of(t.begin(), t.end(), [&](Index leaf) {
-                    return std::binary_search(scratch.neighbours.begin(), scratch.neighbours.end(), leaf);
-                });
-                if (is_neighbour) continue;
+                const Corners its = corners(other);
+                if (!around.meets(box_of(its)) || std::any_of(t.begin(), t.end(), is_neighbour)) continue;
                 const float gap = distance_between(own, its);
                 if (gap < least) least = gap, is_found = true;
             }
             tree_.for_each_child(node, [&](NodeId child) {
-                if (!tree_.is_leaf(child)) scratch.waiting.push_back(child);
+                if (child < interior_ && around.meets(boxes_[child])) scratch.waiting.push_back(child);
             });
         }
         return is_found ? least : infinity;
     }
 
     const VertexTree& tree_;
+    NodeId interior_;
     std::span<const Triangle> triangles_;
     std::span<const glm::vec3> positions_; // of leaves
-    std::span<const NodeBounds> bounds_;
     std::span<const Index> first_triangle_;
+    std::vector<Box> boxes_; // by interior node
     std::vector<Index> first_of_leaf_, of_leaf_;
 };
 

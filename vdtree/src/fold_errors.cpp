@@ -382,18 +382,21 @@ private:
     }
 
     // Where two such surfaces differ most, they do so at a vertex or where two edges cross: looked at are the middles of the edges
-    // that move. The vertices are among the samples.
+    // that move, and of their halves. The vertices are among the samples.
     static void compare(std::span<const Ring> surface, Surface& with, Worst& worst, Mean& mean) {
         if (with.empty()) return;
         const std::size_t count = std::min(surface.size(), triangles_compared);
         for (std::size_t i = 0; i < count; ++i) {
             const Ring& t = surface[i * surface.size() / count];
-            for (std::size_t k = 0; k < 3; ++k)
-                if ((t.inside >> k) & 1) {
-                    const Difference here = with.compare(middle_of(t.corner[k], t.corner[(k + 1) % 3]));
-                    worst.include(here);
-                    mean.include(here);
-                }
+            for (std::size_t k = 0; k < 3; ++k) {
+                if (!((t.inside >> k) & 1)) continue;
+                const Point &a = t.corner[k], &b = t.corner[(k + 1) % 3], middle = middle_of(a, b);
+                const Difference here = with.compare(middle);
+                worst.include(here);
+                mean.include(here);
+                worst.include(with.compare(middle_of(a, middle)));
+                worst.include(with.compare(middle_of(middle, b)));
+            }
         }
     }
 

@@ -13,7 +13,7 @@ class VertexTree;
 // Of an interior node. The mesh's own surface in the node's support, and the surface before the fold, are compared with the ring of
 // triangles around the proxy: while the neighbours are folded as far as nodes that are no larger than this one and not much richer in
 // luminance, about the cut in which nodes fold in the order of what they cost; and while none is. Points compared: the children's
-// proxies, leaves spread over the support, the leaves that were worst in the children, and the middles of the edges that the fold
+// proxies, leaves spread over the support, the leaves that were worst in the children, and three points of the edges that the fold
 // moves, before it with the surface after it and the other way.
 //
 // A measurement, not a bound over all cuts: neighbours may be folded in other ways, and the worst point may lie between those compared.
