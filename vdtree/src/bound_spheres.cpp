@@ -92,7 +92,7 @@ public:
                 node, [&](NodeId child) { farthest_ = std::max(farthest_, bound(child)); },
                 [&](Index leaf) { measure_leaf(leaf); });
         }
-        out_[node] = round_outward(farthest_);
+        out_[node] = round_up(farthest_);
     }
 
 private:

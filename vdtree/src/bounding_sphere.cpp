@@ -361,7 +361,7 @@ DSphere BallSet::enclose(double slack) {
     return {centre, reach};
 }
 
-float round_outward(double distance) {
+float round_up(double distance) {
     if (distance == 0) return 0;
     // Doubles carry distances and sums of the containment test; a few units in their last place cover them.
     const double needed = distance * (1 + 8 * std::numeric_limits<double>::epsilon());
@@ -374,7 +374,7 @@ Sphere round_outward(const DSphere& sphere) {
     if (sphere.radius < 0) return {};
     Sphere out;
     out.centre = glm::vec3(sphere.centre);
-    out.radius = round_outward(sphere.radius + glm::distance(glm::dvec3(out.centre), sphere.centre));
+    out.radius = round_up(sphere.radius + glm::distance(glm::dvec3(out.centre), sphere.centre));
     return out;
 }
 

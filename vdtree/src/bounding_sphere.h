@@ -69,8 +69,9 @@ private:
     std::vector<DSphere> scaled_spheres_;
 };
 
-// The sphere in floats, grown so that it contains the given one in exact arithmetic; a distance, so that it covers the given one.
+// The sphere in floats, grown so that it contains the given one in exact arithmetic.
 Sphere round_outward(const DSphere& sphere);
-float round_outward(double distance);
+// A distance in floats that covers the given one and its rounding.
+float round_up(double distance);
 
 } // namespace unseen::vdtree

@@ -644,7 +644,8 @@ struct Lanes {
                 store(seen + i, m.is_inside ? (as_outline ? outline.seen : inner.seen) : all(0));
                 store(outline_cost + i, outline.cost);
                 store(outline_seen + i, outline.seen);
-                const std::uint32_t near = bits_of(m.is_near & m.is_inside), within = bits_of(m.gap < m.silhouette);
+                const Ints is_within = m.gap < m.silhouette;
+                const std::uint32_t near = bits_of(m.is_inside & (m.is_near | (as_outline & is_within))), within = bits_of(is_within);
                 const std::uint32_t asked_bits = bits_of(m.is_asked);
                 for (std::size_t lane = 0; lane < width; ++lane) {
                     interior_unfolds[i + lane] = (near >> lane) & 1;
