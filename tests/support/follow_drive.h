@@ -181,6 +181,16 @@ private:
             for (Frustum& frustum : viewpoint_.frusta)
                 for (unsigned planes = in_.below(4); planes > 0; --planes) frustum.planes.push_back({in_.direction(), radius * in_.between(-2, 3)});
         }
+        if (in_.below(6) == 0) {
+            viewpoint_.occluders.clear();
+            for (unsigned count = in_.below(4); count > 0; --count)
+                viewpoint_.occluders.push_back({sphere.centre + glm::vec3(radius * in_.share() * in_.direction()), static_cast<float>(radius * in_.share())});
+        }
+        // An occluder that the eye is in, or one at all with other spheres, is no good viewpoint.
+        if (criterion_->parts().spheres != DistanceCriterion::Spheres::ring) viewpoint_.occluders.clear();
+        std::erase_if(viewpoint_.occluders, [&](const Sphere& s) {
+            return !(glm::distance(glm::dvec3(s.centre), viewpoint_.eye) > static_cast<double>(s.radius));
+        });
         return viewpoint_;
     }
 
@@ -241,7 +251,9 @@ private:
         const double bad = in_.below(3) == 0 ? nan : in_.below(2) ? infinity : -infinity;
         Viewpoint viewpoint = viewpoint_;
         FollowOptions options;
-        switch (in_.below(9)) {
+        switch (in_.below(11)) {
+        case 8: viewpoint.occluders = {{glm::vec3(9, 9, 9), static_cast<float>(bad)}}; break;
+        case 9: viewpoint.occluders = {{glm::vec3(viewpoint.eye), static_cast<float>(1 + 0.01 * glm::length(viewpoint.eye))}}; break;
         case 0: viewpoint.eye[static_cast<int>(in_.below(3))] = bad; break;
         case 1: viewpoint.eye = {0, 3e18, 0}; break;
         case 2: viewpoint.gaze = glm::dvec3(bad, 0, 0); break;
