@@ -107,7 +107,7 @@ protected:
             EXPECT_TRUE(criterion->is_monotone());
             Cut whole(tree), cut(tree);
             whole.unfold_all();
-            const bool is_closed = tree.closedness() == vdtree::Closedness::closed_outward;
+            const bool is_closed = tree.closedness() != vdtree::Closedness::open;
             ASSERT_TRUE(cut.follow(*criterion, perception::viewpoint_of(tree, view, options), {.cull_back_faces = is_closed}));
             const perception::Image before = draw(*renderer, whole, view), after = draw(*renderer, cut, view);
             for (const perception::CsfModel model : {perception::CsfModel::castle, perception::CsfModel::stela}) {

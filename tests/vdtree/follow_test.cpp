@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <random>
 #include <set>
 #include <thread>
@@ -17,6 +18,7 @@
 #include <vdtree/builder.h>
 
 #include "fold_tester.h"
+#include "follow_tools.h"
 #include "shapes.h"
 #include "tree_checks.h"
 
@@ -24,6 +26,10 @@ namespace unseen::vdtree {
 namespace {
 
 using shapes::random_unit;
+using support::from_scratch;
+using support::gathered;
+using support::state_of;
+using support::triangles_of;
 
 // Frames a mesh class; the customer's figure, 10^4, is reached with the environment variable UNSEEN_FRAMES.
 int frame_count() {
@@ -163,49 +169,6 @@ private:
     std::vector<Sphere> occluders_;
 };
 
-// Independent of the follower: top-down by single tests.
-std::vector<bool> from_scratch(const VertexTree& tree, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
-                               const FollowOptions& options) {
-    FoldTester tester(tree, criterion, options.cull_back_faces, options.threshold);
-    tester.look_from(viewpoint, 1);
-    std::vector<bool> unfolded(tree.interior_count(), false);
-    for (NodeId node = 0; node < tree.interior_count();) {
-        Verdict verdict;
-        tester.test({&node, 1}, {&verdict, 1});
-        unfolded[node] = verdict.unfolded;
-        node = verdict.unfolded ? node + 1 : tree.subtree_end()[node];
-    }
-    return unfolded;
-}
-
-std::vector<bool> state_of(const Cut& cut) {
-    std::vector<bool> unfolded;
-    for (NodeId node = 0; node < cut.tree().interior_count(); ++node) unfolded.push_back(cut.is_unfolded(node));
-    return unfolded;
-}
-
-using Triangles = std::multiset<std::array<NodeId, 3>>;
-Triangles triangles_of(std::span<const NodeId> indices) {
-    Triangles out;
-    for (std::size_t i = 0; i < indices.size(); i += 3) {
-        std::array<NodeId, 3> t{indices[i], indices[i + 1], indices[i + 2]};
-        std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
-        out.insert(t);
-    }
-    return out;
-}
-
-// What the cut's definition says: triangles of unfolded nodes, by the proxies of their corners.
-Triangles gathered(const Cut& cut) {
-    const VertexTree& tree = cut.tree();
-    std::vector<NodeId> indices;
-    for (NodeId node = 0; node < tree.interior_count(); ++node)
-        if (cut.is_unfolded(node))
-            for (Index t = tree.first_triangle()[node]; t < tree.first_triangle()[node + 1]; ++t)
-                for (const Index leaf : tree.triangles()[t]) indices.push_back(cut.proxy_of_leaf(leaf));
-    return triangles_of(indices);
-}
-
 class Follow : public testing::TestWithParam<MeshClass> {};
 INSTANTIATE_TEST_SUITE_P(MeshClasses, Follow, testing::ValuesIn(mesh_classes),
                          [](const auto& test) { return std::string(test.param.name); });
@@ -306,7 +269,8 @@ TEST_P(Follow, DecidesAndWeighsManyNodesAsOneByOne) {
         ASSERT_TRUE(criterion);
         Path path(tree, 31 + static_cast<std::uint64_t>(variant), with_gaze, with_frustum);
         for (int frame = 0; frame < 12; ++frame) {
-            const Viewpoint viewpoint = path.next();
+            Viewpoint viewpoint = path.next();
+            if (frame % 3 == 0) viewpoint.eye = glm::dvec3(tree.positions()[random() % tree.node_count()]); // inside of many rings
             const FollowOptions options{.threshold = 0.7f, .cull_back_faces = cull};
             const auto every = test_every_node(tree, *criterion, viewpoint, options);
             ASSERT_TRUE(every);
@@ -323,6 +287,7 @@ TEST_P(Follow, DecidesAndWeighsManyNodesAsOneByOne) {
                 ASSERT_EQ(bit(decided, i), verdicts[i].unfolded) << "variant " << variant << ", node " << shuffled[i];
                 ASSERT_EQ(bit(*every, shuffled[i]), verdicts[i].unfolded) << "variant " << variant << ", node " << shuffled[i];
                 ASSERT_EQ(bit(unfolded, i), costs[i].unfolded) << "variant " << variant << ", node " << shuffled[i];
+                ASSERT_EQ(costs[i].unfolded, verdicts[i].unfolded) << "variant " << variant << ", node " << shuffled[i];
                 ASSERT_EQ(cost[i], costs[i].cost) << "variant " << variant << ", node " << shuffled[i];
                 ASSERT_EQ(seen_cost[i], costs[i].seen_cost) << "variant " << variant << ", node " << shuffled[i];
             }
@@ -409,6 +374,14 @@ TEST(FollowAfterOthers, TakesACopyOfTheCriterionInEveryFrame) {
         const auto copy = std::make_unique<DistanceCriterion>(original); // gone after the frame
         const DistanceCriterion on_stack = *copy;
         ASSERT_TRUE(cut.follow(frame % 2 ? *copy : on_stack, viewpoint));
+        ASSERT_EQ(state_of(cut), from_scratch(tree, original, viewpoint, {})) << "frame " << frame;
+    }
+    std::optional<DistanceCriterion> in_place; // always at the same address, with its numbers elsewhere
+    for (int frame = 0; frame < 50; ++frame) {
+        const Viewpoint viewpoint = path.next();
+        const DistanceCriterion other = original;
+        in_place.emplace(other);
+        ASSERT_TRUE(cut.follow(*in_place, viewpoint));
         ASSERT_EQ(state_of(cut), from_scratch(tree, original, viewpoint, {})) << "frame " << frame;
     }
 }
@@ -563,6 +536,49 @@ TEST(FollowScene, SharesABudgetAmongObjects) {
     EXPECT_EQ(state_of(alone), state_of(near_cut));
     const SceneObject twice[] = {{near_cut, near_criterion, {}}, {near_cut, near_criterion, {}}};
     EXPECT_FALSE(follow_scene(twice, 10));
+}
+
+// Whether a triangle of a surface that is turned inside out shows its seen side, the one that its normal points away from; of others,
+// the one that it points to.
+bool is_seen(const VertexTree& tree, const Triangle& t, glm::dvec3 eye) {
+    const auto at = [&](Index leaf) { return glm::dvec3(tree.positions()[tree.interior_count() + leaf]); };
+    const glm::dvec3 normal = glm::cross(at(t[1]) - at(t[0]), at(t[2]) - at(t[0]));
+    const double towards = glm::dot(normal, eye - at(t[0]));
+    return tree.closedness() == Closedness::closed_inward ? towards < 0 : towards > 0;
+}
+
+// Back-face folding goes by the side that is seen: the same nodes fold as on the same surface turned right.
+TEST(FollowBackFaces, OfInsideOutSurfacesAreThoseOfTheSurfaceTurnedRight) {
+    const Mesh outward = shapes::bumpy_sphere(5, 0);
+    const VertexTree right = built(outward, ClustererKind::octree), wrong = built(shapes::inside_out(outward), ClustererKind::octree);
+    ASSERT_EQ(right.closedness(), Closedness::closed_outward);
+    ASSERT_EQ(wrong.closedness(), Closedness::closed_inward);
+    ASSERT_EQ(right.interior_count(), wrong.interior_count());
+    const auto for_right = DistanceCriterion::create(right, {.reach = {1000}}), for_wrong = DistanceCriterion::create(wrong, {.reach = {1000}});
+    ASSERT_TRUE(for_right && for_wrong);
+    const FollowOptions culling{.cull_back_faces = true};
+    Cut of_right(right), of_wrong(wrong), with_back(wrong);
+    std::mt19937_64 random(41);
+    for (int frame = 0; frame < 60; ++frame) {
+        const Viewpoint viewpoint{.eye = (1.5 + 4 * random_unit(random)) * random_direction(random)};
+        ASSERT_TRUE(of_right.follow(*for_right, viewpoint, culling));
+        ASSERT_TRUE(of_wrong.follow(*for_wrong, viewpoint, culling));
+        ASSERT_TRUE(with_back.follow(*for_wrong, viewpoint));
+        EXPECT_EQ(state_of(of_wrong), state_of(of_right)) << "frame " << frame;
+        EXPECT_EQ(state_of(of_wrong), from_scratch(wrong, *for_wrong, viewpoint, culling)) << "frame " << frame;
+        // What folds for facing away shows no triangle of the surface, whose hidden half is folded for the most part.
+        Index hidden = 0;
+        for (Index t = 0; t < wrong.triangle_count(); ++t) {
+            const Triangle& corners = wrong.triangles()[t];
+            const bool is_hidden = std::any_of(corners.begin(), corners.end(), [&](Index leaf) {
+                const NodeId parent = wrong.parents()[wrong.interior_count() + leaf];
+                return with_back.is_unfolded(parent) && !of_wrong.is_unfolded(parent);
+            });
+            hidden += is_hidden;
+            ASSERT_FALSE(is_hidden && is_seen(wrong, corners, viewpoint.eye)) << "frame " << frame << ", triangle " << t;
+        }
+        EXPECT_GT(hidden, wrong.triangle_count() / 8) << "frame " << frame;
+    }
 }
 
 TEST(FollowFarAway, FoldsToNothing) {

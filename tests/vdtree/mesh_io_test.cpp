@@ -511,10 +511,48 @@ TEST(Stl, KeepsSolidsAsGroups) {
 
 TEST(Stl, LeavesNormalsOutThatAreZeroOrNan) {
     std::string zero = mesh_files::ascii_stl_facet();
-    EXPECT_TRUE(read(zero.replace(zero.find("0 0 1"), 5, "0 -0 0"), "a.stl").mesh.normals.empty());
+    const ReadResult without = read(zero.replace(zero.find("0 0 1"), 5, "0 -0 0"), "a.stl");
+    EXPECT_TRUE(without.mesh.normals.empty());
+    EXPECT_TRUE(without.warnings.empty()); // zero is how STL says that there is none
     std::string nan = mesh_files::binary_stl_facet();
     nan.replace(84, 4, mesh_files::floats(std::numeric_limits<float>::quiet_NaN()));
-    EXPECT_TRUE(read(nan, "a.stl").mesh.normals.empty());
+    const ReadResult strange = read(nan, "a.stl");
+    EXPECT_TRUE(strange.mesh.normals.empty());
+    EXPECT_THAT(strange.warnings, ElementsAre("1 facet normal was not finite and computed from the corners."));
+}
+
+TEST(Stl, TellsOfFacetsWithoutANormalAmongOthers) {
+    const std::string one = mesh_files::ascii_stl_facet();
+    std::string other = one;
+    const ReadResult result = read(one + other.replace(other.find("0 0 1"), 5, "0 0 0"), "a.stl");
+    ASSERT_EQ(result.mesh.normals.size(), 6u);
+    EXPECT_EQ(result.mesh.normals[3], glm::vec3(0.0f));
+    EXPECT_THAT(result.warnings, ElementsAre("3 normals were zero or missing and computed from the faces, the first that of vertex 3."));
+}
+
+// Whatever the format: zero is told, what is not finite is refused, and what no triangle uses does not matter.
+TEST(Normals, AreNeverReplacedInSilence) {
+    const std::string properties = "property float nx\nproperty float ny\nproperty float nz\n";
+    const auto ply = [&](const std::string& normal) { return ply_with(properties, normal); };
+    const auto off = [](const std::string& normal) {
+        return "NOFF\n4 1 0\n0 0 0 0 0 1\n1 0 0 " + normal + "\n0 1 0 0 0 1\n9 9 9 nan 0 0\n3 0 1 2\n";
+    };
+    const auto obj = [](const std::string& normal) {
+        return "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nvn " + normal + "\nvn nan nan nan\nf 1//1 2//2 3//1\n";
+    };
+    EXPECT_THAT(read(ply("0 0 0"), "a.ply").warnings,
+                ElementsAre("3 normals were zero or missing and computed from the faces, the first that of vertex 0."));
+    EXPECT_THAT(read(off("0 -0 0"), "a.off").warnings,
+                ElementsAre("1 normal was zero or missing and computed from the faces, the first that of vertex 1."));
+    EXPECT_THAT(read(obj("0 0 0"), "a.obj").warnings,
+                ElementsAre("1 normal was zero or missing and computed from the faces, the first that of vertex 1."));
+    for (const auto& good : {read(ply("0 1 0"), "a.ply"), read(off("1 1 1"), "a.off"), read(obj("0 0 1e-30"), "a.obj")})
+        EXPECT_TRUE(good.warnings.empty());
+    for (const std::string bad : {"nan 0 0", "0 inf 0", "0 0 -inf", "1e300 0 0"}) {
+        EXPECT_EQ(error_of(ply(bad), "a.ply"), "a.ply: the normal of vertex 0 is NaN or infinite; correct it, or leave the normals out.") << bad;
+        EXPECT_EQ(error_of(off(bad), "a.off"), "a.off: the normal of vertex 1 is NaN or infinite; correct it, or leave the normals out.") << bad;
+        EXPECT_EQ(error_of(obj(bad), "a.obj"), "a.obj: line 7: face 1 uses normal 2, which is NaN or infinite; correct it.") << bad;
+    }
 }
 
 TEST(Stl, ReadsUpperCase) {
@@ -609,6 +647,18 @@ std::string gltf_with_attributes(int mode, const std::string& node = R"({"mesh":
                    R"({"buffer":0,"byteLength":144},{"buffer":0,"byteOffset":144,"byteLength":24,"byteStride":4},)"
                    R"({"buffer":0,"byteOffset":168,"byteLength":24}],"buffers":[{"byteLength":192}]})",
                data);
+}
+
+TEST(Gltf, RefusesNormalsThatAreNotFinite) {
+    std::string bad = gltf_with_attributes(4);
+    const std::string good_normal = mesh_files::floats(0.6, 0, 0.8);
+    const std::size_t second = bad.find(good_normal) + good_normal.size();
+    bad.replace(second, good_normal.size(), mesh_files::floats(0, std::numeric_limits<float>::infinity(), 0));
+    EXPECT_EQ(error_of(bad, "a.glb"), "a.glb: normal 1 of accessor 1 is NaN or infinite; correct it.");
+    std::string zero = gltf_with_attributes(4);
+    zero.replace(second, good_normal.size(), mesh_files::floats(0, 0, 0));
+    EXPECT_THAT(read(zero, "a.glb").warnings,
+                ElementsAre("1 normal was zero or missing and computed from the faces, the first that of vertex 1."));
 }
 
 TEST(Gltf, ReadsEveryModeOfTriangles) {

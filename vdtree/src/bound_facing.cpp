@@ -8,6 +8,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include "prefetch.h"
+
 namespace unseen::vdtree {
 
 namespace {
@@ -155,6 +157,8 @@ public:
 
     void add(const Target& target, const Corner (&at)[3]) {
         targets_[batch_.size()] = target;
+        for (const Index to : target)
+            if (to != none) prefetch(&seen_[to]); // for flush()
         batch_.push(at[0], at[1], at[2]);
         if (batch_.full()) flush();
     }

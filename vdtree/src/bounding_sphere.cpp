@@ -176,6 +176,22 @@ private:
     glm::dvec3 origin_;
 };
 
+// Points that somebody else keeps, relative to one of them.
+class FarPoints {
+public:
+    FarPoints(glm::dvec3 origin, FunctionRef<glm::dvec3(glm::dvec3)> farthest) : origin_(origin), farthest_(farthest) {}
+
+    DSphere first() const { return {glm::dvec3(0), 0}; }
+    Farthest farthest(glm::dvec3 from) const {
+        const glm::dvec3 centre = from + origin_, point = farthest_(centre);
+        return {{point - origin_, 0}, glm::distance(point, centre)};
+    }
+
+private:
+    glm::dvec3 origin_;
+    FunctionRef<glm::dvec3(glm::dvec3)> farthest_;
+};
+
 // Grows a basis by what sticks out farthest until nothing does by more than `slack`, a share of the radius. For balls the
 // points of the basis are cutting planes: their smallest sphere is never larger than the one looked for.
 template <class AnyBalls>
@@ -212,6 +228,12 @@ constexpr double sphere_slack = 1e-4;
 } // namespace
 
 DSphere smallest_sphere(std::span<const glm::dvec3> points) { return enclose(points, {}, exact_slack); }
+
+DSphere smallest_sphere(glm::dvec3 first, FunctionRef<glm::dvec3(glm::dvec3)> farthest) {
+    FarPoints points(first, farthest);
+    const DSphere sphere = grow_basis(points, exact_slack);
+    return {sphere.centre + first, sphere.radius};
+}
 
 DSphere enclosing_sphere(std::span<const glm::dvec3> points, std::span<const DSphere> spheres) {
     return enclose(points, spheres, sphere_slack);
@@ -339,17 +361,20 @@ DSphere BallSet::enclose(double slack) {
     return {centre, reach};
 }
 
+float round_up(double distance) {
+    if (distance == 0) return 0;
+    // Doubles carry distances and sums of the containment test; a few units in their last place cover them.
+    const double needed = distance * (1 + 8 * std::numeric_limits<double>::epsilon());
+    const float out = static_cast<float>(needed);
+    // The next float, if need be; of the largest, infinity.
+    return static_cast<double>(out) < needed ? std::bit_cast<float>(std::bit_cast<std::uint32_t>(out) + 1) : out;
+}
+
 Sphere round_outward(const DSphere& sphere) {
     if (sphere.radius < 0) return {};
     Sphere out;
     out.centre = glm::vec3(sphere.centre);
-    const double moved = glm::distance(glm::dvec3(out.centre), sphere.centre);
-    if (sphere.radius == 0 && moved == 0) return out;
-    // Doubles carry the sum and the distances of the containment test; a few units in their last place cover them.
-    const double needed = (sphere.radius + moved) * (1 + 8 * std::numeric_limits<double>::epsilon());
-    out.radius = static_cast<float>(needed);
-    if (static_cast<double>(out.radius) < needed) // the next float; of the largest, infinity
-        out.radius = std::bit_cast<float>(std::bit_cast<std::uint32_t>(out.radius) + 1);
+    out.radius = round_up(sphere.radius + glm::distance(glm::dvec3(out.centre), sphere.centre));
     return out;
 }
 

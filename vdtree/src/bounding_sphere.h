@@ -9,6 +9,7 @@
 
 #include <glm/vec3.hpp>
 
+#include <vdtree/function_ref.h>
 #include <vdtree/vertex_tree.h>
 
 namespace unseen::vdtree {
@@ -21,6 +22,9 @@ struct DSphere {
 // The smallest sphere that contains all points (Welzl 1991, move to front). Deterministic.
 // Cost: expected linear for the sizes used here (tens of points).
 DSphere smallest_sphere(std::span<const glm::dvec3> points);
+// Likewise of points that somebody else keeps, one of which is `first`: asks now and then, ten times or so, for the one that is farthest
+// from a place.
+DSphere smallest_sphere(glm::dvec3 first, FunctionRef<glm::dvec3(glm::dvec3 from)> farthest);
 
 // Nearly the smallest sphere that contains all points and all spheres: the radius exceeds the smallest one by a
 // relative 1e-4 at most, and contains them all.
@@ -67,5 +71,7 @@ private:
 
 // The sphere in floats, grown so that it contains the given one in exact arithmetic.
 Sphere round_outward(const DSphere& sphere);
+// A distance in floats that covers the given one and its rounding.
+float round_up(double distance);
 
 } // namespace unseen::vdtree

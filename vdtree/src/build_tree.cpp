@@ -13,7 +13,6 @@
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
 
 #include "bound_facing.h"
 #include "bound_spheres.h"
@@ -396,8 +395,8 @@ void TreeBuilder::bound() {
     const LeafRings rings = find_rings(triangles.triangles, places, parts);
     const BoundInput input{shape, parts, rings, g_->positions};
 
-    NodeSpheres spheres;
-    tbb::parallel_invoke([&] { spheres = bound_spheres(input); }, [&] { g_->bounding_sphere = bound_corners(input); });
+    NodeSpheres spheres = bound_spheres(input);
+    g_->bounding_sphere = bound_corners(input, spheres.support);
     g_->displacement = bound_displacements(input, spheres.support);
     const std::vector<Directions> facing = bound_facing(input, triangles.triangles, places, spheres.support, ancestors);
     g_->support_spheres = std::move(spheres.support);

@@ -70,60 +70,91 @@ struct SpatialNumbering {
 class KdPartition {
 public:
     KdPartition(std::span<const glm::dvec3> positions, std::span<Index> slots, std::size_t parts)
-        : positions_(positions), slots_(slots), keys_(slots.size()), scratch_(slots.size()), parts_(parts) {}
+        : slots_(slots), items_(slots.size()), other_items_(slots.size()), parts_(parts) {
+        tbb::parallel_for(std::size_t{0}, slots.size(), [&](std::size_t i) { items_[i] = {positions[slots[i]], slots[i]}; });
+    }
 
-    // Puts the slots of parts `first` .. `end` - 1 in order; all slots of these, and perhaps not yet the others, are where they belong.
+    // Puts the slots of parts `first` .. `end` - 1 in order; the others may be anywhere.
     void run(std::size_t first, std::size_t end) {
         wanted_first_ = first;
         wanted_end_ = end;
-        split(0, parts_);
+        split(0, parts_, items_, other_items_);
     }
 
 private:
+    // Positions go with the slots, so that nothing is looked up.
+    struct Item {
+        glm::dvec3 at;
+        Index slot;
+    };
     struct Box {
         glm::dvec3 low, size;
+        double extent() const { return std::max({size.x, size.y, size.z}); }
     };
-    Box box(Index begin, Index end) const {
-        glm::dvec3 low = positions_[slots_[begin]], high = low;
-        for (Index i = begin; i < end; ++i) {
-            low = glm::min(low, positions_[slots_[i]]);
-            high = glm::max(high, positions_[slots_[i]]);
+    static Box box(std::span<const Item> items) {
+        glm::dvec3 low = items[0].at, high = low;
+        for (const Item& item : items) {
+            low = glm::min(low, item.at);
+            high = glm::max(high, item.at);
         }
         return {low, high - low};
     }
 
-    // Halves along the longest side of the bounding box, until there is one part; ties by vertex number.
-    void split(std::size_t first_part, std::size_t parts) {
+    // Halves along the longest side of the bounding box, until there is one part; ties by vertex number. The items are in one of the two
+    // arrays.
+    void split(std::size_t first_part, std::size_t parts, std::vector<Item>& from, std::vector<Item>& to) {
         if (first_part >= wanted_end_ || first_part + parts <= wanted_first_) return;
-        const Index begin = part_begin(first_part, parts_, slots_.size());
-        const Index end = part_begin(first_part + parts, parts_, slots_.size());
-        const Box bounds = box(begin, end);
-        if (parts == 1) return sort_along_curve(begin, end, bounds);
-        const Index middle = part_begin(first_part + parts / 2, parts_, slots_.size());
+        const auto begin_of = [&](std::size_t part) { return part_begin(part, parts_, slots_.size()); };
+        const Index begin = begin_of(first_part), middle = begin_of(first_part + parts / 2), end = begin_of(first_part + parts);
+        const std::span<Item> items = std::span(from).subspan(begin, end - begin);
+        if (parts == 1) return sort_along_curve(items, slots_.subspan(begin, end - begin));
+        halve(items, std::span(to).subspan(begin, end - begin), middle - begin);
+        tbb::parallel_invoke([&] { split(first_part, parts / 2, to, from); },
+                             [&] { split(first_part + parts / 2, parts / 2, to, from); });
+    }
+
+    // The `left` lowest items first. They are dealt into slices; only one of these has items of both halves, which are compared.
+    static void halve(std::span<const Item> from, std::span<Item> to, std::size_t left) {
+        constexpr std::size_t slices = 2048;
+        const Box bounds = box(from);
         const glm::dvec3 size = bounds.size;
         const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-        // Doubles that are not negative compare like their bits.
-        for (Index i = begin; i < end; ++i)
-            keys_[i] = {std::bit_cast<std::uint64_t>(positions_[slots_[i]][axis] - bounds.low[axis] + 0.0), slots_[i]};
-        std::nth_element(keys_.begin() + begin, keys_.begin() + middle, keys_.begin() + end,
-                         [](const CodedIndex& a, const CodedIndex& b) {
-                             return a.code != b.code ? a.code < b.code : a.index < b.index;
-                         });
-        for (Index i = begin; i < end; ++i) slots_[i] = keys_[i].index;
-        tbb::parallel_invoke([&] { split(first_part, parts / 2); }, [&] { split(first_part + parts / 2, parts / 2); });
+        const double low = bounds.low[axis], slices_per_length = slices / size[axis];
+        const double scale = std::isfinite(slices_per_length) ? slices_per_length : 0;
+        const auto offset = [&](const Item& item) { return item.at[axis] - low; };
+        const auto slice_of = [&](const Item& item) { return std::min(slices - 1, static_cast<std::size_t>(offset(item) * scale)); };
+        std::array<Index, slices> counts{};
+        for (const Item& item : from) ++counts[slice_of(item)];
+        std::size_t below = 0, mixed = 0;
+        while (below + counts[mixed] <= left) below += counts[mixed++];
+        // Where the next item below that slice goes, in it, and above it.
+        std::array<std::size_t, 3> next = {0, below, below + counts[mixed]};
+        for (const Item& item : from) {
+            const std::size_t slice = slice_of(item);
+            to[next[static_cast<std::size_t>(slice >= mixed) + static_cast<std::size_t>(slice > mixed)]++] = item;
+        }
+        const auto of_slice = to.subspan(below, counts[mixed]);
+        std::nth_element(of_slice.begin(), of_slice.begin() + static_cast<std::ptrdiff_t>(left - below), of_slice.end(),
+                         [&](const Item& a, const Item& b) { return offset(a) != offset(b) ? offset(a) < offset(b) : a.slot < b.slot; });
     }
 
-    void sort_along_curve(Index begin, Index end, const Box& bounds) {
-        std::sort(slots_.begin() + begin, slots_.begin() + end); // what nth_element leaves is not for equal codes to show
-        const MortonGrid grid(bounds.low, std::max({bounds.size.x, bounds.size.y, bounds.size.z}));
-        for (Index i = begin; i < end; ++i) keys_[i] = {grid.code(positions_[slots_[i]]), slots_[i]};
-        sort_by_code(std::span(keys_).subspan(begin, end - begin), std::span(scratch_).subspan(begin, end - begin));
-        for (Index i = begin; i < end; ++i) slots_[i] = keys_[i].index;
+    // Equal codes by vertex number.
+    static void sort_along_curve(std::span<const Item> items, std::span<Index> slots) {
+        const Box bounds = box(items);
+        const MortonGrid grid(bounds.low, bounds.extent());
+        std::vector<CodedIndex> keys(items.size()), scratch(items.size());
+        for (std::size_t i = 0; i < items.size(); ++i) keys[i] = {grid.code(items[i].at), items[i].slot};
+        sort_by_code(keys, scratch);
+        for (auto run = keys.begin(); run != keys.end();) {
+            const auto end = std::find_if(run, keys.end(), [&](const CodedIndex& key) { return key.code != run->code; });
+            std::sort(run, end, [](const CodedIndex& a, const CodedIndex& b) { return a.index < b.index; });
+            run = end;
+        }
+        for (std::size_t i = 0; i < keys.size(); ++i) slots[i] = keys[i].index;
     }
 
-    std::span<const glm::dvec3> positions_;
     std::span<Index> slots_;
-    std::vector<CodedIndex> keys_, scratch_;
+    std::vector<Item> items_, other_items_;
     std::size_t parts_, wanted_first_ = 0, wanted_end_ = 0;
 };
 
@@ -197,6 +228,11 @@ Result<SpatialNumbering> number_by_space(std::span<const glm::dvec3> positions, 
     n.first_member.assign(slots + 1, 0);
     n.place.resize(vertices);
     for (Index s = 0; s < slots; ++s) n.place[n.vertex_of_slot[s]] = s; // for now
+    if (slots == vertices) { // nothing coincides
+        n.members = n.vertex_of_slot;
+        std::iota(n.first_member.begin(), n.first_member.end(), Index{0});
+        return n;
+    }
     for (Index v = 0; v < vertices; ++v) ++n.first_member[n.place[coincident[v]] + 1];
     std::partial_sum(n.first_member.begin(), n.first_member.end(), n.first_member.begin());
     n.members.resize(vertices);

@@ -53,7 +53,7 @@ void CutFollower::prepare(const DistanceCriterion& criterion, const FollowOption
 void CutFollower::make_tester(const DistanceCriterion& criterion) {
     const bool has_budget = options_.triangle_budget.has_value();
     tester_.emplace(tree_, criterion, options_.cull_back_faces, threshold_, !has_budget);
-    tested_ = &criterion;
+    tested_ = criterion.object_id();
     watches_ancestors_ = !criterion.is_monotone();
 }
 
@@ -66,7 +66,7 @@ AdjustStats CutFollower::follow(Cut& cut, const DistanceCriterion& criterion, co
                       std::chrono::nanoseconds(static_cast<std::int64_t>(*options.milliseconds * 1e6));
     const bool is_same = is_same_request(criterion, options);
     if (!is_same) prepare(criterion, options);
-    else if (tested_ != &criterion) make_tester(criterion);
+    else if (tested_ != criterion.object_id()) make_tester(criterion);
     Motion motion = is_same ? FoldTester::motion(tree_, viewpoint_, viewpoint, length_per_radian_)
                             : Motion{std::numeric_limits<double>::infinity(), 0};
     if (criterion.parts().lit) motion = with_lights(motion, viewpoint);

@@ -85,7 +85,7 @@ private:
     std::uint64_t criterion_ = 0;
     FollowOptions options_;
     std::optional<FoldTester> tester_;
-    const DistanceCriterion* tested_ = nullptr; // what the tester refers to
+    std::uint64_t tested_ = 0; // the criterion object that the tester refers to
     bool watches_ancestors_ = false; // the criterion is not monotone
     float threshold_ = 1;          // with hysteresis it follows the budget
     Viewpoint viewpoint_;

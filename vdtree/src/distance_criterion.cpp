@@ -154,6 +154,8 @@ double radians_of_pixels(const View& view, double pixels) { return pixels / pixe
 
 } // namespace
 
+DistanceCriterion::ObjectId::ObjectId() noexcept : value(next_id()) {}
+
 DistanceCriterion::DistanceCriterion(Parts parts) : parts_(std::move(parts)), id_(next_id()) {
     uses_silhouettes_ = std::any_of(parts_.classes.begin(), parts_.classes.end(),
                                     [](FoldClass c) { return c.interior != c.silhouette; }) ||

@@ -238,7 +238,7 @@ struct Lanes {
 
         m.is_inside = m.height >= 0;
         m.is_near = m.gap < m.interior;
-        m.is_asked = m.is_inside & (view.everybody ? m.gap > 0 : m.gap < m.silhouette);
+        m.is_asked = view.everybody ? m.is_inside : m.is_inside & (m.gap < m.silhouette);
         if (!view.near_ones_too && !view.everybody) m.is_asked &= ~m.is_near;
         if (view.nobody) m.is_asked = Ints{};
         return m;
@@ -639,9 +639,8 @@ struct Lanes {
                 const Costs inner = costs_of(view, tables, of.interior_row, m, of.length);
                 Costs outline = costs_of(view, tables, of.silhouette_row, m, of.silhouette_length);
                 outline = {max_of(inner.cost, outline.cost), max_of(inner.seen, outline.seen)};
-                const Ints as_outline = ~m.is_asked & ~m.is_near; // the eye is inside, and it does not matter
-                store(cost + i, m.is_inside ? (as_outline ? outline.cost : inner.cost) : all(0));
-                store(seen + i, m.is_inside ? (as_outline ? outline.seen : inner.seen) : all(0));
+                store(cost + i, m.is_inside ? inner.cost : all(0));
+                store(seen + i, m.is_inside ? inner.seen : all(0));
                 store(outline_cost + i, outline.cost);
                 store(outline_seen + i, outline.seen);
                 const std::uint32_t near = bits_of(m.is_near & m.is_inside), within = bits_of(m.gap < m.silhouette);

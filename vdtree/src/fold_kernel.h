@@ -45,7 +45,7 @@ struct KernelView {
 
     // Whose facing has to be found out: nodes within their silhouette's distance but not the interior's, and ...
     bool near_ones_too = false;   // ... nodes within the interior's, too, or
-    bool everybody = false;       // ... all that the eye is not inside of, or
+    bool everybody = false;       // ... all, or
     bool nobody = false;          // ... none
 
     bool is_inside_out = false;   // the surface: the side that is seen is the one that its normals point away from

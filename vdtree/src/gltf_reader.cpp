@@ -842,6 +842,10 @@ private:
         if (from[1] >= 0) {
             mesh.normals.resize(first, missing_normal);
             for (const glm::dvec4& n : accessors_.vectors(from[1], 3, "normals")) {
+                if (!std::isfinite(n.x) || !std::isfinite(n.y) || !std::isfinite(n.z)) {
+                    fail("normal " + std::to_string(mesh.normals.size() - first) + " of " +
+                         numbered("accessor", static_cast<std::size_t>(from[1])) + " is NaN or infinite; correct it.");
+                }
                 mesh.normals.push_back(placed_normal(placement, glm::dvec3(n)));
             }
         }

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <utility>
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 namespace unseen::vdtree {
@@ -45,25 +45,54 @@ std::uint32_t hash(const NormalMask& mask) {
     return static_cast<std::uint32_t>((h ^ h >> 29) * odd >> 32);
 }
 
+struct HashedNode {
+    std::uint32_t hash;
+    NodeId node;
+};
+
+constexpr std::size_t grain = 4096; // nodes of a task
+std::size_t chunks_of(std::size_t nodes) { return (nodes + grain - 1) / grain; }
+
+// Calls f(chunk, node) for all nodes, chunks at the same time.
+template <class F>
+void for_each_node(std::size_t nodes, F&& f) {
+    tbb::parallel_for(std::size_t{0}, chunks_of(nodes), [&](std::size_t chunk) {
+        for (std::size_t n = chunk * grain; n < std::min(nodes, (chunk + 1) * grain); ++n) f(chunk, n);
+    });
+}
+
 // For each node, the first one with the same mask.
 std::vector<NodeId> find_equal(std::span<const Directions> nodes) {
+    constexpr std::size_t groups = std::size_t{1} << group_bits;
     std::vector<std::uint32_t> hashes(nodes.size());
-    tbb::parallel_for(std::size_t{0}, nodes.size(), [&](std::size_t n) { hashes[n] = hash(nodes[n].mask); });
+    const auto group_of = [&](std::size_t n) { return hashes[n] >> (32 - group_bits); };
+    std::vector<std::array<NodeId, groups>> next(chunks_of(nodes.size())); // how many, then where the next one goes
+    for_each_node(nodes.size(), [&](std::size_t chunk, std::size_t n) {
+        hashes[n] = hash(nodes[n].mask);
+        ++next[chunk][group_of(n)];
+    });
+    std::array<NodeId, groups + 1> start{};
+    NodeId total = 0;
+    for (std::size_t g = 0; g < groups; ++g) {
+        start[g] = total;
+        for (auto& counts : next) total += std::exchange(counts[g], total);
+    }
+    start[groups] = total;
+    std::vector<HashedNode> grouped(nodes.size());
+    for_each_node(nodes.size(), [&](std::size_t chunk, std::size_t n) {
+        grouped[next[chunk][group_of(n)]++] = {hashes[n], static_cast<NodeId>(n)};
+    });
     std::vector<NodeId> first(nodes.size());
-    tbb::parallel_for(std::uint32_t{0}, std::uint32_t{1} << group_bits, [&](std::uint32_t group) {
-        const auto is_ours = [&](std::size_t n) { return hashes[n] >> (32 - group_bits) == group; };
-        std::size_t count = 0;
-        for (std::size_t n = 0; n < nodes.size(); ++n) count += is_ours(n);
-        const std::size_t wrap = std::bit_ceil(2 * count + 1) - 1;
-        std::vector<NodeId> table(wrap + 1, no_node);
-        for (std::size_t n = 0; n < nodes.size(); ++n) {
-            if (!is_ours(n)) continue;
-            std::size_t slot = hashes[n] & wrap;
-            while (table[slot] != no_node &&
-                   !(hashes[table[slot]] == hashes[n] && nodes[table[slot]].mask == nodes[n].mask))
+    tbb::parallel_for(std::size_t{0}, groups, [&](std::size_t g) {
+        const auto group = std::span(grouped).subspan(start[g], start[g + 1] - start[g]);
+        const std::size_t wrap = std::bit_ceil(2 * group.size() + 1) - 1;
+        std::vector<HashedNode> table(wrap + 1, {0, no_node});
+        for (const HashedNode& n : group) {
+            std::size_t slot = n.hash & wrap;
+            while (table[slot].node != no_node && !(table[slot].hash == n.hash && nodes[table[slot].node].mask == nodes[n.node].mask))
                 slot = (slot + 1) & wrap;
-            if (table[slot] == no_node) table[slot] = static_cast<NodeId>(n);
-            first[n] = table[slot];
+            if (table[slot].node == no_node) table[slot] = n;
+            first[n.node] = table[slot].node;
         }
     });
     return first;
@@ -87,23 +116,24 @@ NormalMask unpack_mask(std::span<const std::uint8_t> records, std::size_t at) no
 }
 
 PooledMasks pool_masks(std::span<const Directions> nodes, std::span<const NodeId> parents) {
-    constexpr std::size_t grain = 4096; // nodes
     PooledMasks pool;
     pool.at = find_equal(nodes);
     std::vector<std::uint8_t> sizes(nodes.size(), 0); // of the records, by first node; 0: none
-    const auto for_each_first = [&](auto&& f) {
-        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, nodes.size(), grain), [&](const auto& range) {
-            std::array<std::uint8_t, most_mask_bytes> record;
-            for (std::size_t n = range.begin(); n < range.end(); ++n) f(n, record);
-        });
-    };
-    for_each_first([&](std::size_t n, auto& record) {
-        if (pool.at[n] == n) sizes[n] = static_cast<std::uint8_t>(pack(nodes[n].mask, record));
+    std::vector<std::vector<std::uint8_t>> records(chunks_of(nodes.size())); // of each chunk's first nodes, one after another
+    for_each_node(nodes.size(), [&](std::size_t chunk, std::size_t n) {
+        if (pool.at[n] != n) return;
+        std::array<std::uint8_t, most_mask_bytes> record;
+        sizes[n] = static_cast<std::uint8_t>(pack(nodes[n].mask, record));
+        records[chunk].insert(records[chunk].end(), record.begin(), record.begin() + sizes[n]);
     });
+    std::vector<std::uint32_t> begin; // by chunk: of its records in the pool
     std::uint32_t end = 0;
+    bool full = false;
     for (std::size_t n = 0; n < nodes.size(); ++n) {
+        if (n % grain == 0) begin.push_back(end);
         const NodeId first = pool.at[n];
-        if (first == n && sizes[n] > no_record - most_mask_bytes - end) sizes[n] = 0;
+        if (first == n) full = full || sizes[n] > no_record - most_mask_bytes - end;
+        if (first == n && full) sizes[n] = 0;
         if (sizes[first] == 0) {
             pool.at[n] = pool.at[parents[n]];
         } else if (first == n) {
@@ -114,10 +144,9 @@ PooledMasks pool_masks(std::span<const Directions> nodes, std::span<const NodeId
         }
     }
     pool.records.assign(end + most_mask_bytes, 0);
-    for_each_first([&](std::size_t n, auto& record) {
-        if (sizes[n] == 0) return;
-        pack(nodes[n].mask, record);
-        std::copy_n(record.data(), sizes[n], pool.records.data() + pool.at[n]);
+    begin.push_back(end);
+    tbb::parallel_for(std::size_t{0}, records.size(), [&](std::size_t chunk) {
+        std::copy_n(records[chunk].data(), begin[chunk + 1] - begin[chunk], pool.records.data() + begin[chunk]);
     });
     return pool;
 }

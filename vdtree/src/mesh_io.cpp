@@ -86,7 +86,34 @@ Result<ReadResult> read_as(Format format, const MeshSource& source) {
     return malformed(source, "unknown format.");
 }
 
-// Colours and UVs take part in costs, where a NaN would spread. Normals may be anything: see MeshView.
+// Of the vertices that triangles use. A normal that is not finite is refused, for nobody knows what it was to be; one of length 0, which
+// stands for none as well, is computed from the faces.
+Result<void> check_normals(const MeshSource& source, ReadResult& result) {
+    const Mesh& mesh = result.mesh;
+    if (mesh.normals.empty()) return {};
+    std::vector<bool> used(mesh.positions.size(), false);
+    for (const Triangle& t : mesh.triangles)
+        for (const Index v : t) used[v] = true;
+    std::uint64_t zero = 0;
+    std::size_t first_zero = 0;
+    for (std::size_t v = 0; v < used.size(); ++v) {
+        if (!used[v]) continue;
+        const glm::vec3 n = mesh.normals[v];
+        if (!is_finite(n)) {
+            return malformed(source, "the normal of vertex " + std::to_string(v) +
+                                         " is NaN or infinite; correct it, or leave the normals out.");
+        }
+        if (n != glm::vec3(0.0f)) continue;
+        if (zero++ == 0) first_zero = v;
+    }
+    if (zero > 0) {
+        result.warnings.push_back(counted_were(zero, "normal") + " zero or missing and computed from the faces, the first that of vertex " +
+                                  std::to_string(first_zero) + ".");
+    }
+    return {};
+}
+
+// Colours and UVs take part in costs, where a NaN would spread.
 void repair_attributes(ReadResult& result) {
     std::uint64_t colours = 0;
     for (glm::vec4& colour : result.mesh.colours) {
@@ -124,6 +151,7 @@ Result<ReadResult> finish(const MeshSource& source, ReadResult result) {
         return malformed(source, "all of its " + std::to_string(result.dropped_triangles) +
                                      " triangles use a vertex twice, so none is left; give a file with proper faces.");
     }
+    if (const Result<void> valid = check_normals(source, result); !valid) return valid.error();
     return result;
 }
 
@@ -163,6 +191,8 @@ std::string in_quotes(std::string_view text) {
 std::string counted_were(std::uint64_t count, const std::string& noun) {
     return std::to_string(count) + " " + noun + (count == 1 ? " was" : "s were");
 }
+
+bool is_finite(const glm::vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 float srgb_to_linear(float encoded) {
     // 0.04045 and not 0.03928: the value of IEC 61966-2-1, where the two branches meet.

@@ -325,6 +325,10 @@ private:
             if (!done) return done;
         }
         if (at != word_end) return bad_corner();
+        if (corner.normal != none && !is_finite(normals_[corner.normal])) {
+            return bad(line, "face " + std::to_string(result_.source_faces + 1) + " uses normal " + std::to_string(corner.normal + 1) +
+                                 ", which is NaN or infinite; correct it.");
+        }
         has_uvs_ = has_uvs_ || corner.uv != none;
         has_normals_ = has_normals_ || corner.normal != none;
         return {};

@@ -4,12 +4,17 @@
 
 #include <glm/geometric.hpp>
 
+#include "prefetch.h"
+
 namespace unseen::vdtree {
 
 namespace {
 
 // Every vertex counts a little, so that vertices without an area have a mean too: share of the largest vertex area.
 constexpr double least_weight = 1e-6;
+
+// Sources lie anywhere: they are asked for so many leaves before they are needed.
+constexpr Index ahead = 16;
 
 // Weighted sums of positions and normals, and their weight.
 struct ShapeSum {
@@ -74,6 +79,7 @@ ProxyVertices place_proxies(const TreeShape& shape, const TreeParts& parts, cons
     std::vector<double> weights(shape.leaves());
     const auto leaf_sum = [&](Index leaf) -> ShapeSum {
         const NodeId node = shape.node_of_leaf(leaf);
+        if (leaf >= ahead) prefetch(&leaves.mesh.positions[leaves.sources[leaf - ahead]]); // from the last to the first
         const double w = weights[leaf] = (largest > 0 ? leaves.areas[leaf] / largest : 0) + least_weight;
         const glm::dvec3 relative = leaves.mesh.positions[leaves.sources[leaf]] - leaves.origin;
         out.positions[node] = glm::vec3(relative);

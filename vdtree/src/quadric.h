@@ -1,4 +1,4 @@
-// Quadrics over position and any number of attribute channels, in floats, four at a time.
+// Quadrics over position and any number of attribute channels, in floats, four or eight at a time.
 //
 // A cluster's quadric is the sum over its triangles of the squared distance from the triangle's plane and, for each channel,
 // of the squared difference from the channel's linear function on the triangle:
@@ -20,8 +20,11 @@
 
 namespace unseen::vdtree {
 
-// Four floats that are computed with at once.
+// Floats that are computed with at once; eight where the processor has AVX2.
 using Float4 = float __attribute__((vector_size(16)));
+using Float8 = float __attribute__((vector_size(32)));
+
+#define UNSEEN_INLINE __attribute__((always_inline)) inline
 
 // Where the numbers of one quadric lie: x'Mx + 2 h'x + k, and for each channel G'x + D - W s, the derivative by s.
 namespace quadric {
@@ -38,9 +41,9 @@ constexpr std::size_t quadric_stride(std::size_t channels) {
 }
 
 // sum = a + b, where b's place lies at (dx, dy, dz) from a's and b's references exceed a's by `difference`. F is float or
-// Float4.
+// one of the vectors.
 template <class F>
-void add_from(const F* a, const F* b, F dx, F dy, F dz, const F* difference, std::size_t channels, F* sum) {
+UNSEEN_INLINE void add_from(const F* a, const F* b, F dx, F dy, F dz, const F* difference, std::size_t channels, F* sum) {
     using namespace quadric;
     const F mdx = b[xx] * dx + b[xy] * dy + b[xz] * dz;
     const F mdy = b[xy] * dx + b[yy] * dy + b[yz] * dz;
@@ -71,7 +74,7 @@ struct Minimum {
 // The least error of a sum whose parts lie at 0 and (dx, dy, dz), with the best channel values. Where the form is nearly flat
 // its minimum may be far away; then the middle of the two is the better place.
 template <class F>
-Minimum<F> minimise(const F* q, F dx, F dy, F dz, std::size_t channels) {
+UNSEEN_INLINE Minimum<F> minimise(const F* q, F dx, F dy, F dz, std::size_t channels) {
     using namespace quadric;
     F m00 = q[xx], m01 = q[xy], m02 = q[xz], m11 = q[yy], m12 = q[yz], m22 = q[zz];
     F r0 = q[hx], r1 = q[hy], r2 = q[hz], rest = q[k];

@@ -16,6 +16,9 @@
 #include "quadric.h"
 #include "spatial_order.h"
 
+// Vectors wider than the target's are only handed to functions that are inlined.
+#pragma GCC diagnostic ignored "-Wpsabi"
+
 namespace unseen::vdtree {
 
 namespace {
@@ -42,6 +45,55 @@ constexpr std::size_t curve_neighbours = 3;
 constexpr std::size_t rounds_to_absorb = 4;
 
 constexpr Index none = std::numeric_limits<Index>::max();
+
+// ---- quadrics of several clusters side by side
+
+// The first `floats` numbers of four clusters' quadrics, one cluster a lane.
+UNSEEN_INLINE void gather(const float* quadrics, const Index (&clusters)[4], std::size_t floats, Float4* out) {
+    const std::size_t stride = floats;
+    for (std::size_t i = 0; i < floats; i += 4) {
+        Float4 row[4];
+        for (std::size_t l = 0; l < 4; ++l) std::memcpy(&row[l], quadrics + clusters[l] * stride + i, sizeof(Float4));
+        using Lanes = int __attribute__((vector_size(16)));
+        const Float4 low01 = __builtin_shuffle(row[0], row[1], Lanes{0, 4, 1, 5});
+        const Float4 low23 = __builtin_shuffle(row[2], row[3], Lanes{0, 4, 1, 5});
+        const Float4 high01 = __builtin_shuffle(row[0], row[1], Lanes{2, 6, 3, 7});
+        const Float4 high23 = __builtin_shuffle(row[2], row[3], Lanes{2, 6, 3, 7});
+        out[i] = __builtin_shuffle(low01, low23, Lanes{0, 1, 4, 5});
+        out[i + 1] = __builtin_shuffle(low01, low23, Lanes{2, 3, 6, 7});
+        out[i + 2] = __builtin_shuffle(high01, high23, Lanes{0, 1, 4, 5});
+        out[i + 3] = __builtin_shuffle(high01, high23, Lanes{2, 3, 6, 7});
+    }
+}
+
+#if defined(__x86_64__) && defined(__GNUC__)
+
+const bool has_avx2 = __builtin_cpu_supports("avx2");
+
+// Likewise of eight: the halves of the registers are as above.
+UNSEEN_INLINE void gather(const float* quadrics, const Index (&clusters)[8], std::size_t floats, Float8* out) {
+    const std::size_t stride = floats;
+    for (std::size_t i = 0; i < floats; i += 4) {
+        Float8 row[4];
+        for (std::size_t l = 0; l < 4; ++l) {
+            Float4 low, high;
+            std::memcpy(&low, quadrics + clusters[l] * stride + i, sizeof(Float4));
+            std::memcpy(&high, quadrics + clusters[l + 4] * stride + i, sizeof(Float4));
+            row[l] = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
+        }
+        using Lanes = int __attribute__((vector_size(32)));
+        const Float8 low01 = __builtin_shuffle(row[0], row[1], Lanes{0, 8, 1, 9, 4, 12, 5, 13});
+        const Float8 low23 = __builtin_shuffle(row[2], row[3], Lanes{0, 8, 1, 9, 4, 12, 5, 13});
+        const Float8 high01 = __builtin_shuffle(row[0], row[1], Lanes{2, 10, 3, 11, 6, 14, 7, 15});
+        const Float8 high23 = __builtin_shuffle(row[2], row[3], Lanes{2, 10, 3, 11, 6, 14, 7, 15});
+        out[i] = __builtin_shuffle(low01, low23, Lanes{0, 1, 8, 9, 4, 5, 12, 13});
+        out[i + 1] = __builtin_shuffle(low01, low23, Lanes{2, 3, 10, 11, 6, 7, 14, 15});
+        out[i + 2] = __builtin_shuffle(high01, high23, Lanes{0, 1, 8, 9, 4, 5, 12, 13});
+        out[i + 3] = __builtin_shuffle(high01, high23, Lanes{2, 3, 10, 11, 6, 7, 14, 15});
+    }
+}
+
+#endif
 
 // ---- a part's first clusters
 
@@ -422,44 +474,75 @@ private:
 
     // ---- errors
 
-    struct FourQuadrics {
-        Float4 values[most_quadric_floats];
+    // A pair and its error, in ascending error, then in the order of the pairs. Errors are not negative, so that floats compare like
+    // their bits.
+    class Rank {
+    public:
+        Rank() = default; // no pair: above all
+        Rank(float error, Index pair) : bits_(std::uint64_t{std::bit_cast<std::uint32_t>(error)} << 32 | pair) {}
+
+        bool is_none() const { return bits_ == no_bits; }
+        Index pair() const { return static_cast<Index>(bits_); }
+        float error() const { return std::bit_cast<float>(static_cast<std::uint32_t>(bits_ >> 32)); }
+        auto operator<=>(const Rank&) const = default;
+
+    private:
+        static constexpr std::uint64_t no_bits = ~std::uint64_t{0};
+        std::uint64_t bits_ = no_bits;
     };
+    static constexpr float unknown_error = -1;
 
-    void gather(const Index* clusters, std::size_t floats, FourQuadrics& out) const {
-        for (std::size_t i = 0; i < floats; i += 4) {
-            Float4 row[4];
-            for (std::size_t l = 0; l < 4; ++l) std::memcpy(&row[l], quadric_of(clusters[l]) + i, sizeof(Float4));
-            using Lanes = int __attribute__((vector_size(16)));
-            const Float4 low01 = __builtin_shuffle(row[0], row[1], Lanes{0, 4, 1, 5});
-            const Float4 low23 = __builtin_shuffle(row[2], row[3], Lanes{0, 4, 1, 5});
-            const Float4 high01 = __builtin_shuffle(row[0], row[1], Lanes{2, 6, 3, 7});
-            const Float4 high23 = __builtin_shuffle(row[2], row[3], Lanes{2, 6, 3, 7});
-            out.values[i] = __builtin_shuffle(low01, low23, Lanes{0, 1, 4, 5});
-            out.values[i + 1] = __builtin_shuffle(low01, low23, Lanes{2, 3, 6, 7});
-            out.values[i + 2] = __builtin_shuffle(high01, high23, Lanes{0, 1, 4, 5});
-            out.values[i + 3] = __builtin_shuffle(high01, high23, Lanes{2, 3, 6, 7});
-        }
-    }
 
-    // Errors of four pairs. `channels` is channels_, as a constant where the compiler is to unroll.
-    Float4 errors_of_four(const ClusterPair* pairs, std::size_t channels) const {
-        Index a[4], b[4];
-        Float4 dx{}, dy{}, dz{}, difference[most_channels];
-        for (std::size_t l = 0; l < 4; ++l) {
+    // Errors of as many pairs as F has lanes. `channels` is channels_, as a constant where the compiler is to unroll.
+    template <class F>
+    UNSEEN_INLINE void errors_of(const ClusterPair* pairs, std::size_t channels, float* errors) const {
+        constexpr std::size_t lanes = sizeof(F) / sizeof(float);
+        Index a[lanes], b[lanes];
+        float offsets[3][lanes], differences[most_channels][lanes];
+        for (std::size_t l = 0; l < lanes; ++l) {
             a[l] = pairs[l].a;
             b[l] = pairs[l].b;
             const glm::vec3 d = offset(pairs[l]);
-            dx[l] = d.x, dy[l] = d.y, dz[l] = d.z;
+            for (int axis = 0; axis < 3; ++axis) offsets[axis][l] = d[axis];
             for (std::size_t c = 0; c < channels; ++c)
-                difference[c][l] = live_.references[b[l] * channels + c] - live_.references[a[l] * channels + c];
+                differences[c][l] = live_.references[b[l] * channels + c] - live_.references[a[l] * channels + c];
         }
-        FourQuadrics qa, qb, sum;
-        gather(a, quadric_stride(channels), qa);
-        gather(b, quadric_stride(channels), qb);
-        add_from(qa.values, qb.values, dx, dy, dz, difference, channels, sum.values);
-        return minimise(sum.values, dx, dy, dz, channels).error;
+        F qa[most_quadric_floats], qb[most_quadric_floats], sum[most_quadric_floats], d[3], difference[most_channels];
+        std::memcpy(d, offsets, sizeof(d));
+        std::memcpy(difference, differences, channels * sizeof(F));
+        const float* quadrics = live_.quadrics.data();
+        gather(quadrics, a, quadric_stride(channels), qa);
+        gather(quadrics, b, quadric_stride(channels), qb);
+        add_from(qa, qb, d[0], d[1], d[2], difference, channels, sum);
+        const F found = minimise(sum, d[0], d[1], d[2], channels).error;
+        std::memcpy(errors, &found, sizeof(F));
     }
+    template <class F>
+    UNSEEN_INLINE void errors_of_all(std::span<const ClusterPair> pairs, float* errors) const {
+        constexpr std::size_t lanes = sizeof(F) / sizeof(float);
+        for (std::size_t i = 0; i < pairs.size(); i += lanes) {
+            ClusterPair some[lanes];
+            float found[lanes];
+            const std::size_t count = std::min(lanes, pairs.size() - i);
+            for (std::size_t l = 0; l < lanes; ++l) some[l] = pairs[i + std::min(l, count - 1)];
+            if (channels_ == 1) errors_of<F>(some, 1, found);
+            else errors_of<F>(some, channels_, found);
+            std::copy_n(found, count, errors + i);
+        }
+    }
+    void errors_by_fours(std::span<const ClusterPair> pairs, float* errors) const { errors_of_all<Float4>(pairs, errors); }
+#if defined(__x86_64__) && defined(__GNUC__)
+    // Neither has fused operations, so both give the same bits.
+    [[gnu::target("avx2")]] void errors_by_eights(std::span<const ClusterPair> pairs, float* errors) const {
+        errors_of_all<Float8>(pairs, errors);
+    }
+    void find_errors(std::span<const ClusterPair> pairs, float* errors) const {
+        if (has_avx2) errors_by_eights(pairs, errors);
+        else errors_by_fours(pairs, errors);
+    }
+#else
+    void find_errors(std::span<const ClusterPair> pairs, float* errors) const { errors_by_fours(pairs, errors); }
+#endif
 
     // Ward's measure: by how much the sum of squared distances from the clusters' middles grows.
     float gap_error(ClusterPair p) const {
@@ -468,23 +551,31 @@ private:
         return gap_weight * (a * b / (a + b)) * glm::dot(d, d);
     }
 
+    // Of pairs whose clusters are what they were in the last round, the error is known.
+    void update_errors(std::size_t first) {
+        pair_errors_.resize(c_.pairs.size(), unknown_error);
+        unknown_.clear();
+        unknown_pairs_.clear();
+        for (std::size_t i = first; i < c_.pairs.size(); ++i) {
+            if (pair_errors_[i] >= 0) continue;
+            unknown_.push_back(static_cast<Index>(i));
+            unknown_pairs_.push_back(c_.pairs[i]);
+        }
+        found_errors_.resize(unknown_.size());
+        find_errors(unknown_pairs_, found_errors_.data());
+        for (std::size_t i = 0; i < unknown_.size(); ++i) pair_errors_[unknown_[i]] = found_errors_[i];
+    }
+
     // Lets the pairs from `first` on compete for being the best of their clusters; `gaps`: no edges join them. Ties go
     // to the pair that comes first, for both its clusters, so some pair is always the best of both.
     void compete(std::size_t first, bool gaps) {
-        const std::size_t count = c_.pairs.size();
-        for (std::size_t i = first; i < count; i += 4) {
-            ClusterPair four[4];
-            for (std::size_t l = 0; l < 4; ++l) four[l] = c_.pairs[std::min(i + l, count - 1)];
-            Float4 errors = channels_ == 1 ? errors_of_four(four, 1) : errors_of_four(four, channels_);
-            for (std::size_t l = 0; l < 4 && i + l < count; ++l) {
-                if (gaps ? !is_allowed(four[l]) : held_[four[l].a] != 0) continue; // an edge is within one component
-                const float error = errors[l] + (gaps ? gap_error(four[l]) : 0);
-                for (const Index cluster : {four[l].a, four[l].b}) {
-                    if (best_[cluster] != none && !(error < best_error_[cluster])) continue;
-                    best_[cluster] = static_cast<Index>(i + l);
-                    best_error_[cluster] = error;
-                }
-            }
+        update_errors(first);
+        for (std::size_t i = first; i < c_.pairs.size(); ++i) {
+            const ClusterPair p = c_.pairs[i];
+            if (gaps ? !is_allowed(p) : held_[p.a] != 0) continue; // an edge is within one component
+            const Rank rank(pair_errors_[i] + (gaps ? gap_error(p) : 0), static_cast<Index>(i));
+            best_[p.a] = std::min(best_[p.a], rank);
+            best_[p.b] = std::min(best_[p.b], rank);
         }
     }
 
@@ -509,7 +600,7 @@ private:
     void connect_lone_clusters() {
         lone_.assign(live_.size(), 0);
         bool any = false;
-        for (Index s = 0; s < live_.size(); ++s) any |= (lone_[s] = best_[s] == none);
+        for (Index s = 0; s < live_.size(); ++s) any |= (lone_[s] = best_[s].is_none());
         if (!any) return;
         if (!impatient_)
             for (const auto& edge : c_.outer_edges) lone_[edge.cluster] = 0;
@@ -527,8 +618,7 @@ private:
 
     void contract_round() {
         const std::size_t clusters = live_.size();
-        best_.assign(clusters, none);
-        best_error_.resize(clusters);
+        best_.assign(clusters, {});
         into_.resize(clusters);
         std::iota(into_.begin(), into_.end(), Index{0});
         taken_.assign(clusters, 0);
@@ -545,6 +635,7 @@ private:
         if (too_few()) contract_second_best();
         if (too_few()) contract_rivals();
         c_.pairs.resize(edges_);
+        pair_errors_.resize(edges_);
         order_by_error(before);
     }
 
@@ -571,33 +662,35 @@ private:
 
     void contract_mutually_best() {
         for (Index s = 0; s < best_.size(); ++s) {
-            if (best_[s] == none) continue;
-            const ClusterPair p = c_.pairs[best_[s]];
-            if (p.a == s && best_[p.b] == best_[s] && is_allowed(p)) contract(p, best_error_[s], best_[s] >= edges_);
+            if (best_[s].is_none()) continue;
+            const ClusterPair p = c_.pairs[best_[s].pair()];
+            if (p.a == s && best_[p.b] == best_[s] && is_allowed(p)) contract(p, best_[s].error(), best_[s].pair() >= edges_);
         }
     }
 
     // Pairs that are the best of one of their clusters, in ascending error.
     void contract_second_best() {
-        std::vector<std::pair<float, Index>> order;
+        std::vector<Rank> order;
         for (Index s = 0; s < best_.size(); ++s)
-            if (best_[s] != none && !taken_[s]) order.emplace_back(best_error_[s], best_[s]);
+            if (!best_[s].is_none() && !taken_[s]) order.push_back(best_[s]);
         std::sort(order.begin(), order.end());
-        for (const auto& [error, i] : order)
-            if (!taken_[c_.pairs[i].a] && !taken_[c_.pairs[i].b] && is_allowed(c_.pairs[i])) contract(c_.pairs[i], error, i >= edges_);
+        for (const Rank& best : order) {
+            const ClusterPair p = c_.pairs[best.pair()];
+            if (!taken_[p.a] && !taken_[p.b] && is_allowed(p)) contract(p, best.error(), best.pair() >= edges_);
+        }
     }
 
     // Clusters that want the same partner are contracted with each other: a hub would otherwise contract with one spoke a round.
     void contract_rivals() {
         std::vector<Index> waiting(best_.size(), none); // by the partner that is wanted
         for (Index s = 0; s < best_.size(); ++s) {
-            if (best_[s] == none || taken_[s]) continue;
-            const ClusterPair p = c_.pairs[best_[s]];
+            if (best_[s].is_none() || taken_[s]) continue;
+            const ClusterPair p = c_.pairs[best_[s].pair()];
             Index& rival = waiting[p.a == s ? p.b : p.a];
             if (rival == none) {
                 rival = s;
             } else if (is_allowed({rival, s})) {
-                contract({rival, s}, std::max(best_error_[rival], best_error_[s]), false);
+                contract({rival, s}, std::max(best_[rival].error(), best_[s].error()), false);
                 rival = none;
             }
         }
@@ -650,7 +743,7 @@ private:
         Index kept = 0;
         for (Index s = 0; s < live_.size(); ++s) {
             if (into_[s] != s) continue;
-            new_number_[s] = kept;
+            new_number_[s] = kept | (taken_[s] ? is_new : 0);
             if (kept != s) {
                 live_.names[kept] = live_.names[s];
                 live_.places[kept] = live_.places[s];
@@ -673,35 +766,40 @@ private:
         live_.vanishing.resize(kept);
         live_.quadrics.resize(kept * stride_);
         live_.references.resize(kept * channels_);
-        for (auto& edge : c_.outer_edges) edge.cluster = new_number_[edge.cluster];
-        for (auto& border : c_.border_slots) border.cluster = new_number_[border.cluster];
+        for (auto& edge : c_.outer_edges) edge.cluster = new_number_[edge.cluster] & ~is_new;
+        for (auto& border : c_.border_slots) border.cluster = new_number_[border.cluster] & ~is_new;
         renumber_pairs(kept);
     }
 
-    // Sorted by a, each pair once. Linear: two counting passes, and a mark by which a's other pairs are known.
+    // Sorted by a, each pair once, with its error where it is still known. Linear: two counting passes, and a mark by which a's
+    // other pairs are known. Which pairs go is as good as random: they are overwritten, for the processor is not to guess.
     void renumber_pairs(Index clusters) {
         start_.assign(clusters + 1, 0);
         std::size_t inner = 0;
-        for (const ClusterPair& p : c_.pairs) {
-            const Index a = new_number_[p.a], b = new_number_[p.b];
-            if (a == b) continue;
-            c_.pairs[inner++] = {std::min(a, b), std::max(a, b)};
-            ++start_[std::min(a, b) + 1];
+        for (std::size_t i = 0; i < c_.pairs.size(); ++i) {
+            const Index number_a = new_number_[c_.pairs[i].a], number_b = new_number_[c_.pairs[i].b];
+            const Index a = number_a & ~is_new, b = number_b & ~is_new;
+            pair_errors_[inner] = (number_a | number_b) & is_new ? unknown_error : pair_errors_[i];
+            c_.pairs[inner] = {std::min(a, b), std::max(a, b)};
+            inner += a != b;
+            start_[std::min(a, b) + 1] += a != b;
         }
         std::partial_sum(start_.begin(), start_.end(), start_.begin());
         partners_.resize(inner);
-        for (std::size_t i = 0; i < inner; ++i) partners_[start_[c_.pairs[i].a]++] = c_.pairs[i].b;
+        for (std::size_t i = 0; i < inner; ++i) partners_[start_[c_.pairs[i].a]++] = {c_.pairs[i].b, pair_errors_[i]};
         marks_.assign(clusters, none);
         std::size_t out = 0;
         for (Index a = 0; a < clusters; ++a) {
             for (Index i = a == 0 ? 0 : start_[a - 1]; i < start_[a]; ++i) {
-                const Index b = partners_[i];
-                if (marks_[b] == a) continue;
+                const auto [b, error] = partners_[i];
+                c_.pairs[out] = {a, b};
+                pair_errors_[out] = error;
+                out += marks_[b] != a;
                 marks_[b] = a;
-                c_.pairs[out++] = {a, b};
             }
         }
         c_.pairs.resize(out);
+        pair_errors_.resize(out);
     }
 
     Contraction& c_;
@@ -716,11 +814,21 @@ private:
     std::vector<Component> components_;
     std::vector<Nearest> nearest_;     // by component
     std::size_t edges_ = 0;            // of the pairs; what follows are this round's pairs across gaps
-    std::vector<Index> best_;          // by cluster: its best pair
-    std::vector<float> best_error_;
+    std::vector<float> pair_errors_;   // by pair
+    std::vector<Index> unknown_;       // pairs whose errors are to be found; likewise the next
+    std::vector<ClusterPair> unknown_pairs_;
+    std::vector<float> found_errors_;
+    std::vector<Rank> best_;           // by cluster: its best pair
     std::vector<Index> into_;          // by cluster: the one that it was joined to in this round, or itself
     std::vector<std::uint8_t> taken_, lone_, held_;
-    std::vector<Index> new_number_, start_, partners_, marks_;
+    struct Partner {
+        Index cluster;
+        float error;
+    };
+    // By cluster: its number after the round, and whether it was made in it. (Never so many clusters are live that they need the bit.)
+    static constexpr Index is_new = Index{1} << 31;
+    std::vector<Index> new_number_, start_, marks_;
+    std::vector<Partner> partners_;
     std::vector<CodedIndex> curve_, curve_scratch_, order_, order_scratch_;
 };
 

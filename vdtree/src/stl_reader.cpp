@@ -46,22 +46,32 @@ bool is_ascii_stl(std::string_view bytes) {
     return equals_ignoring_case(word, "facet") || equals_ignoring_case(word, "endsolid");
 }
 
-// A normal of zero or NaN means "compute it" in STL; a mesh takes such a vertex normal the same way.
-bool is_direction(const glm::vec3& n) {
-    return std::isfinite(n.x) && std::isfinite(n.y) && std::isfinite(n.z) && (n.x != 0.0f || n.y != 0.0f || n.z != 0.0f);
-}
+bool is_direction(const glm::vec3& n) { return is_finite(n) && n != glm::vec3(0.0f); }
 
 void add_facet(ReadResult& result, const glm::vec3& normal, const std::array<glm::dvec3, 3>& corners) {
     Mesh& mesh = result.mesh;
     const auto first = static_cast<Index>(mesh.positions.size());
     mesh.positions.insert(mesh.positions.end(), corners.begin(), corners.end());
-    mesh.normals.insert(mesh.normals.end(), 3, is_direction(normal) ? normal : missing_normal);
+    mesh.normals.insert(mesh.normals.end(), 3, normal);
     mesh.triangles.push_back({first, first + 1, first + 2});
     ++result.source_faces;
 }
 
-void drop_normals_without_direction(Mesh& mesh) {
-    if (std::none_of(mesh.normals.begin(), mesh.normals.end(), is_direction)) mesh.normals = {};
+// A facet's normal of zero means "compute it" in STL, and so does one that is not finite, which flat facets often have: what it was to
+// say follows from the corners.
+void settle_normals(ReadResult& result) {
+    Mesh& mesh = result.mesh;
+    const bool any = std::any_of(mesh.normals.begin(), mesh.normals.end(), is_direction);
+    std::uint64_t not_finite = 0; // a facet's three are the same
+    for (glm::vec3& normal : mesh.normals) {
+        if (is_finite(normal)) continue;
+        normal = missing_normal;
+        ++not_finite;
+    }
+    if (not_finite > 0) {
+        result.warnings.push_back(counted_were(not_finite / 3, "facet normal") + " not finite and computed from the corners.");
+    }
+    if (!any) mesh.normals = {};
 }
 
 Error too_many_facets(const MeshSource& source) {
@@ -101,7 +111,7 @@ Result<ReadResult> read_binary(const MeshSource& source) {
     if (bytes.size() > preamble_bytes + count * facet_bytes) {
         result.warnings.push_back("data behind the last facet were ignored.");
     }
-    drop_normals_without_direction(result.mesh);
+    settle_normals(result);
     return result;
 }
 
@@ -115,7 +125,7 @@ public:
             if (!equals_ignoring_case(word, "solid")) return unexpected("solid", word);
             if (Result<void> solid = read_solid(); !solid) return solid.error();
         }
-        drop_normals_without_direction(result_.mesh);
+        settle_normals(result_);
         return std::move(result_);
     }
 

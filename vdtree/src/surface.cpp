@@ -68,38 +68,46 @@ std::uint64_t hash(glm::dvec3 p) {
     return mix(bits(p.x) + mix(bits(p.y) + mix(bits(p.z)) * 3) * 5);
 }
 
-// The vertices whose hash begins alike, ascending: finds the first at each position. Positions made to collide would fill the
+// A vertex and 32 bits of its position's hash: where these differ, the positions need not be looked at.
+struct HashedVertex {
+    std::uint32_t hash;
+    Index vertex;
+};
+
+// Vertices whose hashes begin alike, ascending: finds the first at each position. Positions made to collide would fill the
 // table in quadratic time; they are sorted instead.
 class CoincidenceFinder {
 public:
     CoincidenceFinder(std::span<const glm::dvec3> positions, std::span<Index> first)
         : positions_(positions), first_(first) {}
 
-    void find(std::span<const Index> vertices) {
+    void find(std::span<const HashedVertex> vertices) {
         if (!by_table(vertices)) by_sorting(vertices);
     }
 
 private:
-    bool by_table(std::span<const Index> vertices) {
+    bool by_table(std::span<const HashedVertex> vertices) {
         constexpr std::size_t most_probes = 16; // a vertex, on average
         constexpr Index none = ~Index{0};
         const std::size_t size = std::bit_ceil(vertices.size() * 2 + 1);
-        table_.assign(size, none);
+        table_.assign(size, {0, none});
         std::size_t probes = 0;
-        for (const Index v : vertices) {
-            std::size_t slot = hash(positions_[v]) & (size - 1);
-            while (table_[slot] != none && positions_[table_[slot]] != positions_[v]) {
+        for (const HashedVertex& v : vertices) {
+            std::size_t slot = v.hash & (size - 1);
+            while (table_[slot].vertex != none &&
+                   !(table_[slot].hash == v.hash && positions_[table_[slot].vertex] == positions_[v.vertex])) {
                 slot = (slot + 1) & (size - 1);
                 if (++probes > most_probes * vertices.size()) return false;
             }
-            if (table_[slot] == none) table_[slot] = v;
-            first_[v] = table_[slot];
+            if (table_[slot].vertex == none) table_[slot] = v;
+            first_[v.vertex] = table_[slot].vertex;
         }
         return true;
     }
 
-    void by_sorting(std::span<const Index> vertices) {
-        std::vector<Index> order(vertices.begin(), vertices.end());
+    void by_sorting(std::span<const HashedVertex> vertices) {
+        std::vector<Index> order;
+        for (const HashedVertex& v : vertices) order.push_back(v.vertex);
         std::sort(order.begin(), order.end(), [&](Index a, Index b) {
             const glm::dvec3 &p = positions_[a], &q = positions_[b];
             if (p.x != q.x) return p.x < q.x;
@@ -114,7 +122,7 @@ private:
 
     std::span<const glm::dvec3> positions_;
     std::span<Index> first_;
-    std::vector<Index> table_;
+    std::vector<HashedVertex> table_;
 };
 
 // ---- around each position
@@ -146,67 +154,79 @@ struct VertexRange {
     bool has(std::size_t v) const { return v - begin < size(); }
 };
 
-// By vertex of a range that stands for its position: the triangles there, ascending.
-struct Incidence {
-    VertexRange vertices;
-    std::vector<Index> start, triangles;
-    std::span<const Index> around(std::size_t v) const {
-        const std::size_t at = v - vertices.begin;
-        return std::span(triangles).subspan(start[at], start[at + 1] - start[at]);
+// Of a triangle at a place: the other corners, as they follow it and precede it.
+struct Wedge {
+    Index following, preceding;
+};
+
+// What is collected at the places of a range: the wedges of the triangles there, and the sum of these triangles' area vectors, twice.
+struct Wedges {
+    std::vector<Index> start; // one longer
+    std::vector<Wedge> wedges;
+    std::vector<glm::dvec3> sums;
+
+    std::span<const Wedge> around(std::size_t place) const {
+        return std::span(wedges).subspan(start[place], start[place + 1] - start[place]);
     }
 };
 
-Incidence find_incidence(const MeshView& mesh, const Places& places, VertexRange vertices) {
-    Incidence incidence{vertices, {}, {}};
-    incidence.start.assign(vertices.size() + 1, 0);
-    // Each thread looks at all triangles, for a range of the places: they are soon seen, and counting is what takes time.
+// Triangles that the welding degenerates have neither edges nor an area. `vertex_areas`: by vertex, of which only those at the range's
+// places grow.
+Wedges collect_wedges(const MeshView& mesh, const Places& places, VertexRange vertices, std::span<double> vertex_areas) {
+    Wedges out;
+    out.start.assign(vertices.size() + 1, 0);
+    out.sums.assign(vertices.size(), glm::dvec3(0));
+    // Each thread looks at all triangles, for a range of the places: they are soon seen, and collecting is what takes time. All sums are
+    // made in the order of the triangles.
     constexpr int most_ranges = 8;
     const auto ranges = static_cast<std::size_t>(std::min(tbb::this_task_arena::max_concurrency(), most_ranges));
-    const auto for_each_use = [&](auto&& use) {
+    const auto for_each_triangle = [&](auto&& use) {
         tbb::parallel_for(std::size_t{0}, ranges, [&](std::size_t r) {
             const auto end_of = [&](std::size_t range) { return vertices.begin + vertices.size() * range / ranges; };
             const VertexRange own{end_of(r), end_of(r + 1)};
-            for (std::size_t t = mesh.triangles.size(); t-- > 0;)
-                for (const Index v : places.of(mesh.triangles[t]))
-                    if (own.has(v)) use(incidence.start[v - vertices.begin], t);
+            for (const Triangle& corners : mesh.triangles) {
+                const Triangle at = places.of(corners);
+                if (!own.has(at[0]) && !own.has(at[1]) && !own.has(at[2])) continue;
+                if (!places.degenerates(corners)) use(own, corners, at);
+            }
         });
     };
-    for_each_use([](Index& count, std::size_t) { ++count; });
-    std::partial_sum(incidence.start.begin(), incidence.start.end(), incidence.start.begin());
-    incidence.triangles.resize(incidence.start.back());
-    for_each_use([&](Index& end, std::size_t t) { incidence.triangles[--end] = static_cast<Index>(t); });
-    return incidence;
+    for_each_triangle([&](VertexRange own, const Triangle&, const Triangle& at) {
+        for (const Index place : at)
+            if (own.has(place)) ++out.start[place - vertices.begin];
+    });
+    std::partial_sum(out.start.begin(), out.start.end(), out.start.begin());
+    out.wedges.resize(out.start.back());
+    for_each_triangle([&](VertexRange own, const Triangle& corners, const Triangle& at) {
+        const glm::dvec3& a = mesh.positions[corners[0]];
+        const glm::dvec3 vector = glm::cross(mesh.positions[corners[1]] - a, mesh.positions[corners[2]] - a);
+        const double sixth = glm::length(vector) / 6; // what each corner has of the triangle's area
+        for (std::size_t k = 0; k < 3; ++k) {
+            if (!own.has(at[k])) continue;
+            const std::size_t place = at[k] - vertices.begin;
+            out.wedges[--out.start[place]] = {at[(k + 1) % 3], at[(k + 2) % 3]};
+            out.sums[place] += vector;
+            vertex_areas[corners[k]] += sixth;
+        }
+    });
+    return out;
 }
 
-// The ends of the edges around a place: `following` in the triangles there, and `preceding`.
+// Looks at the wedges around one place after another.
 class Fan {
 public:
-    // Of so many triangles at most.
-    void begin(Index place, std::size_t triangles) {
-        if (triangles > preceding_.size()) {
-            following_.resize(2 * triangles);
-            preceding_.resize(2 * triangles);
+    // Whether every edge at the place has two triangles that run it in opposite ways: each neighbour follows once and precedes once.
+    bool is_regular(Index place, std::span<const Wedge> wedges) {
+        const std::uint64_t stamp = std::uint64_t{place} << 32;
+        for (const Wedge& wedge : wedges) {
+            std::uint64_t& seen = slot(wedge.following);
+            if ((seen & stamp_mask) == stamp) return is_regular_by_sorting(wedges); // seen twice, or two in one slot
+            seen = stamp | wedge.following;
         }
-        size_ = 0;
-        stamp_ = std::uint64_t{place} << 32;
-    }
-    void add(Index following, Index preceding) {
-        following_[size_] = following;
-        preceding_[size_++] = preceding;
-    }
-
-    // Whether every edge has two triangles that run it in opposite ways: each neighbour follows once and precedes once. Sorts what
-    // was added, if need be.
-    bool is_regular() {
-        for (std::size_t i = 0; i < size_; ++i) {
-            std::uint64_t& seen = slot(following_[i]);
-            if ((seen & stamp_mask) == stamp_) return is_regular_by_sorting(); // seen twice, or two in one slot
-            seen = stamp_ | following_[i];
-        }
-        for (std::size_t i = 0; i < size_; ++i) {
-            std::uint64_t& seen = slot(preceding_[i]);
-            if (seen != (stamp_ | preceding_[i])) return false;
-            seen = stamp_ | nobody; // only once
+        for (const Wedge& wedge : wedges) {
+            std::uint64_t& seen = slot(wedge.preceding);
+            if (seen != (stamp | wedge.preceding)) return false;
+            seen = stamp | nobody; // only once
         }
         return true;
     }
@@ -217,15 +237,18 @@ private:
 
     std::uint64_t& slot(Index v) { return slots_[v * 0x9e3779b1u >> (32 - slot_bits)]; }
 
-    bool is_regular_by_sorting() {
-        const auto end = static_cast<std::ptrdiff_t>(size_);
-        std::sort(following_.begin(), following_.begin() + end);
-        std::sort(preceding_.begin(), preceding_.begin() + end);
-        return std::equal(following_.begin(), following_.begin() + end, preceding_.begin()) &&
-               std::adjacent_find(following_.begin(), following_.begin() + end) == following_.begin() + end;
+    bool is_regular_by_sorting(std::span<const Wedge> wedges) {
+        following_.clear();
+        preceding_.clear();
+        for (const Wedge& wedge : wedges) {
+            following_.push_back(wedge.following);
+            preceding_.push_back(wedge.preceding);
+        }
+        std::sort(following_.begin(), following_.end());
+        std::sort(preceding_.begin(), preceding_.end());
+        return following_ == preceding_ && std::adjacent_find(following_.begin(), following_.end()) == following_.end();
     }
 
-    std::size_t size_ = 0;
     std::vector<Index> following_, preceding_;
     // Neighbours in the lower halves, stamped with the place that they were seen at; no place has the stamp of the others.
     std::array<std::uint64_t, 1 << slot_bits> slots_ = [] {
@@ -233,67 +256,6 @@ private:
         none.fill(~std::uint64_t{0});
         return none;
     }();
-    std::uint64_t stamp_ = 0;
-};
-
-// Twice a triangle's area as a vector, and what each corner has of it: found once, and read at each corner.
-struct FaceArea {
-    glm::dvec3 vector{0};
-    double sixth = 0; // of its length
-};
-
-// Nothing for triangles that the welding degenerates, or that have no corner among the vertices.
-std::vector<FaceArea> find_areas(const MeshView& mesh, const Places& places, VertexRange vertices) {
-    std::vector<FaceArea> areas(mesh.triangles.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, areas.size(), grain), [&](const auto& range) {
-        for (std::size_t t = range.begin(); t < range.end(); ++t) {
-            const Triangle& corners = mesh.triangles[t];
-            const Triangle at = places.of(corners);
-            if (!vertices.has(at[0]) && !vertices.has(at[1]) && !vertices.has(at[2])) continue;
-            if (places.degenerates(corners)) continue;
-            const glm::dvec3& a = mesh.positions[corners[0]];
-            const glm::dvec3 vector = glm::cross(mesh.positions[corners[1]] - a, mesh.positions[corners[2]] - a);
-            areas[t] = {vector, glm::length(vector) / 6};
-        }
-    });
-    return areas;
-}
-
-// Looks at one position after another.
-class SurfaceWorker {
-public:
-    SurfaceWorker(const MeshView& mesh, const Places& places, const Incidence& incidence, std::span<const FaceArea> areas,
-                  Surface& surface)
-        : triangles_(mesh.triangles), places_(places), incidence_(incidence), areas_(areas), vertex_areas_(surface.areas),
-          surface_(surface) {}
-
-    void operator()(Index v) {
-        const std::span<const Index> around = incidence_.around(v);
-        fan_.begin(v, around.size());
-        glm::dvec3 sum(0);
-        for (const Index t : around) {
-            const Triangle& corners = triangles_[t];
-            if (places_.degenerates(corners)) continue; // it has neither edges nor an area
-            const Triangle w = places_.of(corners);
-            const std::size_t k = (w[1] == v) + 2u * (w[2] == v);
-            constexpr std::size_t next[] = {1, 2, 0, 1};
-            const FaceArea& area = areas_[t];
-            fan_.add(w[next[k]], w[next[k + 1]]);
-            sum += area.vector;
-            vertex_areas_[corners[k]] += area.sixth;
-        }
-        surface_.irregular[v] = !fan_.is_regular();
-        surface_.normals[v] = glm::vec3(unit(sum));
-    }
-
-private:
-    std::span<const Triangle> triangles_;
-    const Places places_;
-    const Incidence& incidence_;
-    std::span<const FaceArea> areas_;
-    std::span<double> vertex_areas_;
-    Surface& surface_;
-    Fan fan_;
 };
 
 // How well the mesh's own normals agree with its faces: positive where they do.
@@ -326,13 +288,15 @@ Surface survey(const MeshView& mesh, std::span<const Index> coincident, VertexRa
     surface.irregular.assign(coincident.size(), 0);
     surface.areas.assign(coincident.size(), 0);
     surface.normals.resize(coincident.size());
-    const Places places(coincident);
-    const Incidence incidence = find_incidence(mesh, places, range);
-    const std::vector<FaceArea> areas = find_areas(mesh, places, range);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(range.begin, range.end, grain), [&](const auto& vertices) {
-        SurfaceWorker worker(mesh, places, incidence, areas, surface);
-        for (std::size_t v = vertices.begin(); v < vertices.end(); ++v)
-            if (coincident[v] == v) worker(static_cast<Index>(v));
+    const Wedges wedges = collect_wedges(mesh, Places(coincident), range, surface.areas);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, range.size(), grain), [&](const auto& places) {
+        Fan fan;
+        for (std::size_t place = places.begin(); place < places.end(); ++place) {
+            const std::size_t v = range.begin + place;
+            if (coincident[v] != v) continue;
+            surface.irregular[v] = !fan.is_regular(static_cast<Index>(v), wedges.around(place));
+            surface.normals[v] = glm::vec3(unit(wedges.sums[place]));
+        }
     });
     return surface;
 }
@@ -438,13 +402,17 @@ std::vector<Index> find_coincident(std::span<const glm::dvec3> positions) {
     // In groups by the upper bits of a hash, which fit the caches and are independent of each other.
     constexpr unsigned group_bits = 6;
     constexpr std::size_t groups = 1u << group_bits;
-    const auto group_of = [&](std::size_t v) { return hash(positions[v]) >> (64 - group_bits); };
+    std::vector<std::uint64_t> hashes(positions.size());
+    const auto group_of = [&](std::size_t v) { return hashes[v] >> (64 - group_bits); };
     const std::size_t chunks = (positions.size() + grain - 1) / grain;
     const auto end_of = [&](std::size_t chunk) { return std::min(positions.size(), (chunk + 1) * grain); };
     std::vector<std::array<Index, groups>> places(chunks); // by chunk and group: how many, then where the next one goes
     tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
         places[chunk].fill(0);
-        for (std::size_t v = chunk * grain; v < end_of(chunk); ++v) ++places[chunk][group_of(v)];
+        for (std::size_t v = chunk * grain; v < end_of(chunk); ++v) {
+            hashes[v] = hash(positions[v]);
+            ++places[chunk][group_of(v)];
+        }
     });
     std::array<Index, groups + 1> start{};
     Index total = 0;
@@ -453,11 +421,12 @@ std::vector<Index> find_coincident(std::span<const glm::dvec3> positions) {
         for (auto& counts : places) total += std::exchange(counts[g], total);
     }
     start[groups] = total;
-    std::vector<Index> grouped(positions.size()), first(positions.size());
+    std::vector<HashedVertex> grouped(positions.size());
     tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
         for (std::size_t v = chunk * grain; v < end_of(chunk); ++v)
-            grouped[places[chunk][group_of(v)]++] = static_cast<Index>(v);
+            grouped[places[chunk][group_of(v)]++] = {static_cast<std::uint32_t>(hashes[v]), static_cast<Index>(v)};
     });
+    std::vector<Index> first(positions.size());
     tbb::parallel_for(std::size_t{0}, groups, [&](std::size_t g) {
         CoincidenceFinder(positions, first).find(std::span(grouped).subspan(start[g], start[g + 1] - start[g]));
     });

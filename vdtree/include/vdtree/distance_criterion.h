@@ -74,13 +74,25 @@ public:
     bool is_monotone() const noexcept { return is_monotone_; }
     bool uses_gaze() const noexcept { return parts_.eccentricity_bins > 1; }
     std::uint64_t id() const noexcept { return id_; } // of these values; a copy shares it
+    std::uint64_t object_id() const noexcept { return object_id_.value; } // of this object: a copy has another one, wherever it lies
 
 private:
+    struct ObjectId {
+        ObjectId() noexcept;
+        ObjectId(const ObjectId&) noexcept : ObjectId() {}
+        ObjectId& operator=(const ObjectId&) noexcept {
+            value = ObjectId().value;
+            return *this;
+        }
+        std::uint64_t value;
+    };
+
     explicit DistanceCriterion(Parts parts);
 
     Parts parts_;
     bool uses_silhouettes_ = false, is_monotone_ = false;
     std::uint64_t id_;
+    ObjectId object_id_;
 };
 
 // A half space: points with normal . x + offset >= 0, in the tree's frame.

@@ -35,7 +35,7 @@ struct ReadResult {
 
 // Polygons are triangulated (ear clipping in the plane of the polygon, so concave ones keep their area),
 // triangle strips unrolled with their orientation, glTF node transforms applied. Coincident vertices stay apart.
-// Fails on a mesh without triangles.
+// Fails on a mesh without triangles, and on vertex normals in use that are not finite; those of length 0 are told in the warnings.
 Result<ReadResult> read_mesh(const std::filesystem::path& file, const ReadOptions& options = {});
 
 // Writes to a temporary name in the same folder, then renames; an existing file is replaced only by a whole one.
