@@ -388,6 +388,14 @@ vdtree::Viewpoint Follower::viewpoint_for(const Scene& scene, const WhatOptions&
     return viewpoint;
 }
 
+Result<std::vector<float>> Follower::costs(const Scene& scene, const WhatOptions& what, Purpose purpose) {
+    const auto criterion = criterion_for(scene, what);
+    if (!criterion) return criterion.error();
+    vdtree::FollowOptions options;
+    options.cull_back_faces = purpose == Purpose::picture && culls_back_faces(scene);
+    return vdtree::find_every_cost(scene.tree, **criterion, viewpoint_for(scene, what, purpose), options);
+}
+
 Result<Simplification> Follower::change(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
     const bool is_full = what.mode == Mode::full && cut.triangle_count() == scene.tree.triangle_count();
     if (what.mode == Mode::full && !is_full) return simplify(cut, scene, what, purpose);

@@ -68,6 +68,12 @@ public:
     Result<Simplification> follow(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what,
                                   Purpose purpose = Purpose::picture);
 
+    // What follow() looks at: the criterion of `what`, valid until the next call, and where from. Not in the mode full.
+    Result<const vdtree::DistanceCriterion*> criterion_for(const Scene& scene, const WhatOptions& what);
+    vdtree::Viewpoint viewpoint_for(const Scene& scene, const WhatOptions& what, Purpose purpose);
+    // What each interior node costs there.
+    Result<std::vector<float>> costs(const Scene& scene, const WhatOptions& what, Purpose purpose);
+
 private:
     // What a criterion depends on, besides the tree, its light and the display.
     struct Key {
@@ -83,8 +89,6 @@ private:
         bool chroma = false;
         bool operator==(const Key&) const = default;
     };
-    Result<const vdtree::DistanceCriterion*> criterion_for(const Scene& scene, const WhatOptions& what);
-    vdtree::Viewpoint viewpoint_for(const Scene& scene, const WhatOptions& what, Purpose purpose);
     Result<Simplification> change(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose);
     Result<void> glide(const vdtree::Cut& cut, Simplification& result);
 
