@@ -6,6 +6,8 @@
 #include <iterator>
 #include <memory>
 
+#include <perception/csf.h>
+
 #include "command.h"
 #include "effects_bench.h"
 #include "engine_bench.h"
@@ -102,6 +104,13 @@ std::vector<std::string> parse_groups(std::string_view list) {
     return groups;
 }
 
+std::vector<std::string> achromatic_models() {
+    std::vector<std::string> names;
+    for (const perception::CsfModel model : perception::csf_models)
+        if (perception::is_achromatic(model)) names.emplace_back(perception::name(model));
+    return names;
+}
+
 Result<int> run(PerceptionArguments& a) {
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
@@ -130,6 +139,9 @@ Command perception_command(CLI::App& bench) {
         ->type_name("FOLDER")
         ->check(CLI::ExistingDirectory);
     verb->add_option("--pictures", o.pictures, "A picture of each group: the worst views, and what the judge saw")->type_name("FOLDER");
+    verb->add_option("--second-judge", o.second_judge, "Its model of contrast sensitivity: barten-1999 (default), stela, daly, ...")
+        ->type_name("MODEL")
+        ->check(CLI::IsMember(achromatic_models()).description(""));
     verb->add_option("--window", o.window_px, "Its side; promises are about 1024 (default)")->type_name("PIXELS")->check(within(64, 4096));
     verb->add_flag("--quick", o.quick, "Few views: rough figures");
     verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");

@@ -40,9 +40,9 @@ struct Scale {
 
 Scale scale_of(FoldMap map, const Scene& scene, double largest) {
     switch (map) {
-    case FoldMap::cost: return {1.0 / 64, 1, true, {1.0 / 64, 1.0 / 16, 1.0 / 4, 1}, "fold cost; 1 is just imperceptible, red is more"};
+    case FoldMap::cost: return {1.0 / 64, 1, true, {1.0 / 64, 1.0 / 16, 1.0 / 4, 1}, "fold cost; 1: just imperceptible, red: more"};
     case FoldMap::frequency: {
-        Scale scale{0.5, perception::pixels_per_degree(scene.display).value() / 2, true, {0.5, 1, 2, 4, 8, 16}, "cycles per degree"};
+        Scale scale{0.1, perception::pixels_per_degree(scene.display).value() / 2, true, {0.1, 0.3, 1, 3, 10, 30}, "cycles per degree"};
         std::erase_if(scale.ticks, [&](double tick) { return tick > scale.high; });
         return scale;
     }
@@ -230,12 +230,11 @@ Result<Image> draw_fold_map(const vdtree::Cut& cut, const Scene& scene, const Wh
         return Error{ErrorCode::invalid_argument, "In the full model nothing is folded, so no fold costs anything: leave out --full."};
     if (map == FoldMap::eccentricity && !what.gaze_px)
         return Error{ErrorCode::invalid_argument, "Without a gaze all counts as looked at: --show eccentricity needs --gaze."};
-    Follower follower;
-    const vdtree::Viewpoint viewpoint = follower.viewpoint_for(scene, what, Purpose::picture);
+    const vdtree::Viewpoint viewpoint = Follower().viewpoint_for(scene, what, Purpose::picture);
     const Sight sight(scene, what, viewpoint);
     std::vector<float> costs;
     if (map == FoldMap::cost) {
-        auto found = follower.costs(scene, what, Purpose::picture);
+        auto found = fold_costs(scene, what, Purpose::picture);
         if (!found) return found.error();
         costs = std::move(*found);
     }

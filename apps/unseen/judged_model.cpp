@@ -13,26 +13,17 @@ bool needs_errors(FoldTest test) { return test == FoldTest::error; }
 
 } // namespace
 
-perception::JudgeOptions judge_options(Judge judge, const perception::Display& display, std::optional<glm::dvec2> gaze_px) {
-    perception::JudgeOptions options;
-    options.display = display;
-    options.gaze_px = gaze_px;
-    if (judge == Judge::second) {
-        options.csf = perception::CsfModel::daly;
-        options.beta = 2;
-    }
-    return options;
-}
-
 glm::dvec2 gaze_aside(const perception::Display& display, const vdtree::View& view, double degrees) {
     const double tangent = std::tan(perception::to_radians(perception::Degrees(degrees)).value());
     return {view.width * 0.5 + tangent * (display.distance / display.pixel_pitch), view.height * 0.5};
 }
 
-Result<JudgedModel> JudgedModel::create(render::Context& context, std::string name, vdtree::VertexTree tree, int window_px) {
+Result<JudgedModel> JudgedModel::create(render::Context& context, std::string name, vdtree::VertexTree tree, int window_px,
+                                        perception::CsfModel second) {
     JudgedModel model;
     model.context_ = &context;
     model.name_ = std::move(name);
+    model.second_ = second;
     model.view_.width = model.view_.height = window_px;
     auto scene = make_scene(std::move(tree), model.view_, {});
     if (!scene) return scene.error();
@@ -115,7 +106,14 @@ Result<const perception::Image*> JudgedModel::full() {
 Result<perception::Judgement> JudgedModel::judge(const Picture& picture, const WhatOptions& what, Judge judge) {
     const auto reference = full();
     if (!reference) return reference.error();
-    return perception::judge_modern(**reference, picture.luminance, judge_options(judge, plain_.scene->display, what.gaze_px));
+    perception::JudgeOptions options;
+    options.display = plain_.scene->display;
+    options.gaze_px = what.gaze_px;
+    if (judge == Judge::second) {
+        options.csf = second_;
+        options.beta = 2;
+    }
+    return perception::judge_modern(**reference, picture.luminance, options);
 }
 
 Result<perception::Judgement> JudgedModel::judge(const WhatOptions& what, Judge by) {

@@ -16,11 +16,11 @@
 
 namespace unseen::app {
 
-// The judges. The first shares castleCSF with the fold tests; the second has another model of contrast sensitivity (Daly 1993, whose
-// peak is about twice as high) and adds its bands up as squares.
+// The judges. The first shares castleCSF with the fold tests; the second has another model of contrast sensitivity and adds its bands up
+// as squares.
 enum class Judge { modern, second };
 inline constexpr std::array judges = {Judge::modern, Judge::second};
-perception::JudgeOptions judge_options(Judge judge, const perception::Display& display, std::optional<glm::dvec2> gaze_px);
+inline constexpr perception::CsfModel usual_second = perception::CsfModel::barten_1999; // of the eye's physics, not fitted to castleCSF's data
 
 // Where the viewer looks, so many degrees to the right of the window's centre.
 glm::dvec2 gaze_aside(const perception::Display& display, const vdtree::View& view, double degrees);
@@ -34,7 +34,8 @@ struct Verdicts {
 class JudgedModel {
 public:
     // The context must outlive the model.
-    static Result<JudgedModel> create(render::Context& context, std::string name, vdtree::VertexTree tree, int window_px);
+    static Result<JudgedModel> create(render::Context& context, std::string name, vdtree::VertexTree tree, int window_px,
+                                      perception::CsfModel second = usual_second);
 
     const std::string& name() const { return name_; }
     const vdtree::VertexTree& tree() const { return plain_.scene->tree; }
@@ -73,6 +74,7 @@ private:
 
     render::Context* context_ = nullptr;
     std::string name_;
+    perception::CsfModel second_ = usual_second;
     ViewOptions view_;
     Stand plain_, measured_; // the second with the errors of folds; made when it is first asked for
     std::optional<perception::Image> full_;

@@ -185,8 +185,8 @@ Totals total(const std::vector<Judged>& all, FoldTest test, std::size_t judge) {
 
 class PerceptionBench {
 public:
-    PerceptionBench(const PerceptionBenchOptions& options, render::Context context)
-        : options_(options), context_(std::move(context)), bar_("judging") {}
+    PerceptionBench(const PerceptionBenchOptions& options, render::Context context, perception::CsfModel second)
+        : options_(options), context_(std::move(context)), second_(second), bar_("judging") {}
 
     Result<PerceptionBenchResult> run() {
         if (auto loaded = load(); !loaded) return loaded.error();
@@ -214,7 +214,7 @@ private:
 
     Result<void> load() {
         if (!needs_models()) {
-            result_.title = "no models";
+            result_.title = "made-up meshes";
             return {};
         }
         for (const std::string& file : options_.meshes.empty() ? installed_meshes() : options_.meshes)
@@ -240,7 +240,7 @@ private:
         return add(file.stem().string(), std::move(*tree));
     }
     Result<void> add(std::string name, vdtree::VertexTree tree) {
-        auto model = JudgedModel::create(context_, std::move(name), std::move(tree), options_.window_px);
+        auto model = JudgedModel::create(context_, std::move(name), std::move(tree), options_.window_px, second_);
         if (!model) return model.error();
         models_.push_back(std::make_unique<JudgedModel>(std::move(*model)));
         return {};
@@ -307,7 +307,7 @@ private:
                              static_cast<double>(t.pixels), {}, {}, false, 0};
                 if (judges[j] == Judge::modern) row.must = 0;
                 else {
-                    row.name = "the same by the second judge";
+                    row.name = "the same by the second judge, " + std::string(perception::name(second_));
                     row.aim = 0;
                 }
                 result_.rows.push_back(std::move(row));
@@ -364,7 +364,7 @@ private:
         }
         BenchDetails details{"Triangles kept, mean of " + std::to_string(direction_count()) + " directions and " + std::to_string(main_models_) +
                                  " meshes; what can be seen of it in the worst view; V, and by the second judge",
-                             {{"setting", "test", "triangles", "of luebke-hallen's", "visible", "largest V", "second: visible", "V"}}};
+                             {{"setting", "test", "triangles", "over luebke-hallen's", "visible", "largest V", "second: visible", "V"}}};
         for (std::size_t s = 0; s < settings.size(); ++s) {
             const std::string where = gaze_name(settings[s].gaze) + ", " + percent(settings[s].fill);
             for (std::size_t t = 0; t < std::size(tests); ++t) {
@@ -377,7 +377,7 @@ private:
                     note += (m ? ", " : "") + models_[m]->name() + " " + thousands(base.triangles[m]) + " -> " + thousands(cell.triangles[m]);
                 }
                 const Totals first = total(cell.views, tests[t], 0), second = total(cell.views, tests[t], 1);
-                details.rows.push_back({where, name_of(tests[t]), thousands(kept), rounded(fewer, 3) + "x fewer", grouped(first.pixels),
+                details.rows.push_back({where, name_of(tests[t]), thousands(kept), rounded(1 / fewer, 3), grouped(first.pixels),
                                         rounded(first.largest, 2), grouped(second.pixels), rounded(second.largest, 2)});
                 if (tests[t] == baseline) continue;
                 BenchRow row{"fewer triangles, " + where + ", " + name_of(tests[t]), "x", note, fewer, {}, {}, true, 2};
@@ -503,7 +503,7 @@ private:
         for (const HardMesh& mesh : hard_meshes(triangles)) {
             auto tree = build_hard_tree(mesh);
             if (!tree) return tree.error();
-            auto model = JudgedModel::create(context_, mesh.name, std::move(*tree), options_.window_px);
+            auto model = JudgedModel::create(context_, mesh.name, std::move(*tree), options_.window_px, second_);
             if (!model) return model.error();
             hard_models.push_back(std::make_unique<JudgedModel>(std::move(*model)));
         }
@@ -754,6 +754,7 @@ private:
 
     const PerceptionBenchOptions& options_;
     render::Context context_;
+    perception::CsfModel second_; // of the second judge
     ProgressBar bar_;
     Models models_;
     std::size_t main_models_ = 0;
@@ -770,7 +771,9 @@ Result<PerceptionBenchResult> bench_perception(const PerceptionBenchOptions& opt
         fs::create_directories(options.pictures, failed);
         if (failed) return Error{ErrorCode::io_failure, "Cannot make the folder '" + options.pictures + "': " + failed.message() + "."};
     }
-    return PerceptionBench(options, std::move(*context)).run();
+    const auto second = options.second_judge.empty() ? Result(usual_second) : perception::csf_model(options.second_judge);
+    if (!second) return second.error();
+    return PerceptionBench(options, std::move(*context), *second).run();
 }
 
 } // namespace unseen::app

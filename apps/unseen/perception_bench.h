@@ -17,6 +17,7 @@ struct PerceptionBenchOptions {
     std::vector<std::string> only;          // of perception_groups; empty: all
     std::string pictures;                   // a folder for a picture of each group; empty: none
     std::string reference;                  // a folder of published sensitivities; empty: the checkout's own
+    std::string second_judge;               // its model of contrast sensitivity; empty: Barten's of 1999
     int window_px = 1024;
     bool quick = false;                     // few views
 };
