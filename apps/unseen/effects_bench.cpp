@@ -9,7 +9,7 @@
 #include <glm/geometric.hpp>
 
 #include <perception/criterion.h>
-#include <sample_mesh.h>
+#include <vdtree/occluders.h>
 
 #include "bench_tools.h"
 #include "model_file.h"
@@ -33,7 +33,7 @@ struct Measured {
 struct Variation {
     std::string name, note;
     std::function<Result<DistanceCriterion>(const Scene&, const perception::FoldTestOptions&)> criterion;
-    bool has_gaze = true, culls = true, needs_errors = false, is_lit = false;
+    bool has_gaze = true, culls = true, needs_errors = false, is_lit = false, hides = true;
 };
 
 Result<DistanceCriterion> plain(const Scene& scene, const perception::FoldTestOptions& options) {
@@ -51,9 +51,10 @@ Result<DistanceCriterion> with_classes(const Scene& scene, const perception::Fol
 
 std::vector<Variation> variations() {
     std::vector<Variation> all;
-    all.push_back({"luebke-hallen, all effects", "silhouettes, contrast, gaze 29 degrees aside, back faces folded", plain});
+    all.push_back({"luebke-hallen, all effects", "silhouettes, contrast, gaze 29 degrees aside, back faces and what the solid hides folded", plain});
     all.push_back({"no gaze", "what eccentricity saves", plain, false});
     all.push_back({"no back-face folding", "what faces away is kept like what faces the eye", plain, true, false});
+    all.push_back({"no hidden folding", "what is behind spheres inside the solid is kept", plain, true, true, false, false, false});
     all.push_back({"no contrast", "every fold counts as one against anything in the scene: what knowing luminance saves",
                    [](const Scene& scene, const perception::FoldTestOptions& options) {
                        return with_classes(scene, options, [](vdtree::FoldClass& c) { c.interior = c.silhouette; });
@@ -126,6 +127,7 @@ Result<DistanceCriterion> criterion_of(const Variation& variation, const Scene& 
 Result<Measured> measure(const Scene& scene, const Variation& variation, int repeats) {
     const perception::FoldTestOptions options = test_options(scene, variation.has_gaze);
     vdtree::Viewpoint viewpoint = perception::viewpoint_of(scene.tree, scene.view, options, scene.placement);
+    if (variation.hides) viewpoint.occluders = vdtree::inner_spheres(scene.tree); // of open surfaces, none
     const auto criterion = criterion_of(variation, scene, options, viewpoint);
     if (!criterion) return criterion.error();
     vdtree::FollowOptions following;
