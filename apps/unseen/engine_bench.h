@@ -2,11 +2,10 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "report.h"
+#include "bench_table.h"
 
 namespace unseen::app {
 
@@ -17,16 +16,7 @@ struct EngineBenchOptions {
     bool quick = false;               // few frames
 };
 
-// One line of the table. What is promised holds where the value is at most the bound, or at least.
-struct BenchRow {
-    std::string name, unit, note;
-    std::optional<double> value; // none: not available, see the note
-    std::optional<double> must, aim;
-    bool more_is_better = false;
-    int decimals = 0;
-};
-
-struct BenchResult {
+struct EngineBenchResult {
     std::vector<BenchRow> rows;
     Json sizes = Json::array(); // what was measured at each size, for growth curves
     std::string mesh;
@@ -34,6 +24,6 @@ struct BenchResult {
 
 // Cuts are measured on one thread, pinned to one core, by the wall clock; medians. Trees are built by children of this
 // program, whose peak memory that tells.
-Result<BenchResult> bench_engine(const EngineBenchOptions& options);
+Result<EngineBenchResult> bench_engine(const EngineBenchOptions& options);
 
 } // namespace unseen::app

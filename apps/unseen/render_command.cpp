@@ -1,5 +1,6 @@
 // unseen render: a picture of a cut, for people or for judging.
 #include <filesystem>
+#include <iterator>
 #include <map>
 #include <memory>
 
@@ -8,6 +9,7 @@
 
 #include "command.h"
 #include "fly_through.h"
+#include "fold_map.h"
 #include "frame_image.h"
 #include "gaze_player.h"
 #include "report.h"
@@ -26,7 +28,8 @@ struct RenderArguments {
     DisplayOptions display;
     WhatOptions what;
     render::DrawOptions draw;
-    FlyThroughOptions flight; // where a path is given
+    std::optional<FoldMap> map; // instead of the picture
+    FlyThroughOptions flight;   // where a path is given
 };
 
 bool is_for_people(const std::string& file) {
@@ -75,8 +78,13 @@ Result<int> run(RenderArguments& a) {
     const auto frame = renderer->draw(cut, scene->view, options, scene->placement);
     if (!frame) return frame.error();
 
-    const perception::Image image =
+    perception::Image image =
         is_for_people(a.out) ? code_image(*frame, scene->display) : luminance_image(*frame, scene->display);
+    if (a.map) {
+        auto drawn = draw_fold_map(cut, *scene, a.what, *a.map, scene->view);
+        if (!drawn) return drawn.error();
+        image = std::move(*drawn);
+    }
     if (auto ok = report->prepare(to_json(result, frame->draw_ms)); !ok) return ok.error();
     if (auto ok = perception::write_image(a.out, image); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
@@ -120,10 +128,12 @@ void check(const RenderArguments& a) {
     if (!a.view.lights.empty() && o.geomorph_seconds) refuse("--geomorph and --lights exclude each other: vertices that glide are not lit.");
     if (o.path.empty()) {
         if (a.out.empty()) refuse("-o is required (or --path).");
+        if (a.map && !is_for_people(a.out)) refuse("--show draws pictures for people: -o must end in .png.");
         if (!o.csv.empty() || !o.plot.empty() || o.threshold != 1 || !o.draws || o.geomorph_seconds)
             refuse("--csv, --plot, --threshold, --geomorph and --no-draw need --path.");
         return;
     }
+    if (a.map) refuse("--show is for single pictures, and excludes --path.");
     if (a.out.empty()) return;
     if (!o.draws) refuse("--no-draw and -o exclude each other.");
     if (const auto complaint = complaint_about_picture_names(a.out); !complaint.empty()) refuse(complaint);
@@ -148,6 +158,12 @@ Command render_command(CLI::App& app) {
     verb->add_option("--shading", a->draw.shading, "smooth (default) or flat")
         ->type_name("NAME")
         ->transform(CLI::CheckedTransformer(shadings).description(""));
+    std::map<std::string, FoldMap> maps;
+    for (std::size_t i = 0; i < std::size(fold_map_names); ++i) maps[std::string(fold_map_names[i])] = static_cast<FoldMap>(i);
+    verb->add_option_function<FoldMap>("--show", [a](const FoldMap& map) { a->map = map; },
+                                       "Instead of the model: what its folds cost, or their worst gratings' frequency or contrast, or their eccentricity")
+        ->type_name("NAME")
+        ->transform(CLI::CheckedTransformer(maps).description("cost|frequency|contrast|eccentricity"));
     verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
     add_path_options(*verb, a->flight);
     CLI::Option* frames_a_second = verb->get_option("--fps");
@@ -165,6 +181,7 @@ Command render_command(CLI::App& app) {
     add_moving_gaze_options(*verb, a->flight.gaze, false);
     verb->footer("Examples:\n  unseen render bunny.vdt -o bunny.png --wireframe\n"
                  "  unseen render bunny.vdt -o full.pfm --full --size 1024x1024\n"
+                 "  unseen render bunny.vdt -o cost.png --gaze 1603 512 --show cost\n"
                  "  unseen render bunny.vdt -o aside.pfm --gaze 1603 512 --json -\n"
                  "  unseen render dragon.vdt --path orbit:1 --gaze-mode simulated --seed 7 --gaze-error 0.5 --gaze-latency 50\n"
                  "  unseen render dragon.vdt --path orbit:1 --csv orbit.csv --plot orbit.png\n"

@@ -134,34 +134,64 @@ PlacedSphere placed_sphere(const vdtree::VertexTree& tree, const vdtree::Similar
     return {placement.to_world(tree.origin() + glm::dvec3(sphere.centre)), placement.scale * sphere.radius};
 }
 
-Result<Scene> load_scene(const std::filesystem::path& model, const ViewOptions& view, const DisplayOptions& display) {
-    // What is quickly read and checked comes first.
+namespace {
+
+// What the options say that does not depend on the model.
+struct Surroundings {
+    perception::Display display;
+    float background = 0;
+    std::optional<perception::CsfTable> csf;
+    std::optional<calibration::LightRig> rig;
+};
+
+Result<Surroundings> read_surroundings(const ViewOptions& view, const DisplayOptions& display) {
     auto shown_on = make_display(display);
     if (!shown_on) return shown_on.error();
-    auto background = relative_background(*shown_on, view.background_cdm2);
+    const auto background = relative_background(*shown_on, view.background_cdm2);
     if (!background) return background.error();
-    std::optional<perception::CsfTable> csf;
+    Surroundings around{*shown_on, *background, {}, {}};
     if (!display.csf.empty()) {
         auto choice = choose_csf(display.csf);
         if (!choice) return choice.error();
-        csf = choice->model ? perception::CsfTable::from_model(*choice->model) : *std::move(choice->table);
+        around.csf = choice->model ? perception::CsfTable::from_model(*choice->model) : *std::move(choice->table);
     }
-    std::optional<calibration::LightRig> rig;
     if (!view.lights.empty()) {
         auto read = calibration::LightRig::read(view.lights);
         if (!read) return read.error();
-        rig = std::move(*read);
+        around.rig = std::move(*read);
     }
-    auto tree = open_tree(model);
-    if (!tree) return tree.error();
+    return around;
+}
 
-    Scene scene{std::move(*tree), {}, *shown_on, std::move(csf), {}, *background, false, {}, {}, {}, {}};
+Result<Scene> assemble(vdtree::VertexTree tree, Surroundings around, const ViewOptions& view) {
+    Scene scene{std::move(tree), {}, around.display, std::move(around.csf), {}, around.background, false, {}, {}, {}, {}};
     scene.placement.scale = view.unit_metres;
     if (const auto lit = light(scene, view); !lit) return lit.error();
-    scene.view = make_view(scene, view);
-    if (auto valid = vdtree::validate(scene.view); !valid) return valid.error();
-    if (auto lit = set_up_lights(scene, std::move(rig)); !lit) return lit.error();
+    if (const auto seen = look(scene, view); !seen) return seen.error();
+    if (auto lit = set_up_lights(scene, std::move(around.rig)); !lit) return lit.error();
     return scene;
+}
+
+} // namespace
+
+Result<void> look(Scene& scene, const ViewOptions& options) {
+    scene.view = make_view(scene, options);
+    return vdtree::validate(scene.view);
+}
+
+Result<Scene> make_scene(vdtree::VertexTree tree, const ViewOptions& view, const DisplayOptions& display) {
+    auto around = read_surroundings(view, display);
+    if (!around) return around.error();
+    return assemble(std::move(tree), std::move(*around), view);
+}
+
+Result<Scene> load_scene(const std::filesystem::path& model, const ViewOptions& view, const DisplayOptions& display) {
+    // What is quickly read and checked comes first.
+    auto around = read_surroundings(view, display);
+    if (!around) return around.error();
+    auto tree = open_tree(model);
+    if (!tree) return tree.error();
+    return assemble(std::move(*tree), std::move(*around), view);
 }
 
 } // namespace unseen::app

@@ -50,6 +50,11 @@ Result<CsfChoice> choose_csf(const std::string& model_or_file);
 
 // Fails on a file that cannot be read, and on options that contradict the model or the display.
 Result<Scene> load_scene(const std::filesystem::path& model, const ViewOptions& view, const DisplayOptions& display);
+// The same of a tree that is at hand.
+Result<Scene> make_scene(vdtree::VertexTree tree, const ViewOptions& view, const DisplayOptions& display);
+
+// Looks at the scene in another way; of the options only those that make a view count.
+Result<void> look(Scene& scene, const ViewOptions& options);
 
 // Puts the lights of --lights, if there are any, where they are at a time; to be called when the view has changed, too. Fails where one
 // is at a vertex or inside of the model.

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <memory>
 
 #include <perception/image.h>
@@ -10,6 +11,7 @@
 
 #include "canvas.h"
 #include "command.h"
+#include "fold_map.h"
 #include "frame_image.h"
 #include "report.h"
 #include "simplification.h"
@@ -26,6 +28,8 @@ struct SheetArguments {
     std::optional<glm::dvec2> gaze_px; // default: default_gaze
     int samples = 16;
     int cell_px = 480;
+    bool maps = false;
+    FoldTest test = WhatOptions().test;
 };
 
 constexpr double default_gaze_degrees = 29; // to the right of the window's centre: well in the periphery
@@ -38,7 +42,7 @@ struct Column {
     Simplification simplification;
     double draw_ms = 0;
     perception::Image luminance;                    // cd/m2, of the whole window
-    perception::Image picture, wireframe;           // code values, of a cell's size
+    std::vector<perception::Image> pictures;        // one below the other; code values, of a cell's size
     std::optional<perception::Judgement> judgement; // against the full model; none for that itself
 };
 
@@ -59,6 +63,8 @@ std::vector<Column> wishes(const Scene& scene, const SheetArguments& a) {
         a.triangles ? a.triangles : std::max(1U, scene.tree.triangle_count() / default_budget_share);
     columns[3].name = "gaze-directed";
     columns[3].what.gaze_px = a.gaze_px.value_or(default_gaze(scene));
+    for (Column& column : columns) column.what.test = a.test;
+    if (a.maps) columns.erase(columns.begin() + 2); // a budget is another matter
     return columns;
 }
 
@@ -69,6 +75,17 @@ vdtree::View small_view(const vdtree::View& view, int cell_px) {
     small.width = std::max(1, static_cast<int>(std::lround(view.width * shrink)));
     small.height = std::max(1, static_cast<int>(std::lround(view.height * shrink)));
     return small;
+}
+
+// Where there is none, as that of the cost in the full model, nothing: such columns are shorter.
+Result<void> draw_maps(Column& column, const vdtree::Cut& cut, const Scene& scene, const vdtree::View& small) {
+    for (const FoldMap map : {FoldMap::cost, FoldMap::frequency, FoldMap::contrast, FoldMap::eccentricity}) {
+        if (column.what.mode == Mode::full || (map == FoldMap::eccentricity && !column.what.gaze_px)) continue;
+        auto drawn = draw_fold_map(cut, scene, column.what, map, small);
+        if (!drawn) return drawn.error();
+        column.pictures.push_back(std::move(*drawn));
+    }
+    return {};
 }
 
 Result<void> draw_pictures(Column& column, const vdtree::Cut& cut, const Scene& scene, const SheetArguments& a,
@@ -85,12 +102,12 @@ Result<void> draw_pictures(Column& column, const vdtree::Cut& cut, const Scene& 
     const vdtree::View small = small_view(scene.view, a.cell_px);
     const auto shaded = renderer.draw(cut, small, options, scene.placement);
     if (!shaded) return shaded.error();
-    column.picture = code_image(*shaded, scene.display);
+    column.pictures.push_back(code_image(*shaded, scene.display));
     options.wireframe = true;
     const auto wired = renderer.draw(cut, small, options, scene.placement);
     if (!wired) return wired.error();
-    column.wireframe = code_image(*wired, scene.display);
-    return {};
+    column.pictures.push_back(code_image(*wired, scene.display));
+    return a.maps ? draw_maps(column, cut, scene, small) : Result<void>();
 }
 
 Result<void> judge(Column& column, const Column& full, const Scene& scene) {
@@ -138,12 +155,18 @@ std::string metres(double value) { return rounded(value, 3) + (std::isfinite(val
 perception::Image compose(const std::vector<Column>& columns, const Scene& scene, const std::string& model) {
     constexpr int gap = 12, text_scale = 2, line_height = 20; // pixels
     constexpr glm::vec3 paper{0.12f}, ink{0.95f}, weak{0.7f};
-    const int width = columns.front().picture.width, height = columns.front().picture.height;
+    const int width = columns.front().pictures.front().width;
+    int height = 0; // of the tallest column
+    for (const Column& column : columns) {
+        int below = 0;
+        for (const perception::Image& picture : column.pictures) below += picture.height + gap;
+        height = std::max(height, below);
+    }
     // Two lines of text above each pair of pictures must fit.
     const int cell_width = std::max(width, Canvas::text_width(std::string(30, 'x'), text_scale));
     const int count = static_cast<int>(columns.size());
     const int header = 2 * gap + line_height, captions = 2 * line_height + gap;
-    Canvas canvas(gap + count * (cell_width + gap), header + captions + 2 * (height + gap), paper);
+    Canvas canvas(gap + count * (cell_width + gap), header + captions + height, paper);
 
     const std::string title = std::filesystem::path(model).filename().string() + "   " +
                               std::to_string(scene.view.width) + "x" + std::to_string(scene.view.height) + " pixels, " +
@@ -161,8 +184,11 @@ perception::Image compose(const std::vector<Column>& columns, const Scene& scene
                             metres(s.imperceptible_from_m) + " none",
                         weak, text_scale);
         }
-        canvas.picture(left, header + captions, column.picture);
-        canvas.picture(left, header + captions + height + gap, column.wireframe);
+        int top = header + captions;
+        for (const perception::Image& picture : column.pictures) {
+            canvas.picture(left, top, picture);
+            top += picture.height + gap;
+        }
     }
     return canvas.image();
 }
@@ -202,8 +228,11 @@ void print(const std::vector<Column>& columns) {
 Result<int> run(const SheetArguments& a) {
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
-    const auto scene = load_scene(a.model, a.view, a.display);
+    auto scene = load_scene(a.model, a.view, a.display);
     if (!scene) return scene.error();
+    WhatOptions what;
+    what.test = a.test;
+    if (const auto ready = measure_folds(*scene, what); !ready) return ready.error();
     auto context = render::Context::headless();
     if (!context) return context.error();
     const auto columns = make_columns(*scene, a, *context);
@@ -238,10 +267,18 @@ Command sheet_command(CLI::App& app) {
     verb->add_option("--cell", a->cell_px, "The longer side of a picture on the sheet (default: 480)")
         ->type_name("PIXELS")
         ->check(within(16, 4096));
+    std::map<std::string, FoldTest> tests;
+    for (const FoldTest test : {FoldTest::luebke_hallen, FoldTest::luebke_hallen_safe, FoldTest::error})
+        tests[std::string(perception::fold_test_names[static_cast<std::size_t>(test)])] = test;
+    verb->add_option("--fold-test", a->test, "luebke-hallen, luebke-hallen-safe or error (default: as in 'unseen render')")
+        ->type_name("NAME")
+        ->transform(CLI::CheckedTransformer(tests).description(""));
+    verb->add_flag("--maps", a->maps, "Below, in place of the budget: maps of the folds' cost, frequency, contrast and eccentricity");
     verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     verb->footer("Examples:\n  unseen sheet bunny.vdt -o bunny.png\n"
+                 "  unseen sheet bunny.vdt -o maps.png --maps --cell 320\n"
                  "  unseen sheet bunny.vdt -o bunny.png --direction 1 1 1 --triangles 10000 --gaze 0 512");
     return {verb, [a] { return run(*a); }};
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 
 #include <glm/geometric.hpp>
 
@@ -30,6 +31,12 @@ bool is_perceptual(const WhatOptions& what) { return what.mode != Mode::full && 
 
 bool has_distance_form_only(FoldTest test) { return test == FoldTest::error || test == FoldTest::luebke_hallen_safe; }
 
+// Whether a single cut is made by a criterion in distance form, or asks about each node.
+bool goes_by_distances(const Scene& scene, const WhatOptions& what) {
+    const bool is_lit = scene.lighting && is_perceptual(what);
+    return what.fill_budget || what.milliseconds || what.chroma || is_lit || has_distance_form_only(what.test);
+}
+
 // What silhouettes can be seen against.
 perception::SceneLuminance scene_luminance(const Scene& scene) {
     if (scene.lighting)
@@ -53,6 +60,21 @@ perception::FoldTestOptions test_options(const Scene& scene, const WhatOptions& 
     return test;
 }
 
+// Calls f(criterion) with the test that asks about each node.
+template <class F>
+auto with_criterion(const Scene& scene, const WhatOptions& what, F&& f) {
+    // A budget goes by the order of the costs alone, for which any tolerance will do.
+    const double tolerance_px = what.mode == Mode::pixels ? what.pixels : 1;
+    switch (what.test) {
+    case FoldTest::extent: return f(vdtree::ExtentCriterion(scene.tree, scene.view, tolerance_px, scene.placement));
+    case FoldTest::displacement: return f(vdtree::DisplacementCriterion(scene.tree, scene.view, tolerance_px, scene.placement));
+    case FoldTest::luebke_hallen_safe: // these have the distance form only
+    case FoldTest::error:
+    case FoldTest::luebke_hallen: break;
+    }
+    return f(perception::LuebkeHallenCriterion(scene.tree, scene.view, test_options(scene, what), scene.placement));
+}
+
 vdtree::AdjustStats adjust(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
     if (what.mode == Mode::full) {
         cut.unfold_all();
@@ -64,21 +86,7 @@ vdtree::AdjustStats adjust(vdtree::Cut& cut, const Scene& scene, const WhatOptio
     vdtree::AdjustOptions options;
     if (purpose == Purpose::picture) options.visibility = visibility;
     if (what.mode == Mode::budget) options.triangle_budget = what.triangles;
-
-    // A budget goes by the order of the costs alone, for which any tolerance will do.
-    const double tolerance_px = what.mode == Mode::pixels ? what.pixels : 1;
-    switch (what.test) {
-    case FoldTest::extent:
-        return cut.adjust(vdtree::ExtentCriterion(scene.tree, scene.view, tolerance_px, scene.placement), options);
-    case FoldTest::displacement:
-        return cut.adjust(vdtree::DisplacementCriterion(scene.tree, scene.view, tolerance_px, scene.placement),
-                          options);
-    case FoldTest::luebke_hallen_safe: // these have the distance form only
-    case FoldTest::error:
-    case FoldTest::luebke_hallen: break;
-    }
-    return cut.adjust(
-        perception::LuebkeHallenCriterion(scene.tree, scene.view, test_options(scene, what), scene.placement), options);
+    return with_criterion(scene, what, [&](const auto& criterion) { return cut.adjust(criterion, options); });
 }
 
 // Cost is v*/v for the perceptual test alone; the others count pixels.
@@ -295,8 +303,7 @@ Result<void> measure_folds(Scene& scene, const WhatOptions& what) {
 }
 
 Result<Simplification> simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
-    const bool is_lit = scene.lighting && is_perceptual(what); // likewise in the distance form only
-    if (what.mode != Mode::full && (what.fill_budget || what.milliseconds || what.chroma || is_lit || has_distance_form_only(what.test))) {
+    if (what.mode != Mode::full && goes_by_distances(scene, what)) {
         Follower follower;
         follower.set_hysteresis(1);
         return follower.follow(cut, scene, what, purpose);
@@ -316,6 +323,22 @@ Result<Simplification> simplify(vdtree::Cut& cut, const Scene& scene, const What
     result.imperceptible_from_m = imperceptible_from(scene, what, result.stats);
     add_effects(result, scene, what, purpose);
     return result;
+}
+
+Result<std::vector<float>> fold_costs(const Scene& scene, const WhatOptions& what, Purpose purpose) {
+    if (goes_by_distances(scene, what)) {
+        Follower follower;
+        const auto criterion = follower.criterion_for(scene, what);
+        if (!criterion) return criterion.error();
+        vdtree::FollowOptions options;
+        options.cull_back_faces = purpose == Purpose::picture && culls_back_faces(scene);
+        return vdtree::find_every_cost(scene.tree, **criterion, follower.viewpoint_for(scene, what, purpose), options);
+    }
+    std::vector<vdtree::NodeId> nodes(scene.tree.interior_count());
+    std::iota(nodes.begin(), nodes.end(), vdtree::NodeId(0));
+    std::vector<float> costs(nodes.size());
+    with_criterion(scene, what, [&](const auto& criterion) { criterion(scene.tree, nodes, costs); });
+    return costs;
 }
 
 Result<const vdtree::DistanceCriterion*> Follower::criterion_for(const Scene& scene, const WhatOptions& what) {

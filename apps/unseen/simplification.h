@@ -45,6 +45,9 @@ enum class Purpose {
 // Adjusts `cut`, which must be of the scene's tree. Cost: about a microsecond for each node test.
 Result<Simplification> simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose);
 
+// What folding costs by interior node, as simplify() goes by it. Not in the mode full.
+Result<std::vector<float>> fold_costs(const Scene& scene, const WhatOptions& what, Purpose purpose);
+
 // Measures the errors of the tree's folds where the fold test asks for them and the tree's file does not have them.
 Result<void> measure_folds(Scene& scene, const WhatOptions& what);
 
@@ -68,6 +71,10 @@ public:
     Result<Simplification> follow(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what,
                                   Purpose purpose = Purpose::picture);
 
+    // What follow() looks at: the criterion of `what`, valid until the next call, and where from. Not in the mode full.
+    Result<const vdtree::DistanceCriterion*> criterion_for(const Scene& scene, const WhatOptions& what);
+    vdtree::Viewpoint viewpoint_for(const Scene& scene, const WhatOptions& what, Purpose purpose);
+
 private:
     // What a criterion depends on, besides the tree, its light and the display.
     struct Key {
@@ -83,8 +90,6 @@ private:
         bool chroma = false;
         bool operator==(const Key&) const = default;
     };
-    Result<const vdtree::DistanceCriterion*> criterion_for(const Scene& scene, const WhatOptions& what);
-    vdtree::Viewpoint viewpoint_for(const Scene& scene, const WhatOptions& what, Purpose purpose);
     Result<Simplification> change(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose);
     Result<void> glide(const vdtree::Cut& cut, Simplification& result);
 

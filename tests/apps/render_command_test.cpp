@@ -307,6 +307,45 @@ TEST_F(RenderCommandTest, TheSheetShowsAndJudgesFourCuts) {
     EXPECT_LE(cuts[3]["triangles"], cuts[1]["triangles"]);
 }
 
+// A map has the window's size and a scale below; what is folded has a colour, what is not is grey.
+TEST_F(RenderCommandTest, MapsShowWhatFoldsCost) {
+    const auto share_of_colour = [&](const std::string& map, const std::vector<std::string>& more) {
+        std::vector<std::string> words = {"--show", map};
+        words.insert(words.end(), more.begin(), more.end());
+        render(words, map + ".png");
+        const auto picture = read_image(path(map + ".png"));
+        EXPECT_TRUE(picture) << picture.error().message;
+        EXPECT_EQ(picture->image.width, 200);
+        EXPECT_GT(picture->image.height, 160);
+        double model = 0, coloured = 0;
+        for (int y = 0; y < 160; ++y) {
+            for (int x = 0; x < 200; ++x) {
+                const float r = picture->image.at(x, y, 0), g = picture->image.at(x, y, 1), b = picture->image.at(x, y, 2);
+                model += r + g + b > 0;
+                coloured += r != g || g != b;
+            }
+        }
+        EXPECT_GT(model, 0.3 * 200 * 160) << "the ball fills most of the height";
+        return coloured / model;
+    };
+    const std::vector<std::string> aside = {"--gaze", "1191", "80"};
+    for (const std::string map : {"cost", "frequency", "contrast", "eccentricity"}) EXPECT_GT(share_of_colour(map, aside), 0.05) << map;
+    EXPECT_GT(share_of_colour("cost", aside), share_of_colour("cost", {})) << "more is folded in the corner of the eye";
+    EXPECT_EQ(run({"render", "ball.vdt", "-o", "map.png", "--show", "eccentricity"}).status, 1) << "of which gaze?";
+    EXPECT_EQ(run({"render", "ball.vdt", "-o", "map.png", "--show", "cost", "--full"}).status, 1);
+    EXPECT_FALSE(fs::exists(path("map.png")));
+    EXPECT_EQ(run({"render", "ball.vdt", "-o", "map.pfm", "--show", "cost"}).status, 2) << "no luminance";
+    EXPECT_EQ(run({"render", "ball.vdt", "-o", "map.png", "--show", "beauty"}).status, 2);
+    EXPECT_EQ(run({"render", "ball.vdt", "--path", "orbit:10", "--show", "cost"}).status, 2);
+
+    const Outcome outcome = run({"sheet", "ball.vdt", "-o", "maps.png", "--maps", "--size", "256x256", "--samples", "4", "--cell", "64", "--json", "-"});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_EQ(outcome.json()["cuts"].size(), 3u);
+    const auto sheet = read_image(path("maps.png"));
+    ASSERT_TRUE(sheet) << sheet.error().message;
+    EXPECT_GT(sheet->image.height, 6 * 64);
+}
+
 TEST_F(RenderCommandTest, WrongUsageIsStatusTwo) {
     const auto before = files();
     for (const std::vector<std::string>& words :

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cassert>
 #include <cmath>
+#include <numeric>
 #include <queue>
 #include <string>
 
@@ -570,6 +571,20 @@ Result<std::vector<std::uint64_t>> test_every_node(const VertexTree& tree, const
     std::vector<std::uint64_t> unfolded((std::size_t{tree.interior_count()} + 63) / 64);
     tester.decide_range(0, tree.interior_count(), unfolded.data());
     return unfolded;
+}
+
+Result<std::vector<float>> find_every_cost(const VertexTree& tree, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
+                                           const FollowOptions& options) {
+    if (const auto valid = check(viewpoint, criterion); !valid) return valid.error();
+    if (const auto valid = check(options); !valid) return valid.error();
+    FoldTester tester(tree, criterion, options.cull_back_faces, options.threshold);
+    tester.look_from(viewpoint, 1);
+    std::vector<NodeId> nodes(tree.interior_count());
+    std::iota(nodes.begin(), nodes.end(), NodeId(0));
+    std::vector<float> without_least(nodes.size()), costs(nodes.size());
+    std::vector<std::uint64_t> unfolded((nodes.size() + 63) / 64);
+    tester.find_costs(nodes, {without_least.data(), costs.data(), unfolded.data()});
+    return costs;
 }
 
 Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objects, Index triangle_budget) {

@@ -175,6 +175,10 @@ Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objec
 // (see VertexTree::is_sound) means nothing. Cost: some ten nanoseconds a node.
 Result<std::vector<std::uint64_t>> test_every_node(const VertexTree& tree, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
                                                    const FollowOptions& options = {});
+// What folding costs, by interior node: the threshold from which on the node folds; 0 where nothing of it shows, infinite where it shows from
+// everywhere. Fails and costs as the above.
+Result<std::vector<float>> find_every_cost(const VertexTree& tree, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
+                                           const FollowOptions& options = {});
 
 // The cut as a mesh of its own: only the vertices in use, in double precision, with the tree's attributes.
 Mesh extract_mesh(const Cut& cut);

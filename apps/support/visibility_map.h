@@ -1,0 +1,11 @@
+// What a judge saw, as a picture for people.
+#pragma once
+
+#include <perception/image.h>
+
+namespace unseen::app {
+
+// Invisible differences in blues, visible ones from yellow (just so) to red (8 times that and more). Code values.
+perception::Image visibility_map(const perception::Image& visibility);
+
+} // namespace unseen::app

@@ -1,0 +1,83 @@
+// A model whose simplifications are drawn and judged, view by view.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <perception/image.h>
+#include <perception/judge.h>
+#include <render/renderer.h>
+#include <vdtree/cut.h>
+
+#include "scene.h"
+#include "simplification.h"
+
+namespace unseen::app {
+
+// The judges. The first shares castleCSF with the fold tests; the second has another model of contrast sensitivity and adds its bands up
+// as squares.
+enum class Judge { modern, second };
+inline constexpr std::array judges = {Judge::modern, Judge::second};
+inline constexpr perception::CsfModel usual_second = perception::CsfModel::barten_1999; // of the eye's physics, not fitted to castleCSF's data
+
+// Where the viewer looks, so many degrees to the right of the window's centre.
+glm::dvec2 gaze_aside(const perception::Display& display, const vdtree::View& view, double degrees);
+
+struct Verdicts {
+    vdtree::Index triangles = 0;
+    std::array<std::uint64_t, judges.size()> visible_pixels = {};
+    std::array<double, judges.size()> largest = {}; // V
+};
+
+class JudgedModel {
+public:
+    // The context must outlive the model.
+    static Result<JudgedModel> create(render::Context& context, std::string name, vdtree::VertexTree tree, int window_px,
+                                      perception::CsfModel second = usual_second);
+
+    const std::string& name() const { return name_; }
+    const vdtree::VertexTree& tree() const { return plain_.scene->tree; }
+    vdtree::Index triangles() const { return tree().triangle_count(); }
+
+    // What a fold test looks at: the tree as it was built or, where the test asks for it, with the errors of its folds.
+    Result<const Scene*> scene(FoldTest test);
+
+    // From now on everything is seen so. Of the options, the window's size is the model's own.
+    Result<void> look(ViewOptions view);
+
+    struct Picture {
+        vdtree::Index triangles = 0;
+        perception::Image luminance; // cd/m2
+        perception::Image codes;     // for people
+    };
+    Result<Picture> draw(const WhatOptions& what, bool wireframe = false);
+    // Against the full model, which is drawn once a view.
+    Result<Verdicts> judge(const WhatOptions& what); // by all judges
+    Result<perception::Judgement> judge(const WhatOptions& what, Judge judge);
+
+    // The cut alone.
+    Result<vdtree::Index> count(const WhatOptions& what);
+
+private:
+    struct Stand { // a scene with what draws it
+        std::unique_ptr<Scene> scene;
+        std::unique_ptr<render::Renderer> renderer;
+    };
+    JudgedModel() = default;
+    Result<Stand*> stand(FoldTest test);
+    Result<Stand> make_stand(Scene scene) const;
+    Result<Picture> draw(Stand& stand, const WhatOptions& what, bool wireframe);
+    Result<const perception::Image*> full();
+    Result<perception::Judgement> judge(const Picture& picture, const WhatOptions& what, Judge judge);
+
+    render::Context* context_ = nullptr;
+    std::string name_;
+    perception::CsfModel second_ = usual_second;
+    ViewOptions view_;
+    Stand plain_, measured_; // the second with the errors of folds; made when it is first asked for
+    std::optional<perception::Image> full_;
+};
+
+} // namespace unseen::app
