@@ -319,32 +319,29 @@ void CutFollower::step(Cut& cut, const Motion& motion) {
         return;
     }
     if (watched_.empty()) watch_all(cut, Deadlines::now);
-    due_.clear();
-    watched_.collect_due(due_);
-    if (static_cast<double>(due_.size()) > most_due * static_cast<double>(watched_.size()) && !time_limit_) return start_over(cut);
+    const auto due = watched_.collect_due();
+    if (static_cast<double>(due.size()) > most_due * static_cast<double>(watched_.size()) && !time_limit_) return start_over(cut);
     cut.begin_changes();
-    settle(cut);
+    settle(cut, due);
     cut.end_changes(stats_);
 }
 
 void CutFollower::settle_due(Cut& cut) {
-    due_.clear();
-    watched_.collect_due(due_);
-    settle(cut);
+    settle(cut, watched_.collect_due());
 }
 
 // Tests what is due, folds what has to go, and unfolds what has to come, with all that follows above and under it.
-void CutFollower::settle(Cut& cut) {
+void CutFollower::settle(Cut& cut, std::span<const Slot> due) {
     begin_settling();
     // In pieces, between which the clock is looked at; what is not reached stays due.
     constexpr std::size_t piece = 2048;
-    for (std::size_t first = 0; first < due_.size(); first += piece) {
+    for (std::size_t first = 0; first < due.size(); first += piece) {
         if (first > 0 && is_out_of_time()) {
             stats_.is_complete = false;
-            for (const Slot slot : std::span(due_).subspan(first)) watched_.stay_due(slot);
+            for (const Slot slot : due.subspan(first)) watched_.stay_due(slot);
             break;
         }
-        test_due(std::span(due_).subspan(first, std::min(piece, due_.size() - first)));
+        test_due(due.subspan(first, std::min(piece, due.size() - first)));
     }
     end_settling(cut);
 }
