@@ -25,6 +25,7 @@ constexpr double most_due = 0.6;
 // After larger steps from a cut without deadlines, deadlines would not be worth making. In lengths for a radian, like longest_step.
 constexpr double step_worth_deadlines = 0.03;
 constexpr std::size_t piece_tests = 512; // tests at once while slots are filled: what they read stays in the cache
+constexpr std::size_t piece_decisions = 1024; // decisions at once while all are made anew; likewise
 // Beyond this step a good part of all verdicts would be due anyway. In lengths for a radian: twice the tree's distance.
 constexpr double longest_step = 0.125;
 constexpr double longest_light_step = 0.5; // radians; likewise
@@ -220,11 +221,15 @@ void CutFollower::start_over(Cut& cut) {
     cut.change_to(decide_all(), stats_);
 }
 
-// What unfolds, top-down, by decisions alone.
+// What unfolds, by decisions alone: parents before their children, and as far as that goes subtree by subtree, for children lie beside
+// their parents.
 std::vector<std::uint64_t> CutFollower::decide_all() {
     std::vector<std::uint64_t> unfolded((std::size_t{tree_.interior_count()} + 63) / 64);
-    wave_.assign(1, VertexTree::root());
-    while (!wave_.empty()) {
+    next_wave_.assign(1, VertexTree::root()); // what is left to be decided, the next ones last
+    while (!next_wave_.empty()) {
+        const auto first = next_wave_.end() - static_cast<std::ptrdiff_t>(std::min(piece_decisions, next_wave_.size()));
+        wave_.assign(first, next_wave_.end());
+        next_wave_.erase(first, next_wave_.end());
         decisions_.resize((wave_.size() + 63) / 64);
         tester_->decide(wave_, decisions_.data());
         stats_.node_tests += wave_.size();
@@ -237,10 +242,8 @@ std::vector<std::uint64_t> CutFollower::decide_all() {
                 unfolding_.push_back(node);
             }
         }
-        next_wave_.clear();
         walk_children(tree_, unfolding_.size(), [&](std::size_t i) { return unfolding_[i]; },
                       [&](std::size_t, NodeId child) { next_wave_.push_back(child); });
-        wave_.swap(next_wave_);
     }
     return unfolded;
 }
@@ -319,32 +322,29 @@ void CutFollower::step(Cut& cut, const Motion& motion) {
         return;
     }
     if (watched_.empty()) watch_all(cut, Deadlines::now);
-    due_.clear();
-    watched_.collect_due(due_);
-    if (static_cast<double>(due_.size()) > most_due * static_cast<double>(watched_.size()) && !time_limit_) return start_over(cut);
+    const auto due = watched_.collect_due();
+    if (static_cast<double>(due.size()) > most_due * static_cast<double>(watched_.size()) && !time_limit_) return start_over(cut);
     cut.begin_changes();
-    settle(cut);
+    settle(cut, due);
     cut.end_changes(stats_);
 }
 
 void CutFollower::settle_due(Cut& cut) {
-    due_.clear();
-    watched_.collect_due(due_);
-    settle(cut);
+    settle(cut, watched_.collect_due());
 }
 
 // Tests what is due, folds what has to go, and unfolds what has to come, with all that follows above and under it.
-void CutFollower::settle(Cut& cut) {
+void CutFollower::settle(Cut& cut, std::span<const Slot> due) {
     begin_settling();
     // In pieces, between which the clock is looked at; what is not reached stays due.
     constexpr std::size_t piece = 2048;
-    for (std::size_t first = 0; first < due_.size(); first += piece) {
+    for (std::size_t first = 0; first < due.size(); first += piece) {
         if (first > 0 && is_out_of_time()) {
             stats_.is_complete = false;
-            for (const Slot slot : std::span(due_).subspan(first)) watched_.stay_due(slot);
+            for (const Slot slot : due.subspan(first)) watched_.stay_due(slot);
             break;
         }
-        test_due(std::span(due_).subspan(first, std::min(piece, due_.size() - first)));
+        test_due(due.subspan(first, std::min(piece, due.size() - first)));
     }
     end_settling(cut);
 }

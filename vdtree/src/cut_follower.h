@@ -57,7 +57,7 @@ private:
     void step(Cut& cut, const Motion& motion);
     bool is_out_of_time() const;
     void settle_due(Cut& cut);
-    void settle(Cut& cut);
+    void settle(Cut& cut, std::span<const Slot> due);
     void begin_settling();
     void end_settling(Cut& cut);
     void test_due(std::span<const Slot> slots);
@@ -98,7 +98,7 @@ private:
 
     // Of one frame.
     std::vector<NodeId> wave_, next_wave_, unfolding_, folding_, parents_;
-    std::vector<Slot> due_, kept_, wave_slots_;
+    std::vector<Slot> kept_, wave_slots_;
     std::vector<FoldCandidate> parent_candidates_;
     std::vector<Verdict> verdicts_;
     std::vector<std::uint64_t> decisions_;

@@ -104,6 +104,12 @@ struct Lanes {
     static UNSEEN_INLINE Floats abs_of(const Floats& a) { return max_of(a, -a); }
     static UNSEEN_INLINE Floats all(float a) { return Floats{} + a; }
 
+    static UNSEEN_INLINE float least_of(const Floats& values) {
+        if constexpr (width == 4) return std::min(std::min(values[0], values[1]), std::min(values[2], values[3]));
+        else return std::min(std::min(std::min(values[0], values[1]), std::min(values[2], values[3])),
+                             std::min(std::min(values[4], values[5]), std::min(values[6], values[7])));
+    }
+
     // A register of what the lanes have. (By way of an array, the processor would wait for its stores.)
     template <class Register, class Of>
     static UNSEEN_INLINE Register collect(Of of) {
@@ -714,6 +720,41 @@ UNSEEN_INLINE void move_blocks(const float (&eye_high)[3], const float (&eye_low
 }
 
 template <class Vectors>
+UNSEEN_INLINE std::size_t look_at_blocks(std::span<const std::uint32_t> which, float position_clock, float facing_clock, const BlockDues* dues,
+                                         const std::uint16_t* unfolded, const BlockSpheres& spheres, BlockDeadlines& deadlines, std::uint32_t* due) {
+    using L = Lanes<Vectors>;
+    using Floats = typename Vectors::Floats;
+    using Ints = typename Vectors::Ints;
+    const Floats never = L::all(std::numeric_limits<float>::infinity());
+    std::size_t count = 0;
+    for (std::size_t at = 0; at < which.size(); ++at) {
+        constexpr std::size_t ahead = 12; // blocks between a prefetch and its use
+        if (at + ahead < which.size()) {
+            prefetch(dues[which[at + ahead]].position);
+            prefetch(dues[which[at + ahead]].facing);
+        }
+        const std::uint32_t block = which[at];
+        const float passed = spheres.error[block] + position_clock;
+        const Floats recede = L::all(passed + spheres.distance[block]), approach = L::all(passed - spheres.distance[block]);
+        Floats next_recede = never, next_approach = never, next_facing = never;
+        std::uint32_t bits = 0;
+        for (std::size_t i = 0; i < block_slots; i += L::width) {
+            const Floats position = L::load(dues[block].position + i), facing = L::load(dues[block].facing + i);
+            const Ints recedes = L::mask_of(unfolded[block], i);
+            const Ints is_due = (position <= (recedes ? recede : approach)) | (facing <= facing_clock);
+            bits |= L::bits_of(is_due) << i;
+            next_recede = L::min_of(next_recede, ~is_due & recedes ? position : never);
+            next_approach = L::min_of(next_approach, is_due | recedes ? never : position);
+            next_facing = L::min_of(next_facing, is_due ? never : facing);
+        }
+        deadlines.set(block, L::least_of(next_recede), L::least_of(next_approach), L::least_of(next_facing));
+        for (; bits; bits &= bits - 1)
+            due[count++] = block * static_cast<std::uint32_t>(block_slots) + static_cast<std::uint32_t>(std::countr_zero(bits));
+    }
+    return count;
+}
+
+template <class Vectors>
 UNSEEN_INLINE void find_due(float position, float facing, const BlockSpheres& spheres, const BlockDeadlines& deadlines, std::uint64_t* due) {
     using L = Lanes<Vectors>;
     const std::size_t count = spheres.x.size();
@@ -746,6 +787,11 @@ UNSEEN_INLINE void find_due(float position, float facing, const BlockSpheres& sp
                                            std::uint64_t* due) {
     find_due<Eight>(position, facing, spheres, deadlines, due);
 }
+[[gnu::target("avx2")]] std::size_t look_at_blocks_avx2(std::span<const std::uint32_t> which, float position, float facing, const BlockDues* dues,
+                                                        const std::uint16_t* unfolded, const BlockSpheres& spheres, BlockDeadlines& deadlines,
+                                                        std::uint32_t* due) {
+    return look_at_blocks<Eight>(which, position, facing, dues, unfolded, spheres, deadlines, due);
+}
 [[gnu::target("avx2")]] void measure_avx2(const KernelView& view, FoldBatch& batch) { Lanes<Eight>::measure(view, batch); }
 [[gnu::target("avx2")]] void find_slacks_avx2(const KernelView& view, SlackBatch& batch) { Lanes<Eight>::find_slacks(view, batch); }
 [[gnu::target("avx2")]] void finish_slacks_avx2(const KernelView& view, const FoldBatch& batch, Findings& findings) {
@@ -774,6 +820,10 @@ void finish_slacks_avx2(const KernelView&, const FoldBatch&, Findings&) {}
 void facing_gaps_avx2(const FacingBatch&, FacingGaps&) {}
 void move_blocks_avx2(const float (&)[3], const float (&)[3], float, BlockSpheres&) {}
 void find_due_avx2(float, float, const BlockSpheres&, const BlockDeadlines&, std::uint64_t*) {}
+std::size_t look_at_blocks_avx2(std::span<const std::uint32_t>, float, float, const BlockDues*, const std::uint16_t*, const BlockSpheres&,
+                                BlockDeadlines&, std::uint32_t*) {
+    return 0;
+}
 void decide_avx2(const KernelView&, const NodeArrays&, std::span<const NodeId>, std::uint64_t*) {}
 void find_costs_avx2(const KernelView&, const NodeArrays&, const CostTables&, std::span<const NodeId>, const NodeCosts&) {}
 void decide_range_avx2(const KernelView&, const NodeArrays&, NodeId, std::size_t, std::uint64_t*) {}
@@ -822,6 +872,12 @@ void decide_range(const KernelView& view, const NodeArrays& arrays, NodeId first
 void move_blocks(const float (&eye_high)[3], const float (&eye_low)[3], float path, BlockSpheres& spheres) noexcept {
     if (has_avx2) move_blocks_avx2(eye_high, eye_low, path, spheres);
     else move_blocks<Four>(eye_high, eye_low, path, spheres);
+}
+
+std::size_t look_at_blocks(std::span<const std::uint32_t> which, float position_clock, float facing_clock, const BlockDues* dues,
+                           const std::uint16_t* unfolded, const BlockSpheres& spheres, BlockDeadlines& deadlines, std::uint32_t* due) noexcept {
+    if (has_avx2) return look_at_blocks_avx2(which, position_clock, facing_clock, dues, unfolded, spheres, deadlines, due);
+    return look_at_blocks<Four>(which, position_clock, facing_clock, dues, unfolded, spheres, deadlines, due);
 }
 
 void find_due(float position_clock, float facing_clock, const BlockSpheres& spheres, const BlockDeadlines& deadlines,

@@ -193,6 +193,17 @@ struct BlockDeadlines {
     }
     std::uint64_t byte_size() const noexcept { return 3 * sizeof(float) * recede.capacity(); }
 };
+// The deadlines of a block's slots; of slots that are not used: infinite.
+inline constexpr std::size_t block_slots = 16;
+struct alignas(64) BlockDues {
+    float position[block_slots];
+    float facing[block_slots];
+};
+// Looks at the slots of some blocks: tells those that are due, in order, and sets the blocks' deadlines to the earliest of the others.
+// `due` has room for block_slots a block. Returns how many are due.
+std::size_t look_at_blocks(std::span<const std::uint32_t> which, float position_clock, float facing_clock, const BlockDues* dues,
+                           const std::uint16_t* unfolded, const BlockSpheres& spheres, BlockDeadlines& deadlines, std::uint32_t* due) noexcept;
+
 // One bit a block: a deadline has come.
 void find_due(float position_clock, float facing_clock, const BlockSpheres& spheres, const BlockDeadlines& deadlines,
               std::uint64_t* due) noexcept;

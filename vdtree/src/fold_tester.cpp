@@ -114,8 +114,11 @@ void FoldTester::prefetch(NodeId node) const {
 
 void FoldTester::test(std::span<const FoldCandidate> candidates, std::span<const std::uint32_t> which, std::span<Verdict> verdicts) const {
     std::array<const FoldCandidate*, kernel_lanes> lanes;
+    constexpr std::size_t ahead = 2 * kernel_lanes; // candidates between a prefetch and its use
+    for (std::size_t i = 0; i < std::min(ahead, which.size()); ++i) vdtree::prefetch(&candidates[which[i]]);
     for (std::size_t first = 0; first < which.size(); first += kernel_lanes) {
         const std::size_t count = std::min(kernel_lanes, which.size() - first);
+        for (std::size_t i = first + ahead; i < std::min(first + ahead + kernel_lanes, which.size()); ++i) vdtree::prefetch(&candidates[which[i]]);
         for (std::size_t i = 0; i < count; ++i) lanes[i] = &candidates[which[first + i]];
         if (lit_)
             for (std::size_t i = first + kernel_lanes; i < std::min(first + 2 * kernel_lanes, which.size()); ++i)

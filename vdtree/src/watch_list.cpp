@@ -21,28 +21,6 @@ constexpr float just_less = 1 - std::numeric_limits<float>::epsilon(); // times 
 float rounded_down(double clock) { return clock > 0 ? std::nextafter(static_cast<float>(clock), 0.0f) : 0.0f; }
 float rounded_up(double clock) { return std::nextafter(static_cast<float>(clock), std::numeric_limits<float>::infinity()); }
 
-using Four [[gnu::vector_size(16)]] = float; // in a register of any processor
-using FourBits [[gnu::vector_size(16)]] = std::int32_t;
-
-// The position deadlines of four slots, and their facing deadlines.
-struct FourDues {
-    Four position, facing;
-    explicit FourDues(const void* from) {
-        Four pairs[2];
-        std::memcpy(pairs, from, sizeof pairs);
-        position = __builtin_shufflevector(pairs[0], pairs[1], 0, 2, 4, 6);
-        facing = __builtin_shufflevector(pairs[0], pairs[1], 1, 3, 5, 7);
-    }
-};
-
-// All bits of the lanes that have one in the first four of these.
-FourBits lanes_of(std::uint32_t bits) {
-    constexpr FourBits places = {1, 2, 4, 8};
-    return ((FourBits{} + static_cast<std::int32_t>(bits)) & places) != 0;
-}
-
-float least_of(const Four& values) { return std::min(std::min(values[0], values[1]), std::min(values[2], values[3])); }
-
 } // namespace
 
 template <class F>
@@ -97,7 +75,8 @@ WatchList::BlockId WatchList::new_block() {
         block = free_blocks_.back();
         free_blocks_.pop_back();
     }
-    blocks_[block].dues.fill(Due{});
+    std::ranges::fill(blocks_[block].position, never);
+    std::ranges::fill(blocks_[block].facing, never);
     return block;
 }
 
@@ -144,7 +123,7 @@ void WatchList::remove(NodeId node) {
     slots_of_nodes_[node] = no_slot;
     const BlockId block = static_cast<BlockId>(slot / block_slots);
     const std::size_t place = slot % block_slots;
-    blocks_[block].dues[place] = Due{};
+    blocks_[block].position[place] = blocks_[block].facing[place] = never;
     used_[block] = static_cast<std::uint16_t>(used_[block] & ~(1u << place));
     --size_;
     if (used_[block] != 0) return;
@@ -186,11 +165,11 @@ void WatchList::include(BlockId block, const FoldCandidate& candidate) {
 // What is left of them now.
 WatchList::Slacks WatchList::slacks_of(Slot slot) const noexcept {
     const std::size_t block = slot / block_slots, place = slot % block_slots;
-    const Due& due = blocks_[block].dues[place];
+    const BlockDues& dues = blocks_[block];
     const bool unfolded = (unfolded_[block] >> place) & 1;
     const float passed = spheres_.error[block] + position_clock_float_, distance = spheres_.distance[block];
-    const float position = (due.position - passed) + (unfolded ? -distance : distance) - sum_rounding * (passed + distance);
-    return {unfolded, std::max(position, 0.0f), std::max(due.facing - facing_clock_down_, 0.0f)};
+    const float position = (dues.position[place] - passed) + (unfolded ? -distance : distance) - sum_rounding * (passed + distance);
+    return {unfolded, std::max(position, 0.0f), std::max(dues.facing[place] - facing_clock_down_, 0.0f)};
 }
 
 void WatchList::split(BlockId block) {
@@ -220,7 +199,8 @@ void WatchList::set_deadlines(Slot slot, bool unfolded, float position_slack, fl
     const float slack = position_slack - sum_rounding * (passed + distance + std::min(position_slack, distance));
     const float position = passed + slack + (unfolded ? distance : -distance);
     const float facing = (facing_clock_down_ + facing_slack) * just_less;
-    blocks_[block].dues[place] = {position, facing};
+    blocks_[block].position[place] = position;
+    blocks_[block].facing[place] = facing;
     unfolded_[block] = static_cast<std::uint16_t>((unfolded_[block] & ~(1u << place)) | (std::uint32_t{unfolded} << place));
     float& earliest = (unfolded ? earliest_.recede : earliest_.approach)[block];
     earliest = std::min(earliest, position);
@@ -266,52 +246,24 @@ void WatchList::restart_clocks(double longest) {
     path_ = 0;
 }
 
-void WatchList::collect_due(std::vector<Slot>& due) {
+std::span<const WatchList::Slot> WatchList::collect_due() {
     due_blocks_.resize((blocks_.size() + 63) / 64);
     // In floats the clock may be a little late.
     const float facing = rounded_up(facing_clock_), position = position_clock_float_;
     find_due(position, facing, spheres_, earliest_, due_blocks_.data());
     looked_at_.clear();
-    for (std::size_t word = 0; word < due_blocks_.size(); ++word) {
-        for (std::uint64_t bits = due_blocks_[word]; bits; bits &= bits - 1) {
-            const auto block = static_cast<BlockId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
-            prefetch(&blocks_[block].dues[0]);
-            prefetch(&blocks_[block].dues[block_slots / 2]);
-            looked_at_.push_back(block);
-        }
-    }
-    constexpr FourBits places = {1, 2, 4, 8};
-    for (const BlockId block : looked_at_) {
-        const float passed = spheres_.error[block] + position;
-        const Four recede = Four{} + (passed + spheres_.distance[block]), approach = Four{} + (passed - spheres_.distance[block]);
-        const std::uint32_t unfolded = unfolded_[block];
-        // The earliest of those that are left; the others come back when their deadlines are set.
-        Four next_recede = Four{} + never, next_approach = next_recede, next_facing = next_recede;
-        std::uint32_t bits = 0;
-        for (std::size_t i = 0; i < block_slots; i += 4) {
-            const FourDues dues(&blocks_[block].dues[i]);
-            const FourBits recedes = lanes_of(unfolded >> i);
-            const FourBits is_due = (dues.position <= (recedes ? recede : approach)) | (dues.facing <= facing);
-            const FourBits due_places = is_due & places;
-            bits |= static_cast<std::uint32_t>((due_places[0] | due_places[1]) | (due_places[2] | due_places[3])) << i;
-            const Four left = is_due ? Four{} + never : dues.position, left_facing = is_due ? Four{} + never : dues.facing;
-            next_recede = (left < next_recede) & recedes ? left : next_recede;
-            next_approach = (left < next_approach) & ~recedes ? left : next_approach;
-            next_facing = left_facing < next_facing ? left_facing : next_facing;
-        }
-        earliest_.set(block, least_of(next_recede), least_of(next_approach), least_of(next_facing));
-        for (; bits; bits &= bits - 1) {
-            const std::size_t slot = block * block_slots + static_cast<std::size_t>(std::countr_zero(bits));
-            prefetch(&candidates_[slot]);
-            due.push_back(static_cast<Slot>(slot));
-        }
-    }
+    for (std::size_t word = 0; word < due_blocks_.size(); ++word)
+        for (std::uint64_t bits = due_blocks_[word]; bits; bits &= bits - 1)
+            looked_at_.push_back(static_cast<BlockId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))));
+    if (const std::size_t room = looked_at_.size() * block_slots; due_.size() < room) due_.resize(room);
+    // The blocks keep the earliest deadlines of what is not due; those of the others come back when they are set.
+    return std::span(due_).first(look_at_blocks(looked_at_, position, facing, blocks_.data(), unfolded_.data(), spheres_, earliest_, due_.data()));
 }
 
 void WatchList::stay_due(Slot slot) { set_deadlines(slot, (unfolded_[slot / block_slots] >> (slot % block_slots)) & 1, 0, 0); }
 
 std::uint64_t WatchList::byte_size() const noexcept {
-    return sizeof(FoldCandidate) * candidates_.capacity() + sizeof(Slot) * slots_of_nodes_.capacity() + sizeof(Block) * blocks_.capacity() +
+    return sizeof(FoldCandidate) * candidates_.capacity() + sizeof(Slot) * slots_of_nodes_.capacity() + sizeof(BlockDues) * blocks_.capacity() +
            2 * sizeof(std::uint16_t) * used_.capacity() + spheres_.byte_size() + earliest_.byte_size();
 }
 

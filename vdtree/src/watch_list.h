@@ -25,7 +25,7 @@ class WatchList {
 public:
     using Slot = std::uint32_t;
     static constexpr Slot no_slot = 0xffffffffu;
-    static constexpr std::size_t block_slots = 16;
+    static constexpr std::size_t block_slots = vdtree::block_slots;
 
     explicit WatchList(NodeId interior_count) : interior_count_(interior_count) {}
 
@@ -44,7 +44,9 @@ public:
     void prefetch_slot(NodeId node) const noexcept { prefetch(&slots_of_nodes_[node]); }
     void prefetch_deadlines(NodeId node) const noexcept {
         const Slot slot = slots_of_nodes_[node];
-        if (slot != no_slot) prefetch(&blocks_[slot / block_slots].dues[slot % block_slots]);
+        if (slot == no_slot) return;
+        prefetch(blocks_[slot / block_slots].position);
+        prefetch(blocks_[slot / block_slots].facing);
     }
 
     // A node that is not watched yet, into the block of `near` (or one of its own, where that is no_slot). Its deadlines are set next.
@@ -65,8 +67,8 @@ public:
     // Sets back what has grown beyond `longest`, so that deadlines in floats stay fine enough.
     void restart_clocks(double longest);
 
-    // Appends the slots that are due. These get new deadlines, or stay_due().
-    void collect_due(std::vector<Slot>& due);
+    // The slots that are due, until the next call. These get new deadlines, or stay_due().
+    std::span<const Slot> collect_due();
     void stay_due(Slot slot);
 
     std::uint64_t byte_size() const noexcept;
@@ -77,12 +79,6 @@ private:
     static constexpr std::uint16_t full = 0xffff;
     static constexpr float never = std::numeric_limits<float>::infinity();
 
-    struct Due {
-        float position = never, facing = never;
-    };
-    struct alignas(64) Block {
-        std::array<Due, block_slots> dues; // of slots that are not used: never
-    };
     struct Slacks {
         bool unfolded;
         float position, facing;
@@ -104,13 +100,14 @@ private:
     std::vector<Slot> slots_of_nodes_;
     std::size_t size_ = 0;
     // By block.
-    std::vector<Block> blocks_;
+    std::vector<BlockDues> blocks_;
     std::vector<std::uint16_t> used_;      // a bit a slot
     std::vector<std::uint16_t> unfolded_;  // likewise: growing distances change the verdict
     BlockSpheres spheres_;
     BlockDeadlines earliest_;              // not later than any slot's
     std::vector<BlockId> free_blocks_, looked_at_;
     std::vector<std::uint64_t> due_blocks_;
+    std::vector<Slot> due_;
     BlockId first_unplaced_ = 0;           // while nodes are appended
 
     glm::dvec3 eye_{0};
