@@ -11,6 +11,11 @@ layout(location = 0) out vec4 surface_shade;
 #endif
 layout(location = 1) out vec3 corner_weights;
 
+#ifdef TEXTURED
+layout(location = 2) in vec2 uv[];
+layout(location = 2) out vec2 surface_uv;
+#endif
+
 invariant gl_Position;
 
 void main() {
@@ -22,6 +27,9 @@ void main() {
         surface_shade = shade[corner];
 #endif
         corner_weights = vec3(corner == 0, corner == 1, corner == 2);
+#ifdef TEXTURED
+        surface_uv = uv[corner];
+#endif
         EmitVertex();
     }
     EndPrimitive();

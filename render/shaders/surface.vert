@@ -57,6 +57,10 @@ float lit_luminance() {
 #endif
 
 layout(location = 0) out vec4 shade;
+#ifdef TEXTURED
+layout(location = 4) in vec2 vertex_uv;
+layout(location = 2) out vec2 uv;
+#endif
 
 // All variants of the program put a vertex at the same place, so that a wireframe lies on the surface it is of.
 invariant gl_Position;
@@ -64,6 +68,9 @@ invariant gl_Position;
 void main() {
     gl_Position = clip_from_unit * vec4(position, 1.0);
     shade = vertex_shade;
+#ifdef TEXTURED
+    uv = vertex_uv;
+#endif
 #ifdef LIT
     float luminance = lit_luminance();
     shade = vec4(vertex_shade.a > 0.0 ? vertex_shade.rgb * (luminance / vertex_shade.a) : vec3(luminance), luminance);

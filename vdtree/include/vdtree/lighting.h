@@ -53,7 +53,7 @@ Result<void> check_lights(const VertexTree& tree, const Lighting& lighting);
 // Relative luminance of a vertex. `normal`: unit or zero.
 double lit_luminance(const Lighting& lighting, glm::dvec3 position, glm::dvec3 normal, double albedo, glm::dvec3 eye);
 
-// Of white light: the luminance of a node's colour, or default_albedo.
+// Of white light: the luminance of a node's colour, or default_albedo; with a texture, which is multiplied with it, 1 in its place.
 float albedo_of(const VertexTree& tree, NodeId node);
 
 // What the vertices have that a fold may show: those of the ring, and the proxies of the subtree.
