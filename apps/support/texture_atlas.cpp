@@ -15,6 +15,9 @@ using vdtree::Wrap;
 // Texels around a part: mip levels up to the fourth do not reach across.
 constexpr std::int64_t border = 16;
 
+// What repeats grows: texels of the atlas for each of the images', and texels in any case.
+constexpr std::int64_t most_growth = 64, small_atlas = std::int64_t{1} << 24;
+
 // The part as it is laid: whole copies of its texture, from the copy `first` on.
 struct Tile {
     std::size_t part = 0;
@@ -25,9 +28,8 @@ struct Tile {
 
 Error too_large(const AtlasPart& part) {
     return {ErrorCode::unsupported, "The texture of " + part.name + " is repeated from " + std::to_string(part.used.lo.x) + ", " + std::to_string(part.used.lo.y) +
-                                        " to " + std::to_string(part.used.hi.x) + ", " + std::to_string(part.used.hi.y) + ": together with the others that makes more than " +
-                                        std::to_string(vdtree::largest_texture_side) +
-                                        " texels a side; scale the images down, or give the mesh one image for all."};
+                                        " to " + std::to_string(part.used.hi.x) + ", " + std::to_string(part.used.hi.y) +
+                                        ": laid beside the others that takes too many texels; scale the images down, or give the mesh one image for all."};
 }
 
 Result<Tile> tile_of(const AtlasPart& part, std::size_t number) {
@@ -74,15 +76,17 @@ void lay(const Tile& tile, const Texture& from, Texture& to) {
 
 Result<Atlas> make_atlas(std::span<const AtlasPart> parts) {
     std::vector<Tile> tiles;
-    std::int64_t area = 0, widest = 1;
+    std::int64_t area = 0, widest = 1, of_images = 0;
     for (std::size_t i = 0; i < parts.size(); ++i) {
         auto tile = tile_of(parts[i], i);
         if (!tile) return tile.error();
         area += (tile->width + 2 * border) * (tile->height + 2 * border);
         widest = std::max(widest, tile->width + 2 * border);
+        of_images += std::int64_t{parts[i].texture->width} * parts[i].texture->height;
         tiles.push_back(*tile);
     }
     std::stable_sort(tiles.begin(), tiles.end(), [](const Tile& a, const Tile& b) { return a.height > b.height; });
+    if (area > std::max(small_atlas, most_growth * of_images)) return too_large(parts[tiles.front().part]);
     const auto square = static_cast<std::int64_t>(std::ceil(std::sqrt(static_cast<double>(area))));
     std::int64_t width = std::max(widest, square), height = place_in_rows(tiles, width);
     if (height > vdtree::largest_texture_side) {

@@ -157,7 +157,6 @@ Result<Scene> load_scene(const std::filesystem::path& model, const ViewOptions& 
 
     Scene scene{std::move(*tree), {}, *shown_on, std::move(csf), {}, *background, false, {}, {}, {}, {}};
     scene.is_texture_left_out = view.texture.is_left_out;
-    if (rig && !scene.tree.texture().empty()) return invalid("--lights does not light textures: add --no-texture.");
     scene.placement.scale = view.unit_metres;
     if (const auto lit = light(scene, view); !lit) return lit.error();
     scene.view = make_view(scene, view);

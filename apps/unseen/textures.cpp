@@ -100,6 +100,15 @@ void colour_vertices(Mesh& mesh, const std::vector<Material>& materials, const s
         if (!is_white(of_vertex[v])) mesh.colours[v] *= materials[of_vertex[v]].colour;
 }
 
+// Without an image, of materials' opacity only: where vertices have colours at all, which make it known.
+void thin_vertices(Mesh& mesh, const std::vector<Material>& materials, const std::vector<std::size_t>& of_triangle) {
+    if (mesh.colours.empty()) return;
+    for (std::size_t t = 0; t < of_triangle.size(); ++t) {
+        if (of_triangle[t] == no_material) continue;
+        for (const Index v : mesh.triangles[t]) mesh.colours[v].a = std::min(mesh.colours[v].a, materials[of_triangle[t]].colour.a);
+    }
+}
+
 Result<void> check_uvs(const std::filesystem::path& mesh_file, const vdtree::ReadResult& read) {
     if (read.mesh.uvs.empty())
         return Error{ErrorCode::malformed_data, mesh_file.string() + ": it has a texture but no texture coordinates, which say where it lies" + advice + "."};
@@ -122,7 +131,10 @@ Result<void> lay_materials(const std::filesystem::path& mesh_file, vdtree::ReadR
     Mesh& mesh = read.mesh;
     const std::vector<std::size_t> of_triangle = materials_of_triangles(read);
     const auto has_image = [&](std::size_t m) { return m != no_material && read.materials[m].has_image(); };
-    if (std::none_of(of_triangle.begin(), of_triangle.end(), has_image)) return {};
+    if (std::none_of(of_triangle.begin(), of_triangle.end(), has_image)) {
+        thin_vertices(mesh, read.materials, of_triangle);
+        return {};
+    }
     if (const auto ok = check_uvs(mesh_file, read); !ok) return ok;
     const std::vector<std::size_t> of_vertex = part_vertices(mesh, of_triangle);
 

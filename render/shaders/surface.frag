@@ -23,6 +23,9 @@ vec4 bounded(vec4 shade) {
 
 #ifdef TEXTURED
 layout(location = 2) in vec2 surface_uv;
+#ifdef LIT
+layout(location = 3) in float surface_highlight;
+#endif
 
 layout(binding = 1) uniform sampler2D surface_image; // linear RGB
 layout(location = 60) uniform float lod_bias;
@@ -34,6 +37,10 @@ vec4 textured(vec4 shade) {
     vec2 uv = mix(uv_bounds.xy, surface_uv, greaterThanEqual(surface_uv, uv_bounds.xy));
     uv = mix(uv_bounds.zw, uv, lessThanEqual(uv, uv_bounds.zw));
     vec3 rgb = shade.rgb * texture(surface_image, uv, lod_bias).rgb;
+#ifdef LIT
+    rgb += vec3(surface_highlight >= 0.0 ? surface_highlight : 0.0); // neither less nor NaN, as for shades
+    rgb /= max(dot(rgb, rec709), 1.0);
+#endif
     return vec4(rgb, dot(rgb, rec709));
 }
 #endif

@@ -14,6 +14,10 @@ layout(location = 1) out vec3 corner_weights;
 #ifdef TEXTURED
 layout(location = 2) in vec2 uv[];
 layout(location = 2) out vec2 surface_uv;
+#ifdef LIT
+layout(location = 3) in float highlight[];
+layout(location = 3) out float surface_highlight;
+#endif
 #endif
 
 invariant gl_Position;
@@ -29,6 +33,13 @@ void main() {
         corner_weights = vec3(corner == 0, corner == 1, corner == 2);
 #ifdef TEXTURED
         surface_uv = uv[corner];
+#ifdef LIT
+#ifdef FLAT
+        surface_highlight = (highlight[0] + highlight[1] + highlight[2]) / 3.0;
+#else
+        surface_highlight = highlight[corner];
+#endif
+#endif
 #endif
         EmitVertex();
     }

@@ -147,9 +147,8 @@ Result<Camera> Renderer::Impl::prepare(const vdtree::Cut& cut, Moved moved, cons
         if (!moved.empty())
             return invalid("Vertices that glide cannot be lit: draw the cut instead of the geomorph, or without lights.");
     }
-    if (!cut.tree().texture().empty() && (options.lighting || !moved.empty()))
-        return invalid(options.lighting ? "Textures are not lit: draw without lights, or the tree without its texture."
-                                        : "Textures do not glide: draw the cut instead of the geomorph, or the tree without its texture.");
+    if (!cut.tree().texture().empty() && !moved.empty())
+        return invalid("Textures do not glide: draw the cut instead of the geomorph, or the tree without its texture.");
     if (std::addressof(cut.tree().data()) != tree)
         return invalid("The cut belongs to another tree than the renderer's; make a renderer for that tree.");
     const Camera camera = camera_for(view, placement, origin, frame);

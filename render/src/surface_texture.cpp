@@ -3,12 +3,10 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <string>
 #include <vector>
 
 #include <glm/vec3.hpp>
-#include <glm/vec4.hpp>
 
 #include "gl.h"
 
@@ -24,12 +22,6 @@ struct Level {
     int width = 0, height = 0;
     std::vector<glm::vec3> pixels;
 };
-
-std::uint8_t srgb_code(float linear) {
-    const float c = std::clamp(linear, 0.0f, 1.0f);
-    const float encoded = c <= 0.0031308f ? 12.92f * c : 1.055f * std::pow(c, 1 / 2.4f) - 0.055f;
-    return static_cast<std::uint8_t>(encoded * 255 + 0.5f);
-}
 
 // The parts of `fine` cells that one of `coarse` covers, two or three.
 struct Cover {
@@ -67,13 +59,6 @@ Level halved(int width, int height, Pixel&& pixel) {
     return level;
 }
 
-void upload(const Texture2d& image, int number, const Level& level) {
-    std::vector<vdtree::Texel> codes;
-    codes.reserve(level.pixels.size());
-    for (const glm::vec3& p : level.pixels) codes.push_back({srgb_code(p.r), srgb_code(p.g), srgb_code(p.b), 255});
-    glTextureSubImage2D(image.id(), number, 0, 0, level.width, level.height, GL_RGBA, GL_UNSIGNED_BYTE, codes.data());
-}
-
 void set_unpacking() {
     glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
     glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
@@ -82,17 +67,22 @@ void set_unpacking() {
 
 void upload_all(const Texture2d& image, const vdtree::TextureView& texture, int levels) {
     const int width = static_cast<int>(texture.width), height = static_cast<int>(texture.height);
-    set_unpacking();
-    glTextureSubImage2D(image.id(), 0, 0, 0, width, height, GL_RGBA, GL_UNSIGNED_BYTE, texture.texels.data());
-    if (levels == 1) return;
-    Level level = halved(width, height, [&](int x, int y) {
+    const auto texel = [&](int x, int y) {
         return glm::vec3(vdtree::linear_colour(texture.texels[static_cast<std::size_t>(y) * texture.width + static_cast<std::size_t>(x)]));
-    });
-    upload(image, 1, level);
-    for (int number = 2; number < levels; ++number) {
-        level = halved(level.width, level.height,
-                       [&](int x, int y) { return level.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(level.width) + static_cast<std::size_t>(x)]; });
-        upload(image, number, level);
+    };
+    set_unpacking();
+    std::vector<glm::vec3> row(texture.width);
+    for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) row[static_cast<std::size_t>(x)] = texel(x, y);
+        glTextureSubImage2D(image.id(), 0, 0, y, width, 1, GL_RGB, GL_FLOAT, row.data());
+    }
+    Level level;
+    for (int number = 1; number < levels; ++number) {
+        if (number == 1) level = halved(width, height, texel);
+        else
+            level = halved(level.width, level.height,
+                           [&](int x, int y) { return level.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(level.width) + static_cast<std::size_t>(x)]; });
+        glTextureSubImage2D(image.id(), number, 0, 0, level.width, level.height, GL_RGB, GL_FLOAT, level.pixels.data());
     }
 }
 
@@ -113,7 +103,9 @@ Result<SurfaceTexture> SurfaceTexture::create(const vdtree::TextureView& texture
     glNamedBufferStorage(made.uvs_.id(), static_cast<GLsizeiptr>(std::max<std::size_t>(uvs.size_bytes(), 1)), uvs.data(), 0);
     made.image_ = Texture2d::create("texture");
     const int levels = std::bit_width(std::max(texture.width, texture.height));
-    glTextureStorage2D(made.image_.id(), levels, GL_SRGB8_ALPHA8, static_cast<GLsizei>(texture.width), static_cast<GLsizei>(texture.height));
+    // Linear light, and not sRGB codes: their decoding in hardware and drivers is off by up to a fifth of a percent, and coarse levels would
+    // be rounded to codes.
+    glTextureStorage2D(made.image_.id(), levels, GL_RGB16F, static_cast<GLsizei>(texture.width), static_cast<GLsizei>(texture.height));
     if (glGetError() == GL_OUT_OF_MEMORY)
         return Error{ErrorCode::unsupported, "The graphics memory does not hold the model's texture of " + size + " texels and its coordinates."};
     upload_all(made.image_, texture, levels);

@@ -18,6 +18,8 @@ constexpr glm::dvec3 rec709(0.2126, 0.7152, 0.0722);
 constexpr std::size_t upload_batch = 1u << 16;              // vertices; bounds the memory that uploading takes
 constexpr std::uint64_t most_indices_a_call = 3ull << 28;    // a multiple of 3 that fits GLsizei
 
+constexpr float brightest_light = 1e6f;                      // times white: far beyond what shows any texel
+
 enum UniformLocation {
     clip_from_unit_location = 0,
     lowest_shade_location = 1,
@@ -354,7 +356,9 @@ void TriangleDrawer::draw_surface(const Program& program, const glm::mat4& clip_
     set_surface_state(style.cull);
     program.set(clip_from_unit_location, clip_from_unit);
     program.set(lowest_shade_location, style.is_lit ? glm::vec4(0) : lowest_shade_);
-    program.set(highest_shade_location, style.is_lit ? highest_hue_ : highest_shade_);
+    // A texture that is lit is cut off at white behind it.
+    const glm::vec4 highest_lit = texture_ ? glm::vec4(brightest_light) : highest_hue_;
+    program.set(highest_shade_location, style.is_lit ? highest_lit : highest_shade_);
     if (style.is_lit) {
         program.set(material_location, lights_.material);
         program.set(eye_location, lights_.eye);

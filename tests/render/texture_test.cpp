@@ -26,7 +26,7 @@ using vdtree::VertexTree;
 using vdtree::View;
 
 constexpr glm::dvec3 rec709(0.2126, 0.7152, 0.0722);
-constexpr double code_step = 1e-3; // of linear light: what graphics processors may lose in decoding and filtering
+constexpr double code_step = 3e-4; // of linear light: the rounding of half floats and of filters
 
 VertexTree built(const Mesh& mesh) {
     Result<VertexTree> tree = vdtree::build_tree(mesh.view());
@@ -175,18 +175,68 @@ TEST_F(Textured, NothingIsMadeWithoutATexture) {
     EXPECT_EQ(without.luminance, never.luminance);
 }
 
-TEST_F(Textured, AreRefusedWhereTheyCannotFollow) {
-    const VertexTree tree = built(textures::textured_grid(4, four_colours()));
-    auto renderer = render::Renderer::create(*context_, tree);
-    ASSERT_TRUE(renderer);
-    Cut cut(tree);
+// Light times texel, plus the highlight, which the texture does not colour; white at most.
+TEST_F(Textured, AreLitByLights) {
+    const Texture texture = four_colours();
+    const VertexTree tree = built(textures::textured_grid(4, texture));
+    vdtree::LightSource sun;
+    sun.direction = {0, 0, 1};
+    for (const auto& [intensity, specular] : {std::pair(0.5, 0.0), std::pair(0.5, 0.04), std::pair(3.0, 0.0)}) {
+        vdtree::Lighting lighting;
+        lighting.ambient = 0.1;
+        lighting.specular = specular;
+        lighting.shininess = 1; // so that it hardly changes over the square
+        lighting.lights = {sun};
+        lighting.lights[0].intensity = intensity;
+        for (const auto shading : {render::Shading::smooth, render::Shading::flat}) {
+            render::DrawOptions options{.shading = shading};
+            const render::Frame plain = draw(tree, 4, 64, options);
+            options.lighting = &lighting;
+            const render::Frame lit = draw(tree, 4, 64, options);
+            for (const auto& [x, y] : {std::pair(16, 16), std::pair(48, 16), std::pair(16, 48), std::pair(30, 33)}) {
+                glm::dvec3 expected = colour(plain, x, y) * (0.1 + intensity) + intensity * specular * 9 / 8;
+                expected /= std::max(1.0, glm::dot(expected, rec709));
+                expect_near(colour(lit, x, y), expected, 1e-3);
+                EXPECT_NEAR(luminance(lit, x, y), glm::dot(expected, rec709), 1e-3);
+            }
+        }
+    }
+}
+
+// Any vertex under any texel, in the range of its node.
+TEST_F(Textured, AreBoundedUnderLights) {
+    Mesh mesh = textures::textured_sphere(3, textures::noise(40, 40, 6));
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v) mesh.colours.push_back({0.3f + 0.7f * static_cast<float>(v % 2), 0.8f, v % 3 ? 0.2f : 1.0f, 1});
+    const VertexTree tree = built(mesh);
+    const auto bounds = vdtree::LightBounds::measure(tree);
+    ASSERT_TRUE(bounds);
     vdtree::Lighting lighting;
-    lighting.ambient = 1;
-    render::DrawOptions options;
-    options.lighting = &lighting;
-    const auto frame = renderer->draw(cut, View{}, options);
-    ASSERT_FALSE(frame);
-    EXPECT_NE(frame.error().message.find("Textures are not lit"), std::string::npos) << frame.error().message;
+    lighting.ambient = 0.1;
+    lighting.specular = 0.05;
+    lighting.shininess = 20;
+    vdtree::LightSource sun;
+    sun.direction = glm::normalize(glm::dvec3(0.4, 0.7, 0.6));
+    sun.intensity = 0.8;
+    lighting.lights = {sun};
+    const glm::dvec3 eye(0, 0, 4);
+    vdtree::Lighting dull = lighting;
+    dull.specular = 0;
+    for (vdtree::NodeId node = 0; node < tree.interior_count(); ++node) {
+        const vdtree::LuminanceRange range = vdtree::lit_range(lighting, bounds->cones()[node], tree.bounds()[node].ring, eye);
+        for (vdtree::Index leaf = tree.first_leaf()[node]; leaf < tree.leaf_end()[node]; ++leaf) {
+            const vdtree::NodeId vertex = tree.interior_count() + leaf;
+            const glm::dvec3 p(tree.positions()[vertex]), n(glm::vec3(tree.normals()[vertex])), rgb(tree.colours()[vertex]);
+            const double light = vdtree::lit_luminance(dull, p, n, 1, eye), both = vdtree::lit_luminance(lighting, p, n, 1, eye);
+            const auto at = [&](float u) { return static_cast<std::size_t>((u - std::floor(u)) * 40) % 40; };
+            const glm::vec2 uv = tree.uvs()[vertex];
+            const glm::dvec3 texel(vdtree::linear_colour(mesh.texture.texels[at(uv.y) * 40 + at(uv.x)]));
+            const double shown = std::min(1.0, glm::dot(rgb * texel, rec709) * light + (both < 1 ? both - light : 0));
+            EXPECT_GE(range.hi, shown - 1e-5) << node;
+            if (both < 1) {
+                EXPECT_LE(range.lo, shown + 1e-5) << node;
+            }
+        }
+    }
 }
 
 } // namespace

@@ -102,24 +102,26 @@ TEST_P(TexturedOracle, SeesNothingOfWhatTheSafeTestFolds) {
         options.display = display_;
         options.scene = {std::min(range.lo, background), std::max(range.hi, background)};
         if (trial % 2) options.gaze_px = glm::dvec2(window_px * 0.5 + 1100, window_px * 0.5);
+        Cut whole(tree);
+        whole.unfold_all();
+        const perception::Image before = draw(*renderer, whole, view);
         for (const bool is_safe : {false, true}) {
             const auto criterion = is_safe ? perception::luebke_hallen_safe_distances(tree, rings, view, options)
                                            : perception::luebke_hallen_distances(tree, view, options);
             ASSERT_TRUE(criterion) << criterion.error().message;
             EXPECT_TRUE(criterion->is_monotone());
-            Cut whole(tree), cut(tree);
-            whole.unfold_all();
+            Cut cut(tree);
             const bool is_closed = tree.closedness() == vdtree::Closedness::closed_outward;
             ASSERT_TRUE(cut.follow(*criterion, perception::viewpoint_of(tree, view, options), {.cull_back_faces = is_closed}));
-            const perception::Image before = draw(*renderer, whole, view), after = draw(*renderer, cut, view);
+            const perception::Image after = draw(*renderer, cut, view);
             for (const perception::CsfModel model : {perception::CsfModel::castle, perception::CsfModel::stela}) {
                 const auto judged = perception::judge_modern(before, after, {.display = display_, .gaze_px = options.gaze_px, .csf = model});
                 ASSERT_TRUE(judged) << judged.error().message;
                 EXPECT_EQ(judged->visible_pixels, 0u) << "view " << trial << (is_safe ? ", safe, " : ", ") << cut.triangle_count() << " of " << tree.triangle_count()
                                                       << " triangles, largest V " << judged->max_ratio;
                 if (model == perception::CsfModel::castle)
-                    std::printf("view %d%s: %u of %u triangles, largest V %.3g\n", trial, is_safe ? ", safe" : "", static_cast<unsigned>(cut.triangle_count()),
-                                static_cast<unsigned>(tree.triangle_count()), judged->max_ratio);
+                    RecordProperty("view_" + std::to_string(trial) + (is_safe ? "_safe" : ""),
+                                   std::to_string(cut.triangle_count()) + " of " + std::to_string(tree.triangle_count()) + ", V " + std::to_string(judged->max_ratio));
             }
         }
     }

@@ -69,13 +69,13 @@ inline Mesh textured_sphere(int level, const Texture& texture, double scale = 0.
     return mesh;
 }
 
-// The right half gets its coordinates from elsewhere in the texture, by vertices of its own.
-inline Mesh with_seams(const Mesh& mesh) {
+// What lies to the right of this place gets its coordinates from elsewhere in the texture, by vertices of its own.
+inline Mesh with_seams(const Mesh& mesh, double at = 0) {
     Mesh out = mesh;
     std::vector<vdtree::Index> twin(mesh.positions.size(), vdtree::Index(-1));
     for (vdtree::Triangle& t : out.triangles) {
         const double x = mesh.positions[t[0]].x + mesh.positions[t[1]].x + mesh.positions[t[2]].x;
-        if (!(x > 0)) continue;
+        if (!(x > 3 * at)) continue;
         for (vdtree::Index& v : t) {
             if (twin[v] == vdtree::Index(-1)) {
                 twin[v] = static_cast<vdtree::Index>(out.positions.size());

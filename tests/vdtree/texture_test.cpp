@@ -17,6 +17,7 @@
 #include "shapes.h"
 #include "temp_folder.h"
 #include "textures.h"
+#include "tree_file.h"
 
 namespace unseen::vdtree {
 namespace {
@@ -62,9 +63,10 @@ TEST(TexturePyramid, HoldsWhatFilteringReturns) {
                     EXPECT_GE(range.hi, y);
                     least = std::min(least, y), most = std::max(most, y);
                 }
-                // Nothing that is not near: an eighth of the box, and the texel that filters reach for.
+                // Nothing that is not near: a seventh of the longer side, and the texel that filters reach for.
                 if (wrap == Wrap::repeat) {
-                    const glm::vec2 around = (hi - lo) / 8.0f + glm::vec2(2.0f / static_cast<float>(width), 2.0f / static_cast<float>(height));
+                    const float w = static_cast<float>(width), h = static_cast<float>(height), longer = std::max((hi.x - lo.x) * w, (hi.y - lo.y) * h);
+                    const glm::vec2 around((longer / 7 + 2) / w, (longer / 7 + 2) / h);
                     const auto lies_near = [](double at, float first, float last) { return at - std::floor(at - static_cast<double>(first)) <= static_cast<double>(last); };
                     double least_near = 1, most_near = 0;
                     for (std::uint32_t y = 0; y < height; ++y)
@@ -314,12 +316,50 @@ TEST(Textures, AreKeptInFiles) {
     EXPECT_FLOAT_EQ(again->luminance_range().hi, plain->luminance_range().hi);
 }
 
+TEST(Textures, OfDamagedFilesAreRefused) {
+    const support::TempFolder folder;
+    const std::filesystem::path file = folder.path() / "t.vdt";
+    ASSERT_TRUE(write_tree(file, built(textures::textured_sphere(2, textures::noise(8, 8, 8)))));
+    const std::string whole = support::read_bytes(file);
+    const auto complaint = [&](auto&& damage) {
+        support::TreeFile parts = support::TreeFile::parse(whole);
+        damage(parts);
+        std::ofstream(file, std::ios::binary) << parts.bytes();
+        std::string all;
+        for (const bool mapped : {false, true}) {
+            const auto tree = mapped ? map_tree(file) : read_tree(file);
+            all += tree ? "none;" : tree.error().message + ";";
+        }
+        return all;
+    };
+    using Parts = support::TreeFile;
+    EXPECT_EQ(complaint([](Parts&) {}), "none;none;");
+    const auto expect = [&](const char* words, int times, auto&& damage) {
+        const std::string found = complaint(damage);
+        int count = 0;
+        for (std::size_t at = found.find(words); at != std::string::npos; at = found.find(words, at + 1)) ++count;
+        EXPECT_EQ(count, times) << found;
+    };
+    for (const std::uint32_t width : {0u, 7u, 9u, 0xffffffffu}) expect("texture", 2, [&](Parts& p) { p["texture"].set<std::uint32_t>(0, width); });
+    expect("repeats", 2, [](Parts& p) { p["texture"].set<std::uint32_t>(2, 5u); });
+    expect("texels", 2, [](Parts& p) { p["texels"].data.resize(4 * 63); });
+    expect("texture", 2, [](Parts& p) { p["texture"].data += p["texture"].data; });
+    expect("texture", 2, [](Parts& p) { p["uvs"].data.clear(); });
+    expect("ring_texture", 2, [](Parts& p) { p["ring_texture"].data.resize(4); });
+    expect("ends before it begins", 1, [](Parts& p) { // not looked at where it is mapped: it can only draw another picture
+        p["ring_texture"].set<std::uint16_t>(0, 60000);
+        p["ring_texture"].set<std::uint16_t>(1, 1);
+    });
+    for (const char* name : {"texture", "texels", "ring_texture"})
+        expect("Section", 2, [&](Parts& p) { std::erase_if(p.sections, [&](const auto& s) { return s.name == name; }); });
+}
+
 // Coincident vertices with the same texture coordinates merge for free; those of a seam do not.
 TEST(Textures, StayAtTheirSeams) {
     Mesh mesh = textures::textured_grid(8, textures::checkerboard(32, 32, 16, 0, 255));
     Mesh unwelded = shapes::unwelded(mesh);
     unwelded.texture = mesh.texture;
-    const VertexTree split = built(unwelded), seamed = built(textures::with_seams(mesh));
+    const VertexTree split = built(unwelded), seamed = built(textures::with_seams(mesh, 4));
     const auto contrast_of_coincident = [](const VertexTree& tree) {
         float most = 0;
         for (NodeId node = 0; node < tree.interior_count(); ++node)

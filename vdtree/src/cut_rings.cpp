@@ -85,7 +85,7 @@ struct TexturedVertices {
         return glm::dvec2((y.x + y.y + y.z) / 3, sum / (parts * parts)) / double{Unorm16::largest};
     }
 
-    static constexpr int parts = 4; // of a side: 16 triangles, the texture's mean in each
+    static constexpr int parts = 3; // of a side: 9 triangles, the texture's mean in each
     std::span<const Unorm16> luminance;
     std::span<const glm::vec2> uvs;
     TexturePyramid pyramid;

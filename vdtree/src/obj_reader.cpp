@@ -369,7 +369,7 @@ private:
         const std::string where = "line " + std::to_string(line) + ": the materials in " + in_quotes(library);
         const auto path = path_beside(library);
         if (!path || source_.folder.empty()) {
-            warn(where + " were left out: only files beside the mesh are read.");
+            warn(where + " were left out: only files beside the mesh are read" + (path ? ", and a mesh in memory has none." : "."));
             return {};
         }
         if (!libraries_.insert(*path).second) return {}; // it is often named again and again

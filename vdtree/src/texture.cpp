@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <string>
 
 #include <tbb/parallel_for.h>
@@ -27,11 +28,11 @@ const std::array<double, 256>& linear_of_code() {
     return table;
 }
 
-// Filters on graphics processors place their samples to 1/256 of a texel, and decode sRGB to about as much.
+// Filters on graphics processors place their samples to 1/256 of a texel, and keep light in half floats.
 constexpr double placing_slack = 1.0 / 64;  // texels
 constexpr double float_slack = 4e-7;        // of a coordinate: a few roundings of its float on the way to the texel
 constexpr double decoding_slack = 1.0 / 4096; // of a luminance, and of 1/16 at least
-// Ranges are looked up in boxes of up to so many cells a side: an eighth of it is looked up too much.
+// Ranges are looked up in boxes of up to so many cells a side: less than a seventh of it is looked up too much.
 constexpr std::int64_t most_cells = 16;
 // Beyond, a coordinate in float has no texel of its own any more.
 constexpr double farthest_coordinate = 1 << 23; // texels
@@ -170,10 +171,8 @@ double TexturePyramid::bilinear_mean(const Level& level, glm::dvec2 uv) const {
 
 double TexturePyramid::mean(glm::dvec2 uv, double width) const {
     const double texels = width * std::max(width_, height_);
-    const double level = texels > 1 ? std::min(std::log2(texels), static_cast<double>(levels_.size() - 1)) : 0;
-    const auto below = static_cast<std::size_t>(level);
-    const double share = level - static_cast<double>(below), fine = bilinear_mean(levels_[below], uv);
-    return share > 0 ? (1 - share) * fine + share * bilinear_mean(levels_[below + 1], uv) : fine;
+    const int nearest = texels > 1 ? std::ilogb(texels * std::numbers::sqrt2) : 0;
+    return bilinear_mean(levels_[std::min(static_cast<std::size_t>(nearest), levels_.size() - 1)], uv);
 }
 
 } // namespace unseen::vdtree

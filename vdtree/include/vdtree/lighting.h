@@ -60,7 +60,7 @@ float albedo_of(const VertexTree& tree, NodeId node);
 struct VertexCone {
     glm::vec3 axis = glm::vec3(0, 0, 1); // unit; all normals are within the angle from it
     float cosine = 1, sine = 0;          // of the angle; -1 and 0 where they point anywhere, or one of them is zero
-    LuminanceRange albedo;
+    LuminanceRange albedo; // with the texture's share, if there is one
     // Coordinates of the normals along two directions across the axis, across_axis(); of no account where `largest` is not above `least`.
     // Normals differ more along a ridge's curvature than across it, and seldom by as much as the cone allows.
     float least_across[2] = {0, 0}, largest_across[2] = {0, 0};

@@ -81,11 +81,11 @@ public:
     explicit TexturePyramid(const TextureView& texture);
 
     // What bilinear filtering can return for coordinates in the box, which may reach beyond 0..1: the range of the texels there, and of
-    // others nearer than an eighth of the box. That of a box within another lies within the other's. Coarser mip levels mix texels that
+    // others nearer than a seventh of its longer side. That of a box within another lies within the other's. Coarser mip levels mix texels that
     // are as far away as a pixel is wide. Cost: up to some hundred look-ups.
     Range range(const UvBox& box) const;
 
-    // The mean luminance over an area of this width (in texture coordinates, 0: none) around a point, about: trilinear.
+    // The mean luminance over an area of this width (in texture coordinates, 0: none) around a point, about: bilinear in the nearest level.
     double mean(glm::dvec2 uv, double width) const;
 
 private:
