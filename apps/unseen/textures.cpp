@@ -20,7 +20,11 @@ using vdtree::Mesh;
 using vdtree::MeshRange;
 using vdtree::Texture;
 
-constexpr const char* advice = " (--texture FILE names another image, --no-texture leaves textures out)";
+// What one can do about a bad image, in the same sentence.
+std::string with_advice(std::string complaint) {
+    if (complaint.ends_with('.')) complaint.pop_back();
+    return complaint + " (--texture FILE names another image, --no-texture leaves textures out).";
+}
 
 constexpr std::size_t no_material = std::numeric_limits<std::size_t>::max(), unused = no_material - 1;
 
@@ -77,7 +81,7 @@ public:
         auto [entry, is_new] = images_.try_emplace({file, material.wrap_u, material.wrap_v});
         if (is_new) {
             auto texture = is_embedded ? decode_texture(material.image_bytes, file, from_top_) : read_texture(file, from_top_);
-            if (!texture) return Error{texture.error().code, texture.error().message + advice};
+            if (!texture) return Error{texture.error().code, with_advice(texture.error().message)};
             entry->second = std::move(*texture);
             entry->second.wrap_u = material.wrap_u;
             entry->second.wrap_v = material.wrap_v;
@@ -111,10 +115,10 @@ void thin_vertices(Mesh& mesh, const std::vector<Material>& materials, const std
 
 Result<void> check_uvs(const std::filesystem::path& mesh_file, const vdtree::ReadResult& read) {
     if (read.mesh.uvs.empty())
-        return Error{ErrorCode::malformed_data, mesh_file.string() + ": it has a texture but no texture coordinates, which say where it lies" + advice + "."};
+        return Error{ErrorCode::malformed_data, with_advice(mesh_file.string() + ": it has a texture but no texture coordinates, which say where it lies")};
     if (read.bad_uv)
-        return Error{ErrorCode::malformed_data, mesh_file.string() + ": the texture coordinates of vertex " + std::to_string(*read.bad_uv) +
-                                                    " are not finite; correct them" + advice + "."};
+        return Error{ErrorCode::malformed_data, with_advice(mesh_file.string() + ": the texture coordinates of vertex " + std::to_string(*read.bad_uv) +
+                                                            " are not finite; correct them")};
     return {};
 }
 
@@ -165,7 +169,7 @@ Result<void> lay_materials(const std::filesystem::path& mesh_file, vdtree::ReadR
         return {};
     }
     auto atlas = make_atlas(parts);
-    if (!atlas) return Error{atlas.error().code, mesh_file.string() + ": " + atlas.error().message + advice};
+    if (!atlas) return Error{atlas.error().code, with_advice(mesh_file.string() + ": " + atlas.error().message)};
     for (std::size_t v = 0; v < of_vertex.size(); ++v) { // those that are not used get some place, too
         const AtlasPlace& place = atlas->places[part_of_vertex[v]];
         mesh.uvs[v] = glm::vec2(place.scale * glm::dvec2(mesh.uvs[v]) + place.offset);
