@@ -280,6 +280,7 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
         if (*pixels) o.mode = Mode::pixels;
         if (*pixels) o.test = FoldTest::extent;
         if (*test) o.test = fold_test(o.fold_test);
+        o.is_fold_test_given = test->count() > 0;
         check(o);
     });
 }

@@ -47,6 +47,7 @@ struct WhatOptions {
     Mode mode = Mode::imperceptible;
     FoldTest test = FoldTest::luebke_hallen;
     std::string fold_test = "luebke-hallen"; // as it was given
+    bool is_fold_test_given = false;
     std::uint32_t triangles = 0;             // of Mode::budget
     double pixels = 0;                       // of Mode::pixels
     bool chroma = false;                     // look at colour, too

@@ -297,7 +297,11 @@ vdtree::View widened(const vdtree::View& view) {
 
 } // namespace
 
-Result<void> measure_folds(Scene& scene, const WhatOptions& what) {
+Result<void> measure_folds(Scene& scene, WhatOptions& what) {
+    if (what.test == FoldTest::error && !what.is_fold_test_given && !scene.tree.texture().empty()) {
+        what.test = FoldTest::luebke_hallen_safe;
+        what.fold_test = name_of(what.test);
+    }
     if (what.mode == Mode::full || what.test != FoldTest::error || !scene.tree.fold_errors().empty()) return {};
     if (!scene.tree.texture().empty())
         return Error{ErrorCode::invalid_argument, "--fold-test error does not measure textures: use --fold-test luebke-hallen-safe, or add --no-texture."};

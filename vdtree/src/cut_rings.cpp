@@ -167,7 +167,7 @@ private:
         ChromaRange colours = no_chroma_yet;
         UvBox uvs;
         thread_local std::vector<NodeId> others; // with a texture: those seen so far
-        others.assign(1, interior_ + neighbour);
+        if constexpr (is_textured) others.assign(1, interior_ + neighbour);
         int steps = 0;
         for (NodeId node = parent_of_leaf(here); node != no_node && !supports(node, neighbour); node = g_.parents[node]) {
             for (; !supports(other, here) && !is_larger(other, node); other = g_.parents[other]) {

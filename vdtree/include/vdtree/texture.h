@@ -77,7 +77,7 @@ public:
         bool operator==(const Range&) const = default;
     };
 
-    // Of a valid texture that is not empty. Cost: a pass over the texels; 8 bytes of memory for each.
+    // Of a valid texture that is not empty. Cost: a pass over the texels; 11 bytes of memory for each.
     explicit TexturePyramid(const TextureView& texture);
 
     // What bilinear filtering can return for coordinates in the box, which may reach beyond 0..1: the range of the texels there, and of
