@@ -9,11 +9,13 @@
 #include <cstdio> // what jpeglib.h counts on
 #include <fstream>
 #include <iterator>
+#include <new>
 #include <string>
 #include <system_error>
 #include <vector>
 
 #include <jpeglib.h>
+#include <jerror.h>
 
 #include <perception/image.h>
 
@@ -66,7 +68,8 @@ JpegReader& reader_of(j_common_ptr info) { return *static_cast<JpegReader*>(info
 }
 void on_jpeg_message(j_common_ptr info, int level) {
     JpegReader& reader = reader_of(info);
-    if (level >= 0 || reader.is_damaged) return;
+    const bool is_harmless = level >= 0 || info->err->msg_code == JWRN_EXTRANEOUS_DATA; // bytes between parts, as cameras leave them
+    if (is_harmless || reader.is_damaged) return;
     reader.is_damaged = true;
     info->err->format_message(info, reader.message.data());
 }
