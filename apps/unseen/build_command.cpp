@@ -29,6 +29,7 @@ struct BuildArguments {
     int threads = 0;
     double memory_gib = 0; // 0: no limit
     bool fold_errors = false;
+    TextureOptions texture;
 };
 
 constexpr int most_threads = 1024;
@@ -50,7 +51,7 @@ Json to_json(const vdtree::VertexTree& tree, double seconds) {
     return {{"vertices", tree.leaf_count()},       {"triangles", tree.triangle_count()},
             {"dropped", tree.dropped_triangles()}, {"nodes", tree.node_count()},
             {"bytes", tree.byte_size()},           {"build_seconds", number_or_null(seconds)},
-            {"peak_bytes", peak_bytes()}};
+            {"peak_bytes", peak_bytes()},          {"texture", texture_json(tree)}};
 }
 
 void print(const vdtree::VertexTree& tree, double seconds) {
@@ -61,6 +62,7 @@ void print(const vdtree::VertexTree& tree, double seconds) {
                  {"nodes", grouped(tree.node_count())},
                  {"bytes", grouped(tree.byte_size())},
                  {"bytes a triangle", rounded(bytes_per_triangle, 4)},
+                 {"texture", texture_text(tree)},
                  {"built in", rounded(seconds, 3) + " s"}});
 }
 
@@ -99,12 +101,22 @@ Result<void> check_names(const BuildArguments& a) {
     return {};
 }
 
+// Without words.
+Result<vdtree::ReadResult> read_quietly(const std::filesystem::path& file, const vdtree::ReadOptions& options, const TextureOptions& texture) {
+    vdtree::ReadOptions reading = options;
+    reading.materials = texture.file.empty() && !texture.is_left_out;
+    auto read = vdtree::read_mesh(file, reading);
+    if (!read) return read;
+    if (const auto laid = lay_texture(file, *read, texture); !laid) return laid.error();
+    return read;
+}
+
 // The mesh, if it can be built within the limit of memory. `read_file` reads it, with or without words.
 template <class ReadFile>
 Result<vdtree::ReadResult> read_source(const BuildArguments& a, ProcessTeam* team, ReadFile&& read_file) {
     const auto limit = MemoryLimit::set(a.memory_gib, a.out, threads(a, team));
     if (!limit) return limit.error();
-    Result<vdtree::ReadResult> read = read_file(a.mesh, reading(a));
+    Result<vdtree::ReadResult> read = read_file(a.mesh, reading(a), a.texture);
     if (!read) {
         const std::string disk_full = disk_full_complaint(); // to a reader, that is memory as well
         return disk_full.empty() ? read.error() : Error{ErrorCode::io_failure, disk_full};
@@ -125,7 +137,7 @@ Result<Source> open_source(const BuildArguments& a, ProcessTeam* team) {
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     if (const auto ok = vdtree::prepare_tree_file(a.out); !ok) return ok.error();
-    auto read = read_source(a, team, read_mesh_file);
+    auto read = read_source(a, team, read_textured_mesh);
     if (!read) return read.error();
     return Source{std::move(*report), std::move(*read)};
 }
@@ -152,6 +164,8 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
     const auto start = std::chrono::steady_clock::now();
     auto tree = build(a, std::move(source->read), team);
     if (!tree) return tree.error();
+    if (a.fold_errors && !tree->texture().empty())
+        return Error{ErrorCode::invalid_argument, "--fold-errors does not measure textures: add --no-texture."};
     if (a.fold_errors) {
         print_note("measuring what folds change ...");
         tree = vdtree::with_fold_errors(*tree, a.threads);
@@ -169,7 +183,7 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
 
 // The others: they write nothing, and print nothing unless they fail alone.
 Result<int> help(const BuildArguments& a, ProcessTeam& team) {
-    const auto read = read_source(a, &team, vdtree::read_mesh);
+    const auto read = read_source(a, &team, read_quietly);
     const Result<void> own = read ? Result<void>() : Result<void>(read.error());
     const auto ok = agree(team, own, read ? fingerprint(read->mesh.view(), a.clusterer) : 0);
     if (ok)
@@ -209,6 +223,7 @@ Command build_command(CLI::App& app) {
     verb->add_flag("--fold-errors", a->fold_errors,
                    "Measure what every fold changes, for the fold test 'error' (else that is done at each start), and give proxies the luminance "
                    "that keeps the surface's light");
+    add_texture_options(*verb, a->texture);
     verb->add_option("--memory", a->memory_gib,
                      "Memory that each process aims to keep to; the rest waits in a temporary file beside the tree")
         ->type_name("GIB")
@@ -217,6 +232,7 @@ Command build_command(CLI::App& app) {
     verb->footer("Examples:\n  unseen build bunny.ply -o bunny.vdt\n"
                  "  unseen build city.obj -o city.vdt --clusterer octree --threads 4\n"
                  "  unseen build city.obj -o city.vdt --memory 4\n"
+                 "  unseen build scan.ply -o scan.vdt --texture scan.jpg\n"
                  "  mpirun -np 4 unseen build city.obj -o city.vdt");
     return {verb, [a] { return run(*a); }};
 }

@@ -1,4 +1,5 @@
 // unseen info: what a mesh or a tree is, and whether it is sound.
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 
@@ -62,6 +63,7 @@ Result<int> describe_tree(const InfoArguments& a) {
                  {"file_bytes", file_bytes},
                  {"closed", tree->closedness() != vdtree::Closedness::open},
                  {"prelit", tree->is_prelit()},
+                 {"texture", texture_json(*tree)},
                  {"ranges", tree->ranges().size()}};
     if (a.verify) json["verified"] = true;
     Rows rows = {{"kind", "tree"},
@@ -74,6 +76,7 @@ Result<int> describe_tree(const InfoArguments& a) {
                  {"surface", text_of(tree->closedness())},
                  {"luminance", rounded(static_cast<double>(range.lo), 3) + " to " +
                                    rounded(static_cast<double>(range.hi), 3) + (tree->is_prelit() ? ", pre-lit" : "")},
+                 {"texture", texture_text(*tree)},
                  {"groups and materials", grouped(tree->ranges().size())}};
     if (a.verify) rows.push_back({"verified", "sound"});
     output(a.json, json, rows);
@@ -91,6 +94,7 @@ Result<int> describe_mesh(const InfoArguments& a) {
     const std::uint64_t bytes = bytes_of(mesh.positions) + bytes_of(mesh.triangles) + bytes_of(mesh.normals) +
                                 bytes_of(mesh.colours) + bytes_of(mesh.uvs);
     const std::uint64_t file_bytes = file_bytes_of(a.file);
+    const auto images = std::count_if(read->materials.begin(), read->materials.end(), [](const vdtree::Material& m) { return m.has_image(); });
     Json json = {{"kind", "mesh"},
                  {"vertices", mesh.positions.size()},
                  {"triangles", mesh.triangles.size()},
@@ -99,6 +103,7 @@ Result<int> describe_mesh(const InfoArguments& a) {
                  {"bytes", bytes},
                  {"file_bytes", file_bytes},
                  {"faces", read->source_faces},
+                 {"images", images},
                  {"ranges", mesh.ranges.size()}};
     if (a.verify) json["verified"] = true;
     const auto yes = [](bool has) { return std::string(has ? "yes" : "no"); };
@@ -112,6 +117,7 @@ Result<int> describe_mesh(const InfoArguments& a) {
                  {"normals", yes(!mesh.normals.empty())},
                  {"colours", yes(!mesh.colours.empty())},
                  {"texture coordinates", yes(!mesh.uvs.empty())},
+                 {"materials with images", std::to_string(images)},
                  {"groups and materials", grouped(mesh.ranges.size())}};
     if (a.verify) rows.push_back({"verified", "sound"});
     output(a.json, json, rows);

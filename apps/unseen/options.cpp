@@ -136,6 +136,12 @@ CLI::Validator ending_in(std::vector<std::string> endings) {
         "");
 }
 
+void add_texture_options(CLI::App& verb, TextureOptions& o) {
+    CLI::Option* file = verb.add_option("--texture", o.file, "Of a mesh with texture coordinates: the image that lies over it, instead of its materials' images")
+                            ->type_name("IMAGE");
+    verb.add_flag("--no-texture", o.is_left_out, "Leave images out")->excludes(file);
+}
+
 void add_geomorph_option(CLI::App& verb, std::optional<double>& seconds) {
     add_number(verb, "--geomorph", seconds, within(0, 60), "SECONDS",
                "Vertices glide for so long where the cut changes, up to 60 s (default: they do not); what folds is "
@@ -229,6 +235,7 @@ void add_view_options(CLI::App& verb, ViewOptions& o) {
     group.add_option("--unit", o.unit_metres, "Metres a mesh unit (default: 1)")
         ->type_name("METRES")
         ->check(positive());
+    add_texture_options(group, o.texture);
     group.callback([&o] { check(o); });
 }
 
@@ -273,6 +280,7 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
         if (*pixels) o.mode = Mode::pixels;
         if (*pixels) o.test = FoldTest::extent;
         if (*test) o.test = fold_test(o.fold_test);
+        o.is_fold_test_given = test->count() > 0;
         check(o);
     });
 }

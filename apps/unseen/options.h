@@ -11,6 +11,8 @@
 
 #include <perception/gaze.h>
 
+#include "textures.h"
+
 namespace unseen::app {
 
 // VIEW. What is not given follows from the model and the display, see scene.h.
@@ -25,6 +27,7 @@ struct ViewOptions {
     std::string lights;                        // a file of lights instead
     std::optional<double> background_cdm2;
     double unit_metres = 1; // world units a mesh unit
+    TextureOptions texture;
 };
 
 // DISPLAY.
@@ -44,6 +47,7 @@ struct WhatOptions {
     Mode mode = Mode::imperceptible;
     FoldTest test = FoldTest::luebke_hallen;
     std::string fold_test = "luebke-hallen"; // as it was given
+    bool is_fold_test_given = false;
     std::uint32_t triangles = 0;             // of Mode::budget
     double pixels = 0;                       // of Mode::pixels
     bool chroma = false;                     // look at colour, too
@@ -69,6 +73,7 @@ void add_display_options(CLI::App& verb, DisplayOptions& options);
 void add_what_options(CLI::App& verb, WhatOptions& options);
 // Beside add_what_options(), for verbs with frames in time: gazes that move. `allows_mouse`: the verb has a window.
 void add_moving_gaze_options(CLI::App& verb, GazeOptions& options, bool allows_mouse);
+void add_texture_options(CLI::App& verb, TextureOptions& options);
 void add_geomorph_option(CLI::App& verb, std::optional<double>& seconds);
 void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px);
 CLI::Option* add_triangles_option(CLI::App& verb, std::uint32_t& triangles, const std::string& text);

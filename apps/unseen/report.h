@@ -9,6 +9,7 @@
 
 #include <output_file.h>
 #include <vdtree/result.h>
+#include <vdtree/vertex_tree.h>
 
 namespace unseen::app {
 
@@ -37,5 +38,9 @@ private:
 
 // Columns of text, the first to the left and the others to the right, for stdout.
 void print_table(const std::vector<std::vector<std::string>>& rows);
+
+// Of a tree's texture: null and "none" where it has none.
+Json texture_json(const vdtree::VertexTree& tree);
+std::string texture_text(const vdtree::VertexTree& tree);
 
 } // namespace unseen::app

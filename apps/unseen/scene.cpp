@@ -165,6 +165,7 @@ Result<Surroundings> read_surroundings(const ViewOptions& view, const DisplayOpt
 
 Result<Scene> assemble(vdtree::VertexTree tree, Surroundings around, const ViewOptions& view) {
     Scene scene{std::move(tree), {}, around.display, std::move(around.csf), {}, around.background, false, {}, {}, {}, {}};
+    scene.is_texture_left_out = view.texture.is_left_out;
     scene.placement.scale = view.unit_metres;
     if (const auto lit = light(scene, view); !lit) return lit.error();
     if (const auto seen = look(scene, view); !seen) return seen.error();
@@ -189,7 +190,7 @@ Result<Scene> load_scene(const std::filesystem::path& model, const ViewOptions& 
     // What is quickly read and checked comes first.
     auto around = read_surroundings(view, display);
     if (!around) return around.error();
-    auto tree = open_tree(model);
+    auto tree = open_tree(model, view.texture);
     if (!tree) return tree.error();
     return assemble(std::move(*tree), std::move(*around), view);
 }

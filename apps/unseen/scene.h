@@ -36,6 +36,7 @@ struct Scene {
     // For gazes that are known to a margin only; null where the margin is so wide that everything may be looked at.
     const perception::CsfTable* csf_table(perception::Degrees margin) const;
     mutable std::unique_ptr<perception::WidenedTables> widened_tables; // made when they are asked for
+    bool is_texture_left_out = false; // --no-texture
 };
 
 // The display that the options describe; ranges are checked.

@@ -143,9 +143,20 @@ Effect csf_effect(const Scene& scene, const WhatOptions& what) {
 
 Effect prelit_effect(const Scene& scene) {
     if (scene.lighting && !scene.tree.colours().empty()) return {"pre-lit colours", false, "--lights lights the colours"};
-    if (scene.tree.is_prelit()) return {"pre-lit colours", true, "the mesh's colours are taken as lit"};
+    if (scene.tree.is_prelit())
+        return {"pre-lit colours", true, scene.tree.colours().empty() ? "the texture is taken as lit" : "the mesh's colours are taken as lit"};
+    if (!scene.tree.texture().empty()) return {"pre-lit colours", false, "--light or --ambient lights the texture"};
     return {"pre-lit colours", false,
             scene.tree.colours().empty() ? "the mesh has no colours" : "--light or --ambient lights the colours"};
+}
+
+Effect texture_effect(const Scene& scene, const WhatOptions& what) {
+    if (scene.tree.texture().empty())
+        return {"texture", false, scene.is_texture_left_out ? "--no-texture leaves it out" : "the model has none"};
+    if (!is_perceptual(what)) return {"texture", true, "drawn; folds are not tested against it"};
+    if (what.test == FoldTest::luebke_hallen_safe)
+        return {"texture", true, "folds are tested against its darkest and brightest texels around them, and by how far they move it"};
+    return {"texture", true, "folds are tested against its darkest and brightest texels around them"};
 }
 
 Effect chroma_effect(const Scene& scene, const WhatOptions& what) {
@@ -260,6 +271,7 @@ void add_effects(Simplification& result, const Scene& scene, const WhatOptions& 
                       csf_effect(scene, what),
                       chroma_effect(scene, what),
                       translucency_effect(scene, what),
+                      texture_effect(scene, what),
                       prelit_effect(scene),
                       light_effect(scene, what),
                       frustum_effect(what, purpose),
@@ -293,8 +305,14 @@ vdtree::View widened(const vdtree::View& view) {
 
 } // namespace
 
-Result<void> measure_folds(Scene& scene, const WhatOptions& what) {
+Result<void> measure_folds(Scene& scene, WhatOptions& what) {
+    if (what.test == FoldTest::error && !what.is_fold_test_given && !scene.tree.texture().empty()) {
+        what.test = FoldTest::luebke_hallen_safe;
+        what.fold_test = name_of(what.test);
+    }
     if (what.mode == Mode::full || what.test != FoldTest::error || !scene.tree.fold_errors().empty()) return {};
+    if (!scene.tree.texture().empty())
+        return Error{ErrorCode::invalid_argument, "--fold-test error does not measure textures: use --fold-test luebke-hallen-safe, or add --no-texture."};
     print_note("measuring what folds change (unseen build --fold-errors keeps that in the tree) ...");
     auto measured = vdtree::with_fold_errors(scene.tree);
     if (!measured) return measured.error();
@@ -374,6 +392,8 @@ Result<const vdtree::DistanceCriterion*> Follower::criterion_for(const Scene& sc
                                                       "with --lights, use --fold-test luebke-hallen."};
         if (scene.lighting && what.chroma)
             return Error{ErrorCode::invalid_argument, "--chroma and --lights exclude each other: ranges of colour are those of the tree's own light."};
+        if (what.chroma && !scene.tree.texture().empty())
+            return Error{ErrorCode::invalid_argument, "--chroma does not look at the colours of textures: leave it out, or add --no-texture."};
         if (scene.lighting) return perception::lit_distances(scene.tree, scene.light_bounds, scene.view, options);
         if (what.test == FoldTest::luebke_hallen) return perception::luebke_hallen_distances(scene.tree, scene.view, options);
         if (what.test == FoldTest::luebke_hallen_safe) {
@@ -389,6 +409,8 @@ Result<const vdtree::DistanceCriterion*> Follower::criterion_for(const Scene& sc
 }
 
 Result<void> Follower::set_geomorph(const Scene& scene, double seconds) {
+    if (!scene.tree.texture().empty())
+        return Error{ErrorCode::invalid_argument, "--geomorph does not move textures: leave it out, or add --no-texture."};
     auto made = vdtree::Geomorph::create(scene.tree, {.seconds = seconds});
     if (!made) return made.error();
     geomorph_ = std::move(*made);

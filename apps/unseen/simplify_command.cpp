@@ -23,7 +23,7 @@ struct SimplifyArguments {
 
 constexpr double nothing_drawn = std::numeric_limits<double>::quiet_NaN();
 
-Result<int> run(const SimplifyArguments& a) {
+Result<int> run(SimplifyArguments& a) {
     std::error_code unknown;
     if (std::filesystem::equivalent(a.model, a.out, unknown))
         return Error{ErrorCode::invalid_argument, "'" + a.out + "' is the model itself: give the result another name."};

@@ -42,17 +42,21 @@ inline constexpr ClassSeries shifts{3, -9, 10};    // of the mean over the middl
 // Of colour, in both directions.
 inline constexpr ClassSeries chroma_contrasts{3, -13, 18};
 inline constexpr ClassSeries chroma_shifts{1, -13, 18};
+// Of textures: Michelson's, and by how much of a fold's extent they move.
+inline constexpr ClassSeries texture_contrasts{4, -9, 9};
+inline constexpr ClassSeries texture_motions{1, -16, 16};
 
 inline constexpr std::size_t luminance_count = 16;
 
 struct Level {
     std::size_t contrast = 0, luminance = 0, shift = 0; // classes
     std::array<std::size_t, 2> chroma{}, chroma_shift{}; // red-green and yellow-violet
+    std::size_t texture = 0, texture_motion = 0;         // both, or neither
 
-    bool is_nothing() const { return contrast == 0 && chroma[0] == 0 && chroma[1] == 0; }
+    bool is_nothing() const { return contrast == 0 && chroma[0] == 0 && chroma[1] == 0 && texture == 0; }
     std::size_t grey_number() const { return (shift * luminance_count + luminance) * contrasts.count() + contrast; }
     std::uint64_t number() const {
-        std::uint64_t number = 0;
+        std::uint64_t number = texture * texture_motions.count() + texture_motion;
         for (std::size_t i = 0; i < 2; ++i)
             number = (number * chroma_shifts.count() + chroma_shift[i]) * chroma_contrasts.count() + chroma[i];
         return number * grey_count + grey_number();
@@ -66,6 +70,8 @@ struct RingLooks {
     double adaptation = 0; // relative luminance
     double shift = 0;      // contrast, and so on
     glm::dvec2 chroma = glm::dvec2(0), chroma_shift = glm::dvec2(0);
+    double texture = 0, texture_motion = 0; // contrast; share of the fold's extent
+    double least_contrast = 0; // the range counts as one of this contrast at least
 };
 
 // The display's luminances and the classes that they fall into.
@@ -76,11 +82,24 @@ public:
           log2_step_(std::log2((black_ + span_) / lowest()) / (luminance_count - 1)) {}
 
     Level level(const RingLooks& looks) const {
+        const bool moves_texture = looks.texture > 0 && looks.texture_motion > 0;
         const double lo = in_cdm2(looks.range.lo), hi = in_cdm2(looks.range.hi);
         const double l = std::ceil(std::log2(std::max(in_cdm2(looks.adaptation), lowest()) / lowest()) / log2_step_ - ClassSeries::edge);
-        return {contrasts.of((hi - lo) / (hi + lo)), static_cast<std::size_t>(std::clamp(l, 0.0, static_cast<double>(luminance_count - 1))),
+        return {contrasts.of(std::max((hi - lo) / (hi + lo), looks.least_contrast)), static_cast<std::size_t>(std::clamp(l, 0.0, static_cast<double>(luminance_count - 1))),
                 shifts.of(looks.shift), {chroma_contrasts.of(looks.chroma.x), chroma_contrasts.of(looks.chroma.y)},
-                {chroma_shifts.of(looks.chroma_shift.x), chroma_shifts.of(looks.chroma_shift.y)}};
+                {chroma_shifts.of(looks.chroma_shift.x), chroma_shifts.of(looks.chroma_shift.y)},
+                moves_texture ? texture_contrasts.of(looks.texture) : 0, moves_texture ? texture_motions.of(looks.texture_motion) : 0};
+    }
+    // What the contrasts of vertices and texture come to together, rounded up like each of them.
+    double sum_of_contrasts(const RingLooks& looks) const {
+        const Level rounded = level(looks);
+        if (rounded.texture == 0) return 0;
+        return std::min(1.0, contrasts.value(rounded.contrast) + texture_contrasts.value(rounded.texture));
+    }
+    // Michelson's.
+    double contrast(vdtree::LuminanceRange range) const {
+        const double lo = in_cdm2(range.lo), hi = in_cdm2(range.hi);
+        return (hi - lo) / (hi + lo);
     }
     double luminance(std::size_t luminance_class) const {
         return lowest() * std::exp2(log2_step_ * static_cast<double>(luminance_class)) * (1 + 2 * ClassSeries::edge);
@@ -109,14 +128,15 @@ private:
 // rounded up to fewer: then begin again with coarser rows.
 class Rows {
 public:
-    Rows(bool has_chroma, std::size_t coarseness) : has_chroma_(has_chroma), coarseness_(coarseness) {
-        if (!has_chroma) grey_rows_.assign(Level::grey_count, 0);
+    // `is_grey`: of contrasts and shifts of luminance alone.
+    Rows(bool is_grey, std::size_t coarseness) : is_grey_(is_grey), coarseness_(coarseness) {
+        if (is_grey) grey_rows_.assign(Level::grey_count, 0);
     }
 
     std::uint16_t of(const Level& fine) {
         if (fine.is_nothing()) return 0;
         const Level level = coarser(fine);
-        std::uint16_t& row = has_chroma_ ? rows_[level.number()] : grey_rows_[level.grey_number()];
+        std::uint16_t& row = is_grey_ ? grey_rows_[level.grey_number()] : rows_[level.number()];
         if (row == 0 && !is_full()) {
             levels_.push_back(level);
             row = static_cast<std::uint16_t>(levels_.size());
@@ -137,10 +157,11 @@ private:
             round(level.chroma[i], chroma_contrasts.count());
             round(level.chroma_shift[i], chroma_shifts.count());
         }
+        round(level.texture, texture_contrasts.count());
         return level;
     }
 
-    bool has_chroma_;
+    bool is_grey_;
     std::size_t coarseness_;
     std::vector<std::uint16_t> grey_rows_;
     std::unordered_map<std::uint64_t, std::uint16_t> rows_;

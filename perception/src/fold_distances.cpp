@@ -46,23 +46,41 @@ Sensitivities sensitivities_for(const FoldTestOptions& options, bool has_chroma)
 struct Row {
     double contrast, shift, luminance_cdm2;
     glm::dvec2 chroma, chroma_shift;
+    double texture, texture_motion;
 
     Row(const Level& level, const Classes& classes)
         : contrast(contrasts.value(level.contrast)), shift(shifts.value(level.shift)), luminance_cdm2(classes.luminance(level.luminance)),
           chroma(chroma_contrasts.value(level.chroma[0]), chroma_contrasts.value(level.chroma[1])),
-          chroma_shift(chroma_shifts.value(level.chroma_shift[0]), chroma_shifts.value(level.chroma_shift[1])) {}
+          chroma_shift(chroma_shifts.value(level.chroma_shift[0]), chroma_shifts.value(level.chroma_shift[1])),
+          texture(texture_contrasts.value(level.texture)), texture_motion(std::min(texture_motions.value(level.texture_motion), 1.0)) {}
 
     bool has_chroma() const { return chroma != glm::dvec2(0); }
+    bool has_texture() const { return texture > 0; }
 
     // 1 is just visible: of a grating of this frequency in all directions of colour.
     double visibility(const Sensitivities& see, double frequency_cpd, double eccentricity_deg) const {
         const CyclesPerDegree frequency(frequency_cpd);
         const Degrees eccentricity(eccentricity_deg);
         const Luminance luminance(luminance_cdm2);
-        const double grey = contrast > 0 ? contrast * see.luminance.monotone_sensitivity(frequency, eccentricity, luminance) : 0;
+        const double sensitivity = contrast > 0 || has_texture() ? see.luminance.monotone_sensitivity(frequency, eccentricity, luminance) : 0;
+        double grey = contrast * sensitivity;
+        if (has_texture()) grey = std::min(grey + texture * moved_sensitivity(see, frequency_cpd, eccentricity, luminance), sensitivity);
         if (!has_chroma()) return grey;
         return std::hypot(grey, chroma.x * see.red_green->monotone_sensitivity(frequency, eccentricity, luminance),
                           chroma.y * see.yellow_violet->monotone_sensitivity(frequency, eccentricity, luminance));
+    }
+    // To a pattern that moves by a share of half a wave of this frequency, within a patch that holds no lower ones: the bands of higher
+    // frequencies see the share of it that lies in their own half waves.
+    double moved_sensitivity(const Sensitivities& see, double lowest_cpd, Degrees eccentricity, Luminance luminance) const {
+        constexpr double steps_per_octave = 2;
+        double largest = 0;
+        for (double multiple = 1;; ) { // sensitivity falls and shares grow: up to the next step both are no more than this
+            const double next = multiple * std::exp2(1 / steps_per_octave);
+            const double share = std::min(1.0, next * texture_motion);
+            largest = std::max(largest, share * see.luminance.monotone_sensitivity(CyclesPerDegree(lowest_cpd * multiple), eccentricity, luminance));
+            if (share >= 1) return largest;
+            multiple = next;
+        }
     }
     // Of the shifts of the mean, at whatever frequency they are seen best.
     double shift_visibility(const Sensitivities& see, double eccentricity_deg) const {
@@ -153,7 +171,7 @@ void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes
         without_shifts.chroma_shift = {};
         const auto [found, is_new] = known.try_emplace(without_shifts.number(), bins);
         std::vector<double>& extents = found->second;
-        if (is_new && (is_around_spheres || row.has_chroma())) {
+        if (is_new && (is_around_spheres || row.has_chroma() || row.has_texture())) {
             LargestExtents largest(row, see, screen, is_around_spheres);
             for (std::size_t bin = 0; bin < bins; ++bin) extents[bin] = largest.at(static_cast<double>(bin) * degrees_per_bin);
         } else if (is_new) {
@@ -194,14 +212,31 @@ struct Rings {
     std::span<const ChromaRange> chroma;             // none: not looked at
     std::span<const float> mean_shift = {};          // likewise
     std::span<const glm::vec2> mean_chroma_shift = {};
+    std::span<const vdtree::PackedRange> vertices = {}, texture = {}; // where the texture is counted by how far it moves; then, too:
+    std::span<const float> texture_deviation = {}, lengths = {};      // mesh units
 };
 
 // All that grows up the tree stays so: contrasts against a middle would not.
 void saturate(RingLooks& parent, const RingLooks& child) {
     parent.adaptation = std::max(parent.adaptation, child.adaptation);
+    parent.least_contrast = std::max(parent.least_contrast, child.least_contrast);
     parent.shift = std::max(parent.shift, child.shift);
     parent.chroma = glm::max(parent.chroma, child.chroma);
     parent.chroma_shift = glm::max(parent.chroma_shift, child.chroma_shift);
+}
+
+// Of a surface that faces the eye: its vertices' contrast where the texture is brightest, the texture's where the vertices are, and how far
+// that moves: no less than in the children, whose shares of their extents are rounded up.
+void add_texture(RingLooks& inside, const Rings& rings, NodeId node, const Classes& classes, std::vector<double>& motions) {
+    const vdtree::LuminanceRange vertices = rings.vertices[node], texture = rings.texture[node];
+    inside.range = {vertices.lo * texture.hi, vertices.hi * texture.hi};
+    inside.texture = classes.contrast({vertices.hi * texture.lo, vertices.hi * texture.hi});
+    const double length = static_cast<double>(rings.lengths[node]);
+    double& motion = motions[node];
+    motion = std::max(motion, static_cast<double>(rings.texture_deviation[node]));
+    // Half waves fill twice the length.
+    inside.texture_motion = motion > 0 ? (length > 0 ? std::min(1.0, motion / (2 * length)) : 1.0) : 0.0;
+    motion = std::min(1.0, texture_motions.value(texture_motions.of(inside.texture_motion))) * 2 * length;
 }
 
 // Puts all nodes into classes. False where there are too many of them for rows so fine.
@@ -210,6 +245,7 @@ bool classify(const vdtree::VertexTree& tree, const Rings& rings, const FoldTest
     const bool has_chroma = !rings.chroma.empty();
     const glm::dvec2 of_scene = has_chroma ? half_of(scene_chroma(rings.chroma)) : glm::dvec2(0);
     std::vector<RingLooks> interior(tree.interior_count()), outlines(tree.interior_count());
+    std::vector<double> motions(rings.vertices.size(), 0); // of textures
     fold_classes.resize(tree.interior_count());
     for (NodeId node = tree.interior_count(); node-- > 0;) { // children before parents
         RingLooks &inside = interior[node], &outline = outlines[node];
@@ -218,6 +254,8 @@ bool classify(const vdtree::VertexTree& tree, const Rings& rings, const FoldTest
         const bool is_translucent = tree.bounds()[node].flags & vdtree::translucent_ring;
         inside.range = is_translucent ? outline.range : vdtree::LuminanceRange(rings.luminance[node]);
         inside.adaptation = std::max({inside.adaptation, static_cast<double>(tree.adaptation_luminance()[node]), middle_of(inside.range)});
+        if (!rings.vertices.empty() && !is_translucent) add_texture(inside, rings, node, classes, motions);
+        outline.least_contrast = std::max(outline.least_contrast, classes.sum_of_contrasts(inside));
         if (!rings.mean_shift.empty())
             inside.shift = std::max(inside.shift, classes.contrast(static_cast<double>(rings.mean_shift[node]), rings.luminance[node]));
         if (has_chroma) {
@@ -231,6 +269,7 @@ bool classify(const vdtree::VertexTree& tree, const Rings& rings, const FoldTest
         if (rows.is_full()) return false;
         if (node == 0) break;
         saturate(interior[tree.parents()[node]], inside);
+        if (!motions.empty()) motions[tree.parents()[node]] = std::max(motions[tree.parents()[node]], motions[node]);
         saturate(outlines[tree.parents()[node]], outline);
     }
     return true;
@@ -241,13 +280,15 @@ Result<DistanceCriterion> make_criterion(const vdtree::VertexTree& tree, const R
     const Screen screen(view, options);
     const Classes classes(options.display);
     const bool has_chroma = !rings.chroma.empty();
+    if (!tree.texture().empty() && options.chroma)
+        return Error{ErrorCode::invalid_argument, "The colours of textures are not looked at: leave the chroma out, or the texture."};
     DistanceCriterion::Parts parts;
     parts.spheres = DistanceCriterion::Spheres::ring;
     parts.eccentricity_bins = options.gaze_px ? bin_count : 1;
     parts.bin_degrees = degrees_per_bin / screen.least_magnification;
     parts.lengths = std::move(lengths);
     for (std::size_t coarseness = 1;; coarseness *= 2) {
-        Rows rows(has_chroma, coarseness);
+        Rows rows(!has_chroma && rings.vertices.empty(), coarseness);
         if (!classify(tree, rings, options, classes, rows, parts.classes)) continue;
         fill_table(parts, rows, classes, screen, sensitivities_for(options, has_chroma));
         return DistanceCriterion::create(tree, std::move(parts));
@@ -277,6 +318,11 @@ Result<DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree&
         lengths[node] = std::max({lengths[node], tree.bounds()[node].ring.radius, around});
         if (node > 0) lengths[tree.parents()[node]] = std::max(lengths[tree.parents()[node]], lengths[node]);
     }
+    rings.vertices = cut_rings.vertices;
+    rings.texture = cut_rings.texture;
+    rings.texture_deviation = cut_rings.texture_deviation;
+    const std::vector<float> own_lengths = rings.vertices.empty() ? std::vector<float>() : lengths; // which the criterion takes
+    rings.lengths = own_lengths;
     return make_criterion(tree, rings, std::move(lengths), view, options);
 }
 

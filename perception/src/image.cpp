@@ -704,10 +704,14 @@ private:
 Result<ImageFile> read_image(const std::filesystem::path& file) {
     auto bytes = read_bytes(file);
     if (!bytes) return bytes.error();
+    return decode_image(*bytes, file);
+}
+
+Result<ImageFile> decode_image(const std::vector<unsigned char>& bytes, const std::filesystem::path& file) {
     try {
-        if (begins_with(*bytes, {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'})) return read_png(file, *bytes);
-        if (begins_with(*bytes, {0x76, 0x2f, 0x31, 0x01})) return read_exr(file, *bytes);
-        if (begins_with(*bytes, {'P', 'f'}) || begins_with(*bytes, {'P', 'F'})) return read_pfm(file, *bytes);
+        if (begins_with(bytes, {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'})) return read_png(file, bytes);
+        if (begins_with(bytes, {0x76, 0x2f, 0x31, 0x01})) return read_exr(file, bytes);
+        if (begins_with(bytes, {'P', 'f'}) || begins_with(bytes, {'P', 'F'})) return read_pfm(file, bytes);
     } catch (const std::bad_alloc&) {
         return unsupported(file, "needs more memory than this machine has");
     }

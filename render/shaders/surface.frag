@@ -21,6 +21,30 @@ vec4 bounded(vec4 shade) {
     return mix(highest_shade, shade, lessThanEqual(shade, highest_shade));
 }
 
+#ifdef TEXTURED
+layout(location = 2) in vec2 surface_uv;
+#ifdef LIT
+layout(location = 3) in float surface_highlight;
+#endif
+
+layout(binding = 1) uniform sampler2D surface_image; // linear RGB
+layout(location = 60) uniform float lod_bias;
+layout(location = 61) uniform vec4 uv_bounds; // the least of any vertex, and the largest: likewise
+
+const vec3 rec709 = vec3(0.2126, 0.7152, 0.0722);
+
+vec4 textured(vec4 shade) {
+    vec2 uv = mix(uv_bounds.xy, surface_uv, greaterThanEqual(surface_uv, uv_bounds.xy));
+    uv = mix(uv_bounds.zw, uv, lessThanEqual(uv, uv_bounds.zw));
+    vec3 rgb = shade.rgb * texture(surface_image, uv, lod_bias).rgb;
+#ifdef LIT
+    rgb += vec3(surface_highlight >= 0.0 ? surface_highlight : 0.0); // neither less nor NaN, as for shades
+    rgb /= max(dot(rgb, rec709), 1.0);
+#endif
+    return vec4(rgb, dot(rgb, rec709));
+}
+#endif
+
 #ifdef WIREFRAME
 const float half_line = 0.5;             // pixels, on each side of an edge
 const float half_line_of_height = 0.15;  // lines get thinner where triangles are so small that lines would cover them
@@ -61,6 +85,9 @@ vec3 srgb_encoded(vec3 linear) {
 
 void main() {
     vec4 result = bounded(surface_shade);
+#ifdef TEXTURED
+    result = textured(result);
+#endif
 #ifdef WIREFRAME
     result = mix(result, line_shade(result), line_coverage());
 #endif

@@ -11,6 +11,15 @@ layout(location = 0) out vec4 surface_shade;
 #endif
 layout(location = 1) out vec3 corner_weights;
 
+#ifdef TEXTURED
+layout(location = 2) in vec2 uv[];
+layout(location = 2) out vec2 surface_uv;
+#ifdef LIT
+layout(location = 3) in float highlight[];
+layout(location = 3) out float surface_highlight;
+#endif
+#endif
+
 invariant gl_Position;
 
 void main() {
@@ -22,6 +31,16 @@ void main() {
         surface_shade = shade[corner];
 #endif
         corner_weights = vec3(corner == 0, corner == 1, corner == 2);
+#ifdef TEXTURED
+        surface_uv = uv[corner];
+#ifdef LIT
+#ifdef FLAT
+        surface_highlight = (highlight[0] + highlight[1] + highlight[2]) / 3.0;
+#else
+        surface_highlight = highlight[corner];
+#endif
+#endif
+#endif
         EmitVertex();
     }
     EndPrimitive();

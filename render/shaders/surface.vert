@@ -25,9 +25,10 @@ vec3 normal() {
     return normalize(vec3(p, z));
 }
 
-float lit_luminance() {
+// What the surface sends out by its albedo, and as a highlight.
+vec2 lit_luminance() {
     vec3 n = normal();
-    float sum = material.x * albedo;
+    vec2 sum = vec2(material.x * albedo, 0.0);
     for (int i = 0; i < int(material.w); ++i) {
         vec3 direction = lights[3 * i].xyz;
         float intensity = lights[3 * i].w;
@@ -44,19 +45,26 @@ float lit_luminance() {
         float facing = dot(n, towards);
         if (!(facing > 0.0))
             continue;
-        float share = albedo;
+        vec2 share = vec2(albedo, 0.0);
         if (material.y > 0.0) {
             vec3 sum_of_both = towards + normalize(eye.xyz - position);
             vec3 half_way = sum_of_both / max(length(sum_of_both), 1e-20);
-            share += material.y * pow(max(dot(n, half_way), 1e-20), material.z);
+            share.y = material.y * pow(max(dot(n, half_way), 1e-20), material.z);
         }
         sum += intensity * facing * share;
     }
-    return min(sum, 1.0);
+    return sum;
 }
 #endif
 
 layout(location = 0) out vec4 shade;
+#ifdef TEXTURED
+layout(location = 4) in vec2 vertex_uv;
+layout(location = 2) out vec2 uv;
+#ifdef LIT
+layout(location = 3) out float highlight; // which the texture does not colour
+#endif
+#endif
 
 // All variants of the program put a vertex at the same place, so that a wireframe lies on the surface it is of.
 invariant gl_Position;
@@ -64,8 +72,17 @@ invariant gl_Position;
 void main() {
     gl_Position = clip_from_unit * vec4(position, 1.0);
     shade = vertex_shade;
+#ifdef TEXTURED
+    uv = vertex_uv;
+#endif
 #ifdef LIT
-    float luminance = lit_luminance();
+    vec2 lit = lit_luminance();
+#ifdef TEXTURED
+    float luminance = lit.x;
+    highlight = lit.y;
+#else
+    float luminance = min(lit.x + lit.y, 1.0);
+#endif
     shade = vec4(vertex_shade.a > 0.0 ? vertex_shade.rgb * (luminance / vertex_shade.a) : vec3(luminance), luminance);
 #endif
 }

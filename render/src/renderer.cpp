@@ -67,7 +67,7 @@ double milliseconds_since(std::chrono::steady_clock::time_point start) {
 }
 
 VertexArrays arrays_of(const vdtree::VertexTree& tree, const UnitFrame& frame) {
-    return {tree.positions(), tree.luminance(), tree.colours(), frame};
+    return {tree.positions(), tree.luminance(), tree.colours(), frame, tree.uvs(), tree.texture()};
 }
 
 Frame frame_of(std::span<const glm::vec4> pixels, int width, int height) {
@@ -147,6 +147,8 @@ Result<Camera> Renderer::Impl::prepare(const vdtree::Cut& cut, Moved moved, cons
         if (!moved.empty())
             return invalid("Vertices that glide cannot be lit: draw the cut instead of the geomorph, or without lights.");
     }
+    if (!cut.tree().texture().empty() && !moved.empty())
+        return invalid("Textures do not glide: draw the cut instead of the geomorph, or the tree without its texture.");
     if (std::addressof(cut.tree().data()) != tree)
         return invalid("The cut belongs to another tree than the renderer's; make a renderer for that tree.");
     const Camera camera = camera_for(view, placement, origin, frame);

@@ -18,6 +18,8 @@ constexpr glm::dvec3 rec709(0.2126, 0.7152, 0.0722);
 constexpr std::size_t upload_batch = 1u << 16;              // vertices; bounds the memory that uploading takes
 constexpr std::uint64_t most_indices_a_call = 3ull << 28;    // a multiple of 3 that fits GLsizei
 
+constexpr float brightest_light = 1e6f;                      // times white: far beyond what shows any texel
+
 enum UniformLocation {
     clip_from_unit_location = 0,
     lowest_shade_location = 1,
@@ -25,6 +27,8 @@ enum UniformLocation {
     material_location = 4,
     eye_location = 5,
     lights_location = 6,
+    lod_bias_location = 60,
+    uv_bounds_location = 61,
     background_location = 0,
 };
 
@@ -155,6 +159,13 @@ Result<TriangleDrawer> TriangleDrawer::create(const VertexArrays& vertices) {
     if (auto uploaded = drawer.upload(vertices); !uploaded)
         return uploaded.error();
     describe_vertices(drawer.surface_arrays_.id(), drawer.vertices_.id());
+    if (!vertices.texture.empty()) {
+        auto texture = SurfaceTexture::create(vertices.texture, vertices.uvs);
+        if (!texture)
+            return texture.error();
+        drawer.texture_ = std::move(*texture);
+        drawer.texture_->describe(drawer.surface_arrays_.id());
+    }
 
     const ShaderSource sources[] = {{ShaderSource::Stage::vertex, shaders::full_screen_vert},
                                     {ShaderSource::Stage::fragment, shaders::accumulate_frag}};
@@ -252,10 +263,12 @@ Result<std::span<const glm::vec4>> TriangleDrawer::draw(int width, int height,
     set_fixed_state(width, height);
     glClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE); // rows from the top, as they are read back
     clear(sum_.id(), glm::vec4(0), false);
+    // Each of n samples stands for an n-th of a pixel.
+    const float lod_bias = -0.5f * std::log2(static_cast<float>(std::max<std::size_t>(clip_from_unit.size(), 1)));
     for (const glm::mat4& matrix : clip_from_unit) {
         glBindFramebuffer(GL_DRAW_FRAMEBUFFER, sample_.id());
         clear(sample_.id(), glm::vec4(style.background), true);
-        draw_surface(**program, matrix, style);
+        draw_surface(**program, matrix, style, lod_bias);
         glBindFramebuffer(GL_DRAW_FRAMEBUFFER, sum_.id());
         add_sample_to_sum(style.background);
     }
@@ -284,7 +297,7 @@ Result<void> TriangleDrawer::draw_to_window(int width, int height, const glm::ma
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);
     const float background = encodes ? style.background : srgb_encoded(style.background);
     clear(0, glm::vec4(glm::vec3(background), 1), true);
-    draw_surface(**program, clip_from_unit, style);
+    draw_surface(**program, clip_from_unit, style, 0);
     return {};
 }
 
@@ -318,6 +331,8 @@ Result<const Program*> TriangleDrawer::program_for(const SurfaceStyle& style, Ta
         defines.push_back("WIREFRAME");
     if (style.is_lit)
         defines.push_back("LIT");
+    if (texture_)
+        defines.push_back("TEXTURED");
     if (target != Target::image)
         defines.push_back("WINDOW");
     if (target == Target::window_to_encode)
@@ -335,18 +350,25 @@ Result<const Program*> TriangleDrawer::program_for(const SurfaceStyle& style, Ta
 }
 
 void TriangleDrawer::draw_surface(const Program& program, const glm::mat4& clip_from_unit,
-                                  const SurfaceStyle& style) const {
+                                  const SurfaceStyle& style, float lod_bias) const {
     if (indices_.count() == 0)
         return;
     set_surface_state(style.cull);
     program.set(clip_from_unit_location, clip_from_unit);
     program.set(lowest_shade_location, style.is_lit ? glm::vec4(0) : lowest_shade_);
-    program.set(highest_shade_location, style.is_lit ? highest_hue_ : highest_shade_);
+    // A texture that is lit is cut off at white behind it.
+    const glm::vec4 highest_lit = texture_ ? glm::vec4(brightest_light) : highest_hue_;
+    program.set(highest_shade_location, style.is_lit ? highest_lit : highest_shade_);
     if (style.is_lit) {
         program.set(material_location, lights_.material);
         program.set(eye_location, lights_.eye);
         if (!lights_.lights.empty())
             program.set(lights_location, lights_.lights);
+    }
+    if (texture_) {
+        program.set(lod_bias_location, lod_bias);
+        program.set(uv_bounds_location, texture_->uv_bounds());
+        texture_->bind();
     }
     program.use();
     glBindVertexArray(surface_arrays_.id());

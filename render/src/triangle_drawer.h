@@ -20,6 +20,7 @@
 
 #include "camera.h"
 #include "gpu_indices.h"
+#include "surface_texture.h"
 #include "vertex.h"
 #include "vertex_mover.h"
 
@@ -34,6 +35,8 @@ struct VertexArrays {
     std::span<const vdtree::Unorm16> luminance; // relative, linear
     std::span<const glm::vec4> colours;   // linear; only their hue and saturation count
     UnitFrame frame;                      // that the positions are uploaded in
+    std::span<const glm::vec2> uvs = {};  // where there is a texture
+    vdtree::TextureView texture = {};     // multiplied with the colours; empty: none
 };
 
 // How triangles look.
@@ -85,7 +88,8 @@ private:
     Result<void> upload(const VertexArrays& vertices);
     Result<void> fit_targets(int width, int height);
     Result<const Program*> program_for(const SurfaceStyle& style, Target target);
-    void draw_surface(const Program& program, const glm::mat4& clip_from_unit, const SurfaceStyle& style) const;
+    // `lod_bias`: of the texture, negative where the images that are added up are finer than one.
+    void draw_surface(const Program& program, const glm::mat4& clip_from_unit, const SurfaceStyle& style, float lod_bias) const;
     void add_sample_to_sum(float background) const;
 
     Buffer vertices_;
@@ -99,6 +103,7 @@ private:
     glm::vec4 lowest_shade_ = glm::vec4(std::numeric_limits<float>::max()); // of all vertices
     glm::vec4 highest_shade_ = glm::vec4(std::numeric_limits<float>::lowest());
     glm::vec4 highest_hue_ = glm::vec4(1); // of all vertices: the shade over its luminance
+    std::optional<SurfaceTexture> texture_; // made where the model has one
     std::optional<Buffer> lit_vertices_;   // made when lights are first set
     LightUniforms lights_;
     std::array<std::optional<Program>, 24> programs_; // 3 targets x lit x shading x wireframe, made when first used

@@ -21,6 +21,8 @@
 #include "order_nodes.h"
 #include "place_proxies.h"
 #include "surface.h"
+#include "texture_bounds.h"
+#include "texture_fit.h"
 #include "vertex_tree_data.h"
 
 namespace unseen::vdtree {
@@ -208,6 +210,10 @@ Result<void> check_attributes(const MeshView& mesh) {
     for (std::size_t v = 0; v < mesh.uvs.size(); ++v)
         if (!std::isfinite(mesh.uvs[v].x) || !std::isfinite(mesh.uvs[v].y))
             return invalid("A value is not finite in the texture coordinates", v);
+    if (mesh.texture.empty()) return {};
+    for (std::size_t v = 0; v < mesh.colours.size(); ++v) // what textures are multiplied with
+        for (int k = 0; k < 3; ++k)
+            if (!(mesh.colours[v][k] >= 0 && mesh.colours[v][k] <= 1)) return invalid("A mesh with a texture needs colours from 0 to 1; correct that", v);
     return {};
 }
 
@@ -229,6 +235,8 @@ private:
     void place_vertices(const Clustering& clustering);
     void bound();
     LeafPlaces find_places() const;
+    bool is_textured() const { return !source_.texture.empty(); }
+    void lay_texture();
     std::vector<std::uint8_t> find_translucent(std::span<const Triangle> triangles) const;
 
     const MeshView& source_;
@@ -262,12 +270,13 @@ Result<VertexTree> TreeBuilder::build(Clusterer clusterer) {
     }
     if (reporter_.cancelled(0.8, "bounding")) return cancelled_error();
     bound();
+    if (is_textured()) lay_texture();
 
     g_->closedness = surface_.closedness;
     g_->dropped_triangles = clean_.dropped + options_.dropped_before;
     g_->ranges.assign(source_.ranges.begin(), source_.ranges.end());
     auto data = std::make_shared<VertexTree::Data>();
-    data->light = derive_luminance(*g_, *parts_, options_.light, prelit_);
+    data->light = derive_luminance(*g_, *parts_, options_.light, prelit_, is_textured());
     data->geometry = std::move(g_);
     if (reporter_.cancelled(1.0, "done")) return cancelled_error();
     return VertexTree(std::move(data));
@@ -280,7 +289,7 @@ Result<void> TreeBuilder::help() {
 }
 
 Result<void> TreeBuilder::analyse() {
-    prelit_ = !mesh_.colours.empty();
+    prelit_ = !mesh_.colours.empty() || is_textured();
     coincident_ = find_coincident(mesh_.positions);
     if (!options_.team || options_.clusterer != ClustererKind::quadric) { // only quadrics are helped with
         surface_ = analyse_surface(mesh_, coincident_);
@@ -295,8 +304,8 @@ Result<void> TreeBuilder::analyse() {
 std::vector<float> TreeBuilder::find_luminance() const {
     std::vector<float> luminance(mesh_.positions.size());
     tbb::parallel_for(std::size_t{0}, luminance.size(), [&](std::size_t v) {
-        luminance[v] =
-            vertex_luminance(surface_.normals[v], prelit_ ? &mesh_.colours[v] : nullptr, options_.light, prelit_);
+        luminance[v] = vertex_luminance(surface_.normals[v], mesh_.colours.empty() ? nullptr : &mesh_.colours[v], options_.light, prelit_,
+                                        is_textured());
     });
     return luminance;
 }
@@ -338,10 +347,20 @@ void TreeBuilder::place_vertices(const Clustering& clustering) {
         if (node != no_node) proxies.positions[node] = glm::vec3(clustering.positions[i] - g_->origin);
     });
     keep_coincident_proxies(nodes_.shape, parts, proxies.positions);
+    if (is_textured()) keep_equal_uvs(nodes_.shape, parts, proxies.uvs);
     g_->positions = std::move(proxies.positions);
     g_->normals = std::move(proxies.normals);
     g_->colours = std::move(proxies.colours);
     g_->uvs = std::move(proxies.uvs);
+}
+
+void TreeBuilder::lay_texture() {
+    const TextureView& texture = source_.texture;
+    g_->texture = std::vector<TextureFacts>{{texture.width, texture.height, texture.wrap_u, texture.wrap_v}};
+    g_->texels = std::vector<Texel>(texture.texels.begin(), texture.texels.end());
+    std::vector<glm::vec2> uvs = TextureFits(*g_, *parts_).fitted_uvs(bound_footprints(*g_, *parts_));
+    g_->uvs = std::move(uvs);
+    g_->ring_texture = bound_ring_texture(*g_, *parts_);
 }
 
 LeafPlaces TreeBuilder::find_places() const {

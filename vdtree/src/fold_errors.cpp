@@ -473,6 +473,8 @@ void include_proxies(const VertexTree& tree, std::span<const Unorm16> luminance,
 
 Result<VertexTree> with_fold_errors(const VertexTree& tree, int threads) {
     if (const auto sound = tree.check(); !sound) return sound.error();
+    if (!tree.texture().empty())
+        return Error{ErrorCode::unsupported, "What folds change of a texture is not measured: take another fold test, or the tree without its texture."};
     const auto copy_of = [](const auto& values) { return std::vector(values.begin(), values.end()); };
     const VertexTree::Data& given = tree.data();
     std::vector<Unorm16> luminance = light_keeping_luminance(tree);

@@ -13,6 +13,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include <glm/geometric.hpp>
@@ -420,6 +421,22 @@ public:
         }
     }
 
+    static std::string decode_data(std::string_view uri, const std::string& where) {
+        const std::size_t comma = uri.find(',');
+        if (comma == std::string_view::npos || !uri.substr(0, comma).ends_with(";base64")) {
+            fail(where + " has a data URI that is not in base64; correct it.");
+        }
+        std::optional<std::string> bytes = decode_base64(uri.substr(comma + 1));
+        if (!bytes) fail(where + " has a data URI with characters that are not base64; correct it.");
+        return std::move(*bytes);
+    }
+
+    static fs::path below_folder(const std::string& uri, const std::string& where) {
+        const auto path = path_beside(decode_percent(uri));
+        if (!path) fail(where + " is " + in_quotes(uri) + ", and only files beside the mesh are read; move it there.");
+        return *path;
+    }
+
     std::size_t count() const { return buffers_.size(); }
     std::string_view operator[](std::size_t i) const { return buffers_[i]; }
     std::uint64_t external_bytes() const { return external_bytes_; }
@@ -432,24 +449,9 @@ private:
         return found->second;
     }
 
-    static std::string decode_data(std::string_view uri, const std::string& where) {
-        const std::size_t comma = uri.find(',');
-        if (comma == std::string_view::npos || !uri.substr(0, comma).ends_with(";base64")) {
-            fail(where + " has a data URI that is not in base64; correct it.");
-        }
-        std::optional<std::string> bytes = decode_base64(uri.substr(comma + 1));
-        if (!bytes) fail(where + " has a data URI with characters that are not base64; correct it.");
-        return std::move(*bytes);
-    }
-
     // Only files in the mesh file's folder and below: a mesh must not be able to name any file of the machine.
     std::string read_beside(const std::string& uri, const std::string& where) {
-        const fs::path relative = decode_percent(uri);
-        const bool leaves_folder = std::find(relative.begin(), relative.end(), "..") != relative.end();
-        if (relative.empty() || relative.is_absolute() || leaves_folder || uri.find(':') != std::string::npos ||
-            relative.native().find('\0') != std::string::npos) {
-            fail(where + " is " + in_quotes(uri) + ", and only files beside the mesh are read; move it there.");
-        }
+        const fs::path relative = below_folder(uri, where);
         if (source_.folder.empty()) fail(where + " lies in another file, which a mesh in memory cannot have.");
         Result<std::string> bytes = read_whole_file(source_.folder / relative);
         if (!bytes) fail(where + ": " + bytes.error().message);
@@ -461,6 +463,112 @@ private:
     std::map<std::string, std::string> loaded_;
     std::vector<std::string_view> buffers_;
     std::uint64_t external_bytes_ = 0;
+};
+
+// ---- materials ----
+
+// The colours and images of materials, straight from the document.
+class MaterialReader {
+public:
+    MaterialReader(const json& document, const Buffers& buffers, std::vector<std::string>& warnings)
+        : document_(document), buffers_(buffers), warnings_(warnings) {}
+
+    // Alpha counts where it is not said to be ignored.
+    Material read(std::size_t index, std::string name) {
+        Material material{.name = std::move(name)};
+        const json& of_file = array_of(document_, "materials")[index];
+        where_ = numbered("material", index);
+        const json* surface = optional_object(of_file, "pbrMetallicRoughness");
+        if (surface == nullptr) return material;
+        if (const json* factor = member(*surface, "baseColorFactor")) material.colour = colour(*factor);
+        const json* mode = member(of_file, "alphaMode");
+        if (mode == nullptr || *mode == "OPAQUE") material.colour.a = 1;
+        if (const json* texture = optional_object(*surface, "baseColorTexture")) add_texture(*texture, material);
+        return material;
+    }
+
+private:
+    const json* optional_object(const json& in, const char* key) const {
+        const json* value = member(in, key);
+        if (value != nullptr && !value->is_object()) fail(where_ + ": its " + key + " is no object; correct the JSON.");
+        return value;
+    }
+
+    glm::vec4 colour(const json& values) const {
+        glm::vec4 colour(1);
+        bool is_valid = values.is_array() && values.size() == 4;
+        for (std::size_t i = 0; is_valid && i < 4; ++i) {
+            is_valid = values[i].is_number() && values[i].get<double>() >= 0 && values[i].get<double>() <= 1;
+            if (is_valid) colour[static_cast<int>(i)] = values[i].get<float>();
+        }
+        if (!is_valid) fail(where_ + ": its baseColorFactor should be 4 numbers from 0 to 1; correct it.");
+        return colour;
+    }
+
+    const json& element(const char* key, const json& in, const char* of) {
+        const json& array = array_of(document_, key);
+        const json* value = member(in, of);
+        if (value == nullptr) fail(where_ + " has no " + of + "; correct the JSON.");
+        const auto index = static_cast<std::size_t>(to_integer_in_range(*value, max_int, where_ + ": " + of));
+        if (index >= array.size() || !array[index].is_object()) {
+            fail(where_ + ": its " + of + " is " + std::to_string(index) + ", but there are " + std::to_string(array.size()) + " " + key + "; correct the JSON.");
+        }
+        where_ = numbered(key, index);
+        return array[index];
+    }
+
+    void add_texture(const json& info, Material& material) {
+        if (const json* set = member(info, "texCoord"); set != nullptr && *set != 0) {
+            fail(where_ + ": its texture lies by the texture coordinates " + set->dump() + ", and only 0 is read; export it without, or leave the textures out.");
+        }
+        if (member(info, "extensions") != nullptr) warnings_.push_back(where_ + ": the transform of its texture was ignored.");
+        const json& texture = element("textures", info, "index");
+        if (member(texture, "sampler") != nullptr) {
+            const std::string of_texture = where_;
+            const json& sampler = element("samplers", texture, "sampler");
+            material.wrap_u = wrap(sampler, "wrapS");
+            material.wrap_v = wrap(sampler, "wrapT");
+            where_ = of_texture;
+        }
+        add_image(element("images", texture, "source"), material);
+    }
+
+    Wrap wrap(const json& sampler, const char* key) const {
+        constexpr int clamps = 33071, mirrors = 33648;
+        const json* value = member(sampler, key);
+        if (value == nullptr) return Wrap::repeat;
+        if (*value == mirrors) fail(where_ + ": a texture that is repeated in a mirror is not read; export it otherwise, or leave the textures out.");
+        return *value == clamps ? Wrap::clamp : Wrap::repeat;
+    }
+
+    void add_image(const json& image, Material& material) {
+        if (const json* uri = member(image, "uri")) {
+            if (!uri->is_string()) fail(where_ + ": its uri is no text; correct the JSON.");
+            const auto& text = uri->get_ref<const std::string&>();
+            if (text.starts_with("data:")) material.image_bytes = Buffers::decode_data(text, where_);
+            else material.image = Buffers::below_folder(text, where_);
+            return;
+        }
+        const std::string of_image = where_;
+        const json& view = element("bufferViews", image, "bufferView");
+        const auto number = [&](const char* key, std::int64_t missing) {
+            const json* value = member(view, key);
+            if (value == nullptr && missing >= 0) return static_cast<std::size_t>(missing);
+            if (value == nullptr) fail(where_ + " has no " + key + "; correct the JSON.");
+            return static_cast<std::size_t>(to_integer_in_range(*value, max_size, where_ + ": " + key));
+        };
+        const std::size_t buffer = number("buffer", -1), offset = number("byteOffset", 0), length = number("byteLength", -1);
+        if (buffer >= buffers_.count() || offset > buffers_[buffer].size() || length > buffers_[buffer].size() - offset) {
+            fail(of_image + " ends behind its buffer; the data are cut short or the JSON is wrong.");
+        }
+        if (length == 0) fail(of_image + " is empty; correct the JSON.");
+        material.image_bytes = buffers_[buffer].substr(offset, length);
+    }
+
+    const json& document_;
+    const Buffers& buffers_;
+    std::vector<std::string>& warnings_;
+    std::string where_;
 };
 
 // ---- accessors ----
@@ -715,6 +823,12 @@ public:
         return std::move(result_);
     }
 
+    // After read(): of the file, those that triangles have.
+    void read_materials(MaterialReader& reader, ReadResult& result) const {
+        for (const std::size_t index : used_materials_)
+            result.materials.push_back(reader.read(index, material_name(static_cast<int>(index))));
+    }
+
 private:
     std::vector<int> root_nodes() const {
         if (!model_.scenes.empty()) {
@@ -895,6 +1009,7 @@ private:
         result_.source_faces += added;
         if (added == 0) return;
         if (primitive.material >= 0) {
+            used_materials_.insert(static_cast<std::size_t>(primitive.material));
             add_range(material_name(primitive.material), MeshRange::Kind::material, first_triangle, added);
         }
         add_range(mesh.name, MeshRange::Kind::primitive, first_triangle, added);
@@ -913,6 +1028,9 @@ private:
                  std::to_string(model_.materials.size()) + "; correct the JSON.");
         }
         const std::string& name = model_.materials[index].name;
+        const auto has_name = [&](const tinygltf::Material& other) { return other.name == name; };
+        const auto first = std::find_if(model_.materials.begin(), model_.materials.end(), has_name);
+        if (!name.empty() && first != model_.materials.begin() + static_cast<std::ptrdiff_t>(index)) return name + " (" + numbered("material", index) + ")";
         return name.empty() ? numbered("material", index) : name;
     }
 
@@ -921,6 +1039,7 @@ private:
     Accessors accessors_;
     ReadResult result_;
     std::vector<bool> reached_;
+    std::set<std::size_t> used_materials_;
     std::uint64_t bytes_left_;
     std::uint64_t skipped_primitives_ = 0;
 };
@@ -934,8 +1053,14 @@ Result<ReadResult> read_document(const MeshSource& source) {
     Reducer reducer(document);
     const tinygltf::Model model = to_model(reducer.reduce());
     const Buffers buffers(source, document, container.bin);
-    std::optional<ReadResult> result = SceneReader(source, model, buffers).read();
+    SceneReader scene(source, model, buffers);
+    std::optional<ReadResult> result = scene.read();
     if (!result) return cancelled(source);
+    result->uvs_from_top = true;
+    if (source.options.materials) {
+        MaterialReader materials(document, buffers, result->warnings);
+        scene.read_materials(materials, *result);
+    }
     if (reducer.has_skins()) result->warnings.push_back("skins were ignored; the mesh is in its bind pose.");
     if (reducer.has_morph_targets()) result->warnings.push_back("morph targets were ignored.");
     return std::move(*result);

@@ -11,6 +11,8 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "texture_bounds.h"
+
 namespace unseen::vdtree {
 
 namespace {
@@ -30,7 +32,7 @@ public:
     std::vector<VertexCone> run() {
         tbb::parallel_for(NodeId{0}, tree_.node_count(), [&](NodeId node) {
             normals_[node] = tree_.normals()[node];
-            albedo_[node] = albedo_of(tree_, node);
+            albedo_[node] = albedos_of(node);
         });
         find_neighbours();
         for (Index leaf = 0; leaf < tree_.leaf_count(); ++leaf) sums_[leaf + 1] = sums_[leaf] + glm::dvec3(normals_[interior_ + leaf]);
@@ -41,6 +43,12 @@ public:
         });
         for (NodeId node = interior_; node-- > 0;)
             if (!is_small(node)) measure_children(node);
+        // What the texture leaves of the albedo; highlights are not its.
+        const auto texture = tree_.ring_texture();
+        for (NodeId node = 0; node < texture.size(); ++node) {
+            LuminanceRange& albedo = cones_[node].albedo;
+            albedo = {albedo.lo * texture[node].lo, albedo.hi * texture[node].hi};
+        }
         return std::move(cones_);
     }
 
@@ -54,6 +62,13 @@ private:
         glm::vec3 across[2];
         float least_across[2] = {2, 2}, largest_across[2] = {-2, -2};
     };
+
+    // With a texture, over the channels of the colour that it is multiplied with.
+    LuminanceRange albedos_of(NodeId node) const {
+        const float albedo = albedo_of(tree_, node);
+        if (tree_.texture().empty() || tree_.colours().empty()) return {albedo, albedo};
+        return channel_range(tree_.colours()[node], Unorm16::nearest(static_cast<double>(albedo)));
+    }
 
     bool is_small(NodeId node) const { return tree_.leaf_end()[node] - tree_.first_leaf()[node] <= looked_at_each; }
 
@@ -81,8 +96,8 @@ private:
     }
 
     void see(NodeId node, Seen& seen) const {
-        seen.lo = std::min(seen.lo, albedo_[node]);
-        seen.hi = std::max(seen.hi, albedo_[node]);
+        seen.lo = std::min(seen.lo, albedo_[node].lo);
+        seen.hi = std::max(seen.hi, albedo_[node].hi);
         const glm::vec3 normal = normals_[node], apart = normal - seen.axis;
         if (normal == glm::vec3(0)) seen.everywhere = true;
         seen.squared_chord = std::max(seen.squared_chord, glm::dot(apart, apart));
@@ -141,7 +156,7 @@ private:
     std::vector<VertexCone> cones_;
     std::vector<float> angles_;      // by interior node
     std::vector<glm::vec3> normals_; // by node
-    std::vector<float> albedo_;      // by node
+    std::vector<LuminanceRange> albedo_; // by node
     std::vector<Index> start_, neighbours_; // by leaf: those that it shares triangles with, some more than once
     std::vector<glm::dvec3> sums_;   // by leaf: of the normals of those before it
 };

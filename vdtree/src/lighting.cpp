@@ -171,7 +171,7 @@ double lit_luminance(const Lighting& lighting, glm::dvec3 position, glm::dvec3 n
 }
 
 float albedo_of(const VertexTree& tree, NodeId node) {
-    return vertex_luminance(glm::vec3(0), tree.colours().empty() ? nullptr : &tree.colours()[node], {}, true);
+    return vertex_luminance(glm::vec3(0), tree.colours().empty() ? nullptr : &tree.colours()[node], {}, true, !tree.texture().empty());
 }
 
 double light_motion(const VertexTree& tree, const Lighting& from, glm::dvec3 eye_from, const Lighting& to, glm::dvec3 eye_to) {

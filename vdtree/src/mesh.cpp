@@ -58,6 +58,10 @@ Result<void> validate(const MeshView& mesh) {
     if (Result<void> checked = check_length("normals", mesh.normals.size(), vertices); !checked) return checked;
     if (Result<void> checked = check_length("colours", mesh.colours.size(), vertices); !checked) return checked;
     if (Result<void> checked = check_length("UVs", mesh.uvs.size(), vertices); !checked) return checked;
+    if (Result<void> checked = validate(mesh.texture); !checked) return checked;
+    if (!mesh.texture.empty() && mesh.uvs.empty()) {
+        return invalid("The mesh has a texture but no UVs, which say where it lies; give one for each vertex or no texture.");
+    }
     return check_ranges(mesh);
 }
 

@@ -128,6 +128,7 @@ void repair_attributes(ReadResult& result) {
     std::uint64_t uvs = 0;
     for (glm::vec2& uv : result.mesh.uvs) {
         if (std::isfinite(uv.x) && std::isfinite(uv.y)) continue;
+        if (!result.bad_uv) result.bad_uv = static_cast<std::uint64_t>(&uv - result.mesh.uvs.data());
         uv = glm::vec2(0.0f);
         ++uvs;
     }
@@ -208,6 +209,17 @@ float linear_to_srgb(float linear) {
 glm::vec4 decode_colour(glm::vec4 encoded, ColourEncoding encoding) {
     if (encoding == ColourEncoding::linear) return encoded;
     return {srgb_to_linear(encoded.r), srgb_to_linear(encoded.g), srgb_to_linear(encoded.b), encoded.a};
+}
+
+std::optional<fs::path> path_beside(std::string_view name) {
+    std::string slashes(name);
+    std::replace(slashes.begin(), slashes.end(), '\\', '/');
+    const fs::path relative = slashes;
+    const bool leaves_folder = std::find(relative.begin(), relative.end(), "..") != relative.end();
+    if (relative.empty() || relative.is_absolute() || leaves_folder || slashes.find(':') != std::string::npos ||
+        slashes.find('\0') != std::string::npos)
+        return std::nullopt;
+    return relative;
 }
 
 Result<std::string> read_whole_file(const fs::path& file) {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -40,6 +41,12 @@ Result<ReadResult> read_mesh_bytes(std::string_view bytes, const std::filesystem
 bool is_binary_stl(std::string_view bytes);
 // Whether the bytes start with one of the keywords of OFF (COFF, STOFF, ...), after comments.
 bool starts_with_off_keyword(std::string_view bytes);
+
+// A name in a mesh file as a path below its folder, or nothing: a mesh must not be able to name any file of the machine.
+std::optional<std::filesystem::path> path_beside(std::string_view name);
+
+// Materials of a Wavefront MTL file, added to those there are. `name` is that of the file, for messages.
+Result<void> read_mtl(std::string_view bytes, const std::string& name, std::vector<Material>& materials, std::vector<std::string>& warnings);
 
 // Reads a regular file whole; pipes and devices are refused.
 Result<std::string> read_whole_file(const std::filesystem::path& file);

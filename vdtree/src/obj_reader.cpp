@@ -11,17 +11,20 @@
 #include <limits>
 #include <numeric>
 #include <random>
+#include <set>
 #include <unordered_map>
 #include <vector>
 
 namespace unseen::vdtree {
+
+namespace fs = std::filesystem;
 
 namespace {
 
 constexpr Index none = std::numeric_limits<Index>::max(); // a corner without UV or normal
 // Statements of surfaces, curves, display and grouping that change no triangle.
 constexpr std::string_view ignored_keywords[] = {
-    "s",    "mtllib", "l",     "p",    "vp",  "mg",   "lod",  "bevel", "c_interp", "d_interp", "shadow_obj",
+    "s",    "l",     "p",    "vp",  "mg",   "lod",  "bevel", "c_interp", "d_interp", "shadow_obj",
     "trace_obj", "maplib", "usemap", "cstype", "deg", "bmat", "step", "curv", "curv2", "surf", "parm",
     "trim", "hole",   "scrv",  "sp",   "end", "con",  "ctech", "stech", "call", "csh", "cdc", "cdp", "bzp", "bsp", "res"};
 
@@ -255,6 +258,9 @@ private:
                 if (Result<void> done = add_face(rest, statements.line()); !done) return done;
             } else if (keyword == "g" || keyword == "o") {
                 start_range(group_, rest, MeshRange::Kind::group);
+            } else if (keyword == "mtllib") {
+                if (source_.options.materials)
+                    if (Result<void> done = read_materials(rest, statements.line()); !done) return done;
             } else if (keyword == "usemtl") {
                 start_range(material_, rest, MeshRange::Kind::material);
             } else {
@@ -351,6 +357,33 @@ private:
     }
 
     // ---- groups and materials ----
+
+    // One name with blanks in it, or several.
+    Result<void> read_materials(std::string_view rest, std::uint64_t line) {
+        rest = trimmed(rest);
+        std::error_code error;
+        const auto whole = path_beside(rest);
+        if (whole && fs::exists(source_.folder / *whole, error)) return read_library(rest, line);
+        while (!(rest = trimmed(rest)).empty())
+            if (Result<void> done = read_library(take_word(rest), line); !done) return done;
+        return {};
+    }
+
+    Result<void> read_library(std::string_view library, std::uint64_t line) {
+        const std::string where = "line " + std::to_string(line) + ": the materials in " + in_quotes(library);
+        const auto path = path_beside(library);
+        if (!path || source_.folder.empty()) {
+            warn(where + " were left out: only files beside the mesh are read" + (path ? ", and a mesh in memory has none." : "."));
+            return {};
+        }
+        if (!libraries_.insert(*path).second) return {}; // it is often named again and again
+        const Result<std::string> bytes = read_whole_file(source_.folder / *path);
+        if (!bytes) {
+            warn(where + " were left out: " + bytes.error().message);
+            return {};
+        }
+        return read_mtl(*bytes, (source_.folder / *path).string(), result_.materials, result_.warnings);
+    }
 
     struct OpenRange {
         MeshRange range;
@@ -457,6 +490,7 @@ private:
     bool has_normals_ = false;
     bool has_index_overflow_ = false;
     OpenRange group_, material_;
+    std::set<fs::path> libraries_; // that were read
     PolygonTriangulator polygons_;
     std::uint64_t statements_ = 0;
     std::uint64_t small_faces_ = 0;

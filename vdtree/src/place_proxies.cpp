@@ -97,19 +97,31 @@ ProxyVertices place_proxies(const TreeShape& shape, const TreeParts& parts, cons
     return out;
 }
 
-void keep_coincident_proxies(const TreeShape& shape, const TreeParts& parts, std::span<glm::vec3> positions) {
-    std::vector<std::uint8_t> coincident(shape.interior(), 1);
+namespace {
+
+// Gives every node whose leaves have one value that value, which means would round.
+template <class Value>
+void keep_equal(const TreeShape& shape, const TreeParts& parts, std::span<Value> values) {
+    std::vector<std::uint8_t> equal(shape.interior(), 1);
     parts.bottom_up([&] {
         return [&](NodeId node) {
-            const glm::vec3 first = positions[shape.node_of_leaf(shape.first_leaf[node])];
+            const Value first = values[shape.node_of_leaf(shape.first_leaf[node])];
             bool all = true;
             shape.for_each_child(
-                node, [&](NodeId child) { all = all && coincident[child] && positions[child] == first; },
-                [&](Index leaf) { all = all && positions[shape.node_of_leaf(leaf)] == first; });
-            coincident[node] = all;
-            if (all) positions[node] = first;
+                node, [&](NodeId child) { all = all && equal[child] && values[child] == first; },
+                [&](Index leaf) { all = all && values[shape.node_of_leaf(leaf)] == first; });
+            equal[node] = all;
+            if (all) values[node] = first;
         };
     });
 }
+
+} // namespace
+
+void keep_coincident_proxies(const TreeShape& shape, const TreeParts& parts, std::span<glm::vec3> positions) {
+    keep_equal(shape, parts, positions);
+}
+
+void keep_equal_uvs(const TreeShape& shape, const TreeParts& parts, std::span<glm::vec2> uvs) { keep_equal(shape, parts, uvs); }
 
 } // namespace unseen::vdtree

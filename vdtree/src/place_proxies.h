@@ -29,4 +29,7 @@ ProxyVertices place_proxies(const TreeShape& shape, const TreeParts& parts, cons
 // Puts proxies of coincident leaves exactly where these are.
 void keep_coincident_proxies(const TreeShape& shape, const TreeParts& parts, std::span<glm::vec3> positions);
 
+// Gives proxies of leaves with equal texture coordinates exactly these.
+void keep_equal_uvs(const TreeShape& shape, const TreeParts& parts, std::span<glm::vec2> uvs);
+
 } // namespace unseen::vdtree

@@ -111,10 +111,15 @@ void for_each_array(Geometry& g, Luminance& l, F&& f) {
     f("triangles", g.triangles);
     f("source_triangles", g.source_triangles);
     f("source_vertices", g.source_vertices);
+    f("texture", g.texture);
+    f("texels", g.texels);
+    f("ring_texture", g.ring_texture);
 }
 
+bool is_of_texture(std::string_view name) { return name == "texture" || name == "texels" || name == "ring_texture"; }
+
 // Sections that are there only where they have elements.
-bool is_optional(std::string_view name) { return name == "ring_chroma" || name == "fold_errors"; }
+bool is_optional(std::string_view name) { return name == "ring_chroma" || name == "fold_errors" || is_of_texture(name); }
 
 enum class OpenMode { read, map };
 
@@ -123,6 +128,7 @@ constexpr std::uint32_t component_bytes() {
     if constexpr (std::is_arithmetic_v<T>) return sizeof(T);
     else if constexpr (std::is_same_v<T, Unorm16> || std::is_same_v<T, PackedRange> || std::is_same_v<T, PackedNormal>)
         return 2;
+    else if constexpr (std::is_same_v<T, Texel>) return 1;
     else return 4; // vectors, spheres and triangles of 4-byte components; of NodeBounds, the sphere
 }
 
@@ -457,9 +463,13 @@ Result<void> Reader::check_counts(const TreeGeometry& g, const TreeLuminance& l)
         {l.ring_chroma.empty() || (l.ring_chroma.size() == interior && !g.colours.empty()), "ring_chroma"},
         {l.fold_errors.empty() || l.fold_errors.size() == interior, "fold_errors"},
         {g.source_triangles.size() == (g.ranges.empty() ? 0 : triangles), "source_triangles"},
-        {g.source_vertices.size() == leaves, "source_vertices"}};
+        {g.source_vertices.size() == leaves, "source_vertices"},
+        {g.texture.size() <= 1 && (g.texture.empty() || !g.uvs.empty()), "texture"},
+        {g.texels.empty() == g.texture.empty(), "texels"},
+        {g.ring_texture.size() == (g.texture.empty() ? 0 : interior), "ring_texture"}};
     for (const auto& [holds, name] : checks)
         if (const auto r = expect(holds, name); !r) return r;
+    if (const auto valid = validate(g.texture_view()); !valid) return fail(valid.error().message);
     return {};
 }
 
@@ -505,6 +515,8 @@ Result<void> Reader::check_values(const TreeGeometry& g, const TreeLuminance& l)
     for (const auto* ranges : {&l.support_range, &l.ring_range})
         for (const PackedRange& r : *ranges)
             if (!(r.lo <= r.hi)) return fail("A luminance range ends before it begins.");
+    for (const PackedRange& r : g.ring_texture)
+        if (!(r.lo <= r.hi)) return fail("A range of the texture's luminance ends before it begins.");
     for (const ChromaRange& r : l.ring_chroma)
         if (!(r.lo.x <= r.hi.x && r.lo.y <= r.hi.y)) return fail("A range of chroma ends before it begins.");
     for (const FoldError& e : l.fold_errors)
@@ -584,6 +596,7 @@ Result<VertexTree> Reader::read() {
     if (!state) return state.error();
     if (const auto r = read_facts(g, l); !r) return r.error();
     if (const auto r = check_counts(g, l); !r) return r.error();
+    l.textured = !g.texture.empty();
     if (mode_ == OpenMode::map) {
         data->checks = std::make_shared<NodeChecks>(g);
         const char* fault = fault_in_root(g);
@@ -614,6 +627,7 @@ Result<void> write_tree(const std::filesystem::path& file, const VertexTree& tre
     for_each_array(g, l, [&](std::string_view name, const auto& values) {
         using T = typename std::remove_cvref_t<decltype(values)>::value_type;
         if (is_optional(name) && values.empty()) return;
+        if (is_of_texture(name) && !l.textured) return;
         writer.add(name, std::span<const T>(values), component_bytes<T>());
     });
     Facts facts = facts_of(g, l);

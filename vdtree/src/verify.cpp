@@ -1,11 +1,14 @@
 // Checks everything that a vertex tree promises.
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
+#include <optional>
 #include <string>
 
 #include <glm/geometric.hpp>
 
 #include "chroma.h"
+#include "texture_bounds.h"
 #include "vertex_tree_data.h"
 
 namespace unseen::vdtree {
@@ -62,6 +65,12 @@ private:
         expect(contains(g_.bounds[node].ring, proxy, 0), "the ring's sphere does not contain the proxy.");
         const Unorm16 y = l_.luminance[node];
         expect(contains(l_.support_range[node], {y, y}), "the support's luminance does not contain the proxy's.");
+        if (pyramid_) {
+            const PackedRange texture = texture_of({node});
+            expect(contains(g_.ring_texture[node], texture), "the ring's texture does not contain the proxy's.");
+            expect(g_.support_spheres[node].radius == 0 || contains(l_.ring_range[node], product(shade_of({node}), texture)),
+                   "the ring's luminance does not contain what its proxy shows.");
+        }
         expect(!has_chroma_ || contains(l_.ring_chroma[node], chroma_of(node)), "the ring's chroma does not contain the proxy's.");
         const Index measured = std::min<Index>(g_.leaf_end[node], g_.first_leaf[node] + most_leaves_measured);
         for (Index leaf = g_.first_leaf[node]; leaf < measured; ++leaf) {
@@ -90,6 +99,7 @@ private:
             expect(l_.adaptation[node] >= l_.adaptation[child], "a child's adaptation luminance is higher.");
             expect(contains(l_.support_range[node], l_.support_range[child]), "a child's support luminance sticks out.");
             expect(contains(l_.ring_range[node], l_.ring_range[child]), "a child's ring luminance sticks out.");
+            expect(!pyramid_ || contains(g_.ring_texture[node], g_.ring_texture[child]), "a child's texture sticks out.");
             expect(!has_chroma_ || contains(l_.ring_chroma[node], l_.ring_chroma[child]), "a child's ring chroma sticks out.");
         });
     }
@@ -101,6 +111,8 @@ private:
                          c = g_.positions[interior + t[2]];
         const glm::dvec3 normal = glm::cross(b - a, c - a);
         const int cell = normal_cell(normal);
+        const PackedRange texture = pyramid_ ? texture_of({interior + t[0], interior + t[1], interior + t[2]}) : PackedRange{};
+        const PackedRange shown = pyramid_ ? product(shade_of({interior + t[0], interior + t[1], interior + t[2]}), texture) : PackedRange{};
         const bool shows_through =
             !g_.colours.empty() && std::any_of(t.begin(), t.end(), [&](Index leaf) { return !(g_.colours[interior + leaf].a >= 1); });
         for (const Index leaf : t) {
@@ -109,16 +121,36 @@ private:
             if (node == no_node) continue; // everything is at one point
             expect(!shows_through || (g_.bounds[node].flags & translucent_ring), "a corner's parent does not know of an alpha below 1.");
             expect(cell < 0 || tree_.mask(node).contains(cell), "a normal is missing in the mask of a corner's parent.");
+            expect(!pyramid_ || contains(g_.ring_texture[node], texture), "a triangle's texture is outside of that of the ring of a corner's parent.");
+            expect(!pyramid_ || contains(l_.ring_range[node], shown),
+                   "what a triangle shows is outside of the luminance of the ring of a corner's parent.");
             for (const Index corner : t) {
                 const Unorm16 y = l_.luminance[interior + corner];
                 expect(contains(g_.bounds[node].ring, g_.positions[interior + corner], 0),
                        "a corner is outside of the ring sphere of another corner's parent.");
-                expect(contains(l_.ring_range[node], {y, y}),
+                expect(pyramid_ || contains(l_.ring_range[node], {y, y}),
                        "a corner's luminance is outside of the ring's of another corner's parent.");
                 expect(!has_chroma_ || contains(l_.ring_chroma[node], chroma_of(interior + corner)),
                        "a corner's chroma is outside of the ring's of another corner's parent.");
             }
         }
+    }
+
+    // Of the texture over the box of these vertices, and of what it is multiplied with there.
+    PackedRange texture_of(std::initializer_list<NodeId> nodes) const {
+        UvBox box;
+        for (const NodeId node : nodes) box.include(g_.uvs[node]);
+        const TexturePyramid::Range range = pyramid_->range(box);
+        return {range.lo, range.hi};
+    }
+    PackedRange shade_of(std::initializer_list<NodeId> nodes) const {
+        PackedRange range{{Unorm16::largest}, {0}};
+        for (const NodeId node : nodes) {
+            const Unorm16 y = l_.luminance[node];
+            const PackedRange shade = g_.colours.empty() ? PackedRange{y, y} : channel_range(g_.colours[node], y);
+            range = {std::min(range.lo, shade.lo), std::max(range.hi, shade.hi)};
+        }
+        return range;
     }
 
     ChromaRange chroma_of(NodeId node) const {
@@ -146,6 +178,7 @@ private:
     const VertexTree& tree_;
     const TreeGeometry& g_;
     const TreeLuminance& l_;
+    const std::optional<TexturePyramid> pyramid_ = l_.textured ? std::optional<TexturePyramid>(g_.texture_view()) : std::nullopt;
     const bool has_chroma_ = !l_.ring_chroma.empty() && !g_.colours.empty();
     std::string fault_;
 };

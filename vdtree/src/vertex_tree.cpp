@@ -11,6 +11,7 @@
 #include "chroma.h"
 #include "mask_pool.h"
 #include "node_check.h"
+#include "texture_bounds.h"
 #include "tree_parts.h"
 
 namespace unseen::vdtree {
@@ -48,7 +49,22 @@ struct LeafSurroundings {
     PackedRange corners = empty_range;
 };
 
-LeafSurroundings survey_leaves(const TreeGeometry& g, const TreeParts& parts, std::span<const Unorm16> luminance) {
+// By node: what the texture is multiplied with, over the three channels of colour; for others, the luminance alone.
+class Shades {
+public:
+    Shades(const TreeGeometry& g, std::span<const Unorm16> luminance, bool textured)
+        : luminance_(luminance), colours_(textured && !g.colours.empty() ? g.colours.data() : nullptr) {}
+
+    PackedRange operator[](NodeId node) const {
+        return colours_ ? channel_range(colours_[node], luminance_[node]) : PackedRange{luminance_[node], luminance_[node]};
+    }
+
+private:
+    std::span<const Unorm16> luminance_;
+    const glm::vec4* colours_; // null where they do not matter
+};
+
+LeafSurroundings survey_leaves(const TreeGeometry& g, const TreeParts& parts, const Shades& shades) {
     const NodeId interior = static_cast<NodeId>(g.first_leaf.size());
     LeafSurroundings out;
     out.ring.assign(g.leaf_end[0], empty_range);
@@ -60,7 +76,7 @@ LeafSurroundings survey_leaves(const TreeGeometry& g, const TreeParts& parts, st
                              c = g.positions[interior + t[2]];
             const double area = glm::length(glm::cross(b - a, c - a)) / 6;
             PackedRange range = empty_range;
-            for (const Index leaf : t) range = unite(range, luminance[interior + leaf]);
+            for (const Index leaf : t) range = unite(range, shades[interior + leaf]);
             for (const Index leaf : t) {
                 if (!parts.owns_leaf(part, leaf)) continue;
                 out.areas[leaf] += area;
@@ -69,8 +85,8 @@ LeafSurroundings survey_leaves(const TreeGeometry& g, const TreeParts& parts, st
         };
     });
     for (Index leaf = 0; leaf < out.ring.size(); ++leaf) {
-        if (out.ring[leaf] == empty_range) out.ring[leaf] = unite(empty_range, luminance[interior + leaf]);
-        else out.corners = unite(out.corners, luminance[interior + leaf]);
+        if (out.ring[leaf] == empty_range) out.ring[leaf] = shades[interior + leaf];
+        else out.corners = unite(out.corners, shades[interior + leaf]);
     }
     return out;
 }
@@ -109,17 +125,18 @@ bool is_coincident(const TreeGeometry& g, NodeId node) { return g.support_sphere
 
 } // namespace
 
-float vertex_luminance(glm::vec3 normal, const glm::vec4* colour, const Light& light, bool prelit) {
+float vertex_luminance(glm::vec3 normal, const glm::vec4* colour, const Light& light, bool prelit, bool textured) {
     const float albedo =
         colour ? std::clamp(0.2126f * colour->r + 0.7152f * colour->g + 0.0722f * colour->b, 0.0f, 1.0f)
-               : default_albedo;
+               : textured ? 1.0f : default_albedo;
     if (prelit) return albedo;
     const float lit = light.ambient + (1 - light.ambient) * std::max(0.0f, glm::dot(normal, light.direction));
     // Unit vectors in floats may be a little long; an impossible light must not lead out of 0..1 either.
     return std::max(0.0f, std::min(1.0f, albedo * lit));
 }
 
-TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, const Light& light, bool prelit) {
+TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, const Light& light, bool prelit, bool textured) {
+    textured = textured && !g.texels.empty();
     const TreeLinks tree = links_of(g);
     const NodeId interior = tree.interior();
     const Index leaves = tree.leaves();
@@ -134,13 +151,16 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
         for (Index leaf = range.begin(); leaf < range.end(); ++leaf) {
             const NodeId node = interior + leaf;
             out.luminance[node] = Unorm16::nearest(
-                vertex_luminance(g.normals[node], g.colours.empty() ? nullptr : &g.colours[node], light, prelit));
+                vertex_luminance(g.normals[node], g.colours.empty() ? nullptr : &g.colours[node], light, prelit, textured));
         }
     });
-    const LeafSurroundings leaf = survey_leaves(g, parts, out.luminance);
+    const Shades shades(g, out.luminance, textured);
+    const LeafSurroundings leaf = survey_leaves(g, parts, shades);
     // A proxy's luminance is the area-weighted mean of its leaves: folds keep the mean of their surroundings.
     const RunningSums sums(leaf.areas, std::span(out.luminance).subspan(interior));
 
+    std::vector<PackedRange> of_vertices(textured ? interior : 0); // the rings, without the texture
+    const std::vector<std::uint8_t> moves_texture = textured ? find_texture_moves(g, parts) : std::vector<std::uint8_t>();
     parts.bottom_up([&] {
         return [&](NodeId node) {
             PackedRange support = empty_range, ring = empty_range;
@@ -149,7 +169,7 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
                 node,
                 [&](NodeId child) {
                     support = unite(support, out.support_range[child]);
-                    ring = unite(ring, out.ring_range[child]);
+                    ring = unite(ring, textured ? of_vertices[child] : out.ring_range[child]);
                     if (is_coincident(g, child)) // its ring_range is narrower than its ring
                         for (Index l = g.first_leaf[child]; l < g.leaf_end[child]; ++l) ring = unite(ring, leaf.ring[l]);
                     adaptation = std::max(adaptation, out.adaptation[child]);
@@ -163,13 +183,22 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
             const Unorm16 y = std::clamp(Unorm16::nearest(mean / Unorm16::largest), support.lo, support.hi);
             out.luminance[node] = y;
             support = unite(support, y);
-            ring = unite(ring, y);
-            if (is_coincident(g, node)) {
+            ring = unite(ring, shades[node]);
+            if (is_coincident(g, node) && !(textured && moves_texture[node])) {
                 // Nothing moves; a pixel of the ring changes by the spread of the coincident vertices at most. The
                 // contrast of that is largest on the ring's darkest luminance.
-                ring = shortened(ring, support);
+                PackedRange spread = support;
+                for (NodeId below = node; textured && below < g.subtree_end[node]; ++below) spread = unite(spread, shades[below]);
+                for (Index l = g.first_leaf[node]; textured && l < g.leaf_end[node]; ++l) spread = unite(spread, shades[interior + l]);
+                ring = shortened(ring, spread);
             }
             out.support_range[node] = support;
+            if (textured) {
+                of_vertices[node] = ring;
+                PackedRange texture = g.ring_texture[node];
+                if (is_coincident(g, node) && !moves_texture[node]) texture.lo = texture.hi; // the brightest shows the spread best
+                ring = product(ring, texture);
+            }
             out.ring_range[node] = ring;
             out.adaptation[node] = std::max(adaptation, middle(ring));
         };
@@ -177,7 +206,7 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
     std::vector<ChromaRange> chroma = derive_ring_chroma(g, parts, out.luminance);
     TreeLuminance done{{std::move(out.luminance), std::move(out.support_range), std::move(out.ring_range),
                         std::move(out.adaptation), std::move(chroma), {}},
-                       light, prelit, leaf.corners};
+                       light, prelit, textured, textured ? product(leaf.corners, g.ring_texture[VertexTree::root()]) : leaf.corners};
     return done;
 }
 
@@ -205,6 +234,8 @@ std::span<const PackedNormal> VertexTree::normals() const noexcept { return data
 std::span<const glm::vec4> VertexTree::colours() const noexcept { return data_->geometry->colours; }
 std::span<const glm::vec2> VertexTree::uvs() const noexcept { return data_->geometry->uvs; }
 
+TextureView VertexTree::texture() const noexcept { return data_->light.textured ? data_->geometry->texture_view() : TextureView{}; }
+
 std::span<const NodeBounds> VertexTree::bounds() const noexcept { return data_->geometry->bounds; }
 NormalMask VertexTree::mask(NodeId node) const noexcept {
     return unpack_mask(data_->geometry->mask_records, data_->geometry->mask_at[node]);
@@ -212,6 +243,9 @@ NormalMask VertexTree::mask(NodeId node) const noexcept {
 std::span<const Sphere> VertexTree::support_spheres() const noexcept { return data_->geometry->support_spheres; }
 std::span<const PackedRange> VertexTree::support_luminance() const noexcept { return data_->light.support_range; }
 std::span<const PackedRange> VertexTree::ring_luminance() const noexcept { return data_->light.ring_range; }
+std::span<const PackedRange> VertexTree::ring_texture() const noexcept {
+    return data_->light.textured ? std::span<const PackedRange>(data_->geometry->ring_texture) : std::span<const PackedRange>();
+}
 std::span<const ChromaRange> VertexTree::ring_chroma() const noexcept { return data_->light.ring_chroma; }
 std::span<const FoldError> VertexTree::fold_errors() const noexcept { return data_->light.fold_errors; }
 std::span<const Unorm16> VertexTree::adaptation_luminance() const noexcept { return data_->light.adaptation; }
@@ -240,15 +274,32 @@ Result<void> VertexTree::check() const {
     return {};
 }
 
+namespace {
+
+// The data of a tree whose luminance is found anew.
+Result<std::shared_ptr<const VertexTree::Data>> shaded_anew(const VertexTree& tree, const Light& light, bool prelit, bool textured) {
+    if (const auto sound = tree.check(); !sound) return sound.error();
+    auto data = std::make_shared<VertexTree::Data>();
+    data->geometry = tree.data().geometry;
+    data->checks = tree.data().checks;
+    TreeParts parts(links_of(*data->geometry));
+    parts.assign_triangles(tree.first_triangle(), tree.triangles());
+    data->light = derive_luminance(*data->geometry, parts, light, prelit, textured);
+    return std::shared_ptr<const VertexTree::Data>(std::move(data));
+}
+
+} // namespace
+
 Result<VertexTree> VertexTree::relit(const Light& light) const {
-    if (const auto sound = check(); !sound) return sound.error();
-    auto data = std::make_shared<Data>();
-    data->geometry = data_->geometry;
-    data->checks = data_->checks;
-    TreeParts parts(links_of(*data_->geometry));
-    parts.assign_triangles(first_triangle(), triangles());
-    data->light = derive_luminance(*data_->geometry, parts, light, false);
-    return VertexTree(std::move(data));
+    auto data = shaded_anew(*this, light, false, data_->light.textured);
+    if (!data) return data.error();
+    return VertexTree(std::move(*data));
+}
+
+Result<VertexTree> VertexTree::untextured() const {
+    auto data = shaded_anew(*this, light(), is_prelit() && !colours().empty(), false);
+    if (!data) return data.error();
+    return VertexTree(std::move(*data));
 }
 
 std::uint64_t VertexTree::byte_size() const noexcept {
@@ -258,7 +309,7 @@ std::uint64_t VertexTree::byte_size() const noexcept {
            bytes_of(g.first_leaf) + bytes_of(g.leaf_end) + bytes_of(g.subtree_end) + bytes_of(g.first_triangle) +
            bytes_of(g.bounds) + bytes_of(g.support_spheres) + bytes_of(g.mask_at) + bytes_of(g.mask_records) +
            bytes_of(g.displacement) + bytes_of(g.triangles) + bytes_of(g.source_triangles) +
-           bytes_of(g.source_vertices) + g.ranges.capacity() * sizeof(MeshRange) + bytes_of(l.luminance) + bytes_of(l.support_range) +
+           bytes_of(g.source_vertices) + bytes_of(g.texels) + bytes_of(g.ring_texture) + g.ranges.capacity() * sizeof(MeshRange) + bytes_of(l.luminance) + bytes_of(l.support_range) +
            bytes_of(l.ring_range) + bytes_of(l.adaptation) + bytes_of(l.fold_errors) + bytes_of(l.ring_chroma);
 }
 

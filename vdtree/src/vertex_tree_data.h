@@ -14,6 +14,12 @@ namespace unseen::vdtree {
 template <class T>
 using Vector = std::vector<T>;
 
+struct TextureFacts {
+    std::uint32_t width, height;
+    Wrap wrap_u, wrap_v;
+};
+static_assert(sizeof(TextureFacts) == 16);
+
 // `Storage`: Vector while they are filled, Array when they are done.
 template <template <class> class Storage>
 struct GeometryArrays {
@@ -40,6 +46,11 @@ struct GeometryArrays {
     Storage<Index> source_triangles; // empty without ranges
 
     Storage<Index> source_vertices; // by leaf
+
+    // Of textured trees only.
+    Storage<TextureFacts> texture; // one
+    Storage<Texel> texels;
+    Storage<PackedRange> ring_texture; // by interior node
 };
 
 struct GeometryFacts {
@@ -53,6 +64,12 @@ struct GeometryFacts {
 // What another light leaves as it is.
 struct TreeGeometry : GeometryArrays<Array>, GeometryFacts {
     std::shared_ptr<const void> mapping; // the memory that arrays view
+
+    // Empty where there is none.
+    TextureView texture_view() const {
+        if (texture.empty()) return {};
+        return {texture[0].width, texture[0].height, texture[0].wrap_u, texture[0].wrap_v, texels};
+    }
 };
 
 template <template <class> class Storage>
@@ -69,6 +86,7 @@ struct LuminanceArrays {
 struct TreeLuminance : LuminanceArrays<Array> {
     Light light;
     bool prelit = false;
+    bool textured = false; // by the geometry's texture, if it has one
     LuminanceRange range;
 };
 
@@ -85,9 +103,9 @@ class TreeParts;
 
 // Luminance of every node and the bounds over support and ring, bottom-up. `parts`: of this tree, with its triangles. Cost: one
 // pass over triangles and nodes; parallel.
-TreeLuminance derive_luminance(const TreeGeometry& geometry, const TreeParts& parts, const Light& light, bool prelit);
+TreeLuminance derive_luminance(const TreeGeometry& geometry, const TreeParts& parts, const Light& light, bool prelit, bool textured);
 
-// Relative luminance of one vertex.
-float vertex_luminance(glm::vec3 normal, const glm::vec4* colour, const Light& light, bool prelit);
+// Relative luminance of one vertex; a texture's is to be multiplied with it.
+float vertex_luminance(glm::vec3 normal, const glm::vec4* colour, const Light& light, bool prelit, bool textured = false);
 
 } // namespace unseen::vdtree

@@ -36,6 +36,9 @@ struct ImageFile {
 // side; non-finite values are an error that names the pixel.
 Result<ImageFile> read_image(const std::filesystem::path& file);
 
+// The same of a file's bytes; `name` is for messages.
+Result<ImageFile> decode_image(const std::vector<unsigned char>& bytes, const std::filesystem::path& name);
+
 // By ending: .png (values are code values 0..1, 8 bit), .pfm and .exr (float as they are). Written to a temporary
 // name, then renamed.
 Result<void> write_image(const std::filesystem::path& file, const Image& image);

@@ -42,7 +42,8 @@ struct Frame {
     double draw_ms = 0;            // drawing of all samples and reading back, wall clock
 };
 
-// Keeps the tree's vertices on the GPU. The context must be current and outlive the renderer.
+// Keeps the tree's vertices on the GPU, and its texture if it has one: filtered trilinearly in linear light, and multiplied with the
+// colours. The context must be current and outlive the renderer.
 class Renderer {
 public:
     static Result<Renderer> create(Context& context, const vdtree::VertexTree& tree);

@@ -24,12 +24,24 @@ struct CutRings {
     // least as large as the children's.
     std::vector<float> mean_shift;
 
-    // The same of the colours, as they are drawn; empty where the tree's ring_chroma() is.
+    // Of textured trees; else empty. All of them at least the children's. `luminance` above is that of both together, as drawn; what
+    // vertices and texture can be in any cut, each for itself:
+    std::vector<PackedRange> vertices; // what the texture is multiplied with
+    std::vector<PackedRange> texture;
+    // Mesh units: how far apart two points of triangles around the node can be that show the same place of the texture, whatever is
+    // folded among those that `luminance` is of. (Points of triangles that are interpolated between vertices near an affine map from the
+    // texture to the surface are no farther from it than these: twice the largest distance of all these vertices from the best such map.
+    // Where the surface is flat and the texture lies evenly on it that is 0.) Twice `radius` at most.
+    // (Where all of a node's leaves lie at one point, of the texture, too, these three are of what changes: the vertices' spread.)
+    std::vector<float> texture_deviation;
+
+    // The same of the colours, as they are drawn; empty where the tree's ring_chroma() is, and of textured trees.
     std::vector<ChromaRange> chroma;
     std::vector<glm::vec2> mean_chroma_shift; // 0 or more
 };
 
-// Under the tree's light. Cost: some microseconds a triangle; in parallel. Results do not depend on the threads.
+// Under the tree's light, with its texture: mean shifts count what that shows. Cost: some microseconds a triangle, some tens with a texture;
+// in parallel. Results do not depend on the threads.
 CutRings bound_cut_rings(const VertexTree& tree);
 
 } // namespace unseen::vdtree

@@ -40,7 +40,8 @@ static_assert(sizeof(FoldError) == 40);
 
 // The tree with the errors of its folds, under its light, as VertexTree::fold_errors(); and with luminances of the proxies that keep
 // the light which the surface sends out: a mean of the leaves loses where the surface curves, and many folds together would show.
-// Bounds of support luminance grow with them; everything else is shared with the given tree. Fails where check() does.
+// Bounds of support luminance grow with them; everything else is shared with the given tree. Fails where check() does, and
+// on trees with a texture, of which nothing is measured.
 // Cost: some 20 us a node; in parallel. The result does not depend on the threads. `threads`: 0: all cores.
 Result<VertexTree> with_fold_errors(const VertexTree& tree, int threads = 0);
 

@@ -53,14 +53,14 @@ Result<void> check_lights(const VertexTree& tree, const Lighting& lighting);
 // Relative luminance of a vertex. `normal`: unit or zero.
 double lit_luminance(const Lighting& lighting, glm::dvec3 position, glm::dvec3 normal, double albedo, glm::dvec3 eye);
 
-// Of white light: the luminance of a node's colour, or default_albedo.
+// Of white light: the luminance of a node's colour, or default_albedo; with a texture, which is multiplied with it, 1 in its place.
 float albedo_of(const VertexTree& tree, NodeId node);
 
 // What the vertices have that a fold may show: those of the ring, and the proxies of the subtree.
 struct VertexCone {
     glm::vec3 axis = glm::vec3(0, 0, 1); // unit; all normals are within the angle from it
     float cosine = 1, sine = 0;          // of the angle; -1 and 0 where they point anywhere, or one of them is zero
-    LuminanceRange albedo;
+    LuminanceRange albedo; // with the texture's share, if there is one
     // Coordinates of the normals along two directions across the axis, across_axis(); of no account where `largest` is not above `least`.
     // Normals differ more along a ridge's curvature than across it, and seldom by as much as the cone allows.
     float least_across[2] = {0, 0}, largest_across[2] = {0, 0};

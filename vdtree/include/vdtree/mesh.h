@@ -12,6 +12,7 @@
 #include <glm/vec4.hpp>
 
 #include <vdtree/result.h>
+#include <vdtree/texture.h>
 
 namespace unseen::vdtree {
 
@@ -36,6 +37,7 @@ struct MeshView {
     std::span<const glm::vec4> colours = {};  // linear RGB and alpha, 0..1
     std::span<const glm::vec2> uvs = {};
     std::span<const MeshRange> ranges = {};   // ordered by first_triangle; may overlap between kinds
+    TextureView texture = {};                 // over the whole mesh by its UVs, multiplied with the colours; empty: none
 };
 
 // A triangle soup that owns its arrays.
@@ -46,12 +48,13 @@ struct Mesh {
     std::vector<glm::vec4> colours;
     std::vector<glm::vec2> uvs;
     std::vector<MeshRange> ranges;
+    Texture texture;
 
-    MeshView view() const { return {positions, triangles, normals, colours, uvs, ranges}; }
+    MeshView view() const { return {positions, triangles, normals, colours, uvs, ranges, texture.view()}; }
 };
 
 // Checks what every algorithm relies on: finite positions, indices in range, attributes as long as the
-// positions, ranges within the triangles. The error names the first offender.
+// positions, ranges within the triangles, a texture of as many texels as it says, with UVs. The error names the first offender.
 Result<void> validate(const MeshView& mesh);
 
 // Removes the triangles that use a vertex twice, shrinks the ranges to match, and returns how many went.

@@ -8,7 +8,9 @@
 // allocated for it, so memory stays proportional to the file. Errors name file, and line, byte or index.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +26,19 @@ struct ReadOptions {
     // How 8-bit and float colours of PLY, OBJ and OFF are encoded; glTF defines its own (linear).
     ColourEncoding colours = ColourEncoding::srgb;
     Progress progress = {};
+    bool materials = true; // read them: of OBJ, the files that it names
+};
+
+// What a file says of the surface of a range of triangles. Images are named, or are there as they were in the file: nothing here decodes
+// them.
+struct Material {
+    std::string name;                 // of the MeshRange; different for all materials of a file
+    glm::vec4 colour = glm::vec4(1);  // linear RGB, 0..1, that vertex colours and texture are multiplied with; alpha
+    std::filesystem::path image = {}; // beside the mesh file, or below; empty: none
+    std::string image_bytes = {};     // the image file itself, where the mesh file holds it
+    Wrap wrap_u = Wrap::repeat, wrap_v = Wrap::repeat;
+
+    bool has_image() const { return !image.empty() || !image_bytes.empty(); }
 };
 
 struct ReadResult {
@@ -31,6 +46,9 @@ struct ReadResult {
     std::uint64_t source_faces = 0;       // faces of the file before triangulation
     std::uint64_t dropped_triangles = 0;  // triangles that used a vertex twice
     std::vector<std::string> warnings;    // repairs that were made, one sentence each
+    std::vector<Material> materials = {}; // of OBJ and glTF
+    bool uvs_from_top = false;            // v grows downward in images (glTF), not upward (OBJ, PLY)
+    std::optional<std::uint64_t> bad_uv = {}; // the first vertex whose texture coordinates were not finite, and set to 0
 };
 
 // Polygons are triangulated (ear clipping in the plane of the polygon, so concave ones keep their area),

@@ -126,13 +126,17 @@ public:
     std::span<const glm::vec4> colours() const noexcept;    // linear
     std::span<const glm::vec2> uvs() const noexcept;
 
+    // What lies over the surface by uvs(), and is multiplied with the vertices' colours and luminance; empty: none.
+    TextureView texture() const noexcept;
+
     // Bounds, by interior node.
     std::span<const NodeBounds> bounds() const noexcept;
     NormalMask mask(NodeId node) const noexcept;              // facing of the ring dilated by one more ring; unpacks it
     std::span<const Sphere> support_spheres() const noexcept; // leaves and proxies of the subtree
-    std::span<const PackedRange> support_luminance() const noexcept;
-    std::span<const PackedRange> ring_luminance() const noexcept;
-    std::span<const ChromaRange> ring_chroma() const noexcept; // as drawn; empty where all vertices are grey
+    std::span<const PackedRange> support_luminance() const noexcept; // of vertices, without the texture
+    std::span<const PackedRange> ring_luminance() const noexcept;    // as drawn: with the texture
+    std::span<const PackedRange> ring_texture() const noexcept;      // the texture's own luminance there; empty without one
+    std::span<const ChromaRange> ring_chroma() const noexcept; // of vertices, as drawn; empty where all of them are grey
     std::span<const Unorm16> adaptation_luminance() const noexcept; // middle of ring_luminance, saturated up the tree
     std::span<const FoldError> fold_errors() const noexcept; // of with_fold_errors(); else empty
     std::span<const float> displacement() const noexcept; // largest distance of a supported leaf from the proxy
@@ -145,7 +149,7 @@ public:
     std::uint64_t dropped_triangles() const noexcept;         // input triangles that used a vertex twice
     Closedness closedness() const noexcept;
     Sphere bounding_sphere() const noexcept; // of the triangles' corners
-    LuminanceRange luminance_range() const noexcept;
+    LuminanceRange luminance_range() const noexcept; // of all that is drawn
 
     // Luminance and its bounds under another light; everything else is shared with this tree. Cost: one pass over the
     // triangles and the nodes. A pre-lit mesh (with colours) is shaded by its colours times the light.
@@ -153,6 +157,10 @@ public:
     bool is_prelit() const noexcept; // luminance comes from the colours alone
     // Fails where check() does.
     Result<VertexTree> relit(const Light& light) const;
+
+    // The same tree without its texture, under its light, with luminance and bounds of its vertices alone; everything else is shared.
+    // Vertices without colours then have the default albedo, lit. Fails where check() does. Cost: as relit().
+    Result<VertexTree> untextured() const;
 
     std::uint64_t byte_size() const noexcept; // of all arrays; those of a mapped tree are resident only where they were used
 

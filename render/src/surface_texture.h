@@ -1,0 +1,34 @@
+// A model's texture on the GPU, with the coordinates of its vertices.
+#pragma once
+
+#include <span>
+
+#include <glm/vec2.hpp>
+#include <glm/vec4.hpp>
+
+#include <render/gl_object.h>
+#include <vdtree/texture.h>
+
+namespace unseen::render {
+
+// Move-only; needs a current context for everything. GL errors other than too little memory are left for the caller to ask for.
+class SurfaceTexture {
+public:
+    // `uvs`: by vertex. Its mip levels are means in linear light.
+    static Result<SurfaceTexture> create(const vdtree::TextureView& texture, std::span<const glm::vec2> uvs);
+
+    void describe(unsigned vertex_array) const; // the coordinates, as surface.vert takes them
+    void bind() const;                          // the image, as surface.frag does
+
+    // The least coordinates of all vertices, then the largest.
+    glm::vec4 uv_bounds() const noexcept { return {box_.lo, box_.hi}; }
+
+private:
+    SurfaceTexture() = default;
+
+    Buffer uvs_;
+    Texture2d image_;
+    vdtree::UvBox box_;
+};
+
+} // namespace unseen::render

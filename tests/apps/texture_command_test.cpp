@@ -1,0 +1,307 @@
+// Textures from files to pictures: OBJ with MTL, glTF with images in it and beside it, PNG and JPEG; and what is said of bad ones.
+#include "run_command.h"
+
+#include <cstdio> // what jpeglib.h counts on
+
+#include <jpeglib.h>
+
+#include <perception/image.h>
+
+namespace {
+
+using namespace unseen::app::testing;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using unseen::perception::Image;
+using unseen::perception::read_image;
+
+class TextureCommandTest : public CommandTest {
+protected:
+    // A square of n x n cells in z = 0 with the image once over it, `more` before its faces.
+    std::string square(int n, const std::string& more) const {
+        std::ostringstream obj;
+        for (int i = 0; i <= n; ++i)
+            for (int k = 0; k <= n; ++k)
+                obj << "v " << k / static_cast<double>(n) << ' ' << i / static_cast<double>(n) << " 0\nvt " << k / static_cast<double>(n) << ' '
+                    << i / static_cast<double>(n) << '\n';
+        obj << more;
+        const auto corner = [&](int i, int k) {
+            const std::string number = std::to_string(i * (n + 1) + k + 1);
+            return ' ' + number + '/' + number;
+        };
+        for (int i = 0; i < n; ++i)
+            for (int k = 0; k < n; ++k) obj << "f" << corner(i, k) << corner(i, k + 1) << corner(i + 1, k + 1) << corner(i + 1, k) << '\n';
+        return obj.str();
+    }
+    void write_square(const std::string& image) const {
+        write_text(path("square.obj"), square(8, "mtllib square.mtl\nusemtl paint\n"));
+        write_text(path("square.mtl"), "newmtl paint\nKd 1 1 1\nmap_Kd " + image + "\n");
+    }
+    // Black below and white above.
+    Image halves(int size = 16) const {
+        Image image{size, size, 3, {}};
+        for (int y = 0; y < size; ++y)
+            for (int x = 0; x < 3 * size; ++x) image.values.push_back(y < size / 2 ? 1.0f : 0.0f);
+        return image;
+    }
+    void write_png(const std::string& name, const Image& image) const {
+        const auto written = unseen::perception::write_image(path(name), image);
+        ASSERT_TRUE(written) << written.error().message;
+    }
+    std::string jpeg(const Image& image) const {
+        jpeg_compress_struct info{};
+        jpeg_error_mgr errors{};
+        info.err = jpeg_std_error(&errors);
+        jpeg_create_compress(&info);
+        unsigned char* bytes = nullptr;
+        unsigned long size = 0;
+        jpeg_mem_dest(&info, &bytes, &size);
+        info.image_width = static_cast<JDIMENSION>(image.width);
+        info.image_height = static_cast<JDIMENSION>(image.height);
+        info.input_components = 3;
+        info.in_color_space = JCS_RGB;
+        jpeg_set_defaults(&info);
+        jpeg_set_quality(&info, 95, TRUE);
+        jpeg_start_compress(&info, TRUE);
+        while (info.next_scanline < info.image_height) {
+            std::vector<JSAMPLE> row;
+            for (int i = 0; i < 3 * image.width; ++i)
+                row.push_back(static_cast<JSAMPLE>(255 * image.values[static_cast<std::size_t>(static_cast<int>(info.next_scanline) * 3 * image.width + i)]));
+            JSAMPROW rows = row.data();
+            jpeg_write_scanlines(&info, &rows, 1);
+        }
+        jpeg_finish_compress(&info);
+        std::string out(reinterpret_cast<const char*>(bytes), size);
+        jpeg_destroy_compress(&info);
+        std::free(bytes);
+        return out;
+    }
+    Json build(const std::string& mesh, std::vector<std::string> more = {}) const {
+        std::vector<std::string> words = {"build", mesh, "-o", "t.vdt", "--json", "-"};
+        words.insert(words.end(), more.begin(), more.end());
+        const Outcome outcome = run(words);
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        const Outcome verified = run({"info", "t.vdt", "--verify"});
+        EXPECT_EQ(verified.status, 0) << verified.err;
+        return outcome.json();
+    }
+    // The luminance in cd/m2 of the pictures' upper and lower halves; empty where nothing can be drawn.
+    std::optional<std::pair<float, float>> draw(const std::string& model, std::vector<std::string> more = {}, Json* report = nullptr) const {
+        std::vector<std::string> words = {"render", model, "-o", "p.pfm", "--size", "64x64", "--fill", "1.2", "--samples", "4", "--json", "-"};
+        words.insert(words.end(), more.begin(), more.end());
+        const Outcome outcome = run(words);
+        if (outcome.err.find("No OpenGL") != std::string::npos) return std::nullopt;
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        if (report) *report = outcome.json();
+        const auto picture = read_image(path("p.pfm"));
+        if (!picture) throw std::runtime_error(picture.error().message);
+        return std::pair(picture->image.at(32, 24), picture->image.at(32, 40));
+    }
+    std::string complaint(const std::vector<std::string>& words) const {
+        const Outcome outcome = run(words);
+        EXPECT_NE(outcome.status, 0) << outcome.out;
+        EXPECT_THAT(outcome.err, IsAnErrorForPeople());
+        return outcome.err;
+    }
+};
+
+TEST_F(TextureCommandTest, OfObjectsWithMaterialsAreDrawnTheRightWayUp) {
+    for (const std::string image : {"a picture.png", "picture.jpg"}) {
+        if (image.ends_with(".png")) write_png(image, halves());
+        else write_text(path(image), jpeg(halves()));
+        write_square(image);
+        const Json report = build("square.obj");
+        EXPECT_EQ(report["texture"]["width"], 16) << report;
+        Json drawn;
+        if (const auto seen = draw("t.vdt", {}, &drawn)) {
+            EXPECT_GT(seen->first, 95);
+            EXPECT_LT(seen->second, 2);
+            EXPECT_TRUE(effect_named(drawn, "texture")["on"].get<bool>());
+            EXPECT_THAT(effect_named(drawn, "texture")["why"].get<std::string>(), HasSubstr("texels"));
+        }
+    }
+}
+
+TEST_F(TextureCommandTest, CanBeLeftOutOrReplaced) {
+    write_png("p.png", halves());
+    write_square("p.png");
+    EXPECT_TRUE(build("square.obj", {"--no-texture"})["texture"].is_null());
+    write_png("grey.png", Image{1, 1, 1, {0.5f}});
+    EXPECT_EQ(build("square.obj", {"--texture", "grey.png"})["texture"]["width"], 1);
+    if (const auto seen = draw("t.vdt")) {
+        EXPECT_NEAR(seen->first, seen->second, 0.1);
+    }
+    build("square.obj");
+    Json drawn;
+    if (const auto seen = draw("t.vdt", {"--no-texture"}, &drawn)) {
+        EXPECT_NEAR(seen->first, seen->second, 0.1);
+        EXPECT_FALSE(effect_named(drawn, "texture")["on"].get<bool>());
+        EXPECT_THAT(effect_named(drawn, "texture")["why"].get<std::string>(), HasSubstr("--no-texture"));
+    }
+    EXPECT_THAT(complaint({"render", "t.vdt", "-o", "x.png", "--texture", "grey.png"}), HasSubstr("unseen build"));
+    const Outcome both = run({"build", "square.obj", "-o", "x.vdt", "--texture", "grey.png", "--no-texture"});
+    EXPECT_EQ(both.status, 2);
+    EXPECT_THAT(both.err, HasSubstr("--texture excludes --no-texture"));
+}
+
+TEST_F(TextureCommandTest, OfSeveralMaterialsBecomeOne) {
+    write_png("p.png", halves());
+    Image green{2, 2, 3, {}};
+    for (int i = 0; i < 4; ++i) green.values.insert(green.values.end(), {0.0f, 1.0f, 0.0f});
+    write_png("green.png", green);
+    // The lower half by one material, the upper by the other, and a corner by a third without an image.
+    std::string obj = square(4, "mtllib m.mtl\nusemtl striped\n");
+    std::size_t at = 0;
+    for (int face = 0; face < 9; ++face) at = obj.find("\nf ", at + 1);
+    obj.insert(at + 1, "usemtl green\n");
+    for (int face = 0; face < 8; ++face) at = obj.find("\nf ", at + 1);
+    obj.insert(at + 1, "usemtl plain\n");
+    write_text(path("m.obj"), obj);
+    write_text(path("m.mtl"), "newmtl striped\nmap_Kd -clamp on p.png\nnewmtl green\nmap_Kd green.png\nnewmtl plain\nKd 0 0 1\n");
+    EXPECT_GT(build("m.obj")["texture"]["width"].get<int>(), 16);
+    if (const auto seen = draw("t.vdt", {"--full"})) {
+        EXPECT_NEAR(seen->first, 0.5 + 99.5 * 0.7152, 1);
+        EXPECT_LT(seen->second, 2); // the picture's lower half
+    }
+}
+
+std::string base64(const std::string& bytes) {
+    const std::string digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    std::string out;
+    for (std::size_t i = 0; i < bytes.size(); i += 3) {
+        unsigned word = 0;
+        for (std::size_t k = 0; k < 3; ++k) word = word << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
+        for (std::size_t k = 0; k < 4; ++k) out += i + k > bytes.size() ? '=' : digits[word >> (18 - 6 * k) & 63];
+    }
+    return out;
+}
+
+TEST_F(TextureCommandTest, OfGltfAreFoundInTheFileAndBesideIt) {
+    write_png("p.png", halves());
+    // Two triangles; v runs downward.
+    const float values[] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0, 1, 1, 1, 1, 0, 0, 0};
+    const unsigned short corners[] = {0, 1, 2, 0, 2, 3};
+    std::string buffer(reinterpret_cast<const char*>(values), sizeof values);
+    buffer.append(reinterpret_cast<const char*>(corners), sizeof corners);
+    const std::string png = read_text(path("p.png"));
+    const std::size_t image_at = buffer.size();
+    buffer += png;
+    const auto document = [&](const Json& image, const Json& factor) {
+        return Json{{"asset", {{"version", "2.0"}}},
+                    {"buffers", {{{"byteLength", buffer.size()}, {"uri", "data:application/octet-stream;base64," + base64(buffer)}}}},
+                    {"bufferViews", {{{"buffer", 0}, {"byteLength", 48}}, {{"buffer", 0}, {"byteOffset", 48}, {"byteLength", 32}},
+                                     {{"buffer", 0}, {"byteOffset", 80}, {"byteLength", 12}},
+                                     {{"buffer", 0}, {"byteOffset", image_at}, {"byteLength", png.size()}}}},
+                    {"accessors", {{{"bufferView", 0}, {"componentType", 5126}, {"count", 4}, {"type", "VEC3"}},
+                                   {{"bufferView", 1}, {"componentType", 5126}, {"count", 4}, {"type", "VEC2"}},
+                                   {{"bufferView", 2}, {"componentType", 5123}, {"count", 6}, {"type", "SCALAR"}}}},
+                    {"images", {image}},
+                    {"textures", {{{"source", 0}}}},
+                    {"materials", {{{"pbrMetallicRoughness", {{"baseColorFactor", factor}, {"baseColorTexture", {{"index", 0}}}}}}}},
+                    {"meshes", {{{"primitives", {{{"attributes", {{"POSITION", 0}, {"TEXCOORD_0", 1}}}, {"indices", 2}, {"material", 0}}}}}}},
+                    {"nodes", {{{"mesh", 0}}}},
+                    {"scenes", {{{"nodes", {0}}}}}};
+    };
+    const Json white = {1, 1, 1, 1}, half = {0.5, 0.5, 0.5, 1};
+    for (const Json& image : {Json{{"uri", "p.png"}}, Json{{"bufferView", 3}, {"mimeType", "image/png"}}, Json{{"uri", "data:image/png;base64," + base64(png)}}}) {
+        for (const bool is_dark : {false, true}) {
+            write_text(path("q.gltf"), document(image, is_dark ? half : white).dump());
+            EXPECT_EQ(build("q.gltf")["texture"]["height"], 16);
+            if (const auto seen = draw("t.vdt", {"--full"})) {
+                EXPECT_NEAR(seen->first, 0.5 + 99.5 * (is_dark ? 0.5 : 1.0), 1);
+                EXPECT_LT(seen->second, 2);
+            }
+        }
+    }
+    const auto complaint_about = [&](Json changed) {
+        write_text(path("bad.gltf"), changed.dump());
+        return complaint({"build", "bad.gltf", "-o", "x.vdt"});
+    };
+    EXPECT_THAT(complaint_about(document({{"uri", "nowhere.png"}}, white)), AllOf(HasSubstr("nowhere.png"), HasSubstr("--no-texture")));
+    EXPECT_THAT(complaint_about(document({{"uri", "../p.png"}}, white)), HasSubstr("only files beside the mesh"));
+    EXPECT_THAT(complaint_about(document({{"bufferView", 9}}, white)), HasSubstr("there are 4 bufferViews"));
+    EXPECT_THAT(complaint_about(document({{"bufferView", 2}}, white)), HasSubstr("image of material"));
+    EXPECT_THAT(complaint_about(document({{"uri", "p.png"}}, {1, 2, 3, 4})), HasSubstr("baseColorFactor"));
+    Json second_set = document({{"uri", "p.png"}}, white);
+    second_set["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["texCoord"] = 1;
+    EXPECT_THAT(complaint_about(second_set), HasSubstr("only 0 is read"));
+}
+
+TEST_F(TextureCommandTest, BadImagesAreNamed) {
+    const auto complaint_about = [&](const std::string& image) {
+        write_square(image);
+        return complaint({"build", "square.obj", "-o", "x.vdt"});
+    };
+    EXPECT_THAT(complaint_about("missing.png"), AllOf(HasSubstr("missing.png"), HasSubstr("no such image"), HasSubstr("--no-texture")));
+    write_text(path("empty.png"), "");
+    EXPECT_THAT(complaint_about("empty.png"), HasSubstr("is empty"));
+    write_text(path("text.png"), "hello");
+    EXPECT_THAT(complaint_about("text.png"), HasSubstr("neither PNG"));
+    write_png("p.png", halves(64));
+    const std::string png = read_text(path("p.png"));
+    write_text(path("cut.png"), png.substr(0, png.size() / 2));
+    EXPECT_THAT(complaint_about("cut.png"), HasSubstr("damaged PNG"));
+    std::string whole = jpeg(halves(64));
+    for (std::size_t size = 3; size < whole.size(); size += 37) {
+        write_text(path("cut.jpg"), whole.substr(0, size));
+        EXPECT_THAT(complaint_about("cut.jpg"), HasSubstr("damaged JPEG")) << size;
+    }
+    // The height and width in the frame's header.
+    const std::size_t frame = whole.find("\xFF\xC0");
+    ASSERT_NE(frame, std::string::npos);
+    std::string huge = whole;
+    for (std::size_t i = 5; i < 9; ++i) huge[frame + i] = '\x3f';
+    write_text(path("huge.jpg"), huge);
+    EXPECT_THAT(complaint_about("huge.jpg"), HasSubstr("cannot hold"));
+    for (std::size_t i = 5; i < 9; ++i) huge[frame + i] = '\x4f'; // 20,303
+    write_text(path("huger.jpg"), huge);
+    EXPECT_THAT(complaint_about("huger.jpg"), HasSubstr("scale it down"));
+    // Floats that are none, and that no display shows.
+    write_text(path("nan.pfm"), std::string("Pf\n1 1\n-1.0\n") + std::string("\x00\x00\xc0\x7f", 4));
+    EXPECT_THAT(complaint_about("nan.pfm"), AllOf(HasSubstr("pixel (0, 0)"), HasSubstr("not a finite number")));
+    write_text(path("two.pfm"), std::string("Pf\n1 1\n-1.0\n") + std::string("\x00\x00\x00\x40", 4));
+    EXPECT_THAT(complaint_about("two.pfm"), HasSubstr("values from 0 to 1"));
+    EXPECT_THAT(complaint_about("../p.png"), HasSubstr("only files beside the mesh"));
+    EXPECT_THAT(complaint_about(""), AllOf(HasSubstr("line 3"), HasSubstr("names no image")));
+    write_text(path("square.mtl"), "newmtl paint\nKd 1 nan 1\n");
+    EXPECT_THAT(complaint({"build", "square.obj", "-o", "x.vdt"}), AllOf(HasSubstr("square.mtl: line 2"), HasSubstr("from 0 to 1")));
+    EXPECT_EQ(run({"build", "square.obj", "-o", "x.vdt", "--no-texture"}).status, 0);
+    EXPECT_FALSE(fs::exists(path("y.vdt")));
+}
+
+TEST_F(TextureCommandTest, BadCoordinatesAreNamed) {
+    write_png("p.png", halves());
+    write_text(path("none.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    EXPECT_THAT(complaint({"build", "none.obj", "-o", "x.vdt", "--texture", "p.png"}), HasSubstr("no texture coordinates"));
+    write_text(path("nan.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt nan 0\nvt 1 1\nf 1/1 2/2 3/3\n");
+    const Outcome outcome = run({"build", "nan.obj", "-o", "x.vdt", "--texture", "p.png"});
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_THAT(outcome.err, HasSubstr("texture coordinates of vertex 1 are not finite"));
+}
+
+TEST_F(TextureCommandTest, MissingMaterialsAreNoted) {
+    write_text(path("square.obj"), square(4, "mtllib nowhere.mtl\nusemtl paint\n"));
+    const Outcome outcome = run({"build", "square.obj", "-o", "t.vdt"});
+    EXPECT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr("nowhere.mtl"));
+}
+
+TEST_F(TextureCommandTest, WhatCannotFollowThemSaysSo) {
+    write_png("p.png", halves());
+    write_square("p.png");
+    build("square.obj");
+    EXPECT_THAT(complaint({"build", "square.obj", "-o", "x.vdt", "--fold-errors"}), HasSubstr("--no-texture"));
+    EXPECT_THAT(complaint({"simplify", "t.vdt", "-o", "x.obj", "--fold-test", "error"}), HasSubstr("luebke-hallen-safe"));
+    EXPECT_THAT(complaint({"simplify", "t.vdt", "-o", "x.obj", "--chroma"}), HasSubstr("--no-texture"));
+    write_text(path("l.json"), R"({"ambient": 0.1, "lights": [{"type": "headlight", "intensity": 0.5}]})");
+    if (const auto seen = draw("t.vdt", {"--lights", "l.json", "--full"})) {
+        EXPECT_NEAR(seen->first, 0.5 + 99.5 * 0.6, 1);
+        EXPECT_LT(seen->second, 2);
+    }
+    // Half black and half white: only folds within a half are free.
+    const Outcome cut = run({"simplify", "t.vdt", "-o", "x.obj", "--fold-test", "luebke-hallen-safe", "--json", "-"});
+    EXPECT_EQ(cut.status, 0) << cut.err;
+    EXPECT_THAT(effect_named(cut.json(), "texture")["why"].get<std::string>(), HasSubstr("how far they move it"));
+}
+
+} // namespace

@@ -1,0 +1,243 @@
+// Drawing textures: the right texel in the right place, in linear light, and nothing of all that without one.
+#include <cmath>
+#include <memory>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+
+#define GL_GLEXT_PROTOTYPES 1
+#include <GL/glcorearb.h>
+
+#include <render/context.h>
+#include <render/renderer.h>
+#include <vdtree/builder.h>
+#include <vdtree/geomorph.h>
+
+#include "shapes.h"
+#include "textures.h"
+
+namespace unseen {
+namespace {
+
+using vdtree::Cut;
+using vdtree::Mesh;
+using vdtree::Texture;
+using vdtree::VertexTree;
+using vdtree::View;
+
+constexpr glm::dvec3 rec709(0.2126, 0.7152, 0.0722);
+constexpr double code_step = 3e-4; // of linear light: the rounding of half floats and of filters
+
+VertexTree built(const Mesh& mesh) {
+    Result<VertexTree> tree = vdtree::build_tree(mesh.view());
+    if (!tree) throw std::runtime_error(tree.error().message);
+    return std::move(*tree);
+}
+
+Texture four_colours() {
+    Texture texture{2, 2, {}, {}, {}};
+    texture.texels = {{255, 0, 0, 255}, {30, 200, 90, 255}, {10, 20, 250, 255}, {128, 128, 128, 255}};
+    return texture;
+}
+
+class Textured : public testing::Test {
+protected:
+    void SetUp() override {
+        auto context = render::Context::headless();
+        if (!context) GTEST_SKIP() << context.error().message;
+        context_ = std::make_unique<render::Context>(std::move(*context));
+    }
+    // The square 0..n seen straight from the front, filling the window.
+    render::Frame draw(const VertexTree& tree, int n, int window, render::DrawOptions options = {}) const {
+        auto renderer = render::Renderer::create(*context_, tree);
+        if (!renderer) throw std::runtime_error(renderer.error().message);
+        Cut cut(tree);
+        cut.unfold_all();
+        View view;
+        view.width = view.height = window;
+        view.fov_y_degrees = 2 * std::atan(0.5 / 10) * 180 / 3.14159265358979;
+        view.target = {n * 0.5, n * 0.5, 0};
+        view.eye = view.target + glm::dvec3(0, 0, 10.0 * n);
+        auto frame = renderer->draw(cut, view, options);
+        if (!frame) throw std::runtime_error(frame.error().message);
+        return std::move(*frame);
+    }
+    static glm::dvec3 colour(const render::Frame& frame, int x, int y) {
+        const std::size_t i = 3 * static_cast<std::size_t>(y * frame.width + x);
+        return {frame.colour[i], frame.colour[i + 1], frame.colour[i + 2]};
+    }
+    static double luminance(const render::Frame& frame, int x, int y) { return static_cast<double>(frame.luminance[static_cast<std::size_t>(y * frame.width + x)]); }
+    static void expect_near(glm::dvec3 a, glm::dvec3 b, double tolerance) {
+        for (int k = 0; k < 3; ++k) EXPECT_NEAR(a[k], b[k], tolerance) << k;
+    }
+    std::unique_ptr<render::Context> context_;
+};
+
+// Row 0 of the texture is where v is 0: at the bottom of this square.
+TEST_F(Textured, TexelsAreDrawnWhereTheirCoordinatesSay) {
+    const Texture texture = four_colours();
+    for (const auto shading : {render::Shading::smooth, render::Shading::flat}) {
+        const render::Frame frame = draw(built(textures::textured_grid(4, texture)), 4, 64, {.shading = shading});
+        for (int i = 0; i < 2; ++i)
+            for (int k = 0; k < 2; ++k) {
+                const glm::dvec3 expected(vdtree::linear_colour(texture.texels[static_cast<std::size_t>(2 * k + i)]));
+                const int x = 16 + 32 * i, y = 48 - 32 * k;
+                // Beside a texel's centre filtering mixes in a little of the next.
+                expect_near(colour(frame, x, y), expected, 0.04);
+                EXPECT_NEAR(luminance(frame, x, y), glm::dot(colour(frame, x, y), rec709), 1e-5);
+            }
+    }
+    // Halfway between texels: the mean of their light, not of their codes.
+    const render::Frame frame = draw(built(textures::textured_grid(4, texture)), 4, 65);
+    glm::dvec3 mean(0);
+    for (const vdtree::Texel& texel : texture.texels) mean += glm::dvec3(vdtree::linear_colour(texel)) / 4.0;
+    expect_near(colour(frame, 32, 32), mean, 0.01);
+}
+
+TEST_F(Textured, TexelsAreDecodedExactly) {
+    Texture ramp{256, 1, {}, {}, {}};
+    for (int code = 0; code < 256; ++code) {
+        const auto c = static_cast<std::uint8_t>(code);
+        ramp.texels.push_back({c, c, c, 255});
+    }
+    const render::Frame frame = draw(built(textures::textured_grid(1, ramp)), 1, 256, {.samples = 1});
+    for (int code = 1; code < 255; ++code)
+        EXPECT_NEAR(luminance(frame, code, 128), vdtree::linear_luminance(ramp.texels[static_cast<std::size_t>(code)]), code_step) << code;
+}
+
+TEST_F(Textured, AreMultipliedWithTheColoursOfVertices) {
+    Mesh mesh = textures::textured_grid(4, four_colours());
+    mesh.colours.assign(mesh.positions.size(), {0.5f, 0.25f, 1.0f, 1});
+    const render::Frame plain = draw(built(textures::textured_grid(4, four_colours())), 4, 64), tinted = draw(built(mesh), 4, 64);
+    for (const auto& [x, y] : {std::pair(10, 12), std::pair(48, 16), std::pair(33, 40)}) {
+        const glm::dvec3 expected = colour(plain, x, y) * glm::dvec3(0.5, 0.25, 1);
+        expect_near(colour(tinted, x, y), expected, 1e-4);
+        EXPECT_NEAR(luminance(tinted, x, y), glm::dot(expected, rec709), 1e-4);
+    }
+}
+
+TEST_F(Textured, AreLitByTheTreesLight) {
+    const auto relit = built(textures::textured_grid(4, four_colours())).relit({.direction = {0, 0, 1}, .ambient = 0.5f});
+    ASSERT_TRUE(relit);
+    const auto aside = built(textures::textured_grid(4, four_colours())).relit({.direction = {1, 0, 0}, .ambient = 0.5f});
+    ASSERT_TRUE(aside);
+    const render::Frame bright = draw(*relit, 4, 64), dark = draw(*aside, 4, 64);
+    expect_near(colour(dark, 16, 48), colour(bright, 16, 48) * 0.5, 1e-4);
+}
+
+// Fields of a tenth of a pixel: half of them white is half the light, an sRGB code of 188 and not of 128.
+TEST_F(Textured, KeepTheirLightWhereTheyAreSmall) {
+    for (const int samples : {1, 16}) {
+        const render::Frame frame = draw(built(textures::textured_grid(4, textures::checkerboard(512, 512, 1, 0, 255))), 4, 50, {.samples = samples});
+        for (int x = 5; x < 45; x += 7) EXPECT_NEAR(luminance(frame, x, 25), 0.5, 0.02) << samples;
+    }
+    // Sides that no two divides, too.
+    Texture texture{301, 77, {}, {}, {}};
+    for (std::uint32_t i = 0; i < 301 * 77; ++i) {
+        const std::uint8_t code = i % 3 == 0 ? 255 : 0;
+        texture.texels.push_back({code, code, code, 255});
+    }
+    const render::Frame frame = draw(built(textures::textured_grid(4, texture)), 4, 16, {.samples = 1});
+    EXPECT_NEAR(luminance(frame, 8, 8), 1.0 / 3, 0.02);
+}
+
+TEST_F(Textured, RepeatOrEndWhereTheySaySo) {
+    for (const auto wrap : {vdtree::Wrap::repeat, vdtree::Wrap::clamp}) {
+        Mesh mesh = textures::textured_grid(4, four_colours());
+        mesh.texture.wrap_u = mesh.texture.wrap_v = wrap;
+        for (glm::vec2& uv : mesh.uvs) uv = uv * 2.0f;
+        const render::Frame frame = draw(built(mesh), 4, 64);
+        const auto texel = [&](int i) { return glm::dvec3(vdtree::linear_colour(mesh.texture.texels[static_cast<std::size_t>(i)])); };
+        expect_near(colour(frame, 8, 56), texel(0), 0.08);
+        expect_near(colour(frame, 40, 24), texel(wrap == vdtree::Wrap::repeat ? 0 : 3), wrap == vdtree::Wrap::repeat ? 0.08 : code_step);
+    }
+}
+
+TEST_F(Textured, NothingIsMadeWithoutATexture) {
+    const auto count = [] {
+        int objects = 0;
+        for (GLuint name = 1; name < 200; ++name) objects += glIsBuffer(name) + glIsTexture(name);
+        return objects;
+    };
+    const VertexTree tree = built(textures::textured_grid(4, four_colours()));
+    const auto plain = tree.untextured();
+    ASSERT_TRUE(plain);
+    const auto made_for = [&](const VertexTree& t) {
+        const int before = count();
+        auto renderer = render::Renderer::create(*context_, t);
+        EXPECT_TRUE(renderer);
+        return count() - before;
+    };
+    EXPECT_EQ(made_for(tree), made_for(*plain) + 2); // coordinates and image
+    Mesh mesh = textures::textured_grid(4, four_colours());
+    mesh.texture = {};
+    const render::Frame without = draw(*plain, 4, 32), never = draw(built(mesh), 4, 32);
+    EXPECT_EQ(without.luminance, never.luminance);
+}
+
+// Light times texel, plus the highlight, which the texture does not colour; white at most.
+TEST_F(Textured, AreLitByLights) {
+    const Texture texture = four_colours();
+    const VertexTree tree = built(textures::textured_grid(4, texture));
+    vdtree::LightSource sun;
+    sun.direction = {0, 0, 1};
+    for (const auto& [intensity, specular] : {std::pair(0.5, 0.0), std::pair(0.5, 0.04), std::pair(3.0, 0.0)}) {
+        vdtree::Lighting lighting;
+        lighting.ambient = 0.1;
+        lighting.specular = specular;
+        lighting.shininess = 1; // so that it hardly changes over the square
+        lighting.lights = {sun};
+        lighting.lights[0].intensity = intensity;
+        for (const auto shading : {render::Shading::smooth, render::Shading::flat}) {
+            render::DrawOptions options{.shading = shading};
+            const render::Frame plain = draw(tree, 4, 64, options);
+            options.lighting = &lighting;
+            const render::Frame lit = draw(tree, 4, 64, options);
+            for (const auto& [x, y] : {std::pair(16, 16), std::pair(48, 16), std::pair(16, 48), std::pair(30, 33)}) {
+                glm::dvec3 expected = colour(plain, x, y) * (0.1 + intensity) + intensity * specular * 9 / 8;
+                expected /= std::max(1.0, glm::dot(expected, rec709));
+                expect_near(colour(lit, x, y), expected, 1e-3);
+                EXPECT_NEAR(luminance(lit, x, y), glm::dot(expected, rec709), 1e-3);
+            }
+        }
+    }
+}
+
+// Any vertex under any texel, in the range of its node.
+TEST_F(Textured, AreBoundedUnderLights) {
+    Mesh mesh = textures::textured_sphere(3, textures::noise(40, 40, 6));
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v) mesh.colours.push_back({0.3f + 0.7f * static_cast<float>(v % 2), 0.8f, v % 3 ? 0.2f : 1.0f, 1});
+    const VertexTree tree = built(mesh);
+    const auto bounds = vdtree::LightBounds::measure(tree);
+    ASSERT_TRUE(bounds);
+    vdtree::Lighting lighting;
+    lighting.ambient = 0.1;
+    lighting.specular = 0.05;
+    lighting.shininess = 20;
+    vdtree::LightSource sun;
+    sun.direction = glm::normalize(glm::dvec3(0.4, 0.7, 0.6));
+    sun.intensity = 0.8;
+    lighting.lights = {sun};
+    const glm::dvec3 eye(0, 0, 4);
+    vdtree::Lighting dull = lighting;
+    dull.specular = 0;
+    for (vdtree::NodeId node = 0; node < tree.interior_count(); ++node) {
+        const vdtree::LuminanceRange range = vdtree::lit_range(lighting, bounds->cones()[node], tree.bounds()[node].ring, eye);
+        for (vdtree::Index leaf = tree.first_leaf()[node]; leaf < tree.leaf_end()[node]; ++leaf) {
+            const vdtree::NodeId vertex = tree.interior_count() + leaf;
+            const glm::dvec3 p(tree.positions()[vertex]), n(glm::vec3(tree.normals()[vertex])), rgb(tree.colours()[vertex]);
+            const double light = vdtree::lit_luminance(dull, p, n, 1, eye), both = vdtree::lit_luminance(lighting, p, n, 1, eye);
+            const auto at = [&](float u) { return static_cast<std::size_t>((u - std::floor(u)) * 40) % 40; };
+            const glm::vec2 uv = tree.uvs()[vertex];
+            const glm::dvec3 texel(vdtree::linear_colour(mesh.texture.texels[at(uv.y) * 40 + at(uv.x)]));
+            const double shown = std::min(1.0, glm::dot(rgb * texel, rec709) * light + (both < 1 ? both - light : 0));
+            EXPECT_GE(range.hi, shown - 1e-5) << node;
+            if (both < 1) {
+                EXPECT_LE(range.lo, shown + 1e-5) << node;
+            }
+        }
+    }
+}
+
+} // namespace
+} // namespace unseen

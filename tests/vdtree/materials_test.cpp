@@ -1,0 +1,87 @@
+// What files say of materials: colours, opacity and the names of images; nothing of it is decoded here.
+#include <fstream>
+
+#include <gtest/gtest.h>
+
+#include <vdtree/mesh_io.h>
+
+#include "temp_folder.h"
+
+namespace unseen::vdtree {
+namespace {
+
+class Materials : public testing::Test {
+protected:
+    void write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name, std::ios::binary) << text; }
+    Result<ReadResult> read(const std::string& mtl, const std::string& library = "m.mtl", ReadOptions options = {}) const {
+        write("m.mtl", mtl);
+        write("m.obj", "mtllib " + library + "\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n");
+        return read_mesh(folder_ / "m.obj", options);
+    }
+    Material first(const std::string& mtl) const {
+        const auto result = read(mtl);
+        if (!result) throw std::runtime_error(result.error().message);
+        return result->materials.at(0);
+    }
+    std::string complaint(const std::string& mtl) const {
+        const auto result = read(mtl);
+        return result ? "none" : result.error().message;
+    }
+    support::TempFolder folder_;
+};
+
+TEST_F(Materials, OfObjectsAreRead) {
+    const Material plain = first("# by hand\nKd 0.1 0.1 0.1\nnewmtl a\nKd 1 0 0.5\nillum 2\nd 0.25\n");
+    EXPECT_EQ(plain.name, "a");
+    EXPECT_NEAR(plain.colour.r, 1, 1e-6);
+    EXPECT_NEAR(plain.colour.b, 0.2140411, 1e-5); // decoded from sRGB
+    EXPECT_EQ(plain.colour.a, 0.25f);
+    EXPECT_FALSE(plain.has_image());
+    EXPECT_EQ(first("newmtl a\nTr 0.25\n").colour.a, 0.75f);
+    EXPECT_NEAR(first("newmtl a\nKd 0.5\n").colour.g, 0.2140411, 1e-5);
+    EXPECT_EQ(first("newmtl a\nKd spectral f.rfl\n").colour, glm::vec4(1));
+
+    EXPECT_EQ(first("newmtl a\nmap_Kd  my image.png \r\n").image, "my image.png");
+    const Material clamped = first("newmtl a\nmap_Kd -blendu on -mm 0 1 -s 2 3 -clamp on textures\\p.jpg\n");
+    EXPECT_EQ(clamped.image, "textures/p.jpg");
+    EXPECT_EQ(clamped.wrap_u, Wrap::clamp);
+    EXPECT_EQ(clamped.wrap_v, Wrap::clamp);
+    const auto scaled = read("newmtl a\nmap_Kd -s 2 3 4 p.png\n");
+    ASSERT_TRUE(scaled);
+    EXPECT_EQ(scaled->materials[0].image, "p.png");
+    ASSERT_EQ(scaled->warnings.size(), 1u);
+    EXPECT_NE(scaled->warnings[0].find("'-s' of an image was ignored"), std::string::npos) << scaled->warnings[0];
+
+    // The first of a name counts, and a library that is named twice is read once.
+    write("n.mtl", "newmtl a\nKd 0 0 0\nnewmtl b\n");
+    const auto several = read("newmtl a\nKd 1 1 1\n", "m.mtl n.mtl\nmtllib m.mtl");
+    ASSERT_TRUE(several);
+    ASSERT_EQ(several->materials.size(), 2u);
+    EXPECT_EQ(several->materials[0].colour, glm::vec4(1));
+    EXPECT_EQ(several->materials[1].name, "b");
+}
+
+TEST_F(Materials, ThatCannotBeReadAreNotedAndBadOnesAreNot) {
+    EXPECT_NE(complaint("newmtl a\nKd 1 2 1\n").find("m.mtl: line 2"), std::string::npos);
+    EXPECT_NE(complaint("newmtl a\nKd 1 nan 1\n").find("from 0 to 1"), std::string::npos);
+    EXPECT_NE(complaint("newmtl a\nKd\n").find("from 0 to 1"), std::string::npos);
+    EXPECT_NE(complaint("newmtl a\nd inf\n").find("opacity of material 'a'"), std::string::npos);
+    EXPECT_NE(complaint("newmtl a\nmap_Kd -clamp on\n").find("names no image"), std::string::npos);
+    for (const char* image : {"../p.png", "/etc/p.png", "C:\\p.png", "http://a/p.png", "x/../../p.png"})
+        EXPECT_NE(complaint(std::string("newmtl a\nmap_Kd ") + image + "\n").find("only files beside the mesh"), std::string::npos) << image;
+    EXPECT_NE(complaint(std::string("newmtl a\nKd 1 1 1\0\n", 20)).find("NUL byte"), std::string::npos);
+    for (const char* library : {"nowhere.mtl", "../m.mtl", ""}) {
+        const auto result = read("newmtl a\n", library);
+        ASSERT_TRUE(result) << result.error().message;
+        EXPECT_TRUE(result->materials.empty());
+        EXPECT_EQ(result->warnings.size(), *library ? 1u : 0u);
+    }
+    ReadOptions without;
+    without.materials = false;
+    const auto result = read("newmtl a\nKd nan\n", "m.mtl", without);
+    ASSERT_TRUE(result);
+    EXPECT_TRUE(result->materials.empty());
+}
+
+} // namespace
+} // namespace unseen::vdtree

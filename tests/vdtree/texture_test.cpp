@@ -1,0 +1,382 @@
+// Textures: what pyramids say of them against every texel, and what trees with textures promise.
+#include <vdtree/texture.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include <vdtree/builder.h>
+#include <vdtree/cut.h>
+#include <vdtree/cut_rings.h>
+#include <vdtree/fold_errors.h>
+#include <vdtree/tree_io.h>
+
+#include "shapes.h"
+#include "temp_folder.h"
+#include "textures.h"
+#include "tree_file.h"
+
+namespace unseen::vdtree {
+namespace {
+
+VertexTree built(const Mesh& mesh, const BuildOptions& options = {}) {
+    Result<VertexTree> tree = build_tree(mesh.view(), options);
+    if (!tree) throw std::runtime_error(tree.error().message);
+    return std::move(*tree);
+}
+
+// What filters on graphics processors do, in double.
+double bilinear(const Texture& texture, double u, double v) {
+    const double x = u * texture.width - 0.5, y = v * texture.height - 0.5;
+    const auto wrapped = [](double i, std::uint32_t n, Wrap wrap) {
+        const double size = n;
+        return static_cast<std::size_t>(wrap == Wrap::clamp ? std::clamp(i, 0.0, size - 1) : i - size * std::floor(i / size));
+    };
+    const auto at = [&](double i, double j) {
+        return linear_luminance(texture.texels[wrapped(j, texture.height, texture.wrap_v) * texture.width + wrapped(i, texture.width, texture.wrap_u)]);
+    };
+    const double i = std::floor(x), j = std::floor(y), s = x - i, t = y - j;
+    return (1 - t) * ((1 - s) * at(i, j) + s * at(i + 1, j)) + t * ((1 - s) * at(i, j + 1) + s * at(i + 1, j + 1));
+}
+
+TEST(TexturePyramid, HoldsWhatFilteringReturns) {
+    std::mt19937_64 random(3);
+    int tight = 0, looked = 0;
+    for (const auto& [width, height] : {std::pair(64u, 64u), std::pair(37u, 19u), std::pair(1u, 1u), std::pair(100u, 3u)}) {
+        for (const Wrap wrap : {Wrap::repeat, Wrap::clamp}) {
+            Texture texture = textures::noise(width, height, 7);
+            texture.wrap_u = wrap;
+            const TexturePyramid pyramid(texture.view());
+            for (int trial = 0; trial < 300; ++trial) {
+                const double size = std::exp2(shapes::random_between(random, -8, 1));
+                const glm::vec2 lo(shapes::random_between(random, -2, 2), shapes::random_between(random, -2, 2));
+                const glm::vec2 hi = lo + glm::vec2(size * shapes::random_unit(random), size * shapes::random_unit(random));
+                const TexturePyramid::Range range = pyramid.range({lo, hi});
+                double least = 1, most = 0;
+                for (int k = 0; k < 40; ++k) {
+                    const double u = shapes::random_between(random, lo.x, hi.x), v = shapes::random_between(random, lo.y, hi.y);
+                    const double y = bilinear(texture, u, v);
+                    EXPECT_LE(range.lo, y);
+                    EXPECT_GE(range.hi, y);
+                    least = std::min(least, y), most = std::max(most, y);
+                }
+                // Nothing that is not near: a seventh of the longer side, and the texel that filters reach for.
+                if (wrap == Wrap::repeat) {
+                    const float w = static_cast<float>(width), h = static_cast<float>(height), longer = std::max((hi.x - lo.x) * w, (hi.y - lo.y) * h);
+                    const glm::vec2 around((longer / 7 + 2) / w, (longer / 7 + 2) / h);
+                    const auto lies_near = [](double at, float first, float last) { return at - std::floor(at - static_cast<double>(first)) <= static_cast<double>(last); };
+                    double least_near = 1, most_near = 0;
+                    for (std::uint32_t y = 0; y < height; ++y)
+                        for (std::uint32_t x = 0; x < width; ++x) {
+                            if (!lies_near((x + 0.5) / width, lo.x - around.x, hi.x + around.x) || !lies_near((y + 0.5) / height, lo.y - around.y, hi.y + around.y))
+                                continue;
+                            const double luminance = linear_luminance(texture.texels[y * width + x]);
+                            least_near = std::min(least_near, luminance), most_near = std::max(most_near, luminance);
+                        }
+                    EXPECT_GE(range.lo, least_near - 1e-3);
+                    EXPECT_LE(range.hi, most_near + 1e-3);
+                }
+                ++looked;
+                tight += range.lo >= least - 0.1 && range.hi <= most + 0.1;
+            }
+        }
+    }
+    EXPECT_GT(tight, looked / 4); // it is not just everything
+}
+
+TEST(TexturePyramid, OfABoxWithinAnotherLiesWithinTheOthers) {
+    std::mt19937_64 random(4);
+    Texture texture = textures::noise(90, 70, 2);
+    const TexturePyramid pyramid(texture.view());
+    for (int trial = 0; trial < 5000; ++trial) {
+        UvBox inner, outer;
+        for (int k = 0; k < 2; ++k) {
+            const double size = std::exp2(shapes::random_between(random, -7, 1));
+            inner.include(glm::vec2(size * shapes::random_between(random, -2, 2), size * shapes::random_between(random, -2, 2)));
+            outer.include(glm::vec2(size * shapes::random_between(random, -2, 2), size * shapes::random_between(random, -2, 2)));
+        }
+        outer.include(inner);
+        const auto a = pyramid.range(inner), b = pyramid.range(outer);
+        EXPECT_LE(b.lo, a.lo);
+        EXPECT_GE(b.hi, a.hi);
+    }
+}
+
+TEST(TexturePyramid, TakesCoordinatesThatAreNowhere) {
+    const Texture texture = textures::checkerboard(16, 16, 4, 0, 255);
+    const TexturePyramid pyramid(texture.view());
+    const float far = 3e38f;
+    for (const UvBox& box : {UvBox{{-far, -far}, {far, far}}, UvBox{{far, far}, {far, far}}, UvBox{}}) {
+        EXPECT_EQ(pyramid.range(box).lo, Unorm16{0});
+        EXPECT_EQ(pyramid.range(box).hi, Unorm16{Unorm16::largest});
+    }
+    EXPECT_NEAR(pyramid.mean({1e30, 0}, 1), 0.5, 0.01);
+    EXPECT_NEAR(pyramid.mean({0.3, 0.7}, 8), 0.5, 0.01);
+    EXPECT_NEAR(pyramid.mean({2.0 / 16, 2.0 / 16}, 0), 0, 0.01);
+}
+
+TEST(Textures, AreCheckedBeforeTheyAreLaid) {
+    Mesh mesh = textures::textured_grid(3, textures::checkerboard(8, 8, 2, 0, 255));
+    const auto complaint = [](const Mesh& m) {
+        const auto tree = build_tree(m.view());
+        return tree ? std::string() : tree.error().message;
+    };
+    EXPECT_EQ(complaint(mesh), "");
+    Mesh bad = mesh;
+    bad.texture.texels.pop_back();
+    EXPECT_NE(complaint(bad).find("8 x 8 texels holds 63"), std::string::npos) << complaint(bad);
+    bad = mesh;
+    bad.texture.width = 0;
+    EXPECT_NE(complaint(bad).find("empty"), std::string::npos);
+    bad = mesh;
+    bad.texture.width = 100000;
+    EXPECT_NE(complaint(bad).find("scale it down"), std::string::npos);
+    bad = mesh;
+    bad.uvs.clear();
+    EXPECT_NE(complaint(bad).find("no UVs"), std::string::npos);
+    bad = mesh;
+    bad.uvs[2].y = std::nanf("");
+    EXPECT_NE(complaint(bad).find("texture coordinates of vertex 2"), std::string::npos) << complaint(bad);
+    bad = mesh;
+    bad.colours.assign(mesh.positions.size(), glm::vec4(1));
+    bad.colours[4].g = 1.5f;
+    EXPECT_NE(complaint(bad).find("of vertex 4"), std::string::npos) << complaint(bad);
+}
+
+Mesh with_colours(Mesh mesh) {
+    std::mt19937_64 random(9);
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v)
+        mesh.colours.push_back({shapes::random_unit(random), shapes::random_unit(random), shapes::random_unit(random), 1});
+    return mesh;
+}
+
+Mesh textured_cases(int which) {
+    const Texture noise = textures::noise(61, 40, 5);
+    switch (which) {
+    case 0: return textures::textured_sphere(4, noise);
+    case 1: return textures::textured_grid(20, textures::checkerboard(32, 32, 4, 20, 230));
+    case 2: return with_colours(textures::textured_sphere(3, noise));
+    case 3: return textures::with_seams(textures::textured_sphere(3, noise));
+    default: return textures::with_uvs(shapes::random_soup(200, 400, 3), noise);
+    }
+}
+
+TEST(Textures, BoundTheRingsOfAllMeshes) {
+    for (int which = 0; which < 5; ++which) {
+        for (const ClustererKind clusterer : {ClustererKind::quadric, ClustererKind::octree}) {
+            const VertexTree tree = built(textured_cases(which), {.clusterer = clusterer});
+            const auto sound = verify(tree);
+            EXPECT_TRUE(sound) << which << ": " << sound.error().message;
+            EXPECT_TRUE(tree.is_prelit());
+            EXPECT_EQ(tree.ring_texture().size(), tree.interior_count());
+            const auto relit = tree.relit({.direction = {0, 0, 1}, .ambient = 0.1f});
+            ASSERT_TRUE(relit);
+            EXPECT_TRUE(verify(*relit)) << verify(*relit).error().message;
+        }
+    }
+}
+
+// Triangles of any cut show, anywhere, what the ring of their largest node says; and where they show one place of the texture, they are
+// as near to each other as it says.
+TEST(Textures, BoundTheRingsOfAllCuts) {
+    std::mt19937_64 random(17);
+    int looked = 0;
+    for (int which = 0; which < 5; ++which) {
+        const Mesh mesh = textured_cases(which);
+        const VertexTree tree = built(mesh);
+        const CutRings rings = bound_cut_rings(tree);
+        const auto is_larger = [&](NodeId a, NodeId b) {
+            const float ra = tree.support_spheres()[a].radius, rb = tree.support_spheres()[b].radius;
+            return ra != rb ? ra > rb : a < b;
+        };
+        for (int trial = 0; trial < 30; ++trial) {
+            const double keep = shapes::random_unit(random);
+            std::vector<float> costs(tree.interior_count());
+            for (NodeId node = 0; node < costs.size(); ++node)
+                costs[node] = (node == 0 || costs[tree.parents()[node]] > 1) && shapes::random_unit(random) < 1 - keep / 20 ? 2.0f : 0.0f;
+            Cut cut(tree);
+            cut.adjust([&](const VertexTree&, std::span<const NodeId> nodes, std::span<float> out) {
+                for (std::size_t i = 0; i < nodes.size(); ++i) out[i] = costs[nodes[i]];
+            });
+            const auto indices = cut.indices();
+            for (std::size_t i = 0; i < indices.size(); i += 3) {
+                NodeId largest = no_node;
+                for (std::size_t k = 0; k < 3; ++k)
+                    if (!tree.is_leaf(indices[i + k]) && (largest == no_node || is_larger(indices[i + k], largest))) largest = indices[i + k];
+                if (largest == no_node || tree.support_spheres()[largest].radius == 0) continue;
+                for (int k = 0; k < 4; ++k) {
+                    double a = shapes::random_unit(random), b = shapes::random_unit(random);
+                    if (a + b > 1) a = 1 - a, b = 1 - b;
+                    const std::array<double, 3> weights = {1 - a - b, a, b};
+                    glm::dvec2 uv(0);
+                    glm::dvec3 rgb(0);
+                    for (std::size_t c = 0; c < 3; ++c) {
+                        const NodeId node = indices[i + c];
+                        uv += weights[c] * glm::dvec2(tree.uvs()[node]);
+                        const double y = tree.luminance()[node];
+                        glm::dvec3 shade(y);
+                        if (!tree.colours().empty()) {
+                            const glm::dvec3 colour(tree.colours()[node]);
+                            shade = colour * (y / (0.2126 * colour.r + 0.7152 * colour.g + 0.0722 * colour.b));
+                        }
+                        rgb += weights[c] * shade;
+                    }
+                    // The texel there, for noise's texels differ in all channels.
+                    const auto at = [&](double x, std::uint32_t n) { return std::min<std::size_t>(n - 1, static_cast<std::size_t>((x - std::floor(x)) * n)); };
+                    const Texture& texture = mesh.texture;
+                    const glm::dvec3 texel(linear_colour(texture.texels[at(uv.y, texture.height) * texture.width + at(uv.x, texture.width)]));
+                    const double shown = 0.2126 * rgb.r * texel.r + 0.7152 * rgb.g * texel.g + 0.0722 * rgb.b * texel.b;
+                    EXPECT_LE(rings.luminance[largest].lo, shown + 1e-6) << which;
+                    EXPECT_GE(rings.luminance[largest].hi, shown - 1e-6) << which;
+                    ++looked;
+                }
+            }
+        }
+        for (NodeId node = 1; node < tree.interior_count(); ++node) {
+            const NodeId parent = tree.parents()[node];
+            EXPECT_LE(rings.texture_deviation[node], rings.texture_deviation[parent]);
+            EXPECT_LE(rings.texture[parent].lo, rings.texture[node].lo);
+            EXPECT_GE(rings.texture[parent].hi, rings.texture[node].hi);
+            EXPECT_LE(rings.vertices[parent].lo, rings.vertices[node].lo);
+            EXPECT_GE(rings.vertices[parent].hi, rings.vertices[node].hi);
+            EXPECT_LE(rings.luminance[parent].lo, rings.luminance[node].lo);
+            EXPECT_GE(rings.luminance[parent].hi, rings.luminance[node].hi);
+        }
+    }
+    EXPECT_GT(looked, 10000);
+}
+
+// Two points of triangles around a node that show the same place of the texture, in the mesh and after all below it has folded.
+TEST(Textures, MoveByNoMoreThanTheirDeviation) {
+    const VertexTree flat = built(textures::textured_grid(24, textures::noise(32, 32, 1)));
+    const CutRings of_flat = bound_cut_rings(flat);
+    const float size = flat.support_spheres()[0].radius;
+    for (NodeId node = 0; node < flat.interior_count(); ++node) EXPECT_LE(of_flat.texture_deviation[node], 1e-5f * size);
+
+    const VertexTree sphere = built(textures::textured_sphere(4, textures::noise(32, 32, 1)));
+    const CutRings of_sphere = bound_cut_rings(sphere);
+    int smaller = 0, looked = 0;
+    for (NodeId node = 0; node < sphere.interior_count(); ++node) {
+        EXPECT_LE(of_sphere.texture_deviation[node], 2 * of_sphere.radius[node]);
+        if (sphere.support_spheres()[node].radius > 0.2f || sphere.support_spheres()[node].radius == 0) continue;
+        smaller += of_sphere.texture_deviation[node] < 0.5f * sphere.support_spheres()[node].radius;
+        ++looked;
+        // The proxy's place in the texture, on the mesh's triangles around.
+        const glm::dvec2 uv(sphere.uvs()[node]);
+        const glm::dvec3 proxy(sphere.positions()[node]);
+        for (Index t = 0; t < sphere.triangle_count(); ++t) {
+            const Triangle& corners = sphere.triangles()[t];
+            const bool is_around = std::any_of(corners.begin(), corners.end(), [&](Index leaf) { return sphere.first_leaf()[node] <= leaf && leaf < sphere.leaf_end()[node]; });
+            if (!is_around) continue;
+            const auto u = [&](int k) { return glm::dvec2(sphere.uvs()[sphere.interior_count() + corners[static_cast<std::size_t>(k)]]); };
+            const auto p = [&](int k) { return glm::dvec3(sphere.positions()[sphere.interior_count() + corners[static_cast<std::size_t>(k)]]); };
+            const glm::dvec2 e = u(1) - u(0), f = u(2) - u(0), to = uv - u(0);
+            const double area = e.x * f.y - e.y * f.x;
+            if (std::abs(area) < 1e-12) continue;
+            const double b = (to.x * f.y - to.y * f.x) / area, c = (e.x * to.y - e.y * to.x) / area;
+            if (b < 0 || c < 0 || b + c > 1) continue;
+            const glm::dvec3 before = p(0) + b * (p(1) - p(0)) + c * (p(2) - p(0));
+            EXPECT_LE(glm::length(before - proxy), static_cast<double>(of_sphere.texture_deviation[node]) * (1 + 1e-6)) << node;
+        }
+    }
+    EXPECT_GT(smaller, looked / 4);
+}
+
+TEST(Textures, AreKeptInFiles) {
+    const support::TempFolder folder;
+    const std::filesystem::path file = folder.path() / "t.vdt";
+    Mesh mesh = textures::with_seams(textures::textured_sphere(3, textures::noise(33, 20, 8)));
+    mesh.texture.wrap_v = Wrap::clamp;
+    const VertexTree tree = built(mesh);
+    ASSERT_TRUE(write_tree(file, tree));
+    for (const bool mapped : {false, true}) {
+        const auto again = mapped ? map_tree(file) : read_tree(file);
+        ASSERT_TRUE(again) << again.error().message;
+        const TextureView texture = again->texture();
+        EXPECT_EQ(texture.width, 33u);
+        EXPECT_EQ(texture.height, 20u);
+        EXPECT_EQ(texture.wrap_u, Wrap::repeat);
+        EXPECT_EQ(texture.wrap_v, Wrap::clamp);
+        EXPECT_TRUE(std::equal(texture.texels.begin(), texture.texels.end(), mesh.texture.texels.begin(), mesh.texture.texels.end()));
+        EXPECT_TRUE(std::equal(again->ring_texture().begin(), again->ring_texture().end(), tree.ring_texture().begin(), tree.ring_texture().end()));
+        EXPECT_TRUE(verify(*again));
+    }
+    // Without it, the file is that of a mesh without texture.
+    const auto plain = tree.untextured();
+    ASSERT_TRUE(plain);
+    ASSERT_TRUE(write_tree(file, *plain));
+    const auto again = read_tree(file);
+    ASSERT_TRUE(again) << again.error().message;
+    EXPECT_TRUE(again->texture().empty());
+    EXPECT_FALSE(again->is_prelit());
+    EXPECT_TRUE(verify(*again)) << verify(*again).error().message;
+    EXPECT_FLOAT_EQ(again->luminance_range().hi, plain->luminance_range().hi);
+}
+
+TEST(Textures, OfDamagedFilesAreRefused) {
+    const support::TempFolder folder;
+    const std::filesystem::path file = folder.path() / "t.vdt";
+    ASSERT_TRUE(write_tree(file, built(textures::textured_sphere(2, textures::noise(8, 8, 8)))));
+    const std::string whole = support::read_bytes(file);
+    const auto complaint = [&](auto&& damage) {
+        support::TreeFile parts = support::TreeFile::parse(whole);
+        damage(parts);
+        std::ofstream(file, std::ios::binary) << parts.bytes();
+        std::string all;
+        for (const bool mapped : {false, true}) {
+            const auto tree = mapped ? map_tree(file) : read_tree(file);
+            all += tree ? "none;" : tree.error().message + ";";
+        }
+        return all;
+    };
+    using Parts = support::TreeFile;
+    EXPECT_EQ(complaint([](Parts&) {}), "none;none;");
+    const auto expect = [&](const char* words, int times, auto&& damage) {
+        const std::string found = complaint(damage);
+        int count = 0;
+        for (std::size_t at = found.find(words); at != std::string::npos; at = found.find(words, at + 1)) ++count;
+        EXPECT_EQ(count, times) << found;
+    };
+    for (const std::uint32_t width : {0u, 7u, 9u, 0xffffffffu}) expect("texture", 2, [&](Parts& p) { p["texture"].set<std::uint32_t>(0, width); });
+    expect("repeats", 2, [](Parts& p) { p["texture"].set<std::uint32_t>(2, 5u); });
+    expect("texels", 2, [](Parts& p) { p["texels"].data.resize(4 * 63); });
+    expect("texture", 2, [](Parts& p) { p["texture"].data += p["texture"].data; });
+    expect("texture", 2, [](Parts& p) { p["uvs"].data.clear(); });
+    expect("ring_texture", 2, [](Parts& p) { p["ring_texture"].data.resize(4); });
+    expect("ends before it begins", 1, [](Parts& p) { // not looked at where it is mapped: it can only draw another picture
+        p["ring_texture"].set<std::uint16_t>(0, 60000);
+        p["ring_texture"].set<std::uint16_t>(1, 1);
+    });
+    for (const char* name : {"texture", "texels", "ring_texture"})
+        expect("Section", 2, [&](Parts& p) { std::erase_if(p.sections, [&](const auto& s) { return s.name == name; }); });
+}
+
+// Coincident vertices with the same texture coordinates merge for free; those of a seam do not.
+TEST(Textures, StayAtTheirSeams) {
+    Mesh mesh = textures::textured_grid(8, textures::checkerboard(32, 32, 16, 0, 255));
+    Mesh unwelded = shapes::unwelded(mesh);
+    unwelded.texture = mesh.texture;
+    const VertexTree split = built(unwelded), seamed = built(textures::with_seams(mesh, 4));
+    const auto contrast_of_coincident = [](const VertexTree& tree) {
+        float most = 0;
+        for (NodeId node = 0; node < tree.interior_count(); ++node)
+            if (tree.support_spheres()[node].radius == 0) most = std::max(most, tree.ring_luminance()[node].hi - tree.ring_luminance()[node].lo);
+        return most;
+    };
+    EXPECT_EQ(contrast_of_coincident(split), 0);
+    EXPECT_GT(contrast_of_coincident(seamed), 0.5f);
+}
+
+TEST(Textures, AreNotMeasuredByFoldErrors) {
+    const VertexTree tree = built(textures::textured_grid(4, textures::checkerboard(8, 8, 2, 0, 255)));
+    const auto measured = with_fold_errors(tree);
+    ASSERT_FALSE(measured);
+    EXPECT_NE(measured.error().message.find("texture"), std::string::npos);
+    EXPECT_TRUE(with_fold_errors(*tree.untextured()));
+}
+
+} // namespace
+} // namespace unseen::vdtree

@@ -1,0 +1,178 @@
+// Pyramids of the least, the largest and the mean luminance of textures.
+#include <vdtree/texture.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include <tbb/parallel_for.h>
+
+namespace unseen::vdtree {
+
+namespace {
+
+// IEC 61966-2-1.
+double decoded(int code) {
+    const double c = code / 255.0;
+    return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
+}
+
+const std::array<double, 256>& linear_of_code() {
+    static const std::array<double, 256> table = [] {
+        std::array<double, 256> t{};
+        for (int code = 0; code < 256; ++code) t[static_cast<std::size_t>(code)] = decoded(code);
+        return t;
+    }();
+    return table;
+}
+
+// Filters on graphics processors place their samples to 1/256 of a texel, and keep light in half floats.
+constexpr double placing_slack = 1.0 / 64;  // texels
+constexpr double float_slack = 4e-7;        // of a coordinate: a few roundings of its float on the way to the texel
+constexpr double decoding_slack = 1.0 / 4096; // of a luminance, and of 1/16 at least
+// Ranges are looked up in boxes of up to so many cells a side: less than a seventh of it is looked up too much.
+constexpr std::int64_t most_cells = 16;
+// Beyond, a coordinate in float has no texel of its own any more.
+constexpr double farthest_coordinate = 1 << 23; // texels
+
+Unorm16 rounded_down(double y) {
+    const double slack = decoding_slack * std::max(y, 1.0 / 16);
+    return {static_cast<std::uint16_t>(std::clamp(std::floor((y - slack) * Unorm16::largest), 0.0, double{Unorm16::largest}))};
+}
+Unorm16 rounded_up(double y) {
+    const double slack = decoding_slack * std::max(y, 1.0 / 16);
+    return {static_cast<std::uint16_t>(std::clamp(std::ceil((y + slack) * Unorm16::largest), 0.0, double{Unorm16::largest}))};
+}
+
+TexturePyramid::Range unite(TexturePyramid::Range a, TexturePyramid::Range b) { return {std::min(a.lo, b.lo), std::max(a.hi, b.hi)}; }
+
+constexpr TexturePyramid::Range empty_range{{Unorm16::largest}, {0}};
+
+} // namespace
+
+Result<void> validate(const TextureView& texture) {
+    if (texture.texels.empty() && texture.width == 0 && texture.height == 0) return {};
+    const auto invalid = [](const std::string& what) { return Error{ErrorCode::malformed_data, what}; };
+    const std::string size = std::to_string(texture.width) + " x " + std::to_string(texture.height);
+    if (texture.width == 0 || texture.height == 0) return invalid("The texture of " + size + " texels is empty; give another one.");
+    if (texture.width > largest_texture_side || texture.height > largest_texture_side)
+        return invalid("The texture has " + size + " texels, and at most " + std::to_string(largest_texture_side) + " a side can be drawn; scale it down.");
+    if (texture.texels.size() != std::size_t{texture.width} * texture.height)
+        return invalid("The texture of " + size + " texels holds " + std::to_string(texture.texels.size()) + "; give as many as it says.");
+    for (const Wrap wrap : {texture.wrap_u, texture.wrap_v})
+        if (wrap != Wrap::repeat && wrap != Wrap::clamp) return invalid("The texture repeats in a way that is not known.");
+    return {};
+}
+
+glm::vec4 linear_colour(Texel texel) noexcept {
+    const auto& linear = linear_of_code();
+    return {static_cast<float>(linear[texel[0]]), static_cast<float>(linear[texel[1]]), static_cast<float>(linear[texel[2]]),
+            static_cast<float>(texel[3]) / 255.0f};
+}
+
+double linear_luminance(Texel texel) noexcept {
+    const auto& linear = linear_of_code();
+    return 0.2126 * linear[texel[0]] + 0.7152 * linear[texel[1]] + 0.0722 * linear[texel[2]];
+}
+
+TexturePyramid::TexturePyramid(const TextureView& texture)
+    : width_(texture.width), height_(texture.height), wrap_u_(texture.wrap_u), wrap_v_(texture.wrap_v) {
+    Level base{width_, height_, {}, {}};
+    base.ranges.resize(texture.texels.size());
+    base.means.resize(texture.texels.size());
+    tbb::parallel_for(std::size_t{0}, std::size_t{height_}, [&](std::size_t y) {
+        for (std::size_t i = y * width_; i < (y + 1) * width_; ++i) {
+            const double luminance = linear_luminance(texture.texels[i]);
+            base.ranges[i] = {rounded_down(luminance), rounded_up(luminance)};
+            base.means[i] = static_cast<float>(luminance);
+        }
+    });
+    levels_.push_back(std::move(base));
+    while (levels_.back().width > 1 || levels_.back().height > 1) {
+        const Level& fine = levels_.back();
+        Level coarse{(fine.width + 1) / 2, (fine.height + 1) / 2, {}, {}};
+        coarse.ranges.resize(std::size_t{coarse.width} * coarse.height);
+        coarse.means.resize(coarse.ranges.size());
+        tbb::parallel_for(std::uint32_t{0}, coarse.height, [&](std::uint32_t y) {
+            for (std::uint32_t x = 0; x < coarse.width; ++x) {
+                Range range = empty_range;
+                double sum = 0;
+                int count = 0;
+                for (std::uint32_t fy = 2 * y; fy < std::min(2 * y + 2, fine.height); ++fy) {
+                    for (std::uint32_t fx = 2 * x; fx < std::min(2 * x + 2, fine.width); ++fx) {
+                        const std::size_t i = std::size_t{fy} * fine.width + fx;
+                        range = unite(range, fine.ranges[i]);
+                        sum += static_cast<double>(fine.means[i]);
+                        ++count;
+                    }
+                }
+                const std::size_t i = std::size_t{y} * coarse.width + x;
+                coarse.ranges[i] = range;
+                coarse.means[i] = static_cast<float>(sum / count);
+            }
+        });
+        levels_.push_back(std::move(coarse));
+    }
+}
+
+// The texels between which filtering interpolates.
+TexturePyramid::Cells TexturePyramid::texels_of(double lo, double hi, std::uint32_t size, Wrap wrap) {
+    const std::int64_t n = size;
+    const double first = lo * size, last = hi * size;
+    const double slack = placing_slack + float_slack * std::max(std::abs(first), std::abs(last));
+    if (!(std::abs(first) < farthest_coordinate) || !(std::abs(last) < farthest_coordinate)) return {0, n - 1, -1};
+    const auto begin = static_cast<std::int64_t>(std::floor(first - 0.5 - slack)), end = static_cast<std::int64_t>(std::floor(last + 0.5 + slack));
+    if (wrap == Wrap::clamp) return {std::clamp<std::int64_t>(begin, 0, n - 1), std::clamp<std::int64_t>(end, 0, n - 1), -1};
+    if (end - begin + 1 >= n) return {0, n - 1, -1};
+    const std::int64_t wrapped = ((begin % n) + n) % n, wrapped_end = wrapped + (end - begin);
+    return wrapped_end < n ? Cells{wrapped, wrapped_end, -1} : Cells{wrapped, n - 1, wrapped_end - n};
+}
+
+TexturePyramid::Range TexturePyramid::range(const UvBox& box) const {
+    if (box.is_empty()) return levels_.back().ranges[0];
+    const Cells u = texels_of(static_cast<double>(box.lo.x), static_cast<double>(box.hi.x), width_, wrap_u_);
+    const Cells v = texels_of(static_cast<double>(box.lo.y), static_cast<double>(box.hi.y), height_, wrap_v_);
+    const auto look = [&](std::int64_t x0, std::int64_t x1, std::int64_t y0, std::int64_t y1) {
+        std::size_t k = 0;
+        while (std::max((x1 >> k) - (x0 >> k), (y1 >> k) - (y0 >> k)) >= most_cells) ++k;
+        const Level& level = levels_[k];
+        Range range = empty_range;
+        for (std::int64_t y = y0 >> k; y <= y1 >> k; ++y)
+            for (std::int64_t x = x0 >> k; x <= x1 >> k; ++x)
+                range = unite(range, level.ranges[static_cast<std::size_t>(y) * level.width + static_cast<std::size_t>(x)]);
+        return range;
+    };
+    Range range = look(u.first, u.last, v.first, v.last);
+    if (u.second_last >= 0) range = unite(range, look(0, u.second_last, v.first, v.last));
+    if (v.second_last >= 0) range = unite(range, look(u.first, u.last, 0, v.second_last));
+    if (u.second_last >= 0 && v.second_last >= 0) range = unite(range, look(0, u.second_last, 0, v.second_last));
+    return range;
+}
+
+float TexturePyramid::texel_mean(const Level& level, std::int64_t x, std::int64_t y) const {
+    const auto wrapped = [](std::int64_t i, std::int64_t n, Wrap wrap) {
+        return wrap == Wrap::clamp ? std::clamp<std::int64_t>(i, 0, n - 1) : ((i % n) + n) % n;
+    };
+    const auto column = static_cast<std::size_t>(wrapped(x, level.width, wrap_u_)), row = static_cast<std::size_t>(wrapped(y, level.height, wrap_v_));
+    return level.means[row * level.width + column];
+}
+
+double TexturePyramid::bilinear_mean(const Level& level, glm::dvec2 uv) const {
+    const double x = uv.x * level.width - 0.5, y = uv.y * level.height - 0.5;
+    if (!(std::abs(x) < farthest_coordinate) || !(std::abs(y) < farthest_coordinate)) return static_cast<double>(levels_.back().means[0]);
+    const double fx = std::floor(x), fy = std::floor(y);
+    const auto i = static_cast<std::int64_t>(fx), j = static_cast<std::int64_t>(fy);
+    const double s = x - fx, t = y - fy;
+    const auto at = [&](std::int64_t a, std::int64_t b) { return static_cast<double>(texel_mean(level, a, b)); };
+    return (1 - t) * ((1 - s) * at(i, j) + s * at(i + 1, j)) + t * ((1 - s) * at(i, j + 1) + s * at(i + 1, j + 1));
+}
+
+double TexturePyramid::mean(glm::dvec2 uv, double width) const {
+    const double texels = width * std::max(width_, height_);
+    const int nearest = texels > 1 ? std::ilogb(texels * std::numbers::sqrt2) : 0;
+    return bilinear_mean(levels_[std::min(static_cast<std::size_t>(nearest), levels_.size() - 1)], uv);
+}
+
+} // namespace unseen::vdtree
