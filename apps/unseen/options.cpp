@@ -99,7 +99,7 @@ void check(const WhatOptions& what) {
     if (what.mode == Mode::imperceptible && !is_perceptual)
         refuse("--fold-test " + what.fold_test +
                " cannot tell what is imperceptible: add --triangles N or --pixels E.");
-    const bool knows_chroma = what.test == FoldTest::luebke_hallen || what.test == FoldTest::luebke_hallen_safe;
+    const bool knows_chroma = !what.is_fold_test_given || what.test == FoldTest::luebke_hallen || what.test == FoldTest::luebke_hallen_safe;
     if (what.chroma && (!knows_chroma || what.mode == Mode::full))
         refuse("--chroma needs --fold-test luebke-hallen or luebke-hallen-safe, and not --full.");
 }
@@ -266,7 +266,9 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
     std::string& name = o.fold_test;
     CLI::Option* test =
         group.add_option("--fold-test", name)->type_name("NAME")->check(CLI::IsMember(fold_test_list()));
-    test->description("luebke-hallen (perceptual; default), luebke-hallen-safe (the same with its known holes closed, more triangles), error (perceptual, far fewer triangles, measured and not yet proven), extent or displacement (in pixels; of --pixels: extent)");
+    test->description("error (perceptual: what folds change in fact; default), luebke-hallen (perceptual: what they could change at most), "
+                      "luebke-hallen-safe (the same with its known holes closed, more triangles), extent or displacement (in pixels; of --pixels: "
+                      "extent)");
     group.add_flag("--chroma", o.chroma, "Keep changes of colour that can be seen, too, not only those of luminance");
     add_gaze_option(group, o.gaze_px);
     group.callback([=, &o] {

@@ -45,9 +45,10 @@ constexpr bool is_perceptual(FoldTest test) { return test != FoldTest::extent &&
 // WHAT.
 struct WhatOptions {
     Mode mode = Mode::imperceptible;
-    FoldTest test = FoldTest::luebke_hallen;
-    std::string fold_test = "luebke-hallen"; // as it was given
+    FoldTest test = FoldTest::error; // the default; settle_fold_test() takes another where this one does not know the scene
+    std::string fold_test = "error"; // as it was given
     bool is_fold_test_given = false;
+    std::string why_not_error;       // of the default that settle_fold_test() took
     std::uint32_t triangles = 0;             // of Mode::budget
     double pixels = 0;                       // of Mode::pixels
     bool chroma = false;                     // look at colour, too

@@ -40,7 +40,7 @@ bool is_for_people(const std::string& file) {
 Result<int> run_flight(RenderArguments& a) {
     auto scene = load_scene(a.model, a.view, a.display);
     if (!scene) return scene.error();
-    if (const auto ready = measure_folds(*scene, a.what); !ready) return ready.error();
+    if (const auto ready = settle_fold_test(*scene, a.what); !ready) return ready.error();
     a.flight.pictures = a.out;
     a.flight.json = a.json;
     a.flight.what = a.what;
@@ -59,7 +59,7 @@ Result<int> run(RenderArguments& a) {
     if (!report) return report.error();
     auto scene = load_scene(a.model, a.view, a.display);
     if (!scene) return scene.error();
-    if (const auto ready = measure_folds(*scene, a.what); !ready) return ready.error();
+    if (const auto ready = settle_fold_test(*scene, a.what); !ready) return ready.error();
     auto context = render::Context::headless();
     if (!context) return context.error();
     auto renderer = render::Renderer::create(*context, scene->tree);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 #include <memory>
 
 #include <perception/image.h>
@@ -26,10 +27,10 @@ struct SheetArguments {
     DisplayOptions display;
     std::uint32_t triangles = 0;       // 0: a quarter of the model's
     std::optional<glm::dvec2> gaze_px; // default: default_gaze
-    int samples = 16;
+    int samples = 64;
     int cell_px = 480;
     bool maps = false;
-    FoldTest test = WhatOptions().test;
+    std::optional<FoldTest> test;      // default: as in 'unseen render'
 };
 
 constexpr double default_gaze_degrees = 29; // to the right of the window's centre: well in the periphery
@@ -52,8 +53,10 @@ glm::dvec2 default_gaze(const Scene& scene) {
     return {scene.view.width * 0.5 + offset_px, scene.view.height * 0.5};
 }
 
-std::vector<Column> wishes(const Scene& scene, const SheetArguments& a) {
+// As `what`, in four ways.
+std::vector<Column> wishes(const Scene& scene, const SheetArguments& a, const WhatOptions& what) {
     std::vector<Column> columns(4);
+    for (Column& column : columns) column.what = what;
     columns[0].name = "full";
     columns[0].what.mode = Mode::full;
     columns[1].name = "imperceptible";
@@ -63,7 +66,6 @@ std::vector<Column> wishes(const Scene& scene, const SheetArguments& a) {
         a.triangles ? a.triangles : std::max(1U, scene.tree.triangle_count() / default_budget_share);
     columns[3].name = "gaze-directed";
     columns[3].what.gaze_px = a.gaze_px.value_or(default_gaze(scene));
-    for (Column& column : columns) column.what.test = a.test;
     if (a.maps) columns.erase(columns.begin() + 2); // a budget is another matter
     return columns;
 }
@@ -120,10 +122,10 @@ Result<void> judge(Column& column, const Column& full, const Scene& scene) {
     return {};
 }
 
-Result<std::vector<Column>> make_columns(const Scene& scene, const SheetArguments& a, render::Context& context) {
+Result<std::vector<Column>> make_columns(const Scene& scene, const SheetArguments& a, const WhatOptions& what, render::Context& context) {
     auto renderer = render::Renderer::create(context, scene.tree);
     if (!renderer) return renderer.error();
-    std::vector<Column> columns = wishes(scene, a);
+    std::vector<Column> columns = wishes(scene, a, what);
     for (Column& column : columns) {
         vdtree::Cut cut(scene.tree);
         auto simplified = simplify(cut, scene, column.what, Purpose::picture);
@@ -231,11 +233,11 @@ Result<int> run(const SheetArguments& a) {
     auto scene = load_scene(a.model, a.view, a.display);
     if (!scene) return scene.error();
     WhatOptions what;
-    what.test = a.test;
-    if (const auto ready = measure_folds(*scene, what); !ready) return ready.error();
+    if (a.test) what.test = *a.test, what.is_fold_test_given = true;
+    if (const auto ready = settle_fold_test(*scene, what); !ready) return ready.error();
     auto context = render::Context::headless();
     if (!context) return context.error();
-    const auto columns = make_columns(*scene, a, *context);
+    const auto columns = make_columns(*scene, a, what, *context);
     if (!columns) return columns.error();
 
     if (auto ok = report->prepare(to_json(*columns)); !ok) return ok.error();
@@ -261,7 +263,7 @@ Command sheet_command(CLI::App& app) {
     verb->get_option("--gaze")->description(
         "Gaze of the gaze-directed cut, in pixels from the top left; may lie outside "
         "(default: 29 degrees to the right of the window's centre)");
-    verb->add_option("--samples", a->samples, "Samples a pixel, 1 to 256 (default: 16)")
+    verb->add_option("--samples", a->samples, "Samples a pixel, 1 to 256 (default: 64)")
         ->type_name("N")
         ->check(within(1, 256));
     verb->add_option("--cell", a->cell_px, "The longer side of a picture on the sheet (default: 480)")

@@ -101,14 +101,15 @@ std::string name_of(FoldTest test) { return std::string(perception::fold_test_na
 
 Effect fold_test_effect(const WhatOptions& what) {
     if (what.mode == Mode::full) return {"fold test", false, "nothing is folded in the full model"};
+    const std::string instead = what.why_not_error.empty() ? "" : " (" + what.why_not_error + ")";
     if (what.test == FoldTest::error)
         return {"fold test", true, "error: what each fold changes in luminance and outline, against the contrast sensitivity"};
     if (what.test == FoldTest::luebke_hallen_safe)
         return {"fold test", true,
                 "luebke-hallen-safe: the worst grating of each fold with any neighbours folded, and the shift of the mean, against the contrast "
-                "sensitivity"};
+                "sensitivity" + instead};
     if (what.test == FoldTest::luebke_hallen)
-        return {"fold test", true, "luebke-hallen: the worst grating of each fold against the contrast sensitivity"};
+        return {"fold test", true, "luebke-hallen: the worst grating of each fold against the contrast sensitivity" + instead};
     return {"fold test", true, name_of(what.test) + ": pixels on the screen, whether they can be seen or not"};
 }
 
@@ -293,6 +294,21 @@ Effect geomorph_effect(const vdtree::Geomorph* geomorph, const Simplification& r
                 grouped(*result.drawn_triangles - result.stats.triangles) + " triangles wait for them to be folded"};
 }
 
+// What is taken in place of the test by errors where that does not know the scene, or would have to measure a very large tree first.
+void take_default(const Scene& scene, WhatOptions& what) {
+    constexpr vdtree::NodeId most_measured = 2'000'000; // nodes; about a minute on one core
+    const auto take = [&](FoldTest test, const char* why) {
+        what.test = test;
+        what.fold_test = name_of(test);
+        what.why_not_error = why;
+    };
+    if (!scene.tree.texture().empty()) take(FoldTest::luebke_hallen_safe, "the test error does not know textures");
+    else if (scene.lighting) take(FoldTest::luebke_hallen, "the test error does not know lights that move");
+    else if (what.chroma) take(FoldTest::luebke_hallen, "the test error does not know colours");
+    else if (scene.tree.fold_errors().empty() && scene.tree.interior_count() > most_measured)
+        take(FoldTest::luebke_hallen, "the tree does not hold the errors of its folds, and measuring them takes long: unseen build --fold-errors");
+}
+
 // The view through a window whose sides are so much farther from its centre.
 vdtree::View widened(const vdtree::View& view) {
     constexpr double wider = 1.3, widest_degrees = 179;
@@ -305,12 +321,10 @@ vdtree::View widened(const vdtree::View& view) {
 
 } // namespace
 
-Result<void> measure_folds(Scene& scene, WhatOptions& what) {
-    if (what.test == FoldTest::error && !what.is_fold_test_given && !scene.tree.texture().empty()) {
-        what.test = FoldTest::luebke_hallen_safe;
-        what.fold_test = name_of(what.test);
-    }
-    if (what.mode == Mode::full || what.test != FoldTest::error || !scene.tree.fold_errors().empty()) return {};
+Result<void> settle_fold_test(Scene& scene, WhatOptions& what) {
+    if (what.mode == Mode::full || what.test != FoldTest::error) return {};
+    if (!what.is_fold_test_given) take_default(scene, what);
+    if (what.test != FoldTest::error || !scene.tree.fold_errors().empty()) return {};
     if (!scene.tree.texture().empty())
         return Error{ErrorCode::invalid_argument, "--fold-test error does not measure textures: use --fold-test luebke-hallen-safe, or add --no-texture."};
     print_note("measuring what folds change (unseen build --fold-errors keeps that in the tree) ...");

@@ -48,9 +48,10 @@ Result<Simplification> simplify(vdtree::Cut& cut, const Scene& scene, const What
 // What folding costs by interior node, as simplify() goes by it. Not in the mode full.
 Result<std::vector<float>> fold_costs(const Scene& scene, const WhatOptions& what, Purpose purpose);
 
-// Measures the errors of the tree's folds where the fold test asks for them and the tree's file does not have them. These do not know
-// textures: for a tree with one, a test by errors that nobody asked for becomes luebke-hallen-safe, and one that was asked for fails.
-Result<void> measure_folds(Scene& scene, WhatOptions& what);
+// The default fold test goes by errors, which do not know textures, moving lights or colours: there, and where a very large tree does not hold
+// them, another is taken, and its effect says why. Measures the errors of the tree's folds where they are needed and not there. Fails where a
+// test that was asked for does not know the scene.
+Result<void> settle_fold_test(Scene& scene, WhatOptions& what);
 
 // Keeps a cut at what moving views of a scene ask for. In the modes imperceptible and pixels the cost goes with what changes from
 // one call to the next; the others begin anew each time (full: once).

@@ -31,7 +31,7 @@ Result<int> run(SimplifyArguments& a) {
     if (!report) return report.error();
     auto scene = load_scene(a.model, a.view, a.display);
     if (!scene) return scene.error();
-    if (const auto ready = measure_folds(*scene, a.what); !ready) return ready.error();
+    if (const auto ready = settle_fold_test(*scene, a.what); !ready) return ready.error();
 
     vdtree::Cut cut(scene->tree);
     auto simplified = simplify(cut, *scene, a.what, Purpose::mesh);

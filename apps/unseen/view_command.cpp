@@ -22,7 +22,7 @@ Result<int> run(ViewArguments& a) {
         return Error{ErrorCode::invalid_argument, "--geomorph and --lights exclude each other: vertices that glide are not lit."};
     auto scene = load_scene(a.model, a.view, a.display);
     if (!scene) return scene.error();
-    if (const auto ready = measure_folds(*scene, a.viewer.what); !ready) return ready.error();
+    if (const auto ready = settle_fold_test(*scene, a.viewer.what); !ready) return ready.error();
     a.viewer.has_fixed_field = a.view.fov_degrees.has_value();
     if (auto ended = run_viewer(*scene, a.viewer); !ended) return ended.error();
     return exit_done;

@@ -136,7 +136,8 @@ private:
     void choose(Mode mode) {
         what_.mode = mode;
         what_.triangles = budget_;
-        if (mode == Mode::imperceptible && !is_perceptual(what_.test)) what_.test = FoldTest::luebke_hallen;
+        if (mode == Mode::imperceptible && !is_perceptual(what_.test))
+            what_.test = scene_.tree.fold_errors().empty() ? FoldTest::luebke_hallen : FoldTest::error;
         what_.gaze_px.reset();
         gaze_follows_pointer_ = plays_gaze_ = false;
     }

@@ -214,6 +214,7 @@ struct Rings {
     std::span<const glm::vec2> mean_chroma_shift = {};
     std::span<const vdtree::PackedRange> vertices = {}, texture = {}; // where the texture is counted by how far it moves; then, too:
     std::span<const float> texture_deviation = {}, lengths = {};      // mesh units
+    std::vector<vdtree::NormalSlabs> facing = {};                     // empty: the tree's
 };
 
 // All that grows up the tree stays so: contrasts against a middle would not.
@@ -287,6 +288,7 @@ Result<DistanceCriterion> make_criterion(const vdtree::VertexTree& tree, const R
     parts.eccentricity_bins = options.gaze_px ? bin_count : 1;
     parts.bin_degrees = degrees_per_bin / screen.least_magnification;
     parts.lengths = std::move(lengths);
+    parts.facing = rings.facing;
     for (std::size_t coarseness = 1;; coarseness *= 2) {
         Rows rows(!has_chroma && rings.vertices.empty(), coarseness);
         if (!classify(tree, rings, options, classes, rows, parts.classes)) continue;
@@ -318,6 +320,9 @@ Result<DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree&
         lengths[node] = std::max({lengths[node], tree.bounds()[node].ring.radius, around});
         if (node > 0) lengths[tree.parents()[node]] = std::max(lengths[tree.parents()[node]], lengths[node]);
     }
+    if (!cut_rings.meets_another.empty())
+        for (NodeId node = 0; node < tree.interior_count(); ++node) // an outline, whatever it faces
+            rings.facing.push_back(cut_rings.meets_another[node] ? vdtree::NormalSlabs::everything() : tree.bounds()[node].slabs);
     rings.vertices = cut_rings.vertices;
     rings.texture = cut_rings.texture;
     rings.texture_deviation = cut_rings.texture_deviation;

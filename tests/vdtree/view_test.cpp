@@ -69,7 +69,7 @@ TEST(View, TakesExtremesThatAreFine) {
         EXPECT_TRUE(validate({.eye = {0, 0, scale}, .up = {0, scale, 0}})) << scale;
     EXPECT_TRUE(validate({.fov_y_degrees = 179.9}));
     EXPECT_TRUE(validate({.fov_y_degrees = 1e-3}));
-    EXPECT_TRUE(validate({.width = 1, .height = 32768}));
+    EXPECT_TRUE(validate(View{.width = 1, .height = 32768}));
     EXPECT_TRUE(validate({.eye = {0, 0, 1}, .up = {0, 1e-3, 1}}));
 }
 

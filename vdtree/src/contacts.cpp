@@ -96,6 +96,18 @@ public:
     }
 
     std::vector<float> run() const {
+        const std::vector<float> gaps = by_triangle();
+        std::vector<float> nearest(interior_, infinity);
+        const std::span<const NodeId> parents = tree_.parents();
+        const auto include = [&](NodeId node, float gap) { nearest[node] = std::min(nearest[node], gap); };
+        for (Index t = 0; t < gaps.size(); ++t)
+            for (const Index leaf : triangles_[t]) include(parents[interior_ + leaf], gaps[t]);
+        for (NodeId node = interior_; node-- > 1;) include(parents[node], nearest[node]);
+        return nearest;
+    }
+
+private:
+    std::vector<float> by_triangle() const {
         std::vector<float> gaps(triangles_.size(), infinity);
         constexpr Index piece = 1024;
         tbb::parallel_for(Index{0}, static_cast<Index>((triangles_.size() + piece - 1) / piece), [&](Index i) {
@@ -105,7 +117,6 @@ public:
         return gaps;
     }
 
-private:
     struct Scratch {
         std::vector<Index> neighbours; // leaves of neighbouring triangles, ascending
         std::vector<NodeId> waiting;

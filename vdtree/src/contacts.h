@@ -7,8 +7,9 @@
 
 namespace unseen::vdtree {
 
-// By triangle: the distance (mesh units) to the nearest triangle that is no neighbour of it or of its neighbours; 0 where they intersect.
-// Infinite where none is near, as triangles go: nearer than a quarter of the circle around this one. In parallel; some microseconds each.
+// By interior node: how near (mesh units) any triangle that touches its support, or the supports below, is to one that is no neighbour of it or
+// of its neighbours; 0 where they intersect. Infinite where none is near, as triangles go: nearer than a quarter of the circle around the first.
+// In parallel; some microseconds a triangle.
 std::vector<float> find_contacts(const VertexTree& tree);
 
 } // namespace unseen::vdtree

@@ -11,6 +11,7 @@
 #include <tbb/parallel_for.h>
 
 #include "chroma.h"
+#include "contacts.h"
 #include "texture_bounds.h"
 #include "texture_fit.h"
 #include "tree_parts.h"
@@ -393,8 +394,17 @@ private:
 } // namespace
 
 CutRings bound_cut_rings(const VertexTree& tree) {
-    if (!tree.texture().empty()) return RingBounder<TexturedVertices>(tree).run();
-    return tree.ring_chroma().empty() ? RingBounder<GreyVertices>(tree).run() : RingBounder<ColouredVertices>(tree).run();
+    CutRings rings = !tree.texture().empty()       ? RingBounder<TexturedVertices>(tree).run()
+                     : tree.ring_chroma().empty() ? RingBounder<GreyVertices>(tree).run()
+                                                  : RingBounder<ColouredVertices>(tree).run();
+    // What comes as near as a quarter of a triangle is in the way of any fold.
+    const std::vector<float> nearest = find_contacts(tree);
+    const auto meets = [](float gap) { return std::isfinite(gap); };
+    if (std::any_of(nearest.begin(), nearest.end(), meets)) {
+        rings.meets_another.resize(nearest.size());
+        std::transform(nearest.begin(), nearest.end(), rings.meets_another.begin(), meets);
+    }
+    return rings;
 }
 
 } // namespace unseen::vdtree

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include <glm/geometric.hpp>
 #include <tbb/parallel_for.h>
@@ -158,7 +157,7 @@ public:
         : tree_(tree), errors_(errors), positions_(tree.positions()), luminance_(tree.luminance()), support_luminance_(tree.support_luminance()),
           first_leaf_(tree.first_leaf()), leaf_end_(tree.leaf_end()), parents_(tree.parents()),
           first_triangle_(tree.first_triangle()), triangles_(tree.triangles()), support_(tree.support_spheres()),
-          interior_(tree.interior_count()), crossing_(interior_), contact_(find_contacts(tree)), nearest_(interior_), witnesses_(interior_) {
+          interior_(tree.interior_count()), crossing_(interior_), contact_(find_contacts(tree)), witnesses_(interior_) {
         find_triangles_of_leaves();
     }
 
@@ -347,18 +346,15 @@ private:
             mean.include(over_fine_after.value());
         }
         NormalSlabs facing = turned.slabs();
-        float extent = 0, nearest = std::numeric_limits<float>::infinity();
-        for (const Index t : crossing_[node]) nearest = std::min(nearest, contact_[t]);
+        float extent = 0;
         tree_.for_each_child(node, [&](NodeId child) {
             if (tree_.is_leaf(child)) return;
             worst.include({errors_[child].distance, errors_[child].luminance});
             facing |= errors_[child].facing;
             extent = std::max(extent, errors_[child].extent);
-            nearest = std::min(nearest, nearest_[child]);
         });
-        nearest_[node] = nearest;
         // Where parts meet, a fold moves the line along which the one hides the other, like an outline, whatever they face.
-        if (worst.distance > 0 && nearest < contact_reach * worst.distance) facing = NormalSlabs::everything();
+        if (worst.distance > 0 && contact_[node] < contact_reach * worst.distance) facing = NormalSlabs::everything();
         errors_[node].distance = worst.distance;
         errors_[node].luminance = worst.luminance;
         errors_[node].mean_distance = mean.distance;
@@ -454,8 +450,7 @@ private:
     NodeId interior_;
     std::vector<Index> first_of_leaf_, of_leaf_;
     std::vector<std::vector<Index>> crossing_; // of nodes whose parent has not been measured yet
-    std::vector<float> contact_; // by triangle, of find_contacts()
-    std::vector<float> nearest_; // the least of all triangles that touch the support
+    std::vector<float> contact_; // of find_contacts()
     std::vector<Witnesses> witnesses_;
 };
 

@@ -24,6 +24,10 @@ struct CutRings {
     // least as large as the children's.
     std::vector<float> mean_shift;
 
+    // Whether another part of the surface is so near to the ring that a fold may bring the one through the other, and so uncover anything. True
+    // where it is of a child. Empty where it is of none.
+    std::vector<bool> meets_another;
+
     // Of textured trees; else empty. All of them at least the children's. `luminance` above is that of both together, as drawn; what
     // vertices and texture can be in any cut, each for itself:
     std::vector<PackedRange> vertices; // what the texture is multiplied with
