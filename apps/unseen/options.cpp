@@ -99,7 +99,8 @@ void check(const WhatOptions& what) {
     if (what.mode == Mode::imperceptible && !is_perceptual)
         refuse("--fold-test " + what.fold_test +
                " cannot tell what is imperceptible: add --triangles N or --pixels E.");
-    const bool knows_chroma = !what.is_fold_test_given || what.test == FoldTest::luebke_hallen || what.test == FoldTest::luebke_hallen_safe;
+    const bool is_default = !what.is_fold_test_given && is_perceptual; // which takes another test for colour
+    const bool knows_chroma = is_default || what.test == FoldTest::luebke_hallen || what.test == FoldTest::luebke_hallen_safe;
     if (what.chroma && (!knows_chroma || what.mode == Mode::full))
         refuse("--chroma needs --fold-test luebke-hallen or luebke-hallen-safe, and not --full.");
 }

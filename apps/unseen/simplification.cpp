@@ -237,7 +237,8 @@ bool is_wholly_in_window(const Scene& scene) {
     });
 }
 
-Effect back_face_effect(const Scene& scene) {
+Effect back_face_effect(const Scene& scene, Purpose purpose) {
+    if (purpose == Purpose::mesh) return {"back-face folding", false, "the mesh may be looked at from elsewhere"};
     if (culls_back_faces(scene)) return {"back-face folding", true, "what faces away is not drawn, so it is folded"};
     if (scene.tree.closedness() == vdtree::Closedness::open)
         return {"back-face folding", false, "the surface is open"};
@@ -252,6 +253,7 @@ bool folds_hidden(const Scene& scene, const WhatOptions& what, Purpose purpose) 
 
 Effect hidden_effect(const Scene& scene, const WhatOptions& what, Purpose purpose, std::size_t occluders) {
     const std::string name = "hidden folding";
+    if (purpose == Purpose::mesh) return {name, false, "the mesh may be looked at from elsewhere"};
     if (!folds_hidden(scene, what, purpose))
         return {name, false, is_perceptual(what) ? "nothing solid is looked at from outside" : "only the perceptual fold tests know what a fold changes"};
     if (occluders == 0) return {name, false, "no sphere fits into the solid"};
@@ -327,7 +329,9 @@ Result<void> settle_fold_test(Scene& scene, WhatOptions& what) {
     if (what.test != FoldTest::error || !scene.tree.fold_errors().empty()) return {};
     if (!scene.tree.texture().empty())
         return Error{ErrorCode::invalid_argument, "--fold-test error does not measure textures: use --fold-test luebke-hallen-safe, or add --no-texture."};
-    print_note("measuring what folds change (unseen build --fold-errors keeps that in the tree) ...");
+    constexpr vdtree::NodeId told_from = 20'000; // nodes; about half a second on one core
+    if (scene.tree.interior_count() >= told_from)
+        print_note("measuring what folds change (unseen build --fold-errors keeps that in the tree) ...");
     auto measured = vdtree::with_fold_errors(scene.tree);
     if (!measured) return measured.error();
     scene.tree = std::move(*measured);
@@ -477,7 +481,7 @@ Result<Simplification> Follower::change(vdtree::Cut& cut, const Scene& scene, co
     result.imperceptible_from_m = imperceptible_from(scene, what, result.stats);
     add_effects(result, scene, what, purpose);
     if (is_full) return result;
-    result.effects.push_back(back_face_effect(scene));
+    result.effects.push_back(back_face_effect(scene, purpose));
     result.effects.push_back(hidden_effect(scene, what, purpose, viewpoint.occluders.size()));
     result.effects.push_back(time_limit_effect(what, result));
     if (is_perceptual(what) && what.mode != Mode::budget)

@@ -65,6 +65,12 @@ float distance_between(const Corners& a, const Corners& b) {
     return least;
 }
 
+float sine_between(const Corners& a, const Corners& b) {
+    const glm::vec3 m = glm::cross(a[1] - a[0], a[2] - a[0]), n = glm::cross(b[1] - b[0], b[2] - b[0]);
+    const float lengths = glm::length(m) * glm::length(n);
+    return lengths > 0 ? std::min(glm::length(glm::cross(m, n)) / lengths, 1.0f) : 0.0f;
+}
+
 struct Box {
     glm::vec3 lo = glm::vec3(infinity), hi = glm::vec3(-infinity);
 
@@ -95,26 +101,25 @@ public:
             for (const Index leaf : triangles_[t]) of_leaf_[next[leaf]++] = t;
     }
 
-    std::vector<float> run() const {
-        const std::vector<float> gaps = by_triangle();
-        std::vector<float> nearest(interior_, infinity);
+    std::vector<Contact> run() const {
+        const std::vector<Contact> contacts = by_triangle();
+        std::vector<Contact> all(interior_);
         const std::span<const NodeId> parents = tree_.parents();
-        const auto include = [&](NodeId node, float gap) { nearest[node] = std::min(nearest[node], gap); };
-        for (Index t = 0; t < gaps.size(); ++t)
-            for (const Index leaf : triangles_[t]) include(parents[interior_ + leaf], gaps[t]);
-        for (NodeId node = interior_; node-- > 1;) include(parents[node], nearest[node]);
-        return nearest;
+        for (Index t = 0; t < contacts.size(); ++t)
+            for (const Index leaf : triangles_[t]) all[parents[interior_ + leaf]].include(contacts[t]);
+        for (NodeId node = interior_; node-- > 1;) all[parents[node]].include(all[node]);
+        return all;
     }
 
 private:
-    std::vector<float> by_triangle() const {
-        std::vector<float> gaps(triangles_.size(), infinity);
+    std::vector<Contact> by_triangle() const {
+        std::vector<Contact> contacts(triangles_.size());
         constexpr Index piece = 1024;
         tbb::parallel_for(Index{0}, static_cast<Index>((triangles_.size() + piece - 1) / piece), [&](Index i) {
             Scratch scratch;
-            for (Index t = i * piece; t < std::min<std::size_t>(triangles_.size(), std::size_t{i + 1} * piece); ++t) gaps[t] = find(t, scratch);
+            for (Index t = i * piece; t < std::min<std::size_t>(triangles_.size(), std::size_t{i + 1} * piece); ++t) contacts[t] = find(t, scratch);
         });
-        return gaps;
+        return contacts;
     }
 
     struct Scratch {
@@ -137,13 +142,13 @@ private:
         leaves.erase(std::unique(leaves.begin(), leaves.end()), leaves.end());
     }
 
-    float find(Index triangle, Scratch& scratch) const {
+    Contact find(Index triangle, Scratch& scratch) const {
         const Corners own = corners(triangle);
         const glm::vec3 centre = (own[0] + own[1] + own[2]) / 3.0f;
-        float least = near_share * std::max({glm::length(own[0] - centre), glm::length(own[1] - centre), glm::length(own[2] - centre)});
-        if (!(least > 0)) return infinity;
-        const Box around = box_of(own).wider(least);
-        bool is_found = false;
+        const float near = near_share * std::max({glm::length(own[0] - centre), glm::length(own[1] - centre), glm::length(own[2] - centre)});
+        Contact contact;
+        if (!(near > 0)) return contact;
+        const Box around = box_of(own).wider(near);
         int nodes = 0;
         collect_neighbours(triangle, scratch.neighbours);
         const auto is_neighbour = [&](Index leaf) { return std::binary_search(scratch.neighbours.begin(), scratch.neighbours.end(), leaf); };
@@ -151,19 +156,19 @@ private:
         while (!scratch.waiting.empty()) {
             const NodeId node = scratch.waiting.back();
             scratch.waiting.pop_back();
-            if (least == 0 || ++nodes > most_nodes) return 0;
+            if (++nodes > most_nodes) return {0, 0};
             for (Index other = first_triangle_[node]; other < first_triangle_[node + 1]; ++other) {
                 const Triangle& t = triangles_[other];
                 const Corners its = corners(other);
                 if (!around.meets(box_of(its)) || std::any_of(t.begin(), t.end(), is_neighbour)) continue;
                 const float gap = distance_between(own, its);
-                if (gap < least) least = gap, is_found = true;
+                if (gap < near) contact.include({gap, sine_between(own, its)});
             }
             tree_.for_each_child(node, [&](NodeId child) {
                 if (child < interior_ && around.meets(boxes_[child])) scratch.waiting.push_back(child);
             });
         }
-        return is_found ? least : infinity;
+        return contact;
     }
 
     const VertexTree& tree_;
@@ -177,6 +182,6 @@ private:
 
 } // namespace
 
-std::vector<float> find_contacts(const VertexTree& tree) { return ContactFinder(tree).run(); }
+std::vector<Contact> find_contacts(const VertexTree& tree) { return ContactFinder(tree).run(); }
 
 } // namespace unseen::vdtree

@@ -1,15 +1,25 @@
 // Where parts of a surface touch or pass through each other without sharing a vertex.
 #pragma once
 
+#include <algorithm>
+#include <limits>
 #include <vector>
 
 #include <vdtree/vertex_tree.h>
 
 namespace unseen::vdtree {
 
-// By interior node: how near (mesh units) any triangle that touches its support, or the supports below, is to one that is no neighbour of it or
-// of its neighbours; 0 where they intersect. Infinite where none is near, as triangles go: nearer than a quarter of the circle around the first.
-// In parallel; some microseconds a triangle.
-std::vector<float> find_contacts(const VertexTree& tree);
+// Of triangles that are near to others which are no neighbours of theirs or of their neighbours. Near is, as triangles go, nearer than a
+// quarter of the circle around the first.
+struct Contact {
+    float gap = std::numeric_limits<float>::infinity(); // mesh units: the least distance; 0 where they intersect; infinite where none is near
+    float sine = 1;                                     // of the least angle between the planes of such triangles
+
+    bool is_any() const { return gap < std::numeric_limits<float>::infinity(); }
+    void include(const Contact& other) { gap = std::min(gap, other.gap), sine = std::min(sine, other.sine); }
+};
+
+// By interior node: of all triangles that touch its support, or the supports below. In parallel; some microseconds a triangle.
+std::vector<Contact> find_contacts(const VertexTree& tree);
 
 } // namespace unseen::vdtree

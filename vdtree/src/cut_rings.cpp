@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <type_traits>
 
@@ -398,11 +399,10 @@ CutRings bound_cut_rings(const VertexTree& tree) {
                      : tree.ring_chroma().empty() ? RingBounder<GreyVertices>(tree).run()
                                                   : RingBounder<ColouredVertices>(tree).run();
     // What comes as near as a quarter of a triangle is in the way of any fold.
-    const std::vector<float> nearest = find_contacts(tree);
-    const auto meets = [](float gap) { return std::isfinite(gap); };
-    if (std::any_of(nearest.begin(), nearest.end(), meets)) {
-        rings.meets_another.resize(nearest.size());
-        std::transform(nearest.begin(), nearest.end(), rings.meets_another.begin(), meets);
+    const std::vector<Contact> contacts = find_contacts(tree);
+    if (std::any_of(contacts.begin(), contacts.end(), std::mem_fn(&Contact::is_any))) {
+        rings.meets_another.resize(contacts.size());
+        std::transform(contacts.begin(), contacts.end(), rings.meets_another.begin(), std::mem_fn(&Contact::is_any));
     }
     return rings;
 }

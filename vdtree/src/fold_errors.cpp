@@ -23,7 +23,8 @@ constexpr Index spread_count = 8;        // leaves compared besides, at equal st
 constexpr int much_more = 2;           // luminance range than the node's: such neighbours fold later
 constexpr std::size_t triangles_compared = 16; // of each surface, at equal steps
 constexpr std::size_t most_fine_triangles = 64; // in rings of more, some neighbours are folded
-constexpr float contact_reach = 2; // times the distance by which folds move a surface: then parts that near may pass through each other
+constexpr float contact_reach = 4; // times the distance by which folds move a surface: then parts that near may pass through each other
+constexpr float least_sine = 1e-3f; // of the angle at which parts meet
 constexpr Index leaves_of_part = 4096;   // of a subtree that one task measures
 
 struct Point {
@@ -157,7 +158,7 @@ public:
         : tree_(tree), errors_(errors), positions_(tree.positions()), luminance_(tree.luminance()), support_luminance_(tree.support_luminance()),
           first_leaf_(tree.first_leaf()), leaf_end_(tree.leaf_end()), parents_(tree.parents()),
           first_triangle_(tree.first_triangle()), triangles_(tree.triangles()), support_(tree.support_spheres()),
-          interior_(tree.interior_count()), crossing_(interior_), contact_(find_contacts(tree)), witnesses_(interior_) {
+          interior_(tree.interior_count()), crossing_(interior_), contacts_(find_contacts(tree)), witnesses_(interior_) {
         find_triangles_of_leaves();
     }
 
@@ -353,8 +354,13 @@ private:
             facing |= errors_[child].facing;
             extent = std::max(extent, errors_[child].extent);
         });
-        // Where parts meet, a fold moves the line along which the one hides the other, like an outline, whatever they face.
-        if (worst.distance > 0 && contact_[node] < contact_reach * worst.distance) facing = NormalSlabs::everything();
+        // Where parts meet, a fold moves the line along which the one hides the other, like an outline, whatever they face: the farther, the
+        // flatter they meet.
+        const Contact& contact = contacts_[node];
+        if (worst.distance > 0 && contact.gap < contact_reach * worst.distance) {
+            facing = NormalSlabs::everything();
+            worst.distance = std::max(worst.distance, std::min(worst.distance / std::max(contact.sine, least_sine), tree_.bounds()[node].ring.radius));
+        }
         errors_[node].distance = worst.distance;
         errors_[node].luminance = worst.luminance;
         errors_[node].mean_distance = mean.distance;
@@ -450,7 +456,7 @@ private:
     NodeId interior_;
     std::vector<Index> first_of_leaf_, of_leaf_;
     std::vector<std::vector<Index>> crossing_; // of nodes whose parent has not been measured yet
-    std::vector<float> contact_; // of find_contacts()
+    std::vector<Contact> contacts_;
     std::vector<Witnesses> witnesses_;
 };
 
