@@ -9,6 +9,7 @@ using ::testing::ElementsAre;
 using ::testing::Ge;
 using ::testing::HasSubstr;
 using ::testing::Le;
+using ::testing::StartsWith;
 
 class UsageTest : public CommandTest {};
 class BuildTest : public CommandTest {};
@@ -328,6 +329,14 @@ TEST_F(SimplifyTest, TheSafeTestKeepsNoLess) {
     EXPECT_GE(safe["triangles"], plain["triangles"]);
     EXPECT_THAT(effect_named(safe, "fold test")["why"], HasSubstr("luebke-hallen-safe"));
     EXPECT_TRUE(safe["max_fold_cost"] <= 1);
+}
+
+TEST_F(SimplifyTest, TheDefaultTestGoesByErrorsWhereTheseKnowTheScene) {
+    const auto fold_test = [](const Json& report) { return effect_named(report, "fold test")["why"].get<std::string>(); };
+    EXPECT_THAT(fold_test(simplify({})), StartsWith("error"));
+    EXPECT_THAT(fold_test(simplify({"--chroma"})), AllOf(StartsWith("luebke-hallen:"), HasSubstr("does not know colours")));
+    write_text(path("lights.json"), R"({"ambient": 0.2, "lights": [{"type": "directional", "direction": [0, 0, 1], "intensity": 0.8}]})");
+    EXPECT_THAT(fold_test(simplify({"--lights", "lights.json"})), AllOf(StartsWith("luebke-hallen:"), HasSubstr("does not know lights")));
 }
 
 // The ball in red and green of one luminance, with an alpha for all vertices.

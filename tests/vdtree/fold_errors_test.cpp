@@ -139,6 +139,29 @@ TEST(FoldErrors, GrowUpTheTreeAndHoldTheirDirections) {
     }
 }
 
+// Two spheres that pass through each other, and two that do not: where they meet, a fold moves a line like an outline.
+TEST(FoldErrors, CountAsOutlinesWherePartsMeet) {
+    const auto meeting = [](double apart) {
+        const VertexTree tree = built(shapes::together(shapes::icosphere(4), shapes::placed(shapes::icosphere(4), 1, {apart, 0, 0})));
+        std::size_t everywhere = 0, near = 0;
+        for (NodeId node = 1; node < tree.interior_count(); ++node) {
+            const FoldError& error = tree.fold_errors()[node];
+            const bool is_small = tree.bounds()[node].ring.radius < 0.3f; // larger ones look everywhere by themselves
+            if (!is_small || error.facing != NormalSlabs::everything()) continue;
+            ++everywhere;
+            // The circle in the plane half way between, of radius sqrt(1 - (apart / 2)^2).
+            const Sphere ring = tree.bounds()[node].ring;
+            const glm::dvec3 at = tree.origin() + glm::dvec3(ring.centre);
+            const double across = std::hypot(at.y, at.z) - std::sqrt(std::max(1 - apart * apart / 4, 0.0));
+            near += std::hypot(at.x - apart / 2, across) <= 2 * static_cast<double>(ring.radius);
+        }
+        EXPECT_EQ(near, everywhere);
+        return everywhere;
+    };
+    EXPECT_GT(meeting(1.2), 100u);
+    EXPECT_EQ(meeting(2.6), 0u);
+}
+
 TEST(FoldErrors, AreTheSameForAnyNumberOfThreads) {
     const VertexTree tree = built(shapes::bumpy_sphere(5, 0.02));
     const auto one = with_fold_errors(tree, 1), four = with_fold_errors(tree, 4);
