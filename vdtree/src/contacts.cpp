@@ -10,6 +10,8 @@
 #include <glm/geometric.hpp>
 #include <tbb/parallel_for.h>
 
+#include "leaf_triangles.h"
+
 namespace unseen::vdtree {
 
 namespace {
@@ -22,27 +24,30 @@ constexpr float infinity = std::numeric_limits<float>::infinity();
 
 float unit(float part, float whole) { return whole > 0 ? std::clamp(part / whole, 0.0f, 1.0f) : 0.0f; }
 
-float distance_to_triangle(const glm::vec3& p, const Corners& t) {
+glm::vec3 shorter(const glm::vec3& a, const glm::vec3& b) { return glm::dot(b, b) < glm::dot(a, a) ? b : a; }
+
+// The shortest ways from a triangle to a point, and from one edge, a + [0, 1] u, to another, b + [0, 1] v.
+glm::vec3 way_to_point(const Corners& t, const glm::vec3& p) {
     const glm::vec3 n = glm::cross(t[1] - t[0], t[2] - t[0]);
     const float squared = glm::dot(n, n);
     bool is_over = squared > 0;
-    float least = infinity;
+    glm::vec3 least(infinity);
     for (std::size_t k = 0; k < 3; ++k) {
         const glm::vec3 a = t[k], ab = t[(k + 1) % 3] - a, ap = p - a;
         is_over = is_over && glm::dot(glm::cross(ab, ap), n) >= 0;
-        least = std::min(least, glm::length(ap - unit(glm::dot(ap, ab), glm::dot(ab, ab)) * ab));
+        least = shorter(least, ap - unit(glm::dot(ap, ab), glm::dot(ab, ab)) * ab);
     }
-    return is_over ? std::abs(glm::dot(p - t[0], n)) / std::sqrt(squared) : least;
+    return is_over ? (glm::dot(p - t[0], n) / squared) * n : least;
 }
 
-float distance_of_edges(const glm::vec3& a, const glm::vec3& u, const glm::vec3& b, const glm::vec3& v) { // a + [0,1] u, b + [0,1] v
+glm::vec3 way_between_edges(const glm::vec3& a, const glm::vec3& u, const glm::vec3& b, const glm::vec3& v) {
     const glm::vec3 w = a - b;
     const float uu = glm::dot(u, u), uv = glm::dot(u, v), vv = glm::dot(v, v), uw = glm::dot(u, w), vw = glm::dot(v, w);
     const float determinant = uu * vv - uv * uv;
     float s = determinant > 0 ? std::clamp((uv * vw - vv * uw) / determinant, 0.0f, 1.0f) : 0.0f;
     const float t = unit(s * uv + vw, vv);
     s = unit(t * uv - uw, uu);
-    return glm::length(w + s * u - t * v);
+    return w + s * u - t * v;
 }
 
 bool passes_through(const glm::vec3& a, const glm::vec3& b, const Corners& t) {
@@ -55,20 +60,39 @@ bool passes_through(const glm::vec3& a, const glm::vec3& b, const Corners& t) {
     return true;
 }
 
-float distance_between(const Corners& a, const Corners& b) {
-    float least = infinity;
+// The shortest way between triangles, whichever way round; none where they intersect.
+glm::vec3 way_between(const Corners& a, const Corners& b) {
+    glm::vec3 least(infinity);
     for (std::size_t i = 0; i < 3; ++i) {
-        if (passes_through(a[i], a[(i + 1) % 3], b) || passes_through(b[i], b[(i + 1) % 3], a)) return 0;
-        least = std::min({least, distance_to_triangle(a[i], b), distance_to_triangle(b[i], a)});
-        for (std::size_t k = 0; k < 3; ++k) least = std::min(least, distance_of_edges(a[i], a[(i + 1) % 3] - a[i], b[k], b[(k + 1) % 3] - b[k]));
+        if (passes_through(a[i], a[(i + 1) % 3], b) || passes_through(b[i], b[(i + 1) % 3], a)) return glm::vec3(0);
+        least = shorter(shorter(least, way_to_point(b, a[i])), way_to_point(a, b[i]));
+        for (std::size_t k = 0; k < 3; ++k) least = shorter(least, way_between_edges(a[i], a[(i + 1) % 3] - a[i], b[k], b[(k + 1) % 3] - b[k]));
     }
     return least;
+}
+
+// Whether the one lies beside the other in one sheet, not over it: the way between them runs along both.
+bool is_beside(const Corners& a, const Corners& b, const glm::vec3& way) {
+    constexpr float along = 0.5f; // the cosine between way and normal, at most
+    const auto runs_along = [&](const Corners& t) {
+        const glm::vec3 n = glm::cross(t[1] - t[0], t[2] - t[0]);
+        return std::abs(glm::dot(n, way)) <= along * glm::length(n) * glm::length(way);
+    };
+    return glm::dot(way, way) > 0 && runs_along(a) && runs_along(b);
 }
 
 float sine_between(const Corners& a, const Corners& b) {
     const glm::vec3 m = glm::cross(a[1] - a[0], a[2] - a[0]), n = glm::cross(b[1] - b[0], b[2] - b[0]);
     const float lengths = glm::length(m) * glm::length(n);
     return lengths > 0 ? std::min(glm::length(glm::cross(m, n)) / lengths, 1.0f) : 0.0f;
+}
+
+// Which of them is in front makes no difference: they face alike, and look alike.
+constexpr float alike_cosine = 0.9f;
+constexpr float alike_luminance = 0.01f; // relative, 0..1; of the means
+bool face_alike(const Corners& a, const Corners& b) {
+    const glm::vec3 m = glm::cross(a[1] - a[0], a[2] - a[0]), n = glm::cross(b[1] - b[0], b[2] - b[0]);
+    return glm::dot(m, n) > alike_cosine * glm::length(m) * glm::length(n);
 }
 
 struct Box {
@@ -86,19 +110,12 @@ class ContactFinder {
 public:
     explicit ContactFinder(const VertexTree& tree)
         : tree_(tree), interior_(tree.interior_count()), triangles_(tree.triangles()), positions_(tree.positions().subspan(interior_)),
-          first_triangle_(tree.first_triangle()), boxes_(interior_) {
+          luminance_(tree.luminance().subspan(interior_)),
+          first_triangle_(tree.first_triangle()), boxes_(interior_), of_leaf_(tree) {
         for (NodeId node = interior_; node-- > 0;) {
             for (Index t = first_triangle_[node]; t < first_triangle_[node + 1]; ++t) boxes_[node].include(box_of(corners(t)));
             if (node > 0) boxes_[tree.parents()[node]].include(boxes_[node]);
         }
-        first_of_leaf_.assign(std::size_t{tree.leaf_count()} + 1, 0);
-        for (const Triangle& t : triangles_)
-            for (const Index leaf : t) ++first_of_leaf_[leaf + 1];
-        for (std::size_t i = 1; i < first_of_leaf_.size(); ++i) first_of_leaf_[i] += first_of_leaf_[i - 1];
-        of_leaf_.resize(triangles_.size() * 3);
-        std::vector<Index> next(first_of_leaf_.begin(), first_of_leaf_.end() - 1);
-        for (Index t = 0; t < triangles_.size(); ++t)
-            for (const Index leaf : triangles_[t]) of_leaf_[next[leaf]++] = t;
     }
 
     std::vector<Contact> run() const {
@@ -131,13 +148,16 @@ private:
         const Triangle& t = triangles_[triangle];
         return {positions_[t[0]], positions_[t[1]], positions_[t[2]]};
     }
+    float luminance(Index triangle) const {
+        const Triangle& t = triangles_[triangle];
+        return (luminance_[t[0]] + luminance_[t[1]] + luminance_[t[2]]) / 3;
+    }
     static Box box_of(const Corners& c) { return {glm::min(c[0], glm::min(c[1], c[2])), glm::max(c[0], glm::max(c[1], c[2]))}; }
 
     void collect_neighbours(Index triangle, std::vector<Index>& leaves) const {
         leaves.clear();
         for (const Index leaf : triangles_[triangle])
-            for (Index i = first_of_leaf_[leaf]; i < first_of_leaf_[leaf + 1]; ++i)
-                leaves.insert(leaves.end(), triangles_[of_leaf_[i]].begin(), triangles_[of_leaf_[i]].end());
+            for (const Index t : of_leaf_.around(leaf)) leaves.insert(leaves.end(), triangles_[t].begin(), triangles_[t].end());
         std::sort(leaves.begin(), leaves.end());
         leaves.erase(std::unique(leaves.begin(), leaves.end()), leaves.end());
     }
@@ -161,8 +181,11 @@ private:
                 const Triangle& t = triangles_[other];
                 const Corners its = corners(other);
                 if (!around.meets(box_of(its)) || std::any_of(t.begin(), t.end(), is_neighbour)) continue;
-                const float gap = distance_between(own, its);
-                if (gap < near) contact.include({gap, sine_between(own, its)});
+                const glm::vec3 way = way_between(own, its);
+                const float gap = glm::length(way);
+                if (!(gap < near) || is_beside(own, its, way)) continue;
+                const bool is_alike = face_alike(own, its) && std::abs(luminance(triangle) - luminance(other)) <= alike_luminance;
+                if (!is_alike) contact.include({gap, sine_between(own, its)});
             }
             tree_.for_each_child(node, [&](NodeId child) {
                 if (child < interior_ && around.meets(boxes_[child])) scratch.waiting.push_back(child);
@@ -175,9 +198,10 @@ private:
     NodeId interior_;
     std::span<const Triangle> triangles_;
     std::span<const glm::vec3> positions_; // of leaves
+    std::span<const Unorm16> luminance_;   // likewise
     std::span<const Index> first_triangle_;
     std::vector<Box> boxes_; // by interior node
-    std::vector<Index> first_of_leaf_, of_leaf_;
+    LeafTriangles of_leaf_;
 };
 
 } // namespace

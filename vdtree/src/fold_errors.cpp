@@ -11,6 +11,7 @@
 #include "contacts.h"
 #include "drift.h"
 #include "keep_light.h"
+#include "leaf_triangles.h"
 #include "vertex_tree_data.h"
 
 namespace unseen::vdtree {
@@ -23,8 +24,8 @@ constexpr Index spread_count = 8;        // leaves compared besides, at equal st
 constexpr int much_more = 2;           // luminance range than the node's: such neighbours fold later
 constexpr std::size_t triangles_compared = 16; // of each surface, at equal steps
 constexpr std::size_t most_fine_triangles = 64; // in rings of more, some neighbours are folded
-constexpr float contact_reach = 4; // times the distance by which folds move a surface: then parts that near may pass through each other
-constexpr float least_sine = 1e-3f; // of the angle at which parts meet
+constexpr float contact_reach = 6; // times the distance by which folds move a surface: then parts that near may pass through each other
+constexpr float least_sine = 0.2f; // of the angle at which parts meet: flatter ones count as this
 constexpr Index leaves_of_part = 4096;   // of a subtree that one task measures
 
 struct Point {
@@ -158,9 +159,7 @@ public:
         : tree_(tree), errors_(errors), positions_(tree.positions()), luminance_(tree.luminance()), support_luminance_(tree.support_luminance()),
           first_leaf_(tree.first_leaf()), leaf_end_(tree.leaf_end()), parents_(tree.parents()),
           first_triangle_(tree.first_triangle()), triangles_(tree.triangles()), support_(tree.support_spheres()),
-          interior_(tree.interior_count()), crossing_(interior_), contacts_(find_contacts(tree)), witnesses_(interior_) {
-        find_triangles_of_leaves();
-    }
+          interior_(tree.interior_count()), of_leaf_(tree), crossing_(interior_), contacts_(find_contacts(tree)), witnesses_(interior_) {}
 
     void run() {
         std::vector<NodeId> parts, above;
@@ -222,17 +221,6 @@ private:
     };
     using Witnesses = std::array<Index, witness_count>;
 
-    void find_triangles_of_leaves() {
-        first_of_leaf_.assign(std::size_t{tree_.leaf_count()} + 1, 0);
-        for (const Triangle& t : triangles_)
-            for (const Index leaf : t) ++first_of_leaf_[leaf + 1];
-        for (std::size_t i = 1; i < first_of_leaf_.size(); ++i) first_of_leaf_[i] += first_of_leaf_[i - 1];
-        of_leaf_.resize(triangles_.size() * 3);
-        std::vector<Index> next(first_of_leaf_.begin(), first_of_leaf_.end() - 1);
-        for (Index t = 0; t < triangles_.size(); ++t)
-            for (const Index leaf : triangles_[t]) of_leaf_[next[leaf]++] = t;
-    }
-
     Point point(NodeId node) const { return {positions_[node], luminance_[node]}; }
     Point leaf_point(Index leaf) const { return point(interior_ + leaf); }
 
@@ -242,7 +230,8 @@ private:
         tree_.for_each_child(node, [&](NodeId child) {
             if (tree_.is_leaf(child)) {
                 const Index leaf = child - interior_;
-                all.insert(all.end(), of_leaf_.begin() + first_of_leaf_[leaf], of_leaf_.begin() + first_of_leaf_[leaf + 1]);
+                const std::span<const Index> around = of_leaf_.around(leaf);
+                all.insert(all.end(), around.begin(), around.end());
                 return;
             }
             for (const Index t : crossing_[child])
@@ -454,7 +443,7 @@ private:
     std::span<const Triangle> triangles_;
     std::span<const Sphere> support_;
     NodeId interior_;
-    std::vector<Index> first_of_leaf_, of_leaf_;
+    LeafTriangles of_leaf_;
     std::vector<std::vector<Index>> crossing_; // of nodes whose parent has not been measured yet
     std::vector<Contact> contacts_;
     std::vector<Witnesses> witnesses_;
