@@ -66,7 +66,7 @@ TEST_P(InnerSpheres, AreEnclosedAndTouchNothing) {
     const VertexTree tree = built(GetParam().make());
     const std::vector<Sphere> spheres = inner_spheres(tree);
     ASSERT_FALSE(spheres.empty());
-    EXPECT_LE(spheres.size(), 16u);
+    EXPECT_LE(spheres.size(), 8u);
     EXPECT_GE(spheres.front().radius, GetParam().least_radius * static_cast<double>(tree.bounding_sphere().radius));
     for (const Sphere& sphere : spheres) {
         const glm::dvec3 centre(sphere.centre);

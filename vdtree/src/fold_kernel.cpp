@@ -240,7 +240,8 @@ struct Lanes {
             }
             m.height = max_of(m.height, lowest + of.radius);
         }
-        if (!view.occluders.empty()) m.height = min_of(m.height, uncovered(view, m, of.radius));
+        // Far nodes fold anyway.
+        if (!view.occluders.empty() && (view.everybody || any(m.gap < m.silhouette))) m.height = min_of(m.height, uncovered(view, m, of.radius));
 
         m.is_inside = m.height >= 0;
         m.is_near = m.gap < m.interior;

@@ -8,7 +8,7 @@
 namespace unseen::vdtree {
 
 struct InnerSphereOptions {
-    int count = 16; // at most so many, the largest; each costs a nanosecond or less in every test
+    int count = 8;  // at most so many, the largest; each costs a nanosecond or less in every test
     int cells = 96; // of a grid along the tree's longest side, 8 to 512: spheres stay out of all cells that the surface touches
 };
 
