@@ -43,7 +43,8 @@ perception::SceneLuminance scene_luminance(const Scene& scene) {
         return perception::lit_scene(scene.tree, *scene.light_bounds, *scene.lighting,
                                      vdtree::eye_in_tree(scene.tree, scene.view, scene.placement), scene.background);
     const vdtree::LuminanceRange range = scene.tree.luminance_range();
-    return {std::min(range.lo, scene.background), std::max(range.hi, scene.background)};
+    return {std::min(range.lo, scene.background), std::max(range.hi, scene.background),
+            vdtree::LuminanceRange{scene.background, scene.background}};
 }
 
 perception::FoldTestOptions test_options(const Scene& scene, const WhatOptions& what) {

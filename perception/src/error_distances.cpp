@@ -10,6 +10,7 @@
 #include <perception/criterion.h>
 
 #include "fold_screen.h"
+#include "stage_distances.h"
 
 namespace unseen::perception {
 
@@ -223,6 +224,11 @@ public:
         p.drift = no_contrast;
         return rounded(p);
     }
+    // A row of distances, in lengths of its own.
+    std::uint16_t add(std::span<const float> distances, float length) {
+        for (const float distance : distances) reach_.push_back(std::min(distance / length, DistanceCriterion::always_visible));
+        return static_cast<std::uint16_t>(reach_.size() / bins_ - 1);
+    }
     std::span<const float> reach(std::uint16_t row) const { return std::span(reach_).subspan(row * bins_, bins_); }
     std::vector<float> take() { return std::move(reach_); }
     std::size_t size() const { return rows_.size(); }
@@ -361,6 +367,25 @@ void cover(Reaches& reaches, Shown& a, const Shown& b) {
     a = std::isfinite(wider.length) && is_wider_less ? wider : richer;
 }
 
+// A node folds as well where the whole mesh does, as far as the node's stage: takes the stage where that is nowhere seen from farther, unless a
+// child would then be. Children before parents.
+void fold_in_stages(const vdtree::VertexTree& tree, const Reaches& reaches, std::span<const Shown> stages, std::span<Shown> shown) {
+    const std::span<const vdtree::FoldError> errors = tree.fold_errors();
+    std::vector<bool> may_take(shown.size(), true);
+    for (std::size_t node = shown.size(); node-- > 0;) {
+        const std::size_t number = errors[node].stage;
+        if (number >= stages.size()) return; // a damaged file
+        if (may_take[node] && shortfall(reaches, shown[node], stages[number]) <= 1) {
+            shown[node] = stages[number]; // no more than the parent's own, nor its stage
+            continue;
+        }
+        if (node == 0) return;
+        const NodeId parent = tree.parents()[node];
+        const std::size_t above = errors[parent].stage;
+        if (above >= stages.size() || !(shortfall(reaches, stages[above], shown[node]) <= 1)) may_take[parent] = false;
+    }
+}
+
 } // namespace
 
 Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options) {
@@ -427,6 +452,16 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
         const NodeId parent = tree.parents()[node];
         cover(reaches, patches[parent], patch);
         cover(reaches, strips[parent], strip);
+    }
+    const std::vector<float> distances = stage_distances(tree, screen, options, parts.eccentricity_bins);
+    if (!distances.empty() && object_radius > 0) {
+        std::vector<Shown> stages;
+        for (std::size_t first = 0; first < distances.size(); first += parts.eccentricity_bins) {
+            const std::uint16_t row = reaches.add(std::span(distances).subspan(first, parts.eccentricity_bins), object_radius);
+            stages.push_back({.pattern = {}, .length = object_radius, .row = row});
+        }
+        fold_in_stages(tree, reaches, stages, patches);
+        fold_in_stages(tree, reaches, stages, strips);
     }
     for (NodeId node = 0; node < nodes; ++node) {
         parts.classes[node] = {patches[node].row, strips[node].row};

@@ -23,6 +23,7 @@
 #include <glm/vec3.hpp>
 
 #include "judge_input.h"
+#include "masking.h"
 
 namespace unseen::perception {
 namespace {
@@ -36,8 +37,6 @@ constexpr int smallest_base_side = 4;         // pixels; a smaller base would be
 constexpr double contrast_limit = 1000;       // of one band, so that a black reference stays finite
 constexpr double luminance_floor = 0.01;      // cd/m2, where the display's black level does not say more
 constexpr double sensitivity_floor = 1e-60;   // keeps logarithms and squares finite; 1e-57 times below visibility
-// Daly 1993: elevation (1 + (k1 (k2 m)^s)^b)^(1/b), b = 4; k1 = 6^(-7/3), k2 = 6^(10/3).
-constexpr double masking_k1 = 0.015286700226364008, masking_k2 = 392.4980480517423, masking_s = 0.7;
 // Steps of the sensitivity tables. log S is linear in eccentricity, so only luminance errs: by less than 5e-4 of S,
 // most where castleCSF's peak frequency crosses the band's.
 constexpr double eccentricity_step = 1.0;          // degrees
@@ -266,12 +265,6 @@ private:
     std::vector<Node> nodes_;
 };
 
-double masking(double normalised_contrast) {
-    constexpr double asymptotic = 1e3; // from here on 1 + t^4 is t^4 in double, and t^4 could overflow
-    const double t = masking_k1 * std::pow(masking_k2 * normalised_contrast, masking_s);
-    return t > asymptotic ? t : std::sqrt(std::sqrt(1 + t * t * t * t));
-}
-
 // ---- geometry -----------------------------------------------------------------------------------------------------
 
 // The angle between gaze point and pixel, both on the flat screen, for an eye in front of the window's centre.
@@ -463,7 +456,7 @@ Result<Judgement> judge_modern(const Image& reference, const Image& test, const 
     for_each_band(reference, &test, base, contrast_floor(options.display), [&](const Band& band) {
         Plane powers(band.luminance.width, band.luminance.height);
         for_each_sample(band, conditions, eccentricity, true, [&](std::size_t i, double s, double mask, double change) {
-            powers.values[i] = std::pow(change * s / masking(mask * s), options.beta);
+            powers.values[i] = std::pow(change * s / daly_elevation(mask * s), options.beta);
         });
         spread(powers, band.level, sum, [](double& to, double from) { to += from; });
     });
@@ -491,7 +484,7 @@ Result<Image> threshold_map_modern(const Image& reference, const JudgeOptions& o
     for_each_band(reference, nullptr, base, contrast_floor(options.display), [&](const Band& band) {
         Plane steps(band.luminance.width, band.luminance.height);
         for_each_sample(band, conditions, eccentricity, false, [&](std::size_t i, double s, double mask, double) {
-            steps.values[i] = band.luminance.values[i] * masking(mask * s) / s;
+            steps.values[i] = band.luminance.values[i] * daly_elevation(mask * s) / s;
         });
         spread(steps, band.level, threshold, [](double& to, double from) { to = std::min(to, from); });
     });

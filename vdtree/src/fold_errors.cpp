@@ -10,6 +10,7 @@
 
 #include "contacts.h"
 #include "drift.h"
+#include "find_stages.h"
 #include "keep_light.h"
 #include "leaf_triangles.h"
 #include "vertex_tree_data.h"
@@ -489,8 +490,9 @@ Result<VertexTree> with_fold_errors(const VertexTree& tree, int threads) {
     arena.execute([&] {
         Measurer(measured, errors).run();
         find_drift(measured, errors);
+        light.fold_stages = find_stages(measured, errors); // nobody else has the tree yet
     });
-    light.fold_errors = std::move(errors); // nobody else has the tree yet
+    light.fold_errors = std::move(errors);
     return measured;
 }
 

@@ -28,6 +28,7 @@ constexpr std::array<char, 8> magic = {'U', 'N', 'S', 'E', 'E', 'N', 'V', 'T'};
 constexpr std::uint32_t format_version = 2;
 constexpr std::uint64_t page_bytes = 1 << 20;
 constexpr std::uint32_t most_sections = 64;
+constexpr std::size_t most_stages = 256; // that a byte can name
 constexpr std::uint64_t section_alignment = 64; // bytes; a cache line, and what any mapped element needs
 
 // All integers and floats little-endian.
@@ -108,6 +109,7 @@ void for_each_array(Geometry& g, Luminance& l, F&& f) {
     f("adaptation", l.adaptation);
     f("ring_chroma", l.ring_chroma);
     f("fold_errors", l.fold_errors);
+    f("fold_stages", l.fold_stages);
     f("triangles", g.triangles);
     f("source_triangles", g.source_triangles);
     f("source_vertices", g.source_vertices);
@@ -119,7 +121,7 @@ void for_each_array(Geometry& g, Luminance& l, F&& f) {
 bool is_of_texture(std::string_view name) { return name == "texture" || name == "texels" || name == "ring_texture"; }
 
 // Sections that are there only where they have elements.
-bool is_optional(std::string_view name) { return name == "ring_chroma" || name == "fold_errors" || is_of_texture(name); }
+bool is_optional(std::string_view name) { return name == "ring_chroma" || name == "fold_errors" || name == "fold_stages" || is_of_texture(name); }
 
 enum class OpenMode { read, map };
 
@@ -462,6 +464,7 @@ Result<void> Reader::check_counts(const TreeGeometry& g, const TreeLuminance& l)
         {l.adaptation.size() == interior, "adaptation"},
         {l.ring_chroma.empty() || (l.ring_chroma.size() == interior && !g.colours.empty()), "ring_chroma"},
         {l.fold_errors.empty() || l.fold_errors.size() == interior, "fold_errors"},
+        {l.fold_stages.empty() || (!l.fold_errors.empty() && l.fold_stages.size() <= most_stages), "fold_stages"},
         {g.source_triangles.size() == (g.ranges.empty() ? 0 : triangles), "source_triangles"},
         {g.source_vertices.size() == leaves, "source_vertices"},
         {g.texture.size() <= 1 && (g.texture.empty() || !g.uvs.empty()), "texture"},
@@ -522,6 +525,13 @@ Result<void> Reader::check_values(const TreeGeometry& g, const TreeLuminance& l)
     for (const FoldError& e : l.fold_errors)
         for (const float value : {e.distance, e.mean_distance, e.luminance, e.mean_luminance, e.extent, e.drift})
             if (!(value >= 0) || !std::isfinite(value)) return fail("An error of a fold is negative or not finite.");
+    for (const FoldError& e : l.fold_errors)
+        if (!l.fold_stages.empty() && e.stage >= l.fold_stages.size()) return fail("A node folds in a stage that is not there.");
+    for (const FoldStage& stage : l.fold_stages)
+        for (const auto& by_band : stage.contrast)
+            for (const auto& by_mask : by_band)
+                for (const float contrast : by_mask)
+                    if (!(contrast >= 0) || !std::isfinite(contrast)) return fail("A contrast of a stage is negative or not finite.");
     for (const float moved : g.displacement)
         if (!(moved >= 0)) return fail("A displacement is negative.");
     return {};

@@ -205,7 +205,7 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
     });
     std::vector<ChromaRange> chroma = derive_ring_chroma(g, parts, out.luminance);
     TreeLuminance done{{std::move(out.luminance), std::move(out.support_range), std::move(out.ring_range),
-                        std::move(out.adaptation), std::move(chroma), {}},
+                        std::move(out.adaptation), std::move(chroma), {}, {}},
                        light, prelit, textured, textured ? product(leaf.corners, g.ring_texture[VertexTree::root()]) : leaf.corners};
     return done;
 }
@@ -248,6 +248,7 @@ std::span<const PackedRange> VertexTree::ring_texture() const noexcept {
 }
 std::span<const ChromaRange> VertexTree::ring_chroma() const noexcept { return data_->light.ring_chroma; }
 std::span<const FoldError> VertexTree::fold_errors() const noexcept { return data_->light.fold_errors; }
+std::span<const FoldStage> VertexTree::fold_stages() const noexcept { return data_->light.fold_stages; }
 std::span<const Unorm16> VertexTree::adaptation_luminance() const noexcept { return data_->light.adaptation; }
 std::span<const float> VertexTree::displacement() const noexcept { return data_->geometry->displacement; }
 
@@ -310,7 +311,7 @@ std::uint64_t VertexTree::byte_size() const noexcept {
            bytes_of(g.bounds) + bytes_of(g.support_spheres) + bytes_of(g.mask_at) + bytes_of(g.mask_records) +
            bytes_of(g.displacement) + bytes_of(g.triangles) + bytes_of(g.source_triangles) +
            bytes_of(g.source_vertices) + bytes_of(g.texels) + bytes_of(g.ring_texture) + g.ranges.capacity() * sizeof(MeshRange) + bytes_of(l.luminance) + bytes_of(l.support_range) +
-           bytes_of(l.ring_range) + bytes_of(l.adaptation) + bytes_of(l.fold_errors) + bytes_of(l.ring_chroma);
+           bytes_of(l.ring_range) + bytes_of(l.adaptation) + bytes_of(l.fold_errors) + bytes_of(l.fold_stages) + bytes_of(l.ring_chroma);
 }
 
 } // namespace unseen::vdtree

@@ -80,6 +80,7 @@ struct LuminanceArrays {
     Storage<Unorm16> adaptation;
     Storage<ChromaRange> ring_chroma; // empty where all is grey
     Storage<FoldError> fold_errors; // empty: not measured
+    Storage<FoldStage> fold_stages; // likewise, and where there are none
 };
 
 // What depends on the light.

@@ -21,6 +21,7 @@ namespace unseen::perception {
 struct SceneLuminance {
     float darkest = 0;
     float brightest = 1;
+    std::optional<vdtree::LuminanceRange> behind = {}; // the model as a whole: its background; default: anything of the scene
     bool operator==(const SceneLuminance&) const = default;
 };
 

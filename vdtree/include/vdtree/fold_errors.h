@@ -32,17 +32,17 @@ struct FoldError {
     // these face the eye, or none does, the fold moves no outline. It includes the children's.
     NormalSlabs facing;
     std::uint8_t fading = 0; // 0: as large over any area, systematic; 2: as random errors do; 3: errors that cancel each other
-    std::uint8_t spare = 0;
+    std::uint8_t stage = 0;  // in which it folds: see fold_stages.h; no earlier than the children
 
     bool operator==(const FoldError&) const = default;
 };
 static_assert(sizeof(FoldError) == 40);
 
-// The tree with the errors of its folds, under its light, as VertexTree::fold_errors(); and with luminances of the proxies that keep
+// The tree with the errors of its folds, under its light, as VertexTree::fold_errors() and fold_stages(); and with luminances of the proxies that keep
 // the light which the surface sends out: a mean of the leaves loses where the surface curves, and many folds together would show.
 // Bounds of support luminance grow with them; everything else is shared with the given tree. Fails where check() does, and
 // on trees with a texture, of which nothing is measured.
-// Cost: some 20 us a node; in parallel. The result does not depend on the threads. `threads`: 0: all cores.
+// Cost: some 20 us a node, and a second; in parallel. The result does not depend on the threads. `threads`: 0: all cores.
 Result<VertexTree> with_fold_errors(const VertexTree& tree, int threads = 0);
 
 } // namespace unseen::vdtree

@@ -28,6 +28,7 @@
 
 #include <vdtree/chroma.h>
 #include <vdtree/fold_errors.h>
+#include <vdtree/fold_stages.h>
 #include <vdtree/mesh.h>
 #include <vdtree/normal_mask.h>
 #include <vdtree/packed.h>
@@ -50,6 +51,7 @@ struct Sphere {
 struct LuminanceRange {
     float lo = 0;
     float hi = 0;
+    bool operator==(const LuminanceRange&) const = default;
 };
 struct PackedRange {
     Unorm16 lo, hi;
@@ -139,6 +141,7 @@ public:
     std::span<const ChromaRange> ring_chroma() const noexcept; // of vertices, as drawn; empty where all of them are grey
     std::span<const Unorm16> adaptation_luminance() const noexcept; // middle of ring_luminance, saturated up the tree
     std::span<const FoldError> fold_errors() const noexcept; // of with_fold_errors(); else empty
+    std::span<const FoldStage> fold_stages() const noexcept; // likewise; empty, too, where vertices are translucent
     std::span<const float> displacement() const noexcept; // largest distance of a supported leaf from the proxy
 
     // The mesh. By leaf: the input vertex. The input's ranges (groups, materials), over its triangles, and by triangle

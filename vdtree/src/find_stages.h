@@ -1,0 +1,17 @@
+// Folds a tree in stages, and measures what pictures of them show.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <vdtree/fold_errors.h>
+#include <vdtree/fold_stages.h>
+#include <vdtree/vertex_tree.h>
+
+namespace unseen::vdtree {
+
+// Reads the errors, and notes in which stage every node folds. No stages for trees with translucent vertices, and of no extent. Cost: some
+// hundred pictures of up to half of the triangles; in parallel.
+std::vector<FoldStage> find_stages(const VertexTree& tree, std::span<FoldError> errors);
+
+} // namespace unseen::vdtree
