@@ -146,6 +146,7 @@ struct Kernel {
     decltype(&vdtree::decide) decide;
     decltype(&vdtree::decide_range) decide_range;
     decltype(&vdtree::find_costs) find_costs;
+    decltype(&vdtree::find_cost_bounds) find_cost_bounds;
     decltype(&vdtree::move_blocks) move_blocks;
     decltype(&vdtree::look_at_blocks) look_at_blocks;
     decltype(&vdtree::find_due) find_due;
@@ -154,7 +155,7 @@ struct Kernel {
 template <class Of>
 constexpr Kernel kernel_of() {
     return {Of::measure, Of::find_slacks, Of::finish_slacks, Of::facing_gaps, Of::decide, Of::decide_range, Of::find_costs,
-            Of::move_blocks, Of::look_at_blocks, Of::find_due};
+            Of::find_cost_bounds, Of::move_blocks, Of::look_at_blocks, Of::find_due};
 }
 
 Kernel best_kernel() {
@@ -183,6 +184,11 @@ void decide(const KernelView& view, const NodeArrays& arrays, std::span<const No
 void find_costs(const KernelView& view, const NodeArrays& arrays, const CostTables& tables, std::span<const NodeId> nodes,
                 const NodeCosts& costs) noexcept {
     kernel.find_costs(view, arrays, tables, nodes, costs);
+}
+
+void find_cost_bounds(const KernelView& view, const NodeArrays& arrays, const CostTables& tables, std::span<const NodeId> nodes,
+                      float no_outline_over, float* cost, float* seen_cost) noexcept {
+    kernel.find_cost_bounds(view, arrays, tables, nodes, no_outline_over, cost, seen_cost);
 }
 
 void decide_range(const KernelView& view, const NodeArrays& arrays, NodeId first, std::size_t count, std::uint64_t* unfolded) noexcept {

@@ -516,6 +516,32 @@ struct Lanes {
         return costs;
     }
 
+    // As an outline's, which are the larger ones; of the interior where both are the same.
+    static UNSEEN_INLINE Costs outline_costs(const KernelView& view, const CostTables& tables, const Nodes& of, const Measures& m, const Costs& inner) {
+        const Costs outline = costs_of(view, tables, of.silhouette_row, m, of.silhouette_length);
+        return {max_of(inner.cost, outline.cost), max_of(inner.seen, outline.seen)};
+    }
+
+    static UNSEEN_INLINE void find_cost_bounds(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
+                                               std::span<const NodeId> nodes, float no_outline_over, float* cost, float* seen) {
+        const Listed listed{arrays, nodes.data(), nodes.size() - 1};
+        for (std::size_t i = 0; i < nodes.size(); i += width) {
+            listed.prefetch(i);
+            const Nodes of = load_nodes(arrays, [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return listed(i + lane); });
+            const Measures m = measure(view, of);
+            const Costs inner = costs_of(view, tables, of.interior_row, m, of.length), outline = outline_costs(view, tables, of, m, inner);
+            const Ints is_none = outline.cost > no_outline_over;
+            const Floats bound = m.is_inside ? (is_none ? inner.cost : outline.cost) : all(0);
+            const Floats seen_bound = m.is_inside ? (is_none ? inner.seen : outline.seen) : all(0);
+            if (i + width <= nodes.size()) {
+                store(cost + i, bound);
+                store(seen + i, seen_bound);
+            } else {
+                for (std::size_t lane = 0; i + lane < nodes.size(); ++lane) cost[i + lane] = bound[lane], seen[i + lane] = seen_bound[lane];
+            }
+        }
+    }
+
     // Like decide_all().
     static UNSEEN_INLINE void find_costs(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
                                          std::span<const NodeId> nodes, const NodeCosts& out) {
@@ -533,8 +559,7 @@ struct Lanes {
                 const Nodes of = load_nodes(arrays, [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return listed(start + i + lane); });
                 const Measures m = measure(view, of);
                 const Costs inner = costs_of(view, tables, of.interior_row, m, of.length);
-                Costs outline = costs_of(view, tables, of.silhouette_row, m, of.silhouette_length);
-                outline = {max_of(inner.cost, outline.cost), max_of(inner.seen, outline.seen)};
+                const Costs outline = outline_costs(view, tables, of, m, inner);
                 store(cost + i, m.is_inside ? inner.cost : all(0));
                 store(seen + i, m.is_inside ? inner.seen : all(0));
                 store(outline_cost + i, outline.cost);
@@ -685,6 +710,10 @@ struct Kernels {
     static void find_costs(const KernelView& view, const NodeArrays& arrays, const CostTables& tables, std::span<const NodeId> nodes,
                            const NodeCosts& costs) noexcept {
         Lanes::find_costs(view, arrays, tables, nodes, costs);
+    }
+    static void find_cost_bounds(const KernelView& view, const NodeArrays& arrays, const CostTables& tables, std::span<const NodeId> nodes,
+                                 float no_outline_over, float* cost, float* seen_cost) noexcept {
+        Lanes::find_cost_bounds(view, arrays, tables, nodes, no_outline_over, cost, seen_cost);
     }
     static void move_blocks(const float (&eye_high)[3], const float (&eye_low)[3], float path, BlockSpheres& spheres) noexcept {
         blocks::move_blocks(eye_high, eye_low, path, spheres);
