@@ -117,11 +117,17 @@ private:
     bool start_at(float threshold) {
         TreeDecider decider;
         bool is_damaged = false;
+        far_bucket_ = bucket_of(threshold / far_factor);
+        // What would unfold as an outline, but did not, is none.
+        const float unfolding = threshold * (1 + decision_rounding);
         for (std::uint32_t tree = 0; tree < trees_.size(); ++tree) {
             const auto decide = [&](std::span<const NodeId> nodes, std::uint64_t* bits) { testers_[tree]->decide_at(threshold, nodes, bits); };
-            decision_.unfolded[tree] = decider.run(*trees_[tree], decide, [&](NodeId node) {
-                is_damaged |= !trees_[tree]->is_sound(node);
-                ask(tree, node, std::numeric_limits<float>::infinity());
+            decision_.unfolded[tree] = decider.run(*trees_[tree], decide, [&](std::span<const NodeId> folded) {
+                for (const NodeId node : folded) {
+                    is_damaged |= !trees_[tree]->is_sound(node);
+                    ask(tree, node, std::numeric_limits<float>::infinity());
+                }
+                find_bounds(tree, &unfolding, [&](const Entry& entry) { wait(entry); });
             });
             const auto& unfolded = decision_.unfolded[tree];
             for (std::size_t word = 0; word < unfolded.size(); ++word)
@@ -129,12 +135,7 @@ private:
                     triangles_ += triangles_of(tree, static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))));
         }
         decision_.node_tests += decider.decisions;
-        if (is_damaged || triangles_ > limits_.triangles) return false;
-        far_bucket_ = bucket_of(threshold / far_factor);
-        // What would unfold as an outline, but did not, is none.
-        const float unfolding = threshold * (1 + decision_rounding);
-        find_bounds(&unfolding, [&](const Entry& entry) { wait(entry); });
-        return true;
+        return !is_damaged && triangles_ <= limits_.triangles;
     }
 
     // ---- costs
@@ -192,16 +193,15 @@ private:
     }
     // Entries with what their costs are at most; those of folded ones, where a threshold is given at which all that were asked for are.
     template <class F>
-    void find_bounds(const float* folded_at, F&& f) {
-        for (std::uint32_t tree = 0; tree < trees_.size(); ++tree) {
-            const auto& nodes = asked_[tree];
-            costs_.resize(nodes.size());
-            seen_costs_.resize(nodes.size());
-            if (!nodes.empty()) testers_[tree]->find_cost_bounds(nodes, folded_at, costs_.data(), seen_costs_.data());
-            decision_.node_tests += nodes.size();
-            for (std::size_t i = 0; i < nodes.size(); ++i) f(entry_of(tree, i));
-            forget_asked(tree);
-        }
+    void find_bounds(std::uint32_t tree, const float* folded_at, F&& f) {
+        const auto& nodes = asked_[tree];
+        if (nodes.empty()) return;
+        costs_.resize(nodes.size());
+        seen_costs_.resize(nodes.size());
+        testers_[tree]->find_cost_bounds(nodes, folded_at, costs_.data(), seen_costs_.data());
+        decision_.node_tests += nodes.size();
+        for (std::size_t i = 0; i < nodes.size(); ++i) f(entry_of(tree, i));
+        forget_asked(tree);
     }
     // The costs of what has bounds. (The bound is at most the parent's cost.)
     template <class F>
@@ -214,10 +214,11 @@ private:
     void answer(std::size_t bucket, F&& f, G&& g) {
         if (!has_bounds_) return answer(f);
         near_.clear();
-        find_bounds(nullptr, [&](const Entry& entry) {
-            if (bucket_of(entry.cost) == bucket) near_.push_back(entry);
-            else g(entry);
-        });
+        for (std::uint32_t tree = 0; tree < trees_.size(); ++tree)
+            find_bounds(tree, nullptr, [&](const Entry& entry) {
+                if (bucket_of(entry.cost) == bucket) near_.push_back(entry);
+                else g(entry);
+            });
         resolve(near_, f);
     }
 

@@ -223,7 +223,8 @@ void CutFollower::start_over(Cut& cut) {
 // What unfolds, by decisions alone.
 std::vector<std::uint64_t> CutFollower::decide_all() {
     const std::uint64_t before = decider_.decisions;
-    auto unfolded = decider_.run(tree_, [&](std::span<const NodeId> nodes, std::uint64_t* bits) { tester_->decide(nodes, bits); }, [](NodeId) {});
+    auto unfolded = decider_.run(tree_, [&](std::span<const NodeId> nodes, std::uint64_t* bits) { tester_->decide(nodes, bits); },
+                                 [](std::span<const NodeId>) {});
     stats_.node_tests += decider_.decisions - before;
     return unfolded;
 }

@@ -17,8 +17,8 @@ class TreeDecider {
 public:
     std::uint64_t decisions = 0; // in all runs
 
-    // One bit a node that unfolds. `decide(nodes, bits)` says what would, one bit each in whole words; on_folded(node) hears of the
-    // others under those that do (and of the root). Parents come before their children, and as far as that goes subtree by subtree, for
+    // One bit a node that unfolds. `decide(nodes, bits)` says what would, one bit each in whole words; on_folded(nodes) hears of the
+    // others under those that do (and of the root), some at a time. Parents come before their children, and as far as that goes subtree by subtree, for
     // children lie beside their parents.
     template <class Decide, class OnFolded>
     std::vector<std::uint64_t> run(const VertexTree& tree, Decide&& decide, OnFolded&& on_folded) {
@@ -39,7 +39,7 @@ public:
                 return true;
             });
             for (const NodeId node : unfolding_) unfolded[node >> 6] |= std::uint64_t{1} << (node & 63);
-            for (const NodeId node : folded_) on_folded(node);
+            if (!folded_.empty()) on_folded(std::span<const NodeId>(folded_));
             add_children(tree.subtree_end());
         }
         return unfolded;
