@@ -1,11 +1,16 @@
 #include "budget.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
+#include <cmath>
+#include <functional>
+#include <iterator>
 #include <limits>
+#include <optional>
 #include <queue>
+#include <utility>
 
+#include "decide_tree.h"
 #include "prefetch.h"
 #include "walk_children.h"
 
@@ -13,12 +18,20 @@ namespace unseen::vdtree {
 
 namespace {
 
-// Nodes wait in buckets of an eighth of an octave of cost: floats that share their first eleven bits.
-constexpr unsigned bucket_shift = 20;
+// Nodes wait in buckets of a sixteenth of an octave of cost: floats that share their first twelve bits.
+constexpr unsigned bucket_shift = 19;
 constexpr std::size_t bucket_count = (0x7f800000u >> bucket_shift) + 1; // infinity's is the last
 
+// The threshold is guessed from so many nodes of all trees together, so that the triangles of those that unfold are found to a few percent.
+constexpr std::size_t samples = 6144;
+// A guess leaves room for so many standard deviations of what it is a guess of, and for a share besides.
+constexpr double guess_deviations = 2.5, guess_share = 0.01;
+// Decisions and costs are rounded differently: a dozen roundings of floats.
+constexpr float decision_rounding = 1e-5f;
+constexpr float far_factor = 1.5f; // costs lower than the guess by this are hardly reached
+
 struct Entry {
-    float cost, seen_cost;
+    float cost, seen_cost; // or what they are at most
     std::uint32_t tree;
     NodeId node;
 };
@@ -34,19 +47,27 @@ std::size_t bucket_of(float cost) { return std::bit_cast<std::uint32_t>(cost) >>
 class Budgeter {
 public:
     Budgeter(std::span<const VertexTree* const> trees, std::span<const FoldTester* const> testers, const BudgetLimits& limits)
-        : trees_(trees), testers_(testers), limits_(limits), asked_(trees.size()), above_(trees.size()) {
+        : trees_(trees), testers_(testers), limits_(limits), asked_(trees.size()), above_(trees.size()),
+          has_bounds_(!limits.only_unfolding && std::ranges::none_of(testers, &FoldTester::has_lights)) {
         for (const VertexTree* tree : trees) decision_.unfolded.emplace_back((std::size_t{tree->interior_count()} + 63) / 64);
     }
 
+    // From the roots down; the result of all ways.
     BudgetDecision run() {
         for (std::uint32_t tree = 0; tree < trees_.size(); ++tree) ask(tree, VertexTree::root(), std::numeric_limits<float>::infinity());
         answer([&](const Entry& entry) { buckets_[bucket_of(entry.cost)].push_back(entry); });
-        std::size_t bucket = bucket_count;
-        while (bucket-- > 0)
-            if (!buckets_[bucket].empty() && (is_out_of_time() || !take_bucket(bucket))) break;
-        for (const auto& left : buckets_)
-            for (const Entry& entry : left) leave(entry);
-        return std::move(decision_);
+        return run_buckets();
+    }
+
+    // From a threshold that leaves some of the budget, and on from there. None where that turns out to be no way.
+    std::optional<BudgetDecision> run_from_guess() {
+        if (!has_bounds_ || limits_.is_out_of_time || !std::ranges::all_of(testers_, &FoldTester::is_monotone)) return std::nullopt;
+        const float threshold = guess();
+        if (!(threshold > 0) || !start_at(threshold)) return std::nullopt;
+        BudgetDecision decision = run_buckets();
+        // What unfolds at the threshold does so in the result only if that goes on beyond.
+        if (!(decision.threshold < threshold * (1 - decision_rounding))) return std::nullopt;
+        return decision;
     }
 
 private:
@@ -54,15 +75,70 @@ private:
         if (limits_.is_out_of_time && limits_.is_out_of_time()) decision_.is_complete = false;
         return !decision_.is_complete;
     }
-    std::uint64_t triangles_of(const Entry& e) const {
-        const auto first = trees_[e.tree]->first_triangle();
-        return first[e.node + 1] - first[e.node];
+    std::uint64_t triangles_of(std::uint32_t tree, NodeId node) const {
+        const auto first = trees_[tree]->first_triangle();
+        return first[node + 1] - first[node];
     }
+    std::uint64_t triangles_of(const Entry& e) const { return triangles_of(e.tree, e.node); }
     void take(const Entry& e) { decision_.unfolded[e.tree][e.node >> 6] |= std::uint64_t{1} << (e.node & 63); }
     void leave(const Entry& e) {
         decision_.threshold = std::max(decision_.threshold, e.cost);
         decision_.max_seen_cost = std::max(decision_.max_seen_cost, e.seen_cost);
     }
+
+    // ---- a guess
+
+    // Of nodes that nest, a node unfolds whatever the others do; so a sample of all tells what unfolds at a threshold.
+    float guess() {
+        std::size_t nodes = 0;
+        for (const VertexTree* tree : trees_) nodes += tree->interior_count();
+        const std::size_t stride = nodes / samples + 1;
+        std::vector<std::pair<float, double>> found; // costs, and triangles that the node speaks for
+        std::vector<NodeId> sample;
+        for (std::uint32_t tree = 0; tree < trees_.size(); ++tree) {
+            sample.clear();
+            for (std::size_t node = stride / 2; node < trees_[tree]->interior_count(); node += stride) sample.push_back(static_cast<NodeId>(node));
+            find_costs(tree, sample);
+            for (std::size_t i = 0; i < sample.size(); ++i)
+                if (costs_[i] > 0) found.emplace_back(costs_[i], static_cast<double>(stride * triangles_of(tree, sample[i])));
+        }
+        std::sort(found.begin(), found.end(), std::greater<>());
+        double triangles = 0, variance = 0;
+        for (const auto& [cost, more] : found) {
+            triangles += more;
+            variance += more * more;
+            if (triangles + guess_deviations * std::sqrt(variance) > (1 - guess_share) * static_cast<double>(limits_.triangles))
+                return std::isfinite(cost) ? cost : 0;
+        }
+        return 0; // everything may fit
+    }
+
+    // Unfolds what the threshold says, if it fits; those that stay folded wait. Not where nodes are damaged.
+    bool start_at(float threshold) {
+        TreeDecider decider;
+        bool is_damaged = false;
+        far_bucket_ = bucket_of(threshold / far_factor);
+        // What would unfold as an outline, but did not, is none.
+        const float unfolding = threshold * (1 + decision_rounding);
+        for (std::uint32_t tree = 0; tree < trees_.size(); ++tree) {
+            const auto decide = [&](std::span<const NodeId> nodes, std::uint64_t* bits) { testers_[tree]->decide_at(threshold, nodes, bits); };
+            decision_.unfolded[tree] = decider.run(*trees_[tree], decide, [&](std::span<const NodeId> folded) {
+                for (const NodeId node : folded) {
+                    is_damaged |= !trees_[tree]->is_sound(node);
+                    ask(tree, node, std::numeric_limits<float>::infinity());
+                }
+                find_bounds(tree, &unfolding, [&](const Entry& entry) { wait(entry); });
+            });
+            const auto& unfolded = decision_.unfolded[tree];
+            for (std::size_t word = 0; word < unfolded.size(); ++word)
+                for (std::uint64_t bits = unfolded[word]; bits; bits &= bits - 1)
+                    triangles_ += triangles_of(tree, static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))));
+        }
+        decision_.node_tests += decider.decisions;
+        return !is_damaged && triangles_ <= limits_.triangles;
+    }
+
+    // ---- costs
 
     // Nodes are asked about one by one and answered in batches.
     void ask(std::uint32_t tree, NodeId node, float parents_cost) {
@@ -80,24 +156,108 @@ private:
             first = end;
         }
     }
+    void find_costs(std::uint32_t tree, std::span<const NodeId> nodes) {
+        costs_.resize(nodes.size());
+        seen_costs_.resize(nodes.size());
+        unfolded_.resize((nodes.size() + 63) / 64);
+        if (nodes.empty()) return;
+        testers_[tree]->find_costs(nodes, {costs_.data(), seen_costs_.data(), unfolded_.data()});
+        decision_.node_tests += nodes.size();
+    }
+    Entry entry_of(std::uint32_t tree, std::size_t i) const {
+        const float cost = costs_[i] >= 0 ? costs_[i] : std::numeric_limits<float>::infinity();
+        return {std::min(cost, above_[tree][i]), seen_costs_[i], tree, asked_[tree][i]};
+    }
+    void forget_asked(std::uint32_t tree) {
+        asked_[tree].clear();
+        above_[tree].clear();
+    }
+    // Entries with their costs; those that must stay folded are left.
     template <class F>
     void answer(F&& f) {
         for (std::uint32_t tree = 0; tree < trees_.size(); ++tree) {
-            auto& nodes = asked_[tree];
-            costs_.resize(nodes.size());
-            seen_costs_.resize(nodes.size());
-            unfolded_.resize((nodes.size() + 63) / 64);
-            testers_[tree]->find_costs(nodes, {costs_.data(), seen_costs_.data(), unfolded_.data()});
-            decision_.node_tests += nodes.size();
-            for (std::size_t i = 0; i < nodes.size(); ++i) {
-                const float cost = costs_[i] >= 0 ? costs_[i] : std::numeric_limits<float>::infinity();
-                const Entry entry{std::min(cost, above_[tree][i]), seen_costs_[i], tree, nodes[i]};
+            find_costs(tree, asked_[tree]);
+            for (std::size_t i = 0; i < asked_[tree].size(); ++i) {
+                const Entry entry = entry_of(tree, i);
                 const bool wanted = limits_.only_unfolding ? (unfolded_[i / 64] >> (i % 64)) & 1 : entry.cost > 0 || limits_.fill;
-                if (wanted && trees_[tree]->is_sound(nodes[i])) f(entry);
+                if (wanted && trees_[tree]->is_sound(entry.node)) f(entry);
                 else leave(entry);
             }
-            nodes.clear();
-            above_[tree].clear();
+            forget_asked(tree);
+        }
+    }
+    // Waits with what its costs are at most.
+    void wait(const Entry& entry) {
+        const std::size_t bucket = bucket_of(entry.cost);
+        (bucket < far_bucket_ ? far_ : bounded_[bucket]).push_back(entry);
+    }
+    // Entries with what their costs are at most; those of folded ones, where a threshold is given at which all that were asked for are.
+    template <class F>
+    void find_bounds(std::uint32_t tree, const float* folded_at, F&& f) {
+        const auto& nodes = asked_[tree];
+        if (nodes.empty()) return;
+        costs_.resize(nodes.size());
+        seen_costs_.resize(nodes.size());
+        testers_[tree]->find_cost_bounds(nodes, folded_at, costs_.data(), seen_costs_.data());
+        decision_.node_tests += nodes.size();
+        for (std::size_t i = 0; i < nodes.size(); ++i) f(entry_of(tree, i));
+        forget_asked(tree);
+    }
+    // The costs of what has bounds. (The bound is at most the parent's cost.)
+    template <class F>
+    void resolve(std::span<const Entry> bounded, F&& f) {
+        for (const Entry& entry : bounded) ask(entry.tree, entry.node, entry.cost);
+        answer(f);
+    }
+    // The costs of what is asked, as far as they may lie in the bucket: f(entry); or g(entry), with what they are at most.
+    template <class F, class G>
+    void answer(std::size_t bucket, F&& f, G&& g) {
+        if (!has_bounds_) return answer(f);
+        near_.clear();
+        for (std::uint32_t tree = 0; tree < trees_.size(); ++tree)
+            find_bounds(tree, nullptr, [&](const Entry& entry) {
+                if (bucket_of(entry.cost) == bucket) near_.push_back(entry);
+                else g(entry);
+            });
+        resolve(near_, f);
+    }
+
+    // ---- buckets
+
+    BudgetDecision run_buckets() {
+        std::size_t bucket = bucket_count;
+        while (bucket-- > 0) {
+            if (bucket + 1 == far_bucket_) {
+                far_bucket_ = 0;
+                for (const Entry& entry : std::exchange(far_, {})) wait(entry);
+            }
+            if (buckets_[bucket].empty() && bounded_[bucket].empty()) continue;
+            if (is_out_of_time()) break;
+            const std::vector<Entry> bounded = std::move(bounded_[bucket]);
+            bounded_[bucket].clear();
+            resolve(bounded, [&](const Entry& entry) { buckets_[bucket_of(entry.cost)].push_back(entry); });
+            if (!take_bucket(bucket)) break;
+        }
+        for (const auto& left : buckets_)
+            for (const Entry& entry : left) leave(entry);
+        left_.insert(left_.end(), far_.begin(), far_.end());
+        for (const auto& left : bounded_) left_.insert(left_.end(), left.begin(), left.end());
+        leave_bounded();
+        return std::move(decision_);
+    }
+
+    // Asks only for the costs of those that may have the largest of either.
+    void leave_bounded() {
+        constexpr std::size_t at_once = 256;
+        for (bool by_seen_cost = false;; by_seen_cost = true) {
+            const auto larger = [&](const Entry& a, const Entry& b) { return by_seen_cost ? a.seen_cost > b.seen_cost : a.cost > b.cost; };
+            std::erase_if(left_, [&](const Entry& e) { return e.cost <= decision_.threshold && e.seen_cost <= decision_.max_seen_cost; });
+            if (left_.empty()) return;
+            const std::size_t count = std::min(at_once, left_.size());
+            const auto end = left_.begin() + static_cast<std::ptrdiff_t>(count);
+            std::nth_element(left_.begin(), end - 1, left_.end(), larger);
+            resolve(std::span(left_).first(count), [&](const Entry& entry) { leave(entry); });
+            left_.erase(left_.begin(), end);
         }
     }
 
@@ -108,7 +268,7 @@ private:
         buckets_[bucket].clear();
         // Costs that are all the same may make a bucket as large as the tree; then one by one.
         const std::size_t most = 4 * waiting.size() + 4096;
-        std::vector<Entry> all, fresh = waiting, below;
+        std::vector<Entry> all, fresh = waiting, below, bounded_below;
         std::uint64_t sum = triangles_;
         while (!fresh.empty()) {
             constexpr std::size_t ahead = 16; // entries between a prefetch and its use
@@ -123,19 +283,21 @@ private:
             }
             ask_children(fresh);
             fresh.clear();
-            answer([&](const Entry& entry) { (bucket_of(entry.cost) == bucket ? fresh : below).push_back(entry); });
+            answer(bucket, [&](const Entry& entry) { (bucket_of(entry.cost) == bucket ? fresh : below).push_back(entry); },
+                   [&](const Entry& entry) { bounded_below.push_back(entry); });
         }
         if (sum > limits_.triangles) {
-            finish(std::move(all), below);
+            finish(std::move(all), below, bounded_below);
             return false;
         }
         triangles_ = sum;
         for (const Entry& entry : all) take(entry);
         for (const Entry& entry : below) buckets_[bucket_of(entry.cost)].push_back(entry);
+        for (const Entry& entry : bounded_below) wait(entry);
         return true;
     }
 
-    void finish(std::vector<Entry> all, std::span<const Entry> below) {
+    void finish(std::vector<Entry> all, std::span<const Entry> below, std::span<const Entry> bounded_below) {
         std::sort(all.begin(), all.end(), comes_first);
         std::size_t i = 0;
         for (; i < all.size(); ++i) {
@@ -154,6 +316,7 @@ private:
             if (is_folded_under_unfolded(all[i])) leave(all[i]);
         for (const Entry& entry : below)
             if (is_folded_under_unfolded(entry)) leave(entry);
+        std::ranges::copy_if(bounded_below, std::back_inserter(left_), is_folded_under_unfolded);
     }
 
     void finish_one_by_one(std::vector<Entry> waiting) {
@@ -174,9 +337,14 @@ private:
     std::span<const FoldTester* const> testers_;
     const BudgetLimits& limits_;
     std::uint64_t triangles_ = 0;
-    std::array<std::vector<Entry>, bucket_count> buckets_;
+    std::vector<std::vector<Entry>> buckets_{bucket_count};
+    std::vector<std::vector<Entry>> bounded_{bucket_count}; // of which only bounds are known yet
+    std::size_t far_bucket_ = 0;
+    std::vector<Entry> far_; // what has a bound below this bucket, which may never be reached
+    std::vector<Entry> near_, left_;
     std::vector<std::vector<NodeId>> asked_;
     std::vector<std::vector<float>> above_;
+    bool has_bounds_;
     std::vector<float> costs_, seen_costs_;
     std::vector<std::uint64_t> unfolded_;
     BudgetDecision decision_;
@@ -186,6 +354,7 @@ private:
 
 BudgetDecision decide_budget(std::span<const VertexTree* const> trees, std::span<const FoldTester* const> testers,
                              const BudgetLimits& limits) {
+    if (auto decision = Budgeter(trees, testers, limits).run_from_guess()) return std::move(*decision);
     return Budgeter(trees, testers, limits).run();
 }
 

@@ -26,6 +26,9 @@ constexpr std::size_t batch_size = 1024;
 constexpr std::size_t triangles_per_patch = 40;
 std::size_t few_changes(Index triangles) { return std::max<std::size_t>(triangles / triangles_per_patch, 16); }
 
+// All leaves in order are gone through in the time in which those of so many times fewer changes are found.
+constexpr std::size_t leaves_per_change = 16;
+
 // Revisions of one cut never come to those of another one.
 std::uint64_t first_revision() {
     static std::atomic<std::uint64_t> cuts{0};
@@ -444,6 +447,31 @@ void Cut::replay(std::span<const std::uint64_t> unfolded, AdjustStats& stats) {
     end_changes(stats);
 }
 
+// The proxies of all leaves, in order: what is folded under unfolded nodes stands for its leaves, and other leaves for themselves.
+void Cut::assign_all(std::span<const std::uint64_t> unfolded) {
+    const auto first_leaf = tree_->first_leaf(), leaf_end = tree_->leaf_end();
+    const auto subtree_end = tree_->subtree_end();
+    const NodeId end = tree_->interior_count();
+    const auto next_folded = [&](NodeId node) {
+        std::size_t word = node / 64;
+        std::uint64_t folded = ~unfolded[word] & (~std::uint64_t{0} << (node % 64));
+        while (folded == 0 && ++word < unfolded.size()) folded = ~unfolded[word];
+        return folded == 0 ? end : static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(folded)));
+    };
+    Index leaf = 0;
+    const auto stand_for_themselves = [&](Index leaves_end) {
+        for (; leaf < leaves_end; ++leaf) proxy_[leaf] = end + leaf;
+    };
+    for (NodeId node = 0; node < end; node = subtree_end[node]) {
+        node = next_folded(node);
+        if (node >= end) break;
+        stand_for_themselves(first_leaf[node]);
+        const Index leaves_end = leaf_end[node];
+        for (; leaf < leaves_end; ++leaf) proxy_[leaf] = node;
+    }
+    stand_for_themselves(tree_->leaf_count());
+}
+
 // Every proxy is written at most once, however deep the new cut is.
 void Cut::become(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
     changes_.clear();
@@ -458,6 +486,36 @@ void Cut::become(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
             changes_.push_back({static_cast<NodeId>(word * 64 + static_cast<std::size_t>(highest)), true});
         }
     }
+    if (tree_->leaf_count() < leaves_per_change * changes_.size()) {
+        count_triangles();
+        assign_all(unfolded);
+    } else {
+        assign_changed(unfolded);
+    }
+    for (const FoldChange& change : changes_) ++(change.folded ? stats.folds : stats.unfolds);
+    stats.triangles = triangle_count_;
+    unfolded_ = std::move(unfolded);
+    if (!indices_ || changes_.empty()) return;
+    indices_->is_stale = true;
+    indices_->is_patched = false;
+    indices_->count_changes(changes_.size(), triangle_count_);
+    indices_->buffer.drop_lists();
+}
+
+// The triangles of changes_.
+void Cut::count_triangles() {
+    const auto first = tree_->first_triangle();
+    constexpr std::size_t ahead = 32; // changes between a prefetch and its use
+    for (std::size_t i = 0; i < changes_.size(); ++i) {
+        if (i + ahead < changes_.size()) prefetch(&first[changes_[i + ahead].node]);
+        const auto [node, folded] = changes_[i];
+        const Index triangles = first[node + 1] - first[node];
+        triangle_count_ = folded ? triangle_count_ - triangles : triangle_count_ + triangles;
+    }
+}
+
+// The triangles of changes_, and the proxies under them.
+void Cut::assign_changed(const std::vector<std::uint64_t>& unfolded) {
     const auto first = tree_->first_triangle(), first_leaf = tree_->first_leaf(), leaf_end = tree_->leaf_end();
     const auto subtree_end = tree_->subtree_end();
     const auto parents = tree_->parents();
@@ -490,14 +548,6 @@ void Cut::become(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
             });
         }
     }
-    for (const FoldChange& change : changes_) ++(change.folded ? stats.folds : stats.unfolds);
-    stats.triangles = triangle_count_;
-    unfolded_ = std::move(unfolded);
-    if (!indices_ || changes_.empty()) return;
-    indices_->is_stale = true;
-    indices_->is_patched = false;
-    indices_->count_changes(changes_.size(), triangle_count_);
-    indices_->buffer.drop_lists();
 }
 
 AdjustStats Cut::adjust(FoldCriterion criterion, const AdjustOptions& options) {

@@ -25,7 +25,6 @@ constexpr double most_due = 0.6;
 // After larger steps from a cut without deadlines, deadlines would not be worth making. In lengths for a radian, like longest_step.
 constexpr double step_worth_deadlines = 0.03;
 constexpr std::size_t piece_tests = 512; // tests at once while slots are filled: what they read stays in the cache
-constexpr std::size_t piece_decisions = 1024; // decisions at once while all are made anew; likewise
 // Beyond this step a good part of all verdicts would be due anyway. In lengths for a radian: twice the tree's distance.
 constexpr double longest_step = 0.125;
 constexpr double longest_light_step = 0.5; // radians; likewise
@@ -221,30 +220,12 @@ void CutFollower::start_over(Cut& cut) {
     cut.change_to(decide_all(), stats_);
 }
 
-// What unfolds, by decisions alone: parents before their children, and as far as that goes subtree by subtree, for children lie beside
-// their parents.
+// What unfolds, by decisions alone.
 std::vector<std::uint64_t> CutFollower::decide_all() {
-    std::vector<std::uint64_t> unfolded((std::size_t{tree_.interior_count()} + 63) / 64);
-    next_wave_.assign(1, VertexTree::root()); // what is left to be decided, the next ones last
-    while (!next_wave_.empty()) {
-        const auto first = next_wave_.end() - static_cast<std::ptrdiff_t>(std::min(piece_decisions, next_wave_.size()));
-        wave_.assign(first, next_wave_.end());
-        next_wave_.erase(first, next_wave_.end());
-        decisions_.resize((wave_.size() + 63) / 64);
-        tester_->decide(wave_, decisions_.data());
-        stats_.node_tests += wave_.size();
-        unfolding_.clear();
-        for (std::size_t word = 0; word < decisions_.size(); ++word) {
-            for (std::uint64_t bits = decisions_[word]; bits; bits &= bits - 1) {
-                const NodeId node = wave_[word * 64 + static_cast<std::size_t>(std::countr_zero(bits))];
-                if (!tree_.is_sound(node)) continue;
-                unfolded[node >> 6] |= std::uint64_t{1} << (node & 63);
-                unfolding_.push_back(node);
-            }
-        }
-        walk_children(tree_, unfolding_.size(), [&](std::size_t i) { return unfolding_[i]; },
-                      [&](std::size_t, NodeId child) { next_wave_.push_back(child); });
-    }
+    const std::uint64_t before = decider_.decisions;
+    auto unfolded = decider_.run(tree_, [&](std::span<const NodeId> nodes, std::uint64_t* bits) { tester_->decide(nodes, bits); },
+                                 [](std::span<const NodeId>) {});
+    stats_.node_tests += decider_.decisions - before;
     return unfolded;
 }
 

@@ -11,6 +11,7 @@
 
 #include <vdtree/cut.h>
 
+#include "decide_tree.h"
 #include "fold_tester.h"
 #include "watch_list.h"
 
@@ -101,7 +102,7 @@ private:
     std::vector<Slot> kept_, wave_slots_;
     std::vector<FoldCandidate> parent_candidates_;
     std::vector<Verdict> verdicts_;
-    std::vector<std::uint64_t> decisions_;
+    TreeDecider decider_;
     AdjustStats stats_;
 };
 

@@ -77,6 +77,9 @@ struct NodeCosts {
 };
 void find_costs(const KernelView& view, const NodeArrays& arrays, const CostTables& tables, std::span<const NodeId> nodes,
                 const NodeCosts& costs) noexcept;
+// At least what both costs of a node are, whatever it faces, or, where it would cost more than `no_outline_over` as an outline, as none.
+void find_cost_bounds(const KernelView& view, const NodeArrays& arrays, const CostTables& tables, std::span<const NodeId> nodes,
+                      float no_outline_over, float* cost, float* seen_cost) noexcept;
 
 // Sixteen nodes.
 struct FoldBatch {

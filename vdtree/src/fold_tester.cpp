@@ -171,8 +171,22 @@ void FoldTester::find_costs(std::span<const NodeId> nodes, const NodeCosts& cost
         }
         return;
     }
+    vdtree::find_costs(costs_view_, arrays_, cost_tables(), nodes, costs);
+}
+
+CostTables FoldTester::cost_tables() const {
     const DistanceCriterion::Parts& parts = criterion_.parts();
-    vdtree::find_costs(costs_view_, arrays_, {parts.reach.data(), parts.least_cost.empty() ? nullptr : parts.least_cost.data()}, nodes, costs);
+    return {parts.reach.data(), parts.least_cost.empty() ? nullptr : parts.least_cost.data()};
+}
+
+void FoldTester::find_cost_bounds(std::span<const NodeId> nodes, const float* folded_at, float* cost, float* seen_cost) const {
+    vdtree::find_cost_bounds(costs_view_, arrays_, cost_tables(), nodes, folded_at ? *folded_at : infinity, cost, seen_cost);
+}
+
+void FoldTester::decide_at(float threshold, std::span<const NodeId> nodes, std::uint64_t* unfolded) const {
+    KernelView view = view_;
+    view.inverse_threshold = 1 / threshold;
+    vdtree::decide(view, arrays_, nodes, unfolded);
 }
 
 void FoldTester::test_nodes(std::span<const NodeId> nodes, std::span<Verdict> verdicts, bool costs) const {

@@ -70,8 +70,15 @@ public:
     // Only whether they unfold, one bit each; the same verdicts.
     void decide(std::span<const NodeId> nodes, std::uint64_t* unfolded) const;
     void decide_range(NodeId first, std::size_t count, std::uint64_t* unfolded) const;
+    // The same at another threshold. Only without least costs.
+    void decide_at(float threshold, std::span<const NodeId> nodes, std::uint64_t* unfolded) const;
     // Both costs of nodes, and whether they unfold; the same as those of test_costs().
     void find_costs(std::span<const NodeId> nodes, const NodeCosts& costs) const;
+    // At least both costs, found without a look at what faces the eye: at a third of the price. `folded_at`, if not null, is a threshold
+    // (somewhat more than one) at which all of them are folded. Not with lights.
+    void find_cost_bounds(std::span<const NodeId> nodes, const float* folded_at, float* cost, float* seen_cost) const;
+    bool has_lights() const noexcept { return lit_.has_value(); }
+    bool is_monotone() const noexcept { return criterion_.is_monotone(); }
     // The same where costs count, not only what is above the threshold: what nodes face is always found out. (In the above, the
     // costs of nodes that are far from the threshold may be those of another facing.)
     void test_costs(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const;
@@ -87,6 +94,7 @@ private:
     void find_facings(Lanes lanes, const FoldBatch& batch, bool costs, Findings& findings) const;
     void find_position_slacks(const FoldBatch& batch, Findings& findings) const;
     void light(Lanes lanes, FoldBatch& batch, LitFindings& lit) const;
+    CostTables cost_tables() const;
     void leave_room_for_lights(LitFindings& lit, FoldBatch& batch, const Findings& findings) const;
     void set_costs(Verdict& verdict, const FoldBatch& batch, std::size_t lane, bool is_silhouette) const;
     void set_costs(Verdict& verdict, std::int32_t row, std::int32_t bin, float unit, float gap) const;

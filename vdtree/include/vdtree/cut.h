@@ -141,6 +141,9 @@ private:
     void end_changes(AdjustStats& stats);
     friend Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objects, Index triangle_budget);
     void become(std::vector<std::uint64_t> unfolded, AdjustStats& stats);
+    void count_triangles();
+    void assign_changed(const std::vector<std::uint64_t>& unfolded);
+    void assign_all(std::span<const std::uint64_t> unfolded);
     void change_to(std::vector<std::uint64_t> unfolded, AdjustStats& stats);
     void replay(std::span<const std::uint64_t> unfolded, AdjustStats& stats);
     std::span<const NodeId> children_of(NodeId node);
