@@ -368,9 +368,9 @@ struct Lanes {
             std::memcpy(rows, batch.slabs, sizeof rows);
             for (int stage = 0; stage < 4; ++stage) {
                 for (std::size_t i = 0; i < 8; ++i) {
-                    mixed[2 * i] = __builtin_shuffle(rows[i], rows[i + 8], Bytes{0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23});
+                    mixed[2 * i] = __builtin_shufflevector(rows[i], rows[i + 8], 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
                     mixed[2 * i + 1] =
-                        __builtin_shuffle(rows[i], rows[i + 8], Bytes{8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31});
+                        __builtin_shufflevector(rows[i], rows[i + 8], 8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
                 }
                 std::memcpy(rows, mixed, sizeof rows);
             }
