@@ -214,7 +214,9 @@ TEST_P(Follow, EqualsTheCutFromScratchOnRandomPaths) {
         }
     }
     EXPECT_LT(incremental_tests, 4 * all_tests);
-    if (GetParam().has_small_rings) EXPECT_GT(hiding_frames, frame_count() / 20);
+    if (GetParam().has_small_rings) {
+        EXPECT_GT(hiding_frames, frame_count() / 20);
+    }
 }
 
 // Straight at the model, past it and away from it, by steps of all sizes, with a gaze that goes its own way.
