@@ -131,7 +131,8 @@ Command perception_command(CLI::App& bench) {
     auto a = std::make_shared<PerceptionArguments>();
     PerceptionBenchOptions& o = a->options;
     CLI::App* verb = bench.add_subcommand("perception", "What fold tests save, whether it can be seen, and what it costs, against what is promised");
-    verb->add_option("--mesh", o.meshes, "Meshes or trees (default: the bunny and the dragon, as ./quickstart gets them; without them a sphere with bumps)")
+    verb->add_option("--mesh", o.meshes, "Meshes or trees (default: the bunny and the dragon, as ./quickstart gets them; without them a sphere with bumps); "
+                                             "of the dragon, unless it is named, only random views, from afar, and speed")
         ->type_name("MESH");
     verb->add_option("--other", o.others, "More of them, for the random views and from afar")->type_name("MESH");
     verb->add_option("--only", a->only, "Groups: savings,random,far,hard,tolerance,csf,observers,speed (default: all)")->type_name("LIST");

@@ -9,6 +9,10 @@ namespace {
 
 constexpr int samples_to_judge = 64; // a pixel; with fewer, samples that jump at outlines can be seen
 
+bool is_same(const vdtree::View& a, const vdtree::View& b) {
+    return a.eye == b.eye && a.target == b.target && a.up == b.up && a.fov_y_degrees == b.fov_y_degrees && a.width == b.width && a.height == b.height;
+}
+
 bool needs_errors(FoldTest test) { return test == FoldTest::error; }
 
 } // namespace
@@ -66,10 +70,11 @@ Result<void> JudgedModel::look(ViewOptions view) {
     view.width = view_.width;
     view.height = view_.height;
     view_ = view;
-    full_.reset();
+    const vdtree::View before = plain_.scene->view;
     for (Stand* stand : {&plain_, &measured_})
         if (stand->scene)
             if (auto looked = app::look(*stand->scene, view_); !looked) return looked;
+    if (!is_same(plain_.scene->view, before)) full_.reset();
     return {};
 }
 

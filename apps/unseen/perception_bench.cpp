@@ -30,12 +30,15 @@ using perception::Image;
 using vdtree::Index;
 
 constexpr FoldTest tests[] = {FoldTest::luebke_hallen, FoldTest::luebke_hallen_safe, FoldTest::error};
+constexpr FoldTest geometric_tests[] = {FoldTest::displacement, FoldTest::extent};
 constexpr FoldTest baseline = FoldTest::luebke_hallen;
 constexpr FoldTest promised = FoldTest::error; // the one that the promises are about
 constexpr double gaze_degrees = 29;
 constexpr double gazes[] = {gaze_degrees, 0}; // 0: none, all is looked at
 constexpr double fills[] = {0.9, 0.5, 0.2};   // of the window's height
 constexpr Index large_mesh = 50'000;          // triangles, of the meshes that are looked at from afar
+constexpr Index huge_mesh = 400'000;          // triangles, whose pictures take a minute each in software
+constexpr std::size_t huge_views = 6;         // random ones, of each such mesh
 constexpr Index lit_active = 100'000;         // triangles, under moving lights
 constexpr std::uint64_t random_seed = 20;
 
@@ -220,6 +223,7 @@ private:
         for (const std::string& file : options_.meshes.empty() ? installed_meshes() : options_.meshes)
             if (auto added = add_file(file); !added) return added;
         main_models_ = models_.size();
+        if (options_.meshes.empty()) settle_huge_models();
         if (models_.empty()) {
             auto tree = sample_tree();
             if (!tree) return tree.error();
@@ -233,6 +237,13 @@ private:
             result_.title += (i ? (i == main_models_ ? "; and " : ", ") : "") + models_[i]->name() + " (" + grouped(models_[i]->triangles()) + ")";
         result_.title += "; " + grouped(static_cast<std::uint64_t>(options_.window_px)) + " pixels a side";
         return {};
+    }
+    // Where nobody named the meshes, huge ones are looked at only at random, from afar and for speed, and with --quick not at all.
+    void settle_huge_models() {
+        const auto huge = std::stable_partition(models_.begin(), models_.end(), [](const auto& model) { return model->triangles() <= huge_mesh; });
+        if (huge == models_.begin()) return; // there are no others
+        main_models_ = static_cast<std::size_t>(huge - models_.begin());
+        if (options_.quick) models_.erase(huge, models_.end());
     }
     Result<void> add_file(const fs::path& file) {
         auto tree = load_tree(file);
@@ -348,16 +359,19 @@ private:
         for (const double gaze : gazes)
             for (const double fill : wanted) settings.push_back({gaze, fill});
         std::vector<std::array<Cell, std::size(tests)>> cells(settings.size());
+        for (auto& of_tests : cells)
+            for (Cell& cell : of_tests) cell.triangles.assign(main_models_, 0);
         for (std::size_t model = 0; model < main_models_; ++model) {
-            for (std::size_t s = 0; s < settings.size(); ++s) {
-                for (Cell& cell : cells[s]) cell.triangles.push_back(0);
+            for (std::size_t f = 0; f < wanted.size(); ++f) {
                 for (std::size_t d = 0; d < direction_count(); ++d) {
-                    progress(done++, all, "savings");
-                    const std::size_t first = found.size();
-                    if (auto ok = judge("savings", models_, model, look(directions[d], settings[s].fill, settings[s].gaze), found); !ok) return ok;
-                    for (std::size_t t = 0; t < std::size(tests); ++t) {
-                        cells[s][t].views.push_back(found[first + t]);
-                        cells[s][t].triangles.back() += found[first + t].verdicts.triangles / static_cast<double>(direction_count());
+                    for (std::size_t s = f; s < settings.size(); s += wanted.size()) { // the gazes: the full model is drawn once for all
+                        progress(done++, all, "savings");
+                        const std::size_t first = found.size();
+                        if (auto ok = judge("savings", models_, model, look(directions[d], settings[s].fill, settings[s].gaze), found); !ok) return ok;
+                        for (std::size_t t = 0; t < std::size(tests); ++t) {
+                            cells[s][t].views.push_back(found[first + t]);
+                            cells[s][t].triangles[model] += found[first + t].verdicts.triangles / static_cast<double>(direction_count());
+                        }
                     }
                 }
             }
@@ -410,8 +424,23 @@ private:
 
     // ---- random views
 
+    // The models in turn, those that are huge only so often.
+    std::vector<std::size_t> models_of_random_views(std::size_t count) const {
+        const auto is_huge = [&](std::size_t m) { return models_[m]->triangles() > huge_mesh; };
+        bool all_huge = true;
+        for (std::size_t m = 0; m < models_.size(); ++m) all_huge = all_huge && is_huge(m);
+        std::vector<std::size_t> order, views(models_.size());
+        for (std::size_t m = 0; order.size() < count; m = (m + 1) % models_.size()) {
+            if (is_huge(m) && !all_huge && views[m] >= huge_views) continue;
+            ++views[m];
+            order.push_back(m);
+        }
+        return order;
+    }
+
     Result<void> random_views() {
         const std::size_t count = options_.quick ? std::min<std::size_t>(models_.size(), 6) : 72;
+        const std::vector<std::size_t> order = models_of_random_views(count);
         std::mt19937_64 random(random_seed);
         const auto uniform = [&](double low, double high) { return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53; };
         std::vector<Judged> found;
@@ -431,7 +460,7 @@ private:
                 how.gaze_px = centre + px * glm::dvec2(std::cos(where), std::sin(where));
                 how.text.replace(how.text.rfind("fovea"), 5, "gaze " + rounded(aside, 3) + " degrees aside");
             }
-            if (auto ok = judge("random", models_, i % models_.size(), how, found); !ok) return ok;
+            if (auto ok = judge("random", models_, order[i], how, found); !ok) return ok;
         }
         add_visibility_rows(std::to_string(count) + " random views", found, models_);
         return write_worst(found, models_, "random.png");
@@ -545,35 +574,51 @@ private:
 
     // ---- a tolerance in pixels
 
-    // The largest of which nothing can be seen in any of the looks, by bisection; what is kept by it.
-    Result<double> safe_tolerance(FoldTest test, const std::vector<std::pair<std::size_t, Look>>& looks) {
-        constexpr double largest_px = 32, precision = 1.05;
-        double tolerance = largest_px;
+    // The largest tolerances of which nothing can be seen in any of the looks.
+    struct SafeTolerances {
+        static constexpr double largest_px = 32, precision = 1.05;
+        double px[std::size(geometric_tests)][std::size(gazes)];
+        SafeTolerances() { std::fill_n(&px[0][0], std::size(geometric_tests) * std::size(gazes), largest_px); }
+    };
+
+    // By bisection, and only where the one so far is not safe; view by view, so that the full model is drawn once for all tests and gazes.
+    Result<SafeTolerances> safe_tolerances() {
+        SafeTolerances safe;
         std::size_t done = 0;
-        for (const auto& [model, how] : looks) {
-            progress(done++, looks.size(), "tolerances in pixels");
-            if (auto looked = models_[model]->look(how.view); !looked) return looked.error();
-            const auto is_safe = [&](double px) -> Result<bool> {
-                WhatOptions what = what_of(test, how);
-                what.mode = Mode::pixels;
-                what.pixels = px;
-                const auto verdict = models_[model]->judge(what, Judge::modern);
-                if (!verdict) return verdict.error();
-                return verdict->visible_pixels == 0;
-            };
-            const auto safe = is_safe(tolerance);
-            if (!safe) return safe.error();
-            if (*safe) continue;
-            double low = 1e-3, high = tolerance;
-            while (high > low * precision) {
-                const double middle = std::sqrt(low * high);
-                const auto is = is_safe(middle);
-                if (!is) return is.error();
-                (*is ? low : high) = middle;
-            }
-            tolerance = low;
+        const std::size_t all = main_models_ * wanted_fills().size() * direction_count();
+        for (std::size_t model = 0; model < main_models_; ++model)
+            for (const double fill : wanted_fills())
+                for (std::size_t d = 0; d < direction_count(); ++d) {
+                    progress(done++, all, "tolerances in pixels");
+                    for (std::size_t g = 0; g < std::size(gazes); ++g)
+                        for (std::size_t t = 0; t < std::size(geometric_tests); ++t)
+                            if (auto ok = lower_tolerance(safe.px[t][g], geometric_tests[t], model, look(directions[d], fill, gazes[g])); !ok) return ok.error();
+                }
+        return safe;
+    }
+
+    Result<void> lower_tolerance(double& tolerance, FoldTest test, std::size_t model, const Look& how) {
+        if (auto looked = models_[model]->look(how.view); !looked) return looked;
+        const auto is_safe = [&](double px) -> Result<bool> {
+            WhatOptions what = what_of(test, how);
+            what.mode = Mode::pixels;
+            what.pixels = px;
+            const auto verdict = models_[model]->judge(what, Judge::modern);
+            if (!verdict) return verdict.error();
+            return verdict->visible_pixels == 0;
+        };
+        const auto safe = is_safe(tolerance);
+        if (!safe) return safe.error();
+        if (*safe) return {};
+        double low = 1e-3, high = tolerance;
+        while (high > low * SafeTolerances::precision) {
+            const double middle = std::sqrt(low * high);
+            const auto is = is_safe(middle);
+            if (!is) return is.error();
+            (*is ? low : high) = middle;
         }
-        return tolerance;
+        tolerance = low;
+        return {};
     }
 
     // The mean of the looks.
@@ -595,12 +640,10 @@ private:
 
     Result<void> tolerance() {
         using Looks = std::vector<std::pair<std::size_t, Look>>;
-        const auto looks_of = [&](double gaze, std::optional<double> only_fill) {
+        const auto looks_of = [&](double gaze, double fill) {
             Looks looks;
             for (std::size_t m = 0; m < main_models_; ++m)
-                for (const double fill : wanted_fills())
-                    for (std::size_t d = 0; d < direction_count(); ++d)
-                        if (!only_fill || fill == *only_fill) looks.emplace_back(m, look(directions[d], fill, gaze));
+                for (std::size_t d = 0; d < direction_count(); ++d) looks.emplace_back(m, look(directions[d], fill, gaze));
             return looks;
         };
         BenchDetails details{"One tolerance for all views against one threshold: what each keeps, in triangles, mean of " +
@@ -619,13 +662,14 @@ private:
             details.rows.push_back(std::move(line));
             return {};
         };
-        for (const FoldTest test : {FoldTest::displacement, FoldTest::extent}) {
+        const auto found = safe_tolerances();
+        if (!found) return found.error();
+        for (std::size_t t = 0; t < std::size(geometric_tests); ++t) {
+            const FoldTest test = geometric_tests[t];
             double safe[2] = {};
             for (const double gaze : {0.0, gaze_degrees}) {
-                const auto found = safe_tolerance(test, looks_of(gaze, {}));
-                if (!found) return found.error();
-                safe[gaze > 0] = *found;
-                if (auto added = add_line(test, *found, rounded(*found, 2) + " px", "safe: " + gaze_name(gaze)); !added) return added;
+                const double px = safe[gaze > 0] = found->px[t][gaze > 0 ? 0 : 1]; // as `gazes` has them
+                if (auto added = add_line(test, px, rounded(px, 2) + " px", "safe: " + gaze_name(gaze)); !added) return added;
             }
             result_.rows.push_back({"safe " + name_of(test) + " at " + gaze_name(gaze_degrees) + " over that at the fovea", "x",
                                     rounded(safe[1], 3) + " px over " + rounded(safe[0], 3) +

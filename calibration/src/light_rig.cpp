@@ -19,8 +19,10 @@ using Kind = vdtree::LightSource::Kind;
 using nlohmann::json;
 
 constexpr double unbounded = std::numeric_limits<double>::max();
-constexpr Range positive{.minimum = 0, .maximum = unbounded, .minimum_allowed = false};
-constexpr Range not_negative{.minimum = 0, .maximum = unbounded};
+// Beyond, single floats overflow where distances are squared; nothing is so bright or so far away.
+constexpr double brightest = 1e6, farthest = 1e12; // times white; world units
+constexpr Range distance_range{.minimum = 0, .maximum = farthest, .minimum_allowed = false};
+constexpr Range intensity_range{.minimum = 0, .maximum = brightest};
 constexpr Range share{.minimum = 0, .maximum = 1};
 constexpr Range any_number{.minimum = -unbounded, .maximum = unbounded};
 constexpr Range half_angle{.minimum = 0, .maximum = 180};
@@ -37,6 +39,14 @@ Result<glm::dvec3> vector(const JsonObject& object, std::string_view key) {
     for (const double x : v)
         if (!std::isfinite(x)) return object.key_error(key, "must have finite numbers");
     return glm::dvec3(v[0], v[1], v[2]);
+}
+
+Result<glm::dvec3> location(const JsonObject& object, std::string_view key) {
+    const auto v = vector(object, key);
+    if (!v) return v;
+    for (int k = 0; k < 3; ++k)
+        if (std::abs((*v)[k]) > farthest) return object.key_error(key, "must lie within 1e12 world units of the origin, but has " + to_text((*v)[k]));
+    return v;
 }
 
 // Scaled first, so that neither tiny nor huge directions under- or overflow when squared.
@@ -121,7 +131,7 @@ private:
         vdtree::LightSource& source = light.at_rest;
         light.is_headlight = type == "headlight";
         source.kind = type == "point" ? Kind::point : type == "spot" ? Kind::spot : Kind::directional;
-        const auto intensity = object->number("intensity", not_negative);
+        const auto intensity = object->number("intensity", intensity_range);
         if (!intensity) return intensity.error();
         source.intensity = *intensity;
         if (type == "directional" || type == "spot") {
@@ -130,10 +140,10 @@ private:
             source.direction = *v;
         }
         if (source.kind != Kind::directional) {
-            const auto v = vector(*object, "position");
+            const auto v = location(*object, "position");
             if (!v) return v.error();
             source.position = *v;
-            const auto distance = object->number("distance", positive);
+            const auto distance = object->number("distance", distance_range);
             if (!distance) return distance.error();
             source.distance = *distance;
         }
@@ -177,7 +187,7 @@ private:
         light.degrees_per_second = *speed;
         light.has_centre = orbit->has("centre");
         if (!light.has_centre) return {};
-        const auto centre = vector(*orbit, "centre");
+        const auto centre = location(*orbit, "centre");
         if (!centre) return centre.error();
         light.centre = *centre;
         return {};
@@ -204,9 +214,9 @@ private:
             key.seconds = *seconds;
             if (!light.keys.empty() && !(key.seconds > light.keys.back().seconds))
                 return frame->key_error("time_s", "must be later than that of the keyframe before");
-            if (auto ok = frame->get("intensity", key.intensity, not_negative); !ok) return ok;
+            if (auto ok = frame->get("intensity", key.intensity, intensity_range); !ok) return ok;
             if (frame->has("position")) {
-                const auto v = vector(*frame, "position");
+                const auto v = location(*frame, "position");
                 if (!v) return v.error();
                 key.position = *v;
             }

@@ -76,12 +76,16 @@ std::vector<double> log2_of(std::span<const double> values) {
 }
 
 // `positions` are the values as interpolation sees them: their logarithms, or themselves.
-Result<void> check_axis(std::string_view field, std::span<const double> values, std::span<const double> positions) {
+// What no table of an eye has, by orders of magnitude: values beyond are a slip.
+constexpr double most_cpd = 1e4, most_degrees = 180, most_cdm2 = 1e10, most_sensitive = 1e6;
+
+Result<void> check_axis(std::string_view field, std::span<const double> values, std::span<const double> positions, double highest) {
     for (std::size_t i = 0; i < values.size(); ++i) {
         const std::string place = indexed(field, {i});
         if (!std::isfinite(values[i]) || !std::isfinite(positions[i])) {
             return bad(place + " must be a finite number in its range, but is " + number(values[i]));
         }
+        if (values[i] > highest) return bad(place + " must be at most " + number(highest) + ", but is " + number(values[i]));
         if (i > 0 && !(positions[i] - positions[i - 1] >= smallest_spacing)) {
             return bad(place + " is " + number(values[i]) + " after " + number(values[i - 1]) +
                        ": the values must rise from sample to sample, by at least " + number(smallest_spacing) +
@@ -252,9 +256,9 @@ Result<CsfTable> CsfTable::create(CsfSamples samples, Branches branches) {
 
     // The logarithm of a value that is not above 0 is not finite, which the check finds.
     std::vector<double> log2_frequency = log2_of(s.frequency_cpd), log2_luminance = log2_of(s.luminance_cdm2);
-    if (auto ok = check_axis("frequency_cpd", s.frequency_cpd, log2_frequency); !ok) return ok.error();
-    if (auto ok = check_axis("eccentricity_deg", s.eccentricity_deg, s.eccentricity_deg); !ok) return ok.error();
-    if (auto ok = check_axis("luminance_cdm2", s.luminance_cdm2, log2_luminance); !ok) return ok.error();
+    if (auto ok = check_axis("frequency_cpd", s.frequency_cpd, log2_frequency, most_cpd); !ok) return ok.error();
+    if (auto ok = check_axis("eccentricity_deg", s.eccentricity_deg, s.eccentricity_deg, most_degrees); !ok) return ok.error();
+    if (auto ok = check_axis("luminance_cdm2", s.luminance_cdm2, log2_luminance, most_cdm2); !ok) return ok.error();
     if (s.eccentricity_deg.front() != 0) {
         return bad("eccentricity_deg[0] must be 0 (the fovea), but is " + number(s.eccentricity_deg.front()));
     }
@@ -267,10 +271,10 @@ Result<CsfTable> CsfTable::create(CsfSamples samples, Branches branches) {
                    std::to_string(frequencies));
     }
     for (std::size_t i = 0; i < s.sensitivity.size(); ++i) {
-        if (!(s.sensitivity[i] > 0 && std::isfinite(s.sensitivity[i]))) {
+        if (!(s.sensitivity[i] > 0 && s.sensitivity[i] <= most_sensitive)) {
             const std::size_t column = i / frequencies, luminances = s.luminance_cdm2.size();
             return bad(indexed("sensitivity", {column / luminances, column % luminances, i % frequencies}) +
-                       " must be finite and above 0, but is " + number(s.sensitivity[i]));
+                       " must be above 0 and at most 1e6, but is " + number(s.sensitivity[i]));
         }
     }
 

@@ -56,39 +56,41 @@ double table_encode(const std::vector<double>& table, double linear) {
 }
 
 // What no display reaches: values beyond are a slip of the unit.
-constexpr double largest_pitch_m = 1, farthest_m = 1e4, brightest_cdm2 = 1e6, brightest_ambient_lux = 1e6;
-constexpr double largest_gamma = 10, most_ppd = 1e5;
+constexpr double smallest_pitch_m = 1e-9, largest_pitch_m = 1, nearest_m = 1e-3, farthest_m = 1e4;
+constexpr double darkest_cdm2 = 1e-7; // a tenth of what a rested eye sees
+constexpr double brightest_cdm2 = 1e6, brightest_ambient_lux = 1e6;
+constexpr double least_gamma = 0.1, largest_gamma = 10, most_ppd = 1e5, least_field_deg = 0.1;
 
 std::string in_brackets(const char* name, std::size_t i) { return std::string(name).append("[").append(std::to_string(i)).append("]"); }
 
 Result<void> check_transfer(const Display& d) {
-    if (d.transfer == TransferFunction::gamma && !(positive(d.gamma) && d.gamma <= largest_gamma))
-        return bad("gamma must be above 0 and at most 10, but is " + number(d.gamma));
+    if (d.transfer == TransferFunction::gamma && !(d.gamma >= least_gamma && d.gamma <= largest_gamma))
+        return bad("transfer must be a gamma from 0.1 to 10, but is " + number(d.gamma));
     if (d.transfer == TransferFunction::pq && !(d.peak.value() <= pq_peak_cdm2))
-        return bad("peak must be at most 10000 cd/m2 with the transfer function pq, but is " + number(d.peak.value()));
+        return bad("peak_cdm2 must be at most 10000 cd/m2 with the transfer function pq, but is " + number(d.peak.value()));
     if (d.transfer != TransferFunction::table) return {};
     constexpr std::size_t least_size = 3, largest_size = 65536;
     if (d.table.size() < least_size || d.table.size() > largest_size)
-        return bad("table must have 3 to 65536 values, but has " + std::to_string(d.table.size()));
+        return bad("transfer_table must have 3 to 65536 values, but has " + std::to_string(d.table.size()));
     if (d.table.front() != 0 || d.table.back() != 1)
-        return bad("table must go from 0 to 1, but goes from " + number(d.table.front()) + " to " + number(d.table.back()));
+        return bad("transfer_table must go from 0 to 1, but goes from " + number(d.table.front()) + " to " + number(d.table.back()));
     for (std::size_t i = 1; i < d.table.size(); ++i)
-        if (!(d.table[i] > d.table[i - 1])) return bad(in_brackets("table", i) + " must be above the value before it, but is " + number(d.table[i]));
+        if (!(d.table[i] > d.table[i - 1])) return bad(in_brackets("transfer_table", i) + " must be above the value before it, but is " + number(d.table[i]));
     return {};
 }
 
 Result<void> check_lens(const Display& d) {
-    if (!(d.field_deg >= 0 && d.field_deg < 360)) return bad("field_deg must lie in 0..360, but is " + number(d.field_deg));
+    if (d.field_deg != 0 && !(d.field_deg >= least_field_deg && d.field_deg < 360)) return bad("field_deg must be from 0.1 to 360, but is " + number(d.field_deg));
     if (d.lens.empty()) return {};
     if (d.lens.size() == 1 || d.lens.size() > 10'000)
-        return bad("lens must have 2 to 10000 angles, but has " + std::to_string(d.lens.size()));
-    if (d.lens.front().angle_deg != 0) return bad("lens[0] must be at 0 degrees, but is at " + number(d.lens.front().angle_deg));
+        return bad("pixels_per_degree_at must have 2 to 10000 angles, but has " + std::to_string(d.lens.size()));
+    if (d.lens.front().angle_deg != 0) return bad("pixels_per_degree_at[0] must be at 0 degrees, but is at " + number(d.lens.front().angle_deg));
     for (std::size_t i = 0; i < d.lens.size(); ++i) {
         const PixelsPerDegreeAt& at = d.lens[i];
         if (i > 0 && !(at.angle_deg > d.lens[i - 1].angle_deg && at.angle_deg <= 180))
-            return bad(in_brackets("lens", i) + " must be at a larger angle than the one before it, up to 180 degrees, but is at " + number(at.angle_deg));
+            return bad(in_brackets("pixels_per_degree_at", i) + " must be at a larger angle than the one before it, up to 180 degrees, but is at " + number(at.angle_deg));
         if (!(positive(at.pixels_per_degree) && at.pixels_per_degree <= most_ppd))
-            return bad(in_brackets("lens", i) + " must have pixels per degree above 0 and at most 1e5, but has " + number(at.pixels_per_degree));
+            return bad(in_brackets("pixels_per_degree_at", i) + " must have pixels per degree above 0 and at most 1e5, but has " + number(at.pixels_per_degree));
     }
     return {};
 }
@@ -101,26 +103,26 @@ Result<void> validate(const Display& d) {
     constexpr int most_pixels = 1'000'000; // a side
     if (d.width_px > most_pixels) return bad("width_px must be at most 1000000, but is " + std::to_string(d.width_px));
     if (d.height_px > most_pixels) return bad("height_px must be at most 1000000, but is " + std::to_string(d.height_px));
-    if (!(positive(d.pixel_pitch.value()) && d.pixel_pitch.value() <= largest_pitch_m)) {
-        return bad("pixel_pitch must be a length above 0 metres and at most 1, but is " + number(d.pixel_pitch.value()));
+    if (!(d.pixel_pitch.value() >= smallest_pitch_m && d.pixel_pitch.value() <= largest_pitch_m)) {
+        return bad("pixel_pitch_m (or the diagonal_m that it follows from) must be a length from 1e-9 to 1 metre, but is " + number(d.pixel_pitch.value()));
     }
-    if (!(positive(d.distance.value()) && d.distance.value() <= farthest_m)) {
-        return bad("distance must be a length above 0 metres and at most 10 km, but is " + number(d.distance.value()));
+    if (!(d.distance.value() >= nearest_m && d.distance.value() <= farthest_m)) {
+        return bad("viewing_distance_m must be a length from 1 mm to 10 km, but is " + number(d.distance.value()));
     }
     if (!positive(pixels_per_degree(d).value())) {
-        return bad("pixel_pitch " + number(d.pixel_pitch.value()) + " m at distance " + number(d.distance.value()) +
+        return bad("pixel_pitch_m " + number(d.pixel_pitch.value()) + " m at viewing_distance_m " + number(d.distance.value()) +
                    " m gives no finite number of pixels per degree");
     }
     if (!(positive(d.peak.value()) && d.peak.value() <= brightest_cdm2))
-        return bad("peak must be above 0 and at most 1e6 cd/m2, but is " + number(d.peak.value()));
-    if (!(d.black.value() > 0 && d.black < d.peak)) {
-        return bad("black must be above 0 and below the peak of " + number(d.peak.value()) + " cd/m2, but is " +
+        return bad("peak_cdm2 must be above 0 and at most 1e6 cd/m2, but is " + number(d.peak.value()));
+    if (!(d.black.value() >= darkest_cdm2 && d.black < d.peak)) {
+        return bad("black_cdm2 must be at least 1e-7 and below the peak of " + number(d.peak.value()) + " cd/m2, but is " +
                    number(d.black.value()));
     }
     if (auto ok = check_transfer(d); !ok) return ok;
     if (auto ok = check_lens(d); !ok) return ok;
     if (!(d.ambient.value() >= 0 && d.ambient.value() <= brightest_ambient_lux)) {
-        return bad("ambient must be 0 to 1e6 lux, but is " + number(d.ambient.value()));
+        return bad("ambient_lux must be 0 to 1e6 lux, but is " + number(d.ambient.value()));
     }
     if (!(d.reflectivity >= 0 && d.reflectivity <= 1)) {
         return bad("reflectivity must lie in 0..1, but is " + number(d.reflectivity));

@@ -10,6 +10,7 @@
 #include <perception/criterion.h>
 
 #include "fold_screen.h"
+#include "sound_parents.h"
 #include "stage_distances.h"
 
 namespace unseen::perception {
@@ -37,6 +38,8 @@ constexpr double amplitude_of_mean = 1.9;
 
 // An outline moves with the folds beside it, too. Found by comparing pictures.
 constexpr float moved_by_neighbours = 1.4f;
+// The widest mesh there can be, in widths of a node: also where nodes have none.
+constexpr float widest = 1e9f;
 
 class Levels {
 public:
@@ -392,6 +395,7 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
     const std::span<const vdtree::FoldError> errors = tree.fold_errors();
     if (errors.empty())
         return Error{ErrorCode::invalid_argument, "The errors of the tree's folds have not been measured (vdtree::with_fold_errors)."};
+    if (const auto sound = check_parents(tree); !sound) return sound.error();
     const NodeId nodes = tree.interior_count();
     const Screen screen(view, options);
     const Levels levels(options.display);
@@ -431,7 +435,7 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
         if (drift != no_contrast && Levels::contrast(drift) * whole_peak > 1) {
             patch.pattern.luminance = std::max(patch.pattern.luminance, whole);
             patch.pattern.drift = drift, patch.pattern.fading = errors[node].fading;
-            patch.pattern.quarters = static_cast<int>(std::ceil(4 * std::log2(std::max(object_radius / patch.length, 1.0f))));
+            patch.pattern.quarters = static_cast<int>(std::ceil(4 * std::log2(std::max(std::min(widest, object_radius / patch.length), 1.0f))));
         }
         patch.pattern = reaches.simplified(rounded(patch.pattern));
         patch.row = reaches.row(patch.pattern);

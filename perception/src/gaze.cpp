@@ -39,10 +39,15 @@ std::string number(double value) {
 
 // What is wrong with a sample after another, or nothing.
 std::string complaint_about(const GazeSample& sample, const GazeSample* before) {
-    if (!std::isfinite(sample.time_s) || !std::isfinite(sample.px.x) || !std::isfinite(sample.px.y)) return "is not finite";
+    constexpr double farthest_px = 1e6; // from the window's corner: a thousand windows away
+    if (!std::isfinite(sample.time_s)) return "has a time_s that is not finite";
+    for (const auto& [name, px] : {std::pair("x_px", sample.px.x), std::pair("y_px", sample.px.y)}) {
+        if (!std::isfinite(px)) return "has an " + std::string(name) + " that is not finite";
+        if (std::abs(px) > farthest_px) return "has an " + std::string(name) + " of " + number(px) + ": at most a million pixels aside can be";
+    }
     if (!before) return {};
     if (!(sample.time_s > before->time_s))
-        return "is out of order: " + number(sample.time_s) + " s comes after " + number(before->time_s) + " s";
+        return "is out of order: time_s " + number(sample.time_s) + " s comes after " + number(before->time_s) + " s";
     if (!(sample.time_s - before->time_s <= GazeTrace::longest_gap_s))
         return "follows a gap of " + number(sample.time_s - before->time_s) + " s: at most 1 s may be missing";
     return {};

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <string>
 
 #include "gl.h"
@@ -114,6 +115,31 @@ void clear(GLuint framebuffer, glm::vec4 colour, bool depth) {
         glClearNamedFramebufferfv(framebuffer, GL_DEPTH, 0, &infinitely_far);
 }
 
+// Pixels from the top left.
+struct PixelBox {
+    int left, top, width, height;
+};
+
+// Which pixels of images by these matrices can show anything of a box: all of them where a part of it may lie behind the eye.
+PixelBox pixels_of(const Box& box, std::span<const glm::mat4> clip_from_unit, int width, int height) {
+    constexpr double margin = 2; // pixels, for the rounding of single floats and of the rasteriser
+    glm::dvec2 low(std::numeric_limits<double>::infinity()), high = -low;
+    for (const glm::mat4& matrix : clip_from_unit) {
+        for (int corner = 0; corner < 8; ++corner) {
+            const glm::dvec3 at(corner & 1 ? box.high.x : box.low.x, corner & 2 ? box.high.y : box.low.y, corner & 4 ? box.high.z : box.low.z);
+            const glm::dvec4 clip = glm::dmat4(matrix) * glm::dvec4(at, 1);
+            const glm::dvec2 pixel((clip.x / clip.w + 1) / 2 * width, (1 - clip.y / clip.w) / 2 * height);
+            if (!(clip.w > 0 && std::isfinite(pixel.x) && std::isfinite(pixel.y)))
+                return {0, 0, width, height};
+            low = glm::min(low, pixel);
+            high = glm::max(high, pixel);
+        }
+    }
+    const auto within = [](double at, int most) { return static_cast<int>(std::clamp(at, 0.0, static_cast<double>(most))); };
+    const int left = within(std::floor(low.x - margin), width), top = within(std::floor(low.y - margin), height);
+    return {left, top, within(std::ceil(high.x + margin), width) - left, within(std::ceil(high.y + margin), height) - top};
+}
+
 float srgb_encoded(float linear) {
     const float c = std::clamp(linear, 0.0f, 1.0f);
     return c <= 0.0031308f ? 12.92f * c : 1.055f * std::pow(c, 1 / 2.4f) - 0.055f;
@@ -192,6 +218,7 @@ Result<void> TriangleDrawer::upload(const VertexArrays& vertices) {
         for (std::size_t i = first; i < std::min(count, first + upload_batch); ++i)
             batch.push_back(vertex_at(vertices, i));
         for (const Vertex& vertex : batch) {
+            box_.include(vertex.position);
             lowest_shade_ = glm::min(lowest_shade_, vertex.shade);
             highest_shade_ = glm::max(highest_shade_, vertex.shade);
             if (vertex.shade.a > 0) highest_hue_ = glm::max(highest_hue_, vertex.shade / vertex.shade.a);
@@ -224,6 +251,7 @@ Result<void> TriangleDrawer::set_moved(const VertexArrays& vertices, std::span<c
         now.push_back(vertex.node);
         const glm::vec4* const colour = vertices.colours.empty() ? nullptr : &vertex.colour;
         moves_.push_back({vertex.node, vertex_of(vertices.frame, vertex.position, vertex.luminance, colour)});
+        box_.include(moves_.back().to.position);
     }
     std::sort(now.begin(), now.end());
     for (auto next = now.begin(); const std::uint32_t vertex : moved_) { // those that are not moved any more
@@ -263,6 +291,10 @@ Result<std::span<const glm::vec4>> TriangleDrawer::draw(int width, int height,
     set_fixed_state(width, height);
     glClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE); // rows from the top, as they are read back
     clear(sum_.id(), glm::vec4(0), false);
+    // Where nothing can be, the sum stays 0: the background.
+    const PixelBox used = pixels_of(box_, clip_from_unit, width, height);
+    glScissor(used.left, used.top, used.width, used.height);
+    glEnable(GL_SCISSOR_TEST);
     // Each of n samples stands for an n-th of a pixel.
     const float lod_bias = -0.5f * std::log2(static_cast<float>(std::max<std::size_t>(clip_from_unit.size(), 1)));
     for (const glm::mat4& matrix : clip_from_unit) {
@@ -272,6 +304,7 @@ Result<std::span<const glm::vec4>> TriangleDrawer::draw(int width, int height,
         glBindFramebuffer(GL_DRAW_FRAMEBUFFER, sum_.id());
         add_sample_to_sum(style.background);
     }
+    glDisable(GL_SCISSOR_TEST);
     read_pixels(sum_, pixels_);
 
     const double share = 1.0 / static_cast<double>(std::max<std::size_t>(clip_from_unit.size(), 1));

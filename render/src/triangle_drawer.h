@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include <glm/common.hpp>
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
@@ -37,6 +38,12 @@ struct VertexArrays {
     UnitFrame frame;                      // that the positions are uploaded in
     std::span<const glm::vec2> uvs = {};  // where there is a texture
     vdtree::TextureView texture = {};     // multiplied with the colours; empty: none
+};
+
+// Of vertices, in the unit frame; empty at first.
+struct Box {
+    glm::vec3 low = glm::vec3(std::numeric_limits<float>::infinity()), high = -low;
+    void include(glm::vec3 p) { low = glm::min(low, p), high = glm::max(high, p); }
 };
 
 // How triangles look.
@@ -100,6 +107,7 @@ private:
     GpuIndices indices_;
     VertexArray surface_arrays_;
     VertexArray no_arrays_; // for the full-screen triangle, which comes from nowhere
+    Box box_;               // around all vertices, and around wherever they were moved
     glm::vec4 lowest_shade_ = glm::vec4(std::numeric_limits<float>::max()); // of all vertices
     glm::vec4 highest_shade_ = glm::vec4(std::numeric_limits<float>::lowest());
     glm::vec4 highest_hue_ = glm::vec4(1); // of all vertices: the shade over its luminance

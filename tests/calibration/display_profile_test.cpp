@@ -76,13 +76,15 @@ TEST_F(DisplayProfile, TablesAndLensesGoThereAndBack) {
     const std::pair<const char*, const char*> bad[] = {
         {"{\"transfer\": \"table\",", "\"transfer_table\" is missing"},
         {"{\"transfer_table\": [0, 0.5, 1],", "\"transfer_table\" needs"},
-        {"{\"transfer\": \"table\", \"transfer_table\": [0, 0.5, 0.4, 1],", "table[2]"},
+        {"{\"transfer\": \"table\", \"transfer_table\": [0, 0.5, 0.4, 1],", "transfer_table[2]"},
         {"{\"transfer\": \"table\", \"transfer_table\": [0, null, 1],", "transfer_table[1]"},
         {"{\"pixels_per_degree_at\": [],", "pixels_per_degree_at"},
         {"{\"pixels_per_degree_at\": [[0, 20], [10]],", "pixels_per_degree_at[1]"},
-        {"{\"pixels_per_degree_at\": [[0, 20], [10, 0]],", "lens[1]"},
+        {"{\"pixels_per_degree_at\": [[0, 20], [10, 0]],", "pixels_per_degree_at[1]"},
         {"{\"field_deg\": 400,", "field_deg"},
-        {"{\"ambient_lux\": 1e9,", "ambient"},
+        {"{\"ambient_lux\": 1e9,", "ambient_lux"},
+        {"{\"transfer\": 1e-9,", "transfer"},
+        {"{\"field_deg\": 1e-9,", "field_deg"},
     };
     for (const auto& [start, expected] : bad) {
         const auto read = read_display(write(replaced(minimal, "{", start), "bad.json"));

@@ -1,10 +1,8 @@
 // Fuzzes the reader of tree files with libFuzzer: any bytes must give an error, or a tree with which everything can
 // be done.
 //
-//   clang++ -std=c++20 -g -O1 -fsanitize=fuzzer,address,undefined -Ivdtree/include -Itests/support
-//       tests/fuzz/tree_fuzz.cpp vdtree/src/{atomic_file,criteria,cut,distance_criterion,facing_gap,fold_tester}.cpp
-//       vdtree/src/{mapped_file,mask_pool,mesh,node_check,normal_mask,packed,tree_io,tree_parts,verify}.cpp
-//       vdtree/src/{vertex_tree,view}.cpp -ltbb
+//   clang++ -std=c++20 -g -O1 -fsanitize=fuzzer,address,undefined -Ivdtree/include -Ivdtree/src -Itests/support
+//       tests/fuzz/tree_fuzz.cpp vdtree/src/*.cpp -ltinygltf -ltbb -lxxhash -o build/tree_fuzz
 //
 // Start it with a folder of small trees made by `unseen build`.
 #include <cstddef>

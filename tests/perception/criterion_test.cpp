@@ -9,6 +9,11 @@
 
 #include <vdtree/builder.h>
 #include <vdtree/cut.h>
+#include <vdtree/fold_errors.h>
+#include <vdtree/tree_io.h>
+
+#include "temp_folder.h"
+#include "tree_file.h"
 
 namespace unseen::perception {
 namespace {
@@ -231,6 +236,47 @@ TEST(LuebkeHallenHoles, NodesBesideTheContourAreSilhouettes) {
         }
     }
     EXPECT_GT(contour_rings, 50);
+}
+
+// Files whose checksums are right and whose values are not, mapped, so that nobody has looked at all of them: no criterion reads or writes
+// where it must not, and what it makes can be followed.
+TEST(FoldTests, SurviveMappedTreesOfRandomLies) {
+    const auto built = vdtree::build_tree(bumpy_sphere(8).view());
+    ASSERT_TRUE(built);
+    const auto tree = vdtree::with_fold_errors(*built, 1);
+    ASSERT_TRUE(tree);
+    const support::TempFolder folder;
+    const std::filesystem::path file = folder / "lie.vdt";
+    ASSERT_TRUE(vdtree::write_tree(file, *tree));
+    const std::string honest = support::read_bytes(file);
+    std::mt19937_64 random(3);
+    int taken = 0, refused = 0;
+    for (int round = 0; round < 120; ++round) {
+        support::TreeFile lying = support::TreeFile::parse(honest);
+        for (std::uint64_t lie = 0; lie <= random() % 3; ++lie) {
+            support::TreeFile::Section& s = lying.sections[random() % lying.sections.size()];
+            const std::uint32_t values[] = {0, 1, 0x7f800000, 0x7fc00000, 0x7f7fffff, 0x80000000, 0xffffffff, static_cast<std::uint32_t>(random())};
+            if (s.data.size() >= 4) s.set(random() % (s.data.size() / 4), values[random() % std::size(values)]);
+        }
+        support::write_bytes(file, lying.bytes());
+        const auto mapped = vdtree::map_tree(file);
+        if (!mapped) continue;
+        const View view = window({}, {0.3, 0.4, 3});
+        const FoldTestOptions options{.gaze_px = glm::dvec2(900, 300)};
+        for (const auto& criterion : {luebke_hallen_distances(*mapped, view, options), error_distances(*mapped, view, options)}) {
+            if (!criterion) {
+                EXPECT_NE(criterion.error().message, "");
+                ++refused;
+                continue;
+            }
+            vdtree::Cut cut(*mapped);
+            EXPECT_TRUE(cut.follow(*criterion, viewpoint_of(*mapped, view, options, {}, true))) << "round " << round;
+            EXPECT_LE(cut.indices().size(), 3 * std::size_t{mapped->triangle_count()});
+            ++taken;
+        }
+    }
+    EXPECT_GT(taken, 60);
+    EXPECT_GT(refused, 0);
 }
 
 } // namespace

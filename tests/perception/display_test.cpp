@@ -187,7 +187,7 @@ TEST(Display, HeadsetsHaveThePixelsOfTheirLens) {
         display.lens = lens;
         const auto result = validate(display);
         ASSERT_FALSE(result);
-        EXPECT_THAT(result.error().message, HasSubstr("lens"));
+        EXPECT_THAT(result.error().message, HasSubstr("pixels_per_degree_at"));
     }
     set_pixels_per_degree(display, PixelsPerDegree(30));
     EXPECT_NEAR(pixels_per_degree(display).value(), 30, 1e-9);
@@ -207,20 +207,22 @@ TEST(Display, ValidationNamesTheField) {
     const BadDisplay cases[] = {
         {"width_px", [](Display& d, double v) { d.width_px = int(v); }, {0, -1, 2e6}},
         {"height_px", [](Display& d, double v) { d.height_px = int(v); }, {0, -5}},
-        {"pixel_pitch",
+        {"pixel_pitch_m",
          [](Display& d, double v) { d.pixel_pitch = Metres(v); },
-         {0, -1, 2, infinity, not_a_number, 1e-320}},
-        {"distance", [](Display& d, double v) { d.distance = Metres(v); }, {0, -1, 1e5, infinity, not_a_number}},
-        {"peak", [](Display& d, double v) { d.peak = Luminance(v); }, {0, -1, 0.5, 1e7, infinity, not_a_number}},
-        {"black", [](Display& d, double v) { d.black = Luminance(v); }, {0, -1, 100, 101, infinity, not_a_number}},
-        {"ambient", [](Display& d, double v) { d.ambient = Lux(v); }, {-1, 1e7, infinity, not_a_number}},
+         {0, -1, 2, infinity, not_a_number, 1e-300, 1e-320}},
+        {"viewing_distance_m", [](Display& d, double v) { d.distance = Metres(v); }, {0, -1, 1e-300, 1e-4, 1e5, infinity, not_a_number}},
+        {"peak_cdm2", [](Display& d, double v) { d.peak = Luminance(v); }, {0, -1, 1e7, infinity, not_a_number}},
+        {"below the peak of", [](Display& d, double v) { d.peak = Luminance(v); }, {0.5, 0.1}},
+        {"black_cdm2", [](Display& d, double v) { d.black = Luminance(v); }, {0, -1, 1e-300, 1e-8, 100, 101, infinity, not_a_number}},
+        {"ambient_lux", [](Display& d, double v) { d.ambient = Lux(v); }, {-1, 1e7, infinity, not_a_number}},
         {"reflectivity", [](Display& d, double v) { d.reflectivity = v; }, {-0.1, 1.1, infinity, not_a_number}},
-        {"gamma",
+        {"field_deg", [](Display& d, double v) { d.field_deg = v; }, {-1, 1e-9, 360, infinity, not_a_number}},
+        {"transfer",
          [](Display& d, double v) {
              d.transfer = TransferFunction::gamma;
              d.gamma = v;
          },
-         {0, -2.2, infinity, not_a_number}},
+         {0, -2.2, 1e-9, 100, infinity, not_a_number}},
     };
     for (const BadDisplay& bad : cases) {
         for (const double value : bad.values) {

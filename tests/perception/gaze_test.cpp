@@ -54,10 +54,12 @@ TEST_F(GazeTest, BadTracesNameTheFileAndTheLine) {
         {head + "0,1,2\n0.1,1\n", "line 3: must be three numbers"},
         {head + "0,1,2,3\n", "line 2: must be three numbers"},
         {head + "0,one,2\n", "line 2"},
-        {head + "0,nan,2\n", "line 2: the sample is not finite"},
-        {head + "0,1,2\n0.1,1,inf\n", "line 3: the sample is not finite"},
-        {head + "0,1,2\n0.2,1,2\n0.1,1,2\n", "line 4: the sample is out of order: 0.1 s comes after 0.2 s"},
+        {head + "0,nan,2\n", "line 2: the sample has an x_px that is not finite"},
+        {head + "0,1,2\n0.1,1,inf\n", "line 3: the sample has an y_px that is not finite"},
+        {head + "0,1,2\n0.2,1,2\n0.1,1,2\n", "line 4: the sample is out of order: time_s 0.1 s comes after 0.2 s"},
         {head + "0,1,2\n0,1,2\n", "line 3: the sample is out of order"},
+        {head + "nan,1,2\n", "line 2: the sample has a time_s that is not finite"},
+        {head + "0,1,2\n0.1,1,-1e300\n", "line 3: the sample has an y_px of -1e+300"},
         {head + "0,1,2\n\n1.5,1,2\n", "line 4: the sample follows a gap of 1.5 s"},
     };
     for (const auto& [text, expected] : cases) {

@@ -2,9 +2,14 @@
 // crash, hang or read out of bounds, though the picture may be nonsense.
 #pragma once
 
+#include <vector>
+
 #include <vdtree/criteria.h>
 #include <vdtree/cut.h>
 #include <vdtree/cut_rings.h>
+#include <vdtree/fold_errors.h>
+#include <vdtree/lighting.h>
+#include <vdtree/occluders.h>
 #include <vdtree/vertex_tree.h>
 
 namespace unseen::support {
@@ -34,6 +39,15 @@ inline bool use_everything(const vdtree::VertexTree& tree) {
     extract();
     cut.adjust(displacement, {.triangle_budget = tree.triangle_count() / 2});
     extract();
+    (void)with_fold_errors(tree, 1).has_value();
+    (void)LightBounds::measure(tree).has_value();
+    const auto everything = DistanceCriterion::create(tree, {.reach = {DistanceCriterion::always_visible}});
+    valid &= everything.has_value();
+    const std::vector<Sphere> occluders = inner_spheres(tree, {.count = 2, .cells = 8}); // quickly made
+    for (const glm::dvec3 eye : {glm::dvec3(3, 1, 2), glm::dvec3(1e9, 0, 0)}) {
+        (void)cut.follow(*everything, {.eye = eye, .occluders = occluders}).has_value(); // not from within one
+        extract();
+    }
     const auto relit = tree.relit({.direction = {0, 0, 1}});
     return valid && (relit ? relit->node_count() == tree.node_count() : !tree.check());
 }

@@ -76,6 +76,10 @@ TEST_F(Materials, ThatCannotBeReadAreNotedAndBadOnesAreNot) {
         EXPECT_TRUE(result->materials.empty());
         EXPECT_EQ(result->warnings.size(), *library ? 1u : 0u);
     }
+    const auto other = read("newmtl other\n");
+    ASSERT_TRUE(other);
+    ASSERT_EQ(other->warnings.size(), 1u);
+    EXPECT_NE(other->warnings[0].find("1 material is in no library that was read, the first 'a'"), std::string::npos) << other->warnings[0];
     ReadOptions without;
     without.materials = false;
     const auto result = read("newmtl a\nKd nan\n", "m.mtl", without);

@@ -22,9 +22,11 @@
 
 #include <vdtree/builder.h>
 #include <vdtree/cut.h>
+#include <vdtree/fold_errors.h>
 
 #include "shapes.h"
 #include "temp_folder.h"
+#include "textures.h"
 #include "tree_checks.h"
 #include "tree_file.h"
 #include "tree_use.h"
@@ -52,6 +54,19 @@ protected:
     Result<VertexTree> read_bytes(std::string_view bytes) {
         support::write_bytes(file_, bytes);
         return read_tree(file_);
+    }
+    // All the sections that there are: errors of folds, which nobody measures with a texture, too.
+    std::string bytes_with_everything() {
+        Mesh mesh = shapes::with_attributes(shapes::cube(2));
+        const auto measured = with_fold_errors(built(mesh), 1);
+        if (!measured) throw std::runtime_error(measured.error().message);
+        TreeFile::Section errors = TreeFile::parse(bytes_of(*measured))["fold_errors"];
+        mesh.texture = textures::noise(4, 3, 1);
+        TreeFile file = TreeFile::parse(bytes_of(built(mesh)));
+        const std::string first = errors.data.substr(0, errors.element_bytes);
+        for (errors.data.clear(); errors.data.size() < file["first_leaf"].count() * errors.element_bytes;) errors.data += first;
+        file.sections.push_back(errors);
+        return file.bytes();
     }
     void expect_refused(std::string_view bytes, const std::string& reason) {
         const auto tree = read_bytes(bytes);
@@ -328,18 +343,31 @@ std::vector<Lie> lies() {
              f["first_triangle"].data.resize(4);
          }},
         {"nothing at all", [](TreeFile& f) { f.sections.clear(); }},
+        {"an error that is no number", set("fold_errors", 0, nan)},
+        {"an infinite error of luminance", set("fold_errors", 2, inf)},
+        {"a negative extent", set("fold_errors", 4, -1.0f)},
+        {"an infinite drift", set("fold_errors", 5, inf)},
+        {"a texture of no width", set("texture", 0, 0u)},
+        {"a texture of endless height", set("texture", 1, 0xffffffffu)},
+        {"a texture of other texels", set("texture", 0, 5u)},
+        {"a texture that repeats in an unknown way", set("texture", 2, 0xffffffffu)},
+        {"two textures", [](TreeFile& f) { f["texture"].data += f["texture"].data; }},
+        {"a texture without coordinates", [](TreeFile& f) { f["uvs"].data.clear(); }},
+        {"a texture without texels", [](TreeFile& f) { f["texels"].data.clear(); }},
+        {"texels without a texture", [](TreeFile& f) { f["texture"].data.clear(); }},
+        {"a range of a texture in reverse", set("ring_texture", 0, 0x00010002u)},
     };
     for (const char* section : {"parents",          "positions",      "normals",    "colours",     "uvs",
                                 "luminance",        "first_leaf",     "leaf_end",   "subtree_end", "first_triangle",
                                 "bounds",           "support_spheres", "mask_at",
                                 "displacement",     "support_range",  "ring_range", "adaptation",  "ring_chroma", "triangles",
-                                "source_triangles", "source_vertices"})
+                                "source_triangles", "source_vertices", "fold_errors", "texels",     "ring_texture"})
         all.push_back({section, drop_last(section)});
     return all;
 }
 
 TEST_F(TreeIo, RefusesLies) {
-    const std::string honest = bytes_of(built(shapes::with_attributes(shapes::cube(2))));
+    const std::string honest = bytes_with_everything();
     for (const Lie& lie : lies()) {
         TreeFile file = TreeFile::parse(honest);
         lie.tell(file);
@@ -384,7 +412,7 @@ TEST_F(TreeIo, WritesChromaOnlyOfColours) {
 
 // Random values in random places, all checksums right: an error, or a tree with which everything can be done.
 TEST_F(TreeIo, SurvivesRandomLies) {
-    const std::string honest = bytes_of(built(shapes::with_attributes(shapes::cube(2))));
+    const std::string honest = bytes_with_everything();
     std::mt19937_64 random(2);
     int accepted = 0, taken_mapped = 0, found_later = 0;
     for (int round = 0; round < 3000; ++round) {

@@ -251,7 +251,7 @@ Floats load(const std::vector<float>& v, std::size_t i) {
 void store(std::vector<float>& v, std::size_t i, Floats values) { std::memcpy(v.data() + i, &values, sizeof values); }
 Floats larger(Floats a, Floats b) { return a > b ? a : b; }
 float largest(Floats v) {
-    const Floats two = larger(v, __builtin_shuffle(v, Ints{2, 3, 0, 1}));
+    const Floats two = larger(v, __builtin_shufflevector(v, v, 2, 3, 0, 1));
     return std::max(two[0], two[1]);
 }
 
@@ -331,11 +331,11 @@ void BallSet::make_relative() {
     for (std::size_t i = relative_count_ / lanes * lanes; i < count_; i += lanes) {
         const Floats a = (points_[i] - origin) * scale_, b = (points_[i + 1] - origin) * scale_;
         const Floats c = (points_[i + 2] - origin) * scale_, d = (points_[i + 3] - origin) * scale_;
-        const Floats low_ab = __builtin_shuffle(a, b, Ints{0, 4, 1, 5}), low_cd = __builtin_shuffle(c, d, Ints{0, 4, 1, 5});
-        const Floats high_ab = __builtin_shuffle(a, b, Ints{2, 6, 3, 7}), high_cd = __builtin_shuffle(c, d, Ints{2, 6, 3, 7});
-        store(relative_[0], i, __builtin_shuffle(low_ab, low_cd, Ints{0, 1, 4, 5}));
-        store(relative_[1], i, __builtin_shuffle(low_ab, low_cd, Ints{2, 3, 6, 7}));
-        store(relative_[2], i, __builtin_shuffle(high_ab, high_cd, Ints{0, 1, 4, 5}));
+        const Floats low_ab = __builtin_shufflevector(a, b, 0, 4, 1, 5), low_cd = __builtin_shufflevector(c, d, 0, 4, 1, 5);
+        const Floats high_ab = __builtin_shufflevector(a, b, 2, 6, 3, 7), high_cd = __builtin_shufflevector(c, d, 2, 6, 3, 7);
+        store(relative_[0], i, __builtin_shufflevector(low_ab, low_cd, 0, 1, 4, 5));
+        store(relative_[1], i, __builtin_shufflevector(low_ab, low_cd, 2, 3, 6, 7));
+        store(relative_[2], i, __builtin_shufflevector(high_ab, high_cd, 0, 1, 4, 5));
     }
     relative_count_ = count_;
 }

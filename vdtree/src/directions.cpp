@@ -46,11 +46,11 @@ template <std::size_t capacity>
         for (std::size_t corner = 0; corner < 3; ++corner) {
             const Floats a = triangles[i][corner], b = triangles[i + 1][corner];
             const Floats c = triangles[i + 2][corner], d = triangles[i + 3][corner];
-            const Floats low_ab = __builtin_shuffle(a, b, Ints{0, 4, 1, 5}), low_cd = __builtin_shuffle(c, d, Ints{0, 4, 1, 5});
-            const Floats high_ab = __builtin_shuffle(a, b, Ints{2, 6, 3, 7}), high_cd = __builtin_shuffle(c, d, Ints{2, 6, 3, 7});
-            const Floats out[3] = {__builtin_shuffle(low_ab, low_cd, Ints{0, 1, 4, 5}),
-                                   __builtin_shuffle(low_ab, low_cd, Ints{2, 3, 6, 7}),
-                                   __builtin_shuffle(high_ab, high_cd, Ints{0, 1, 4, 5})};
+            const Floats low_ab = __builtin_shufflevector(a, b, 0, 4, 1, 5), low_cd = __builtin_shufflevector(c, d, 0, 4, 1, 5);
+            const Floats high_ab = __builtin_shufflevector(a, b, 2, 6, 3, 7), high_cd = __builtin_shufflevector(c, d, 2, 6, 3, 7);
+            const Floats out[3] = {__builtin_shufflevector(low_ab, low_cd, 0, 1, 4, 5),
+                                   __builtin_shufflevector(low_ab, low_cd, 2, 3, 6, 7),
+                                   __builtin_shufflevector(high_ab, high_cd, 0, 1, 4, 5)};
             for (std::size_t axis = 0; axis < 3; ++axis)
                 std::memcpy(&coordinates[3 * corner + axis][i], &out[axis], sizeof(Floats));
         }

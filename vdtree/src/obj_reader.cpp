@@ -382,6 +382,7 @@ private:
             warn(where + " were left out: " + bytes.error().message);
             return {};
         }
+        has_library_ = true;
         return read_mtl(*bytes, (source_.folder / *path).string(), result_.materials, result_.warnings);
     }
 
@@ -461,9 +462,20 @@ private:
         if (unknown_ > 0) {
             warn(counted_were(unknown_, "line") + " skipped for an unknown keyword, the first " + first_unknown_ + ".");
         }
+        if (has_library_) warn_of_unknown_materials();
         if (const auto fanned = polygons_.fanned_concave(); fanned > 0) {
             warn(counted_were(fanned, "intricate concave polygon") + " cut into a fan.");
         }
+    }
+
+    void warn_of_unknown_materials() {
+        std::set<std::string> known, unknown;
+        for (const Material& material : result_.materials) known.insert(material.name);
+        for (const MeshRange& range : ranges())
+            if (range.kind == MeshRange::Kind::material && !known.contains(range.name)) unknown.insert(range.name);
+        if (!unknown.empty())
+            warn(std::to_string(unknown.size()) + (unknown.size() == 1 ? " material is" : " materials are") + " in no library that was read, the first " +
+                 in_quotes(*unknown.begin()) + "; its faces are left as they are.");
     }
 
     Error too_many_vertices() const {
@@ -490,7 +502,8 @@ private:
     bool has_normals_ = false;
     bool has_index_overflow_ = false;
     OpenRange group_, material_;
-    std::set<fs::path> libraries_; // that were read
+    std::set<fs::path> libraries_; // that were asked for
+    bool has_library_ = false;     // that could be read
     PolygonTriangulator polygons_;
     std::uint64_t statements_ = 0;
     std::uint64_t small_faces_ = 0;

@@ -211,7 +211,7 @@ private:
 } // namespace
 
 std::vector<Sphere> inner_spheres(const VertexTree& tree, const InnerSphereOptions& options) {
-    if (tree.closedness() == Closedness::open || options.count <= 0) return {};
+    if (tree.closedness() == Closedness::open || options.count <= 0 || !tree.check()) return {};
     Grid grid(tree, std::clamp(options.cells, fewest_cells, most_cells) + 2 * border);
     return grid.is_empty() ? std::vector<Sphere>{} : grid.spheres(options.count);
 }

@@ -138,7 +138,8 @@ TriangleOrder order_triangles(std::span<const Triangle> triangles, const NodeOrd
         Triangle leaves = {nodes.leaf_of_vertex[triangles[t][0]], nodes.leaf_of_vertex[triangles[t][1]],
                            nodes.leaf_of_vertex[triangles[t][2]]};
         // Of three leaves, the middle one merges first with another.
-        const auto [low, high] = std::minmax({leaves[0], leaves[1], leaves[2]});
+        const auto ends = std::minmax({leaves[0], leaves[1], leaves[2]});
+        const NodeId low = ends.first, high = ends.second;
         const Index middle = leaves[0] ^ leaves[1] ^ leaves[2] ^ low ^ high;
         vanishing[t] = ancestors.lowest(shape.parents[shape.node_of_leaf(middle)], [&](NodeId node) {
             return shape.first_leaf[node] <= low || high < shape.leaf_end[node];

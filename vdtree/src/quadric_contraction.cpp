@@ -54,15 +54,14 @@ UNSEEN_INLINE void gather(const float* quadrics, const Index (&clusters)[4], std
     for (std::size_t i = 0; i < floats; i += 4) {
         Float4 row[4];
         for (std::size_t l = 0; l < 4; ++l) std::memcpy(&row[l], quadrics + clusters[l] * stride + i, sizeof(Float4));
-        using Lanes = int __attribute__((vector_size(16)));
-        const Float4 low01 = __builtin_shuffle(row[0], row[1], Lanes{0, 4, 1, 5});
-        const Float4 low23 = __builtin_shuffle(row[2], row[3], Lanes{0, 4, 1, 5});
-        const Float4 high01 = __builtin_shuffle(row[0], row[1], Lanes{2, 6, 3, 7});
-        const Float4 high23 = __builtin_shuffle(row[2], row[3], Lanes{2, 6, 3, 7});
-        out[i] = __builtin_shuffle(low01, low23, Lanes{0, 1, 4, 5});
-        out[i + 1] = __builtin_shuffle(low01, low23, Lanes{2, 3, 6, 7});
-        out[i + 2] = __builtin_shuffle(high01, high23, Lanes{0, 1, 4, 5});
-        out[i + 3] = __builtin_shuffle(high01, high23, Lanes{2, 3, 6, 7});
+        const Float4 low01 = __builtin_shufflevector(row[0], row[1], 0, 4, 1, 5);
+        const Float4 low23 = __builtin_shufflevector(row[2], row[3], 0, 4, 1, 5);
+        const Float4 high01 = __builtin_shufflevector(row[0], row[1], 2, 6, 3, 7);
+        const Float4 high23 = __builtin_shufflevector(row[2], row[3], 2, 6, 3, 7);
+        out[i] = __builtin_shufflevector(low01, low23, 0, 1, 4, 5);
+        out[i + 1] = __builtin_shufflevector(low01, low23, 2, 3, 6, 7);
+        out[i + 2] = __builtin_shufflevector(high01, high23, 0, 1, 4, 5);
+        out[i + 3] = __builtin_shufflevector(high01, high23, 2, 3, 6, 7);
     }
 }
 
@@ -81,15 +80,14 @@ UNSEEN_INLINE void gather(const float* quadrics, const Index (&clusters)[8], std
             std::memcpy(&high, quadrics + clusters[l + 4] * stride + i, sizeof(Float4));
             row[l] = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
         }
-        using Lanes = int __attribute__((vector_size(32)));
-        const Float8 low01 = __builtin_shuffle(row[0], row[1], Lanes{0, 8, 1, 9, 4, 12, 5, 13});
-        const Float8 low23 = __builtin_shuffle(row[2], row[3], Lanes{0, 8, 1, 9, 4, 12, 5, 13});
-        const Float8 high01 = __builtin_shuffle(row[0], row[1], Lanes{2, 10, 3, 11, 6, 14, 7, 15});
-        const Float8 high23 = __builtin_shuffle(row[2], row[3], Lanes{2, 10, 3, 11, 6, 14, 7, 15});
-        out[i] = __builtin_shuffle(low01, low23, Lanes{0, 1, 8, 9, 4, 5, 12, 13});
-        out[i + 1] = __builtin_shuffle(low01, low23, Lanes{2, 3, 10, 11, 6, 7, 14, 15});
-        out[i + 2] = __builtin_shuffle(high01, high23, Lanes{0, 1, 8, 9, 4, 5, 12, 13});
-        out[i + 3] = __builtin_shuffle(high01, high23, Lanes{2, 3, 10, 11, 6, 7, 14, 15});
+        const Float8 low01 = __builtin_shufflevector(row[0], row[1], 0, 8, 1, 9, 4, 12, 5, 13);
+        const Float8 low23 = __builtin_shufflevector(row[2], row[3], 0, 8, 1, 9, 4, 12, 5, 13);
+        const Float8 high01 = __builtin_shufflevector(row[0], row[1], 2, 10, 3, 11, 6, 14, 7, 15);
+        const Float8 high23 = __builtin_shufflevector(row[2], row[3], 2, 10, 3, 11, 6, 14, 7, 15);
+        out[i] = __builtin_shufflevector(low01, low23, 0, 1, 8, 9, 4, 5, 12, 13);
+        out[i + 1] = __builtin_shufflevector(low01, low23, 2, 3, 10, 11, 6, 7, 14, 15);
+        out[i + 2] = __builtin_shufflevector(high01, high23, 0, 1, 8, 9, 4, 5, 12, 13);
+        out[i + 3] = __builtin_shufflevector(high01, high23, 2, 3, 10, 11, 6, 7, 14, 15);
     }
 }
 

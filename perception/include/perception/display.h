@@ -46,7 +46,7 @@ struct Display {
 };
 
 // Finite and positive sizes within what a display can be, 0 < black < peak, reflectivity in 0..1, tables as above. The error names
-// the field.
+// the field by its key in a display profile.
 Result<void> validate(const Display& display);
 
 // At the centre of the screen: 1 / (2 atan(pitch / (2 distance))). Of headsets: the largest anywhere, which is safe for tests that
