@@ -310,11 +310,10 @@ void FoldTester::test_batch(Lanes lanes, Verdict* verdicts, bool costs) const {
     if (lit_) leave_room_for_lights(lit, batch, findings);
     if (view_.has_gaze) find_position_slacks(batch, findings);
     finish_slacks(view_, batch, findings);
-    if (lit_)
-        for (std::size_t i = 0; i < lanes.size(); ++i) findings.facing_slack[i] = std::min(findings.facing_slack[i], lit.slack[i]);
     for (std::size_t i = 0; i < lanes.size(); ++i) {
         verdicts[i].position_slack = findings.position_slack[i];
         verdicts[i].facing_slack = findings.facing_slack[i];
+        verdicts[i].light_slack = lit_ ? lit.slack[i] : infinity;
         verdicts[i].unfolded = (findings.unfolded >> i) & 1;
     }
     if (!costs) return;

@@ -16,8 +16,8 @@
 
 namespace unseen::vdtree {
 
-// What a radian of the lights' motion counts as on the facing clock, in lengths for a radian (twice the distance): lights leave most
-// verdicts standing for a dozen degrees or more, and the eye for a tenth of its distance.
+// What a radian of the lights' motion counts as on their clock, in lengths for a radian (twice the distance): slacks by lights are then
+// about as long as those of the eye's path, from which the rounding of tests is taken.
 inline constexpr double light_weight = 0.25;
 
 // What is known of the lights on the lanes of a batch.
@@ -29,7 +29,7 @@ struct LitFindings {
     // For leave_room(): nodes unfold where their row's reach is above `gap`, in lengths; whether those of their own rows do, 1 or 0.
     alignas(64) float gap[kernel_lanes];
     alignas(64) std::int32_t bin[kernel_lanes], is_unfolded[kernel_lanes];
-    // Out: the rows on the way to where the verdicts would change, and for how long, on the facing clock, the lights lead no farther.
+    // Out: the rows on the way to where the verdicts would change, and for how long, on their clock, the lights lead no farther.
     alignas(64) std::int32_t farthest_row[kernel_lanes];
     alignas(64) float slack[kernel_lanes];
 };
@@ -94,7 +94,7 @@ private:
     std::array<std::int32_t, luminance_guess_count> luminance_guesses_;
     std::vector<std::int32_t> reach_guesses_; // by luminance, bin and bucket: of the first contrast to unfold
     KernelLights lights_;
-    float length_ = 1; // of the facing clock, for a radian
+    float length_ = 1; // of the lights' clock, for a radian
 };
 
 } // namespace unseen::vdtree
