@@ -114,7 +114,7 @@ Result<vdtree::ReadResult> read_quietly(const std::filesystem::path& file, const
 // The mesh, if it can be built within the limit of memory. `read_file` reads it, with or without words.
 template <class ReadFile>
 Result<vdtree::ReadResult> read_source(const BuildArguments& a, ProcessTeam* team, ReadFile&& read_file) {
-    const auto limit = MemoryLimit::set(a.memory_gib, a.out, threads(a, team));
+    const auto limit = MemoryLimit::set(a.memory_gib, a.out, a.memory_gib > 0 ? threads(a, team) : 1); // else the team may start meanwhile
     if (!limit) return limit.error();
     Result<vdtree::ReadResult> read = read_file(a.mesh, reading(a), a.texture);
     if (!read) {

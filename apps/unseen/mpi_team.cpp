@@ -1,9 +1,15 @@
 // The team over MPI: point-to-point messages of bytes.
 #include <algorithm>
 #include <chrono>
+#include <condition_variable>
 #include <cstdint>
 #include <cstdlib>
+#include <deque>
+#include <future>
+#include <mutex>
+#include <optional>
 #include <stdexcept>
+#include <string>
 #include <thread>
 
 #include <mpi.h>
@@ -57,9 +63,119 @@ int share_cores() {
     return 1;
 }
 
+// Ours are few large messages, for which the simplest of Open MPI's ways will do: it is there over any network, and some tenths of a
+// second sooner than the others. Who starts us may choose another one.
+void prefer_quick_start() { ::setenv("OMPI_MCA_pml", "ob1", 0); }
+
+// The number of this process, as mpirun tells it before MPI has started.
+std::optional<int> rank_from_mpirun() {
+    for (const char* name : {"OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"})
+        if (const char* rank = std::getenv(name)) return std::atoi(rank);
+    return std::nullopt;
+}
+
+// Does one task after another. MPI wants to be called by one thread, and waits for other processes for a while when it starts and ends:
+// so that thread is this one, and ours goes on.
+class TaskThread {
+public:
+    TaskThread() : thread_([this] { work(); }) {}
+    ~TaskThread() {
+        begin({}); // to end with
+        thread_.join();
+    }
+    TaskThread(const TaskThread&) = delete;
+    TaskThread& operator=(const TaskThread&) = delete;
+
+    std::future<void> begin(std::packaged_task<void()> task) {
+        std::future<void> done = task.valid() ? task.get_future() : std::future<void>();
+        const std::lock_guard lock(mutex_);
+        tasks_.push_back(std::move(task));
+        more_.notify_one();
+        return done;
+    }
+    // Waits for it, and throws what it throws.
+    template <class Task>
+    void run(Task&& task) {
+        begin(std::packaged_task<void()>(task)).get();
+    }
+
+private:
+    void work() {
+        for (;;) {
+            std::unique_lock lock(mutex_);
+            more_.wait(lock, [this] { return !tasks_.empty(); });
+            std::packaged_task<void()> task = std::move(tasks_.front());
+            tasks_.pop_front();
+            lock.unlock();
+            if (!task.valid()) return;
+            task();
+        }
+    }
+
+    std::mutex mutex_;
+    std::condition_variable more_;
+    std::deque<std::packaged_task<void()>> tasks_;
+    std::thread thread_; // last: it uses the others
+};
+
 class MpiTeam : public ProcessTeam {
 public:
-    MpiTeam() : cores_(share_cores()) {
+    MpiTeam() : cores_(share_cores()), told_rank_(rank_from_mpirun()) {
+        prefer_quick_start();
+        mpi_.emplace();
+        started_ = mpi_->begin(std::packaged_task<void()>([this] { start(); })).share();
+    }
+
+    int rank() const override {
+        if (told_rank_) return *told_rank_;
+        started_.get();
+        return rank_;
+    }
+    int size() const override {
+        started_.get();
+        return size_;
+    }
+    int cores() const override { return cores_; }
+    int members_on_machine() const override {
+        started_.get();
+        return on_machine_;
+    }
+
+    void send(int to, std::span<const std::byte> message) override {
+        started_.get();
+        mpi_->run([=] {
+            const std::uint64_t length = message.size();
+            send_piece(&length, sizeof(length), to, length_tag);
+            for (std::size_t at = 0; at < message.size(); at += largest_piece)
+                send_piece(message.data() + at, std::min(largest_piece, message.size() - at), to, piece_tag);
+        });
+    }
+
+    std::vector<std::byte> receive(int from) override {
+        started_.get();
+        std::vector<std::byte> message;
+        mpi_->run([&message, from] {
+            std::uint64_t length = 0;
+            receive_piece(&length, sizeof(length), from, length_tag);
+            message.resize(length);
+            for (std::size_t at = 0; at < message.size(); at += largest_piece)
+                receive_piece(message.data() + at, std::min(largest_piece, message.size() - at), from, piece_tag);
+        });
+        return message;
+    }
+
+    void leave() override {
+        started_.get();
+        mpi_->begin(std::packaged_task<void()>([] {
+            MPI_Request all_here = MPI_REQUEST_NULL;
+            require(MPI_Ibarrier(MPI_COMM_WORLD, &all_here));
+            wait_for(all_here);
+            require(MPI_Finalize());
+        }));
+    }
+
+private:
+    void start() {
         int provided = 0;
         require(MPI_Init_thread(nullptr, nullptr, MPI_THREAD_FUNNELED, &provided));
         require(MPI_Comm_set_errhandler(MPI_COMM_WORLD, MPI_ERRORS_RETURN));
@@ -69,38 +185,13 @@ public:
         require(MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &machine));
         require(MPI_Comm_size(machine, &on_machine_));
         require(MPI_Comm_free(&machine));
+        if (told_rank_ && *told_rank_ != rank_) throw std::runtime_error("mpirun and MPI number the processes in different ways.");
     }
 
-    int rank() const override { return rank_; }
-    int size() const override { return size_; }
-    int cores() const override { return cores_; }
-    int members_on_machine() const override { return on_machine_; }
-
-    void send(int to, std::span<const std::byte> message) override {
-        const std::uint64_t length = message.size();
-        send_piece(&length, sizeof(length), to, length_tag);
-        for (std::size_t at = 0; at < message.size(); at += largest_piece)
-            send_piece(message.data() + at, std::min(largest_piece, message.size() - at), to, piece_tag);
-    }
-
-    std::vector<std::byte> receive(int from) override {
-        std::uint64_t length = 0;
-        receive_piece(&length, sizeof(length), from, length_tag);
-        std::vector<std::byte> message(length);
-        for (std::size_t at = 0; at < message.size(); at += largest_piece)
-            receive_piece(message.data() + at, std::min(largest_piece, message.size() - at), from, piece_tag);
-        return message;
-    }
-
-    void leave() override {
-        MPI_Request all_here = MPI_REQUEST_NULL;
-        require(MPI_Ibarrier(MPI_COMM_WORLD, &all_here));
-        wait_for(all_here);
-        require(MPI_Finalize());
-    }
-
-private:
     int cores_, rank_ = 0, size_ = 1, on_machine_ = 1;
+    std::optional<int> told_rank_;
+    std::shared_future<void> started_;
+    std::optional<TaskThread> mpi_; // last: its tasks use the others
 };
 
 } // namespace

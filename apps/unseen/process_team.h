@@ -10,14 +10,15 @@ namespace unseen::app {
 
 class ProcessTeam : public vdtree::Team {
 public:
-    // Joins the others; null where no mpirun has started this process. To be called once, before anything starts threads. Fails where
-    // mpirun has started several and this build cannot talk to them. A member that ends without leave() takes the others with it.
+    // Begins to join the others, and goes on meanwhile: what depends on them waits. Null where no mpirun has started this process. To be
+    // called once, before anything starts threads. Fails where mpirun has started several and this build cannot talk to them. A member
+    // that ends without leave() takes the others with it.
     static Result<std::unique_ptr<ProcessTeam>> join();
 
     virtual int cores() const = 0;            // that this machine has for all its members together
     virtual int members_on_machine() const = 0;
 
-    // Waits, without using a core, until all members leave. Nothing may be sent afterwards.
+    // Nothing may be sent afterwards. The destructor waits, without using a core, until all members leave.
     virtual void leave() = 0;
 };
 

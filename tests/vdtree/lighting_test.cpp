@@ -328,8 +328,9 @@ TEST(LightBounds, ChangeNoFasterThanTheySay) {
             for (std::size_t i = 0; i < kernel_lanes; ++i) {
                 if (!(motion <= static_cast<double>(before.cap[i]))) continue;
                 ++moved;
-                const double fine = std::min(motion, static_cast<double>(before.fine_cap[i])), full_rate = before.full_rate[i];
-                const double allowed = before.jump[i] + static_cast<double>(before.fine_rate[i]) * fine + full_rate * (motion - fine) + 4e-6;
+                const double fine = std::min(motion, static_cast<double>(before.fine_cap[i])), full_rate = before.full_rate[i],
+                             rough_rate = before.rough_rate[i];
+                const double allowed = before.jump[i] + static_cast<double>(before.fine_rate[i]) * fine + rough_rate * (motion - fine) + 4e-6;
                 const double d0 = static_cast<double>(before.hi[i]) - static_cast<double>(before.lo[i]),
                              d1 = static_cast<double>(after.hi[i]) - static_cast<double>(after.lo[i]);
                 ASSERT_LE(std::abs(d1 - d0), allowed) << s.name << ", trial " << trial << ", node " << nodes[i] << ", motion " << motion;

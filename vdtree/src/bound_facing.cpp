@@ -8,6 +8,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "parallel_array.h"
 #include "prefetch.h"
 
 namespace unseen::vdtree {
@@ -139,7 +140,7 @@ private:
 
     const BoundInput& in_;
     const Ancestors& ancestors_;
-    std::vector<Step> steps_;           // by node
+    ParallelArray<Step> steps_;         // by node
     std::vector<std::uint16_t> border_; // by node: triangles around it after its fold, up to one too many
 };
 
@@ -179,12 +180,12 @@ private:
 
 } // namespace
 
-std::vector<Directions> bound_facing(const BoundInput& input, std::span<const Triangle> triangles, const LeafPlaces& places,
-                        std::span<const Sphere> support, const Ancestors& ancestors) {
+ParallelArray<Directions> bound_facing(const BoundInput& input, std::span<const Triangle> triangles, const LeafPlaces& places,
+                                       std::span<const Sphere> support, const Ancestors& ancestors) {
     const TreeShape& shape = input.shape;
-    std::vector<Directions> facing(shape.interior());
+    ParallelArray<Directions> facing(shape.interior());
 
-    std::vector<Directions> around(shape.leaves()); // by leaf: the normals of the triangles there
+    ParallelArray<Directions> around(shape.leaves()); // by leaf: the normals of the triangles there
     Folds folds(input, ancestors);
     input.parts.for_each_triangle([&](const TreePart& part) {
         return [&, by_node = Views<1>(facing), by_leaf = Views<3>(around)](Index t) mutable {
@@ -197,10 +198,9 @@ std::vector<Directions> bound_facing(const BoundInput& input, std::span<const Tr
         };
     });
     // The dilation runs over places: an unwelded crease is no end of the surface.
-    for (Index leaf = 0; leaf < shape.leaves(); ++leaf) {
-        around[leaf].mark(places.irregular[leaf]);
+    tbb::parallel_for(Index{0}, shape.leaves(), [&](Index leaf) { around[leaf].mark(places.irregular[leaf]); });
+    for (Index leaf = 0; leaf < shape.leaves(); ++leaf)
         if (places.weld[leaf] != leaf) around[places.weld[leaf]] |= around[leaf];
-    }
     for (Index leaf = 0; leaf < shape.leaves(); ++leaf)
         if (places.weld[leaf] != leaf) around[leaf] = around[places.weld[leaf]];
 

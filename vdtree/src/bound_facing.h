@@ -7,6 +7,7 @@
 
 #include "bound_spheres.h"
 #include "directions.h"
+#include "parallel_array.h"
 
 namespace unseen::vdtree {
 
@@ -15,7 +16,7 @@ namespace unseen::vdtree {
 // and the same of all nodes below. Nothing for nodes whose leaves are at one point: when they fold nothing moves.
 //
 // Marked where the ring has an irregular edge.
-std::vector<Directions> bound_facing(const BoundInput& input, std::span<const Triangle> triangles, const LeafPlaces& places,
-                        std::span<const Sphere> support, const Ancestors& ancestors);
+ParallelArray<Directions> bound_facing(const BoundInput& input, std::span<const Triangle> triangles, const LeafPlaces& places,
+                                       std::span<const Sphere> support, const Ancestors& ancestors);
 
 } // namespace unseen::vdtree

@@ -19,6 +19,7 @@
 #include "help_cluster.h"
 #include "mask_pool.h"
 #include "order_nodes.h"
+#include "parallel_array.h"
 #include "place_proxies.h"
 #include "surface.h"
 #include "texture_bounds.h"
@@ -333,8 +334,8 @@ void TreeBuilder::place_vertices(const Clustering& clustering) {
     const Index vertices = static_cast<Index>(mesh_.positions.size());
     g_->origin = choose_origin(source_.positions);
     // By leaf: weights, and normals of the leaves.
-    std::vector<double> weights(nodes_.shape.leaves(), 0);
-    std::vector<glm::vec3> normals(nodes_.shape.leaves(), glm::vec3(0));
+    ParallelArray<double> weights(nodes_.shape.leaves());
+    ParallelArray<glm::vec3> normals(nodes_.shape.leaves());
     tbb::parallel_for(Index{0}, vertices, [&](Index v) {
         weights[nodes_.leaf_of_vertex[v]] = surface_.areas[v];
         normals[nodes_.leaf_of_vertex[v]] = surface_.normals[v];
@@ -370,12 +371,14 @@ LeafPlaces TreeBuilder::find_places() const {
     std::iota(places.weld.begin(), places.weld.end(), Index{0});
     places.irregular.assign(leaves, 0);
     places.alone.assign(leaves, 1);
-    for (std::size_t v = 0; v < mesh_.positions.size(); ++v) {
+    tbb::parallel_for(std::size_t{0}, mesh_.positions.size(), [&](std::size_t v) {
         const Index leaf = nodes_.leaf_of_vertex[v], place = nodes_.leaf_of_vertex[coincident_[v]];
         places.weld[leaf] = place;
         places.irregular[leaf] = surface_.irregular[v];
-        if (leaf != place) places.alone[leaf] = places.alone[place] = 0;
-    }
+        if (leaf == place) return;
+        places.alone[leaf] = 0;
+        std::atomic_ref(places.alone[place]).store(0, std::memory_order_relaxed);
+    });
     return places;
 }
 
@@ -417,7 +420,7 @@ void TreeBuilder::bound() {
     NodeSpheres spheres = bound_spheres(input);
     g_->bounding_sphere = bound_corners(input, spheres.support);
     g_->displacement = bound_displacements(input, spheres.support);
-    const std::vector<Directions> facing = bound_facing(input, triangles.triangles, places, spheres.support, ancestors);
+    const ParallelArray<Directions> facing = bound_facing(input, triangles.triangles, places, spheres.support, ancestors);
     g_->support_spheres = std::move(spheres.support);
     const std::vector<std::uint8_t> is_translucent = find_translucent(triangles.triangles);
     std::vector<NodeBounds> bounds(shape.interior());

@@ -70,7 +70,7 @@ AdjustStats CutFollower::follow(Cut& cut, const DistanceCriterion& criterion, co
     Motion motion = is_same ? FoldTester::motion(tree_, viewpoint_, viewpoint, length_per_radian_)
                             : Motion{std::numeric_limits<double>::infinity(), 0};
     if (criterion.parts().lit) motion = with_lights(motion, viewpoint);
-    if (is_same && was_complete_ && motion.position == 0 && motion.facing == 0) { // nothing can have changed
+    if (is_same && was_complete_ && motion.position == 0 && motion.facing == 0 && motion.light == 0) { // nothing can have changed
         cut.begin_changes();
         cut.end_changes(stats_);
     } else if (options.triangle_budget) {
@@ -84,10 +84,9 @@ AdjustStats CutFollower::follow(Cut& cut, const DistanceCriterion& criterion, co
     return stats_;
 }
 
-// Lights count on the facing clock: they stand still more often than the eye does.
 Motion CutFollower::with_lights(Motion motion, const Viewpoint& viewpoint) const {
     const double turn = light_motion(tree_, viewpoint_.lighting, viewpoint_.eye, viewpoint.lighting, viewpoint.eye);
-    motion.facing += light_weight * length_per_radian_ * turn;
+    motion.light = light_weight * length_per_radian_ * turn;
     if (!(turn < longest_light_step)) motion.position = std::numeric_limits<double>::infinity();
     return motion;
 }
@@ -101,6 +100,7 @@ void CutFollower::start_at(const Viewpoint& viewpoint) {
     length_per_radian_ = 2 * std::max(distance, least);
     set_farthest(distance + static_cast<double>(root.radius));
     watched_.clear();
+    watched_.use_lights(tester_->uses_lights());
     watched_.move_to(viewpoint.eye, 0);
     look_from(viewpoint);
 }
@@ -110,6 +110,7 @@ void CutFollower::move_to(const Viewpoint& viewpoint, const Motion& motion) {
     // With a gaze, directions count, too: coming nearer does not make up for them.
     if (tester_->uses_gaze()) watched_.advance(motion.position, motion.facing);
     else watched_.move_to(viewpoint.eye, motion.facing);
+    watched_.advance_lights(motion.light);
 }
 
 void CutFollower::look_from(const Viewpoint& viewpoint) {
@@ -512,7 +513,8 @@ CutFollower::Slot CutFollower::near_children_of(NodeId node) const {
 void CutFollower::set_deadlines(Slot slot, const Verdict& verdict) {
     const float hair = verdict.unfolded ? hair_ : 0;
     const float position_slack = std::min(verdict.position_slack, longest_slack_);
-    watched_.set_deadlines(slot, verdict.unfolded, std::max(position_slack - hair, 0.0f), std::max(verdict.facing_slack - hair, 0.0f));
+    const auto less_hair = [&](float slack) { return std::max(slack - hair, 0.0f); };
+    watched_.set_deadlines(slot, {verdict.unfolded, less_hair(position_slack), less_hair(verdict.facing_slack), less_hair(verdict.light_slack)});
 }
 
 std::uint64_t CutFollower::byte_size() const noexcept { return watched_.byte_size(); }

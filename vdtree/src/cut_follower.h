@@ -67,7 +67,7 @@ private:
     void fold_wave(Cut& cut);
     void test_parents(const Cut& cut);
     void use_threshold_of(bool unfolded);
-    bool stands_by_a_hair(const Verdict& verdict) const { return !(std::min(verdict.position_slack, verdict.facing_slack) > hair_); }
+    bool stands_by_a_hair(const Verdict& verdict) const { return !(std::min({verdict.position_slack, verdict.facing_slack, verdict.light_slack}) > hair_); }
     void ask_parent(NodeId node);
     float keeping_factor() const;
     void unfold_wave(Cut& cut);

@@ -284,24 +284,28 @@ void FoldTester::light(Lanes lanes, FoldBatch& batch, LitFindings& lit) const {
 // Parts what is left between a verdict and its contrary among the lights' motion and the eye's: the rows from here on are those that the
 // lights may lead to within their slack.
 void FoldTester::leave_room_for_lights(LitFindings& lit, FoldBatch& batch, const Findings& findings) const {
+    alignas(64) float units[kernel_lanes];
     for (std::size_t i = 0; i < kernel_lanes; ++i) {
-        const std::uint32_t bit = 1u << i;
-        const bool is_near = batch.is_near & bit, unfolded = findings.unfolded & bit;
-        const bool is_out = !(batch.is_inside & bit) || (findings.away & bit);
-        if (is_out || (unfolded && !is_near) || (lit.translucent & bit)) { // not by its luminance
+        units[i] = std::max(batch.length[i], least_length) * view_.inverse_threshold;
+        // In lengths, with the rounding of the comparison that the verdict comes from.
+        constexpr float rounding = 1e-6f;
+        const std::int32_t is_near = (batch.is_near >> i) & 1;
+        lit.gap[i] = batch.gap[i] / units[i] * (is_near ? 1 + rounding : 1 - rounding);
+        lit.is_unfolded[i] = is_near;
+    }
+    std::copy_n(batch.bin, kernel_lanes, lit.bin);
+    lit_->leave_room(lit);
+    const std::uint32_t is_out = ~batch.is_inside | findings.away, is_outline = findings.unfolded & ~batch.is_near;
+    for (std::size_t i = 0; i < kernel_lanes; ++i) {
+        if (((is_out | is_outline | lit.translucent) >> i) & 1) { // not by its luminance
             lit.slack[i] = infinity;
             continue;
         }
-        const auto distance = [&](std::int32_t row, float length) {
-            const float reach = view_.reach[static_cast<std::size_t>(row * view_.bins + batch.bin[i])];
-            return std::max(length, least_length) * view_.inverse_threshold * reach;
-        };
-        // In lengths, with the rounding of the comparison that the verdict comes from.
-        constexpr float rounding = 1e-6f;
-        const float gap = batch.gap[i] / (std::max(batch.length[i], least_length) * view_.inverse_threshold) * (is_near ? 1 + rounding : 1 - rounding);
-        batch.interior_row[i] = lit_->leave_room(i, is_near, gap, static_cast<std::size_t>(batch.bin[i]), lit);
-        batch.interior[i] = distance(batch.interior_row[i], batch.length[i]);
-        batch.silhouette[i] = std::max(batch.interior[i], distance(batch.silhouette_row[i], batch.silhouette_length[i]));
+        const auto reach = [&](std::int32_t row) { return view_.reach[static_cast<std::size_t>(row * view_.bins + batch.bin[i])]; };
+        batch.interior_row[i] = lit.farthest_row[i];
+        batch.interior[i] = units[i] * reach(batch.interior_row[i]);
+        const float outline = std::max(batch.silhouette_length[i], least_length) * view_.inverse_threshold * reach(batch.silhouette_row[i]);
+        batch.silhouette[i] = std::max(batch.interior[i], outline);
     }
 }
 
@@ -320,11 +324,10 @@ void FoldTester::test_batch(Lanes lanes, Verdict* verdicts, bool costs) const {
     if (lit_) leave_room_for_lights(lit, batch, findings);
     if (view_.has_gaze) find_position_slacks(batch, findings);
     finish_slacks(view_, batch, findings);
-    if (lit_)
-        for (std::size_t i = 0; i < lanes.size(); ++i) findings.facing_slack[i] = std::min(findings.facing_slack[i], lit.slack[i]);
     for (std::size_t i = 0; i < lanes.size(); ++i) {
         verdicts[i].position_slack = findings.position_slack[i];
         verdicts[i].facing_slack = findings.facing_slack[i];
+        verdicts[i].light_slack = lit_ ? lit.slack[i] : infinity;
         verdicts[i].unfolded = (findings.unfolded >> i) & 1;
     }
     if (!costs) return;

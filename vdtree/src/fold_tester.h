@@ -14,20 +14,22 @@
 
 namespace unseen::vdtree {
 
-// What a test found. The verdict holds while the position clock has advanced by less than `position_slack` and the facing
-// clock by less than `facing_slack` (mesh units, 0 or more; see Motion).
+// What a test found. The verdict holds while the position clock has advanced by less than `position_slack`, the facing
+// clock by less than `facing_slack` and the lights' by less than `light_slack` (mesh units, 0 or more; see Motion).
 struct Verdict {
     float position_slack = 0;
     float facing_slack = 0;
+    float light_slack = 0; // without lights it counts for nothing
     float cost = 0;      // D over the distance, by which budgets go; infinite where the eye is inside
     float seen_cost = 0; // not less than the class's least cost: folded where at most the threshold
     bool unfolded = false;
 };
 
-// How much a move from one viewpoint to another advances the two clocks.
+// How much a move from one viewpoint to another advances the clocks.
 struct Motion {
     double position = 0; // bounds the change of every node's distance; rotations of the gaze count as lengths
     double facing = 0;   // the path of the eye, or the change of a height over a frustum's plane where that is more
+    double light = 0;    // of the lights, in lengths; see light_weight
 };
 
 // What a test reads of a node, in one cache line.
@@ -59,6 +61,7 @@ public:
     void look_from(const Viewpoint& viewpoint, double length_per_radian);
 
     bool uses_gaze() const noexcept { return view_.has_gaze; } // from the current viewpoint
+    bool uses_lights() const noexcept { return lit_.has_value(); }
 
     FoldCandidate candidate(NodeId node) const;
     void prefetch(NodeId node) const; // what candidate(node) will read
@@ -83,7 +86,7 @@ public:
     // costs of nodes that are far from the threshold may be those of another facing.)
     void test_costs(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const;
 
-    // From one viewpoint to another with as many frusta of as many planes; infinite where these differ.
+    // But for the lights: from one viewpoint to another with as many frusta of as many planes; infinite where these differ.
     static Motion motion(const VertexTree& tree, const Viewpoint& from, const Viewpoint& to, double length_per_radian);
 
 private:

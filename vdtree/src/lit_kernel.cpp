@@ -157,10 +157,13 @@ UNSEEN_INLINE void add(const KernelLights& all, const KernelLights::Light& light
     const float full = rise + growth * least * al * moves + least_rate * least * al + fade_rate * ah;
     // Where all of it faces the light, u - w changes by less than 2 sin gamma a radian, or the spread of the box; where some of it faces away, by u alone, and where
     // all of it does, not at all.
-    const float facing_rate = growth * (least * al * (std::max(2 * std::max(sg, 0.0f), b.spread[i]) * l.turn + 2 * l.widen) + (most * ah - least * al) * moves) +
-                              least_rate * least * al * (u - w) + spread_rate + 2 * fade_rate * ah;
+    const float turning_rate = growth * (least * al * (std::max(2 * std::max(sg, 0.0f), b.spread[i]) * l.turn + 2 * l.widen) + (most * ah - least * al) * moves) +
+                               spread_rate + 2 * fade_rate * ah;
+    const float facing_rate = turning_rate + least_rate * least * al * (u - w);
     const bool is_dark = facing.beyond > 0, faces = facing.least > 0;
     b.fine_rate[i] += is_dark ? 0.0f : faces ? facing_rate : rise;
+    // Whichever of these it comes to be; with u at 1 and beyond, lo alone counts.
+    b.rough_rate[i] += std::max(std::max(rise, full - rise), turning_rate + least_rate * least * al);
     b.fine_sum_rate[i] += is_dark ? 0.0f : faces ? full : rise;
     const float fine_cap = (is_dark ? facing.beyond : std::abs(facing.least)) / moves;
     b.full_rate[i] += full;
@@ -235,7 +238,7 @@ UNSEEN_INLINE void run(const KernelLights& all, LitBatch& b) {
         b.lo[i] = all.ambient * b.least_albedo[i];
         b.hi[i] = all.ambient * b.largest_albedo[i];
         b.cap[i] = b.fine_cap[i] = 1e30f;
-        b.fine_rate[i] = b.fine_sum_rate[i] = b.full_rate[i] = b.rise_rate[i] = b.jump[i] = 0;
+        b.fine_rate[i] = b.rough_rate[i] = b.fine_sum_rate[i] = b.full_rate[i] = b.rise_rate[i] = b.jump[i] = 0;
     }
     for (const KernelLights::Light& light : all.lights) {
         if (all.specular > 0) add<true>(all, light, b);

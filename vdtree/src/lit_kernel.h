@@ -47,10 +47,11 @@ struct LitBatch {
     // Out, by find_ranges():
     alignas(64) float lo[kernel_lanes], hi[kernel_lanes];
     // While the lights move by m, m <= cap (see light_motion()): hi - lo changes by at most jump + fine_rate m for m <= fine_cap, and by
-    // at most full_rate for each further unit; hi + lo by 2 jump and at the rates fine_sum_rate and full_rate; and hi by
+    // at most rough_rate for each further unit; hi + lo by 2 jump and at the rates fine_sum_rate and full_rate; and hi by
     // jump + rise_rate m.
     alignas(64) float cap[kernel_lanes], fine_cap[kernel_lanes];
-    alignas(64) float fine_rate[kernel_lanes], fine_sum_rate[kernel_lanes], full_rate[kernel_lanes], rise_rate[kernel_lanes], jump[kernel_lanes];
+    alignas(64) float fine_rate[kernel_lanes], rough_rate[kernel_lanes], fine_sum_rate[kernel_lanes], full_rate[kernel_lanes];
+    alignas(64) float rise_rate[kernel_lanes], jump[kernel_lanes];
 };
 void find_ranges(const KernelLights& lights, LitBatch& batch) noexcept;
 

@@ -40,12 +40,15 @@ void WatchList::clear() {
     unfolded_.clear();
     spheres_.clear();
     earliest_.clear();
+    light_dues_.clear();
+    earliest_light_.clear();
     free_blocks_.clear();
     looked_at_.clear();
     size_ = 0;
     first_unplaced_ = 0;
     path_ = 0;
     set_clocks(0, 0);
+    set_light_clock(0);
 }
 
 void WatchList::reserve(std::size_t nodes) {
@@ -57,6 +60,9 @@ void WatchList::reserve(std::size_t nodes) {
     unfolded_.reserve(blocks);
     spheres_.reserve(blocks);
     earliest_.reserve(blocks);
+    if (!has_lights_) return;
+    light_dues_.reserve(blocks);
+    earliest_light_.reserve(blocks);
 }
 
 // ---- slots
@@ -71,12 +77,17 @@ WatchList::BlockId WatchList::new_block() {
         candidates_.resize(candidates_.size() + block_slots);
         spheres_.push_back();
         earliest_.push_back(never);
+        if (has_lights_) {
+            light_dues_.emplace_back();
+            earliest_light_.push_back(never);
+        }
     } else {
         block = free_blocks_.back();
         free_blocks_.pop_back();
     }
     std::ranges::fill(blocks_[block].position, never);
     std::ranges::fill(blocks_[block].facing, never);
+    if (has_lights_) std::ranges::fill(light_dues_[block].light, never);
     return block;
 }
 
@@ -124,10 +135,12 @@ void WatchList::remove(NodeId node) {
     const BlockId block = static_cast<BlockId>(slot / block_slots);
     const std::size_t place = slot % block_slots;
     blocks_[block].position[place] = blocks_[block].facing[place] = never;
+    if (has_lights_) light_dues_[block].light[place] = never;
     used_[block] = static_cast<std::uint16_t>(used_[block] & ~(1u << place));
     --size_;
     if (used_[block] != 0) return;
     earliest_.set(block, never, never, never);
+    if (has_lights_) earliest_light_[block] = never;
     free_blocks_.push_back(block);
 }
 
@@ -169,7 +182,8 @@ WatchList::Slacks WatchList::slacks_of(Slot slot) const noexcept {
     const bool unfolded = (unfolded_[block] >> place) & 1;
     const float passed = spheres_.error[block] + position_clock_float_, distance = spheres_.distance[block];
     const float position = (dues.position[place] - passed) + (unfolded ? -distance : distance) - sum_rounding * (passed + distance);
-    return {unfolded, std::max(position, 0.0f), std::max(dues.facing[place] - facing_clock_down_, 0.0f)};
+    const float light = has_lights_ ? std::max(light_dues_[block].light[place] - light_clock_down_, 0.0f) : 0.0f;
+    return {unfolded, std::max(position, 0.0f), std::max(dues.facing[place] - facing_clock_down_, 0.0f), light};
 }
 
 void WatchList::split(BlockId block) {
@@ -187,24 +201,29 @@ void WatchList::split(BlockId block) {
     place(block);
     place(other);
     earliest_.set(block, never, never, never);
-    for (std::size_t i = 0; i < block_slots; ++i) set_deadlines(slots[i], left[i].unfolded, left[i].position, left[i].facing);
+    if (has_lights_) earliest_light_[block] = never;
+    for (std::size_t i = 0; i < block_slots; ++i) set_deadlines(slots[i], left[i]);
 }
 
 // ---- deadlines
 
-void WatchList::set_deadlines(Slot slot, bool unfolded, float position_slack, float facing_slack) {
+void WatchList::set_deadlines(Slot slot, const Slacks& slacks) {
     const BlockId block = static_cast<BlockId>(slot / block_slots);
     const std::size_t place = slot % block_slots;
     const float passed = spheres_.error[block] + position_clock_float_, distance = spheres_.distance[block];
-    const float slack = position_slack - sum_rounding * (passed + distance + std::min(position_slack, distance));
-    const float position = passed + slack + (unfolded ? distance : -distance);
-    const float facing = (facing_clock_down_ + facing_slack) * just_less;
+    const float slack = slacks.position - sum_rounding * (passed + distance + std::min(slacks.position, distance));
+    const float position = passed + slack + (slacks.unfolded ? distance : -distance);
+    const float facing = (facing_clock_down_ + slacks.facing) * just_less;
     blocks_[block].position[place] = position;
     blocks_[block].facing[place] = facing;
-    unfolded_[block] = static_cast<std::uint16_t>((unfolded_[block] & ~(1u << place)) | (std::uint32_t{unfolded} << place));
-    float& earliest = (unfolded ? earliest_.recede : earliest_.approach)[block];
+    unfolded_[block] = static_cast<std::uint16_t>((unfolded_[block] & ~(1u << place)) | (std::uint32_t{slacks.unfolded} << place));
+    float& earliest = (slacks.unfolded ? earliest_.recede : earliest_.approach)[block];
     earliest = std::min(earliest, position);
     earliest_.facing[block] = std::min(earliest_.facing[block], facing);
+    if (!has_lights_) return;
+    const float light = (light_clock_down_ + slacks.light) * just_less;
+    light_dues_[block].light[place] = light;
+    earliest_light_[block] = std::min(earliest_light_[block], light);
 }
 
 void WatchList::set_clocks(double position, double facing) {
@@ -212,6 +231,11 @@ void WatchList::set_clocks(double position, double facing) {
     facing_clock_ = facing;
     position_clock_float_ = static_cast<float>(position);
     facing_clock_down_ = rounded_down(facing);
+}
+
+void WatchList::set_light_clock(double light) {
+    light_clock_ = light;
+    light_clock_down_ = rounded_down(light);
 }
 
 void WatchList::move_to(const glm::dvec3& eye, double facing) {
@@ -228,25 +252,64 @@ void WatchList::move_to(const glm::dvec3& eye, double facing) {
 }
 
 void WatchList::restart_clocks(double longest) {
-    if (!(std::max({position_clock_, facing_clock_, path_}) > longest)) return;
-    const double position = position_clock_, facing = facing_clock_;
+    if (!(std::max({position_clock_, facing_clock_, light_clock_, path_}) > longest)) return;
+    const double position = position_clock_, facing = facing_clock_, light = light_clock_;
     for (BlockId block = 0; block < blocks_.size(); ++block) {
         std::array<Slacks, block_slots> left;
         for_each_used(block, [&](Slot slot) { left[slot % block_slots] = slacks_of(slot); });
         spheres_.error[block] = 0;
         earliest_.set(block, never, never, never);
+        if (has_lights_) earliest_light_[block] = never;
         set_clocks(0, 0);
-        for_each_used(block, [&](Slot slot) {
-            const Slacks& slacks = left[slot % block_slots];
-            set_deadlines(slot, slacks.unfolded, slacks.position, slacks.facing);
-        });
+        set_light_clock(0);
+        for_each_used(block, [&](Slot slot) { set_deadlines(slot, left[slot % block_slots]); });
         set_clocks(position, facing);
+        set_light_clock(light);
     }
     set_clocks(0, 0);
+    set_light_clock(0);
     path_ = 0;
 }
 
+// What is due by the lights is due by the facing clock from now on.
+void WatchList::set_all_due_by_lights() {
+    const float clock = rounded_up(light_clock_);
+    looked_at_.clear();
+    for (BlockId block = 0; block < earliest_light_.size(); ++block)
+        if (earliest_light_[block] <= clock) looked_at_.push_back(block);
+    for (std::size_t i = 0; i < looked_at_.size(); ++i) {
+        constexpr std::size_t ahead = 12; // blocks between a prefetch and its use
+        if (i + ahead < looked_at_.size()) {
+            prefetch(&light_dues_[looked_at_[i + ahead]]);
+            prefetch(blocks_[looked_at_[i + ahead]].facing);
+        }
+        set_due_by_lights(looked_at_[i], clock);
+    }
+}
+
+void WatchList::set_due_by_lights(BlockId block, float clock) {
+    using Floats = float __attribute__((vector_size(16))); // an extension that GCC and Clang share
+    const Floats none = Floats{} + never;
+    Floats earliest = none;
+    bool any = false;
+    for (std::size_t i = 0; i < block_slots; i += 4) {
+        Floats light, facing;
+        std::memcpy(&light, &light_dues_[block].light[i], sizeof light);
+        std::memcpy(&facing, &blocks_[block].facing[i], sizeof facing);
+        const auto is_due = light <= clock;
+        any |= (is_due[0] | is_due[1] | is_due[2] | is_due[3]) != 0;
+        facing = is_due ? -none : facing;
+        light = is_due ? none : light;
+        earliest = light < earliest ? light : earliest;
+        std::memcpy(&light_dues_[block].light[i], &light, sizeof light);
+        std::memcpy(&blocks_[block].facing[i], &facing, sizeof facing);
+    }
+    earliest_light_[block] = std::min(std::min(earliest[0], earliest[1]), std::min(earliest[2], earliest[3]));
+    if (any) earliest_.facing[block] = -never;
+}
+
 std::span<const WatchList::Slot> WatchList::collect_due() {
+    if (has_lights_) set_all_due_by_lights();
     due_blocks_.resize((blocks_.size() + 63) / 64);
     // In floats the clock may be a little late.
     const float facing = rounded_up(facing_clock_), position = position_clock_float_;
@@ -260,11 +323,12 @@ std::span<const WatchList::Slot> WatchList::collect_due() {
     return std::span(due_).first(look_at_blocks(looked_at_, position, facing, blocks_.data(), unfolded_.data(), spheres_, earliest_, due_.data()));
 }
 
-void WatchList::stay_due(Slot slot) { set_deadlines(slot, (unfolded_[slot / block_slots] >> (slot % block_slots)) & 1, 0, 0); }
+void WatchList::stay_due(Slot slot) { set_deadlines(slot, {((unfolded_[slot / block_slots] >> (slot % block_slots)) & 1) != 0}); }
 
 std::uint64_t WatchList::byte_size() const noexcept {
     return sizeof(FoldCandidate) * candidates_.capacity() + sizeof(Slot) * slots_of_nodes_.capacity() + sizeof(BlockDues) * blocks_.capacity() +
-           2 * sizeof(std::uint16_t) * used_.capacity() + spheres_.byte_size() + earliest_.byte_size();
+           2 * sizeof(std::uint16_t) * used_.capacity() + spheres_.byte_size() + earliest_.byte_size() +
+           sizeof(LightDues) * light_dues_.capacity() + sizeof(float) * earliest_light_.capacity();
 }
 
 } // namespace unseen::vdtree

@@ -20,7 +20,8 @@ namespace unseen::vdtree {
 // on which side of them the eye comes nearer, and by how much, far better than a bound on the eye's path would tell.
 //
 // Every slot has two deadlines: for the distance when it grows (where the node is unfolded) or shrinks (where it is folded), and for
-// the facing clock; every block knows the earliest ones. A full block is split in two, by node numbers, which keeps neighbours together.
+// the facing clock; every block knows the earliest ones. Where there are lights, it has a third one, for their own clock.
+// A full block is split in two, by node numbers, which keeps neighbours together.
 class WatchList {
 public:
     using Slot = std::uint32_t;
@@ -32,6 +33,8 @@ public:
     bool empty() const noexcept { return size_ == 0; }
     std::size_t size() const noexcept { return size_; }
     void clear();
+    // Only while it is empty.
+    void use_lights(bool are_there) noexcept { has_lights_ = are_there; }
     void reserve(std::size_t nodes);
 
     // Slots hold until the next insert(). Nothing has one before the first reserve().
@@ -47,6 +50,7 @@ public:
         if (slot == no_slot) return;
         prefetch(blocks_[slot / block_slots].position);
         prefetch(blocks_[slot / block_slots].facing);
+        if (has_lights_) prefetch(&light_dues_[slot / block_slots]);
     }
 
     // A node that is not watched yet, into the block of `near` (or one of its own, where that is no_slot). Its deadlines are set next.
@@ -56,14 +60,19 @@ public:
     void end_append();
     void remove(NodeId node); // also where it is not watched
 
-    // What is due when, from now: see Verdict. Slacks are 0 or more. `unfolded`: what the verdict is, which only growing distances
-    // change; else only shrinking ones.
-    void set_deadlines(Slot slot, bool unfolded, float position_slack, float facing_slack);
+    // What there is left until a slot is due, from now: see Verdict; 0 or more. `unfolded`: what the verdict is, which only growing
+    // distances change; else only shrinking ones.
+    struct Slacks {
+        bool unfolded = false;
+        float position = 0, facing = 0, light = 0;
+    };
+    void set_deadlines(Slot slot, const Slacks& slacks);
 
     // The eye goes to a place, and the facing clock on. In place of that, or besides:
     void move_to(const glm::dvec3& eye, double facing);
     // All distances, and what else slacks for them cover, may have changed by so much, whichever way; the facing clock goes on.
     void advance(double position, double facing) { set_clocks(position_clock_ + position, facing_clock_ + facing); }
+    void advance_lights(double light) { set_light_clock(light_clock_ + light); }
     // Sets back what has grown beyond `longest`, so that deadlines in floats stay fine enough.
     void restart_clocks(double longest);
 
@@ -79,9 +88,8 @@ private:
     static constexpr std::uint16_t full = 0xffff;
     static constexpr float never = std::numeric_limits<float>::infinity();
 
-    struct Slacks {
-        bool unfolded;
-        float position, facing;
+    struct alignas(64) LightDues {
+        float light[block_slots];
     };
 
     BlockId new_block();
@@ -92,6 +100,9 @@ private:
     void include(BlockId block, const FoldCandidate& candidate);
     float distance_to(const glm::vec3& point) const noexcept;
     void set_clocks(double position, double facing);
+    void set_light_clock(double light);
+    void set_all_due_by_lights();
+    void set_due_by_lights(BlockId block, float clock);
     template <class F>
     void for_each_used(BlockId block, F&& f) const;
 
@@ -105,6 +116,9 @@ private:
     std::vector<std::uint16_t> unfolded_;  // likewise: growing distances change the verdict
     BlockSpheres spheres_;
     BlockDeadlines earliest_;              // not later than any slot's
+    bool has_lights_ = false;
+    std::vector<LightDues> light_dues_;    // where there are lights, like the next
+    std::vector<float> earliest_light_;
     std::vector<BlockId> free_blocks_, looked_at_;
     std::vector<std::uint64_t> due_blocks_;
     std::vector<Slot> due_;
@@ -115,6 +129,8 @@ private:
     double path_ = 0;                      // since the clocks were restarted
     double position_clock_ = 0, facing_clock_ = 0;
     float position_clock_float_ = 0, facing_clock_down_ = 0;
+    double light_clock_ = 0;
+    float light_clock_down_ = 0;
 };
 
 } // namespace unseen::vdtree
