@@ -83,24 +83,15 @@ void check(const ViewOptions& view) {
     if (view.eye && view.target && *view.eye == *view.target) refuse("--eye and --target are the same point.");
 }
 
-std::vector<std::string> fold_test_list() {
-    return {std::begin(perception::fold_test_names), std::end(perception::fold_test_names)};
-}
-
-FoldTest fold_test(const std::string& name) {
-    const auto& names = perception::fold_test_names;
-    return static_cast<FoldTest>(std::find(std::begin(names), std::end(names), name) - std::begin(names));
-}
-
 void check(const WhatOptions& what) {
-    const bool is_perceptual = app::is_perceptual(what.test);
+    const bool is_perceptual = app::is_perceptual(what.test());
     if (what.mode == Mode::pixels && is_perceptual)
-        refuse("--pixels needs --fold-test extent or displacement: " + what.fold_test + " knows no pixels.");
+        refuse("--pixels needs --fold-test extent or displacement: " + name_of(what.test()) + " knows no pixels.");
     if (what.mode == Mode::imperceptible && !is_perceptual)
-        refuse("--fold-test " + what.fold_test +
+        refuse("--fold-test " + name_of(what.test()) +
                " cannot tell what is imperceptible: add --triangles N or --pixels E.");
-    const bool is_default = !what.is_fold_test_given && is_perceptual; // which takes another test for colour
-    const bool knows_chroma = is_default || what.test == FoldTest::luebke_hallen || what.test == FoldTest::luebke_hallen_safe;
+    // Where none was asked for, one that knows colours is taken.
+    const bool knows_chroma = !what.chosen || what.test() == FoldTest::luebke_hallen || what.test() == FoldTest::luebke_hallen_safe;
     if (what.chroma && (!knows_chroma || what.mode == Mode::full))
         refuse("--chroma needs --fold-test luebke-hallen or luebke-hallen-safe, and not --full.");
 }
@@ -108,6 +99,8 @@ void check(const WhatOptions& what) {
 } // namespace
 
 void refuse(const std::string& message) { throw CLI::ValidationError(message, CLI::ExitCodes::ValidationError); }
+
+std::string name_of(FoldTest test) { return std::string(perception::fold_test_names[static_cast<std::size_t>(test)]); }
 
 CLI::Validator finite() {
     return number_that("a finite number", [](double) { return true; });
@@ -189,6 +182,14 @@ void add_moving_gaze_options(CLI::App& verb, GazeOptions& o, bool allows_mouse) 
     });
 }
 
+void add_fold_test_option(CLI::App& verb, std::optional<ChosenTest>& chosen, std::span<const FoldTest> tests, const std::string& text) {
+    std::map<std::string, FoldTest> by_name;
+    for (const FoldTest test : tests) by_name[name_of(test)] = test;
+    verb.add_option_function<FoldTest>("--fold-test", [&chosen](const FoldTest& test) { chosen = ChosenTest{test}; }, text)
+        ->type_name("NAME")
+        ->transform(CLI::CheckedTransformer(by_name).description(""));
+}
+
 CLI::Option* add_triangles_option(CLI::App& verb, std::uint32_t& triangles, const std::string& text) {
     // The parser's own conversion of unsigned numbers takes "-1" and wraps it.
     return verb
@@ -264,12 +265,11 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
     CLI::Option* pixels = group.add_option("--pixels", o.pixels, "Fold what is smaller than E pixels, seen or not")
                               ->type_name("E")
                               ->check(positive());
-    std::string& name = o.fold_test;
-    CLI::Option* test =
-        group.add_option("--fold-test", name)->type_name("NAME")->check(CLI::IsMember(fold_test_list()));
-    test->description("error (perceptual: what folds change in fact; default), luebke-hallen (perceptual: what they could change at most), "
-                      "luebke-hallen-safe (the same with its known holes closed, more triangles), extent or displacement (in pixels; of --pixels: "
-                      "extent)");
+    add_fold_test_option(group, o.chosen,
+                         std::array{FoldTest::error, FoldTest::luebke_hallen, FoldTest::luebke_hallen_safe, FoldTest::extent, FoldTest::displacement},
+                         "error (perceptual: what folds change in fact; default), luebke-hallen (perceptual: what they could change at most), "
+                         "luebke-hallen-safe (the same with its known holes closed, more triangles), extent or displacement (in pixels; of --pixels: "
+                         "extent)");
     group.add_flag("--chroma", o.chroma, "Keep changes of colour that can be seen, too, not only those of luminance");
     add_gaze_option(group, o.gaze_px);
     group.callback([=, &o] {
@@ -281,9 +281,7 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
         if (*full) o.mode = Mode::full;
         if (*triangles) o.mode = Mode::budget;
         if (*pixels) o.mode = Mode::pixels;
-        if (*pixels) o.test = FoldTest::extent;
-        if (*test) o.test = fold_test(o.fold_test);
-        o.is_fold_test_given = test->count() > 0;
+        if (*pixels && !o.chosen) o.chosen = ChosenTest{FoldTest::extent};
         check(o);
     });
 }

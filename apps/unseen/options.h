@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -41,14 +42,18 @@ enum class Mode { full, imperceptible, budget, pixels };
 enum class FoldTest { luebke_hallen, luebke_hallen_safe, error, extent, displacement }; // like perception::fold_test_names
 
 constexpr bool is_perceptual(FoldTest test) { return test != FoldTest::extent && test != FoldTest::displacement; }
+std::string name_of(FoldTest test); // as --fold-test has it
+
+// A fold test, and why it is taken in place of the default; asked for, it needs no reason.
+struct ChosenTest {
+    FoldTest test = FoldTest::error;
+    std::string why = {};
+};
 
 // WHAT.
 struct WhatOptions {
     Mode mode = Mode::imperceptible;
-    FoldTest test = FoldTest::error; // the default; settle_fold_test() takes another where this one does not know the scene
-    std::string fold_test = "error"; // as it was given
-    bool is_fold_test_given = false;
-    std::string why_not_error;       // of the default that settle_fold_test() took
+    std::optional<ChosenTest> chosen = {};   // none: by the scene, see settle_fold_test() in fold_test.h
     std::uint32_t triangles = 0;             // of Mode::budget
     double pixels = 0;                       // of Mode::pixels
     bool chroma = false;                     // look at colour, too
@@ -56,6 +61,8 @@ struct WhatOptions {
     std::optional<double> milliseconds;      // at most so long for the cut
     std::optional<glm::dvec2> gaze_px;
     double gaze_margin_deg = 0;              // the true gaze may be so far from it
+
+    FoldTest test() const { return chosen ? chosen->test : FoldTest::error; }
 };
 
 // Where gazes come from.
@@ -77,6 +84,8 @@ void add_moving_gaze_options(CLI::App& verb, GazeOptions& options, bool allows_m
 void add_texture_options(CLI::App& verb, TextureOptions& options);
 void add_geomorph_option(CLI::App& verb, std::optional<double>& seconds);
 void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px);
+// Of `tests`.
+void add_fold_test_option(CLI::App& verb, std::optional<ChosenTest>& chosen, std::span<const FoldTest> tests, const std::string& text);
 CLI::Option* add_triangles_option(CLI::App& verb, std::uint32_t& triangles, const std::string& text);
 
 // Validators. All of them refuse NaN and infinities.

@@ -10,6 +10,7 @@
 #include "command.h"
 #include "fly_through.h"
 #include "fold_map.h"
+#include "fold_test.h"
 #include "frame_image.h"
 #include "gaze_player.h"
 #include "report.h"
@@ -38,14 +39,11 @@ bool is_for_people(const std::string& file) {
 }
 
 Result<int> run_flight(RenderArguments& a) {
-    auto scene = load_scene(a.model, a.view, a.display);
-    if (!scene) return scene.error();
-    if (const auto ready = settle_fold_test(*scene, a.what); !ready) return ready.error();
     a.flight.pictures = a.out;
     a.flight.json = a.json;
     a.flight.what = a.what;
     a.flight.draw = a.draw;
-    if (auto flown = fly_through(*scene, a.flight); !flown) return flown.error();
+    if (auto flown = fly_through(a.model, a.view, a.display, a.flight); !flown) return flown.error();
     return exit_done;
 }
 
@@ -55,6 +53,8 @@ Result<int> run(RenderArguments& a) {
     if (std::filesystem::equivalent(a.model, a.out, unknown))
         return Error{ErrorCode::invalid_argument,
                      "'" + a.out + "' is the model itself: give the picture another name."};
+    const auto gaze = GazePlayer::create(a.flight.gaze);
+    if (!gaze) return gaze.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     auto scene = load_scene(a.model, a.view, a.display);
@@ -66,8 +66,6 @@ Result<int> run(RenderArguments& a) {
     if (!renderer) return renderer.error();
 
     vdtree::Cut cut(scene->tree);
-    const auto gaze = GazePlayer::create(a.flight.gaze, *scene, 0);
-    if (!gaze) return gaze.error();
     gaze->apply(a.what, *scene, 0);
     const auto simplified = simplify(cut, *scene, a.what, Purpose::picture);
     if (!simplified) return simplified.error();
@@ -129,6 +127,9 @@ void check(const RenderArguments& a) {
     if (o.path.empty()) {
         if (a.out.empty()) refuse("-o is required (or --path).");
         if (a.map && !is_for_people(a.out)) refuse("--show draws pictures for people: -o must end in .png.");
+        if (a.map == FoldMap::cost && a.what.mode == Mode::full) refuse("--show cost and --full exclude each other: nothing is folded.");
+        if (a.map == FoldMap::eccentricity && !a.what.gaze_px && o.gaze.source == GazeSource::none)
+            refuse("--show eccentricity needs --gaze: without one all counts as looked at.");
         if (!o.csv.empty() || !o.plot.empty() || o.threshold != 1 || !o.draws || o.geomorph_seconds)
             refuse("--csv, --plot, --threshold, --geomorph and --no-draw need --path.");
         return;

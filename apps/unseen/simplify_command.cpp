@@ -7,6 +7,7 @@
 #include <vdtree/mesh_io.h>
 
 #include "command.h"
+#include "fold_test.h"
 #include "report.h"
 #include "simplification.h"
 #include "terminal.h"

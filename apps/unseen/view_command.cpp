@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "command.h"
+#include "fold_test.h"
 #include "options.h"
-#include "simplification.h"
 #include "viewer.h"
 
 namespace unseen::app {
@@ -14,17 +14,21 @@ struct ViewArguments {
     std::string model;
     ViewOptions view;
     DisplayOptions display;
+    GazeOptions gaze;
     ViewerOptions viewer;
 };
 
 Result<int> run(ViewArguments& a) {
     if (!a.view.lights.empty() && a.viewer.geomorph_seconds)
         return Error{ErrorCode::invalid_argument, "--geomorph and --lights exclude each other: vertices that glide are not lit."};
+    auto gaze = GazePlayer::create(a.gaze);
+    if (!gaze) return gaze.error();
     auto scene = load_scene(a.model, a.view, a.display);
     if (!scene) return scene.error();
     if (const auto ready = settle_fold_test(*scene, a.viewer.what); !ready) return ready.error();
     a.viewer.has_fixed_field = a.view.fov_degrees.has_value();
-    if (auto ended = run_viewer(*scene, a.viewer); !ended) return ended.error();
+    a.viewer.gaze_follows_pointer = a.gaze.source == GazeSource::mouse;
+    if (auto ended = run_viewer(*scene, std::move(*gaze), a.viewer); !ended) return ended.error();
     return exit_done;
 }
 
@@ -50,7 +54,7 @@ Command view_command(CLI::App& app) {
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->viewer.what);
-    add_moving_gaze_options(*verb, a->viewer.gaze, true);
+    add_moving_gaze_options(*verb, a->gaze, true);
     verb->footer(std::string(viewer_help) + "\nExamples:\n  unseen view bunny.vdt\n"
                                             "  unseen view bunny.vdt --triangles 5000 --wireframe\n"
                                             "  unseen view dragon.vdt --milliseconds 2 --geomorph 0.25");

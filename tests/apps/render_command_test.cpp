@@ -175,6 +175,10 @@ TEST_F(RenderCommandTest, BadGazesAreRefused) {
     EXPECT_THAT(gap.err, IsAnErrorForPeople());
     EXPECT_THAT(gap.err, HasSubstr("gap.csv: line 3"));
     EXPECT_EQ(with({"--gaze-trace", "missing.csv"}).status, 1);
+    // What is quickly read is told before the model is read and measured.
+    EXPECT_THAT(run({"render", "missing.vdt", "--path", "missing.csv"}).err, HasSubstr("missing.csv"));
+    EXPECT_THAT(run({"render", "missing.vdt", "--path", "orbit:1", "--gaze-trace", "missing.csv"}).err, HasSubstr("missing.csv"));
+    EXPECT_THAT(run({"view", "missing.vdt", "--gaze-trace", "missing.csv"}).err, HasSubstr("missing.csv"));
     for (const std::vector<std::string>& more : std::vector<std::vector<std::string>>{
              {"--gaze-mode", "nobody"}, {"--gaze-mode", "mouse"}, {"--gaze-error", "-1"}, {"--gaze-error", "nan"}, {"--gaze-latency", "1e9"},
              {"--gaze-mode", "head", "--gaze-trace", "gap.csv"}, {"--gaze", "1", "2", "--gaze-mode", "head"}})
