@@ -335,8 +335,8 @@ TEST_F(RenderCommandTest, MapsShowWhatFoldsCost) {
     const std::vector<std::string> aside = {"--gaze", "1191", "80"};
     for (const std::string map : {"cost", "frequency", "contrast", "eccentricity"}) EXPECT_GT(share_of_colour(map, aside), 0.05) << map;
     EXPECT_GT(share_of_colour("cost", aside), share_of_colour("cost", {})) << "more is folded in the corner of the eye";
-    EXPECT_EQ(run({"render", "ball.vdt", "-o", "map.png", "--show", "eccentricity"}).status, 1) << "of which gaze?";
-    EXPECT_EQ(run({"render", "ball.vdt", "-o", "map.png", "--show", "cost", "--full"}).status, 1);
+    EXPECT_EQ(run({"render", "ball.vdt", "-o", "map.png", "--show", "eccentricity"}).status, 2) << "of which gaze?";
+    EXPECT_EQ(run({"render", "ball.vdt", "-o", "map.png", "--show", "cost", "--full"}).status, 2);
     EXPECT_FALSE(fs::exists(path("map.png")));
     EXPECT_EQ(run({"render", "ball.vdt", "-o", "map.pfm", "--show", "cost"}).status, 2) << "no luminance";
     EXPECT_EQ(run({"render", "ball.vdt", "-o", "map.png", "--show", "beauty"}).status, 2);
