@@ -7,7 +7,6 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
-#include <map>
 #include <memory>
 
 #include <perception/criterion.h>
@@ -25,6 +24,13 @@ std::optional<double> parse_number(std::string_view text) {
     const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (code != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
     return value;
+}
+
+// "a, b or c".
+std::string listed(const std::vector<std::string>& names) {
+    std::string list;
+    for (std::size_t i = 0; i < names.size(); ++i) list += (i == 0 ? "" : i + 1 < names.size() ? ", " : " or ") + names[i];
+    return list;
 }
 
 // A validator that passes numbers which `accepts`, and says `requirement` about others.
@@ -116,16 +122,34 @@ CLI::Validator within(double low, double high) {
                        [low, high](double v) { return v >= low && v <= high; });
 }
 
-CLI::Validator ending_in(std::vector<std::string> endings) {
-    std::string list;
-    for (const std::string& ending : endings) list += (list.empty() ? "" : " or ") + ending;
+CLI::Validator whole(double low, double high) {
     return CLI::Validator(
-        [endings, list](std::string& text) {
+        [low, high](std::string& text) {
+            const bool has_digits_only = !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
+            const auto value = parse_number(text);
+            if (has_digits_only && value && *value >= low && *value <= high) return std::string();
+            return "must be a whole number from " + shortest(low) + " to " + shortest(high) + ", not '" + text + "'";
+        },
+        "");
+}
+
+CLI::Validator one_of(std::vector<std::string> names) {
+    return CLI::Validator(
+        [names = std::move(names)](std::string& text) {
+            if (std::find(names.begin(), names.end(), text) != names.end()) return std::string();
+            return "must be " + listed(names) + ", not '" + text + "'";
+        },
+        "");
+}
+
+CLI::Validator ending_in(std::vector<std::string> endings) {
+    return CLI::Validator(
+        [endings = std::move(endings)](std::string& text) {
             std::string ending = std::filesystem::path(text).extension().string();
             std::transform(ending.begin(), ending.end(), ending.begin(),
                            [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
             if (std::find(endings.begin(), endings.end(), ending) != endings.end()) return std::string();
-            return "must end in " + list + ", not '" + text + "'";
+            return "must end in " + listed(endings) + ", not '" + text + "'";
         },
         "");
 }
@@ -153,19 +177,17 @@ void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px) {
 
 void add_moving_gaze_options(CLI::App& verb, GazeOptions& o, bool allows_mouse) {
     CLI::App& group = *verb.add_option_group("GAZE", "Where the viewer looks, frame by frame, instead of --gaze");
-    std::map<std::string, GazeSource> sources = {{"head", GazeSource::head}, {"simulated", GazeSource::simulated}};
-    if (allows_mouse) sources["mouse"] = GazeSource::mouse;
-    CLI::Option* mode = group.add_option("--gaze-mode", o.source,
-                                         std::string("simulated: fixations and saccades by published statistics; head: no tracker, within 15 "
-                                                     "degrees of the middle") + (allows_mouse ? "; mouse: at the pointer" : ""))
-                            ->type_name("NAME")
-                            ->transform(CLI::CheckedTransformer(sources).description(""));
+    std::vector<std::pair<std::string, GazeSource>> sources = {{"simulated", GazeSource::simulated}, {"head", GazeSource::head}};
+    if (allows_mouse) sources.push_back({"mouse", GazeSource::mouse});
+    CLI::Option* mode = add_choice(group, "--gaze-mode", o.source, std::move(sources),
+                                   std::string("simulated: fixations and saccades by published statistics; head: no tracker, within 15 "
+                                               "degrees of the middle") + (allows_mouse ? "; mouse: at the pointer" : ""));
     CLI::Option* trace = group.add_option("--gaze-trace", o.trace, "A recording: CSV with the header time_s,x_px,y_px")->type_name("FILE.csv");
     group
         .add_option_function<double>(
             "--seed", [&o](const double& v) { o.seed = static_cast<std::uint64_t>(v); }, "Of simulated gazes (default: 1)")
         ->type_name("N")
-        ->check(within(0, 9007199254740992.0));
+        ->check(whole(0, 9007199254740992.0)); // 2^53, to which doubles count
     group.add_option("--gaze-error", o.tracker.error_deg, "The tracker's error, which widens the fovea (default: 0)")
         ->type_name("DEGREES")
         ->check(within(0, 180));
@@ -183,11 +205,13 @@ void add_moving_gaze_options(CLI::App& verb, GazeOptions& o, bool allows_mouse) 
 }
 
 void add_fold_test_option(CLI::App& verb, std::optional<ChosenTest>& chosen, std::span<const FoldTest> tests, const std::string& text) {
-    std::map<std::string, FoldTest> by_name;
-    for (const FoldTest test : tests) by_name[name_of(test)] = test;
-    verb.add_option_function<FoldTest>("--fold-test", [&chosen](const FoldTest& test) { chosen = ChosenTest{test}; }, text)
-        ->type_name("NAME")
-        ->transform(CLI::CheckedTransformer(by_name).description(""));
+    std::vector<std::pair<std::string, ChosenTest>> choices;
+    for (const FoldTest test : tests) choices.push_back({name_of(test), ChosenTest{test}});
+    add_choice(verb, "--fold-test", chosen, std::move(choices), text);
+}
+
+void add_json_option(CLI::App& verb, std::string& file) {
+    verb.add_option("--json", file, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
 }
 
 CLI::Option* add_triangles_option(CLI::App& verb, std::uint32_t& triangles, const std::string& text) {

@@ -5,6 +5,8 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <glm/vec2.hpp>
@@ -86,6 +88,7 @@ void add_geomorph_option(CLI::App& verb, std::optional<double>& seconds);
 void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px);
 // Of `tests`.
 void add_fold_test_option(CLI::App& verb, std::optional<ChosenTest>& chosen, std::span<const FoldTest> tests, const std::string& text);
+void add_json_option(CLI::App& verb, std::string& file);
 CLI::Option* add_triangles_option(CLI::App& verb, std::uint32_t& triangles, const std::string& text);
 
 // Validators. All of them refuse NaN and infinities.
@@ -93,8 +96,24 @@ CLI::Validator finite();
 CLI::Validator positive();
 CLI::Validator not_negative();
 CLI::Validator within(double low, double high);
+CLI::Validator whole(double low, double high); // a whole number
+CLI::Validator one_of(std::vector<std::string> names);
 // The file name ends in one of these (lower case, with the point); upper case is fine in the name.
 CLI::Validator ending_in(std::vector<std::string> endings);
+
+// An option that takes one of these names and puts the value of the same place into `target`, which is left as it is where the option is not
+// given. What Value is, Target can be set to.
+template <class Target, class Value>
+CLI::Option* add_choice(CLI::App& verb, const std::string& option, Target& target, std::vector<std::pair<std::string, Value>> choices,
+                        const std::string& text) {
+    std::vector<std::string> names;
+    for (const auto& [name, value] : choices) names.push_back(name);
+    const auto take = [&target, choices = std::move(choices)](const std::string& given) {
+        for (const auto& [name, value] : choices)
+            if (name == given) target = value;
+    };
+    return verb.add_option_function<std::string>(option, take, text)->type_name("NAME")->check(one_of(std::move(names)));
+}
 
 // Ends the parse: exit status 2.
 [[noreturn]] void refuse(const std::string& message);

@@ -267,14 +267,14 @@ Command sheet_command(CLI::App& app) {
         "(default: 29 degrees to the right of the window's centre)");
     verb->add_option("--samples", a->samples, "Samples a pixel, 1 to 256 (default: 64)")
         ->type_name("N")
-        ->check(within(1, 256));
+        ->check(whole(1, 256));
     verb->add_option("--cell", a->cell_px, "The longer side of a picture on the sheet (default: 480)")
         ->type_name("PIXELS")
-        ->check(within(16, 4096));
+        ->check(whole(16, 4096));
     add_fold_test_option(*verb, a->test, std::array{FoldTest::luebke_hallen, FoldTest::luebke_hallen_safe, FoldTest::error},
                          "luebke-hallen, luebke-hallen-safe or error (default: as in 'unseen render')");
     verb->add_flag("--maps", a->maps, "Below, in place of the budget: maps of the folds' cost, frequency, contrast and eccentricity");
-    verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
+    add_json_option(*verb, a->json);
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     verb->footer("Examples:\n  unseen sheet bunny.vdt -o bunny.png\n"

@@ -1,5 +1,4 @@
 // unseen view: a window in which the cut follows the eye.
-#include <map>
 #include <memory>
 
 #include "command.h"
@@ -39,17 +38,14 @@ Command view_command(CLI::App& app) {
     CLI::App* verb = app.add_subcommand("view", "Look at a model in a window");
     verb->add_option("TREE", a->model, "A tree, or a mesh")->required()->type_name("TREE.vdt|MESH");
     verb->add_flag("--wireframe", a->viewer.draw.wireframe, "Begin with the triangles' edges");
-    const std::map<std::string, render::Shading> shadings = {{"smooth", render::Shading::smooth},
-                                                             {"flat", render::Shading::flat}};
-    verb->add_option("--shading", a->viewer.draw.shading, "smooth (default) or flat")
-        ->type_name("NAME")
-        ->transform(CLI::CheckedTransformer(shadings).description(""));
+    add_choice<render::Shading, render::Shading>(*verb, "--shading", a->viewer.draw.shading, {{"smooth", render::Shading::smooth}, {"flat", render::Shading::flat}},
+                                                 "smooth (default) or flat");
     verb->add_option("--screenshot", a->viewer.screenshot, "Write a picture when the viewer ends")
         ->type_name("OUT.png")
         ->check(ending_in({".png"}));
     verb->add_option("--frames", a->viewer.frames, "End after so many frames, for scripts")
         ->type_name("N")
-        ->check(within(1, 1e6));
+        ->check(whole(1, 1e6));
     add_geomorph_option(*verb, a->viewer.geomorph_seconds);
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
