@@ -8,9 +8,9 @@
 #include <limits>
 #include <optional>
 
-#include <output_file.h>
 #include <panel_plot.h>
 #include <perception/image.h>
+#include <vdtree/atomic_file.h>
 
 #include "camera_path.h"
 #include "frame_image.h"
@@ -284,10 +284,11 @@ Result<void> fly_through(const std::string& model, const ViewOptions& view, cons
     if (!gaze) return gaze.error();
     auto report = JsonReport::open(options.json);
     if (!report) return report.error();
-    std::optional<OutputFile> csv;
+    std::optional<vdtree::AtomicFile> csv;
     if (!options.csv.empty()) {
-        auto file = OutputFile::create(options.csv);
+        auto file = vdtree::AtomicFile::create(options.csv);
         if (!file) return file.error();
+        vdtree::AtomicFile::remove_orphans(options.csv);
         csv = std::move(*file);
     }
     auto scene = load_scene(model, view, display);
