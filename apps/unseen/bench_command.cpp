@@ -74,7 +74,7 @@ Command engine_command(CLI::App& bench) {
                              ->type_name("LIST");
     verb->add_option("--keep", a->options.keep, "Keep meshes and trees there, and take those that are there")->type_name("FOLDER");
     verb->add_flag("--quick", a->options.quick, "Few frames and sizes: rough figures");
-    verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
+    add_json_option(*verb, a->json);
     verb->callback([a, sizes] {
         if (sizes->empty() && a->options.quick) a->sizes = quick_sizes;
         a->options.sizes = parse_sizes(a->sizes);
@@ -138,14 +138,14 @@ Command perception_command(CLI::App& bench) {
     verb->add_option("--only", a->only, "Groups: savings,random,far,hard,tolerance,csf,observers,speed (default: all)")->type_name("LIST");
     verb->add_option("--reference", o.reference, "Published sensitivities, as CSV (default: tests/data in the checkout)")
         ->type_name("FOLDER")
-        ->check(CLI::ExistingDirectory);
+        ->check(CLI::Validator(CLI::ExistingDirectory).description(""));
     verb->add_option("--pictures", o.pictures, "A picture of each group: the worst views, and what the judge saw")->type_name("FOLDER");
     verb->add_option("--second-judge", o.second_judge, "Its model of contrast sensitivity: barten-1999 (default), stela, daly, ...")
         ->type_name("MODEL")
-        ->check(CLI::IsMember(achromatic_models()).description(""));
-    verb->add_option("--window", o.window_px, "Its side; promises are about 1024 (default)")->type_name("PIXELS")->check(within(64, 4096));
+        ->check(one_of(achromatic_models()));
+    verb->add_option("--window", o.window_px, "Its side; promises are about 1024 (default)")->type_name("PIXELS")->check(whole(64, 4096));
     verb->add_flag("--quick", o.quick, "Few views: rough figures");
-    verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
+    add_json_option(*verb, a->json);
     verb->callback([a] { a->options.only = parse_groups(a->only); });
     verb->footer("Pictures are drawn with 64 samples a pixel; all of it takes about half an hour without a graphics card.\n\n"
                  "Examples:\n  unseen bench perception --quick\n"
@@ -178,7 +178,7 @@ Command effects_command(CLI::App& bench) {
     CLI::App* verb = bench.add_subcommand("effects", "What each effect of the perceptual test saves in triangles and costs in time");
     verb->add_option("--mesh", a->options.meshes, "Meshes or trees (default: as for 'unseen bench perception')")->type_name("MESH");
     verb->add_flag("--quick", a->options.quick, "Few repetitions");
-    verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
+    add_json_option(*verb, a->json);
     verb->footer("Examples:\n  unseen bench effects --mesh bunny.ply horse.ply dragon.ply");
     return {verb, [a] { return run(*a); }};
 }

@@ -4,7 +4,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <map>
 #include <memory>
 #include <thread>
 
@@ -205,21 +204,17 @@ Result<int> run(const BuildArguments& a) {
 Command build_command(CLI::App& app) {
     auto a = std::make_shared<BuildArguments>();
     CLI::App* verb = app.add_subcommand("build", "Build the vertex tree of a mesh");
-    verb->add_option("MESH", a->mesh, "PLY, OBJ, OFF, STL or glTF")->required();
+    verb->add_option("MESH", a->mesh, "PLY, OBJ, OFF, STL or glTF")->required()->type_name("FILE");
     verb->add_option("-o,--output", a->out, "The tree")->type_name("TREE.vdt")->required()->check(ending_in({".vdt"}));
-    const std::map<std::string, vdtree::ClustererKind> kinds = {{"quadric", vdtree::ClustererKind::quadric},
-                                                                {"octree", vdtree::ClustererKind::octree}};
-    verb->add_option("--clusterer", a->clusterer, "quadric (best; default) or octree (fast)")
-        ->type_name("NAME")
-        ->transform(CLI::CheckedTransformer(kinds).description(""));
-    const std::map<std::string, vdtree::ColourEncoding> encodings = {{"srgb", vdtree::ColourEncoding::srgb},
-                                                                     {"linear", vdtree::ColourEncoding::linear}};
-    verb->add_option("--colours", a->colours, "How the file's colours are encoded: srgb (default) or linear")
-        ->type_name("NAME")
-        ->transform(CLI::CheckedTransformer(encodings).description(""));
+    add_choice<vdtree::ClustererKind, vdtree::ClustererKind>(
+        *verb, "--clusterer", a->clusterer, {{"quadric", vdtree::ClustererKind::quadric}, {"octree", vdtree::ClustererKind::octree}},
+        "quadric (best; default) or octree (fast)");
+    add_choice<vdtree::ColourEncoding, vdtree::ColourEncoding>(
+        *verb, "--colours", a->colours, {{"srgb", vdtree::ColourEncoding::srgb}, {"linear", vdtree::ColourEncoding::linear}},
+        "How the file's colours are encoded: srgb (default) or linear");
     verb->add_option("--threads", a->threads, "Threads of each process; the tree is the same (default: all cores)")
         ->type_name("N")
-        ->check(within(1, most_threads));
+        ->check(whole(1, most_threads));
     verb->add_flag("--fold-errors", a->fold_errors,
                    "Measure what every fold changes, for the fold test 'error' (else that is done at each start), and give proxies the luminance "
                    "that keeps the surface's light");
@@ -228,7 +223,7 @@ Command build_command(CLI::App& app) {
                      "Memory that each process aims to keep to; the rest waits in a temporary file beside the tree")
         ->type_name("GIB")
         ->check(positive());
-    verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
+    add_json_option(*verb, a->json);
     verb->footer("Examples:\n  unseen build bunny.ply -o bunny.vdt\n"
                  "  unseen build city.obj -o city.vdt --clusterer octree --threads 4\n"
                  "  unseen build city.obj -o city.vdt --memory 4\n"

@@ -298,16 +298,6 @@ void check(const CalibrateArguments& a) {
     if ((a.chart || a.gamma || !a.photometer.empty()) && !a.json.empty()) refuse("--json is for observers.");
 }
 
-CLI::Validator whole(double low, double high) {
-    return within(low, high) & CLI::Validator(
-                                   [](std::string& text) {
-                                       return text.find_first_not_of("0123456789") == std::string::npos
-                                                  ? std::string()
-                                                  : "must be a whole number, not '" + text + "'";
-                                   },
-                                   "");
-}
-
 } // namespace
 
 Command calibrate_command(CLI::App& app) {
@@ -317,7 +307,7 @@ Command calibrate_command(CLI::App& app) {
         ->type_name("OUT.json|.png");
     verb->add_option("--method", a->method, "2ifc (default): in which of two intervals was a grating? adjustment: gratings fade in and out")
         ->type_name("NAME")
-        ->check(CLI::IsMember({"2ifc", "adjustment"}).description(""));
+        ->check(one_of({"2ifc", "adjustment"}));
     verb->add_option("--trials", a->trials, "Of 2ifc (default: 200)")->type_name("N")->check(whole(1, 1e5));
     verb->add_option("--settings", a->settings, "Of adjustment, at each place; the first does not count (default: 7)")
         ->type_name("N")
@@ -331,10 +321,10 @@ Command calibrate_command(CLI::App& app) {
         ->type_name("NAME|FILE.json[:key=value,...]");
     verb->add_option("--resume", a->state, "Keep all answers in this file, and go on with those that are there")->type_name("STATE.json");
     verb->add_option("--frequencies", a->frequencies, "To measure at (default: octaves that fit the display)")
-        ->type_name("CPD ...")
+        ->type_name("CPD")
         ->check(positive());
     verb->add_option("--eccentricities", a->eccentricities, "To measure at (default: 0, 5, 10, 20 as far as they fit)")
-        ->type_name("DEG ...")
+        ->type_name("DEG")
         ->check(not_negative());
     verb->add_option_function<double>(
             "--luminance", [o = a.get()](const double& v) { o->luminance = v; }, "Mean of the gratings (default: midway from black to white)")
@@ -343,7 +333,7 @@ Command calibrate_command(CLI::App& app) {
     verb->add_option("--observer", a->observer, "Who it is, for the profile")->type_name("NAME");
     verb->add_option("--conditions", a->conditions, "Room, light, glasses, for the profile")->type_name("TEXT");
     verb->add_option("--date", a->date, "For the profile (default: today)")->type_name("TEXT");
-    verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
+    add_json_option(*verb, a->json);
     verb->add_flag("--gamma", a->gamma, "Measure the display's gamma by matching patches");
     verb->add_option("--photometer", a->photometer, "Take the display's luminances from a table, header code,cdm2")->type_name("FILE.csv");
     verb->add_flag("--chart", a->chart, "Campbell and Robson's chart, in a window or with -o as a picture");

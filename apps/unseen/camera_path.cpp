@@ -38,7 +38,7 @@ bool parse(std::string_view text, Number& value) {
 
 // ---- orbits
 
-Result<std::vector<CameraPose>> orbit(const std::string& path, const vdtree::View& first) {
+Result<Orbit> parse_orbit(const std::string& path) {
     const std::string_view text = std::string_view(path).substr(orbit_prefix.size());
     const std::size_t colon = text.find(':');
     double degrees = 0;
@@ -54,11 +54,15 @@ Result<std::vector<CameraPose>> orbit(const std::string& path, const vdtree::Vie
     } else {
         frames = std::clamp(static_cast<int>(std::ceil(360 / std::abs(degrees))), 1, most_path_frames);
     }
+    return Orbit{degrees, frames};
+}
+
+std::vector<CameraPose> poses_of(const Orbit& orbit, const vdtree::View& first) {
     const glm::dvec3 axis = glm::normalize(first.up);
     std::vector<CameraPose> poses;
-    poses.reserve(static_cast<std::size_t>(frames));
-    for (int frame = 0; frame < frames; ++frame) {
-        const glm::dquat turn = glm::angleAxis(degrees * frame * std::numbers::pi / 180, axis);
+    poses.reserve(static_cast<std::size_t>(orbit.frames));
+    for (int frame = 0; frame < orbit.frames; ++frame) {
+        const glm::dquat turn = glm::angleAxis(orbit.degrees * frame * std::numbers::pi / 180, axis);
         poses.push_back({first.target + turn * (first.eye - first.target), first.target, first.up, {}});
     }
     return poses;
@@ -72,7 +76,7 @@ constexpr std::array<std::string_view, column_count> column_names = {
 
 class PathReader {
 public:
-    PathReader(const std::string& file, const vdtree::View& first) : file_(file), first_(first), stream_(file) {}
+    PathReader(const std::string& file, glm::dvec3 up) : file_(file), up_(up), stream_(file) {}
 
     Result<std::vector<CameraPose>> read() {
         if (!stream_) return Error{ErrorCode::io_failure, "Cannot open '" + file_ + "': is it there, and readable?"};
@@ -153,9 +157,9 @@ private:
         CameraPose pose;
         pose.eye = {v[eye_x], v[eye_y], v[eye_z]};
         pose.target = {v[target_x], v[target_y], v[target_z]};
-        pose.up = has(up_x) ? glm::dvec3(v[up_x], v[up_y], v[up_z]) : first_.up;
+        pose.up = has(up_x) ? glm::dvec3(v[up_x], v[up_y], v[up_z]) : up_;
         if (has(gaze_x)) pose.gaze_px = glm::dvec2(v[gaze_x], v[gaze_y]);
-        vdtree::View view = first_;
+        vdtree::View view; // in which it is seen does not matter here
         view.eye = pose.eye;
         view.target = pose.target;
         view.up = pose.up;
@@ -164,7 +168,7 @@ private:
     }
 
     std::string file_;
-    const vdtree::View& first_;
+    glm::dvec3 up_;
     std::ifstream stream_;
     std::string line_;
     std::uint64_t line_number_ = 0;
@@ -173,8 +177,18 @@ private:
 
 } // namespace
 
-Result<std::vector<CameraPose>> read_camera_path(const std::string& path, const vdtree::View& first) {
-    return path.starts_with(orbit_prefix) ? orbit(path, first) : PathReader(path, first).read();
+Result<CameraPath> CameraPath::read(const std::string& path, glm::dvec3 up) {
+    if (path.starts_with(orbit_prefix)) {
+        const auto orbit = parse_orbit(path);
+        return orbit ? Result(CameraPath(*orbit)) : orbit.error();
+    }
+    auto poses = PathReader(path, up).read();
+    return poses ? Result(CameraPath(std::move(*poses))) : poses.error();
+}
+
+std::vector<CameraPose> CameraPath::poses_from(const vdtree::View& first) const {
+    const Orbit* const orbit = std::get_if<Orbit>(&way_);
+    return orbit ? poses_of(*orbit, first) : std::get<std::vector<CameraPose>>(way_);
 }
 
 } // namespace unseen::app

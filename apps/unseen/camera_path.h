@@ -3,6 +3,8 @@
 
 #include <optional>
 #include <string>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -19,12 +21,28 @@ struct CameraPose {
     std::optional<glm::dvec2> gaze_px; // all poses of a path have one, or none has
 };
 
-// "orbit:DEGREES[:FRAMES]": around the first view's target about its up vector, so many degrees from each frame to the next
-// (negative: the other way); without a count, once around. The first frame is the first view.
-// Otherwise the name of a CSV file: a header line that names the columns eye_x, eye_y, eye_z, target_x, target_y, target_z and
-// optionally up_x, up_y, up_z (default: the first view's) and gaze_x, gaze_y (pixels), in any order; then one line a frame.
-// Empty lines are skipped. Errors name the file, line and column.
-Result<std::vector<CameraPose>> read_camera_path(const std::string& path, const vdtree::View& first);
+// Around the first view's target about its up vector. The first frame is the first view.
+struct Orbit {
+    double degrees = 0; // from each frame to the next; negative: the other way
+    int frames = 1;
+};
+
+// What can be read before there is a view to begin with.
+class CameraPath {
+public:
+    // "orbit:DEGREES[:FRAMES]": see Orbit; without a count, once around.
+    // Otherwise the name of a CSV file: a header line that names the columns eye_x, eye_y, eye_z, target_x, target_y, target_z and
+    // optionally up_x, up_y, up_z (default: `up`) and gaze_x, gaze_y (pixels), in any order; then one line a frame.
+    // Empty lines are skipped. Errors name the file, line and column.
+    static Result<CameraPath> read(const std::string& path, glm::dvec3 up);
+
+    std::vector<CameraPose> poses_from(const vdtree::View& first) const;
+
+private:
+    explicit CameraPath(std::variant<Orbit, std::vector<CameraPose>> way) : way_(std::move(way)) {}
+
+    std::variant<Orbit, std::vector<CameraPose>> way_;
+};
 
 inline constexpr int most_path_frames = 1'000'000;
 

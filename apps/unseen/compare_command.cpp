@@ -175,15 +175,16 @@ Command compare_command(CLI::App& app) {
     auto a = std::make_shared<CompareArguments>();
     CLI::App* verb = app.add_subcommand("compare", "Count the pixels that differ visibly");
     verb->add_option("REF", a->reference, "The reference: PNG (as the display shows it), PFM or EXR (cd/m2)")
-        ->required();
-    verb->add_option("TEST", a->test, "The image to judge")->required();
+        ->required()
+        ->type_name("IMAGE");
+    verb->add_option("TEST", a->test, "The image to judge")->required()->type_name("IMAGE");
     verb->add_option("--model", a->model_name, "modern (default) or rpg99 (of 1999, blind to fine detail)")
         ->type_name("NAME")
-        ->check(CLI::IsMember({"modern", "rpg99"}).description(""));
+        ->check(one_of({"modern", "rpg99"}));
     verb->add_option("--profile", a->profile,
                      "With rpg99: perceptualdiff, which does all as that program does (gamma 2.2, AdobeRGB, black 0)")
         ->type_name("NAME")
-        ->check(CLI::IsMember({perceptualdiff}).description(""));
+        ->check(one_of({perceptualdiff}));
     verb->add_option_function<double>(
             "--field", [o = a.get()](const double& v) { o->field_degrees = v; },
             "With rpg99: the image's horizontal field (default: as shown on the display)")
@@ -201,7 +202,7 @@ Command compare_command(CLI::App& app) {
             "Exit status 1 where more pixels than N differ visibly")
         ->type_name("N")
         ->check(not_negative());
-    verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
+    add_json_option(*verb, a->json);
     add_display_options(*verb, a->display);
     verb->callback([o = a.get()] { check(*o); });
     verb->footer("Examples:\n  unseen compare full.pfm simplified.pfm --gaze 1603 512 --fail-above 0\n"

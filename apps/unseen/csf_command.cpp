@@ -328,7 +328,7 @@ Command csf_command(CLI::App& app) {
         app.add_subcommand("csf", "Contrast sensitivity: 1 / the least visible contrast of a grating patch");
     verb->add_option("--model", a->model_name, "Which closed form (default: castle). " + model_list())
         ->type_name("NAME")
-        ->check(CLI::IsMember(model_names()).description(""));
+        ->check(one_of(model_names()));
     const auto number = [verb](const char* name, std::optional<double>& value, const CLI::Validator& validator,
                                const char* unit, const char* text) {
         verb->add_option_function<double>(
@@ -349,7 +349,7 @@ Command csf_command(CLI::App& app) {
             "--field", [s](const std::string& name) { s->field = field_of(name); },
             "Side of the visual field: nasal, temporal, or the worst of them (default)")
         ->type_name("NAME")
-        ->check(CLI::IsMember({"nasal", "temporal", "worst"}).description(""));
+        ->check(one_of({"nasal", "temporal", "worst"}));
     verb->add_option("--csv", a->csv, "Rows of stimuli, columns named like these options; adds 'sensitivity' to stdout")
         ->type_name("FILE|-");
     verb->add_option("--plot", a->plot, "Curves over frequency")->type_name("OUT.png")->check(ending_in({".png"}));

@@ -9,7 +9,7 @@
 #include <glm/geometric.hpp>
 
 #include <perception/criterion.h>
-#include <vdtree/occluders.h>
+#include <vdtree/fold_errors.h>
 
 #include "bench_tools.h"
 #include "model_file.h"
@@ -72,7 +72,7 @@ std::vector<Variation> variations() {
                    nullptr, true, true, false, true});
     all.push_back({"luebke-hallen-safe", "rings of all cuts, and shifts of the mean",
                    [](const Scene& scene, const perception::FoldTestOptions& options) {
-                       return perception::luebke_hallen_safe_distances(scene.tree, vdtree::bound_cut_rings(scene.tree), scene.view, options);
+                       return perception::luebke_hallen_safe_distances(scene.tree, scene.cut_rings(), scene.view, options);
                    }});
     all.push_back({"error", "what folds change in fact, in place of what they could",
                    [](const Scene& scene, const perception::FoldTestOptions& options) {
@@ -127,7 +127,7 @@ Result<DistanceCriterion> criterion_of(const Variation& variation, const Scene& 
 Result<Measured> measure(const Scene& scene, const Variation& variation, int repeats) {
     const perception::FoldTestOptions options = test_options(scene, variation.has_gaze);
     vdtree::Viewpoint viewpoint = perception::viewpoint_of(scene.tree, scene.view, options, scene.placement);
-    if (variation.hides) viewpoint.occluders = vdtree::inner_spheres(scene.tree); // of open surfaces, none
+    if (variation.hides) viewpoint.occluders.assign(scene.inner_spheres().begin(), scene.inner_spheres().end()); // of open surfaces, none
     const auto criterion = criterion_of(variation, scene, options, viewpoint);
     if (!criterion) return criterion.error();
     vdtree::FollowOptions following;

@@ -8,9 +8,9 @@
 #include <limits>
 #include <optional>
 
-#include <output_file.h>
 #include <panel_plot.h>
 #include <perception/image.h>
+#include <vdtree/atomic_file.h>
 
 #include "camera_path.h"
 #include "frame_image.h"
@@ -158,7 +158,7 @@ Json to_json(const Scene& scene, const std::vector<FrameRecord>& frames, const S
     for (const Measure& m : measures_of(frames))
         json[m.key] = {{"median", number_or_null(median(m.values))}, {"largest", number_or_null(largest(m.values))}};
     json["imperceptible_from_m"] = number_or_null(last.imperceptible_from_m);
-    json["effects"] = app::to_json(last, not_drawn)["effects"];
+    json["effects"] = app::to_json(last.effects);
     return json;
 }
 
@@ -174,25 +174,23 @@ void print(const Scene& scene, const std::vector<FrameRecord>& frames, const Sim
     const std::string metres = std::isfinite(last.imperceptible_from_m) ? " m" : "";
     print_table({{"imperceptible from", rounded(last.imperceptible_from_m, 3) + metres}});
     std::printf("effects of the last frame\n");
-    for (const Effect& effect : last.effects)
-        std::printf("  %-3s  %s: %s\n", effect.on ? "on" : "off", effect.name.c_str(), effect.why.c_str());
+    print(last.effects);
 }
 
 class FlyThrough {
 public:
-    FlyThrough(Scene& scene, const FlyThroughOptions& options)
-        : scene_(scene), options_(options), what_(options.what), cut_(scene.tree) {
+    FlyThrough(Scene& scene, const WhatOptions& what, const FlyThroughOptions& options)
+        : scene_(scene), options_(options), what_(what), cut_(scene.tree) {
         follower_.set_threshold(options.threshold);
     }
 
-    Result<void> run(const std::vector<CameraPose>& poses) {
+    Result<void> run(const std::vector<CameraPose>& poses, GazePlayer gaze) {
         auto drawing = make_drawing(scene_, options_.draws);
         if (!drawing) return drawing.error();
         if (options_.geomorph_seconds)
             if (auto set = follower_.set_geomorph(scene_, *options_.geomorph_seconds); !set) return set;
         const double frame_s = 1 / options_.frames_a_second;
-        const auto gaze = GazePlayer::create(options_.gaze, scene_, static_cast<double>(poses.size()) * frame_s);
-        if (!gaze) return gaze.error();
+        if (auto begun = gaze.begin(scene_, static_cast<double>(poses.size()) * frame_s); !begun) return begun;
         const auto names = parse_pattern(options_.pictures);
         ProgressBar bar("flying");
         for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -200,7 +198,7 @@ public:
             take(poses[i]);
             if (auto lit = light_at(scene_, static_cast<double>(i) * frame_s); !lit)
                 return Error{lit.error().code, "Frame " + std::to_string(i) + ": " + lit.error().message};
-            gaze->apply(what_, scene_, static_cast<double>(i) * frame_s);
+            gaze.apply(what_, scene_, static_cast<double>(i) * frame_s);
             auto frame = next(*drawing);
             if (!frame) return Error{frame.error().code, "Frame " + std::to_string(i) + ": " + frame.error().message};
             if (!names) continue;
@@ -279,33 +277,40 @@ std::string complaint_about_picture_names(const std::string& pattern) {
     return "with --path, -o must be a name with one %d or %04d for the frame's number and end in .png, not '" + pattern + "'.";
 }
 
-Result<void> fly_through(Scene& scene, const FlyThroughOptions& options) {
-    const auto poses = read_camera_path(options.path, scene.view);
-    if (!poses) return poses.error();
+Result<void> fly_through(const std::string& model, const ViewOptions& view, const DisplayOptions& display, const FlyThroughOptions& options) {
+    const auto path = CameraPath::read(options.path, view.up.value_or(vdtree::View().up));
+    if (!path) return path.error();
+    auto gaze = GazePlayer::create(options.gaze);
+    if (!gaze) return gaze.error();
     auto report = JsonReport::open(options.json);
     if (!report) return report.error();
-    std::optional<OutputFile> csv;
+    std::optional<vdtree::AtomicFile> csv;
     if (!options.csv.empty()) {
-        auto file = OutputFile::create(options.csv);
+        auto file = vdtree::AtomicFile::create(options.csv);
         if (!file) return file.error();
+        vdtree::AtomicFile::remove_orphans(options.csv);
         csv = std::move(*file);
     }
+    auto scene = load_scene(model, view, display);
+    if (!scene) return scene.error();
     if (!options.pictures.empty())
         if (auto made = make_folder_of(options.pictures); !made) return made;
+    WhatOptions what = options.what;
+    if (const auto ready = settle_fold_test(*scene, what); !ready) return ready;
 
-    FlyThrough flight(scene, options);
-    if (auto flown = flight.run(*poses); !flown) return flown;
+    FlyThrough flight(*scene, what, options);
+    if (auto flown = flight.run(path->poses_from(scene->view), std::move(*gaze)); !flown) return flown;
     if (csv)
         if (auto ok = csv->write(to_csv(flight.records())); !ok) return ok;
-    if (auto ok = report->prepare(to_json(scene, flight.records(), flight.last())); !ok) return ok;
+    if (auto ok = report->prepare(to_json(*scene, flight.records(), flight.last())); !ok) return ok;
     if (!options.plot.empty()) {
-        const std::string title = grouped(scene.tree.triangle_count()) + " triangles, " + options.path;
+        const std::string title = grouped(scene->tree.triangle_count()) + " triangles, " + options.path;
         if (auto ok = perception::write_image(options.plot, plot_of(flight.records(), title)); !ok) return ok;
     }
     if (csv)
         if (auto ok = csv->commit(); !ok) return ok;
     if (auto ok = report->publish(); !ok) return ok;
-    if (!report->is_on_stdout()) print(scene, flight.records(), flight.last());
+    if (!report->is_on_stdout()) print(*scene, flight.records(), flight.last());
     return {};
 }
 

@@ -13,6 +13,7 @@
 #include <vdtree/normal_mask.h>
 
 #include "canvas.h"
+#include "fold_test.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -226,11 +227,7 @@ void draw_legend(Canvas& canvas, int top, const Scale& scale) {
 } // namespace
 
 Result<Image> draw_fold_map(const vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, FoldMap map, const vdtree::View& view) {
-    if (what.mode == Mode::full && map == FoldMap::cost)
-        return Error{ErrorCode::invalid_argument, "In the full model nothing is folded, so no fold costs anything: leave out --full."};
-    if (map == FoldMap::eccentricity && !what.gaze_px)
-        return Error{ErrorCode::invalid_argument, "Without a gaze all counts as looked at: --show eccentricity needs --gaze."};
-    const vdtree::Viewpoint viewpoint = Follower().viewpoint_for(scene, what, Purpose::picture);
+    const vdtree::Viewpoint viewpoint = viewpoint_of(scene, what, Purpose::picture);
     const Sight sight(scene, what, viewpoint);
     std::vector<float> costs;
     if (map == FoldMap::cost) {

@@ -1,30 +1,34 @@
 #include "gaze_player.h"
 
+#include <utility>
+
 namespace unseen::app {
 
-Result<GazePlayer> GazePlayer::create(const GazeOptions& options, const Scene& scene, double duration_s) {
+Result<GazePlayer> GazePlayer::create(const GazeOptions& options) {
     if (auto valid = perception::validate(options.tracker); !valid) return valid.error();
     GazePlayer player(options);
-    const auto play = [&](perception::GazeTrace trace) {
-        player.tracker_.emplace(std::move(trace), options.tracker, scene.display, scene.view.width, scene.view.height);
-    };
     if (options.source == GazeSource::trace) {
         auto trace = perception::read_gaze_trace(options.trace);
         if (!trace) return trace.error();
-        play(std::move(*trace));
+        player.trace_ = std::move(*trace);
     }
-    if (options.source == GazeSource::simulated) {
+    return player;
+}
+
+Result<void> GazePlayer::begin(const Scene& scene, double duration_s) {
+    if (options_.source == GazeSource::simulated) {
         perception::SimulatedGaze simulated;
-        simulated.seed = options.seed;
+        simulated.seed = options_.seed;
         constexpr double spare_s = 1; // beyond the last frame
         simulated.duration_s = duration_s + spare_s;
         simulated.width_px = scene.view.width;
         simulated.height_px = scene.view.height;
         auto trace = perception::simulate_gaze(simulated, scene.display);
         if (!trace) return trace.error();
-        play(std::move(*trace));
+        trace_ = std::move(*trace);
     }
-    return player;
+    if (trace_) tracker_.emplace(*std::exchange(trace_, {}), options_.tracker, scene.display, scene.view.width, scene.view.height);
+    return {};
 }
 
 void GazePlayer::apply(WhatOptions& what, const Scene& scene, double time_s) const {

@@ -12,8 +12,11 @@ namespace unseen::app {
 
 class GazePlayer {
 public:
-    // For frames up to `duration_s`. Reads the trace; a simulated gaze is in the scene's window.
-    static Result<GazePlayer> create(const GazeOptions& options, const Scene& scene, double duration_s);
+    // Reads the trace.
+    static Result<GazePlayer> create(const GazeOptions& options);
+
+    // To be called before the first frame: simulates a gaze that is to be simulated, in the scene's window, for frames up to `duration_s`.
+    Result<void> begin(const Scene& scene, double duration_s);
 
     // Puts what is known at an instant into `what`. A gaze that the options do not play, such as the mouse's, stays as it
     // is, with the tracker's error around it.
@@ -24,6 +27,7 @@ private:
     explicit GazePlayer(const GazeOptions& options) : options_(options) {}
 
     GazeOptions options_;
+    std::optional<perception::GazeTrace> trace_; // until begin()
     std::optional<perception::GazeTracker> tracker_;
 };
 

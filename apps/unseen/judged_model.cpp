@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include <vdtree/fold_errors.h>
+
 #include "frame_image.h"
 
 namespace unseen::app {
@@ -92,7 +94,7 @@ Result<JudgedModel::Picture> JudgedModel::draw(Stand& stand, const WhatOptions& 
 }
 
 Result<JudgedModel::Picture> JudgedModel::draw(const WhatOptions& what, bool wireframe) {
-    const auto stood = stand(what.mode == Mode::full ? FoldTest::luebke_hallen : what.test);
+    const auto stood = stand(what.mode == Mode::full ? FoldTest::luebke_hallen : what.test());
     if (!stood) return stood.error();
     return draw(**stood, what, wireframe);
 }
@@ -142,7 +144,7 @@ Result<Verdicts> JudgedModel::judge(const WhatOptions& what) {
 }
 
 Result<vdtree::Index> JudgedModel::count(const WhatOptions& what) {
-    const auto stood = stand(what.test);
+    const auto stood = stand(what.test());
     if (!stood) return stood.error();
     vdtree::Cut cut((*stood)->scene->tree);
     const auto simplified = simplify(cut, *(*stood)->scene, what, Purpose::picture);

@@ -46,8 +46,10 @@ int run(const std::vector<Command>& commands) {
     for (const Command& command : commands) {
         if (!command.parser->parsed()) continue;
         const auto status = command.run();
-        if (status) return *status;
-        print_error(status.error().message);
+        if (!status) print_error(status.error().message);
+        if (!status) return exit_failed;
+        if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return *status;
+        print_error("cannot write to the standard output: is the disk full?");
         return exit_failed;
     }
     return exit_usage; // the parser insists on a verb

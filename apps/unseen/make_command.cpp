@@ -61,21 +61,21 @@ Result<int> run(const SubdivideArguments& a) {
 Command subdivide_command(CLI::App& make) {
     auto a = std::make_shared<SubdivideArguments>();
     CLI::App* verb = make.add_subcommand("subdivide", "Split the triangles of a mesh into smaller ones, a little rough");
-    verb->add_option("MESH", a->mesh, "PLY, OBJ, OFF, STL or glTF")->required();
+    verb->add_option("MESH", a->mesh, "PLY, OBJ, OFF, STL or glTF")->required()->type_name("FILE");
     verb->add_option("-o,--output", a->out, "The larger mesh")
         ->type_name("OUT.ply|.obj|.glb")
         ->required()
         ->check(ending_in({".ply", ".obj", ".glb"}));
     CLI::Option* times = verb->add_option("--times", a->options.times, "Make four of every triangle, N times")
                              ->type_name("N")
-                             ->check(within(0, most_subdivisions));
+                             ->check(whole(0, most_subdivisions));
     CLI::Option* triangles = add_triangles_option(
         *verb, a->triangles, "Instead: up to N triangles; the last round splits the longest edges alone");
     verb->add_option("--noise", a->options.noise,
                      "How far new vertices may move, as a share of their edge's length, 0..1 (default: 0.02)")
         ->type_name("SHARE")
         ->check(within(0, 1));
-    verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
+    add_json_option(*verb, a->json);
     verb->callback([=] {
         if (times->count() + triangles->count() != 1) refuse("give either --times or --triangles.");
     });

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
-#include <map>
 #include <memory>
 
 #include <perception/criterion.h>
@@ -25,6 +24,13 @@ std::optional<double> parse_number(std::string_view text) {
     const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (code != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
     return value;
+}
+
+// "a, b or c".
+std::string listed(const std::vector<std::string>& names) {
+    std::string list;
+    for (std::size_t i = 0; i < names.size(); ++i) list += (i == 0 ? "" : i + 1 < names.size() ? ", " : " or ") + names[i];
+    return list;
 }
 
 // A validator that passes numbers which `accepts`, and says `requirement` about others.
@@ -83,24 +89,15 @@ void check(const ViewOptions& view) {
     if (view.eye && view.target && *view.eye == *view.target) refuse("--eye and --target are the same point.");
 }
 
-std::vector<std::string> fold_test_list() {
-    return {std::begin(perception::fold_test_names), std::end(perception::fold_test_names)};
-}
-
-FoldTest fold_test(const std::string& name) {
-    const auto& names = perception::fold_test_names;
-    return static_cast<FoldTest>(std::find(std::begin(names), std::end(names), name) - std::begin(names));
-}
-
 void check(const WhatOptions& what) {
-    const bool is_perceptual = app::is_perceptual(what.test);
+    const bool is_perceptual = app::is_perceptual(what.test());
     if (what.mode == Mode::pixels && is_perceptual)
-        refuse("--pixels needs --fold-test extent or displacement: " + what.fold_test + " knows no pixels.");
+        refuse("--pixels needs --fold-test extent or displacement: " + name_of(what.test()) + " knows no pixels.");
     if (what.mode == Mode::imperceptible && !is_perceptual)
-        refuse("--fold-test " + what.fold_test +
+        refuse("--fold-test " + name_of(what.test()) +
                " cannot tell what is imperceptible: add --triangles N or --pixels E.");
-    const bool is_default = !what.is_fold_test_given && is_perceptual; // which takes another test for colour
-    const bool knows_chroma = is_default || what.test == FoldTest::luebke_hallen || what.test == FoldTest::luebke_hallen_safe;
+    // Where none was asked for, one that knows colours is taken.
+    const bool knows_chroma = !what.chosen || what.test() == FoldTest::luebke_hallen || what.test() == FoldTest::luebke_hallen_safe;
     if (what.chroma && (!knows_chroma || what.mode == Mode::full))
         refuse("--chroma needs --fold-test luebke-hallen or luebke-hallen-safe, and not --full.");
 }
@@ -108,6 +105,8 @@ void check(const WhatOptions& what) {
 } // namespace
 
 void refuse(const std::string& message) { throw CLI::ValidationError(message, CLI::ExitCodes::ValidationError); }
+
+std::string name_of(FoldTest test) { return std::string(perception::fold_test_names[static_cast<std::size_t>(test)]); }
 
 CLI::Validator finite() {
     return number_that("a finite number", [](double) { return true; });
@@ -123,16 +122,34 @@ CLI::Validator within(double low, double high) {
                        [low, high](double v) { return v >= low && v <= high; });
 }
 
-CLI::Validator ending_in(std::vector<std::string> endings) {
-    std::string list;
-    for (const std::string& ending : endings) list += (list.empty() ? "" : " or ") + ending;
+CLI::Validator whole(double low, double high) {
     return CLI::Validator(
-        [endings, list](std::string& text) {
+        [low, high](std::string& text) {
+            const bool has_digits_only = !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
+            const auto value = parse_number(text);
+            if (has_digits_only && value && *value >= low && *value <= high) return std::string();
+            return "must be a whole number from " + shortest(low) + " to " + shortest(high) + ", not '" + text + "'";
+        },
+        "");
+}
+
+CLI::Validator one_of(std::vector<std::string> names) {
+    return CLI::Validator(
+        [names = std::move(names)](std::string& text) {
+            if (std::find(names.begin(), names.end(), text) != names.end()) return std::string();
+            return "must be " + listed(names) + ", not '" + text + "'";
+        },
+        "");
+}
+
+CLI::Validator ending_in(std::vector<std::string> endings) {
+    return CLI::Validator(
+        [endings = std::move(endings)](std::string& text) {
             std::string ending = std::filesystem::path(text).extension().string();
             std::transform(ending.begin(), ending.end(), ending.begin(),
                            [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
             if (std::find(endings.begin(), endings.end(), ending) != endings.end()) return std::string();
-            return "must end in " + list + ", not '" + text + "'";
+            return "must end in " + listed(endings) + ", not '" + text + "'";
         },
         "");
 }
@@ -160,19 +177,17 @@ void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px) {
 
 void add_moving_gaze_options(CLI::App& verb, GazeOptions& o, bool allows_mouse) {
     CLI::App& group = *verb.add_option_group("GAZE", "Where the viewer looks, frame by frame, instead of --gaze");
-    std::map<std::string, GazeSource> sources = {{"head", GazeSource::head}, {"simulated", GazeSource::simulated}};
-    if (allows_mouse) sources["mouse"] = GazeSource::mouse;
-    CLI::Option* mode = group.add_option("--gaze-mode", o.source,
-                                         std::string("simulated: fixations and saccades by published statistics; head: no tracker, within 15 "
-                                                     "degrees of the middle") + (allows_mouse ? "; mouse: at the pointer" : ""))
-                            ->type_name("NAME")
-                            ->transform(CLI::CheckedTransformer(sources).description(""));
+    std::vector<std::pair<std::string, GazeSource>> sources = {{"simulated", GazeSource::simulated}, {"head", GazeSource::head}};
+    if (allows_mouse) sources.push_back({"mouse", GazeSource::mouse});
+    CLI::Option* mode = add_choice(group, "--gaze-mode", o.source, std::move(sources),
+                                   std::string("simulated: fixations and saccades by published statistics; head: no tracker, within 15 "
+                                               "degrees of the middle") + (allows_mouse ? "; mouse: at the pointer" : ""));
     CLI::Option* trace = group.add_option("--gaze-trace", o.trace, "A recording: CSV with the header time_s,x_px,y_px")->type_name("FILE.csv");
     group
         .add_option_function<double>(
             "--seed", [&o](const double& v) { o.seed = static_cast<std::uint64_t>(v); }, "Of simulated gazes (default: 1)")
         ->type_name("N")
-        ->check(within(0, 9007199254740992.0));
+        ->check(whole(0, 9007199254740992.0)); // 2^53, to which doubles count
     group.add_option("--gaze-error", o.tracker.error_deg, "The tracker's error, which widens the fovea (default: 0)")
         ->type_name("DEGREES")
         ->check(within(0, 180));
@@ -187,6 +202,16 @@ void add_moving_gaze_options(CLI::App& verb, GazeOptions& o, bool allows_mouse) 
         if (*mode && *trace) refuse("--gaze-mode and --gaze-trace exclude each other: give one of them.");
         if (*trace) o.source = GazeSource::trace;
     });
+}
+
+void add_fold_test_option(CLI::App& verb, std::optional<ChosenTest>& chosen, std::span<const FoldTest> tests, const std::string& text) {
+    std::vector<std::pair<std::string, ChosenTest>> choices;
+    for (const FoldTest test : tests) choices.push_back({name_of(test), ChosenTest{test}});
+    add_choice(verb, "--fold-test", chosen, std::move(choices), text);
+}
+
+void add_json_option(CLI::App& verb, std::string& file) {
+    verb.add_option("--json", file, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
 }
 
 CLI::Option* add_triangles_option(CLI::App& verb, std::uint32_t& triangles, const std::string& text) {
@@ -264,12 +289,11 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
     CLI::Option* pixels = group.add_option("--pixels", o.pixels, "Fold what is smaller than E pixels, seen or not")
                               ->type_name("E")
                               ->check(positive());
-    std::string& name = o.fold_test;
-    CLI::Option* test =
-        group.add_option("--fold-test", name)->type_name("NAME")->check(CLI::IsMember(fold_test_list()));
-    test->description("error (perceptual: what folds change in fact; default), luebke-hallen (perceptual: what they could change at most), "
-                      "luebke-hallen-safe (the same with its known holes closed, more triangles), extent or displacement (in pixels; of --pixels: "
-                      "extent)");
+    add_fold_test_option(group, o.chosen,
+                         std::array{FoldTest::error, FoldTest::luebke_hallen, FoldTest::luebke_hallen_safe, FoldTest::extent, FoldTest::displacement},
+                         "error (perceptual: what folds change in fact; default), luebke-hallen (perceptual: what they could change at most), "
+                         "luebke-hallen-safe (the same with its known holes closed, more triangles), extent or displacement (in pixels; of --pixels: "
+                         "extent)");
     group.add_flag("--chroma", o.chroma, "Keep changes of colour that can be seen, too, not only those of luminance");
     add_gaze_option(group, o.gaze_px);
     group.callback([=, &o] {
@@ -281,9 +305,7 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
         if (*full) o.mode = Mode::full;
         if (*triangles) o.mode = Mode::budget;
         if (*pixels) o.mode = Mode::pixels;
-        if (*pixels) o.test = FoldTest::extent;
-        if (*test) o.test = fold_test(o.fold_test);
-        o.is_fold_test_given = test->count() > 0;
+        if (*pixels && !o.chosen) o.chosen = ChosenTest{FoldTest::extent};
         check(o);
     });
 }

@@ -3,7 +3,10 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <glm/vec2.hpp>
@@ -41,14 +44,18 @@ enum class Mode { full, imperceptible, budget, pixels };
 enum class FoldTest { luebke_hallen, luebke_hallen_safe, error, extent, displacement }; // like perception::fold_test_names
 
 constexpr bool is_perceptual(FoldTest test) { return test != FoldTest::extent && test != FoldTest::displacement; }
+std::string name_of(FoldTest test); // as --fold-test has it
+
+// A fold test, and why it is taken in place of the default; asked for, it needs no reason.
+struct ChosenTest {
+    FoldTest test = FoldTest::error;
+    std::string why = {};
+};
 
 // WHAT.
 struct WhatOptions {
     Mode mode = Mode::imperceptible;
-    FoldTest test = FoldTest::error; // the default; settle_fold_test() takes another where this one does not know the scene
-    std::string fold_test = "error"; // as it was given
-    bool is_fold_test_given = false;
-    std::string why_not_error;       // of the default that settle_fold_test() took
+    std::optional<ChosenTest> chosen = {};   // none: by the scene, see settle_fold_test() in fold_test.h
     std::uint32_t triangles = 0;             // of Mode::budget
     double pixels = 0;                       // of Mode::pixels
     bool chroma = false;                     // look at colour, too
@@ -56,6 +63,8 @@ struct WhatOptions {
     std::optional<double> milliseconds;      // at most so long for the cut
     std::optional<glm::dvec2> gaze_px;
     double gaze_margin_deg = 0;              // the true gaze may be so far from it
+
+    FoldTest test() const { return chosen ? chosen->test : FoldTest::error; }
 };
 
 // Where gazes come from.
@@ -77,6 +86,9 @@ void add_moving_gaze_options(CLI::App& verb, GazeOptions& options, bool allows_m
 void add_texture_options(CLI::App& verb, TextureOptions& options);
 void add_geomorph_option(CLI::App& verb, std::optional<double>& seconds);
 void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px);
+// Of `tests`.
+void add_fold_test_option(CLI::App& verb, std::optional<ChosenTest>& chosen, std::span<const FoldTest> tests, const std::string& text);
+void add_json_option(CLI::App& verb, std::string& file);
 CLI::Option* add_triangles_option(CLI::App& verb, std::uint32_t& triangles, const std::string& text);
 
 // Validators. All of them refuse NaN and infinities.
@@ -84,8 +96,24 @@ CLI::Validator finite();
 CLI::Validator positive();
 CLI::Validator not_negative();
 CLI::Validator within(double low, double high);
+CLI::Validator whole(double low, double high); // a whole number
+CLI::Validator one_of(std::vector<std::string> names);
 // The file name ends in one of these (lower case, with the point); upper case is fine in the name.
 CLI::Validator ending_in(std::vector<std::string> endings);
+
+// An option that takes one of these names and puts the value of the same place into `target`, which is left as it is where the option is not
+// given. What Value is, Target can be set to.
+template <class Target, class Value>
+CLI::Option* add_choice(CLI::App& verb, const std::string& option, Target& target, std::vector<std::pair<std::string, Value>> choices,
+                        const std::string& text) {
+    std::vector<std::string> names;
+    for (const auto& [name, value] : choices) names.push_back(name);
+    const auto take = [&target, choices = std::move(choices)](const std::string& given) {
+        for (const auto& [name, value] : choices)
+            if (name == given) target = value;
+    };
+    return verb.add_option_function<std::string>(option, take, text)->type_name("NAME")->check(one_of(std::move(names)));
+}
 
 // Ends the parse: exit status 2.
 [[noreturn]] void refuse(const std::string& message);

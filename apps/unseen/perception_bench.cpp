@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <iterator>
 #include <memory>
-#include <numbers>
 #include <random>
 
 #include <glm/geometric.hpp>
@@ -13,10 +12,12 @@
 #include <hard_mesh.h>
 #include <perception/criterion.h>
 #include <render/context.h>
+#include <turning_light.h>
 #include <visibility_map.h>
 
 #include "bench_tools.h"
 #include "canvas.h"
+#include "fold_test.h"
 #include "judged_model.h"
 #include "model_file.h"
 #include "progress_bar.h"
@@ -43,8 +44,6 @@ constexpr Index lit_active = 100'000;         // triangles, under moving lights
 constexpr std::uint64_t random_seed = 20;
 
 const glm::dvec3 directions[] = {{0, 0, 1}, {1, 0, 0}, {1, 1, 1}};
-
-std::string name_of(FoldTest test) { return std::string(perception::fold_test_names[static_cast<std::size_t>(test)]); }
 
 std::string thousands(double triangles) {
     return triangles < 10'000 ? grouped(static_cast<std::uint64_t>(std::llround(triangles))) : rounded(triangles / 1e3, 4) + "k";
@@ -129,8 +128,7 @@ private:
 
 WhatOptions what_of(FoldTest test, const Look& look) {
     WhatOptions what;
-    what.test = test;
-    what.fold_test = name_of(test);
+    what.chosen = ChosenTest{test};
     what.gaze_px = look.gaze_px;
     return what;
 }
@@ -713,37 +711,14 @@ private:
     Result<void> full_tests(JudgedModel& model, FoldTest test) {
         const auto scene = model.scene(test);
         if (!scene) return scene.error();
-        Follower follower;
         const WhatOptions what = what_of(test, {});
-        const auto criterion = follower.criterion_for(**scene, what);
+        const auto criterion = distance_criterion(**scene, what);
         if (!criterion) return criterion.error();
         const Pinned pinned;
-        const double rate = full_tests_per_second((*scene)->tree, **criterion, follower.viewpoint_for(**scene, what, Purpose::mesh), {},
+        const double rate = full_tests_per_second((*scene)->tree, **criterion, viewpoint_of(**scene, what, Purpose::mesh), {},
                                                   options_.quick ? 10 : 60);
         result_.rows.push_back({"full tests from scratch, " + name_of(test), "M/s", model.name() + ", every node, one thread", rate / 1e6, 60, 200, true, 1});
         return {};
-    }
-
-    enum class Lights { directional, point, highlights };
-
-    static vdtree::Lighting lighting_at(const vdtree::VertexTree& tree, Lights kind, double degrees) {
-        const double angle = degrees * std::numbers::pi / 180;
-        const glm::dvec3 direction = glm::normalize(glm::dvec3(std::sin(angle), 0.7, std::cos(angle)));
-        const vdtree::Sphere around = tree.bounding_sphere();
-        vdtree::LightSource light;
-        light.intensity = 0.8;
-        light.direction = direction;
-        if (kind == Lights::point) {
-            light.kind = vdtree::LightSource::Kind::point;
-            light.direction = {0, 0, 1};
-            light.distance = 3 * static_cast<double>(around.radius);
-            light.position = glm::dvec3(around.centre) + light.distance * direction;
-        }
-        vdtree::Lighting lighting;
-        lighting.lights = {light};
-        lighting.ambient = 0.2;
-        if (kind == Lights::highlights) lighting.specular = 0.04;
-        return lighting;
     }
 
     // The light goes around the model by a degree a frame, the eye is still.
@@ -752,13 +727,13 @@ private:
         if (!bounds) return bounds.error();
         const auto shared = std::make_shared<const vdtree::LightBounds>(*bounds);
         const auto wanted = static_cast<Index>(std::min<double>(lit_active, 0.5 * model.triangles()));
-        for (const auto& [kind, name] : {std::pair{Lights::directional, "directional"}, std::pair{Lights::point, "point"},
-                                         std::pair{Lights::highlights, "directional with highlights"}})
+        for (const auto& [kind, name] : {std::pair{TurningLight::directional, "directional"}, std::pair{TurningLight::point, "point"},
+                                         std::pair{TurningLight::highlights, "directional with highlights"}})
             if (auto measured = moving_light(model, shared, wanted, kind, name); !measured) return measured;
         return {};
     }
 
-    Result<void> moving_light(JudgedModel& model, const std::shared_ptr<const vdtree::LightBounds>& bounds, Index wanted, Lights kind, const char* name) {
+    Result<void> moving_light(JudgedModel& model, const std::shared_ptr<const vdtree::LightBounds>& bounds, Index wanted, TurningLight kind, const char* name) {
         const auto scene = model.scene(baseline);
         if (!scene) return scene.error();
         const vdtree::VertexTree& tree = (*scene)->tree;

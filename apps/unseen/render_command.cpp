@@ -1,7 +1,6 @@
 // unseen render: a picture of a cut, for people or for judging.
 #include <filesystem>
 #include <iterator>
-#include <map>
 #include <memory>
 
 #include <perception/image.h>
@@ -10,6 +9,7 @@
 #include "command.h"
 #include "fly_through.h"
 #include "fold_map.h"
+#include "fold_test.h"
 #include "frame_image.h"
 #include "gaze_player.h"
 #include "report.h"
@@ -38,14 +38,11 @@ bool is_for_people(const std::string& file) {
 }
 
 Result<int> run_flight(RenderArguments& a) {
-    auto scene = load_scene(a.model, a.view, a.display);
-    if (!scene) return scene.error();
-    if (const auto ready = settle_fold_test(*scene, a.what); !ready) return ready.error();
     a.flight.pictures = a.out;
     a.flight.json = a.json;
     a.flight.what = a.what;
     a.flight.draw = a.draw;
-    if (auto flown = fly_through(*scene, a.flight); !flown) return flown.error();
+    if (auto flown = fly_through(a.model, a.view, a.display, a.flight); !flown) return flown.error();
     return exit_done;
 }
 
@@ -55,6 +52,8 @@ Result<int> run(RenderArguments& a) {
     if (std::filesystem::equivalent(a.model, a.out, unknown))
         return Error{ErrorCode::invalid_argument,
                      "'" + a.out + "' is the model itself: give the picture another name."};
+    const auto gaze = GazePlayer::create(a.flight.gaze);
+    if (!gaze) return gaze.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     auto scene = load_scene(a.model, a.view, a.display);
@@ -66,8 +65,6 @@ Result<int> run(RenderArguments& a) {
     if (!renderer) return renderer.error();
 
     vdtree::Cut cut(scene->tree);
-    const auto gaze = GazePlayer::create(a.flight.gaze, *scene, 0);
-    if (!gaze) return gaze.error();
     gaze->apply(a.what, *scene, 0);
     const auto simplified = simplify(cut, *scene, a.what, Purpose::picture);
     if (!simplified) return simplified.error();
@@ -116,7 +113,7 @@ void add_path_options(CLI::App& verb, FlyThroughOptions& o) {
     group.add_option("--fps", o.frames_a_second, "With --geomorph, --lights and moving gazes: frames a second of the path (default: 60)")
         ->type_name("N")
         ->check(within(1, 1e6));
-    group.add_flag("!--no-draw", o.draws, "Only cut: draw nothing");
+    group.add_flag_callback("--no-draw", [&o] { o.draws = false; }, "Only cut: draw nothing");
 }
 
 bool is_moving(const GazeOptions& gaze) { return gaze.source == GazeSource::trace || gaze.source == GazeSource::simulated; }
@@ -129,6 +126,9 @@ void check(const RenderArguments& a) {
     if (o.path.empty()) {
         if (a.out.empty()) refuse("-o is required (or --path).");
         if (a.map && !is_for_people(a.out)) refuse("--show draws pictures for people: -o must end in .png.");
+        if (a.map == FoldMap::cost && a.what.mode == Mode::full) refuse("--show cost and --full exclude each other: nothing is folded.");
+        if (a.map == FoldMap::eccentricity && !a.what.gaze_px && o.gaze.source == GazeSource::none)
+            refuse("--show eccentricity needs --gaze: without one all counts as looked at.");
         if (!o.csv.empty() || !o.plot.empty() || o.threshold != 1 || !o.draws || o.geomorph_seconds)
             refuse("--csv, --plot, --threshold, --geomorph and --no-draw need --path.");
         return;
@@ -151,20 +151,15 @@ Command render_command(CLI::App& app) {
     CLI::Option* samples =
         verb->add_option("--samples", a->draw.samples, "Samples a pixel, 1 to 256 (default: 16; for PFM and EXR, which are to be judged: 64; with --path: 1)")
             ->type_name("N")
-            ->check(within(1, 256));
+            ->check(whole(1, 256));
     verb->add_flag("--wireframe", a->draw.wireframe, "Draw the triangles' edges, too");
-    const std::map<std::string, render::Shading> shadings = {{"smooth", render::Shading::smooth},
-                                                             {"flat", render::Shading::flat}};
-    verb->add_option("--shading", a->draw.shading, "smooth (default) or flat")
-        ->type_name("NAME")
-        ->transform(CLI::CheckedTransformer(shadings).description(""));
-    std::map<std::string, FoldMap> maps;
-    for (std::size_t i = 0; i < std::size(fold_map_names); ++i) maps[std::string(fold_map_names[i])] = static_cast<FoldMap>(i);
-    verb->add_option_function<FoldMap>("--show", [a](const FoldMap& map) { a->map = map; },
-                                       "Instead of the model: what its folds cost, or their worst gratings' frequency or contrast, or their eccentricity")
-        ->type_name("NAME")
-        ->transform(CLI::CheckedTransformer(maps).description("cost|frequency|contrast|eccentricity"));
-    verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
+    add_choice<render::Shading, render::Shading>(*verb, "--shading", a->draw.shading, {{"smooth", render::Shading::smooth}, {"flat", render::Shading::flat}},
+                                                 "smooth (default) or flat");
+    std::vector<std::pair<std::string, FoldMap>> maps;
+    for (std::size_t i = 0; i < std::size(fold_map_names); ++i) maps.emplace_back(fold_map_names[i], static_cast<FoldMap>(i));
+    add_choice(*verb, "--show", a->map, std::move(maps),
+               "Instead of the model, of its folds: cost, frequency or contrast (of their worst gratings), or eccentricity");
+    add_json_option(*verb, a->json);
     add_path_options(*verb, a->flight);
     CLI::Option* frames_a_second = verb->get_option("--fps");
     verb->callback([a, samples, frames_a_second] {

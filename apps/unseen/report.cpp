@@ -12,8 +12,9 @@ Result<JsonReport> JsonReport::open(const std::string& name) {
     JsonReport report;
     report.on_stdout_ = name == "-";
     if (name.empty() || report.on_stdout_) return report;
-    auto file = OutputFile::create(name);
+    auto file = vdtree::AtomicFile::create(name);
     if (!file) return file.error();
+    vdtree::AtomicFile::remove_orphans(name);
     report.file_ = std::move(*file);
     return report;
 }

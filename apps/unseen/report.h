@@ -7,7 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include <output_file.h>
+#include <vdtree/atomic_file.h>
 #include <vdtree/result.h>
 #include <vdtree/vertex_tree.h>
 
@@ -32,7 +32,7 @@ public:
 private:
     JsonReport() = default;
     bool on_stdout_ = false;
-    std::optional<OutputFile> file_;
+    std::optional<vdtree::AtomicFile> file_;
     std::string text_;
 };
 

@@ -7,6 +7,7 @@
 
 #include <calibration/display_profile.h>
 #include <calibration/observer_profile.h>
+#include <vdtree/occluders.h>
 
 #include "model_file.h"
 #include "terminal.h"
@@ -48,7 +49,7 @@ Result<void> light(Scene& scene, const ViewOptions& options) {
     if (light == scene.tree.light() && !scene.tree.is_prelit()) return {};
     auto relit = scene.tree.relit(light);
     if (!relit) return relit.error();
-    scene.tree = std::move(*relit);
+    scene.replace_tree(std::move(*relit));
     scene.is_relit = true;
     return {};
 }
@@ -125,8 +126,25 @@ Result<CsfChoice> choose_csf(const std::string& model_or_file) {
 
 const perception::CsfTable* Scene::csf_table(perception::Degrees margin) const {
     if (margin.value() == 0) return &csf_table();
-    if (!widened_tables) widened_tables = std::make_unique<perception::WidenedTables>(csf_table());
-    return widened_tables->at(margin);
+    if (!kept.widened_tables) kept.widened_tables = std::make_unique<perception::WidenedTables>(csf_table());
+    return kept.widened_tables->at(margin);
+}
+
+std::span<const vdtree::Sphere> Scene::inner_spheres() const {
+    if (!kept.inner_spheres) kept.inner_spheres = vdtree::inner_spheres(tree);
+    return *kept.inner_spheres;
+}
+
+const vdtree::CutRings& Scene::cut_rings() const {
+    if (!kept.cut_rings) kept.cut_rings = vdtree::bound_cut_rings(tree);
+    return *kept.cut_rings;
+}
+
+void Scene::replace_tree(vdtree::VertexTree other) {
+    tree = std::move(other);
+    kept.inner_spheres.reset();
+    kept.cut_rings.reset();
+    kept.criterion.reset();
 }
 
 PlacedSphere placed_sphere(const vdtree::VertexTree& tree, const vdtree::Similarity& placement) {
@@ -164,7 +182,10 @@ Result<Surroundings> read_surroundings(const ViewOptions& view, const DisplayOpt
 }
 
 Result<Scene> assemble(vdtree::VertexTree tree, Surroundings around, const ViewOptions& view) {
-    Scene scene{std::move(tree), {}, around.display, std::move(around.csf), {}, around.background, false, {}, {}, {}, {}};
+    Scene scene{std::move(tree)};
+    scene.display = around.display;
+    scene.csf = std::move(around.csf);
+    scene.background = around.background;
     scene.is_texture_left_out = view.texture.is_left_out;
     scene.placement.scale = view.unit_metres;
     if (const auto lit = light(scene, view); !lit) return lit.error();

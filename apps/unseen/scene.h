@@ -4,12 +4,15 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 #include <calibration/light_rig.h>
 #include <perception/csf.h>
 #include <perception/display.h>
 #include <perception/gaze.h>
+#include <vdtree/cut_rings.h>
 #include <vdtree/vertex_tree.h>
 #include <vdtree/view.h>
 
@@ -17,26 +20,43 @@
 
 namespace unseen::app {
 
+struct KeptCriterion; // see fold_test.cpp
+
+// For one thread at a time.
 struct Scene {
-    vdtree::VertexTree tree;
-    vdtree::Similarity placement;
-    perception::Display display;
-    std::optional<perception::CsfTable> csf; // what --csf names; empty: the standard table
-    vdtree::View view;
-    float background = 0;  // relative luminance
-    bool is_relit = false; // the light is not the one that the tree was built for
+    vdtree::VertexTree tree; // changed by replace_tree() only, once the scene is made
+    vdtree::Similarity placement = {};
+    perception::Display display = {};
+    std::optional<perception::CsfTable> csf = {}; // what --csf names; empty: the standard table
+    vdtree::View view = {};
+    float background = 0;             // relative luminance
+    bool is_relit = false;            // the light is not the one that the tree was built for
+    bool is_texture_left_out = false; // --no-texture
 
     // With --lights.
-    std::optional<calibration::LightRig> rig;
-    std::optional<vdtree::Lighting> lighting;                 // as of the view and the time of light_at()
-    std::shared_ptr<const vdtree::LightBounds> light_bounds;
+    std::optional<calibration::LightRig> rig = {};
+    std::optional<vdtree::Lighting> lighting = {}; // as of the view and the time of light_at()
+    std::shared_ptr<const vdtree::LightBounds> light_bounds = {};
     const vdtree::Lighting* lights() const { return lighting ? &*lighting : nullptr; } // to draw with
 
     const perception::CsfTable& csf_table() const { return csf ? *csf : perception::CsfTable::standard(); }
+
+    // Made when they are first asked for, and kept.
     // For gazes that are known to a margin only; null where the margin is so wide that everything may be looked at.
     const perception::CsfTable* csf_table(perception::Degrees margin) const;
-    mutable std::unique_ptr<perception::WidenedTables> widened_tables; // made when they are asked for
-    bool is_texture_left_out = false; // --no-texture
+    std::span<const vdtree::Sphere> inner_spheres() const; // of vdtree::inner_spheres()
+    const vdtree::CutRings& cut_rings() const;
+
+    // Drops what was kept of the tree before.
+    void replace_tree(vdtree::VertexTree other);
+
+    struct Kept {
+        std::unique_ptr<perception::WidenedTables> widened_tables = {};
+        std::optional<std::vector<vdtree::Sphere>> inner_spheres = {};
+        std::optional<vdtree::CutRings> cut_rings = {};
+        std::shared_ptr<const KeptCriterion> criterion = {}; // the last that was asked for
+    };
+    mutable Kept kept = {};
 };
 
 // The display that the options describe; ranges are checked.

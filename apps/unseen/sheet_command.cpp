@@ -1,10 +1,11 @@
 // unseen sheet: what the four kinds of cuts of a model look like, side by side, and how visible they are.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <filesystem>
 #include <limits>
-#include <map>
-#include <optional>
 #include <memory>
+#include <optional>
 
 #include <perception/image.h>
 #include <perception/judge.h>
@@ -13,6 +14,7 @@
 #include "canvas.h"
 #include "command.h"
 #include "fold_map.h"
+#include "fold_test.h"
 #include "frame_image.h"
 #include "report.h"
 #include "simplification.h"
@@ -30,7 +32,7 @@ struct SheetArguments {
     int samples = 64;
     int cell_px = 480;
     bool maps = false;
-    std::optional<FoldTest> test;      // default: as in 'unseen render'
+    std::optional<ChosenTest> test;    // default: as in 'unseen render'
 };
 
 constexpr double default_gaze_degrees = 29; // to the right of the window's centre: well in the periphery
@@ -233,7 +235,7 @@ Result<int> run(const SheetArguments& a) {
     auto scene = load_scene(a.model, a.view, a.display);
     if (!scene) return scene.error();
     WhatOptions what;
-    if (a.test) what.test = *a.test, what.is_fold_test_given = true;
+    what.chosen = a.test;
     if (const auto ready = settle_fold_test(*scene, what); !ready) return ready.error();
     auto context = render::Context::headless();
     if (!context) return context.error();
@@ -265,18 +267,14 @@ Command sheet_command(CLI::App& app) {
         "(default: 29 degrees to the right of the window's centre)");
     verb->add_option("--samples", a->samples, "Samples a pixel, 1 to 256 (default: 64)")
         ->type_name("N")
-        ->check(within(1, 256));
+        ->check(whole(1, 256));
     verb->add_option("--cell", a->cell_px, "The longer side of a picture on the sheet (default: 480)")
         ->type_name("PIXELS")
-        ->check(within(16, 4096));
-    std::map<std::string, FoldTest> tests;
-    for (const FoldTest test : {FoldTest::luebke_hallen, FoldTest::luebke_hallen_safe, FoldTest::error})
-        tests[std::string(perception::fold_test_names[static_cast<std::size_t>(test)])] = test;
-    verb->add_option("--fold-test", a->test, "luebke-hallen, luebke-hallen-safe or error (default: as in 'unseen render')")
-        ->type_name("NAME")
-        ->transform(CLI::CheckedTransformer(tests).description(""));
+        ->check(whole(16, 4096));
+    add_fold_test_option(*verb, a->test, std::array{FoldTest::luebke_hallen, FoldTest::luebke_hallen_safe, FoldTest::error},
+                         "luebke-hallen, luebke-hallen-safe or error (default: as in 'unseen render')");
     verb->add_flag("--maps", a->maps, "Below, in place of the budget: maps of the folds' cost, frequency, contrast and eccentricity");
-    verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
+    add_json_option(*verb, a->json);
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     verb->footer("Examples:\n  unseen sheet bunny.vdt -o bunny.png\n"

@@ -1,32 +1,24 @@
 // From a scene and a wish to a cut, with its statistics and the effects that ran.
 #pragma once
 
+#include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
-#include <perception/criterion.h>
 #include <vdtree/cut.h>
-#include <vdtree/cut_rings.h>
-#include <vdtree/fold_errors.h>
+#include <vdtree/distance_criterion.h>
 #include <vdtree/geomorph.h>
-#include <vdtree/occluders.h>
 
+#include "effects.h"
+#include "fold_test.h"
 #include "report.h"
 #include "scene.h"
 
 namespace unseen::app {
 
-// Something that may or may not have taken part, and the reason in a sentence.
-struct Effect {
-    std::string name;
-    bool on = false;
-    std::string why;
-};
-
 struct Simplification {
     vdtree::Index source_triangles = 0;
-    std::uint64_t dropped = 0;
+    std::uint64_t dropped = 0; // triangles of the mesh
     vdtree::AdjustStats stats;
     double adapt_ms = 0;             // making the cut
     double extract_ms = 0;           // its index buffer
@@ -36,22 +28,8 @@ struct Simplification {
     std::vector<Effect> effects;
 };
 
-// What the picture is for decides what may be left out of it.
-enum class Purpose {
-    picture, // seen from this view only: what is out of the window is folded
-    mesh,    // may be looked at from elsewhere
-};
-
-// Adjusts `cut`, which must be of the scene's tree. Cost: about a microsecond for each node test.
+// Adjusts `cut`, which must be of the scene's tree, by a settled fold test (see fold_test.h). Cost: about a microsecond for each node test.
 Result<Simplification> simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose);
-
-// What folding costs by interior node, as simplify() goes by it. Not in the mode full.
-Result<std::vector<float>> fold_costs(const Scene& scene, const WhatOptions& what, Purpose purpose);
-
-// The default fold test goes by errors, which do not know textures, moving lights or colours: there, and where a very large tree does not hold
-// them, another is taken, and its effect says why. Measures the errors of the tree's folds where they are needed and not there. Fails where a
-// test that was asked for does not know the scene.
-Result<void> settle_fold_test(Scene& scene, WhatOptions& what);
 
 // Keeps a cut at what moving views of a scene ask for. In the modes imperceptible and pixels the cost goes with what changes from
 // one call to the next; the others begin anew each time (full: once).
@@ -73,34 +51,14 @@ public:
     Result<Simplification> follow(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what,
                                   Purpose purpose = Purpose::picture);
 
-    // What follow() looks at: the criterion of `what`, valid until the next call, and where from. Not in the mode full.
-    Result<const vdtree::DistanceCriterion*> criterion_for(const Scene& scene, const WhatOptions& what);
-    vdtree::Viewpoint viewpoint_for(const Scene& scene, const WhatOptions& what, Purpose purpose);
-
 private:
-    // What a criterion depends on, besides the tree, its light and the display.
-    struct Key {
-        FoldTest test = FoldTest::luebke_hallen;
-        double pixels = 0;
-        bool has_gaze = false;
-        double farthest_gaze_px = 0;
-        int width = 0, height = 0;
-        double fov_y_degrees = 0;
-        perception::SceneLuminance scene = {0, 0};
-        bool is_lit = false;
-        const perception::CsfTable* csf = nullptr;
-        bool chroma = false;
-        bool operator==(const Key&) const = default;
-    };
     Result<Simplification> change(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose);
+    vdtree::Viewpoint viewpoint_for(const Scene& scene, const WhatOptions& what, Purpose purpose) const;
     Result<void> glide(const vdtree::Cut& cut, Simplification& result);
 
     double threshold_ = 1;
     float hysteresis_ = 1.1f;
-    Key key_;
-    std::optional<vdtree::DistanceCriterion> criterion_;
-    std::optional<vdtree::CutRings> rings_;    // likewise
-    std::optional<std::vector<vdtree::Sphere>> inner_spheres_; // likewise
+    std::shared_ptr<const vdtree::DistanceCriterion> criterion_; // of the last cut, which refers to it
     std::optional<vdtree::Geomorph> geomorph_;
     double passed_ = 0; // seconds since its last step
 };

@@ -7,6 +7,7 @@
 #include <vdtree/mesh_io.h>
 
 #include "command.h"
+#include "fold_test.h"
 #include "report.h"
 #include "simplification.h"
 #include "terminal.h"
@@ -63,7 +64,7 @@ Command simplify_command(CLI::App& app) {
         ->type_name("OUT.ply|.obj|.glb")
         ->required()
         ->check(ending_in({".ply", ".obj", ".glb"}));
-    verb->add_option("--json", a->json, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
+    add_json_option(*verb, a->json);
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->what);

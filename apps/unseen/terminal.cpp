@@ -17,7 +17,10 @@ void print_to_stderr(std::string_view kind, std::string_view text) {
 
 void print_warning(std::string_view text) { print_to_stderr("warning: ", text); }
 void print_note(std::string_view text) { print_to_stderr("note: ", text); }
-void print_error(std::string_view text) { print_to_stderr("", text); }
+void print_error(std::string_view text) {
+    const bool is_ended = text.ends_with('.') || text.ends_with('?');
+    print_to_stderr("", std::string(text) + (is_ended ? "" : "."));
+}
 
 std::string grouped(std::uint64_t count) {
     const std::string digits = std::to_string(count);

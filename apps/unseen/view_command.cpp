@@ -1,10 +1,9 @@
 // unseen view: a window in which the cut follows the eye.
-#include <map>
 #include <memory>
 
 #include "command.h"
+#include "fold_test.h"
 #include "options.h"
-#include "simplification.h"
 #include "viewer.h"
 
 namespace unseen::app {
@@ -14,17 +13,21 @@ struct ViewArguments {
     std::string model;
     ViewOptions view;
     DisplayOptions display;
+    GazeOptions gaze;
     ViewerOptions viewer;
 };
 
 Result<int> run(ViewArguments& a) {
     if (!a.view.lights.empty() && a.viewer.geomorph_seconds)
         return Error{ErrorCode::invalid_argument, "--geomorph and --lights exclude each other: vertices that glide are not lit."};
+    auto gaze = GazePlayer::create(a.gaze);
+    if (!gaze) return gaze.error();
     auto scene = load_scene(a.model, a.view, a.display);
     if (!scene) return scene.error();
     if (const auto ready = settle_fold_test(*scene, a.viewer.what); !ready) return ready.error();
     a.viewer.has_fixed_field = a.view.fov_degrees.has_value();
-    if (auto ended = run_viewer(*scene, a.viewer); !ended) return ended.error();
+    a.viewer.gaze_follows_pointer = a.gaze.source == GazeSource::mouse;
+    if (auto ended = run_viewer(*scene, std::move(*gaze), a.viewer); !ended) return ended.error();
     return exit_done;
 }
 
@@ -35,22 +38,19 @@ Command view_command(CLI::App& app) {
     CLI::App* verb = app.add_subcommand("view", "Look at a model in a window");
     verb->add_option("TREE", a->model, "A tree, or a mesh")->required()->type_name("TREE.vdt|MESH");
     verb->add_flag("--wireframe", a->viewer.draw.wireframe, "Begin with the triangles' edges");
-    const std::map<std::string, render::Shading> shadings = {{"smooth", render::Shading::smooth},
-                                                             {"flat", render::Shading::flat}};
-    verb->add_option("--shading", a->viewer.draw.shading, "smooth (default) or flat")
-        ->type_name("NAME")
-        ->transform(CLI::CheckedTransformer(shadings).description(""));
+    add_choice<render::Shading, render::Shading>(*verb, "--shading", a->viewer.draw.shading, {{"smooth", render::Shading::smooth}, {"flat", render::Shading::flat}},
+                                                 "smooth (default) or flat");
     verb->add_option("--screenshot", a->viewer.screenshot, "Write a picture when the viewer ends")
         ->type_name("OUT.png")
         ->check(ending_in({".png"}));
     verb->add_option("--frames", a->viewer.frames, "End after so many frames, for scripts")
         ->type_name("N")
-        ->check(within(1, 1e6));
+        ->check(whole(1, 1e6));
     add_geomorph_option(*verb, a->viewer.geomorph_seconds);
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->viewer.what);
-    add_moving_gaze_options(*verb, a->viewer.gaze, true);
+    add_moving_gaze_options(*verb, a->gaze, true);
     verb->footer(std::string(viewer_help) + "\nExamples:\n  unseen view bunny.vdt\n"
                                             "  unseen view bunny.vdt --triangles 5000 --wireframe\n"
                                             "  unseen view dragon.vdt --milliseconds 2 --geomorph 0.25");

@@ -17,7 +17,7 @@
 #include <perception/image.h>
 
 #include "frame_image.h"
-#include "gaze_player.h"
+#include "fold_test.h"
 #include "simplification.h"
 #include "terminal.h"
 
@@ -48,11 +48,10 @@ double milliseconds_since(Clock::time_point start) {
 
 class Viewer {
 public:
-    Viewer(Scene& scene, const ViewerOptions& options, render::Context& context, render::Renderer renderer)
+    Viewer(Scene& scene, GazePlayer gaze, const ViewerOptions& options, render::Context& context, render::Renderer renderer)
         : scene_(scene), options_(options), window_(context.glfw_window()), renderer_(std::move(renderer)),
-          cut_(scene.tree), first_view_(scene.view), what_(options.what), draw_(options.draw) {
+          cut_(scene.tree), first_view_(scene.view), what_(options.what), draw_(options.draw), gaze_follows_pointer_(options.gaze_follows_pointer), gaze_(std::move(gaze)) {
         draw_.background = scene.background;
-        gaze_follows_pointer_ = options.gaze.source == GazeSource::mouse;
         budget_ = what_.mode == Mode::budget ? what_.triangles : std::max(1U, scene.tree.triangle_count() / 4);
         glfwSetWindowUserPointer(window_, this);
         glfwSetCharCallback(window_, [](GLFWwindow* w, unsigned c) { of(w).on_character(c); });
@@ -72,9 +71,7 @@ public:
 
     Result<void> run() {
         constexpr double longest_simulation_s = 3600; // then the eye keeps still
-        auto gaze = GazePlayer::create(options_.gaze, scene_, longest_simulation_s);
-        if (!gaze) return gaze.error();
-        gaze_ = std::move(*gaze);
+        if (auto begun = gaze_.begin(scene_, longest_simulation_s); !begun) return begun;
         if (options_.geomorph_seconds)
             if (auto set = follower_.set_geomorph(scene_, *options_.geomorph_seconds); !set) return set;
         for (int frame = 0; !glfwWindowShouldClose(window_);) {
@@ -136,8 +133,8 @@ private:
     void choose(Mode mode) {
         what_.mode = mode;
         what_.triangles = budget_;
-        if (mode == Mode::imperceptible && !is_perceptual(what_.test))
-            what_.test = scene_.tree.fold_errors().empty() ? FoldTest::luebke_hallen : FoldTest::error;
+        // Nobody waits for errors to be measured here.
+        if (mode == Mode::imperceptible && !is_perceptual(what_.test())) what_.chosen = suitable_test(scene_, what_.chroma, false);
         what_.gaze_px.reset();
         gaze_follows_pointer_ = plays_gaze_ = false;
     }
@@ -206,7 +203,7 @@ private:
         needs_frame_ = false;
         const auto start = Clock::now();
         follower_.let_pass(std::chrono::duration<double>(start - std::exchange(last_frame_, start)).count());
-        if (plays_gaze_) gaze_->apply(what_, scene_, std::chrono::duration<double>(start - first_frame_).count());
+        if (plays_gaze_) gaze_.apply(what_, scene_, std::chrono::duration<double>(start - first_frame_).count());
         if (auto lit = light_at(scene_, std::chrono::duration<double>(start - first_frame_).count()); !lit) return lit;
         draw_.lighting = scene_.lights();
         const auto result = follower_.follow(cut_, scene_, what_);
@@ -217,7 +214,7 @@ private:
         if (!drawn) return drawn;
         glfwSwapBuffers(window_);
         // What the time limit has left to do, and what glides, goes on in the next frame.
-        needs_frame_ = !result->stats.is_complete || result->gliding > 0 || (plays_gaze_ && gaze_->is_moving()) ||
+        needs_frame_ = !result->stats.is_complete || result->gliding > 0 || (plays_gaze_ && gaze_.is_moving()) ||
                        (scene_.rig && scene_.rig->moves());
         show_title(*result, milliseconds_since(start));
         return {};
@@ -238,8 +235,7 @@ private:
                             grouped(s.source_triangles) + " triangles, " + rounded(s.adapt_ms, 2) + " ms to adapt, " +
                             rounded(frame_ms, 2) + " ms a frame";
         if (what_.mode != Mode::full)
-            title += ", " + std::string(perception::fold_test_names[static_cast<std::size_t>(what_.test)]) + ", unseen from " +
-                     rounded(s.imperceptible_from_m, 2) + (std::isfinite(s.imperceptible_from_m) ? " m" : "");
+            title += ", " + name_of(what_.test()) + ", unseen from " + rounded(s.imperceptible_from_m, 2) + (std::isfinite(s.imperceptible_from_m) ? " m" : "");
         if (!s.stats.is_complete) title += ", time is up: to be continued";
         if (s.gliding > 0) title += ", " + grouped(s.gliding) + " vertices glide";
         glfwSetWindowTitle(window_, title.c_str());
@@ -278,8 +274,8 @@ private:
     std::uint32_t budget_ = 1;
     glm::dvec2 pointer_px_ = glm::dvec2(0);
     bool is_dragging_ = false;
-    bool gaze_follows_pointer_ = false;
-    std::optional<GazePlayer> gaze_;
+    bool gaze_follows_pointer_;
+    GazePlayer gaze_;
     bool plays_gaze_ = true; // until a mode is chosen
     Clock::time_point first_frame_ = Clock::now();
     bool needs_frame_ = true;
@@ -290,12 +286,12 @@ private:
 
 } // namespace
 
-Result<void> run_viewer(Scene& scene, const ViewerOptions& options) {
+Result<void> run_viewer(Scene& scene, GazePlayer gaze, const ViewerOptions& options) {
     auto context = render::Context::window({scene.view.width, scene.view.height, "Unseen", true});
     if (!context) return context.error();
     auto renderer = render::Renderer::create(*context, scene.tree);
     if (!renderer) return renderer.error();
-    return Viewer(scene, options, *context, std::move(*renderer)).run();
+    return Viewer(scene, std::move(gaze), options, *context, std::move(*renderer)).run();
 }
 
 } // namespace unseen::app

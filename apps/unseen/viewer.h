@@ -7,13 +7,14 @@
 #include <render/context.h>
 #include <render/renderer.h>
 
+#include "gaze_player.h"
 #include "scene.h"
 
 namespace unseen::app {
 
 struct ViewerOptions {
     WhatOptions what;             // to begin with
-    GazeOptions gaze;             // that what is looked at follows from the first frame on
+    bool gaze_follows_pointer = false;
     bool has_fixed_field = false; // the camera's field was asked for; else it follows the window's height
     render::DrawOptions draw;
     std::string screenshot; // written when the viewer ends
@@ -26,6 +27,6 @@ extern const char* const viewer_help;
 
 // Opens a window of the scene's size and runs until it is closed. On the main thread only. Fails where there is no
 // display.
-Result<void> run_viewer(Scene& scene, const ViewerOptions& options);
+Result<void> run_viewer(Scene& scene, GazePlayer gaze, const ViewerOptions& options);
 
 } // namespace unseen::app

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
@@ -11,7 +10,7 @@
 #include <fstream>
 #include <set>
 
-#include <unistd.h>
+#include <vdtree/atomic_file.h>
 
 namespace unseen::calibration {
 namespace {
@@ -153,13 +152,6 @@ std::string excerpt(const json& value) {
     return text.size() > longest ? text.substr(0, longest).append("...") : text;
 }
 
-// In the same folder, and of no other process or call.
-std::filesystem::path temporary_name(const std::filesystem::path& file) {
-    static std::atomic<unsigned> counter = 0;
-    std::filesystem::path name = file;
-    return name += "." + std::to_string(::getpid()) + "-" + std::to_string(counter++) + ".tmp";
-}
-
 Result<void> write_directly(const std::filesystem::path& file, std::string_view text) {
     errno = 0;
     std::ofstream stream(file, std::ios::binary | std::ios::trunc);
@@ -275,19 +267,10 @@ Result<void> write_text(const std::filesystem::path& file, std::string_view text
     if (std::filesystem::exists(file, ignored) && !std::filesystem::is_regular_file(file, ignored)) {
         return write_directly(file, text);
     }
-    // A link stays a link to the file that is replaced.
-    std::error_code unresolved;
-    std::filesystem::path target = std::filesystem::weakly_canonical(file, unresolved);
-    if (unresolved) target = file;
-
-    const std::filesystem::path temporary = temporary_name(target);
-    std::error_code failure;
-    Result<void> written = write_directly(temporary, text);
-    if (written) std::filesystem::rename(temporary, target, failure);
-    if (written && !failure) return {};
-    std::filesystem::remove(temporary, ignored);
-    if (!written) return written;
-    return file_error(file, ErrorCode::io_failure, "cannot be replaced: " + failure.message());
+    auto whole = vdtree::AtomicFile::create(file);
+    if (!whole) return whole.error();
+    if (auto written = whole->write(text); !written) return written;
+    return whole->commit();
 }
 
 } // namespace unseen::calibration

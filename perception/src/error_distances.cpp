@@ -10,6 +10,7 @@
 #include <perception/criterion.h>
 
 #include "fold_screen.h"
+#include "luminance_classes.h"
 #include "sound_parents.h"
 #include "stage_distances.h"
 
@@ -20,12 +21,12 @@ namespace {
 using vdtree::DistanceCriterion;
 using vdtree::NodeId;
 
-// Contrasts (of a difference over a mean luminance) and luminances in classes.
-constexpr int contrasts_per_octave = 8, least_octave = -10, most_octave = 8; // 2^8: beyond any display's peak over its black
-constexpr int contrast_count = contrasts_per_octave * (most_octave - least_octave) + 1;
-constexpr int luminance_count = 16;
+// Of a difference over a mean luminance, in classes up to 2^8: beyond any display's peak over its black.
+constexpr int contrasts_per_octave = 8;
+constexpr ClassSeries contrasts{contrasts_per_octave, -10, 18};
+constexpr int contrast_count = static_cast<int>(contrasts.count()) - 1; // without no_contrast
 constexpr int no_contrast = -1;
-constexpr double class_edge = 1e-7; // values on a class's edge stay in it; far below a class's width
+constexpr int luminance_count = static_cast<int>(LuminanceClasses::count);
 
 // Where patterns are looked for that a strip may hold: from the lowest frequency that a table must know up to the display's limit.
 constexpr double lowest_cpd = 0.5;
@@ -43,30 +44,21 @@ constexpr float widest = 1e9f;
 
 class Levels {
 public:
-    explicit Levels(const Display& display)
-        : black_(black_level(display).value()), span_(to_luminance(display, 1).value() - black_),
-          lowest_(std::max(black_, (black_ + span_) / 4096)), // where the display is black
-          log2_step_(std::log2((black_ + span_) / lowest_) / (luminance_count - 1)) {}
+    explicit Levels(const Display& display) : luminances_(display) {}
 
-    double in_cdm2(double relative) const { return black_ + span_ * relative; }
-    double difference_in_cdm2(double relative) const { return span_ * relative; }
+    double in_cdm2(double relative) const { return luminances_.in_cdm2(relative); }
+    double difference_in_cdm2(double relative) const { return luminances_.difference_in_cdm2(relative); }
 
-    // Of a contrast, and of a luminance in cd/m2; rounded up.
+    // Of a contrast, and of a luminance in cd/m2.
     int contrast_level(double difference, double base) const {
-        if (!(difference > 0)) return no_contrast;
-        return index(contrasts_per_octave * (std::log2(difference / std::max(base, lowest_)) - least_octave), contrast_count);
+        return static_cast<int>(contrasts.of(difference / std::max(base, luminances_.lowest()))) - 1;
     }
-    int luminance_level(double base) const { return index(std::log2(std::max(base, lowest_) / lowest_) / log2_step_, luminance_count); }
-    static double contrast(int level) {
-        return std::exp2(least_octave + static_cast<double>(level) / contrasts_per_octave) * (1 + 2 * class_edge);
-    }
-    double luminance(int level) const { return lowest_ * std::exp2(log2_step_ * level) * (1 + 2 * class_edge); }
+    int luminance_level(double base) const { return static_cast<int>(luminances_.of(base)); }
+    static double contrast(int level) { return contrasts.value(static_cast<std::size_t>(level + 1)); }
+    double luminance(int level) const { return luminances_.value(static_cast<std::size_t>(level)); }
 
 private:
-    static int index(double x, int count) {
-        return static_cast<int>(std::clamp(std::ceil(x - class_edge), 0.0, static_cast<double>(count - 1)));
-    }
-    double black_, span_, lowest_, log2_step_;
+    LuminanceClasses luminances_;
 };
 
 // What a node's fold shows, as far as that decides from where it can be seen: levels of contrast at widths relative to the node's.

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <unordered_map>
@@ -15,27 +14,9 @@
 #include <vdtree/chroma.h>
 #include <vdtree/vertex_tree.h>
 
+#include "luminance_classes.h"
+
 namespace unseen::perception {
-
-// A series of classes: none, then values in equal steps of their logarithm from 2^least on. Values are rounded up, and what is no number is the
-// largest.
-struct ClassSeries {
-    int per_octave, least_octave, octaves;
-
-    constexpr std::size_t count() const { return static_cast<std::size_t>(per_octave * octaves) + 2; }
-    std::size_t of(double value) const {
-        if (value <= 0) return 0;
-        const double steps = std::ceil(per_octave * (std::log2(value) - least_octave) - edge);
-        const double last = static_cast<double>(count() - 1);
-        return steps + 1 <= last ? static_cast<std::size_t>(std::max(steps + 1, 1.0)) : count() - 1;
-    }
-    double value(std::size_t index) const {
-        if (index == 0) return 0;
-        return std::exp2(static_cast<double>(index - 1) / per_octave + least_octave) * (1 + 2 * edge);
-    }
-    // Values on a class's edge stay in it; far below a class's width.
-    static constexpr double edge = 1e-7;
-};
 
 inline constexpr ClassSeries contrasts{12, -9, 9}; // Michelson's
 inline constexpr ClassSeries shifts{3, -9, 10};    // of the mean over the middle of the range
@@ -46,22 +27,20 @@ inline constexpr ClassSeries chroma_shifts{1, -13, 18};
 inline constexpr ClassSeries texture_contrasts{4, -9, 9};
 inline constexpr ClassSeries texture_motions{1, -16, 16};
 
-inline constexpr std::size_t luminance_count = 16;
-
 struct Level {
     std::size_t contrast = 0, luminance = 0, shift = 0; // classes
     std::array<std::size_t, 2> chroma{}, chroma_shift{}; // red-green and yellow-violet
     std::size_t texture = 0, texture_motion = 0;         // both, or neither
 
     bool is_nothing() const { return contrast == 0 && chroma[0] == 0 && chroma[1] == 0 && texture == 0; }
-    std::size_t grey_number() const { return (shift * luminance_count + luminance) * contrasts.count() + contrast; }
+    std::size_t grey_number() const { return (shift * LuminanceClasses::count + luminance) * contrasts.count() + contrast; }
     std::uint64_t number() const {
         std::uint64_t number = texture * texture_motions.count() + texture_motion;
         for (std::size_t i = 0; i < 2; ++i)
             number = (number * chroma_shifts.count() + chroma_shift[i]) * chroma_contrasts.count() + chroma[i];
         return number * grey_count + grey_number();
     }
-    static constexpr std::size_t grey_count = shifts.count() * luminance_count * contrasts.count();
+    static constexpr std::size_t grey_count = shifts.count() * LuminanceClasses::count * contrasts.count();
 };
 
 // What a node's ring may show, before it is put into classes.
@@ -74,18 +53,14 @@ struct RingLooks {
     double least_contrast = 0; // the range counts as one of this contrast at least
 };
 
-// The display's luminances and the classes that they fall into.
+// What rings look like on a display, in classes.
 class Classes {
 public:
-    explicit Classes(const Display& display)
-        : black_(black_level(display).value()), span_(to_luminance(display, 1).value() - black_),
-          log2_step_(std::log2((black_ + span_) / lowest()) / (luminance_count - 1)) {}
+    explicit Classes(const Display& display) : luminances_(display) {}
 
     Level level(const RingLooks& looks) const {
         const bool moves_texture = looks.texture > 0 && looks.texture_motion > 0;
-        const double lo = in_cdm2(looks.range.lo), hi = in_cdm2(looks.range.hi);
-        const double l = std::ceil(std::log2(std::max(in_cdm2(looks.adaptation), lowest()) / lowest()) / log2_step_ - ClassSeries::edge);
-        return {contrasts.of(std::max((hi - lo) / (hi + lo), looks.least_contrast)), static_cast<std::size_t>(std::clamp(l, 0.0, static_cast<double>(luminance_count - 1))),
+        return {contrasts.of(std::max(contrast(looks.range), looks.least_contrast)), luminances_.of(luminances_.in_cdm2(looks.adaptation)),
                 shifts.of(looks.shift), {chroma_contrasts.of(looks.chroma.x), chroma_contrasts.of(looks.chroma.y)},
                 {chroma_shifts.of(looks.chroma_shift.x), chroma_shifts.of(looks.chroma_shift.y)},
                 moves_texture ? texture_contrasts.of(looks.texture) : 0, moves_texture ? texture_motions.of(looks.texture_motion) : 0};
@@ -98,16 +73,15 @@ public:
     }
     // Michelson's.
     double contrast(vdtree::LuminanceRange range) const {
-        const double lo = in_cdm2(range.lo), hi = in_cdm2(range.hi);
+        const double lo = luminances_.in_cdm2(range.lo), hi = luminances_.in_cdm2(range.hi);
         return (hi - lo) / (hi + lo);
     }
-    double luminance(std::size_t luminance_class) const {
-        return lowest() * std::exp2(log2_step_ * static_cast<double>(luminance_class)) * (1 + 2 * ClassSeries::edge);
-    }
+    double luminance(std::size_t luminance_class) const { return luminances_.value(luminance_class); }
 
     // Of a difference in relative luminance against the middle of a range.
     double contrast(double difference, vdtree::LuminanceRange range) const {
-        return span_ * difference / std::max((in_cdm2(range.lo) + in_cdm2(range.hi)) / 2, lowest());
+        const double middle = (luminances_.in_cdm2(range.lo) + luminances_.in_cdm2(range.hi)) / 2;
+        return luminances_.difference_in_cdm2(difference) / std::max(middle, luminances_.lowest());
     }
     // Of differences in both directions of colour.
     glm::dvec2 chroma_contrast(glm::dvec2 difference, vdtree::LuminanceRange range) const {
@@ -117,11 +91,7 @@ public:
     }
 
 private:
-    double in_cdm2(double relative) const { return black_ + span_ * relative; }
-    // Where the display is black: a four-thousandth of its peak, in place of 0.
-    double lowest() const { return std::max(black_, (black_ + span_) / 4096); }
-
-    double black_, span_, log2_step_;
+    LuminanceClasses luminances_;
 };
 
 // Gives the classes in use their rows of the table, row 0 to what changes nothing. Where they are too many for the rows' numbers, all classes are

@@ -14,6 +14,7 @@
 #include <glm/vec3.hpp>
 
 #include <perception/random.h>
+#include <vdtree/atomic_file.h>
 
 namespace unseen::perception {
 namespace {
@@ -184,24 +185,12 @@ Result<GazeTrace> read_gaze_trace(const std::filesystem::path& file) {
 }
 
 Result<void> write_gaze_trace(const std::filesystem::path& file, const GazeTrace& trace) {
-    const std::filesystem::path temporary = file.string() + ".tmp";
-    {
-        std::ofstream stream(temporary, std::ios::binary | std::ios::trunc);
-        stream << "time_s,x_px,y_px\n";
-        for (const GazeSample& s : trace.samples()) stream << number(s.time_s) << ',' << number(s.px.x) << ',' << number(s.px.y) << '\n';
-        stream.close();
-        if (!stream) {
-            std::error_code ignored;
-            std::filesystem::remove(temporary, ignored);
-            return Error{ErrorCode::io_failure, file.string() + ": cannot be written."};
-        }
-    }
-    std::error_code failed;
-    std::filesystem::rename(temporary, file, failed);
-    if (!failed) return {};
-    std::error_code ignored;
-    std::filesystem::remove(temporary, ignored);
-    return Error{ErrorCode::io_failure, file.string() + ": cannot be replaced: " + failed.message()};
+    std::string text = "time_s,x_px,y_px\n";
+    for (const GazeSample& s : trace.samples()) text += number(s.time_s) + "," + number(s.px.x) + "," + number(s.px.y) + "\n";
+    auto whole = vdtree::AtomicFile::create(file);
+    if (!whole) return whole.error();
+    if (auto written = whole->write(text); !written) return written;
+    return whole->commit();
 }
 
 Result<GazeTrace> simulate_gaze(const SimulatedGaze& o, const Display& display) {

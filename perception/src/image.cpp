@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <bit>
 #include <charconv>
 #include <cmath>
@@ -15,12 +14,11 @@
 #include <fstream>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <system_error>
 #include <utility>
-
-#include <unistd.h>
 
 #include <Iex.h>
 #include <ImfArray.h>
@@ -31,6 +29,8 @@
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
 #include <png.h>
+
+#include <vdtree/atomic_file.h>
 
 namespace unseen::perception {
 namespace {
@@ -642,28 +642,11 @@ Result<Bytes> encode_exr(const std::filesystem::path& file, const Image& image) 
 
 // ---- writing ------------------------------------------------------------------------------------------------------
 
-// To a temporary name in the same folder, then renamed: readers see the old file or the new one, never a part.
 Result<void> write_bytes(const std::filesystem::path& file, const Bytes& bytes) {
-    static std::atomic<unsigned> counter{0};
-    std::filesystem::path temporary = file;
-    temporary += ".part-" + std::to_string(::getpid()) + "-" + std::to_string(counter++);
-    std::error_code code;
-    {
-        std::ofstream stream(temporary, std::ios::binary | std::ios::trunc);
-        stream.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-        stream.close();
-        if (!stream) {
-            std::filesystem::remove(temporary, code);
-            return io_error(file, "cannot be written; check that the folder exists and has space");
-        }
-    }
-    std::filesystem::rename(temporary, file, code);
-    if (code) {
-        const std::string reason = code.message();
-        std::filesystem::remove(temporary, code);
-        return io_error(file, "cannot be replaced: " + reason);
-    }
-    return {};
+    auto whole = vdtree::AtomicFile::create(file);
+    if (!whole) return whole.error();
+    if (auto written = whole->write(std::as_bytes(std::span(bytes))); !written) return written;
+    return whole->commit();
 }
 
 Result<Bytes> encode(const std::filesystem::path& file, const Image& image) {

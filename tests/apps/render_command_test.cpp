@@ -175,6 +175,10 @@ TEST_F(RenderCommandTest, BadGazesAreRefused) {
     EXPECT_THAT(gap.err, IsAnErrorForPeople());
     EXPECT_THAT(gap.err, HasSubstr("gap.csv: line 3"));
     EXPECT_EQ(with({"--gaze-trace", "missing.csv"}).status, 1);
+    // What is quickly read is told before the model is read and measured.
+    EXPECT_THAT(run({"render", "missing.vdt", "--path", "missing.csv"}).err, HasSubstr("missing.csv"));
+    EXPECT_THAT(run({"render", "missing.vdt", "--path", "orbit:1", "--gaze-trace", "missing.csv"}).err, HasSubstr("missing.csv"));
+    EXPECT_THAT(run({"view", "missing.vdt", "--gaze-trace", "missing.csv"}).err, HasSubstr("missing.csv"));
     for (const std::vector<std::string>& more : std::vector<std::vector<std::string>>{
              {"--gaze-mode", "nobody"}, {"--gaze-mode", "mouse"}, {"--gaze-error", "-1"}, {"--gaze-error", "nan"}, {"--gaze-latency", "1e9"},
              {"--gaze-mode", "head", "--gaze-trace", "gap.csv"}, {"--gaze", "1", "2", "--gaze-mode", "head"}})
@@ -331,8 +335,8 @@ TEST_F(RenderCommandTest, MapsShowWhatFoldsCost) {
     const std::vector<std::string> aside = {"--gaze", "1191", "80"};
     for (const std::string map : {"cost", "frequency", "contrast", "eccentricity"}) EXPECT_GT(share_of_colour(map, aside), 0.05) << map;
     EXPECT_GT(share_of_colour("cost", aside), share_of_colour("cost", {})) << "more is folded in the corner of the eye";
-    EXPECT_EQ(run({"render", "ball.vdt", "-o", "map.png", "--show", "eccentricity"}).status, 1) << "of which gaze?";
-    EXPECT_EQ(run({"render", "ball.vdt", "-o", "map.png", "--show", "cost", "--full"}).status, 1);
+    EXPECT_EQ(run({"render", "ball.vdt", "-o", "map.png", "--show", "eccentricity"}).status, 2) << "of which gaze?";
+    EXPECT_EQ(run({"render", "ball.vdt", "-o", "map.png", "--show", "cost", "--full"}).status, 2);
     EXPECT_FALSE(fs::exists(path("map.png")));
     EXPECT_EQ(run({"render", "ball.vdt", "-o", "map.pfm", "--show", "cost"}).status, 2) << "no luminance";
     EXPECT_EQ(run({"render", "ball.vdt", "-o", "map.png", "--show", "beauty"}).status, 2);

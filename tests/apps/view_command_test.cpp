@@ -133,6 +133,15 @@ TEST_F(ViewCommandTest, GlidesComeToRestByThemselves) {
     EXPECT_EQ(ended(), 0) << errors();
 }
 
+TEST_F(ViewCommandTest, FoldingCanBeginAtTheFullModel) {
+    if (!open({"--full"})) GTEST_SKIP() << "no window: " << errors();
+    window().title_with("full");
+    window().press(XK_2);
+    EXPECT_THAT(window().title_with("imperceptible"), HasSubstr("luebke-hallen")) << "nobody waits for errors to be measured";
+    window().press(XK_q);
+    EXPECT_EQ(ended(), 0) << errors();
+}
+
 TEST_F(ViewCommandTest, ResetGoesBackToTheFirstView) {
     if (!open({"--screenshot", "reset.png"})) GTEST_SKIP() << "no window: " << errors();
     window().title_with("imperceptible"); // a budget's cut depends on the way, within its hysteresis

@@ -5,45 +5,22 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <numbers>
-
-#include <glm/geometric.hpp>
 
 #include <perception/criterion.h>
 #include <vdtree/cut.h>
 
 #include "bench_mesh.h"
+#include "turning_light.h"
 
 namespace unseen::bench {
 namespace {
 
+using app::lighting_at;
+using app::TurningLight;
 using vdtree::Cut;
-using vdtree::LightSource;
-
-enum class Lights { directional, point, highlights };
-
-vdtree::Lighting lighting_at(Lights kind, double degrees) {
-    const double angle = degrees * std::numbers::pi / 180;
-    const glm::dvec3 direction = glm::normalize(glm::dvec3(std::sin(angle), 0.7, std::cos(angle)));
-    const vdtree::Sphere around = tree().bounding_sphere();
-    LightSource light;
-    light.intensity = 0.8;
-    light.direction = direction;
-    if (kind == Lights::point) {
-        light.kind = LightSource::Kind::point;
-        light.direction = {0, 0, 1};
-        light.distance = 3 * static_cast<double>(around.radius);
-        light.position = glm::dvec3(around.centre) + light.distance * direction;
-    }
-    vdtree::Lighting lighting;
-    lighting.lights = {light};
-    lighting.ambient = 0.2;
-    if (kind == Lights::highlights) lighting.specular = 0.04;
-    return lighting;
-}
 
 struct Subject {
-    explicit Subject(Lights kind_)
+    explicit Subject(TurningLight kind_)
         : kind(kind_), bounds(std::make_shared<vdtree::LightBounds>(*vdtree::LightBounds::measure(tree()))), criterion(make()) {
         const double wanted = std::min(1e5, 0.5 * tree().triangle_count());
         Cut cut(tree());
@@ -55,13 +32,13 @@ struct Subject {
     }
     vdtree::AdjustStats follow(Cut& cut, double degrees) const {
         vdtree::Viewpoint viewpoint = perception::viewpoint_of(tree(), orbit(0), {}, {}, false);
-        viewpoint.lighting = lighting_at(kind, degrees);
+        viewpoint.lighting = lighting_at(tree(), kind, degrees);
         vdtree::FollowOptions following;
         following.threshold = threshold;
         return *cut.follow(criterion, viewpoint, following);
     }
 
-    Lights kind;
+    TurningLight kind;
     std::shared_ptr<const vdtree::LightBounds> bounds;
     vdtree::DistanceCriterion criterion;
     float threshold = 1;
@@ -70,17 +47,17 @@ private:
     vdtree::DistanceCriterion make() const {
         perception::FoldTestOptions options;
         const glm::dvec3 eye = perception::viewpoint_of(tree(), orbit(0), {}).eye;
-        options.scene = perception::lit_scene(tree(), *bounds, lighting_at(kind, 0), eye, 0.2f);
+        options.scene = perception::lit_scene(tree(), *bounds, lighting_at(tree(), kind, 0), eye, 0.2f);
         return *perception::lit_distances(tree(), bounds, orbit(0), options);
     }
 };
 
-const Subject& subject(Lights kind) {
-    static const Subject directional(Lights::directional), point(Lights::point), highlights(Lights::highlights);
-    return kind == Lights::directional ? directional : kind == Lights::point ? point : highlights;
+const Subject& subject(TurningLight kind) {
+    static const Subject directional(TurningLight::directional), point(TurningLight::point), highlights(TurningLight::highlights);
+    return kind == TurningLight::directional ? directional : kind == TurningLight::point ? point : highlights;
 }
 
-void moving_light(benchmark::State& state, Lights kind) {
+void moving_light(benchmark::State& state, TurningLight kind) {
     const Subject& s = subject(kind);
     Cut cut(tree());
     double degrees = 0, changes = 0, tests = 0, triangles = 0;
@@ -99,9 +76,9 @@ void moving_light(benchmark::State& state, Lights kind) {
     state.counters["tests"] = benchmark::Counter(tests, benchmark::Counter::kAvgIterations);
     state.counters["triangles"] = triangles;
 }
-BENCHMARK_CAPTURE(moving_light, directional, Lights::directional)->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
-BENCHMARK_CAPTURE(moving_light, point, Lights::point)->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
-BENCHMARK_CAPTURE(moving_light, highlights, Lights::highlights)->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(moving_light, directional, TurningLight::directional)->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(moving_light, point, TurningLight::point)->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(moving_light, highlights, TurningLight::highlights)->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
 
 void light_bounds(benchmark::State& state) {
     for (auto _ : state) benchmark::DoNotOptimize(vdtree::LightBounds::measure(tree()));

@@ -7,6 +7,7 @@
 
 #include <vdtree/builder.h>
 #include <vdtree/cut.h>
+#include <vdtree/fold_errors.h>
 
 namespace unseen::perception {
 namespace {
@@ -61,9 +62,17 @@ Halves inner_triangles(const Cut& cut) {
     return count;
 }
 
-enum class Form { at_once, in_distances, safe };
+enum class Form { at_once, in_distances, safe, by_errors };
 
-Halves halves_of(const VertexTree& tree, Form form) {
+Result<vdtree::DistanceCriterion> criterion_of(const VertexTree& tree, const View& view, const FoldTestOptions& options, Form form) {
+    if (form == Form::by_errors) return error_distances(tree, view, options);
+    if (form == Form::safe) return luebke_hallen_safe_distances(tree, vdtree::bound_cut_rings(tree), view, options);
+    return luebke_hallen_distances(tree, view, options);
+}
+
+Halves halves_of(const VertexTree& given, Form form) {
+    const auto measured = vdtree::with_fold_errors(given);
+    const VertexTree& tree = form == Form::by_errors ? *measured : given;
     View view;
     view.width = view.height = 256;
     view.eye = {0, 0, 1968.5 / 4}; // a unit is four pixels
@@ -74,9 +83,7 @@ Halves halves_of(const VertexTree& tree, Form form) {
     if (form == Form::at_once) {
         cut.adjust(LuebkeHallenCriterion(tree, view, options));
     } else {
-        const auto criterion = form == Form::in_distances
-                                   ? luebke_hallen_distances(tree, view, options)
-                                   : luebke_hallen_safe_distances(tree, vdtree::bound_cut_rings(tree), view, options);
+        const auto criterion = criterion_of(tree, view, options, form);
         if (!criterion) throw std::runtime_error(criterion.error().message);
         EXPECT_TRUE(criterion->is_monotone());
         EXPECT_TRUE(cut.follow(*criterion, viewpoint_of(tree, view, options, {}, false)));
@@ -85,7 +92,7 @@ Halves halves_of(const VertexTree& tree, Form form) {
 }
 
 class Translucency : public testing::TestWithParam<Form> {};
-INSTANTIATE_TEST_SUITE_P(Forms, Translucency, testing::Values(Form::at_once, Form::in_distances, Form::safe));
+INSTANTIATE_TEST_SUITE_P(Forms, Translucency, testing::Values(Form::at_once, Form::in_distances, Form::safe, Form::by_errors));
 
 TEST_P(Translucency, KeepsWhatTheSceneMayShowThrough) {
     const VertexTree tree = square(0.5f);

@@ -1,5 +1,4 @@
-// The oracle of the fold tests: whole and simplified models, drawn with many samples and compared by a judge that knows nothing of
-// trees, under one model of contrast sensitivity and another.
+// What the fold tests call invisible, under the oracle's eyes.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -12,27 +11,20 @@
 #include <perception/judge.h>
 #include <render/context.h>
 #include <render/renderer.h>
-#include <vdtree/builder.h>
 #include <vdtree/fold_errors.h>
 
+#include "built.h"
+#include "oracle.h"
 #include "shapes.h"
 
 namespace unseen {
 namespace {
 
+using support::built;
 using vdtree::Cut;
 using vdtree::Mesh;
 using vdtree::VertexTree;
 using vdtree::View;
-
-constexpr int window_px = 320;
-constexpr float background = 0.2f; // relative luminance
-
-VertexTree built(const Mesh& mesh) {
-    Result<VertexTree> tree = vdtree::build_tree(mesh.view());
-    if (!tree) throw std::runtime_error(tree.error().message);
-    return std::move(*tree);
-}
 
 VertexTree measured(const Mesh& mesh) {
     Result<VertexTree> tree = vdtree::with_fold_errors(built(mesh));
@@ -67,55 +59,28 @@ const Case cases[] = {
     {"open", [] { return shapes::grid(40); }},
 };
 
-class FoldOracle : public testing::TestWithParam<Case> {
+class FoldOracleRuns : public testing::TestWithParam<Case> {
 protected:
-    perception::Image draw(render::Renderer& renderer, const Cut& cut, const View& view) const {
-        render::DrawOptions options;
-        options.samples = 64;
-        options.background = background;
-        const auto frame = renderer.draw(cut, view, options);
-        if (!frame) throw std::runtime_error(frame.error().message);
-        perception::Image image{frame->width, frame->height, 1, frame->luminance};
-        for (float& value : image.values) value = static_cast<float>(perception::to_luminance(display_, static_cast<double>(value)).value());
-        return image;
-    }
-    perception::Display display_;
-};
-class FoldOracleRuns : public FoldOracle {
-protected:
-    // Draws six views whole and simplified, near and far, looked at and aside, and has each judged under two models of sensitivity.
     template <class MakeCriterion, class Check>
     void run(const VertexTree& tree, MakeCriterion&& make_criterion, Check&& check) const {
         auto context = render::Context::headless();
         ASSERT_TRUE(context) << context.error().message;
         auto renderer = render::Renderer::create(*context, tree);
         ASSERT_TRUE(renderer) << renderer.error().message;
-        const vdtree::Sphere sphere = tree.bounding_sphere();
-        const vdtree::LuminanceRange range = tree.luminance_range();
-        for (int trial = 0; trial < 6; ++trial) {
-            View view;
-            view.width = view.height = window_px;
-            view.fov_y_degrees = perception::physical_field(display_, window_px).value();
-            const glm::dvec3 direction(std::sin(1.7 * trial), std::cos(2.9 * trial), std::cos(1.1 * trial));
-            view = vdtree::frame_sphere(tree.origin() + glm::dvec3(sphere.centre), sphere.radius, direction, trial % 3 == 2 ? 0.15 : 0.85, view);
-            perception::FoldTestOptions options;
-            options.display = display_;
-            options.scene = {std::min(range.lo, background), std::max(range.hi, background)};
-            if (trial % 2) options.gaze_px = glm::dvec2(window_px * 0.5 + 1100, window_px * 0.5);
-            const auto criterion = make_criterion(view, options);
+        for (const oracle::Look& look : oracle::looks_at(tree)) {
+            const auto criterion = make_criterion(look.view, look.options);
             ASSERT_TRUE(criterion) << criterion.error().message;
             EXPECT_TRUE(criterion->is_monotone());
             Cut whole(tree), cut(tree);
             whole.unfold_all();
             const bool is_closed = tree.closedness() != vdtree::Closedness::open;
-            ASSERT_TRUE(cut.follow(*criterion, perception::viewpoint_of(tree, view, options), {.cull_back_faces = is_closed}));
-            const perception::Image before = draw(*renderer, whole, view), after = draw(*renderer, cut, view);
-            for (const perception::CsfModel model : {perception::CsfModel::castle, perception::CsfModel::stela}) {
-                const auto judged = perception::judge_modern(before, after, {.display = display_, .gaze_px = options.gaze_px, .csf = model});
-                ASSERT_TRUE(judged) << judged.error().message;
-                SCOPED_TRACE("view " + std::to_string(trial) + ", " + std::to_string(cut.triangle_count()) + " of " +
-                             std::to_string(tree.triangle_count()) + " triangles, largest V " + std::to_string(judged->max_ratio));
-                check(*judged);
+            ASSERT_TRUE(cut.follow(*criterion, perception::viewpoint_of(tree, look.view, look.options), {.cull_back_faces = is_closed}));
+            const perception::Image before = oracle::draw(*renderer, whole, look.view), after = oracle::draw(*renderer, cut, look.view);
+            for (const perception::CsfModel model : oracle::judges) {
+                const perception::Judgement judged = oracle::judge(before, after, look, model);
+                SCOPED_TRACE("from " + oracle::words(look) + ", " + std::to_string(cut.triangle_count()) + " of " +
+                             std::to_string(tree.triangle_count()) + " triangles, largest V " + std::to_string(judged.max_ratio));
+                check(judged);
             }
         }
     }

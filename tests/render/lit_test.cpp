@@ -11,13 +11,15 @@
 #include <perception/judge.h>
 #include <render/context.h>
 #include <render/renderer.h>
-#include <vdtree/builder.h>
 
+#include "built.h"
+#include "oracle.h"
 #include "shapes.h"
 
 namespace unseen {
 namespace {
 
+using support::built;
 using vdtree::Cut;
 using vdtree::Lighting;
 using vdtree::LightSource;
@@ -25,12 +27,6 @@ using vdtree::Mesh;
 using vdtree::VertexTree;
 using vdtree::View;
 using Kind = LightSource::Kind;
-
-VertexTree built(const Mesh& mesh) {
-    Result<VertexTree> tree = vdtree::build_tree(mesh.view());
-    if (!tree) throw std::runtime_error(tree.error().message);
-    return std::move(*tree);
-}
 
 struct Lights {
     const char* name;
@@ -74,7 +70,6 @@ protected:
     }
     Lights lights() const { return all_lights()[GetParam()]; }
     std::unique_ptr<render::Context> context_;
-    perception::Display display_;
 };
 
 // A large triangle a pixel: what is drawn in its corner is its vertex.
@@ -112,49 +107,28 @@ TEST_P(Lit, VerticesAreAsBrightAsTheFormulaSays) {
 }
 
 TEST_P(Lit, SimplificationsCannotBeToldFromTheWhole) {
-    constexpr int window_px = 256;
-    constexpr float background = 0.2f;
     const Lighting lighting = lights().lighting;
     for (const Mesh& mesh : {shapes::bumpy_sphere(5, 0.0005), shapes::torus(120, 60, 0.8, 0.3)}) {
         const VertexTree tree = built(mesh);
         const auto bounds = std::make_shared<vdtree::LightBounds>(*vdtree::LightBounds::measure(tree));
         auto renderer = render::Renderer::create(*context_, tree);
         ASSERT_TRUE(renderer) << renderer.error().message;
-        const vdtree::Sphere sphere = tree.bounding_sphere();
         double kept = 0, all = 0;
-        for (int trial = 0; trial < 3; ++trial) {
-            View view;
-            view.width = view.height = window_px;
-            view.fov_y_degrees = perception::physical_field(display_, window_px).value();
-            const glm::dvec3 direction(std::sin(1.7 * trial), std::cos(2.9 * trial), std::cos(1.1 * trial));
-            view = vdtree::frame_sphere(tree.origin() + glm::dvec3(sphere.centre), sphere.radius, direction, trial % 3 == 2 ? 0.3 : 0.85, view);
-            perception::FoldTestOptions options;
-            options.display = display_;
-            if (trial % 2) options.gaze_px = glm::dvec2(window_px * 0.5 + 1100, window_px * 0.5);
-            vdtree::Viewpoint viewpoint = perception::viewpoint_of(tree, view, options);
+        for (oracle::Look look : oracle::looks_at(tree, {.window_px = 256, .count = 3, .far_fill = 0.3})) {
+            vdtree::Viewpoint viewpoint = perception::viewpoint_of(tree, look.view, look.options);
             viewpoint.lighting = lighting;
-            options.scene = perception::lit_scene(tree, *bounds, lighting, viewpoint.eye, background);
-            const auto criterion = perception::lit_distances(tree, bounds, view, options);
+            look.options.scene = perception::lit_scene(tree, *bounds, lighting, viewpoint.eye, oracle::background);
+            const auto criterion = perception::lit_distances(tree, bounds, look.view, look.options);
             ASSERT_TRUE(criterion) << criterion.error().message;
             Cut whole(tree), cut(tree);
             whole.unfold_all();
             ASSERT_TRUE(cut.follow(*criterion, viewpoint));
             kept += cut.triangle_count();
             all += whole.triangle_count();
-            const auto draw = [&](const Cut& of) {
-                render::DrawOptions drawing;
-                drawing.samples = 36;
-                drawing.background = background;
-                drawing.lighting = &lighting;
-                const auto frame = renderer->draw(of, view, drawing);
-                if (!frame) throw std::runtime_error(frame.error().message);
-                perception::Image image{frame->width, frame->height, 1, frame->luminance};
-                for (float& value : image.values) value = static_cast<float>(perception::to_luminance(display_, static_cast<double>(value)).value());
-                return image;
-            };
-            const auto judged = perception::judge_modern(draw(whole), draw(cut), {.display = display_, .gaze_px = options.gaze_px});
-            ASSERT_TRUE(judged) << judged.error().message;
-            EXPECT_EQ(judged->visible_pixels, 0) << lights().name << ", view " << trial << ", " << cut.triangle_count() << " of " << whole.triangle_count();
+            const auto draw = [&](const Cut& of) { return oracle::draw(*renderer, of, look.view, 36, &lighting); };
+            const perception::Judgement judged = oracle::judge(draw(whole), draw(cut), look, perception::CsfModel::castle);
+            EXPECT_EQ(judged.visible_pixels, 0) << lights().name << ", from " << oracle::words(look) << ", " << cut.triangle_count() << " of "
+                                                << whole.triangle_count();
         }
         EXPECT_LT(kept, 0.9 * all);
     }

@@ -10,15 +10,16 @@
 
 #include <render/context.h>
 #include <render/renderer.h>
-#include <vdtree/builder.h>
 #include <vdtree/geomorph.h>
 
+#include "built.h"
 #include "shapes.h"
 #include "textures.h"
 
 namespace unseen {
 namespace {
 
+using support::built;
 using vdtree::Cut;
 using vdtree::Mesh;
 using vdtree::Texture;
@@ -27,12 +28,6 @@ using vdtree::View;
 
 constexpr glm::dvec3 rec709(0.2126, 0.7152, 0.0722);
 constexpr double code_step = 3e-4; // of linear light: the rounding of half floats and of filters
-
-VertexTree built(const Mesh& mesh) {
-    Result<VertexTree> tree = vdtree::build_tree(mesh.view());
-    if (!tree) throw std::runtime_error(tree.error().message);
-    return std::move(*tree);
-}
 
 Texture four_colours() {
     Texture texture{2, 2, {}, {}, {}};

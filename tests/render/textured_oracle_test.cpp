@@ -1,5 +1,4 @@
-// The oracle of the fold tests on textured models: drawn whole and simplified with many samples, and judged under one model of contrast
-// sensitivity and another.
+// What the fold tests call invisible on textured models, under the oracle's eyes.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -12,14 +11,16 @@
 #include <perception/judge.h>
 #include <render/context.h>
 #include <render/renderer.h>
-#include <vdtree/builder.h>
 
+#include "built.h"
+#include "oracle.h"
 #include "shapes.h"
 #include "textures.h"
 
 namespace unseen {
 namespace {
 
+using support::built;
 using vdtree::Cut;
 using vdtree::Mesh;
 using vdtree::Texture;
@@ -27,14 +28,6 @@ using vdtree::VertexTree;
 using vdtree::View;
 
 constexpr int window_px = 256;
-constexpr int samples = 64;
-constexpr float background = 0.2f; // relative luminance
-
-VertexTree built(const Mesh& mesh) {
-    Result<VertexTree> tree = vdtree::build_tree(mesh.view());
-    if (!tree) throw std::runtime_error(tree.error().message);
-    return std::move(*tree);
-}
 
 // A smooth hill of brightness, as of photographs.
 Texture hills() {
@@ -67,20 +60,7 @@ const Case cases[] = {
     {"seams", [] { return textures::with_seams(textures::textured_sphere(4, hills())); }},
 };
 
-class TexturedOracle : public testing::TestWithParam<Case> {
-protected:
-    perception::Image draw(render::Renderer& renderer, const Cut& cut, const View& view) const {
-        render::DrawOptions options;
-        options.samples = samples;
-        options.background = background;
-        const auto frame = renderer.draw(cut, view, options);
-        if (!frame) throw std::runtime_error(frame.error().message);
-        perception::Image image{frame->width, frame->height, 1, frame->luminance};
-        for (float& value : image.values) value = static_cast<float>(perception::to_luminance(display_, static_cast<double>(value)).value());
-        return image;
-    }
-    perception::Display display_;
-};
+class TexturedOracle : public testing::TestWithParam<Case> {};
 INSTANTIATE_TEST_SUITE_P(Meshes, TexturedOracle, testing::ValuesIn(cases), [](const auto& test) { return std::string(test.param.name); });
 
 TEST_P(TexturedOracle, SeesNothingOfWhatTheSafeTestFolds) {
@@ -90,38 +70,23 @@ TEST_P(TexturedOracle, SeesNothingOfWhatTheSafeTestFolds) {
     if (!context) GTEST_SKIP() << context.error().message;
     auto renderer = render::Renderer::create(*context, tree);
     ASSERT_TRUE(renderer) << renderer.error().message;
-    const vdtree::Sphere sphere = tree.bounding_sphere();
-    const vdtree::LuminanceRange range = tree.luminance_range();
-    for (int trial = 0; trial < 6; ++trial) {
-        View view;
-        view.width = view.height = window_px;
-        view.fov_y_degrees = perception::physical_field(display_, window_px).value();
-        const glm::dvec3 direction(std::sin(1.7 * trial), std::cos(2.9 * trial), 1.2 + std::cos(1.1 * trial));
-        view = vdtree::frame_sphere(tree.origin() + glm::dvec3(sphere.centre), sphere.radius, direction, trial % 3 == 2 ? 0.15 : 0.85, view);
-        perception::FoldTestOptions options;
-        options.display = display_;
-        options.scene = {std::min(range.lo, background), std::max(range.hi, background)};
-        if (trial % 2) options.gaze_px = glm::dvec2(window_px * 0.5 + 1100, window_px * 0.5);
+    for (const oracle::Look& look : oracle::looks_at(tree, {.window_px = window_px, .to_the_front = 1.2})) {
         Cut whole(tree);
         whole.unfold_all();
-        const perception::Image before = draw(*renderer, whole, view);
+        const perception::Image before = oracle::draw(*renderer, whole, look.view);
         for (const bool is_safe : {false, true}) {
-            const auto criterion = is_safe ? perception::luebke_hallen_safe_distances(tree, rings, view, options)
-                                           : perception::luebke_hallen_distances(tree, view, options);
+            const auto criterion = is_safe ? perception::luebke_hallen_safe_distances(tree, rings, look.view, look.options)
+                                           : perception::luebke_hallen_distances(tree, look.view, look.options);
             ASSERT_TRUE(criterion) << criterion.error().message;
             EXPECT_TRUE(criterion->is_monotone());
             Cut cut(tree);
             const bool is_closed = tree.closedness() == vdtree::Closedness::closed_outward;
-            ASSERT_TRUE(cut.follow(*criterion, perception::viewpoint_of(tree, view, options), {.cull_back_faces = is_closed}));
-            const perception::Image after = draw(*renderer, cut, view);
-            for (const perception::CsfModel model : {perception::CsfModel::castle, perception::CsfModel::stela}) {
-                const auto judged = perception::judge_modern(before, after, {.display = display_, .gaze_px = options.gaze_px, .csf = model});
-                ASSERT_TRUE(judged) << judged.error().message;
-                EXPECT_EQ(judged->visible_pixels, 0u) << "view " << trial << (is_safe ? ", safe, " : ", ") << cut.triangle_count() << " of " << tree.triangle_count()
-                                                      << " triangles, largest V " << judged->max_ratio;
-                if (model == perception::CsfModel::castle)
-                    RecordProperty("view_" + std::to_string(trial) + (is_safe ? "_safe" : ""),
-                                   std::to_string(cut.triangle_count()) + " of " + std::to_string(tree.triangle_count()) + ", V " + std::to_string(judged->max_ratio));
+            ASSERT_TRUE(cut.follow(*criterion, perception::viewpoint_of(tree, look.view, look.options), {.cull_back_faces = is_closed}));
+            const perception::Image after = oracle::draw(*renderer, cut, look.view);
+            for (const perception::CsfModel model : oracle::judges) {
+                const perception::Judgement judged = oracle::judge(before, after, look, model);
+                EXPECT_EQ(judged.visible_pixels, 0u) << "from " << oracle::words(look) << (is_safe ? ", safe, " : ", ") << cut.triangle_count() << " of "
+                                                     << tree.triangle_count() << " triangles, largest V " << judged.max_ratio;
             }
         }
     }

@@ -10,16 +10,13 @@
 #include <vdtree/builder.h>
 #include <vdtree/cut.h>
 
+#include "built.h"
 #include "shapes.h"
 
 namespace unseen::vdtree {
 namespace {
 
-VertexTree built(const Mesh& mesh, const BuildOptions& options = {}) {
-    Result<VertexTree> tree = build_tree(mesh.view(), options);
-    if (!tree) throw std::runtime_error(tree.error().message);
-    return std::move(*tree);
-}
+using support::built;
 
 bool is_larger(const VertexTree& tree, NodeId a, NodeId b) {
     const float ra = tree.support_spheres()[a].radius, rb = tree.support_spheres()[b].radius;

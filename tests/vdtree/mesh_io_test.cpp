@@ -1,10 +1,11 @@
 // Every format and feature of the mesh readers on files small enough to check by eye, and what the writers give back.
 #include <vdtree/mesh_io.h>
 
+#include <vdtree/atomic_file.h>
+
 #include "mesh_files.h"
 #include "mesh_readers.h"
 #include "polygon_triangulator.h"
-#include "atomic_file.h"
 
 #include <chrono>
 #include <cmath>

@@ -13,17 +13,14 @@
 #include <vdtree/cut.h>
 #include <vdtree/distance_criterion.h>
 
+#include "built.h"
 #include "shapes.h"
 #include "triangle_distance.h"
 
 namespace unseen::vdtree {
 namespace {
 
-VertexTree built(const Mesh& mesh) {
-    Result<VertexTree> tree = build_tree(mesh.view());
-    if (!tree) throw std::runtime_error(tree.error().message);
-    return std::move(*tree);
-}
+using support::built;
 
 // The sum of the solid angles of all triangles, in turns: 1 inside, 0 outside, and -1 inside of what is inside out.
 double winding_number(const VertexTree& tree, glm::dvec3 at) {

@@ -14,6 +14,7 @@
 #include <vdtree/fold_errors.h>
 #include <vdtree/tree_io.h>
 
+#include "built.h"
 #include "shapes.h"
 #include "temp_folder.h"
 #include "textures.h"
@@ -22,11 +23,7 @@
 namespace unseen::vdtree {
 namespace {
 
-VertexTree built(const Mesh& mesh, const BuildOptions& options = {}) {
-    Result<VertexTree> tree = build_tree(mesh.view(), options);
-    if (!tree) throw std::runtime_error(tree.error().message);
-    return std::move(*tree);
-}
+using support::built;
 
 // What filters on graphics processors do, in double.
 double bilinear(const Texture& texture, double u, double v) {

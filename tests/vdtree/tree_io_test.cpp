@@ -24,6 +24,7 @@
 #include <vdtree/cut.h>
 #include <vdtree/fold_errors.h>
 
+#include "built.h"
 #include "shapes.h"
 #include "temp_folder.h"
 #include "textures.h"
@@ -34,15 +35,11 @@
 namespace unseen::vdtree {
 namespace {
 
+using support::built;
+
 using support::TempFolder;
 using support::TreeFile;
 using testing::HasSubstr;
-
-VertexTree built(const Mesh& mesh) {
-    Result<VertexTree> tree = build_tree(mesh.view());
-    if (!tree) throw std::runtime_error(tree.error().message);
-    return std::move(*tree);
-}
 
 class TreeIo : public testing::Test {
 protected:

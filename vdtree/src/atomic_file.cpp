@@ -1,5 +1,5 @@
 // Temporary file and rename, with POSIX calls because their errors say why.
-#include "atomic_file.h"
+#include <vdtree/atomic_file.h>
 
 #include <algorithm>
 #include <cerrno>

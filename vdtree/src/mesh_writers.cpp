@@ -1,7 +1,8 @@
 // Writes meshes as PLY, OBJ and GLB.
 #include <vdtree/mesh_io.h>
 
-#include "atomic_file.h"
+#include <vdtree/atomic_file.h>
+
 #include "mesh_readers.h"
 
 #include <algorithm>

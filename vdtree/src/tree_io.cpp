@@ -14,7 +14,8 @@
 #define XXH_INLINE_ALL
 #include <xxhash.h>
 
-#include "atomic_file.h"
+#include <vdtree/atomic_file.h>
+
 #include "mapped_file.h"
 #include "mask_pool.h"
 #include "node_check.h"
