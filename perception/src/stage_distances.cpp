@@ -17,6 +17,9 @@ namespace {
 using vdtree::FoldStage;
 
 constexpr double pooling = 3.5; // Minkowski's exponent of probability summation
+// The largest contrasts of every band lie in other places, and in pictures from other directions; of all of them together a view shows no more than
+// this. Found by comparing pictures.
+constexpr double share_in_a_view = 0.7;
 constexpr double lowest_cpd = 0.5;  // that a table must know
 
 // The angles, in degrees, that the mesh's sphere is seen under, from far to near.
@@ -54,7 +57,7 @@ public:
     double largest_angle(const FoldStage& stage, std::size_t first_background, std::size_t last_background, double contrast_factor) const {
         for (std::size_t i = 0; i < angle_count; ++i)
             for (std::size_t k = first_background; k <= last_background; ++k)
-                if (!(visibility(stage.contrast[k], bands_[i]) * contrast_factor <= 1)) return i > 0 ? angle(i - 1) : 0;
+                if (!(visibility(stage.contrast[k], bands_[i]) * contrast_factor * share_in_a_view <= 1)) return i > 0 ? angle(i - 1) : 0;
         return angle(angle_count - 1);
     }
 

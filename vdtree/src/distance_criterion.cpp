@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cassert>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -168,7 +167,6 @@ Result<DistanceCriterion> DistanceCriterion::create(const VertexTree& tree, Part
     DistanceCriterion criterion(std::move(parts));
     // With lights the ranges nest but for rounding, which may lift a child by a class.
     criterion.is_monotone_ = !criterion.parts_.lit && is_monotone_in(tree, criterion.parts_);
-    assert(criterion.is_monotone_ || criterion.parts_.lit);
     return criterion;
 }
 

@@ -64,8 +64,8 @@ public:
     static constexpr float always_visible = std::numeric_limits<float>::max();
 
     // Fails where sizes do not fit the tree, a class has no row, a length or reach is NaN or a length is negative or infinite.
-    // A child whose reach exceeds its parent's is safe (it is folded with the parent) but costs time (see is_monotone), and an
-    // assertion in debug builds.
+    // A child whose reach exceeds its parent's, as in a tree from a damaged file, is safe (it is folded with the parent) but costs time: see
+    // is_monotone().
     static Result<DistanceCriterion> create(const VertexTree& tree, Parts parts);
 
     const Parts& parts() const noexcept { return parts_; }
