@@ -26,7 +26,7 @@ constexpr int much_more = 2;           // luminance range than the node's: such 
 constexpr std::size_t triangles_compared = 16; // of each surface, at equal steps
 constexpr std::size_t most_fine_triangles = 64; // in rings of more, some neighbours are folded
 constexpr float contact_reach = 6; // times the distance by which folds move a surface: then parts that near may pass through each other
-constexpr float least_sine = 0.2f; // of the angle at which parts meet: flatter ones count as this
+constexpr float least_sine = 0.1f; // of the angle at which parts meet: flatter ones count as this
 constexpr Index leaves_of_part = 4096;   // of a subtree that one task measures
 
 struct Point {
