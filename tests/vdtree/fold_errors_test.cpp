@@ -162,6 +162,21 @@ TEST(FoldErrors, CountAsOutlinesWherePartsMeet) {
     EXPECT_EQ(meeting(2.6), 0u);
 }
 
+// A dark shell just over a bright one: wherever a fold moves the one, the other shows over a far wider area.
+TEST(FoldErrors, CountFarMoreWherePartsMeetFlat) {
+    Mesh inner = shapes::icosphere(4), outer = shapes::placed(shapes::icosphere(4), 1.0005);
+    inner.colours.assign(inner.positions.size(), {0.9f, 0.9f, 0.9f, 1});
+    outer.colours.assign(outer.positions.size(), {0.1f, 0.1f, 0.1f, 1});
+    const VertexTree alone = built(outer), both = built(shapes::together(inner, outer));
+    const auto most_of = [](const VertexTree& tree) {
+        float most = 0;
+        for (NodeId node = 1; node < tree.interior_count(); ++node)
+            if (const float radius = tree.bounds()[node].ring.radius; radius < 0.2f) most = std::max(most, tree.fold_errors()[node].distance / radius);
+        return most;
+    };
+    EXPECT_GT(most_of(both), 7 * most_of(alone));
+}
+
 TEST(FoldErrors, AreTheSameForAnyNumberOfThreads) {
     const VertexTree tree = built(shapes::bumpy_sphere(5, 0.02));
     const auto one = with_fold_errors(tree, 1), four = with_fold_errors(tree, 4);
