@@ -75,10 +75,10 @@ std::vector<double> log2_of(std::span<const double> values) {
     return logs;
 }
 
-// `positions` are the values as interpolation sees them: their logarithms, or themselves.
 // What no table of an eye has, by orders of magnitude: values beyond are a slip.
 constexpr double most_cpd = 1e4, most_degrees = 180, most_cdm2 = 1e10, most_sensitive = 1e6;
 
+// `positions` are the values as interpolation sees them: their logarithms, or themselves.
 Result<void> check_axis(std::string_view field, std::span<const double> values, std::span<const double> positions, double highest) {
     for (std::size_t i = 0; i < values.size(); ++i) {
         const std::string place = indexed(field, {i});

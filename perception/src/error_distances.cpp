@@ -28,8 +28,7 @@ constexpr int contrast_count = static_cast<int>(contrasts.count()) - 1; // witho
 constexpr int no_contrast = -1;
 constexpr int luminance_count = static_cast<int>(LuminanceClasses::count);
 
-// Where patterns are looked for that a strip may hold: from the lowest frequency that a table must know up to the display's limit.
-constexpr double lowest_cpd = 0.5;
+// Of the frequencies at which patterns are looked for that a strip may hold, from the lowest one up to the display's limit.
 constexpr double frequency_step = 1.0905077326652577; // an eighth of an octave
 
 constexpr int steepest_spike = 8 * contrasts_per_octave; // sharper ones count as this: a sixteenth of the width
@@ -107,7 +106,7 @@ public:
     Eye(const CsfTable& csf, double eccentricity_deg, double luminance_cdm2, const Screen& screen) : screen_(screen) {
         const double highest_cpd = 1 / (2 * screen.pixel_deg);
         std::vector<Band> bands;
-        for (double low = lowest_cpd; low < highest_cpd; low *= frequency_step)
+        for (double low = lowest_table_cpd; low < highest_cpd; low *= frequency_step)
             bands.push_back({std::min(low * frequency_step, highest_cpd),
                              csf.monotone_sensitivity(CyclesPerDegree(low), Degrees(eccentricity_deg), Luminance(luminance_cdm2))});
         for (std::size_t i = 0; i < width_count; ++i) {
@@ -133,9 +132,8 @@ private:
         double highest_cpd, sensitivity;
     };
     static constexpr std::size_t bands_per_octave = 8;
-    static constexpr double pooling = 3.5; // Minkowski's exponent of probability summation
     // Widths from far below any that can be seen up to the lowest frequency's.
-    static constexpr double widest_deg = 1 / lowest_cpd, width_step = 0.91700404320467122; // an eighth of an octave
+    static constexpr double widest_deg = 1 / lowest_table_cpd, width_step = 0.91700404320467122; // an eighth of an octave
     static constexpr std::size_t width_count = 160;
     static double width(std::size_t i) { return widest_deg * std::pow(width_step, static_cast<double>(i)); }
     using Thresholds = std::array<double, width_count>; // contrasts, by width
@@ -161,7 +159,7 @@ private:
             double sum = 0;
             for (std::size_t i = first; i < bands.size(); i += bands_per_octave) {
                 const double seen = share(width_deg * bands[i].highest_cpd) * bands[i].sensitivity;
-                sum += seen * seen * seen * std::sqrt(seen);
+                sum += to_power_of_pooling(seen);
             }
             most = std::max(most, sum);
         }

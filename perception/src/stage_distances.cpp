@@ -16,11 +16,9 @@ namespace {
 
 using vdtree::FoldStage;
 
-constexpr double pooling = 3.5; // Minkowski's exponent of probability summation
 // The largest contrasts of every band lie in other places, and in pictures from other directions; of all of them together a view shows no more than
 // this. Found by comparing pictures.
 constexpr double share_in_a_view = 0.7;
-constexpr double lowest_cpd = 0.5;  // that a table must know
 
 // The angles, in degrees, that the mesh's sphere is seen under, from far to near.
 constexpr double least_angle = 0.01, angle_step = 1.0905077326652577; // an eighth of an octave
@@ -42,7 +40,7 @@ public:
                 const double octaves_finer = b < finer_bands ? static_cast<double>(finer_bands - b) : 0;
                 const double cycles = FoldStage::frequency(b < finer_bands ? 0 : b - finer_bands) * std::exp2(octaves_finer);
                 const double cpd = cycles / angle(i);
-                const double at = std::max(std::min(cpd, highest_cpd), lowest_cpd);
+                const double at = std::max(std::min(cpd, highest_cpd), lowest_table_cpd);
                 const double sensitivity = share_on_display(cpd / highest_cpd) *
                                            csf.monotone_sensitivity(CyclesPerDegree(at), Degrees(eccentricity_deg), luminance);
                 for (std::size_t row = 0; row < FoldStage::masks.size(); ++row) {
@@ -76,7 +74,7 @@ private:
             const auto& rows = contrast[b < finer_bands ? 0 : b - finer_bands];
             double most = 0;
             for (std::size_t row = 0; row < FoldStage::masks.size(); ++row) most = std::max(most, static_cast<double>(rows[row]) * bands[b][row]);
-            sum += most * most * most * std::sqrt(most);
+            sum += to_power_of_pooling(most);
         }
         return std::pow(sum, 1 / pooling);
     }

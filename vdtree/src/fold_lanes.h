@@ -432,6 +432,19 @@ struct Lanes {
         return {~front & ~back, view.near_ones_too ? back : Ints{}};
     }
 
+    // What nodes face that have to be asked, a register of them at a time: calls f(i, is_silhouette, is_away), the last two 0 or 1, for the `count`
+    // places i in `asked`, which has room for a register more. Nodes by place: at(i).
+    template <class At, class F>
+    static UNSEEN_INLINE void for_each_asked(const KernelView& view, const NodeArrays& arrays, std::uint16_t* asked, std::size_t count, At at, F f) {
+        std::fill_n(asked + count, width, count > 0 ? asked[0] : std::uint16_t{0});
+        for (std::size_t first = 0; first < count; first += width) {
+            const Facings facings = find_facings(view, arrays, [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return at(asked[first + lane]); });
+            const std::uint32_t silhouettes = bits_of(facings.silhouette), away = bits_of(facings.away);
+            for (std::size_t lane = 0; lane < std::min(width, count - first); ++lane)
+                f(std::size_t{asked[first + lane]}, (silhouettes >> lane) & 1, (away >> lane) & 1);
+        }
+    }
+
     // Those of a piece of the nodes whose facing matters are looked at together, so that all lanes are of use.
     template <class NodeAt>
     static UNSEEN_INLINE void decide_all(const KernelView& view, const NodeArrays& arrays, std::size_t count, NodeAt node_at,
@@ -459,17 +472,12 @@ struct Lanes {
                 for (asked_bits &= used; asked_bits; asked_bits &= asked_bits - 1)
                     asked[asked_count++] = static_cast<std::uint16_t>(first + static_cast<std::size_t>(std::countr_zero(asked_bits)));
             }
-            std::fill_n(asked + asked_count, width, asked_count > 0 ? asked[0] : std::uint16_t{0});
-            for (std::size_t first = 0; first < asked_count; first += width) {
-                const auto at = [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return node_at(start + asked[first + lane]); };
-                const Facings f = find_facings(view, arrays, at);
-                const std::uint32_t silhouettes = bits_of(f.silhouette), away = bits_of(f.away);
-                for (std::size_t lane = 0; lane < std::min(width, asked_count - first); ++lane) {
-                    const std::size_t i = asked[first + lane], word = i / 64, bit = i % 64;
-                    const std::uint64_t seen = ((near[word] >> bit) | (silhouettes >> lane)) & ~std::uint64_t{away >> lane} & 1;
-                    unfolded[word] = (unfolded[word] & ~(std::uint64_t{1} << bit)) | (seen << bit);
-                }
-            }
+            const auto at = [&](std::size_t i) UNSEEN_INLINE_LAMBDA { return node_at(start + i); };
+            for_each_asked(view, arrays, asked, asked_count, at, [&](std::size_t i, std::uint32_t is_silhouette, std::uint32_t is_away) UNSEEN_INLINE_LAMBDA {
+                const std::size_t word = i / 64, bit = i % 64;
+                const std::uint64_t seen = ((near[word] >> bit) | is_silhouette) & ~std::uint64_t{is_away} & 1;
+                unfolded[word] = (unfolded[word] & ~(std::uint64_t{1} << bit)) | (seen << bit);
+            });
         }
     }
 
@@ -573,20 +581,16 @@ struct Lanes {
                     asked_count += (asked_bits >> lane) & 1 & (i + lane < size);
                 }
             }
-            std::fill_n(asked + asked_count, width, asked_count > 0 ? asked[0] : std::uint16_t{0});
-            for (std::size_t first = 0; first < asked_count; first += width) {
-                const auto at = [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return listed(start + asked[first + lane]); };
-                const Facings f = find_facings(view, arrays, at);
-                const std::uint32_t silhouettes = bits_of(f.silhouette), away = bits_of(f.away);
-                for (std::size_t lane = 0; lane < std::min(width, asked_count - first); ++lane) {
-                    const std::size_t i = asked[first + lane];
-                    if ((away >> lane) & 1) cost[i] = seen[i] = 0, interior_unfolds[i] = 0;
-                    else if ((silhouettes >> lane) & 1) {
-                        cost[i] = outline_cost[i], seen[i] = outline_seen[i];
-                        interior_unfolds[i] = outline_unfolds[i];
-                    }
+            const auto at = [&](std::size_t i) UNSEEN_INLINE_LAMBDA { return listed(start + i); };
+            for_each_asked(view, arrays, asked, asked_count, at, [&](std::size_t i, std::uint32_t is_silhouette, std::uint32_t is_away) UNSEEN_INLINE_LAMBDA {
+                if (is_away) {
+                    cost[i] = seen[i] = 0;
+                    interior_unfolds[i] = 0;
+                } else if (is_silhouette) {
+                    cost[i] = outline_cost[i], seen[i] = outline_seen[i];
+                    interior_unfolds[i] = outline_unfolds[i];
                 }
-            }
+            });
             std::copy_n(cost, size, out.cost + start);
             std::copy_n(seen, size, out.seen_cost + start);
             for (std::size_t first = 0; first < size; first += 64) {
