@@ -12,6 +12,7 @@
 #include "memory_plan.h"
 #include "model_file.h"
 #include "options.h"
+#include "output_files.h"
 #include "paged_memory.h"
 #include "process_team.h"
 #include "progress_bar.h"
@@ -92,9 +93,7 @@ vdtree::BuildOptions building(const BuildArguments& a, ProcessTeam* team) {
 }
 
 Result<void> check_names(const BuildArguments& a) {
-    std::error_code unknown;
-    if (std::filesystem::equivalent(a.mesh, a.out, unknown))
-        return Error{ErrorCode::invalid_argument, "'" + a.out + "' is the mesh itself: give the tree another name."};
+    if (const auto ready = check_outputs({a.mesh, a.texture.file}, {a.out, a.json}); !ready) return ready;
     if (vdtree::is_tree_file(a.mesh))
         return Error{ErrorCode::invalid_argument, "'" + a.mesh + "' is a tree already; give a mesh."};
     return {};
@@ -138,6 +137,8 @@ Result<Source> open_source(const BuildArguments& a, ProcessTeam* team) {
     if (const auto ok = vdtree::prepare_tree_file(a.out); !ok) return ok.error();
     auto read = read_source(a, team, read_textured_mesh);
     if (!read) return read.error();
+    if (a.fold_errors && !read->mesh.texture.texels.empty())
+        return Error{ErrorCode::invalid_argument, "--fold-errors does not measure textures: add --no-texture."};
     return Source{std::move(*report), std::move(*read)};
 }
 
@@ -163,8 +164,6 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
     const auto start = std::chrono::steady_clock::now();
     auto tree = build(a, std::move(source->read), team);
     if (!tree) return tree.error();
-    if (a.fold_errors && !tree->texture().empty())
-        return Error{ErrorCode::invalid_argument, "--fold-errors does not measure textures: add --no-texture."};
     if (a.fold_errors) {
         print_note("measuring what folds change ...");
         tree = vdtree::with_fold_errors(*tree, a.threads);

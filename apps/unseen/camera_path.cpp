@@ -186,6 +186,11 @@ Result<CameraPath> CameraPath::read(const std::string& path, glm::dvec3 up) {
     return poses ? Result(CameraPath(std::move(*poses))) : poses.error();
 }
 
+bool CameraPath::has_gaze() const {
+    const auto* const poses = std::get_if<std::vector<CameraPose>>(&way_);
+    return poses && poses->front().gaze_px;
+}
+
 std::vector<CameraPose> CameraPath::poses_from(const vdtree::View& first) const {
     const Orbit* const orbit = std::get_if<Orbit>(&way_);
     return orbit ? poses_of(*orbit, first) : std::get<std::vector<CameraPose>>(way_);

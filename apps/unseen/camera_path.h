@@ -37,6 +37,7 @@ public:
     static Result<CameraPath> read(const std::string& path, glm::dvec3 up);
 
     std::vector<CameraPose> poses_from(const vdtree::View& first) const;
+    bool has_gaze() const; // the file says where the viewer looks
 
 private:
     explicit CameraPath(std::variant<Orbit, std::vector<CameraPose>> way) : way_(std::move(way)) {}

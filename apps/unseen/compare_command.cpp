@@ -9,6 +9,7 @@
 #include <perception/judge.h>
 
 #include "command.h"
+#include "output_files.h"
 #include "report.h"
 #include "scene.h"
 #include "terminal.h"
@@ -88,6 +89,8 @@ Result<Verdict> judge_modern(const CompareArguments& a, const Pair& pair, const 
 
 Result<Verdict> judge_rpg99(const CompareArguments& a, const Pair& pair, const perception::Display& display) {
     const bool as_the_program = a.profile == perceptualdiff;
+    if (as_the_program && !pair.has_codes())
+        return Error{ErrorCode::invalid_argument, "--profile perceptualdiff is for PNG: PFM and EXR hold cd/m2, which that program does not know."};
     const auto luminance = [&](const ImageFile& file) {
         return as_the_program ? perception::perceptualdiff_luminance(file.image, display.peak.value())
                               : perception::to_luminance(file, display);
@@ -127,6 +130,8 @@ Result<void> write_maps(const CompareArguments& a, const Verdict& verdict) {
 }
 
 Result<int> run(const CompareArguments& a) {
+    if (const auto ready = check_outputs({a.reference, a.test, a.display.file, a.display.csf}, {a.map, a.threshold_map, a.json}); !ready)
+        return ready.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     const auto display = make_display(a.display);

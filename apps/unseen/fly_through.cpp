@@ -15,6 +15,7 @@
 #include "camera_path.h"
 #include "frame_image.h"
 #include "gaze_player.h"
+#include "output_files.h"
 #include "progress_bar.h"
 #include "report.h"
 #include "terminal.h"
@@ -51,7 +52,7 @@ struct NamePattern {
 
 std::optional<NamePattern> parse_pattern(const std::string& pattern) {
     const std::size_t begin = pattern.find('%');
-    if (begin == std::string::npos || pattern.find('%', begin + 1) != std::string::npos) return std::nullopt;
+    if (begin == std::string::npos || pattern.find_first_of("%/", begin + 1) != std::string::npos) return std::nullopt;
     std::size_t end = begin + 1;
     while (end < pattern.size() && pattern[end] >= '0' && pattern[end] <= '9') ++end;
     if (end == pattern.size() || pattern[end] != 'd' || end - begin > 3) return std::nullopt;
@@ -66,14 +67,36 @@ struct Drawing {
     render::Renderer renderer;
 };
 
-Result<std::optional<Drawing>> make_drawing(const Scene& scene, bool draws) {
-    if (!draws) return std::optional<Drawing>();
-    auto context = render::Context::headless();
-    if (!context) return context.error();
+Result<std::optional<Drawing>> make_drawing(const Scene& scene, std::optional<render::Context> context) {
+    if (!context) return std::optional<Drawing>();
     auto renderer = render::Renderer::create(*context, scene.tree);
     if (!renderer) return renderer.error();
     return std::optional<Drawing>(Drawing{std::move(*context), std::move(*renderer)});
 }
+
+// What a flight has written so far, frame by frame; of one that fails nothing is left.
+class Pictures {
+public:
+    explicit Pictures(const std::string& pattern) : names_(parse_pattern(pattern)) {}
+    Pictures(const Pictures&) = delete;
+    Pictures& operator=(const Pictures&) = delete;
+    ~Pictures() {
+        std::error_code ignored;
+        for (std::size_t frame = 0; frame < written_; ++frame) std::filesystem::remove(names_->with(frame), ignored);
+    }
+
+    Result<void> write_next(const perception::Image& image) {
+        auto written = perception::write_image(names_->with(written_), image);
+        if (written) ++written_;
+        return written;
+    }
+    bool are_wanted() const { return names_.has_value(); }
+    void keep() { written_ = 0; }
+
+private:
+    std::optional<NamePattern> names_;
+    std::size_t written_ = 0;
+};
 
 std::string cell(double value) { return std::isfinite(value) ? shortest(value) : std::string(); }
 
@@ -184,14 +207,13 @@ public:
         follower_.set_threshold(options.threshold);
     }
 
-    Result<void> run(const std::vector<CameraPose>& poses, GazePlayer gaze) {
-        auto drawing = make_drawing(scene_, options_.draws);
+    Result<void> run(const std::vector<CameraPose>& poses, GazePlayer gaze, std::optional<render::Context> context, Pictures& pictures) {
+        auto drawing = make_drawing(scene_, std::move(context));
         if (!drawing) return drawing.error();
         if (options_.geomorph_seconds)
             if (auto set = follower_.set_geomorph(scene_, *options_.geomorph_seconds); !set) return set;
         const double frame_s = 1 / options_.frames_a_second;
         if (auto begun = gaze.begin(scene_, static_cast<double>(poses.size()) * frame_s); !begun) return begun;
-        const auto names = parse_pattern(options_.pictures);
         ProgressBar bar("flying");
         for (std::size_t i = 0; i < poses.size(); ++i) {
             bar(static_cast<double>(i) / static_cast<double>(poses.size()), "frames");
@@ -201,9 +223,8 @@ public:
             gaze.apply(what_, scene_, static_cast<double>(i) * frame_s);
             auto frame = next(*drawing);
             if (!frame) return Error{frame.error().code, "Frame " + std::to_string(i) + ": " + frame.error().message};
-            if (!names) continue;
-            const auto image = code_image(*frame, scene_.display);
-            if (auto written = perception::write_image(names->with(i), image); !written) return written;
+            if (!pictures.are_wanted()) continue;
+            if (auto written = pictures.write_next(code_image(*frame, scene_.display)); !written) return written;
         }
         return {};
     }
@@ -273,13 +294,20 @@ Result<void> make_folder_of(const std::string& name) {
 } // namespace
 
 std::string complaint_about_picture_names(const std::string& pattern) {
-    if (parse_pattern(pattern) && (pattern.ends_with(".png") || pattern.ends_with(".PNG"))) return {};
-    return "with --path, -o must be a name with one %d or %04d for the frame's number and end in .png, not '" + pattern + "'.";
+    if (parse_pattern(pattern) && has_ending(pattern, ".png")) return {};
+    return "with --path, -o must be a name with one %d or %04d for the frame's number, not in its folder's name, and end in .png, not '" + pattern + "'.";
 }
 
 Result<void> fly_through(const std::string& model, const ViewOptions& view, const DisplayOptions& display, const FlyThroughOptions& options) {
+    if (const auto ready = check_outputs({model, options.path, options.gaze.trace, view.lights, view.texture.file, display.file, display.csf},
+                                         {options.csv, options.plot, options.json});
+        !ready)
+        return ready;
     const auto path = CameraPath::read(options.path, view.up.value_or(vdtree::View().up));
     if (!path) return path.error();
+    if (path->has_gaze() && (options.what.gaze_px || options.gaze.source != GazeSource::none))
+        return Error{ErrorCode::invalid_argument,
+                     "'" + options.path + "' says where the viewer looks: leave --gaze, --gaze-mode and --gaze-trace away, or its columns gaze_x and gaze_y."};
     auto gaze = GazePlayer::create(options.gaze);
     if (!gaze) return gaze.error();
     auto report = JsonReport::open(options.json);
@@ -291,6 +319,12 @@ Result<void> fly_through(const std::string& model, const ViewOptions& view, cons
         vdtree::AtomicFile::remove_orphans(options.csv);
         csv = std::move(*file);
     }
+    std::optional<render::Context> context;
+    if (options.draws) {
+        auto made = render::Context::headless();
+        if (!made) return made.error();
+        context = std::move(*made);
+    }
     auto scene = load_scene(model, view, display);
     if (!scene) return scene.error();
     if (!options.pictures.empty())
@@ -299,7 +333,8 @@ Result<void> fly_through(const std::string& model, const ViewOptions& view, cons
     if (const auto ready = settle_fold_test(*scene, what); !ready) return ready;
 
     FlyThrough flight(*scene, what, options);
-    if (auto flown = flight.run(path->poses_from(scene->view), std::move(*gaze)); !flown) return flown;
+    Pictures pictures(options.pictures);
+    if (auto flown = flight.run(path->poses_from(scene->view), std::move(*gaze), std::move(context), pictures); !flown) return flown;
     if (csv)
         if (auto ok = csv->write(to_csv(flight.records())); !ok) return ok;
     if (auto ok = report->prepare(to_json(*scene, flight.records(), flight.last())); !ok) return ok;
@@ -310,6 +345,7 @@ Result<void> fly_through(const std::string& model, const ViewOptions& view, cons
     if (csv)
         if (auto ok = csv->commit(); !ok) return ok;
     if (auto ok = report->publish(); !ok) return ok;
+    pictures.keep();
     if (!report->is_on_stdout()) print(*scene, flight.records(), flight.last());
     return {};
 }

@@ -128,8 +128,8 @@ struct KeptCriterion {
 
 ChosenTest suitable_test(const Scene& scene, bool chroma, bool may_measure) {
     constexpr vdtree::NodeId most_measured = 2'000'000; // nodes; about a minute on one core
-    if (!scene.tree.texture().empty()) return {FoldTest::luebke_hallen_safe, "the test error does not know textures"};
     if (scene.lighting) return {FoldTest::luebke_hallen, "the test error does not know lights that move"};
+    if (!scene.tree.texture().empty()) return {FoldTest::luebke_hallen_safe, "the test error does not know textures"};
     if (chroma) return {FoldTest::luebke_hallen, "the test error does not know colours"};
     if (!scene.tree.fold_errors().empty() || (may_measure && scene.tree.interior_count() <= most_measured)) return {FoldTest::error};
     return {FoldTest::luebke_hallen, "the tree does not hold the errors of its folds, and measuring them takes long: unseen build --fold-errors"};

@@ -1,6 +1,9 @@
 #include "gaze_player.h"
 
+#include <string>
 #include <utility>
+
+#include "terminal.h"
 
 namespace unseen::app {
 
@@ -15,17 +18,26 @@ Result<GazePlayer> GazePlayer::create(const GazeOptions& options) {
     return player;
 }
 
-Result<void> GazePlayer::begin(const Scene& scene, double duration_s) {
+Result<void> GazePlayer::begin(const Scene& scene, std::optional<double> duration_s) {
     if (options_.source == GazeSource::simulated) {
         perception::SimulatedGaze simulated;
         simulated.seed = options_.seed;
         constexpr double spare_s = 1; // beyond the last frame
-        simulated.duration_s = duration_s + spare_s;
+        constexpr double longest_s = 3600;
+        simulated.duration_s = duration_s.value_or(longest_s) + spare_s;
         simulated.width_px = scene.view.width;
         simulated.height_px = scene.view.height;
         auto trace = perception::simulate_gaze(simulated, scene.display);
         if (!trace) return trace.error();
         trace_ = std::move(*trace);
+    }
+    if (options_.source == GazeSource::trace) {
+        const double first_s = trace_->samples().front().time_s, last_s = trace_->samples().back().time_s;
+        const std::string times = options_.trace + " runs from " + shortest(first_s) + " to " + shortest(last_s) + " s, and the frames from 0" +
+                                  (duration_s ? " to " + shortest(*duration_s) + " s" : " on");
+        if ((duration_s && first_s > *duration_s) || last_s < 0)
+            return Error{ErrorCode::invalid_argument, times + ": count its times from the first frame."};
+        if (duration_s && last_s < *duration_s) print_warning(times + ": after its end the last gaze holds.");
     }
     if (trace_) tracker_.emplace(*std::exchange(trace_, {}), options_.tracker, scene.display, scene.view.width, scene.view.height);
     return {};

@@ -1,5 +1,4 @@
 // unseen make: meshes made of other meshes.
-#include <filesystem>
 #include <memory>
 
 #include <subdivide.h>
@@ -8,6 +7,7 @@
 #include "command.h"
 #include "model_file.h"
 #include "options.h"
+#include "output_files.h"
 #include "progress_bar.h"
 #include "report.h"
 #include "terminal.h"
@@ -35,9 +35,7 @@ Result<void> write(const std::string& file, const vdtree::Mesh& mesh) {
 }
 
 Result<int> run(const SubdivideArguments& a) {
-    std::error_code unknown;
-    if (std::filesystem::equivalent(a.mesh, a.out, unknown))
-        return Error{ErrorCode::invalid_argument, "'" + a.out + "' is the mesh itself: give the result another name."};
+    if (const auto ready = check_outputs({a.mesh}, {a.out, a.json}); !ready) return ready.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     auto read = read_mesh_file(a.mesh);

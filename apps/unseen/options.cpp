@@ -142,13 +142,16 @@ CLI::Validator one_of(std::vector<std::string> names) {
         "");
 }
 
+bool has_ending(const std::string& file, const std::string& ending) {
+    std::string own = std::filesystem::path(file).extension().string();
+    std::transform(own.begin(), own.end(), own.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return own == ending;
+}
+
 CLI::Validator ending_in(std::vector<std::string> endings) {
     return CLI::Validator(
         [endings = std::move(endings)](std::string& text) {
-            std::string ending = std::filesystem::path(text).extension().string();
-            std::transform(ending.begin(), ending.end(), ending.begin(),
-                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-            if (std::find(endings.begin(), endings.end(), ending) != endings.end()) return std::string();
+            if (std::any_of(endings.begin(), endings.end(), [&](const std::string& ending) { return has_ending(text, ending); })) return std::string();
             return "must end in " + listed(endings) + ", not '" + text + "'";
         },
         "");
@@ -183,7 +186,7 @@ void add_moving_gaze_options(CLI::App& verb, GazeOptions& o, bool allows_mouse) 
                                    std::string("simulated: fixations and saccades by published statistics; head: no tracker, within 15 "
                                                "degrees of the middle") + (allows_mouse ? "; mouse: at the pointer" : ""));
     CLI::Option* trace = group.add_option("--gaze-trace", o.trace, "A recording: CSV with the header time_s,x_px,y_px")->type_name("FILE.csv");
-    group
+    CLI::Option* seed = group
         .add_option_function<double>(
             "--seed", [&o](const double& v) { o.seed = static_cast<std::uint64_t>(v); }, "Of simulated gazes (default: 1)")
         ->type_name("N")
@@ -191,17 +194,29 @@ void add_moving_gaze_options(CLI::App& verb, GazeOptions& o, bool allows_mouse) 
     group.add_option("--gaze-error", o.tracker.error_deg, "The tracker's error, which widens the fovea (default: 0)")
         ->type_name("DEGREES")
         ->check(within(0, 180));
-    group
+    CLI::Option* latency = group
         .add_option_function<double>(
             "--gaze-latency", [&o](const double& ms) { o.tracker.latency_s = ms / 1000; },
             "From the eye to the picture; widens the fovea by the gaze's speed (default: 0)")
         ->type_name("MILLISECONDS")
         ->check(within(0, 10000));
-    group.add_flag("--suppression", o.tracker.suppression, "Keep still during saccades, when nothing is seen");
+    CLI::Option* suppression = group.add_flag("--suppression", o.tracker.suppression, "Keep still during saccades, when nothing is seen");
     group.callback([=, &o] {
         if (*mode && *trace) refuse("--gaze-mode and --gaze-trace exclude each other: give one of them.");
         if (*trace) o.source = GazeSource::trace;
+        if (*seed && o.source != GazeSource::simulated) refuse("--seed needs --gaze-mode simulated.");
+        const bool is_tracked = o.source == GazeSource::trace || o.source == GazeSource::simulated;
+        if ((*latency || *suppression) && !is_tracked)
+            refuse("--gaze-latency and --suppression need --gaze-mode simulated or --gaze-trace: only these know how the eye moves.");
     });
+}
+
+void check_gaze(const WhatOptions& what, const GazeOptions& gaze) {
+    if (what.gaze_px && gaze.source != GazeSource::none) refuse("--gaze excludes --gaze-trace and --gaze-mode.");
+}
+
+void check_geomorph(const std::optional<double>& seconds, const ViewOptions& view) {
+    if (seconds && !view.lights.empty()) refuse("--geomorph and --lights exclude each other: vertices that glide are not lit.");
 }
 
 void add_fold_test_option(CLI::App& verb, std::optional<ChosenTest>& chosen, std::span<const FoldTest> tests, const std::string& text) {

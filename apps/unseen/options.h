@@ -83,6 +83,9 @@ void add_display_options(CLI::App& verb, DisplayOptions& options);
 void add_what_options(CLI::App& verb, WhatOptions& options);
 // Beside add_what_options(), for verbs with frames in time: gazes that move. `allows_mouse`: the verb has a window.
 void add_moving_gaze_options(CLI::App& verb, GazeOptions& options, bool allows_mouse);
+// What add_what_options() and add_moving_gaze_options(), or the view's options, do not allow together.
+void check_gaze(const WhatOptions& what, const GazeOptions& gaze);
+void check_geomorph(const std::optional<double>& seconds, const ViewOptions& view);
 void add_texture_options(CLI::App& verb, TextureOptions& options);
 void add_geomorph_option(CLI::App& verb, std::optional<double>& seconds);
 void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px);
@@ -98,6 +101,8 @@ CLI::Validator not_negative();
 CLI::Validator within(double low, double high);
 CLI::Validator whole(double low, double high); // a whole number
 CLI::Validator one_of(std::vector<std::string> names);
+// Upper case is fine in the name; `ending` is in lower case, with the point.
+bool has_ending(const std::string& file, const std::string& ending);
 // The file name ends in one of these (lower case, with the point); upper case is fine in the name.
 CLI::Validator ending_in(std::vector<std::string> endings);
 

@@ -1,5 +1,4 @@
 // unseen render: a picture of a cut, for people or for judging.
-#include <filesystem>
 #include <iterator>
 #include <memory>
 
@@ -12,6 +11,7 @@
 #include "fold_test.h"
 #include "frame_image.h"
 #include "gaze_player.h"
+#include "output_files.h"
 #include "report.h"
 #include "simplification.h"
 #include "terminal.h"
@@ -32,10 +32,7 @@ struct RenderArguments {
     FlyThroughOptions flight;   // where a path is given
 };
 
-bool is_for_people(const std::string& file) {
-    const std::string ending = std::filesystem::path(file).extension().string();
-    return ending == ".png" || ending == ".PNG";
-}
+bool is_for_people(const std::string& file) { return has_ending(file, ".png"); }
 
 Result<int> run_flight(RenderArguments& a) {
     a.flight.pictures = a.out;
@@ -48,19 +45,17 @@ Result<int> run_flight(RenderArguments& a) {
 
 Result<int> run(RenderArguments& a) {
     if (!a.flight.path.empty()) return run_flight(a);
-    std::error_code unknown;
-    if (std::filesystem::equivalent(a.model, a.out, unknown))
-        return Error{ErrorCode::invalid_argument,
-                     "'" + a.out + "' is the model itself: give the picture another name."};
+    if (const auto ready = check_outputs({a.model, a.view.lights, a.view.texture.file, a.display.file, a.display.csf}, {a.out, a.json}); !ready)
+        return ready.error();
     const auto gaze = GazePlayer::create(a.flight.gaze);
     if (!gaze) return gaze.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
+    auto context = render::Context::headless();
+    if (!context) return context.error();
     auto scene = load_scene(a.model, a.view, a.display);
     if (!scene) return scene.error();
     if (const auto ready = settle_fold_test(*scene, a.what); !ready) return ready.error();
-    auto context = render::Context::headless();
-    if (!context) return context.error();
     auto renderer = render::Renderer::create(*context, scene->tree);
     if (!renderer) return renderer.error();
 
@@ -121,8 +116,12 @@ bool is_moving(const GazeOptions& gaze) { return gaze.source == GazeSource::trac
 void check(const RenderArguments& a) {
     const FlyThroughOptions& o = a.flight;
     if (o.path.empty() && is_moving(o.gaze)) refuse("--gaze-trace and --gaze-mode simulated need --path.");
-    if (a.what.gaze_px && o.gaze.source != GazeSource::none) refuse("--gaze excludes --gaze-trace and --gaze-mode.");
-    if (!a.view.lights.empty() && o.geomorph_seconds) refuse("--geomorph and --lights exclude each other: vertices that glide are not lit.");
+    check_gaze(a.what, o.gaze);
+    check_geomorph(o.geomorph_seconds, a.view);
+    const bool may_have_gaze = a.what.gaze_px || o.gaze.source != GazeSource::none || !o.path.empty();
+    if (o.gaze.tracker.error_deg > 0 && !may_have_gaze) refuse("--gaze-error needs a gaze: --gaze or --gaze-mode.");
+    if (o.threshold != 1 && a.what.mode != Mode::imperceptible)
+        refuse("--threshold is of --imperceptible: --full, --triangles and --pixels say themselves how much is folded.");
     if (o.path.empty()) {
         if (a.out.empty()) refuse("-o is required (or --path).");
         if (a.map && !is_for_people(a.out)) refuse("--show draws pictures for people: -o must end in .png.");
@@ -168,7 +167,7 @@ Command render_command(CLI::App& app) {
         check(*a);
         if (!samples->empty()) return;
         if (!a->flight.path.empty()) a->draw.samples = 1;
-        else if (!a->out.ends_with(".png")) a->draw.samples = samples_to_judge;
+        else if (!is_for_people(a->out)) a->draw.samples = samples_to_judge;
     });
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);

@@ -171,7 +171,9 @@ Result<Surroundings> read_surroundings(const ViewOptions& view, const DisplayOpt
     if (!display.csf.empty()) {
         auto choice = choose_csf(display.csf);
         if (!choice) return choice.error();
-        around.csf = choice->model ? perception::CsfTable::from_model(*choice->model) : *std::move(choice->table);
+        auto table = choice->model ? perception::CsfTable::from_model(*choice->model, {.distance = shown_on->distance}) : *std::move(choice->table);
+        if (!table) return table.error();
+        around.csf = std::move(*table);
     }
     if (!view.lights.empty()) {
         auto read = calibration::LightRig::read(view.lights);

@@ -16,6 +16,7 @@
 #include "fold_map.h"
 #include "fold_test.h"
 #include "frame_image.h"
+#include "output_files.h"
 #include "report.h"
 #include "simplification.h"
 #include "terminal.h"
@@ -118,6 +119,7 @@ Result<void> judge(Column& column, const Column& full, const Scene& scene) {
     perception::JudgeOptions options;
     options.display = scene.display;
     options.gaze_px = column.what.gaze_px;
+    options.csf_table = scene.csf ? &*scene.csf : nullptr;
     auto judgement = perception::judge_modern(full.luminance, column.luminance, options);
     if (!judgement) return judgement.error();
     column.judgement = std::move(*judgement);
@@ -207,7 +209,6 @@ Json to_json(const std::vector<Column>& columns) {
         cut["visible_pixels"] = number_or_null(visible_pixels(column));
         cut["pixels"] = column.luminance.values.size();
         cut["max_ratio"] = column.judgement ? number_or_null(column.judgement->max_ratio) : Json(nullptr);
-        if (column.judgement) cut["visible_pixels"] = column.judgement->visible_pixels;
         cuts.push_back(std::move(cut));
     }
     return {{"cuts", cuts}};
@@ -230,15 +231,17 @@ void print(const std::vector<Column>& columns) {
 }
 
 Result<int> run(const SheetArguments& a) {
+    if (const auto ready = check_outputs({a.model, a.view.lights, a.view.texture.file, a.display.file, a.display.csf}, {a.out, a.json}); !ready)
+        return ready.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
+    auto context = render::Context::headless();
+    if (!context) return context.error();
     auto scene = load_scene(a.model, a.view, a.display);
     if (!scene) return scene.error();
     WhatOptions what;
     what.chosen = a.test;
     if (const auto ready = settle_fold_test(*scene, what); !ready) return ready.error();
-    auto context = render::Context::headless();
-    if (!context) return context.error();
     const auto columns = make_columns(*scene, a, what, *context);
     if (!columns) return columns.error();
 

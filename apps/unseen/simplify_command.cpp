@@ -1,6 +1,5 @@
 // unseen simplify: a cut of a tree as a mesh of its own.
 #include <chrono>
-#include <filesystem>
 #include <limits>
 #include <memory>
 
@@ -8,6 +7,7 @@
 
 #include "command.h"
 #include "fold_test.h"
+#include "output_files.h"
 #include "report.h"
 #include "simplification.h"
 #include "terminal.h"
@@ -25,9 +25,8 @@ struct SimplifyArguments {
 constexpr double nothing_drawn = std::numeric_limits<double>::quiet_NaN();
 
 Result<int> run(SimplifyArguments& a) {
-    std::error_code unknown;
-    if (std::filesystem::equivalent(a.model, a.out, unknown))
-        return Error{ErrorCode::invalid_argument, "'" + a.out + "' is the model itself: give the result another name."};
+    if (const auto ready = check_outputs({a.model, a.view.lights, a.view.texture.file, a.display.file, a.display.csf}, {a.out, a.json}); !ready)
+        return ready.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     auto scene = load_scene(a.model, a.view, a.display);

@@ -4,6 +4,7 @@
 #include "command.h"
 #include "fold_test.h"
 #include "options.h"
+#include "output_files.h"
 #include "viewer.h"
 
 namespace unseen::app {
@@ -18,16 +19,20 @@ struct ViewArguments {
 };
 
 Result<int> run(ViewArguments& a) {
-    if (!a.view.lights.empty() && a.viewer.geomorph_seconds)
-        return Error{ErrorCode::invalid_argument, "--geomorph and --lights exclude each other: vertices that glide are not lit."};
+    if (const auto ready = check_outputs({a.model, a.view.lights, a.view.texture.file, a.display.file, a.display.csf, a.gaze.trace}, {a.viewer.screenshot});
+        !ready)
+        return ready.error();
     auto gaze = GazePlayer::create(a.gaze);
     if (!gaze) return gaze.error();
+    // Not to be seen before there is something to see.
+    auto window = render::Context::window({.width = a.view.width, .height = a.view.height, .title = "Unseen", .visible = false});
+    if (!window) return window.error();
     auto scene = load_scene(a.model, a.view, a.display);
     if (!scene) return scene.error();
     if (const auto ready = settle_fold_test(*scene, a.viewer.what); !ready) return ready.error();
     a.viewer.has_fixed_field = a.view.fov_degrees.has_value();
     a.viewer.gaze_follows_pointer = a.gaze.source == GazeSource::mouse;
-    if (auto ended = run_viewer(*scene, std::move(*gaze), a.viewer); !ended) return ended.error();
+    if (auto ended = run_viewer(*window, *scene, std::move(*gaze), a.viewer); !ended) return ended.error();
     return exit_done;
 }
 
@@ -51,6 +56,10 @@ Command view_command(CLI::App& app) {
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->viewer.what);
     add_moving_gaze_options(*verb, a->gaze, true);
+    verb->callback([o = a.get()] {
+        check_gaze(o->viewer.what, o->gaze);
+        check_geomorph(o->viewer.geomorph_seconds, o->view);
+    });
     verb->footer(std::string(viewer_help) + "\nExamples:\n  unseen view bunny.vdt\n"
                                             "  unseen view bunny.vdt --triangles 5000 --wireframe\n"
                                             "  unseen view dragon.vdt --milliseconds 2 --geomorph 0.25");

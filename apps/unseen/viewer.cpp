@@ -70,8 +70,7 @@ public:
     Viewer& operator=(const Viewer&) = delete;
 
     Result<void> run() {
-        constexpr double longest_simulation_s = 3600; // then the eye keeps still
-        if (auto begun = gaze_.begin(scene_, longest_simulation_s); !begun) return begun;
+        if (auto begun = gaze_.begin(scene_, {}); !begun) return begun;
         if (options_.geomorph_seconds)
             if (auto set = follower_.set_geomorph(scene_, *options_.geomorph_seconds); !set) return set;
         for (int frame = 0; !glfwWindowShouldClose(window_);) {
@@ -136,6 +135,7 @@ private:
         // Nobody waits for errors to be measured here.
         if (mode == Mode::imperceptible && !is_perceptual(what_.test())) what_.chosen = suitable_test(scene_, what_.chroma, false);
         what_.gaze_px.reset();
+        what_.gaze_margin_deg = gaze_.tracker_error_deg();
         gaze_follows_pointer_ = plays_gaze_ = false;
     }
 
@@ -286,12 +286,11 @@ private:
 
 } // namespace
 
-Result<void> run_viewer(Scene& scene, GazePlayer gaze, const ViewerOptions& options) {
-    auto context = render::Context::window({scene.view.width, scene.view.height, "Unseen", true});
-    if (!context) return context.error();
-    auto renderer = render::Renderer::create(*context, scene.tree);
+Result<void> run_viewer(render::Context& window, Scene& scene, GazePlayer gaze, const ViewerOptions& options) {
+    auto renderer = render::Renderer::create(window, scene.tree);
     if (!renderer) return renderer.error();
-    return Viewer(scene, std::move(gaze), options, *context, std::move(*renderer)).run();
+    glfwShowWindow(window.glfw_window());
+    return Viewer(scene, std::move(gaze), options, window, std::move(*renderer)).run();
 }
 
 } // namespace unseen::app

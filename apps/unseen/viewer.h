@@ -25,8 +25,7 @@ struct ViewerOptions {
 // The keys, for people.
 extern const char* const viewer_help;
 
-// Opens a window of the scene's size and runs until it is closed. On the main thread only. Fails where there is no
-// display.
-Result<void> run_viewer(Scene& scene, GazePlayer gaze, const ViewerOptions& options);
+// Shows the window and runs until it is closed. On the main thread only.
+Result<void> run_viewer(render::Context& window, Scene& scene, GazePlayer gaze, const ViewerOptions& options);
 
 } // namespace unseen::app

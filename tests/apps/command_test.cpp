@@ -189,8 +189,26 @@ TEST_F(UsageTest, DoesNotOverwriteItsInput) {
     const std::string tree = read_text(path("ball.vdt")), mesh = read_text(path("ball.obj"));
     EXPECT_EQ(run({"simplify", "ball.obj", "-o", "./ball.obj"}).status, 1);
     EXPECT_EQ(run({"build", "ball.vdt", "-o", "ball.vdt"}).status, 1);
+    const fs::path link = path("link.obj");
+    fs::create_symlink("ball.obj", link);
+    EXPECT_EQ(run({"simplify", "ball.vdt", "-o", "o.obj", "--json", "ball.vdt"}).status, 1);
+    EXPECT_EQ(run({"simplify", "ball.obj", "-o", "link.obj"}).status, 1);
+    EXPECT_EQ(run({"make", "subdivide", "ball.obj", "--times", "1", "-o", "o.obj", "--json", "ball.obj"}).status, 1);
+    fs::remove(link);
+    EXPECT_FALSE(fs::exists(path("o.obj")));
     EXPECT_EQ(read_text(path("ball.obj")), mesh);
     EXPECT_TRUE(read_text(path("ball.vdt")) == tree);
+}
+
+TEST_F(UsageTest, TwoOutputsAreTwoFiles) {
+    build_ball();
+    const auto before = files();
+    for (const std::string json : {"o.ply", "./o.ply"}) {
+        const Outcome outcome = run({"simplify", "ball.vdt", "-o", "o.ply", "--json", json});
+        EXPECT_EQ(outcome.status, 1);
+        EXPECT_THAT(outcome.err, AllOf(IsAnErrorForPeople(), HasSubstr("two outputs")));
+        EXPECT_EQ(files(), before);
+    }
 }
 
 TEST_F(UsageTest, SubVerbsHaveHelpWithExamples) {

@@ -140,6 +140,10 @@ TEST_F(CompareTest, PerceptualDiffHasNoBlackLevel) {
     EXPECT_GT(program["visible_pixels"], 0);
     EXPECT_LT(display["max_ratio"], program["max_ratio"]);
     EXPECT_EQ(compare({"a.png", "b.png", "--model", "rpg99", "--display", "perceptualdiff"}), program);
+    write("a.pfm", disc(20, 0));
+    const Outcome absolute = run({"compare", "a.pfm", "a.pfm", "--model", "rpg99", "--profile", "perceptualdiff"});
+    EXPECT_EQ(absolute.status, 1) << "cd/m2 are no codes";
+    EXPECT_THAT(absolute.err, IsAnErrorForPeople());
 }
 
 } // namespace

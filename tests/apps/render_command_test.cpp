@@ -181,9 +181,24 @@ TEST_F(RenderCommandTest, BadGazesAreRefused) {
     EXPECT_THAT(run({"view", "missing.vdt", "--gaze-trace", "missing.csv"}).err, HasSubstr("missing.csv"));
     for (const std::vector<std::string>& more : std::vector<std::vector<std::string>>{
              {"--gaze-mode", "nobody"}, {"--gaze-mode", "mouse"}, {"--gaze-error", "-1"}, {"--gaze-error", "nan"}, {"--gaze-latency", "1e9"},
-             {"--gaze-mode", "head", "--gaze-trace", "gap.csv"}, {"--gaze", "1", "2", "--gaze-mode", "head"}})
+             {"--gaze-mode", "head", "--gaze-trace", "gap.csv"}, {"--gaze", "1", "2", "--gaze-mode", "head"}, {"--seed", "3"},
+             {"--gaze-mode", "head", "--gaze-latency", "20"}, {"--gaze", "1", "2", "--suppression"}})
         EXPECT_EQ(with(more).status, 2) << more.back();
     EXPECT_EQ(run({"render", "ball.vdt", "-o", "o.png", "--gaze-mode", "simulated"}).status, 2) << "one picture has no time";
+    EXPECT_EQ(run({"render", "ball.vdt", "-o", "o.png", "--gaze-error", "3"}).status, 2) << "of no gaze";
+    // Clocks that have nothing to do with each other.
+    write_text(path("late.csv"), "time_s,x_px,y_px\n1690000000,1,2\n1690000000.1,1,2\n");
+    const Outcome late = with({"--gaze-trace", "late.csv"});
+    EXPECT_EQ(late.status, 1);
+    EXPECT_THAT(late.err, ::testing::AllOf(IsAnErrorForPeople(), HasSubstr("late.csv runs from")));
+    write_text(path("short.csv"), "time_s,x_px,y_px\n0,1,2\n0.01,1,2\n");
+    const Outcome ended = with({"--gaze-trace", "short.csv"});
+    EXPECT_EQ(ended.status, 0) << ended.err;
+    EXPECT_THAT(ended.err, HasSubstr("after its end"));
+    write_text(path("seen.csv"), "eye_x,eye_y,eye_z,target_x,target_y,target_z,gaze_x,gaze_y\n0,0,5,0,0,0,10,10\n");
+    const Outcome twice = run({"render", "ball.vdt", "--path", "seen.csv", "--no-draw", "--gaze", "1", "2"});
+    EXPECT_EQ(twice.status, 1);
+    EXPECT_THAT(twice.err, HasSubstr("says where the viewer looks"));
 }
 
 TEST_F(RenderCommandTest, BadPathsAreNamedByLineAndColumn) {
@@ -359,7 +374,11 @@ TEST_F(RenderCommandTest, WrongUsageIsStatusTwo) {
                                                {"render", "ball.vdt", "-o", "out.png", "--shading", "toon"},
                                                {"sheet", "ball.vdt", "-o", "out.png", "--cell", "0"},
                                                {"sheet", "ball.vdt", "-o", "out.png", "--full"},
+                                               {"render", "ball.vdt", "--path", "orbit:0:2", "--threshold", "2", "--triangles", "20"},
+                                               {"render", "ball.vdt", "--path", "orbit:0:2", "-o", "%d/o.png"},
                                                {"view", "ball.vdt", "--frames", "0"},
+                                               {"view", "ball.vdt", "--gaze", "1", "2", "--gaze-mode", "head"},
+                                               {"view", "ball.vdt", "--lights", "l.json", "--geomorph", "1"},
                                                {"view", "ball.vdt", "--screenshot", "out.ply"}}) {
         const Outcome outcome = run(words);
         EXPECT_EQ(outcome.status, 2) << ::testing::PrintToString(words);
@@ -436,6 +455,23 @@ TEST_F(RenderCommandTest, FailuresLeaveNoFile) {
         EXPECT_THAT(outcome.err, IsAnErrorForPeople());
         EXPECT_EQ(files(), before);
     }
+    EXPECT_EQ(run({"render", "ball.vdt", "--path", "orbit:0:2", "--no-draw", "--csv", "ball.vdt"}).status, 1) << "the model";
+    EXPECT_EQ(run({"render", "ball.vdt", "--path", "orbit:0:2", "--no-draw", "--csv", "o.csv", "--plot", "missing/o.png"}).status, 1);
+    EXPECT_EQ(files(), before);
+    // A light that comes into the model in the third frame.
+    write_text(path("l.json"), R"({"lights": [{"type": "point", "intensity": 1, "distance": 1, "position": [0, 0, 9],
+                             "keyframes": [{"time_s": 0, "position": [0, 0, 9]}, {"time_s": 0.04, "position": [0, 0, 0]}]}]})");
+    const auto with_light = files();
+    const Outcome hit = run({"render", "ball.vdt", "--path", "orbit:0:4", "--lights", "l.json", "-o", "f%d.png", "--size", "16x16"});
+    EXPECT_EQ(hit.status, 1);
+    EXPECT_THAT(hit.err, HasSubstr("Frame "));
+    EXPECT_EQ(files(), with_light);
+}
+
+TEST_F(RenderCommandTest, EndingsMayBeInUpperCase) {
+    render({}, "a.png");
+    render({}, "b.Png");
+    EXPECT_TRUE(read_text(path("a.png")) == read_text(path("b.Png")));
 }
 
 class NoGpuTest : public CommandTest {

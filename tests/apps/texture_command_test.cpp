@@ -298,6 +298,7 @@ TEST_F(TextureCommandTest, WhatCannotFollowThemSaysSo) {
         EXPECT_NEAR(seen->first, 0.5 + 99.5 * 0.6, 1);
         EXPECT_LT(seen->second, 2);
     }
+    EXPECT_EQ(run({"simplify", "t.vdt", "-o", "lit.obj", "--lights", "l.json"}).status, 0) << "a test that knows both is found";
     // Half black and half white: only folds within a half are free.
     const Outcome cut = run({"simplify", "t.vdt", "-o", "x.obj", "--fold-test", "luebke-hallen-safe", "--json", "-"});
     EXPECT_EQ(cut.status, 0) << cut.err;
