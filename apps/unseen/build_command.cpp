@@ -226,8 +226,8 @@ Command build_command(CLI::App& app) {
     verb->footer("Examples:\n  unseen build bunny.ply -o bunny.vdt\n"
                  "  unseen build city.obj -o city.vdt --clusterer octree --threads 4\n"
                  "  unseen build city.obj -o city.vdt --memory 4\n"
-                 "  unseen build scan.ply -o scan.vdt --texture scan.jpg\n"
-                 "  mpirun -np 4 unseen build city.obj -o city.vdt");
+                 "  unseen build scan.ply -o scan.vdt --texture scan.jpg" +
+                 std::string(ProcessTeam::is_there() ? "\n  mpirun -np 4 unseen build city.obj -o city.vdt" : ""));
     return {verb, [a] { return run(*a); }};
 }
 

@@ -12,6 +12,7 @@
 #include <vdtree/fold_errors.h>
 
 #include "bench_tools.h"
+#include "fold_test.h"
 #include "model_file.h"
 #include "simplification.h"
 #include "terminal.h"
@@ -21,7 +22,6 @@ namespace {
 
 using vdtree::DistanceCriterion;
 
-constexpr double gaze_degrees = 29;
 constexpr double fill = 0.9;
 
 struct Measured {
@@ -105,12 +105,10 @@ vdtree::Lighting one_light() {
 
 perception::FoldTestOptions test_options(const Scene& scene, bool has_gaze) {
     perception::FoldTestOptions options;
-    const vdtree::LuminanceRange range = scene.tree.luminance_range();
     options.display = scene.display;
-    options.scene = {std::min(range.lo, scene.background), std::max(range.hi, scene.background)};
+    options.scene = scene_luminance(scene);
     if (!has_gaze) return options;
-    const double tangent = std::tan(perception::to_radians(perception::Degrees(gaze_degrees)).value());
-    options.gaze_px = glm::dvec2(scene.view.width * 0.5 + tangent * (scene.display.distance / scene.display.pixel_pitch), scene.view.height * 0.5);
+    options.gaze_px = gaze_aside(scene.display, scene.view, usual_degrees_aside);
     return options;
 }
 

@@ -22,7 +22,9 @@
 #include "bench_tools.h"
 #include "child_process.h"
 #include "model_file.h"
+#include "process_team.h"
 #include "progress_bar.h"
+#include "scene.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -34,7 +36,6 @@ using Clock = BenchClock;
 constexpr vdtree::Index wanted_active = 100'000; // triangles of the cuts that are measured
 constexpr vdtree::Index budget_triangles = 100'000;
 constexpr double most_of_mesh = 0.5;             // at small meshes: so much of them is active
-constexpr double gaze_degrees = 29;              // aside of the model's centre
 constexpr double fill = 0.9;                     // of the window's height
 constexpr int sphere_rows = 466;                 // 868,624 triangles, about as many as the dragon
 constexpr double orbit_steps[] = {0.1, 1, 5};    // degrees a frame
@@ -195,12 +196,6 @@ Result<vdtree::VertexTree> tree_of_size(const Workshop& shop, const NamedMesh& b
     return load_tree(file);
 }
 
-// What 'unseen build' can do.
-bool build_has(const std::string& option) {
-    const auto help = run_child({own_executable(), "build", "--help"});
-    return help && help->out.find(option) != std::string::npos;
-}
-
 // ---- views
 
 // The model in the window of the default display, around the vertical axis.
@@ -212,9 +207,7 @@ public:
         const auto background = static_cast<float>(perception::to_relative(options_.display, perception::Luminance(20)));
         options_.scene = {std::min(range.lo, background), std::max(range.hi, background)};
         if (!with_gaze) return;
-        const double aside = std::tan(gaze_degrees * std::numbers::pi / 180) * options_.display.distance.value() /
-                             options_.display.pixel_pitch.value();
-        options_.gaze_px = glm::dvec2(window_.width * 0.5 + aside, window_.height * 0.5);
+        options_.gaze_px = gaze_aside(options_.display, window_, usual_degrees_aside);
     }
 
     vdtree::View view(double degrees) const {
@@ -541,7 +534,7 @@ private:
         const auto subject = Subject::create(tree, true);
         if (!subject) return subject.error();
         const OrbitFigures f = measure_orbit(*subject, 1, options_.quick ? 20 : 200);
-        at_main_.push_back({"the same, gaze " + shortest(gaze_degrees) + " degrees aside, 1 degree a frame", "us",
+        at_main_.push_back({"the same, gaze " + shortest(usual_degrees_aside) + " degrees aside, 1 degree a frame", "us",
                             rounded(f.triangles, 6) + " active triangles, threshold 1", f.median_us, {}, {}, false, 1});
         return {};
     }
@@ -590,50 +583,42 @@ private:
         building_.push_back({"peak bytes a triangle while building", "B", "the whole process, from reading the mesh on; the larger of both",
                              largest_peak, 300, 150, false, 0});
         if (auto measured = measure_out_of_core(); !measured) return measured;
-        return measure_ranks(*mesh);
+        measure_ranks(*mesh);
+        return {};
     }
 
     Result<void> measure_out_of_core() {
         BenchRow row{"out-of-core build over in-core", "x", "", {}, 2, 1.3, false, 2};
         const std::uint64_t size = options_.sizes.back();
-        if (!build_has("--memory")) {
-            row.note = "'unseen build' has no --memory here";
-        } else {
-            const auto mesh = mesh_file(shop_, base_, size);
-            if (!mesh) return mesh.error();
-            const auto in_core = build(*mesh, shop_ / "measured.vdt", {"--threads", "1"});
-            if (!in_core) return in_core.error();
-            constexpr double largest = 28e6, gib = 4; // the same share of the mesh where it is smaller
-            // In proportion to the mesh, but not below what any build takes.
-            constexpr double least_gib = 0.125;
-            const double memory = std::max(gib * static_cast<double>(size) / largest, least_gib);
-            const auto out_of_core = build(*mesh, shop_ / "measured.vdt", {"--threads", "1", "--memory", shortest(memory)});
-            if (!out_of_core) return out_of_core.error();
-            row.value = out_of_core->wall_seconds / in_core->wall_seconds;
-            row.note = size_name(size) + " triangles, --memory " + rounded(memory, 3) + ", peak " +
-                       rounded(out_of_core->peak_bytes / (1 << 30), 3) + " GiB against " +
-                       rounded(in_core->peak_bytes / (1 << 30), 3);
-        }
+        const auto mesh = mesh_file(shop_, base_, size);
+        if (!mesh) return mesh.error();
+        const auto in_core = build(*mesh, shop_ / "measured.vdt", {"--threads", "1"});
+        if (!in_core) return in_core.error();
+        constexpr double largest = 28e6, gib = 4; // the same share of the mesh where it is smaller
+        // In proportion to the mesh, but not below what any build takes.
+        constexpr double least_gib = 0.125;
+        const double memory = std::max(gib * static_cast<double>(size) / largest, least_gib);
+        const auto out_of_core = build(*mesh, shop_ / "measured.vdt", {"--threads", "1", "--memory", shortest(memory)});
+        if (!out_of_core) return out_of_core.error();
+        row.value = out_of_core->wall_seconds / in_core->wall_seconds;
+        row.note = size_name(size) + " triangles, --memory " + rounded(memory, 3) + ", peak " +
+                   rounded(out_of_core->peak_bytes / (1 << 30), 3) + " GiB against " + rounded(in_core->peak_bytes / (1 << 30), 3);
         building_.push_back(row);
         return {};
     }
 
-    Result<void> measure_ranks(const fs::path& mesh) {
+    void measure_ranks(const fs::path& mesh) {
         BenchRow row{"mpirun -np 2 over 1", "x", "", {}, 1.6, 1.9, true, 2};
-        if (!build_has("mpirun")) {
-            row.note = "'unseen build' knows no mpirun here";
-        } else {
-            double seconds[2] = {};
-            for (int ranks = 1; ranks <= 2; ++ranks) {
-                const auto built = build(mesh, shop_ / "measured.vdt", {"--threads", "1"},
-                                         {"mpirun", "--allow-run-as-root", "--oversubscribe", "-np", std::to_string(ranks)});
-                if (!built) return built.error();
-                seconds[ranks - 1] = built->wall_seconds;
-            }
-            row.value = seconds[0] / seconds[1];
+        double seconds[2] = {};
+        for (int ranks = 1; ranks <= 2 && ProcessTeam::is_there() && row.note.empty(); ++ranks) {
+            const auto built = build(mesh, shop_ / "measured.vdt", {"--threads", "1"},
+                                     {"mpirun", "--allow-run-as-root", "--oversubscribe", "-np", std::to_string(ranks)});
+            if (built) seconds[ranks - 1] = built->wall_seconds;
+            else row.note = "Open MPI's mpirun did not do: " + built.error().message;
         }
+        if (!ProcessTeam::is_there()) row.note = "this build of the command is without MPI";
+        if (row.note.empty()) row.value = seconds[0] / seconds[1];
         building_.push_back(row);
-        return {};
     }
 
     const EngineBenchOptions& options_;

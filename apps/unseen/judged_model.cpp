@@ -19,11 +19,6 @@ bool needs_errors(FoldTest test) { return test == FoldTest::error; }
 
 } // namespace
 
-glm::dvec2 gaze_aside(const perception::Display& display, const vdtree::View& view, double degrees) {
-    const double tangent = std::tan(perception::to_radians(perception::Degrees(degrees)).value());
-    return {view.width * 0.5 + tangent * (display.distance / display.pixel_pitch), view.height * 0.5};
-}
-
 Result<JudgedModel> JudgedModel::create(render::Context& context, std::string name, vdtree::VertexTree tree, int window_px,
                                         perception::CsfModel second) {
     JudgedModel model;

@@ -22,9 +22,6 @@ enum class Judge { modern, second };
 inline constexpr std::array judges = {Judge::modern, Judge::second};
 inline constexpr perception::CsfModel usual_second = perception::CsfModel::barten_1999; // of the eye's physics, not fitted to castleCSF's data
 
-// Where the viewer looks, so many degrees to the right of the window's centre.
-glm::dvec2 gaze_aside(const perception::Display& display, const vdtree::View& view, double degrees);
-
 struct Verdicts {
     vdtree::Index triangles = 0;
     std::array<std::uint64_t, judges.size()> visible_pixels = {};

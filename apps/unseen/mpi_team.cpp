@@ -196,6 +196,8 @@ private:
 
 } // namespace
 
+bool ProcessTeam::is_there() noexcept { return true; }
+
 Result<std::unique_ptr<ProcessTeam>> ProcessTeam::join() {
     // Without mpirun, MPI would start a server of its own for nothing.
     if (!std::getenv("OMPI_COMM_WORLD_SIZE") && !std::getenv("PMI_SIZE") && !std::getenv("PMIX_RANK"))

@@ -16,4 +16,6 @@ Result<std::unique_ptr<ProcessTeam>> ProcessTeam::join() {
     return std::unique_ptr<ProcessTeam>();
 }
 
+bool ProcessTeam::is_there() noexcept { return false; }
+
 } // namespace unseen::app

@@ -15,6 +15,8 @@ public:
     // that ends without leave() takes the others with it.
     static Result<std::unique_ptr<ProcessTeam>> join();
 
+    static bool is_there() noexcept; // this build can talk to others
+
     virtual int cores() const = 0;            // that this machine has for all its members together
     virtual int members_on_machine() const = 0;
 

@@ -110,6 +110,11 @@ Result<perception::Display> make_display(const DisplayOptions& options) {
     return display;
 }
 
+glm::dvec2 gaze_aside(const perception::Display& display, const vdtree::View& view, double degrees) {
+    const double tangent = std::tan(perception::to_radians(perception::Degrees(degrees)).value());
+    return {view.width * 0.5 + tangent * (display.distance / display.pixel_pitch), view.height * 0.5};
+}
+
 Result<CsfChoice> choose_csf(const std::string& model_or_file) {
     const auto model = perception::csf_model(model_or_file);
     if (model) {

@@ -59,6 +59,10 @@ struct Scene {
     mutable Kept kept = {};
 };
 
+// So far to the right of the window's centre, in pixels; it may lie outside of the window.
+glm::dvec2 gaze_aside(const perception::Display& display, const vdtree::View& view, double degrees);
+inline constexpr double usual_degrees_aside = 29; // well in the periphery
+
 // The display that the options describe; ranges are checked.
 Result<perception::Display> make_display(const DisplayOptions& options);
 

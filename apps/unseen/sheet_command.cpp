@@ -36,7 +36,6 @@ struct SheetArguments {
     std::optional<ChosenTest> test;    // default: as in 'unseen render'
 };
 
-constexpr double default_gaze_degrees = 29; // to the right of the window's centre: well in the periphery
 constexpr std::uint32_t default_budget_share = 4;
 
 // One column of the sheet.
@@ -50,12 +49,6 @@ struct Column {
     std::optional<perception::Judgement> judgement; // against the full model; none for that itself
 };
 
-glm::dvec2 default_gaze(const Scene& scene) {
-    const double tangent = std::tan(perception::to_radians(perception::Degrees(default_gaze_degrees)).value());
-    const double offset_px = tangent * (scene.display.distance / scene.display.pixel_pitch);
-    return {scene.view.width * 0.5 + offset_px, scene.view.height * 0.5};
-}
-
 // As `what`, in four ways.
 std::vector<Column> wishes(const Scene& scene, const SheetArguments& a, const WhatOptions& what) {
     std::vector<Column> columns(4);
@@ -68,7 +61,7 @@ std::vector<Column> wishes(const Scene& scene, const SheetArguments& a, const Wh
     columns[2].what.triangles =
         a.triangles ? a.triangles : std::max(1U, scene.tree.triangle_count() / default_budget_share);
     columns[3].name = "gaze-directed";
-    columns[3].what.gaze_px = a.gaze_px.value_or(default_gaze(scene));
+    columns[3].what.gaze_px = a.gaze_px.value_or(gaze_aside(scene.display, scene.view, usual_degrees_aside));
     if (a.maps) columns.erase(columns.begin() + 2); // a budget is another matter
     return columns;
 }
