@@ -59,8 +59,10 @@ private:
         Entry entries[8];
     };
 
-    Entry* entries(Block block) { return pool_.data()->entries + block; }
-    const Entry* entries(Block block) const { return pool_.data()->entries + block; }
+    // Lines follow each other without gaps: one array of entries.
+    static_assert(sizeof(Line) == sizeof(Line::entries));
+    Entry* entries(Block block) { return reinterpret_cast<Entry*>(pool_.data()) + block; }
+    const Entry* entries(Block block) const { return reinterpret_cast<const Entry*>(pool_.data()) + block; }
     template <class F>
     void for_each_unfolded(std::span<const std::uint64_t> unfolded, F&& f);
     void write(Index corner, NodeId node);

@@ -1,0 +1,92 @@
+// Small files for the fuzz targets to begin with: make_fuzz_seeds FOLDER writes FOLDER/{mesh,tree,follow}/.
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <random>
+#include <stdexcept>
+#include <string>
+
+#include <vdtree/builder.h>
+#include <vdtree/fold_errors.h>
+#include <vdtree/mesh_io.h>
+#include <vdtree/tree_io.h>
+
+#include "shapes.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace unseen::vdtree;
+namespace shapes = unseen::shapes;
+
+void expect(const unseen::Result<void>& done) {
+    if (!done) throw std::runtime_error(done.error().message);
+}
+
+void write(const fs::path& file, const std::string& bytes) {
+    std::ofstream stream(file, std::ios::binary);
+    stream << bytes;
+    if (!stream) throw std::runtime_error("cannot write " + file.string());
+}
+
+// The first byte tells the target which reader is meant.
+void write_for_reader(const fs::path& file, char reader, const fs::path& mesh) {
+    std::ifstream stream(mesh, std::ios::binary);
+    write(file, reader + std::string(std::istreambuf_iterator<char>(stream), {}));
+}
+
+void make_meshes(const fs::path& folder) {
+    const Mesh mesh = shapes::with_attributes(shapes::icosphere(1));
+    for (const auto& [ending, reader] : {std::pair(".ply", '\0'), std::pair(".obj", '\1'), std::pair(".glb", '\5')}) {
+        const fs::path plain = folder / ("plain" + std::string(ending));
+        expect(write_mesh(plain, mesh.view()));
+        write_for_reader(folder / ("mesh" + std::string(ending)), reader, plain);
+        fs::remove(plain);
+    }
+    const std::string text_ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
+                                 "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    write(folder / "text.ply", std::string(1, '\0') + text_ply);
+    write(folder / "mesh.off", "\2OFF\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2\n3 1 3 2\n");
+    write(folder / "mesh.stl", "\3solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid s\n");
+    write(folder / "mesh.gltf", "\4{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":36,\"uri\":\"data:application/octet-stream;base64,"
+                                "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":36}],"
+                                "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}],"
+                                "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],\"nodes\":[{\"mesh\":0}],\"scenes\":[{\"nodes\":[0]}]}");
+}
+
+void make_trees(const fs::path& folder) {
+    const std::pair<const char*, Mesh> meshes[] = {{"ball", shapes::bumpy_sphere(1)}, {"open", shapes::grid(4)}, {"triangle", shapes::single_triangle()},
+                                                   {"attributes", shapes::with_attributes(shapes::icosphere(1))}};
+    for (const auto& [name, mesh] : meshes) {
+        const auto tree = build_tree(mesh.view());
+        if (!tree) throw std::runtime_error(tree.error().message);
+        expect(write_tree(folder / (std::string(name) + ".vdt"), *tree));
+        const auto measured = with_fold_errors(*tree);
+        if (!measured) throw std::runtime_error(measured.error().message);
+        expect(write_tree(folder / (std::string(name) + "_measured.vdt"), *measured));
+    }
+}
+
+void make_drives(const fs::path& folder) {
+    std::mt19937 random(1);
+    for (int i = 0; i < 8; ++i) {
+        std::string bytes(256 << (i % 4), '\0');
+        for (char& byte : bytes) byte = static_cast<char>(random());
+        write(folder / std::to_string(i), bytes);
+    }
+}
+
+} // namespace
+
+int main(int count, char** arguments) try {
+    if (count != 2) throw std::runtime_error("usage: make_fuzz_seeds FOLDER");
+    const fs::path folder = arguments[1];
+    for (const char* target : {"mesh", "tree", "follow"}) fs::create_directories(folder / target);
+    make_meshes(folder / "mesh");
+    make_trees(folder / "tree");
+    make_drives(folder / "follow");
+} catch (const std::exception& error) {
+    std::fprintf(stderr, "make_fuzz_seeds: %s\n", error.what());
+    return 1;
+}
