@@ -143,6 +143,7 @@ struct Kernel {
     decltype(&vdtree::find_slacks) find_slacks;
     decltype(&vdtree::finish_slacks) finish_slacks;
     decltype(&vdtree::facing_gaps) facing_gaps;
+    decltype(&vdtree::test) test;
     decltype(&vdtree::decide) decide;
     decltype(&vdtree::decide_range) decide_range;
     decltype(&vdtree::find_costs) find_costs;
@@ -154,7 +155,7 @@ struct Kernel {
 
 template <class Of>
 constexpr Kernel kernel_of() {
-    return {Of::measure, Of::find_slacks, Of::finish_slacks, Of::facing_gaps, Of::decide, Of::decide_range, Of::find_costs,
+    return {Of::measure, Of::find_slacks, Of::finish_slacks, Of::facing_gaps, Of::test, Of::decide, Of::decide_range, Of::find_costs,
             Of::find_cost_bounds, Of::move_blocks, Of::look_at_blocks, Of::find_due};
 }
 
@@ -176,6 +177,8 @@ void find_slacks(const KernelView& view, SlackBatch& batch) noexcept { kernel.fi
 void finish_slacks(const KernelView& view, const FoldBatch& batch, Findings& findings) noexcept { kernel.finish_slacks(view, batch, findings); }
 
 void facing_gaps(const FacingBatch& batch, FacingGaps& gaps) noexcept { kernel.facing_gaps(batch, gaps); }
+
+void test(const KernelView& view, std::span<const FoldCandidate* const> lanes, TestBatch& tested) noexcept { kernel.test(view, lanes, tested); }
 
 void decide(const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes, std::uint64_t* unfolded) noexcept {
     kernel.decide(view, arrays, nodes, unfolded);

@@ -81,6 +81,28 @@ void find_costs(const KernelView& view, const NodeArrays& arrays, const CostTabl
 void find_cost_bounds(const KernelView& view, const NodeArrays& arrays, const CostTables& tables, std::span<const NodeId> nodes,
                       float no_outline_over, float* cost, float* seen_cost) noexcept;
 
+// What a test reads of a node, in one cache line.
+struct alignas(64) FoldCandidate {
+    Sphere sphere;           // whose distance counts
+    float length = 0, silhouette_length = 0;
+    FoldClass rows;
+    Sphere ring;             // whose facing counts
+    NormalSlabs slabs;       // of the directions in the ring
+    std::uint8_t flags = 0;  // NodeFlags
+    bool is_unfolded = false; // for the one who keeps it; tests do not ask
+    NodeId node = no_node;
+};
+static_assert(sizeof(FoldCandidate) == 64);
+
+// Verdicts on up to sixteen candidates without lights, with their slacks (see Verdict in fold_tester.h); a bit a lane.
+struct TestBatch {
+    alignas(64) float position_slack[kernel_lanes], facing_slack[kernel_lanes];
+    std::uint32_t unfolded = 0;
+};
+void test(const KernelView& view, std::span<const FoldCandidate* const> lanes, TestBatch& tested) noexcept;
+
+// The same in stages, for those that do something in between.
+//
 // Sixteen nodes.
 struct FoldBatch {
     alignas(64) float centre[3][kernel_lanes];

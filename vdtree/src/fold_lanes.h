@@ -171,11 +171,12 @@ struct Lanes {
     // While the clock advances by `path`, the gaze turns by path * turn_per_length, and a point at least `gap` away shifts by
     // asin(step / rest) for each step, the rest of the gap being what longest_path leaves: less than shift_per_gap * path / gap
     // in all.
-    static UNSEEN_INLINE void find_slacks(const KernelView& view, SlackBatch& batch, std::size_t first) {
-        const Floats gap = load(batch.gap + first), inward = load(batch.inward + first), length = load(batch.length + first);
-        const Floats eccentricity = load(batch.eccentricity + first);
-        const Floats other_length = load(batch.silhouette_length + first);
-        const Ints row = load(batch.row + first), other_row = load(batch.silhouette_row + first), bin = load(batch.bin + first);
+    struct SlackQuery {
+        Floats gap, inward, eccentricity, length, other_length;
+        Ints row, other_row, bin;
+    };
+    static UNSEEN_INLINE Floats slack(const KernelView& view, const SlackQuery& of) {
+        const auto& [gap, inward, eccentricity, length, other_length, row, other_row, bin] = of;
         const auto within = [&](const Ints& at) UNSEEN_INLINE_LAMBDA {
             return max_of(distances(view, row, at, length), distances(view, other_row, at, other_length));
         };
@@ -199,32 +200,45 @@ struct Lanes {
         }
         // From inside, or nearly, the eccentricity may be anything soon.
         const Floats anywhere = (within(last) - gap) * inward;
-        best = (gap > 0) | (inward < 0) ? best : max_of(anywhere, all(0));
-        store(batch.slack + first, best);
+        return (gap > 0) | (inward < 0) ? best : max_of(anywhere, all(0));
     }
     static UNSEEN_INLINE void find_slacks(const KernelView& view, SlackBatch& batch) {
-        for (std::size_t first = 0; first < kernel_lanes; first += width) find_slacks(view, batch, first);
+        for (std::size_t i = 0; i < kernel_lanes; i += width)
+            store(batch.slack + i, slack(view, {load(batch.gap + i), load(batch.inward + i), load(batch.eccentricity + i), load(batch.length + i),
+                                                load(batch.silhouette_length + i), load(batch.row + i), load(batch.silhouette_row + i),
+                                                load(batch.bin + i)}));
+    }
+
+    // Brings both slacks to what they are in all.
+    struct Slacks {
+        Floats position, facing;
+    };
+    struct Verdicts {
+        Ints unfolded, outside, away;
+    };
+    static UNSEEN_INLINE Slacks finished(const Slacks& found, const Verdicts& verdicts, const Floats& distance, const Floats& radius, const Floats& height) {
+        const Floats inexact = (distance + radius) * position_rounding;
+        const Floats position = verdicts.outside | verdicts.away ? all(huge) : max_of(found.position - inexact, all(0));
+        Floats facing = found.facing - distance * facing_rounding;
+        facing = verdicts.unfolded ? min_of(facing, height - inexact) : facing;
+        facing = verdicts.outside ? -height - inexact : facing;
+        return {position, max_of(facing, all(0))};
     }
 
     static UNSEEN_INLINE void finish_slacks(const KernelView& view, const FoldBatch& batch, Findings& findings, std::size_t first) {
         const Ints unfolded = mask_of(findings.unfolded, first), silhouettes = mask_of(findings.silhouettes, first);
-        const Ints outside = ~mask_of(batch.is_inside, first), away = mask_of(findings.away, first);
-        const Floats gap = load(batch.gap + first), distance = load(batch.distance + first), height = load(batch.height + first);
-        const Floats inexact = (distance + load(batch.radius + first)) * position_rounding;
         Floats position;
         if (view.has_gaze) {
             position = load(findings.position_slack + first);
         } else {
-            const Floats reach = silhouettes ? load(batch.silhouette + first) : load(batch.interior + first);
+            const Floats gap = load(batch.gap + first), reach = silhouettes ? load(batch.silhouette + first) : load(batch.interior + first);
             position = unfolded ? reach - gap : gap - reach;
         }
-        position = max_of(position - inexact, all(0));
-        position = outside | away ? all(huge) : position;
-        Floats facing = load(findings.facing_slack + first) - distance * facing_rounding;
-        facing = unfolded ? min_of(facing, height - inexact) : facing;
-        facing = outside ? -height - inexact : facing;
-        store(findings.position_slack + first, position);
-        store(findings.facing_slack + first, max_of(facing, all(0)));
+        const Slacks slacks = finished({position, load(findings.facing_slack + first)},
+                                       {unfolded, ~mask_of(batch.is_inside, first), mask_of(findings.away, first)}, load(batch.distance + first),
+                                       load(batch.radius + first), load(batch.height + first));
+        store(findings.position_slack + first, slacks.position);
+        store(findings.facing_slack + first, slacks.facing);
     }
     static UNSEEN_INLINE void finish_slacks(const KernelView& view, const FoldBatch& batch, Findings& findings) {
         for (std::size_t first = 0; first < kernel_lanes; first += width) finish_slacks(view, batch, findings, first);
@@ -402,6 +416,73 @@ struct Lanes {
             });
         }
         return nodes;
+    }
+
+    // ---- tests with slacks, from what a test reads of a node to its verdict
+
+    struct Candidates {
+        Nodes nodes;
+        Floats ring[3], ring_radius;
+        Words words;
+    };
+    template <class At>
+    static UNSEEN_INLINE Candidates load_candidates(At at) {
+        static_assert(offsetof(FoldCandidate, length) == 16 && offsetof(FoldCandidate, rows) == 24 && offsetof(FoldCandidate, ring) == 28 &&
+                      offsetof(FoldCandidate, slabs) == 44 && offsetof(FoldCandidate, flags) == 58);
+        static_assert(sizeof(FoldClass) == 4 && offsetof(FoldClass, interior) == 0 && std::endian::native == std::endian::little);
+        Floats c[16];
+        for (std::size_t quarter = 0; quarter < 4; ++quarter)
+            Vectors::load_columns([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return reinterpret_cast<const std::byte*>(at(lane)) + 16 * quarter; },
+                                  c + 4 * quarter);
+        const auto bits = [&](std::size_t column) UNSEEN_INLINE_LAMBDA { return reinterpret_cast<Ints>(c[column]); };
+        const Ints interior_row = bits(6) & 0xffff, silhouette_row = (bits(6) >> 16) & 0xffff;
+        return {{{c[0], c[1], c[2]}, c[3], c[4], c[5], interior_row, silhouette_row}, {c[7], c[8], c[9]}, c[10], {{bits(11), bits(12), bits(13), bits(14)}}};
+    }
+
+    template <class At>
+    static UNSEEN_INLINE void test(const KernelView& view, At at, TestBatch& tested, std::size_t first) {
+        const Candidates of = load_candidates(at);
+        const Measures m = measure(view, of.nodes);
+        Ints unfolded = m.is_inside & m.is_near, silhouettes = ~m.is_near, away = {};
+        const Floats always = all(std::numeric_limits<float>::infinity());
+        Floats facing = always;
+        if (any(m.is_asked)) {
+            Floats towards[3];
+            for (int k = 0; k < 3; ++k) towards[k] = (view.eye_high[k] - of.ring[k]) + view.eye_low[k];
+            const Gaps gaps = find_gaps<false>(towards, of.ring_radius, Ints{}, [&](std::size_t axis) UNSEEN_INLINE_LAMBDA { return of.words.slab(axis); });
+            // An outline from everywhere; and what has no triangle with an area.
+            const Ints irregular = (of.words.template byte<14>() & std::int32_t{irregular_ring}) != 0;
+            const Ints empty = of.words.template byte<0>() > of.words.template byte<NormalSlabs::axis_count>();
+            const Floats &shown = view.is_inside_out ? gaps.back : gaps.front, &hidden = view.is_inside_out ? gaps.front : gaps.back;
+            const Floats front = irregular ? -always : empty ? always : shown, back = irregular | empty ? -always : hidden;
+            const Ints is_silhouette = ~((front > 0) | (back > 0));
+            away = view.near_ones_too ? m.is_asked & (back > 0) : Ints{};
+            const Ints unfolds = m.is_near | (is_silhouette & (m.gap < m.silhouette));
+            unfolded = m.is_asked ? unfolds & ~away : unfolded;
+            silhouettes = m.is_asked ? is_silhouette & ~m.is_near : silhouettes;
+            // Within the interior's distance nothing but facing away folds it.
+            const Floats near = view.near_ones_too ? -back : always;
+            const Floats far = is_silhouette ? min_of(-front, -back) : max_of(front, back);
+            facing = m.is_asked ? (away ? back : m.is_near ? near : far) : facing;
+        }
+        Floats position;
+        if (view.has_gaze) {
+            position = slack(view, {m.gap, unfolded ? all(1) : all(-1), m.eccentricity, of.nodes.length,
+                                    silhouettes ? of.nodes.silhouette_length : of.nodes.length, of.nodes.interior_row,
+                                    silhouettes ? of.nodes.silhouette_row : of.nodes.interior_row, m.bin});
+        } else {
+            const Floats reach = silhouettes ? m.silhouette : m.interior;
+            position = unfolded ? reach - m.gap : m.gap - reach;
+        }
+        const Slacks slacks = finished({position, facing}, {unfolded, ~m.is_inside, away}, m.distance, of.nodes.radius, m.height);
+        store(tested.position_slack + first, slacks.position);
+        store(tested.facing_slack + first, slacks.facing);
+        tested.unfolded |= bits_of(unfolded) << first;
+    }
+    static UNSEEN_INLINE void test(const KernelView& view, std::span<const FoldCandidate* const> lanes, TestBatch& tested) {
+        tested.unfolded = 0;
+        for (std::size_t first = 0; first < lanes.size(); first += width)
+            test(view, [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return lanes[std::min(first + lane, lanes.size() - 1)]; }, tested, first);
     }
 
     struct Facings {
@@ -705,6 +786,7 @@ struct Kernels {
         Lanes::finish_slacks(view, batch, findings);
     }
     static void facing_gaps(const FacingBatch& batch, FacingGaps& gaps) noexcept { Lanes::run(batch, gaps); }
+    static void test(const KernelView& view, std::span<const FoldCandidate* const> lanes, TestBatch& tested) noexcept { Lanes::test(view, lanes, tested); }
     static void decide(const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes, std::uint64_t* unfolded) noexcept {
         Lanes::decide(view, arrays, nodes, unfolded);
     }

@@ -310,6 +310,19 @@ void FoldTester::leave_room_for_lights(LitFindings& lit, FoldBatch& batch, const
 }
 
 void FoldTester::test_batch(Lanes lanes, Verdict* verdicts, bool costs) const {
+    if (lit_ || costs) return test_in_stages(lanes, verdicts, costs);
+    TestBatch tested;
+    vdtree::test(view_, lanes, tested);
+    for (std::size_t i = 0; i < lanes.size(); ++i) {
+        verdicts[i].position_slack = tested.position_slack[i];
+        verdicts[i].facing_slack = tested.facing_slack[i];
+        verdicts[i].light_slack = infinity;
+        verdicts[i].unfolded = (tested.unfolded >> i) & 1;
+    }
+}
+
+// For lights, and for costs.
+void FoldTester::test_in_stages(Lanes lanes, Verdict* verdicts, bool costs) const {
     FoldBatch batch;
     load(lanes, batch);
     LitFindings lit;

@@ -32,19 +32,6 @@ struct Motion {
     double light = 0;    // of the lights, in lengths; see light_weight
 };
 
-// What a test reads of a node, in one cache line.
-struct alignas(64) FoldCandidate {
-    Sphere sphere;           // whose distance counts
-    float length = 0, silhouette_length = 0;
-    FoldClass rows;
-    Sphere ring;             // whose facing counts
-    NormalSlabs slabs;       // of the directions in the ring
-    std::uint8_t flags = 0;  // NodeFlags
-    bool is_unfolded = false; // for the one who keeps it; tests do not ask
-    NodeId node = no_node;
-};
-static_assert(sizeof(FoldCandidate) == 64);
-
 class FoldTester {
 public:
     // Nodes unfold where their seen cost exceeds `threshold`; without `least_costs`, where their cost does. Cost: a copy of the
@@ -94,6 +81,7 @@ private:
 
     void test_nodes(std::span<const NodeId> nodes, std::span<Verdict> verdicts, bool costs) const;
     void test_batch(Lanes lanes, Verdict* verdicts, bool costs) const;
+    void test_in_stages(Lanes lanes, Verdict* verdicts, bool costs) const;
     void find_facings(Lanes lanes, const FoldBatch& batch, bool costs, Findings& findings) const;
     void find_position_slacks(const FoldBatch& batch, Findings& findings) const;
     void light(Lanes lanes, FoldBatch& batch, LitFindings& lit) const;
