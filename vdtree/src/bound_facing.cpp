@@ -191,34 +191,43 @@ private:
     std::array<Target, NormalBatch::capacity> targets_;
 };
 
-// What a node of another part is to know of what a leaf sees.
-struct Letter {
-    Directions content;
-    NodeId to;
-};
-
 class FacingBounder {
 public:
     FacingBounder(const BoundInput& input, std::span<const Triangle> triangles, const LeafPlaces& places, std::span<const Sphere> support,
                   const Ancestors& ancestors)
         : in_(input), triangles_(triangles), places_(places), support_(support), ancestors_(ancestors), facing_(input.shape.interior()),
-          welded_(std::find(places.alone.begin(), places.alone.end(), 0) == places.alone.end() ? 0 : input.shape.leaves()) {}
+          welded_number_(input.shape.leaves()) {
+        Index welded = 0;
+        for (Index leaf = 0; leaf < input.shape.leaves(); ++leaf) welded_number_[leaf] = places.alone[leaf] ? welded : welded++;
+        welded_.resize(welded);
+    }
 
     ParallelArray<Directions> run() {
-        std::vector<std::vector<Letter>> outgoing(in_.parts.count());
-        tbb::parallel_for(std::size_t{0}, outgoing.size(), [&](std::size_t i) { outgoing[i] = look_around(in_.parts[i]); });
-        for (const std::vector<Letter>& out : outgoing)
-            for (const Letter& letter : out) facing_[letter.to] |= letter.content;
+        std::vector<Outcome> outcomes(in_.parts.count());
+        tbb::parallel_for(std::size_t{0}, outcomes.size(), [&](std::size_t i) { look_around(in_.parts[i], outcomes[i]); });
         // The dilation runs over places: an unwelded crease is no end of the surface.
-        for (Index leaf = 0; leaf < welded_.size(); ++leaf)
-            if (places_.weld[leaf] != leaf) welded_[places_.weld[leaf]] |= welded_[leaf];
-        in_.parts.bottom_up([&] { return [&](NodeId node) { collect(node); }; });
+        for (Index leaf = 0; leaf < in_.shape.leaves(); ++leaf)
+            if (places_.weld[leaf] != leaf) welded(places_.weld[leaf]) |= welded(leaf);
+        tbb::parallel_for(std::size_t{0}, outcomes.size(), [&](std::size_t i) { look_across_welds(in_.parts[i], outcomes[i]); });
+        for (const Outcome& outcome : outcomes)
+            for (const Letter& letter : outcome.letters) facing_[letter.to] |= letter.content;
+        in_.parts.bottom_up([&] { return [&](NodeId node) { add_children(node); }; });
         return std::move(facing_);
     }
 
 private:
+    // What a part's leaves see that nodes of other parts are to know, and those that have not seen all.
+    struct Letter {
+        Directions content;
+        NodeId to;
+    };
+    struct Outcome {
+        std::vector<Letter> letters;
+        std::vector<Index> at_welds;
+    };
+
     // What the part's nodes see when they fold, and what is around its leaves.
-    std::vector<Letter> look_around(const TreePart& part) {
+    void look_around(const TreePart& part, Outcome& out) {
         const OwnLeaves leaves(in_, part);
         std::vector<Directions> around(leaves.size());
         {
@@ -238,9 +247,9 @@ private:
         }
         for (Index i = 0; i < leaves.size(); ++i) {
             around[i].mark(places_.irregular[leaves[i]]);
-            if (!is_alone(leaves[i])) welded_[leaves[i]] = around[i];
+            if (!places_.alone[leaves[i]]) welded(leaves[i]) = around[i];
         }
-        return spread(part, leaves, around);
+        spread(part, leaves, around, out);
     }
 
     // The leaves of a part, and their numbers among them.
@@ -263,6 +272,45 @@ private:
         std::vector<Index> scattered_; // above the other parts: ascending
     };
 
+    // Each leaf hears what is around itself and its neighbours, but for welds; those in other parts get a letter.
+    void spread(const TreePart& part, const OwnLeaves& leaves, std::span<const Directions> around, Outcome& out) {
+        for (Index i = 0; i < leaves.size(); ++i) {
+            const auto ring = in_.rings.around(leaves[i]);
+            if (ring.empty()) continue; // no triangle uses it
+            const bool alone = places_.alone[leaves[i]];
+            bool at_weld = !alone;
+            Directions seen = alone ? around[i] : Directions();
+            for (const Index neighbour : ring) {
+                const bool neighbour_alone = places_.alone[neighbour];
+                if (!neighbour_alone) at_weld = true;
+                if (!in_.parts.owns_leaf(part, neighbour)) {
+                    if (alone) out.letters.push_back({around[i], listener(neighbour)});
+                } else if (neighbour_alone) {
+                    seen |= around[leaves.number(neighbour)];
+                }
+            }
+            if (at_weld) out.at_welds.push_back(leaves[i]);
+            tell(part, listener(leaves[i]), seen, out);
+        }
+    }
+
+    void look_across_welds(const TreePart& part, Outcome& out) {
+        for (const Index leaf : out.at_welds) {
+            Directions seen;
+            const auto look = [&](Index other) {
+                if (!places_.alone[other]) seen |= welded(places_.weld[other]);
+            };
+            look(leaf);
+            for (const Index neighbour : in_.rings.around(leaf)) look(neighbour);
+            tell(part, listener(leaf), seen, out);
+        }
+    }
+
+    void tell(const TreePart& part, NodeId node, const Directions& seen, Outcome& out) {
+        if (in_.parts.owns(part, node)) facing_[node] |= seen;
+        else out.letters.push_back({seen, node});
+    }
+
     // The node that is to know what its leaf sees: those whose leaves are at one point do not.
     NodeId listener(Index leaf) const {
         NodeId node = in_.shape.parents[in_.shape.node_of_leaf(leaf)];
@@ -270,59 +318,17 @@ private:
         return node;
     }
 
-    // Each leaf hears what is around its neighbours; those in other parts get a letter.
-    std::vector<Letter> spread(const TreePart& part, const OwnLeaves& leaves, std::span<const Directions> around) {
-        std::vector<Letter> out;
-        const auto write = [&](NodeId to, const Directions& seen) {
-            out.push_back({seen, to});
-        };
-        for (Index i = 0; i < leaves.size(); ++i) {
-            const auto ring = in_.rings.around(leaves[i]);
-            if (ring.empty()) continue; // no triangle uses it
-            const bool alone = is_alone(leaves[i]);
-            Directions seen = alone ? around[i] : Directions();
-            for (const Index neighbour : ring) {
-                if (!in_.parts.owns_leaf(part, neighbour)) {
-                    if (alone) write(listener(neighbour), around[i]);
-                } else if (is_alone(neighbour)) {
-                    seen |= around[leaves.number(neighbour)];
-                }
-            }
-            const NodeId node = listener(leaves[i]);
-            if (in_.parts.owns(part, node)) facing_[node] |= seen;
-            else write(node, seen);
-        }
-        return out;
-    }
-
-    bool is_alone(Index leaf) const { return welded_.size() == 0 || places_.alone[leaf]; }
-
-    // What is left to do when the leaves have told their neighbours.
-    void collect(NodeId node) {
+    void add_children(NodeId node) {
         if (support_[node].radius == 0) {
             facing_[node] = {};
             return;
         }
         Directions seen = facing_[node];
-        const auto hear = [&](Index leaf) {
-            if (!is_alone(leaf)) seen |= welded_[places_.weld[leaf]];
-        };
-        const auto add_leaf = [&](Index leaf) {
-            const auto ring = in_.rings.around(leaf);
-            if (welded_.size() == 0 || ring.empty()) return;
-            hear(leaf);
-            for (const Index neighbour : ring) hear(neighbour);
-        };
-        in_.shape.for_each_child(
-            node,
-            [&](NodeId child) {
-                seen |= facing_[child];
-                if (support_[child].radius == 0) // it has none of its own
-                    for (Index leaf = in_.shape.first_leaf[child]; leaf < in_.shape.leaf_end[child]; ++leaf) add_leaf(leaf);
-            },
-            add_leaf);
+        in_.shape.for_each_child(node, [&](NodeId child) { seen |= facing_[child]; }, [](Index) {});
         facing_[node] = seen;
     }
+
+    Directions& welded(Index leaf) { return welded_[welded_number_[leaf]]; }
 
     const BoundInput& in_;
     std::span<const Triangle> triangles_;
@@ -330,7 +336,8 @@ private:
     std::span<const Sphere> support_;
     const Ancestors& ancestors_;
     ParallelArray<Directions> facing_; // by node
-    ParallelArray<Directions> welded_; // by leaf that is not alone at its place: what is around it; empty where there are none
+    std::vector<Index> welded_number_; // by leaf: among those that are not alone at their places
+    std::vector<Directions> welded_;   // by these: what is around them, and then around all of the place
 };
 
 } // namespace
