@@ -195,7 +195,7 @@ class FacingBounder {
 public:
     FacingBounder(const BoundInput& input, std::span<const Triangle> triangles, const LeafPlaces& places, std::span<const Sphere> support,
                   const Ancestors& ancestors)
-        : in_(input), triangles_(triangles), places_(places), support_(support), ancestors_(ancestors), facing_(input.shape.interior()),
+        : in_(input), triangles_(triangles), places_(places), support_(support), ancestors_(ancestors), facing_(input.shape.interior(), Unfilled()),
           welded_number_(input.shape.leaves()) {
         Index welded = 0;
         for (Index leaf = 0; leaf < input.shape.leaves(); ++leaf) welded_number_[leaf] = places.alone[leaf] ? welded : welded++;
@@ -228,6 +228,8 @@ private:
 
     // What the part's nodes see when they fold, and what is around its leaves.
     void look_around(const TreePart& part, Outcome& out) {
+        for (NodeId node = part.begin; node < part.end; ++node)
+            if (in_.parts.owns(part, node)) facing_[node] = {};
         const OwnLeaves leaves(in_, part);
         std::vector<Directions> around(leaves.size());
         {

@@ -60,8 +60,8 @@ private:
                     points += 1 + ring.size();
                 });
             heights_[nodes[i]] = below + 1;
-            constexpr std::uint64_t most = 255;
-            sorted_.push_back({std::uint64_t{below} << 16 | std::min(children, most) << 8 | std::min(points, most), nodes[i]});
+            constexpr std::uint64_t most_children = 3, most_points = 63; // a byte for both
+            sorted_.push_back({std::uint64_t{below} << 8 | std::min(children, most_children) << 6 | std::min(points, most_points), nodes[i]});
         }
         scratch_.resize(sorted_.size());
         sort_by_code(sorted_, scratch_);
