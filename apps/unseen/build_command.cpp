@@ -4,8 +4,13 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <memory>
 #include <thread>
+
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include "build_team.h"
 #include "command.h"
@@ -191,7 +196,16 @@ Result<int> help(const BuildArguments& a, ProcessTeam& team) {
     return ok ? exit_done : exit_failed;
 }
 
+// A build gives large blocks back and asks for others all the time. What the process keeps, the system need not clear again.
+void keep_freed_memory() {
+#ifdef __GLIBC__
+    ::mallopt(M_MMAP_MAX, 0);
+    ::mallopt(M_TRIM_THRESHOLD, std::numeric_limits<int>::max());
+#endif
+}
+
 Result<int> run(const BuildArguments& a) {
+    if (a.memory_gib == 0) keep_freed_memory();
     const auto team = ProcessTeam::join();
     if (!team) return team.error();
     ProcessTeam* members = team->get();

@@ -221,6 +221,64 @@ TEST(EnclosingSphere, KeepsASphereThatContainsTheOthers) {
     EXPECT_LE(sphere.radius, 1 + promised_excess);
 }
 
+// What a lane holds, and what is promised of its sphere.
+struct Lane {
+    std::vector<glm::vec3> points;
+    std::vector<Sphere> spheres;
+
+    void expect_enclosed_by(const Sphere& sphere, double slack) const {
+        Points wide_points(points.begin(), points.end());
+        std::vector<DSphere> wide_spheres;
+        for (const Sphere& s : spheres) wide_spheres.push_back({glm::dvec3(s.centre), s.radius});
+        for (const glm::dvec3& p : wide_points) ASSERT_TRUE(support::contains(sphere, p, 0));
+        for (const DSphere& s : wide_spheres) ASSERT_TRUE(support::contains(sphere, s.centre, s.radius));
+        constexpr double float_rounding = 2e-7; // of the centre's coordinates, and of the radius
+        const DSphere about = enclosing_sphere(wide_points, wide_spheres);
+        ASSERT_LE(sphere.radius, about.radius * (1 + slack + float_rounding) + float_rounding * glm::length(about.centre))
+            << points.size() << " points, " << spheres.size() << " spheres";
+    }
+};
+
+TEST(BallLanes, EncloseEachLaneOnItsOwn) {
+    constexpr double slack = 1e-3;
+    std::mt19937_64 random(5);
+    const std::vector<NamedPoints> sets = point_sets();
+    BallLanes balls;
+    for (const float scale : {1.0f, 1e-19f, 1e30f}) {
+        for (int round = 0; round < 100; ++round) {
+            std::vector<Lane> lanes(1 + random() % BallLanes::lanes);
+            std::vector<Sphere> spheres(lanes.size());
+            for (std::size_t i = 0; i < lanes.size(); ++i) {
+                for (const glm::dvec3& p : sets[random() % sets.size()].make(random)) {
+                    const glm::vec3 at = glm::vec3(p) * scale;
+                    if (lanes[i].points.empty() || random() % 3 > 0) lanes[i].points.push_back(at);
+                    else lanes[i].spheres.push_back({at, scale * static_cast<float>(std::pow(10.0, random_between(random, -3, 0.5)))});
+                }
+                balls.begin(i, lanes[i].points[0]);
+                for (std::size_t k = 1; k < lanes[i].points.size(); ++k) balls.add(i, lanes[i].points[k]);
+                for (const Sphere& s : lanes[i].spheres) balls.add(i, s);
+            }
+            balls.enclose(slack, spheres);
+            for (std::size_t i = 0; i < lanes.size(); ++i) lanes[i].expect_enclosed_by(spheres[i], slack);
+            // And with more of one, and less of the other.
+            for (std::size_t i = 0; i < lanes.size(); ++i) {
+                std::vector<glm::vec3> more;
+                std::vector<Index> which;
+                for (const glm::dvec3& p : sets[random() % sets.size()].make(random)) {
+                    more.push_back(glm::vec3(p) * scale);
+                    if (random() % 2 == 0) which.push_back(static_cast<Index>(more.size() - 1));
+                }
+                balls.add(i, more, which);
+                for (const Index k : which) lanes[i].points.push_back(more[k]);
+                balls.forget_spheres(i);
+                lanes[i].spheres.clear();
+            }
+            balls.enclose(slack, spheres);
+            for (std::size_t i = 0; i < lanes.size(); ++i) lanes[i].expect_enclosed_by(spheres[i], slack);
+        }
+    }
+}
+
 TEST(RoundOutward, ContainsTheSphereExactly) {
     std::mt19937_64 random(4);
     for (int round = 0; round < 300'000; ++round) {

@@ -22,49 +22,49 @@ constexpr std::uint16_t most_border_triangles = 1024;
 
 constexpr Index never = std::numeric_limits<Index>::max();
 
-// Follows single triangles through the folds in the order in which the clusterer made them: whenever a corner moves to a
+// Follows single triangles through the folds of a part in the order in which the clusterer made them: whenever a corner moves to a
 // proxy, the node of the proxy sees the triangle as it is then, until two corners meet and the triangle vanishes.
 //
 // Each step changes the node above one corner, and its number in the order of making grows from step to step, so it is the
 // order of making that decides which corner moves next: nothing but the triangle's own ancestors has to be known.
 class Folds {
 public:
-    Folds(const BoundInput& input, const Ancestors& ancestors)
-        : in_(input), ancestors_(ancestors), steps_(input.shape.parents.size()), border_(input.shape.interior(), 0) {
-        const TreeShape& shape = input.shape;
-        tbb::parallel_for(NodeId{0}, static_cast<NodeId>(steps_.size()), [&](NodeId node) {
-            const NodeId above = shape.parents[node];
-            const bool is_top = above == no_node || input.parts.is_top(node < shape.interior() ? node : above);
-            const bool is_followed = above != no_node && input.parts.is_top(above) == is_top;
-            steps_[node] = {input.positions[node], above, is_followed ? shape.made[above] : never};
-        });
+    Folds(const BoundInput& input, const Ancestors& ancestors, const TreePart& part)
+        : in_(input), ancestors_(ancestors), part_(part), is_top_(input.parts.is_top(part)), border_(part.end - part.begin, 0) {
+        if (is_top_) return; // it owns few of the nodes between its ends
+        steps_.reserve(part.end - part.begin + part.leaf_end - part.first_leaf);
+        for (NodeId node = part.begin; node < part.end; ++node) steps_.push_back(step_from(node));
+        for (Index leaf = part.first_leaf; leaf < part.leaf_end; ++leaf) steps_.push_back(step_from(input.shape.node_of_leaf(leaf)));
     }
 
     // Calls see(no_node, corners) for the triangle as it is, then see(node, corners) for each such view from a node of the part,
     // with the triangle's corners in order. Corners outside of the part are looked up when they are needed.
     template <class See>
-    void follow(const Triangle& triangle, const TreePart& part, See&& see) {
+    void follow(const Triangle& triangle, See&& see) {
         Corners c;
+        bool is_here[3];
         for (std::size_t k = 0; k < 3; ++k) {
             const NodeId leaf = in_.shape.node_of_leaf(triangle[k]);
-            c.put(k, leaf, steps_[leaf]);
+            is_here[k] = in_.parts.owns_leaf(part_, triangle[k]);
+            if (is_here[k] && !is_top_) c.put(k, leaf, steps_[part_.end - part_.begin + triangle[k] - part_.first_leaf]);
+            else c.put(k, leaf, step_from(leaf));
         }
         see(no_node, c.at);
         for (std::size_t k = 0; k < 3; ++k) {
-            if (in_.parts.owns_leaf(part, triangle[k])) continue;
+            if (is_here[k]) continue;
             c.current[k] = false;
             c.next[k] = never;
-            if (!in_.parts.is_top(0) || !in_.parts.owns(part, 0)) continue;
+            if (!is_top_ || !in_.parts.is_top(0)) continue;
             // Of the nodes above the other parts, the first is looked for.
             c.above[k] = ancestors_.lowest(c.above[k], [&](NodeId node) { return in_.parts.is_top(node); });
             c.next[k] = in_.shape.made[c.above[k]];
         }
-        if (c.current[0] && c.current[1] && c.current[2]) follow_all(c, see);
+        if (c.current[0] && c.current[1] && c.current[2] && !is_top_) follow_all(c, see);
         else follow_some(c, see);
     }
 
     // Whether more triangles came by than were followed. To be asked when all have been.
-    bool too_many(NodeId node) const { return border_[node] > most_border_triangles; }
+    bool too_many(NodeId node) const { return border_[node - part_.begin] > most_border_triangles; }
 
 private:
     // What a corner has to know when it comes to a node, in one piece.
@@ -73,6 +73,14 @@ private:
         NodeId above;
         Index next; // when the corner moves on, to the node above; never: the part ends here
     };
+
+    Step step_from(NodeId node) const {
+        const NodeId above = in_.shape.parents[node];
+        const bool is_followed = above != no_node && in_.parts.owns(part_, above);
+        return {in_.positions[node], above, is_followed ? in_.shape.made[above] : never};
+    }
+    // Of an interior node of the part.
+    Step step_of(NodeId node) const { return is_top_ ? step_from(node) : steps_[node - part_.begin]; }
 
     // A triangle while it is followed.
     struct Corners {
@@ -100,13 +108,14 @@ private:
             if (first + second + third != 1) return;
             const std::size_t k = second + 2 * third;
             const NodeId node = c.above[k];
-            const Step& step = steps_[node];
-            if (border_[node] > most_border_triangles || step.next == never) return follow_some(c, see);
+            const Step& step = steps_[node - part_.begin];
+            std::uint16_t& border = border_[node - part_.begin];
+            if (border > most_border_triangles || step.next == never) return follow_some(c, see);
             std::memcpy(&c.at[k], &step, sizeof(Corner));
             c.nodes[k] = node;
             c.above[k] = step.above;
             c.next[k] = step.next;
-            ++border_[node];
+            ++border;
             see(node, c.at);
         }
     }
@@ -120,8 +129,9 @@ private:
             if (moves[0] + moves[1] + moves[2] != 1) return; // two corners meet, or none is followed
             const std::size_t k = moves[1] + 2u * moves[2];
             const NodeId node = c.above[k];
-            c.put(k, node, steps_[node]);
-            if (border_[node] > most_border_triangles) {
+            c.put(k, node, step_of(node));
+            std::uint16_t& border = border_[node - part_.begin];
+            if (border > most_border_triangles) {
                 // It faces everywhere already, and so do the nodes above: what they see is of no interest any more.
                 c.current[k] = false;
                 c.next[k] = never;
@@ -130,21 +140,24 @@ private:
             for (std::size_t other = 0; other < 3; ++other) {
                 if (c.current[other] || other == k) continue;
                 c.nodes[other] = ancestors_.highest_made_by(c.nodes[other], now);
-                std::memcpy(&c.at[other], &steps_[c.nodes[other]], sizeof(Corner));
+                const glm::vec3& at = in_.positions[c.nodes[other]];
+                c.at[other] = Corner{at.x, at.y, at.z, 0};
             }
             if (c.nodes[0] == c.nodes[1] || c.nodes[1] == c.nodes[2] || c.nodes[2] == c.nodes[0]) return;
-            ++border_[node];
+            ++border;
             see(node, c.at);
         }
     }
 
     const BoundInput& in_;
     const Ancestors& ancestors_;
-    ParallelArray<Step> steps_;         // by node
-    std::vector<std::uint16_t> border_; // by node: triangles around it after its fold, up to one too many
+    const TreePart& part_;
+    bool is_top_;
+    std::vector<Step> steps_;           // by node of the part, then by leaf; of those above the other parts none
+    std::vector<std::uint16_t> border_; // by node of the part: triangles around it after its fold, up to one too many
 };
 
-// Adds the directions of triangles to nodes, or to up to three leaves each, `none` standing for those to leave out: many at a time.
+// Adds the directions of triangles to up to `targets` each, `none` standing for those to leave out: many at a time.
 template <std::size_t targets>
 class Views {
 public:
@@ -178,58 +191,162 @@ private:
     std::array<Target, NormalBatch::capacity> targets_;
 };
 
+class FacingBounder {
+public:
+    FacingBounder(const BoundInput& input, std::span<const Triangle> triangles, const LeafPlaces& places, std::span<const Sphere> support,
+                  const Ancestors& ancestors)
+        : in_(input), triangles_(triangles), places_(places), support_(support), ancestors_(ancestors), facing_(input.shape.interior(), Unfilled()),
+          welded_number_(input.shape.leaves()) {
+        Index welded = 0;
+        for (Index leaf = 0; leaf < input.shape.leaves(); ++leaf) welded_number_[leaf] = places.alone[leaf] ? welded : welded++;
+        welded_.resize(welded);
+    }
+
+    ParallelArray<Directions> run() {
+        std::vector<Outcome> outcomes(in_.parts.count());
+        tbb::parallel_for(std::size_t{0}, outcomes.size(), [&](std::size_t i) { look_around(in_.parts[i], outcomes[i]); });
+        // The dilation runs over places: an unwelded crease is no end of the surface.
+        for (Index leaf = 0; leaf < in_.shape.leaves(); ++leaf)
+            if (places_.weld[leaf] != leaf) welded(places_.weld[leaf]) |= welded(leaf);
+        tbb::parallel_for(std::size_t{0}, outcomes.size(), [&](std::size_t i) { look_across_welds(in_.parts[i], outcomes[i]); });
+        for (const Outcome& outcome : outcomes)
+            for (const Letter& letter : outcome.letters) facing_[letter.to] |= letter.content;
+        in_.parts.bottom_up([&] { return [&](NodeId node) { add_children(node); }; });
+        return std::move(facing_);
+    }
+
+private:
+    // What a part's leaves see that nodes of other parts are to know, and those that have not seen all.
+    struct Letter {
+        Directions content;
+        NodeId to;
+    };
+    struct Outcome {
+        std::vector<Letter> letters;
+        std::vector<Index> at_welds;
+    };
+
+    // What the part's nodes see when they fold, and what is around its leaves.
+    void look_around(const TreePart& part, Outcome& out) {
+        for (NodeId node = part.begin; node < part.end; ++node)
+            if (in_.parts.owns(part, node)) facing_[node] = {};
+        const OwnLeaves leaves(in_, part);
+        std::vector<Directions> around(leaves.size());
+        {
+            Folds folds(in_, ancestors_, part);
+            Views<1> by_node(facing_);
+            Views<3> by_leaf(around);
+            TreeParts::for_each_triangle(part, [&](Index t) {
+                const Triangle& corners = triangles_[t];
+                const auto number = [&](Index leaf) { return in_.parts.owns_leaf(part, leaf) ? leaves.number(leaf) : by_leaf.none; };
+                folds.follow(corners, [&](NodeId node, const Corner(&at)[3]) {
+                    if (node != no_node) by_node.add({node}, at);
+                    else by_leaf.add({number(corners[0]), number(corners[1]), number(corners[2])}, at);
+                });
+            });
+            for (NodeId node = part.begin; node < part.end; ++node)
+                if (folds.too_many(node)) facing_[node] = Directions::everything();
+        }
+        for (Index i = 0; i < leaves.size(); ++i) {
+            around[i].mark(places_.irregular[leaves[i]]);
+            if (!places_.alone[leaves[i]]) welded(leaves[i]) = around[i];
+        }
+        spread(part, leaves, around, out);
+    }
+
+    // The leaves of a part, and their numbers among them.
+    class OwnLeaves {
+    public:
+        OwnLeaves(const BoundInput& input, const TreePart& part) : first_(part.first_leaf), end_(part.leaf_end), is_top_(input.parts.is_top(part)) {
+            for (Index leaf = first_; is_top_ && leaf < end_; ++leaf)
+                if (input.parts.owns_leaf(part, leaf)) scattered_.push_back(leaf);
+        }
+        Index size() const { return is_top_ ? static_cast<Index>(scattered_.size()) : end_ - first_; }
+        Index operator[](Index i) const { return is_top_ ? scattered_[i] : first_ + i; }
+        Index number(Index leaf) const {
+            if (!is_top_) return leaf - first_;
+            return static_cast<Index>(std::lower_bound(scattered_.begin(), scattered_.end(), leaf) - scattered_.begin());
+        }
+
+    private:
+        Index first_, end_;
+        bool is_top_;
+        std::vector<Index> scattered_; // above the other parts: ascending
+    };
+
+    // Each leaf hears what is around itself and its neighbours, but for welds; those in other parts get a letter.
+    void spread(const TreePart& part, const OwnLeaves& leaves, std::span<const Directions> around, Outcome& out) {
+        for (Index i = 0; i < leaves.size(); ++i) {
+            const auto ring = in_.rings.around(leaves[i]);
+            if (ring.empty()) continue; // no triangle uses it
+            const bool alone = places_.alone[leaves[i]];
+            bool at_weld = !alone;
+            Directions seen = alone ? around[i] : Directions();
+            for (const Index neighbour : ring) {
+                const bool neighbour_alone = places_.alone[neighbour];
+                if (!neighbour_alone) at_weld = true;
+                if (!in_.parts.owns_leaf(part, neighbour)) {
+                    if (alone) out.letters.push_back({around[i], listener(neighbour)});
+                } else if (neighbour_alone) {
+                    seen |= around[leaves.number(neighbour)];
+                }
+            }
+            if (at_weld) out.at_welds.push_back(leaves[i]);
+            tell(part, listener(leaves[i]), seen, out);
+        }
+    }
+
+    void look_across_welds(const TreePart& part, Outcome& out) {
+        for (const Index leaf : out.at_welds) {
+            Directions seen;
+            const auto look = [&](Index other) {
+                if (!places_.alone[other]) seen |= welded(places_.weld[other]);
+            };
+            look(leaf);
+            for (const Index neighbour : in_.rings.around(leaf)) look(neighbour);
+            tell(part, listener(leaf), seen, out);
+        }
+    }
+
+    void tell(const TreePart& part, NodeId node, const Directions& seen, Outcome& out) {
+        if (in_.parts.owns(part, node)) facing_[node] |= seen;
+        else out.letters.push_back({seen, node});
+    }
+
+    // The node that is to know what its leaf sees: those whose leaves are at one point do not.
+    NodeId listener(Index leaf) const {
+        NodeId node = in_.shape.parents[in_.shape.node_of_leaf(leaf)];
+        while (support_[node].radius == 0 && node != 0) node = in_.shape.parents[node];
+        return node;
+    }
+
+    void add_children(NodeId node) {
+        if (support_[node].radius == 0) {
+            facing_[node] = {};
+            return;
+        }
+        Directions seen = facing_[node];
+        in_.shape.for_each_child(node, [&](NodeId child) { seen |= facing_[child]; }, [](Index) {});
+        facing_[node] = seen;
+    }
+
+    Directions& welded(Index leaf) { return welded_[welded_number_[leaf]]; }
+
+    const BoundInput& in_;
+    std::span<const Triangle> triangles_;
+    const LeafPlaces& places_;
+    std::span<const Sphere> support_;
+    const Ancestors& ancestors_;
+    ParallelArray<Directions> facing_; // by node
+    std::vector<Index> welded_number_; // by leaf: among those that are not alone at their places
+    std::vector<Directions> welded_;   // by these: what is around them, and then around all of the place
+};
+
 } // namespace
 
 ParallelArray<Directions> bound_facing(const BoundInput& input, std::span<const Triangle> triangles, const LeafPlaces& places,
                                        std::span<const Sphere> support, const Ancestors& ancestors) {
-    const TreeShape& shape = input.shape;
-    ParallelArray<Directions> facing(shape.interior());
-
-    ParallelArray<Directions> around(shape.leaves()); // by leaf: the normals of the triangles there
-    Folds folds(input, ancestors);
-    input.parts.for_each_triangle([&](const TreePart& part) {
-        return [&, by_node = Views<1>(facing), by_leaf = Views<3>(around)](Index t) mutable {
-            const Triangle& corners = triangles[t];
-            const auto owned = [&](Index leaf) { return input.parts.owns_leaf(part, leaf) ? leaf : by_leaf.none; };
-            folds.follow(corners, part, [&](NodeId node, const Corner(&at)[3]) {
-                if (node != no_node) by_node.add({node}, at);
-                else by_leaf.add({owned(corners[0]), owned(corners[1]), owned(corners[2])}, at);
-            });
-        };
-    });
-    // The dilation runs over places: an unwelded crease is no end of the surface.
-    tbb::parallel_for(Index{0}, shape.leaves(), [&](Index leaf) { around[leaf].mark(places.irregular[leaf]); });
-    for (Index leaf = 0; leaf < shape.leaves(); ++leaf)
-        if (places.weld[leaf] != leaf) around[places.weld[leaf]] |= around[leaf];
-    for (Index leaf = 0; leaf < shape.leaves(); ++leaf)
-        if (places.weld[leaf] != leaf) around[leaf] = around[places.weld[leaf]];
-
-    input.parts.bottom_up([&] {
-        return [&](NodeId node) {
-            Directions seen = facing[node];
-            if (support[node].radius == 0) {
-                facing[node] = {};
-                return;
-            }
-            if (folds.too_many(node)) seen = Directions::everything();
-            const auto add_leaf = [&](Index leaf) {
-                const auto ring = input.rings.around(leaf);
-                if (ring.empty()) return; // no triangle uses it
-                seen |= around[leaf];
-                for (const Index neighbour : ring) seen |= around[neighbour];
-            };
-            shape.for_each_child(
-                node,
-                [&](NodeId child) {
-                    seen |= facing[child];
-                    if (support[child].radius == 0) // it has none of its own
-                        for (Index leaf = shape.first_leaf[child]; leaf < shape.leaf_end[child]; ++leaf) add_leaf(leaf);
-                },
-                add_leaf);
-            facing[node] = seen;
-        };
-    });
-    return facing;
+    return FacingBounder(input, triangles, places, support, ancestors).run();
 }
 
 } // namespace unseen::vdtree

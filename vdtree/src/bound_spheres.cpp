@@ -1,13 +1,15 @@
 #include "bound_spheres.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
 #include "bounding_sphere.h"
+#include "prefetch.h"
+#include "spatial_order.h"
 
 namespace unseen::vdtree {
 
@@ -23,55 +25,79 @@ constexpr Index few_leaves = 12;
 // of children add is more.
 constexpr double node_slack = 1e-3;
 
-// Bounds one node after another, children first. Leaves are seen as points, interior children as their spheres.
+// Bounds the nodes of a part, children first, several at a time. Leaves are seen as points, interior children as their spheres.
 class SphereWorker {
 public:
-    SphereWorker(const BoundInput& input, float scale, NodeSpheres& out) : in_(input), out_(out), balls_(scale) {}
+    // `heights`: by interior node; how many there are below each other, itself the first.
+    SphereWorker(const BoundInput& input, std::span<Index> heights, NodeSpheres& out) : in_(input), heights_(heights), out_(out) {}
 
-    void operator()(NodeId node) {
-        const NodeId first_leaf = in_.shape.node_of_leaf(0);
-        balls_.begin(in_.positions[node]);
-        children_.clear(), leaves_.clear();
-        in_.shape.for_each_child(
-            node,
-            [&](NodeId child) {
-                balls_.add(out_.support[child]);
-                children_.push_back(child);
-            },
-            [&](Index leaf) {
-                balls_.add(in_.positions[first_leaf + leaf]);
-                leaves_.push_back(leaf);
-            });
-        out_.support[node] = round_outward(balls_.enclose(node_slack));
-        // The ring has all these points, too.
-        balls_.forget_spheres();
-        for (const NodeId child : children_) balls_.add(out_.ring[child]);
-        for (const Index leaf : leaves_)
-            for (const Index neighbour : in_.rings.around(leaf)) balls_.add(in_.positions[first_leaf + neighbour]);
-        out_.ring[node] = round_outward(balls_.enclose(node_slack));
+    void operator()(std::span<const NodeId> nodes) {
+        sort(nodes);
+        for (std::size_t i = 0; i < sorted_.size();) {
+            lanes_ = 0;
+            do nodes_[lanes_++] = sorted_[i++].index;
+            while (lanes_ < BallLanes::lanes && i < sorted_.size() && heights_[sorted_[i].index] == heights_[nodes_[0]]);
+            bound();
+        }
     }
 
 private:
-    const BoundInput& in_;
-    NodeSpheres& out_;
-    BallSet balls_;
-    std::vector<NodeId> children_;
-    std::vector<Index> leaves_;
-};
-
-// A power of two that brings the positions' extent to between a half and 1.
-float unit_scale(std::span<const glm::vec3> positions) {
-    glm::vec3 low = positions[0], high = low;
-    for (const glm::vec3& p : positions) {
-        low = glm::min(low, p);
-        high = glm::max(high, p);
+    // Nodes whose children are done before them, and whose bounding takes as long, come together.
+    void sort(std::span<const NodeId> nodes) {
+        sorted_.clear();
+        for (std::size_t i = nodes.size(); i-- > 0;) {
+            Index below = 0;
+            std::uint64_t children = 0, points = 0;
+            in_.shape.for_each_child(
+                nodes[i],
+                [&](NodeId child) {
+                    below = std::max(below, heights_[child]);
+                    ++children;
+                },
+                [&](Index leaf) {
+                    const auto ring = in_.rings.around(leaf);
+                    prefetch(ring.data()); // for bound()
+                    points += 1 + ring.size();
+                });
+            heights_[nodes[i]] = below + 1;
+            constexpr std::uint64_t most_children = 3, most_points = 63; // a byte for both
+            sorted_.push_back({std::uint64_t{below} << 8 | std::min(children, most_children) << 6 | std::min(points, most_points), nodes[i]});
+        }
+        scratch_.resize(sorted_.size());
+        sort_by_code(sorted_, scratch_);
     }
-    const glm::vec3 size = high - low;
-    const float extent = std::max({size.x, size.y, size.z});
-    if (!(extent > 0)) return 1;
-    constexpr int most = 120; // the scale itself must be a float
-    return std::ldexp(1.0f, std::clamp(-std::ilogb(extent) - 1, -most, most));
-}
+
+    void bound() {
+        const auto leaves = in_.positions.subspan(in_.shape.node_of_leaf(0));
+        std::array<Sphere, BallLanes::lanes> spheres;
+        const std::span<Sphere> used = std::span(spheres).first(lanes_);
+        for (std::size_t lane = 0; lane < lanes_; ++lane) {
+            balls_.begin(lane, in_.positions[nodes_[lane]]);
+            in_.shape.for_each_child(
+                nodes_[lane], [&](NodeId child) { balls_.add(lane, out_.support[child]); },
+                [&](Index leaf) { balls_.add(lane, leaves[leaf]); });
+        }
+        balls_.enclose(node_slack, used);
+        for (std::size_t lane = 0; lane < lanes_; ++lane) {
+            out_.support[nodes_[lane]] = spheres[lane];
+            // The ring has all these points, too.
+            balls_.forget_spheres(lane);
+            in_.shape.for_each_child(
+                nodes_[lane], [&](NodeId child) { balls_.add(lane, out_.ring[child]); },
+                [&](Index leaf) { balls_.add(lane, leaves, in_.rings.around(leaf)); });
+        }
+        balls_.enclose(node_slack, used);
+        for (std::size_t lane = 0; lane < lanes_; ++lane) out_.ring[nodes_[lane]] = spheres[lane];
+    }
+
+    const BoundInput& in_;
+    std::span<Index> heights_;
+    NodeSpheres& out_;
+    std::vector<CodedIndex> sorted_, scratch_;
+    BallLanes balls_;
+    std::array<NodeId, BallLanes::lanes> nodes_; // being bounded
+    std::size_t lanes_ = 0;
+};
 
 class DisplacementWorker {
 public:
@@ -203,8 +229,8 @@ NodeSpheres bound_spheres(const BoundInput& input) {
     NodeSpheres spheres;
     spheres.support.resize(input.shape.interior());
     spheres.ring.resize(input.shape.interior());
-    const float scale = unit_scale(input.positions);
-    input.parts.bottom_up([&] { return SphereWorker(input, scale, spheres); });
+    std::vector<Index> heights(input.shape.interior());
+    input.parts.part_by_part([&] { return SphereWorker(input, heights, spheres); });
     return spheres;
 }
 

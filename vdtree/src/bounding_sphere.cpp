@@ -26,6 +26,7 @@ double squared(glm::dvec3 v) { return glm::dot(v, v); }
 // Up to four points, and the smallest sphere around them, which they lie on.
 class Basis {
 public:
+    Basis() = default;
     // The smallest sphere around two balls.
     Basis(const DSphere& a, const DSphere& b) {
         const glm::dvec3 apart = b.centre - a.centre;
@@ -37,9 +38,12 @@ public:
             sphere_ = b;
             count_ = 0;
         } else {
-            const glm::dvec3 direction = apart / distance;
-            points_[0] = a.centre - direction * a.radius;
-            points_[1] = b.centre + direction * b.radius;
+            points_[0] = a.centre, points_[1] = b.centre;
+            if (a.radius != 0 || b.radius != 0) {
+                const glm::dvec3 direction = apart / distance;
+                points_[0] -= direction * a.radius;
+                points_[1] += direction * b.radius;
+            }
             sphere_ = {(points_[0] + points_[1]) * 0.5, (distance + a.radius + b.radius) * 0.5};
             count_ = 2;
         }
@@ -47,6 +51,16 @@ public:
 
     const DSphere& sphere() const { return sphere_; }
 
+    // Makes the smallest sphere around the basis and what of a ball is farthest outside of its sphere.
+    void add(const DSphere& ball) {
+        if (ball.radius == 0) return add(ball.centre);
+        const glm::dvec3 away = ball.centre - sphere_.centre;
+        const double length = glm::length(away);
+        const glm::dvec3 direction = length > 0 ? away / length : glm::dvec3(1, 0, 0);
+        add(ball.centre + direction * ball.radius);
+    }
+
+private:
     // Makes the smallest sphere around the basis and a point outside of its sphere.
     void add(glm::dvec3 p) {
         if (count_ == 0) {
@@ -84,7 +98,6 @@ public:
         sphere_ = {best.sphere.centre, std::sqrt(best.sphere.squared_radius)};
     }
 
-private:
     struct Subset {
         std::array<int, 3> with{-1, -1, -1};
         Subset(std::initializer_list<int> which) { std::copy(which.begin(), which.end(), with.begin()); }
@@ -129,7 +142,7 @@ private:
     }
 
     std::array<glm::dvec3, 4> points_;
-    int count_;
+    int count_ = 0;
     DSphere sphere_;
 };
 
@@ -137,10 +150,6 @@ struct Farthest {
     DSphere ball;
     double reach; // from the centre to the ball's far side
 };
-
-// Four numbers at a time (an extension that GCC and Clang share).
-using Floats = float __attribute__((vector_size(16)));
-using Ints = int __attribute__((vector_size(16)));
 
 // Points and balls as one list of balls, relative to the first.
 class Balls {
@@ -205,10 +214,7 @@ DSphere grow_basis(AnyBalls& balls, double slack) {
         const auto [ball, reach] = balls.farthest(sphere.centre);
         if (reach <= sphere.radius * (1 + slack) || round == most_rounds)
             return {sphere.centre, std::max(sphere.radius, reach)};
-        const glm::dvec3 away = ball.centre - sphere.centre;
-        const double length = glm::length(away);
-        const glm::dvec3 direction = length > 0 ? away / length : glm::dvec3(1, 0, 0);
-        basis.add(ball.centre + direction * ball.radius);
+        basis.add(ball);
     }
 }
 
@@ -239,126 +245,125 @@ DSphere enclosing_sphere(std::span<const glm::dvec3> points, std::span<const DSp
     return enclose(points, spheres, sphere_slack);
 }
 
+// ---- several at once
+
 namespace {
 
-constexpr std::size_t lanes = 4;
+constexpr std::size_t lanes = BallLanes::lanes;
 
-Floats load(const std::vector<float>& v, std::size_t i) {
-    Floats out;
-    std::memcpy(&out, v.data() + i, sizeof out);
-    return out;
-}
-void store(std::vector<float>& v, std::size_t i, Floats values) { std::memcpy(v.data() + i, &values, sizeof values); }
-Floats larger(Floats a, Floats b) { return a > b ? a : b; }
-float largest(Floats v) {
-    const Floats two = larger(v, __builtin_shufflevector(v, v, 2, 3, 0, 1));
-    return std::max(two[0], two[1]);
+// Of each lane, the first of the points that are farthest from `from`.
+[[gnu::always_inline]] inline void find_in(std::span<const BallLanes::Row> rows, const BallLanes::Row& from, BallLanes::FarthestPoints& out) {
+    // Four numbers at a time (an extension that GCC and Clang share).
+    constexpr std::size_t width = 4;
+    using Doubles = double __attribute__((vector_size(8 * width)));
+    using Integers = std::int64_t __attribute__((vector_size(8 * width)));
+    for (std::size_t first = 0; first < lanes; first += width) {
+        Doubles centre_x, centre_y, centre_z, x, y, z, farthest = {-1, -1, -1, -1};
+        std::memcpy(&centre_x, &from.x[first], sizeof x);
+        std::memcpy(&centre_y, &from.y[first], sizeof y);
+        std::memcpy(&centre_z, &from.z[first], sizeof z);
+        Integers number = {}, found = {};
+        for (const BallLanes::Row& row : rows) {
+            std::memcpy(&x, &row.x[first], sizeof x);
+            std::memcpy(&y, &row.y[first], sizeof y);
+            std::memcpy(&z, &row.z[first], sizeof z);
+            x -= centre_x, y -= centre_y, z -= centre_z;
+            const Doubles squared = x * x + y * y + z * z;
+            const Integers is_farther = squared > farthest;
+            farthest = is_farther ? squared : farthest;
+            found = is_farther ? number : found;
+            number += 1;
+        }
+        std::memcpy(&out.squared[first], &farthest, sizeof farthest);
+        std::memcpy(&out.row[first], &found, sizeof found);
+    }
 }
 
-// Of the distance between two of the points: covers the rounding of their positions relative to each other, and of the distance, in
-// floats: less than 8 times half a unit in the last place.
-constexpr double float_slack = 1e-6;
-// Squares below this, in units of the tree's extent, may have lost digits, or everything.
-constexpr float least_square = 1e-30f;
+using FindFarthestPoints = void(std::span<const BallLanes::Row> rows, const BallLanes::Row& from, BallLanes::FarthestPoints& out);
+void find_with_any(std::span<const BallLanes::Row> rows, const BallLanes::Row& from, BallLanes::FarthestPoints& out) { find_in(rows, from, out); }
+
+// Neither has fused operations, so both give the same bits.
+#if defined(__x86_64__) && defined(__GNUC__)
+
+[[gnu::target("avx2")]] void find_with_avx2(std::span<const BallLanes::Row> rows, const BallLanes::Row& from, BallLanes::FarthestPoints& out) {
+    find_in(rows, from, out);
+}
+FindFarthestPoints* const find_farthest_points = __builtin_cpu_supports("avx2") ? find_with_avx2 : find_with_any;
+
+#else
+
+FindFarthestPoints* const find_farthest_points = find_with_any;
+
+#endif
 
 } // namespace
 
-// The view of a BallSet that a basis grows in: relative to the first point, scaled.
-class BallSet::Scaled {
-public:
-    explicit Scaled(const BallSet& set) : set_(set) {}
-
-    DSphere first() const { return {glm::dvec3(0), 0}; }
-
-    // Measured from `from` rounded to floats. Of points nearly as far as each other, any one.
-    Farthest farthest(glm::dvec3 from) {
-        middle_ = glm::vec3(from);
-        const glm::dvec3 centre(middle_);
-        most_squared_ = 0;
-        Farthest out{{glm::dvec3(0), 0}, -1};
-        for (std::size_t begin = 0; begin < set_.count_; begin += block) look_at_block(begin, out);
-        for (const DSphere& s : set_.scaled_spheres_) {
-            const double reach = glm::distance(s.centre, centre) + s.radius;
-            if (reach > out.reach) out = {s, reach};
-        }
-        return out;
-    }
-
-    // Of the last call: where it measured from, and the largest squared distance of a point.
-    glm::vec3 middle() const { return middle_; }
-    float most_squared() const { return most_squared_; }
-
-private:
-    // The last digits of the squared distances make room for the points' numbers: one comparison brings both.
-    static constexpr std::size_t block = 64;
-    static constexpr int number_bits = block - 1;
-    void look_at_block(std::size_t begin, Farthest& out) {
-        const auto& [x, y, z] = set_.relative_;
-        const std::size_t end = std::min(begin + block, set_.count_);
-        Ints number = {0, 1, 2, 3};
-        Floats farthest = {0, 0, 0, 0}, largest_squares = {0, 0, 0, 0};
-        for (std::size_t i = begin; i < end; i += lanes) {
-            const Floats dx = load(x, i) - middle_.x, dy = load(y, i) - middle_.y, dz = load(z, i) - middle_.z;
-            const Floats squared = dx * dx + dy * dy + dz * dz;
-            largest_squares = larger(largest_squares, squared);
-            const Ints numbered = (std::bit_cast<Ints>(squared) & ~number_bits) | number;
-            farthest = larger(farthest, std::bit_cast<Floats>(numbered));
-            number += static_cast<int>(lanes);
-        }
-        const float most = largest(largest_squares);
-        if (most <= most_squared_ && out.reach >= 0) return;
-        most_squared_ = most;
-        const std::size_t i = begin + static_cast<std::size_t>(std::bit_cast<int>(largest(farthest)) & number_bits);
-        const glm::dvec3 point(x[i], y[i], z[i]);
-        out = {{point, 0}, most >= least_square ? std::sqrt(static_cast<double>(most)) : glm::distance(point, glm::dvec3(middle_))};
-    }
-
-    const BallSet& set_;
-    glm::vec3 middle_{0};
-    float most_squared_ = 0;
-};
-
-void BallSet::grow() {
-    constexpr std::size_t least = 64;
-    points_.resize(std::max(least, 2 * count_));
-    for (auto& axis : relative_) axis.resize(points_.size());
+void BallLanes::find_points() {
+    find_farthest_points(std::span(rows_).first(row_count_), from_, farthest_);
 }
 
-// Those that are new, and what fills up the last vector: the first point again.
-void BallSet::make_relative() {
-    for (std::size_t i = count_; i % lanes != 0; ++i) points_[i] = points_[0];
-    const Floats origin = points_[0];
-    for (std::size_t i = relative_count_ / lanes * lanes; i < count_; i += lanes) {
-        const Floats a = (points_[i] - origin) * scale_, b = (points_[i + 1] - origin) * scale_;
-        const Floats c = (points_[i + 2] - origin) * scale_, d = (points_[i + 3] - origin) * scale_;
-        const Floats low_ab = __builtin_shufflevector(a, b, 0, 4, 1, 5), low_cd = __builtin_shufflevector(c, d, 0, 4, 1, 5);
-        const Floats high_ab = __builtin_shufflevector(a, b, 2, 6, 3, 7), high_cd = __builtin_shufflevector(c, d, 2, 6, 3, 7);
-        store(relative_[0], i, __builtin_shufflevector(low_ab, low_cd, 0, 1, 4, 5));
-        store(relative_[1], i, __builtin_shufflevector(low_ab, low_cd, 2, 3, 6, 7));
-        store(relative_[2], i, __builtin_shufflevector(high_ab, high_cd, 0, 1, 4, 5));
+DSphere BallLanes::farthest(std::size_t lane) const { 
+    DSphere out{rows_[static_cast<std::size_t>(farthest_.row[lane])].at(lane), 0};
+    if (spheres_[lane].empty()) return out;
+    double most = std::sqrt(farthest_.squared[lane]);
+    for (const DSphere& s : spheres_[lane]) {
+        const double reach = glm::distance(s.centre, from_.at(lane)) + s.radius;
+        if (reach > most) most = reach, out = s;
     }
-    relative_count_ = count_;
+    return out;
 }
 
-DSphere BallSet::enclose(double slack) {
-    make_relative();
-    const auto point = [&](std::size_t i) { return glm::dvec3(points_[i][0], points_[i][1], points_[i][2]); };
-    const glm::dvec3 origin = point(0);
-    const double scale = scale_;
-    scaled_spheres_.clear();
-    for (const Sphere& s : spheres_)
-        scaled_spheres_.push_back({(glm::dvec3(s.centre) - origin) * scale, s.radius * scale});
-    Scaled scaled(*this);
-    grow_basis(scaled, slack); // the last that it asks for is the farthest from where it ends
-    const glm::dvec3 centre = glm::dvec3(scaled.middle()) * (1 / scale) + origin;
-    double reach = 0;
-    if (const float squared = scaled.most_squared(); squared >= least_square) {
-        reach = std::sqrt(static_cast<double>(squared)) * (1 + float_slack) * (1 / scale);
-    } else {
-        for (std::size_t i = 0; i < count_; ++i) reach = std::max(reach, glm::distance(point(i), centre));
+double BallLanes::reach(std::size_t lane) const {
+    double most = std::sqrt(farthest_.squared[lane]);
+    for (const DSphere& s : spheres_[lane]) most = std::max(most, glm::distance(s.centre, from_.at(lane)) + s.radius);
+    return most;
+}
+
+bool BallLanes::sticks_out(std::size_t lane, double radius) const {
+    if (farthest_.squared[lane] > radius * radius) return true;
+    const auto sticks_out = [&](const DSphere& s) { return glm::distance(s.centre, from_.at(lane)) + s.radius > radius; };
+    return std::any_of(spheres_[lane].begin(), spheres_[lane].end(), sticks_out);
+}
+
+void BallLanes::enclose(double slack, std::span<Sphere> out) {
+    const std::size_t used = out.size();
+    row_count_ = *std::max_element(counts_.begin(), counts_.begin() + static_cast<std::ptrdiff_t>(used));
+    for (std::size_t lane = 0; lane < used; ++lane)
+        for (std::size_t i = counts_[lane]; i < row_count_; ++i) rows_[i].put(lane, glm::dvec3(0));
+
+    // As grow_basis() does.
+    std::array<DSphere, lanes> one;
+    std::array<Basis, lanes> bases;
+    from_ = {};
+    find_points();
+    for (std::size_t lane = 0; lane < used; ++lane) one[lane] = farthest(lane);
+    for (std::size_t lane = 0; lane < used; ++lane) from_.put(lane, one[lane].centre);
+    find_points();
+    for (std::size_t lane = 0; lane < used; ++lane) {
+        bases[lane] = Basis(one[lane], farthest(lane));
+        from_.put(lane, bases[lane].sphere().centre);
     }
-    for (const Sphere& s : spheres_) reach = std::max(reach, glm::distance(glm::dvec3(s.centre), centre) + s.radius);
-    return {centre, reach};
+    unsigned growing = (1u << used) - 1;
+    for (int round = 0; growing != 0 && round < most_rounds; ++round) {
+        find_points();
+        for (unsigned rest = growing; rest != 0; rest &= rest - 1) {
+            const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
+            Basis& basis = bases[lane];
+            if (sticks_out(lane, basis.sphere().radius * (1 + slack))) {
+                basis.add(farthest(lane));
+                from_.put(lane, basis.sphere().centre);
+            } else {
+                growing &= ~(1u << lane);
+            }
+        }
+    }
+
+    for (std::size_t lane = 0; lane < used; ++lane) {
+        out[lane].centre = glm::vec3(from_.at(lane) + origins_[lane]);
+        from_.put(lane, glm::dvec3(out[lane].centre) - origins_[lane]);
+    }
+    find_points();
+    for (std::size_t lane = 0; lane < used; ++lane) out[lane].radius = round_up(reach(lane));
 }
 
 float round_up(double distance) {

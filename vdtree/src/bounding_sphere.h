@@ -1,9 +1,10 @@
 // Small enclosing spheres of points and of spheres.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
-#include <cstring>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -30,43 +31,71 @@ DSphere smallest_sphere(glm::dvec3 first, FunctionRef<glm::dvec3(glm::dvec3 from
 // relative 1e-4 at most, and contains them all.
 DSphere enclosing_sphere(std::span<const glm::dvec3> points, std::span<const DSphere> spheres);
 
-// Points and spheres of one tree, to be enclosed again and again: keeps its memory, and looks for the farthest of several points
-// per instruction.
-class BallSet {
+// Several sets of points and spheres, each to be enclosed by a sphere of its own, at the same time: the farthest points of all are looked
+// for together, and what takes long for one of them is done while others wait for it. Keeps its memory.
+class BallLanes {
 public:
-    // `scale`, a power of two, brings the tree's extent to about 1, so that squares in floats neither overflow nor vanish.
-    explicit BallSet(float scale) : scale_(scale) {}
+    static constexpr std::size_t lanes = 8;
 
-    // Begins with a point, which the others are measured from.
-    void begin(glm::vec3 point) {
-        count_ = relative_count_ = 0;
-        spheres_.clear();
-        add(point);
+    // Begins a lane's set with a point, which the others are measured from.
+    void begin(std::size_t lane, glm::vec3 point) {
+        counts_[lane] = 0;
+        spheres_[lane].clear();
+        origins_[lane] = glm::dvec3(point);
+        add(lane, point);
     }
-    void add(glm::vec3 point) {
-        if (count_ == points_.size()) grow();
-        std::memcpy(&points_[count_++], &point, sizeof(point));
+    void add(std::size_t lane, glm::vec3 point) {
+        make_room(counts_[lane] + 1);
+        rows_[counts_[lane]++].put(lane, glm::dvec3(point) - origins_[lane]);
     }
-    void add(const Sphere& sphere) { spheres_.push_back(sphere); }
-    void forget_spheres() { spheres_.clear(); }
+    void add(std::size_t lane, std::span<const glm::vec3> points, std::span<const Index> which) {
+        std::size_t next = counts_[lane];
+        counts_[lane] += which.size();
+        make_room(counts_[lane]);
+        Row* const rows = rows_.data();
+        const glm::dvec3 origin = origins_[lane];
+        for (const Index i : which) rows[next++].put(lane, glm::dvec3(points[i]) - origin);
+    }
+    void add(std::size_t lane, const Sphere& sphere) {
+        spheres_[lane].push_back({glm::dvec3(sphere.centre) - origins_[lane], static_cast<double>(sphere.radius)});
+    }
+    void forget_spheres(std::size_t lane) { spheres_[lane].clear(); }
 
-    // Contains everything; the radius exceeds the smallest one by a relative `slack` at most, but for the rounding of
-    // positions relative to each other.
-    DSphere enclose(double slack);
+    // For as many lanes as there are in `out`, from the first on: each sphere contains everything, and its radius exceeds the smallest one by a
+    // relative `slack` at most, but for the rounding of the centre to floats.
+    void enclose(double slack, std::span<Sphere> out);
+
+    // A point of each lane.
+    struct alignas(64) Row {
+        std::array<double, lanes> x, y, z;
+
+        void put(std::size_t lane, glm::dvec3 p) { x[lane] = p.x, y[lane] = p.y, z[lane] = p.z; }
+        glm::dvec3 at(std::size_t lane) const { return {x[lane], y[lane], z[lane]}; }
+    };
+
+    // Of each lane, one of the points that are farthest from somewhere.
+    struct FarthestPoints {
+        std::array<double, lanes> squared; // distances
+        std::array<std::int64_t, lanes> row;
+    };
 
 private:
-    class Scaled;
-    using Point = float __attribute__((vector_size(16))); // the fourth number does not matter
+    void make_room(std::size_t rows) {
+        if (rows > rows_.size()) rows_.resize(2 * rows);
+    }
+    // Looks from where `from_` says, for what is asked of single lanes then.
+    void find_points();
+    DSphere farthest(std::size_t lane) const;
+    double reach(std::size_t lane) const; // to the farthest far side
+    bool sticks_out(std::size_t lane, double radius) const;
 
-    void grow();
-    void make_relative();
-
-    float scale_;
-    std::size_t count_ = 0, relative_count_ = 0; // there is room for more, in whole vectors
-    std::vector<Point> points_;
-    std::array<std::vector<float>, 3> relative_; // to the first, scaled
-    std::vector<Sphere> spheres_;
-    std::vector<DSphere> scaled_spheres_;
+    std::size_t row_count_ = 0; // of the rows, those that were filled up for all lanes
+    std::vector<Row> rows_;     // relative to the lanes' first points
+    std::array<std::size_t, lanes> counts_{};
+    std::array<glm::dvec3, lanes> origins_{};
+    std::array<std::vector<DSphere>, lanes> spheres_; // relative, too
+    Row from_{};
+    FarthestPoints farthest_{};
 };
 
 // The sphere in floats, grown so that it contains the given one in exact arithmetic.

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <functional>
 #include <iterator>
 #include <limits>
 #include <optional>
@@ -102,9 +101,11 @@ private:
             for (std::size_t i = 0; i < sample.size(); ++i)
                 if (costs_[i] > 0) found.emplace_back(costs_[i], static_cast<double>(stride * triangles_of(tree, sample[i])));
         }
-        std::sort(found.begin(), found.end(), std::greater<>());
+        std::make_heap(found.begin(), found.end()); // only the first of them are asked for
         double triangles = 0, variance = 0;
-        for (const auto& [cost, more] : found) {
+        for (auto end = found.end(); end != found.begin();) {
+            std::pop_heap(found.begin(), end);
+            const auto& [cost, more] = *--end;
             triangles += more;
             variance += more * more;
             if (triangles + guess_deviations * std::sqrt(variance) > (1 - guess_share) * static_cast<double>(limits_.triangles))
@@ -130,9 +131,12 @@ private:
                 find_bounds(tree, &unfolding, [&](const Entry& entry) { wait(entry); });
             });
             const auto& unfolded = decision_.unfolded[tree];
+            const auto first = trees_[tree]->first_triangle();
             for (std::size_t word = 0; word < unfolded.size(); ++word)
-                for (std::uint64_t bits = unfolded[word]; bits; bits &= bits - 1)
-                    triangles_ += triangles_of(tree, static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))));
+                for (std::uint64_t bits = unfolded[word]; bits; bits &= bits - 1) {
+                    const std::size_t node = word * 64 + static_cast<std::size_t>(std::countr_zero(bits));
+                    triangles_ += first[node + 1] - first[node];
+                }
         }
         decision_.node_tests += decider.decisions;
         return !is_damaged && triangles_ <= limits_.triangles;

@@ -14,6 +14,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include "parallel_array.h"
 #include "progress_counter.h"
 #include "spatial_order.h"
 
@@ -160,7 +161,7 @@ private:
         const std::size_t buckets = std::size_t{1} << (digit_bits * digits);
         const std::size_t chunks = (n + chunk_size - 1) / chunk_size;
         const MortonGrid grid = bounding_cube();
-        std::vector<CodedIndex> coded(n);
+        ParallelArray<CodedIndex> coded(n, Unfilled());
         std::vector<Index> next(chunks * buckets, 0);
         for_each_chunk([&](std::size_t chunk, std::size_t begin, std::size_t end) {
             for (std::size_t v = begin; v < end; ++v) {
@@ -178,7 +179,7 @@ private:
             }
         }
         if (sum != bucket_begin_.back()) bucket_begin_.push_back(sum);
-        items_.resize(n);
+        items_ = ParallelArray<CodedIndex>(n, Unfilled());
         for_each_chunk([&](std::size_t chunk, std::size_t begin, std::size_t end) {
             for (std::size_t v = begin; v < end; ++v)
                 items_[next[chunk * buckets + (coded[v].code >> shift)]++] = coded[v];
@@ -188,8 +189,8 @@ private:
     }
 
     std::size_t bucket_count() const { return bucket_begin_.size() - 1; }
-    std::span<CodedIndex> of_bucket(std::vector<CodedIndex>& items, std::size_t b) const {
-        return std::span(items).subspan(bucket_begin_[b], bucket_begin_[b + 1] - bucket_begin_[b]);
+    std::span<CodedIndex> of_bucket(std::span<CodedIndex> items, std::size_t b) const {
+        return items.subspan(bucket_begin_[b], bucket_begin_[b + 1] - bucket_begin_[b]);
     }
 
     void build_subtrees() {
@@ -231,7 +232,7 @@ private:
     ProgressCounter counter_;
     Clustering result_;
     int bucket_shift_ = 0;
-    std::vector<CodedIndex> items_, scratch_; // by bucket
+    ParallelArray<CodedIndex> items_, scratch_; // by bucket
     std::vector<Index> bucket_begin_;         // of buckets that are not empty; one longer
     std::vector<Subtree> subtrees_;
     std::vector<CodedIndex> roots_;           // by bucket

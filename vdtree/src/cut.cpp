@@ -458,18 +458,27 @@ void Cut::assign_all(std::span<const std::uint64_t> unfolded) {
         while (folded == 0 && ++word < unfolded.size()) folded = ~unfolded[word];
         return folded == 0 ? end : static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(folded)));
     };
+    // How many leaves a node has, nobody could foretell: a few places are written at once, those too many by the next ones again.
+    constexpr Index at_once = 16;
+    const Index leaves = tree_->leaf_count(), last_begin = leaves - std::min(leaves, at_once);
+    NodeId* const proxies = proxy_.data();
     Index leaf = 0;
+    const auto write = [&](Index leaves_end, auto&& proxy_of) {
+        for (; leaf < leaves_end && leaf <= last_begin; leaf += at_once)
+            for (Index i = 0; i < at_once; ++i) proxies[leaf + i] = proxy_of(leaf + i);
+        for (; leaf < leaves_end; ++leaf) proxies[leaf] = proxy_of(leaf);
+        leaf = leaves_end;
+    };
     const auto stand_for_themselves = [&](Index leaves_end) {
-        for (; leaf < leaves_end; ++leaf) proxy_[leaf] = end + leaf;
+        write(leaves_end, [end](Index l) { return end + l; });
     };
     for (NodeId node = 0; node < end; node = subtree_end[node]) {
         node = next_folded(node);
         if (node >= end) break;
         stand_for_themselves(first_leaf[node]);
-        const Index leaves_end = leaf_end[node];
-        for (; leaf < leaves_end; ++leaf) proxy_[leaf] = node;
+        write(leaf_end[node], [node](Index) { return node; });
     }
-    stand_for_themselves(tree_->leaf_count());
+    stand_for_themselves(leaves);
 }
 
 // Every proxy is written at most once, however deep the new cut is.

@@ -144,6 +144,7 @@ void CutFollower::follow_budget(Cut& cut, const Viewpoint& viewpoint, const Moti
     const Sphere& root = tree_.bounds()[VertexTree::root()].ring;
     set_farthest(glm::length(viewpoint.eye - glm::dvec3(root.centre)) + static_cast<double>(root.radius));
     move_to(viewpoint, motion);
+    if (watched_.empty()) watch_all(cut, Deadlines::now);
     cut.begin_changes();
     keep_within_budget(cut);
     cut.end_changes(stats_);
@@ -162,13 +163,10 @@ void CutFollower::start_with_budget(Cut& cut) {
     max_fold_cost_ = decision.max_seen_cost;
     cut.change_to(std::move(decision.unfolded[0]), stats_);
     is_tracking_ = true;
-    if (options_.hysteresis <= 1 || options_.fill_budget) {
-        watched_.clear();
-        return;
-    }
+    watched_.clear(); // left to the next frame, as after a jump
+    if (options_.hysteresis <= 1 || options_.fill_budget) return;
     threshold_ = std::max(decision.threshold, least_threshold);
     tester_->set_threshold(threshold_);
-    watch_all(cut, Deadlines::now);
 }
 
 // Of the hysteresis, half (as a factor: its root) keeps nodes unfolded, and half of the rest keeps the threshold.

@@ -48,11 +48,24 @@ void IndexBuffer::gather(std::span<const std::uint64_t> unfolded, std::span<cons
     indices_.resize(std::size_t{3} * triangles);
     const auto first = tree_->first_triangle();
     const auto corners = tree_->triangles();
-    NodeId* out = indices_.data();
-    for_each_unfolded(unfolded, [&](NodeId node) {
-        for (Index t = first[node]; t < first[node + 1]; ++t)
-            for (const Index leaf : corners[t]) *out++ = proxies[leaf];
+    // First which triangles: most nodes have two or less, and nobody could foretell how many, so nothing branches on that.
+    constexpr Index mostly = 2;
+    shown_.resize(std::size_t{triangles} + mostly);
+    Index* next = shown_.data();
+    for_each_set(unfolded, [&](NodeId node) {
+        const Index begin = first[node], end = first[node + 1];
+        for (Index i = 0; i < mostly; ++i) next[i] = begin + i;
+        for (Index t = begin + mostly; t < end; ++t) next[t - begin] = t;
+        next += end - begin;
     });
+    constexpr std::size_t far = 32, near = 12; // triangles between a prefetch and its use
+    NodeId* out = indices_.data();
+    for (std::size_t i = 0; i < triangles; ++i) {
+        if (i + far < triangles) prefetch(&corners[shown_[i + far]]);
+        if (i + near < triangles)
+            for (const Index leaf : corners[shown_[i + near]]) prefetch(&proxies[leaf]);
+        for (const Index leaf : corners[shown_[i]]) *out++ = proxies[leaf];
+    }
 }
 
 void IndexBuffer::make_lists(std::span<const std::uint64_t> unfolded) {

@@ -83,6 +83,7 @@ private:
     std::vector<Block> free_blocks_[28]; // by log2 of the size
     std::vector<Index> holes_;           // triangles without corners
     std::vector<NodeId> nodes_;          // scratch
+    std::vector<Index> shown_;
     std::vector<Entry> scratch_;
     std::vector<Index> vanished_;
     std::vector<IndexWrite> writes_;

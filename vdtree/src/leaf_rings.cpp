@@ -17,7 +17,7 @@ LeafRings find_rings(std::span<const Triangle> triangles, const LeafPlaces& plac
         };
     });
     std::partial_sum(rings.start.begin(), rings.start.end(), rings.start.begin());
-    rings.neighbours.resize(rings.start.back());
+    rings.neighbours = ParallelArray<Index>(rings.start.back(), Unfilled());
     // From the end of each leaf's range, which is its start when all are in.
     parts.for_each_triangle([&](const TreePart& part) {
         return [&](Index t) {

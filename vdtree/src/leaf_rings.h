@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "parallel_array.h"
 #include "surface.h"
 #include "tree_parts.h"
 
@@ -20,10 +21,10 @@ struct LeafPlaces {
 // By leaf: the leaves that it shares triangles with; once each where the surface is regular, else perhaps more often.
 struct LeafRings {
     std::vector<Index> start; // one longer
-    std::vector<Index> neighbours;
+    ParallelArray<Index> neighbours;
 
     std::span<const Index> around(Index leaf) const {
-        return std::span(neighbours).subspan(start[leaf], start[leaf + 1] - start[leaf]);
+        return std::span<const Index>(neighbours).subspan(start[leaf], start[leaf + 1] - start[leaf]);
     }
 };
 

@@ -45,6 +45,12 @@ std::uint32_t hash(const NormalMask& mask) {
     return static_cast<std::uint32_t>((h ^ h >> 29) * odd >> 32);
 }
 
+bool are_equal(const NormalMask& a, const NormalMask& b) {
+    std::uint64_t differing = 0;
+    for (std::size_t i = 0; i < a.faces.size(); ++i) differing |= a.faces[i] ^ b.faces[i];
+    return differing == 0;
+}
+
 struct HashedNode {
     std::uint32_t hash;
     NodeId node;
@@ -89,7 +95,7 @@ std::vector<NodeId> find_equal(std::span<const Directions> nodes) {
         std::vector<HashedNode> table(wrap + 1, {0, no_node});
         for (const HashedNode& n : group) {
             std::size_t slot = n.hash & wrap;
-            while (table[slot].node != no_node && !(table[slot].hash == n.hash && nodes[table[slot].node].mask == nodes[n.node].mask))
+            while (table[slot].node != no_node && !(table[slot].hash == n.hash && are_equal(nodes[table[slot].node].mask, nodes[n.node].mask)))
                 slot = (slot + 1) & wrap;
             if (table[slot].node == no_node) table[slot] = n;
             first[n.node] = table[slot].node;

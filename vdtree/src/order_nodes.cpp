@@ -7,6 +7,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "parallel_array.h"
 #include "prefetch.h"
 
 namespace unseen::vdtree {
@@ -133,7 +134,7 @@ NodeOrder order_nodes(const Clustering& clustering, Index vertices, Index lone) 
 TriangleOrder order_triangles(std::span<const Triangle> triangles, const NodeOrder& nodes, const Ancestors& ancestors) {
     const TreeShape& shape = nodes.shape;
     TriangleOrder order;
-    std::vector<NodeId> vanishing(triangles.size());
+    ParallelArray<NodeId> vanishing(triangles.size(), Unfilled());
     tbb::parallel_for(std::size_t{0}, triangles.size(), [&](std::size_t t) {
         Triangle leaves = {nodes.leaf_of_vertex[triangles[t][0]], nodes.leaf_of_vertex[triangles[t][1]],
                            nodes.leaf_of_vertex[triangles[t][2]]};

@@ -12,13 +12,18 @@
 
 namespace unseen::vdtree {
 
-// As many values as were asked for first, value-initialised.
+// Says that everything will be written before it is read: nothing is touched until then.
+struct Unfilled {};
+
+// As many values as were asked for first, value-initialised or unfilled.
 template <class T>
 class ParallelArray {
-    static_assert(std::is_trivially_destructible_v<T>);
+    static_assert(std::is_trivially_copyable_v<T> && std::is_trivially_destructible_v<T>);
 
 public:
-    explicit ParallelArray(std::size_t size) : values_(std::allocator<T>().allocate(size), Deallocate{size}) {
+    ParallelArray() = default;
+    ParallelArray(std::size_t size, Unfilled) : values_(std::allocator<T>().allocate(size), Deallocate{size}) {}
+    explicit ParallelArray(std::size_t size) : ParallelArray(size, Unfilled()) {
         constexpr std::size_t grain = 1 << 14;
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, size, grain), [&](const auto& range) {
             std::uninitialized_value_construct_n(values_.get() + range.begin(), range.size());
@@ -33,7 +38,7 @@ public:
 
 private:
     struct Deallocate {
-        std::size_t size;
+        std::size_t size = 0;
         void operator()(T* values) const { std::allocator<T>().deallocate(values, size); }
     };
     std::unique_ptr<T[], Deallocate> values_;

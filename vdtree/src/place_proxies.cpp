@@ -32,7 +32,7 @@ struct ShapeSum {
 // The sums of all nodes, parts at the same time: leaf_sum(leaf) says what a leaf adds to its parent.
 template <class Sum, class LeafSum, class Finish>
 void sum_up(const TreeShape& shape, const TreeParts& parts, LeafSum&& leaf_sum, Finish&& finish) {
-    ParallelArray<Sum> sums(shape.interior());
+    ParallelArray<Sum> sums(shape.interior(), Unfilled());
     parts.bottom_up([&] {
         return [&](NodeId node) {
             Sum sum;
@@ -77,7 +77,7 @@ ProxyVertices place_proxies(const TreeShape& shape, const TreeParts& parts, cons
 
     double largest = 0;
     for (const double a : leaves.areas) largest = std::max(largest, a);
-    ParallelArray<double> weights(shape.leaves());
+    ParallelArray<double> weights(shape.leaves(), Unfilled());
     const auto leaf_sum = [&](Index leaf) -> ShapeSum {
         const NodeId node = shape.node_of_leaf(leaf);
         if (leaf >= ahead) prefetch(&leaves.mesh.positions[leaves.sources[leaf - ahead]]); // from the last to the first

@@ -16,6 +16,7 @@
 #include <tbb/task_arena.h>
 
 #include "message.h"
+#include "parallel_array.h"
 #include "unit_vector.h"
 
 namespace unseen::vdtree {
@@ -162,11 +163,11 @@ struct Wedge {
 // What is collected at the places of a range: the wedges of the triangles there, and the sum of these triangles' area vectors, twice.
 struct Wedges {
     std::vector<Index> start; // one longer
-    std::vector<Wedge> wedges;
+    ParallelArray<Wedge> wedges;
     std::vector<glm::dvec3> sums;
 
     std::span<const Wedge> around(std::size_t place) const {
-        return std::span(wedges).subspan(start[place], start[place + 1] - start[place]);
+        return std::span<const Wedge>(wedges).subspan(start[place], start[place + 1] - start[place]);
     }
 };
 
@@ -196,7 +197,7 @@ Wedges collect_wedges(const MeshView& mesh, const Places& places, VertexRange ve
             if (own.has(place)) ++out.start[place - vertices.begin];
     });
     std::partial_sum(out.start.begin(), out.start.end(), out.start.begin());
-    out.wedges.resize(out.start.back());
+    out.wedges = ParallelArray<Wedge>(out.start.back(), Unfilled());
     for_each_triangle([&](VertexRange own, const Triangle& corners, const Triangle& at) {
         const glm::dvec3& a = mesh.positions[corners[0]];
         const glm::dvec3 vector = glm::cross(mesh.positions[corners[1]] - a, mesh.positions[corners[2]] - a);

@@ -95,15 +95,14 @@ LeafSurroundings survey_leaves(const TreeGeometry& g, const TreeParts& parts, co
 class RunningSums {
 public:
     RunningSums(std::span<const double> areas, std::span<const Unorm16> luminance)
-        : area_(areas.size() + 1, 0.0), weighted_(areas.size() + 1, 0.0), plain_(areas.size() + 1, 0.0) {
+        : before_(areas.size() + 1) {
         double largest = 0;
         for (const double a : areas) largest = std::max(largest, a);
         const double scale = largest > 0 ? 1 / largest : 0;
         for (std::size_t leaf = 0; leaf < areas.size(); ++leaf) {
             const double area = areas[leaf] * scale, y = luminance[leaf].value;
-            area_[leaf + 1] = area_[leaf] + area;
-            weighted_[leaf + 1] = weighted_[leaf] + area * y;
-            plain_[leaf + 1] = plain_[leaf] + y;
+            const Sums& sums = before_[leaf];
+            before_[leaf + 1] = {sums.area + area, sums.weighted + area * y, sums.plain + y};
         }
     }
 
@@ -111,13 +110,17 @@ public:
     double mean(Index begin, Index end) const {
         // Below this share of the largest vertex area, per leaf, the difference of two running sums is rounding noise.
         constexpr double least_mean_area = 1e-9;
-        const double area = area_[end] - area_[begin];
-        if (area > least_mean_area * (end - begin)) return (weighted_[end] - weighted_[begin]) / area;
-        return (plain_[end] - plain_[begin]) / (end - begin);
+        const Sums &first = before_[begin], &last = before_[end];
+        const double area = last.area - first.area;
+        if (area > least_mean_area * (end - begin)) return (last.weighted - first.weighted) / area;
+        return (last.plain - first.plain) / (end - begin);
     }
 
 private:
-    std::vector<double> area_, weighted_, plain_; // by leaf: over those before it
+    struct Sums {
+        double area = 0, weighted = 0, plain = 0;
+    };
+    std::vector<Sums> before_; // by leaf: over those before it
 };
 
 // Whether all leaves of a node lie at one point, its proxy's: then folding it moves nothing.
