@@ -218,7 +218,9 @@ Result<void> plot_observer(const fs::path& file, const calibration::Procedure& p
     plot.x_label = "cycles per degree";
     plot.y_label = "sensitivity";
     plot.x_range = {0.4, 20};
-    const CsfTable table = procedure.table(name);
+    const auto made = procedure.table(name);
+    if (!made) return made.error();
+    const CsfTable& table = *made;
     const glm::vec3 colours[] = {{0.1f, 0.3f, 0.8f}, {0.8f, 0.2f, 0.1f}, {0.3f, 0.6f, 0.1f}, {0.5f, 0.3f, 0.6f}};
     std::size_t colour = 0;
     for (const double degrees : {0.0, 5.0, 10.0, 20.0}) {
