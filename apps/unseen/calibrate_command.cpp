@@ -1,4 +1,5 @@
 // unseen calibrate: measures a viewer, or a simulated one, and a display.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -15,6 +16,7 @@
 #include "calibration_window.h"
 #include "command.h"
 #include "options.h"
+#include "output_files.h"
 #include "progress_bar.h"
 #include "report.h"
 #include "scene.h"
@@ -24,17 +26,19 @@ namespace unseen::app {
 namespace {
 
 using calibration::CalibrationPlan;
+using calibration::GratingPlace;
 using calibration::Method;
 using calibration::PlaceEstimate;
 using calibration::Procedure;
 using calibration::SimulatedObserver;
 
 struct CalibrateArguments {
-    std::string out, json, simulate, state, photometer, observer, conditions, method = "2ifc", date;
+    std::string out, json, simulate, state, photometer, observer, conditions, date;
     bool chart = false, gamma = false;
-    double seed = 1, trials = 200, settings = 7;
+    // Of the plan; what is not given is as CalibrationPlan has it, or as in the file of a calibration that goes on.
+    std::optional<Method> method;
+    std::optional<double> seed, trials, settings, luminance;
     std::vector<double> frequencies, eccentricities;
-    std::optional<double> luminance;
     DisplayOptions display;
     CalibrationWindowOptions window;
 };
@@ -50,30 +54,54 @@ std::string today() {
     return text.data();
 }
 
+// Those that --frequencies and --eccentricities name; none where they are not given.
+std::vector<GratingPlace> places_named(const CalibrateArguments& a) {
+    std::vector<GratingPlace> places;
+    for (const double e : a.eccentricities)
+        for (const double f : a.frequencies) places.push_back({f, e});
+    return places;
+}
+
 Result<CalibrationPlan> make_plan(const CalibrateArguments& a, const perception::Display& display, const perception::CsfTable& expected) {
-    CalibrationPlan plan = calibration::plan_for(display, expected);
-    plan.method = a.method == "adjustment" ? Method::adjustment : Method::two_interval;
-    plan.seed = static_cast<std::uint64_t>(a.seed);
-    plan.trials = static_cast<int>(a.trials);
-    plan.settings = static_cast<int>(a.settings);
+    std::optional<perception::Luminance> luminance;
     if (a.luminance) {
         const double black = perception::black_level(display).value(), white = perception::to_luminance(display, 1).value();
         if (!(*a.luminance > black && *a.luminance < white))
             return invalid("--luminance " + shortest(*a.luminance) + " cd/m2 is not between the display's black (" + shortest(black) +
                            ") and white (" + shortest(white) + ").");
-        plan.luminance = perception::Luminance(*a.luminance);
-        plan.highest_contrast = std::min(*a.luminance - black, white - *a.luminance) / *a.luminance;
+        luminance = perception::Luminance(*a.luminance);
     }
-    if (!a.frequencies.empty() || !a.eccentricities.empty()) {
-        if (a.frequencies.empty() || a.eccentricities.empty()) return invalid("--frequencies and --eccentricities need each other.");
-        plan.places.clear();
-        for (const double e : a.eccentricities)
-            for (const double f : a.frequencies) plan.places.push_back({f, e});
-    }
+    CalibrationPlan plan = calibration::plan_for(display, expected, luminance);
+    if (a.method) plan.method = *a.method;
+    if (a.seed) plan.seed = static_cast<std::uint64_t>(*a.seed);
+    if (a.trials) plan.trials = static_cast<int>(*a.trials);
+    if (a.settings) plan.settings = static_cast<int>(*a.settings);
+    if (std::vector<GratingPlace> named = places_named(a); !named.empty()) plan.places = std::move(named);
     if (plan.places.empty())
         return invalid("No grating fits the display '" + display.name + "': give --frequencies and --eccentricities.");
     if (auto valid = calibration::validate(plan); !valid) return valid.error();
     return plan;
+}
+
+// A calibration goes on as it was begun: what is given must say the same.
+Result<void> check_resumed(const CalibrateArguments& a, const CalibrationPlan& plan) {
+    std::string differing;
+    const auto add = [&](const std::string& option, const std::string& begun_with) {
+        differing += (differing.empty() ? "" : ", ") + option + (begun_with.empty() ? "" : " (it was " + begun_with + ")");
+    };
+    const auto compare = [&](const char* option, const std::optional<double>& given, double begun_with) {
+        if (given && *given != begun_with) add(option, shortest(begun_with));
+    };
+    if (a.method && *a.method != plan.method) add("--method", std::string(calibration::name(plan.method)));
+    compare("--trials", a.trials, plan.trials);
+    compare("--settings", a.settings, plan.settings);
+    compare("--seed", a.seed, static_cast<double>(plan.seed));
+    compare("--luminance", a.luminance, plan.luminance.value());
+    const std::vector<GratingPlace> named = places_named(a);
+    if (!named.empty() && !std::is_permutation(named.begin(), named.end(), plan.places.begin(), plan.places.end()))
+        add("--frequencies and --eccentricities", "");
+    if (differing.empty()) return {};
+    return invalid("'" + a.state + "' was not begun so: leave away " + differing + ", or begin anew with another file.");
 }
 
 // What a person is shown must be what the plan says, also where the plan comes from a file.
@@ -98,7 +126,7 @@ double decibels(double ratio) { return 20 * std::log10(ratio); }
 // Whether there is a threshold at all within the display's contrasts.
 bool is_visible(double sensitivity, const CalibrationPlan& plan) { return sensitivity * plan.highest_contrast >= 1; }
 
-// Root mean square error over the places that the observer can see.
+// Root mean square error over the places that the observer can see; NaN where there are none.
 double rms_db(const Procedure& procedure, const SimulatedObserver& observer) {
     double squares = 0, count = 0;
     for (const PlaceEstimate& e : procedure.estimates()) {
@@ -160,10 +188,12 @@ void print(const Procedure& procedure, const SimulatedObserver* truth) {
     std::printf("%zu answers at %s cd/m2, contrasts up to %s; off the fitted shape by %s dB (rms)\n", procedure.answers().size(),
                 rounded(procedure.plan().luminance.value(), 4).c_str(), rounded(procedure.plan().highest_contrast, 3).c_str(),
                 rounded(misfit_db(procedure), 2).c_str());
-    if (truth) std::printf("error %s dB (rms over what can be seen)\n", rounded(rms_db(procedure, *truth), 3).c_str());
+    if (!truth) return;
+    if (const double error_db = rms_db(procedure, *truth); std::isnan(error_db)) std::printf("this observer can see none of it: no error to tell\n");
+    else std::printf("error %s dB (rms over what can be seen)\n", rounded(error_db, 3).c_str());
 }
 
-calibration::ObserverProfile profile_of(const Procedure& procedure, const CalibrateArguments& a, const perception::Display& display) {
+Result<calibration::ObserverProfile> profile_of(const Procedure& procedure, const CalibrateArguments& a, const perception::Display& display) {
     calibration::ObserverProfile profile;
     profile.observer = !a.observer.empty() ? a.observer : a.simulate.empty() ? "unnamed" : "simulated: " + a.simulate;
     profile.date = a.date.empty() ? today() : a.date;
@@ -174,7 +204,9 @@ calibration::ObserverProfile profile_of(const Procedure& procedure, const Calibr
     profile.measured_at_cdm2 = procedure.plan().luminance.value();
     for (const PlaceEstimate& e : procedure.estimates())
         profile.measured.push_back({e.place, e.sensitivity(), e.low(), e.high(), e.answers});
-    profile.table = procedure.table(profile.observer + ", " + profile.date + ", " + profile.method);
+    auto table = procedure.table(profile.observer + ", " + profile.date + ", " + profile.method);
+    if (!table) return table.error();
+    profile.table = std::move(*table);
     return profile;
 }
 
@@ -190,17 +222,22 @@ void simulate(Procedure& procedure, const SimulatedObserver& observer) {
     }
 }
 
-Result<perception::CsfTable> expected_table(const CalibrateArguments& a) {
+Result<perception::CsfTable> expected_table(const CalibrateArguments& a, const perception::Display& display) {
     if (a.display.csf.empty()) return perception::CsfTable::standard();
     auto choice = choose_csf(a.display.csf);
     if (!choice) return choice.error();
-    return choice->model ? perception::CsfTable::from_model(*choice->model) : *std::move(choice->table);
+    return choice->model ? perception::CsfTable::from_model(*choice->model, {.distance = display.distance}) : *std::move(choice->table);
 }
 
 Result<Procedure> begin_or_resume(const CalibrateArguments& a, const perception::Display& display) {
-    auto expected = expected_table(a);
+    auto expected = expected_table(a, display);
     if (!expected) return expected.error();
-    if (!a.state.empty() && std::filesystem::exists(a.state)) return Procedure::resume(a.state, std::move(*expected));
+    if (!a.state.empty() && std::filesystem::exists(a.state)) {
+        auto procedure = Procedure::resume(a.state, std::move(*expected));
+        if (!procedure) return procedure;
+        if (auto same = check_resumed(a, procedure->plan()); !same) return same.error();
+        return procedure;
+    }
     auto plan = make_plan(a, display, *expected);
     if (!plan) return plan.error();
     return Procedure::create(std::move(*plan), std::move(*expected));
@@ -209,14 +246,15 @@ Result<Procedure> begin_or_resume(const CalibrateArguments& a, const perception:
 Result<int> calibrate_observer(CalibrateArguments& a, const perception::Display& display) {
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
-    std::optional<SimulatedObserver> observer;
-    if (!a.simulate.empty()) {
-        auto made = calibration::simulated_observer(a.simulate, static_cast<std::uint64_t>(a.seed));
-        if (!made) return made.error();
-        observer = std::move(*made);
-    }
     auto procedure = begin_or_resume(a, display);
     if (!procedure) return procedure.error();
+    std::optional<SimulatedObserver> observer;
+    if (!a.simulate.empty()) {
+        auto made = calibration::simulated_observer(a.simulate, procedure->plan().seed);
+        if (!made) return made.error();
+        if (auto ok = calibration::check_measurable(*made, procedure->plan()); !ok) return ok.error();
+        observer = std::move(*made);
+    }
     if (observer) {
         simulate(*procedure, *observer);
         if (!a.state.empty())
@@ -229,13 +267,16 @@ Result<int> calibrate_observer(CalibrateArguments& a, const perception::Display&
             print_note(std::to_string(procedure->answers().size()) + " of " + std::to_string(procedure->trials()) + " answers were given" +
                        (a.state.empty() ? "; with --resume FILE they would have been kept."
                                         : "; go on with --resume '" + a.state + "'."));
-            return exit_done;
+            return a.out.empty() && a.json.empty() ? exit_done : exit_failed; // nothing is written
         }
     }
     const SimulatedObserver* truth = observer ? &*observer : nullptr;
     if (auto ok = report->prepare(to_json(*procedure, truth)); !ok) return ok.error();
-    if (!a.out.empty())
-        if (auto ok = calibration::write_observer(a.out, profile_of(*procedure, a, display)); !ok) return ok.error();
+    if (!a.out.empty()) {
+        auto profile = profile_of(*procedure, a, display);
+        if (!profile) return profile.error();
+        if (auto ok = calibration::write_observer(a.out, *profile); !ok) return ok.error();
+    }
     if (auto ok = report->publish(); !ok) return ok.error();
     if (!report->is_on_stdout()) print(*procedure, truth);
     return exit_done;
@@ -277,6 +318,10 @@ Result<int> calibrate_by_photometer(const CalibrateArguments& a, const perceptio
 }
 
 Result<int> run(CalibrateArguments& a) {
+    // Before anybody has answered anything.
+    const std::string simulated = a.simulate.substr(0, a.simulate.find(':')); // a model, or a file
+    if (const auto ready = check_outputs({a.display.file, a.display.csf, a.photometer, simulated}, {a.out, a.json, a.state, a.window.screenshot}); !ready)
+        return ready.error();
     const auto display = make_display(a.display);
     if (!display) return display.error();
     if (!a.photometer.empty()) return calibrate_by_photometer(a, *display);
@@ -293,7 +338,8 @@ void check(const CalibrateArguments& a) {
     const int modes = a.chart + a.gamma + !a.photometer.empty() + !a.simulate.empty();
     if (modes > 1) refuse("--simulate, --gamma, --photometer and --chart exclude each other: give one of them.");
     const std::string ending = a.chart ? ".png" : ".json";
-    if (!a.out.empty() && !a.out.ends_with(ending)) refuse("-o must end in " + ending + ", not '" + a.out + "'.");
+    if (!a.out.empty() && !has_ending(a.out, ending)) refuse("-o must end in " + ending + ", not '" + a.out + "'.");
+    if (a.frequencies.empty() != a.eccentricities.empty()) refuse("--frequencies and --eccentricities need each other.");
     if (!a.photometer.empty() && a.out.empty()) refuse("--photometer needs -o DISPLAY.json for what was measured.");
     if ((a.chart || a.gamma || !a.photometer.empty()) && !a.json.empty()) refuse("--json is for observers.");
 }
@@ -305,31 +351,24 @@ Command calibrate_command(CLI::App& app) {
     CLI::App* verb = app.add_subcommand("calibrate", "Measure a viewer's contrast sensitivity, for --csf; or a display");
     verb->add_option("-o,--output", a->out, "The observer's profile; of --gamma and --photometer the display's; of --chart a picture")
         ->type_name("OUT.json|.png");
-    verb->add_option("--method", a->method, "2ifc (default): in which of two intervals was a grating? adjustment: gratings fade in and out")
-        ->type_name("NAME")
-        ->check(one_of({"2ifc", "adjustment"}));
-    verb->add_option("--trials", a->trials, "Of 2ifc (default: 200)")->type_name("N")->check(whole(1, 1e5));
-    verb->add_option("--settings", a->settings, "Of adjustment, at each place; the first does not count (default: 7)")
-        ->type_name("N")
-        ->check(whole(2, 1000));
+    add_choice<std::optional<Method>, Method>(*verb, "--method", a->method, {{"2ifc", Method::two_interval}, {"adjustment", Method::adjustment}},
+                                              "2ifc (default): in which of two intervals was a grating? adjustment: gratings fade in and out");
+    add_number(*verb, "--trials", a->trials, whole(1, 1e5), "N", "Of 2ifc (default: 200)");
+    add_number(*verb, "--settings", a->settings, whole(2, 1000), "N", "Of adjustment, at each place; the first does not count (default: 7)");
     constexpr double most_seed = 9007199254740992.0; // 2^53, which JSON keeps
-    verb->add_option("--seed", a->seed, "Of the order of trials, and of simulated observers (default: 1)")
-        ->type_name("N")
-        ->check(whole(0, most_seed));
+    add_number(*verb, "--seed", a->seed, whole(0, most_seed), "N", "Of the order of trials, and of simulated observers (default: 1)");
     verb->add_option("--simulate", a->simulate,
                      "Without a person: a CSF model or a profile, with gain=, frequency=, eccentricity=, slope=, lapse=, scatter=, delay=")
         ->type_name("NAME|FILE.json[:key=value,...]");
-    verb->add_option("--resume", a->state, "Keep all answers in this file, and go on with those that are there")->type_name("STATE.json");
+    verb->add_option("--resume", a->state, "Keep all answers in this file, and go on with those that are there, by the plan that is there")
+        ->type_name("STATE.json");
     verb->add_option("--frequencies", a->frequencies, "To measure at (default: octaves that fit the display)")
         ->type_name("CPD")
         ->check(positive());
     verb->add_option("--eccentricities", a->eccentricities, "To measure at (default: 0, 5, 10, 20 as far as they fit)")
         ->type_name("DEG")
         ->check(not_negative());
-    verb->add_option_function<double>(
-            "--luminance", [o = a.get()](const double& v) { o->luminance = v; }, "Mean of the gratings (default: midway from black to white)")
-        ->type_name("CDM2")
-        ->check(positive());
+    add_number(*verb, "--luminance", a->luminance, positive(), "CDM2", "Mean of the gratings (default: midway from black to white)");
     verb->add_option("--observer", a->observer, "Who it is, for the profile")->type_name("NAME");
     verb->add_option("--conditions", a->conditions, "Room, light, glasses, for the profile")->type_name("TEXT");
     verb->add_option("--date", a->date, "For the profile (default: today)")->type_name("TEXT");

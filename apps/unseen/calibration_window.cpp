@@ -25,7 +25,6 @@ using calibration::Procedure;
 using calibration::Trial;
 using render::TestPattern;
 
-constexpr double degrees_per_radian = 180 / std::numbers::pi;
 constexpr double frame_wait_s = 1.0 / 120; // below a frame of most displays: presenting paces the rest
 constexpr double ramp_share = 0.2;         // of an interval, to fade in and out, so that no edge in time is seen
 constexpr double key_step = 0.05;          // log10 contrast an arrow key
@@ -145,14 +144,14 @@ private:
         const double half = perception::physical_field(options_.display, options_.display.width_px).value() / 2;
         const double reach = 3 / trial_.grating.frequency_cpd; // two standard deviations of the patch
         const double at = std::max(0.0, std::min(trial_.grating.eccentricity_deg, half - reach));
-        stage_.cross = std::tan((at - trial_.grating.eccentricity_deg) / degrees_per_radian);
+        stage_.cross = std::tan((at - trial_.grating.eccentricity_deg) / perception::degrees_per_radian);
         pattern_.kind = TestPattern::Kind::grating;
         pattern_.tangent_per_pixel = options_.display.pixel_pitch / options_.display.distance;
         pattern_.mean = procedure_.plan().luminance.value();
         pattern_.frequency_cpd = trial_.grating.frequency_cpd;
         pattern_.sigma_deg = 1.5 / trial_.grating.frequency_cpd;
         pattern_.phase_deg = trial_.phase_deg;
-        pattern_.centre = {std::tan(at / degrees_per_radian), 0};
+        pattern_.centre = {std::tan(at / perception::degrees_per_radian), 0};
         pattern_.contrast = 0;
     }
 
@@ -187,7 +186,6 @@ private:
     // Fades until a key says that it appeared or vanished; arrows take over from the fading.
     Result<void> adjustment() {
         const double highest = procedure_.plan().highest_contrast;
-        constexpr double lowest = 1e-4;
         double log10_contrast = std::log10(trial_.contrast), last = stage_.seconds();
         bool fades = true;
         stage_.dots = 0;
@@ -206,7 +204,7 @@ private:
                     return {};
                 }
             }
-            log10_contrast = std::clamp(log10_contrast, std::log10(lowest), std::log10(highest));
+            log10_contrast = std::clamp(log10_contrast, calibration::lowest_log10_contrast, std::log10(highest));
             pattern_.contrast = std::pow(10, log10_contrast);
             if (auto shown = stage_.show(pattern_); !shown) return shown;
         }
@@ -226,7 +224,7 @@ TestPattern chart_of(const perception::Display& display) {
     chart.tangent_per_pixel = display.pixel_pitch / display.distance;
     const double black = perception::black_level(display).value(), white = perception::to_luminance(display, 1).value();
     chart.mean = (black + white) / 2;
-    const double nyquist = perception::pixels_per_degree(display).value() / 2;
+    const double nyquist = perception::pixels_per_degree(display).value() / 2; // of the picture
     chart.frequency_cpd = std::min(0.3, nyquist / 8);
     chart.highest_frequency_cpd = nyquist;
     chart.decades = 3;
@@ -236,8 +234,7 @@ TestPattern chart_of(const perception::Display& display) {
 } // namespace
 
 Result<void> run_calibration_window(Procedure& procedure, const CalibrationWindowOptions& options, const std::filesystem::path& state) {
-    std::fputs(calibration_window_help, stdout);
-    std::fflush(stdout);
+    std::fputs(calibration_window_help, stderr); // stdout may be for --json
     auto stage = Stage::open(options, "Unseen - calibration");
     if (!stage) return stage.error();
     Session session(**stage, procedure, options);
@@ -250,8 +247,7 @@ Result<void> run_calibration_window(Procedure& procedure, const CalibrationWindo
 }
 
 Result<std::vector<GammaMatch>> match_gamma(const CalibrationWindowOptions& options) {
-    std::fputs(calibration_window_help, stdout);
-    std::fflush(stdout);
+    std::fputs(calibration_window_help, stderr); // stdout may be for --json
     auto stage = Stage::open(options, "Unseen - gamma");
     if (!stage) return stage.error();
     constexpr int rows = 4;

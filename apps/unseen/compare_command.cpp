@@ -98,7 +98,6 @@ Result<Verdict> judge_rpg99(const CompareArguments& a, const Pair& pair, const p
     const Image reference = luminance(pair.reference), test = luminance(pair.test);
     perception::Rpg99Options options;
     options.field_degrees = a.field_degrees.value_or(perception::physical_field(display, reference.width).value());
-    options.peak_cdm2 = display.peak.value();
     options.masked_by_both = as_the_program;
     auto judgement = perception::judge_rpg99(reference, test, options);
     if (!judgement) return judgement.error();

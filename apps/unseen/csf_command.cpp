@@ -33,7 +33,7 @@ struct StimulusOptions {
 };
 
 struct CsfArguments {
-    std::string model_name = "castle", csv, plot, csf, save;
+    std::string model_name, csv, plot, csf, save; // no model: castle
     bool by_table = false;
     bool is_pursued = false; // the velocity is the image's, and the eye follows it
     StimulusOptions stimulus;
@@ -71,7 +71,7 @@ public:
         Observer observer;
         observer.fixed_ = a.stimulus;
         observer.is_pursued_ = a.is_pursued;
-        auto model = csf_model(a.model_name);
+        auto model = csf_model(a.model_name.empty() ? "castle" : a.model_name);
         if (!model) return model.error();
         observer.model_ = *model;
         bool by_table = a.by_table;
@@ -311,6 +311,7 @@ void check(const CsfArguments& a) {
     if (is_table && a.stimulus.area) refuse("--table and --csf hold patches of 1.5 cycles radius: leave --area away.");
     if (!a.save.empty() && !is_table) refuse("--save-table needs --table or --csf.");
     if (a.by_table && !a.csf.empty()) refuse("--table and --csf exclude each other: give one of them.");
+    if (!a.model_name.empty() && !a.csf.empty()) refuse("--model and --csf exclude each other: give one of them.");
     if (a.stimulus.temporal && a.stimulus.velocity)
         refuse("--temporal and --velocity exclude each other: give one of them.");
     if (a.is_pursued && !a.stimulus.velocity && a.csv.empty()) refuse("--pursuit needs --velocity.");

@@ -22,7 +22,6 @@ namespace {
 using perception::Image;
 using vdtree::NodeId;
 
-constexpr double degrees_per_radian = 180 / std::numbers::pi;
 
 // ---- what a node's fold is worth
 
@@ -43,7 +42,7 @@ Scale scale_of(FoldMap map, const Scene& scene, double largest) {
     switch (map) {
     case FoldMap::cost: return {1.0 / 64, 1, true, {1.0 / 64, 1.0 / 16, 1.0 / 4, 1}, "fold cost; 1: just imperceptible, red: more"};
     case FoldMap::frequency: {
-        Scale scale{0.1, perception::pixels_per_degree(scene.display).value() / 2, true, {0.1, 0.3, 1, 3, 10, 30}, "cycles per degree"};
+        Scale scale{0.1, perception::nyquist(perception::finest_pixels_per_degree(scene.display)).value(), true, {0.1, 0.3, 1, 3, 10, 30}, "cycles per degree"};
         std::erase_if(scale.ticks, [&](double tick) { return tick > scale.high; });
         return scale;
     }
@@ -61,14 +60,14 @@ public:
         const vdtree::LuminanceRange range = tree_.luminance_range();
         darkest_ = std::min(range.lo, scene.background);
         brightest_ = std::max(range.hi, scene.background);
-        pixel_deg_ = 1 / perception::pixels_per_degree(scene.display).value();
+        pixel_deg_ = 1 / perception::coarsest_pixels_per_degree(scene.display).value();
         has_gaze_ = what.gaze_px.has_value() && viewpoint.gaze.has_value();
     }
 
     double frequency(NodeId node) const {
         const vdtree::Sphere& ring = tree_.bounds()[node].ring;
         const double distance = glm::length(glm::dvec3(ring.centre) - viewpoint_.eye);
-        const double extent = ring.radius < distance ? 2 * std::asin(ring.radius / distance) * degrees_per_radian : 180;
+        const double extent = ring.radius < distance ? 2 * std::asin(ring.radius / distance) * perception::degrees_per_radian : 180;
         return 1 / (2 * std::max(extent, pixel_deg_));
     }
 
@@ -92,7 +91,7 @@ public:
         const double distance = glm::length(to_centre);
         if (!has_gaze_ || !(ring.radius < distance)) return 0;
         const double angle = std::atan2(glm::length(glm::cross(to_centre, *viewpoint_.gaze)), glm::dot(to_centre, *viewpoint_.gaze));
-        return std::max(0.0, angle - std::asin(ring.radius / distance)) * degrees_per_radian;
+        return std::max(0.0, angle - std::asin(ring.radius / distance)) * perception::degrees_per_radian;
     }
 
 private:

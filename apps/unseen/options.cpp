@@ -55,15 +55,6 @@ CLI::Option* add_vector(CLI::App& verb, const std::string& name, std::optional<g
         ->check(finite());
 }
 
-CLI::Option* add_number(CLI::App& verb, const std::string& name, std::optional<double>& value,
-                        const CLI::Validator& validator, const std::string& unit, const std::string& text) {
-    return verb
-        .add_option_function<double>(
-            name, [&value](const double& v) { value = v; }, text)
-        ->type_name(unit)
-        ->check(validator);
-}
-
 // "1024x768".
 std::string parse_size(const std::string& text, int& width, int& height) {
     const std::size_t x = text.find('x');
@@ -131,6 +122,15 @@ CLI::Validator whole(double low, double high) {
             return "must be a whole number from " + shortest(low) + " to " + shortest(high) + ", not '" + text + "'";
         },
         "");
+}
+
+CLI::Option* add_number(CLI::App& verb, const std::string& name, std::optional<double>& value,
+                        const CLI::Validator& validator, const std::string& unit, const std::string& text) {
+    return verb
+        .add_option_function<double>(
+            name, [&value](const double& v) { value = v; }, text)
+        ->type_name(unit)
+        ->check(validator);
 }
 
 CLI::Validator one_of(std::vector<std::string> names) {

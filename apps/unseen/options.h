@@ -120,6 +120,10 @@ CLI::Option* add_choice(CLI::App& verb, const std::string& option, Target& targe
     return verb.add_option_function<std::string>(option, take, text)->type_name("NAME")->check(one_of(std::move(names)));
 }
 
+// An option that takes a number.
+CLI::Option* add_number(CLI::App& verb, const std::string& name, std::optional<double>& value, const CLI::Validator& validator,
+                        const std::string& unit, const std::string& text);
+
 // Ends the parse: exit status 2.
 [[noreturn]] void refuse(const std::string& message);
 

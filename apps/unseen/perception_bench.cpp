@@ -186,10 +186,14 @@ Totals total(const std::vector<Judged>& all, FoldTest test, std::size_t judge) {
 
 class PerceptionBench {
 public:
-    PerceptionBench(const PerceptionBenchOptions& options, render::Context context, perception::CsfModel second)
-        : options_(options), context_(std::move(context)), second_(second), bar_("judging") {}
+    PerceptionBench(const PerceptionBenchOptions& options, perception::CsfModel second) : options_(options), second_(second), bar_("judging") {}
 
     Result<PerceptionBenchResult> run() {
+        if (needs_models() || is_wanted("hard")) { // the other groups draw nothing
+            auto context = render::Context::headless();
+            if (!context) return context.error();
+            context_ = std::move(*context);
+        }
         if (auto loaded = load(); !loaded) return loaded.error();
         const struct {
             const char* group;
@@ -249,7 +253,7 @@ private:
         return add(file.stem().string(), std::move(*tree));
     }
     Result<void> add(std::string name, vdtree::VertexTree tree) {
-        auto model = JudgedModel::create(context_, std::move(name), std::move(tree), options_.window_px, second_);
+        auto model = JudgedModel::create(*context_, std::move(name), std::move(tree), options_.window_px, second_);
         if (!model) return model.error();
         models_.push_back(std::make_unique<JudgedModel>(std::move(*model)));
         return {};
@@ -530,7 +534,7 @@ private:
         for (const HardMesh& mesh : hard_meshes(triangles)) {
             auto tree = build_hard_tree(mesh);
             if (!tree) return tree.error();
-            auto model = JudgedModel::create(context_, mesh.name, std::move(*tree), options_.window_px, second_);
+            auto model = JudgedModel::create(*context_, mesh.name, std::move(*tree), options_.window_px, second_);
             if (!model) return model.error();
             hard_models.push_back(std::make_unique<JudgedModel>(std::move(*model)));
         }
@@ -772,7 +776,7 @@ private:
     }
 
     const PerceptionBenchOptions& options_;
-    render::Context context_;
+    std::optional<render::Context> context_;
     perception::CsfModel second_; // of the second judge
     ProgressBar bar_;
     Models models_;
@@ -783,8 +787,6 @@ private:
 } // namespace
 
 Result<PerceptionBenchResult> bench_perception(const PerceptionBenchOptions& options) {
-    auto context = render::Context::headless();
-    if (!context) return context.error();
     if (!options.pictures.empty()) {
         std::error_code failed;
         fs::create_directories(options.pictures, failed);
@@ -792,7 +794,7 @@ Result<PerceptionBenchResult> bench_perception(const PerceptionBenchOptions& opt
     }
     const auto second = options.second_judge.empty() ? Result(usual_second) : perception::csf_model(options.second_judge);
     if (!second) return second.error();
-    return PerceptionBench(options, std::move(*context), *second).run();
+    return PerceptionBench(options, *second).run();
 }
 
 } // namespace unseen::app

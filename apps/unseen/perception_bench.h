@@ -35,7 +35,7 @@ struct PerceptionBenchResult {
     Json views = Json::array(); // every view that was judged
 };
 
-// Needs OpenGL. The picture files are replaced.
+// Needs OpenGL, but for the groups csf and observers. The picture files are replaced.
 Result<PerceptionBenchResult> bench_perception(const PerceptionBenchOptions& options);
 
 // The groups that need no pictures (csf, observers): rows only.

@@ -2,6 +2,7 @@
 // simulated observers.
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -9,6 +10,8 @@
 #include <optional>
 #include <random>
 #include <sstream>
+#include <string_view>
+#include <utility>
 
 #include <calibration/procedure.h>
 #include <calibration/simulated_observer.h>
@@ -39,21 +42,36 @@ struct Printed {
     double value = 0, half_unit = 0;
 };
 
-Printed printed(const std::string& text) {
-    Printed number{std::stod(text), 0};
+std::optional<Printed> printed(std::string_view text) {
+    Printed number;
+    const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), number.value);
+    if (code != std::errc() || end != text.data() + text.size() || !std::isfinite(number.value)) return std::nullopt;
     const std::size_t point = text.find('.'), exponent = text.find_first_of("eE");
-    const double decimals = point == std::string::npos ? 0 : static_cast<double>(std::min(exponent, text.size()) - point - 1);
-    const double scale = exponent == std::string::npos ? 0 : std::stod(text.substr(exponent + 1));
+    const double decimals = point == text.npos ? 0 : static_cast<double>(std::min(exponent, text.size()) - point - 1);
+    int scale = 0;
+    if (exponent != text.npos) {
+        const std::size_t sign = text[exponent + 1] == '+' ? 1 : 0; // which from_chars does not take
+        std::from_chars(text.data() + exponent + 1 + sign, text.data() + text.size(), scale);
+    }
     number.half_unit = 0.5 * std::pow(10, scale - decimals);
     return number;
 }
 
 // Columns by name; lines that begin with '#' are remarks.
 struct Reference {
+    struct Row {
+        std::size_t line = 0; // of the file, from 1
+        std::vector<std::string> cells;
+    };
     fs::path file;
     std::vector<std::string> columns;
-    std::vector<std::vector<std::string>> rows;
+    std::vector<Row> rows;
 
+    Result<Printed> number(const Row& row, std::size_t column) const {
+        if (const auto value = printed(row.cells[column])) return *value;
+        return Error{ErrorCode::malformed_data, file.string() + ": line " + std::to_string(row.line) + ": '" + row.cells[column] + "' in column '" +
+                                                    columns[column] + "' is no number."};
+    }
     std::optional<std::size_t> column(std::initializer_list<const char*> names) const {
         for (std::size_t i = 0; i < columns.size(); ++i)
             for (const char* name : names)
@@ -67,14 +85,16 @@ std::optional<Reference> read_reference(const fs::path& file) {
     if (!stream) return std::nullopt;
     Reference reference;
     reference.file = file;
+    std::size_t number = 0;
     for (std::string line; std::getline(stream, line);) {
+        ++number;
         if (!line.empty() && line.back() == '\r') line.pop_back();
         if (line.empty() || line[0] == '#') continue;
         std::vector<std::string> cells;
         std::istringstream parts(line);
         for (std::string cell; std::getline(parts, cell, ',');) cells.push_back(cell);
         if (reference.columns.empty()) reference.columns = std::move(cells);
-        else if (cells.size() == reference.columns.size()) reference.rows.push_back(std::move(cells));
+        else if (cells.size() == reference.columns.size()) reference.rows.push_back({number, std::move(cells)});
     }
     return reference;
 }
@@ -109,7 +129,32 @@ struct Compared {
 // The greatest values of the published relative curves, to which the models are scaled.
 constexpr double mannos_sakrison_peak = 0.98087787655726166, rushmeier_peak = 1.8830747958791485;
 
-void compare(const Reference& reference, std::initializer_list<Compared> models, double must, std::vector<BenchRow>& rows) {
+// The stimulus of a row, whose columns are told by number.
+struct StimulusColumns {
+    std::size_t frequency, luminance, area, eccentricity;
+    std::optional<std::size_t> temporal, field;
+};
+
+Result<Stimulus> stimulus_of(const Reference& reference, const Reference::Row& row, const StimulusColumns& columns) {
+    double frequency = 0, luminance = 0, area = 0, eccentricity = 0, temporal = 0, field = 0;
+    for (const auto& [column, value] : {std::pair(std::optional(columns.frequency), &frequency), {columns.luminance, &luminance}, {columns.area, &area},
+                                        {columns.eccentricity, &eccentricity}, {columns.temporal, &temporal}, {columns.field, &field}}) {
+        if (!column) continue;
+        const auto number = reference.number(row, *column);
+        if (!number) return number.error();
+        *value = number->value;
+    }
+    Stimulus s;
+    s.frequency = CyclesPerDegree(frequency);
+    s.luminance = Luminance(luminance);
+    s.area = perception::SquareDegrees(area);
+    s.eccentricity = Degrees(eccentricity);
+    s.temporal = perception::Hertz(temporal);
+    if (columns.field) s.field = field == 0 ? perception::VisualField::temporal : perception::VisualField::nasal;
+    return s;
+}
+
+Result<void> compare(const Reference& reference, std::initializer_list<Compared> models, double must, std::vector<BenchRow>& rows) {
     const auto frequency = reference.column({"frequency", "s_frequency"}), luminance = reference.column({"luminance"}),
                area = reference.column({"area"}), eccentricity = reference.column({"eccentricity"}),
                temporal = reference.column({"temporal", "t_frequency"}), field = reference.column({"field", "vis_field"});
@@ -121,20 +166,19 @@ void compare(const Reference& reference, std::initializer_list<Compared> models,
             continue;
         }
         Deviation deviation;
-        for (const auto& row : reference.rows) {
-            Stimulus s;
-            s.frequency = CyclesPerDegree(std::stod(row[*frequency]));
-            s.luminance = Luminance(std::stod(row[*luminance]));
-            s.area = perception::SquareDegrees(std::stod(row[*area]));
-            if (compared.knows_eccentricity) s.eccentricity = Degrees(std::stod(row[*eccentricity]));
-            if (temporal) s.temporal = perception::Hertz(std::stod(row[*temporal]));
-            if (field) s.field = std::stod(row[*field]) == 0 ? perception::VisualField::temporal : perception::VisualField::nasal;
-            deviation.add(perception::sensitivity(compared.model, s), printed(row[*column]), compared.scale);
+        for (const Reference::Row& row : reference.rows) {
+            auto s = stimulus_of(reference, row, {*frequency, *luminance, *area, *eccentricity, temporal, field});
+            if (!s) return s.error();
+            if (!compared.knows_eccentricity) s->eccentricity = Degrees(0);
+            const auto value = reference.number(row, *column);
+            if (!value) return value.error();
+            deviation.add(perception::sensitivity(compared.model, *s), *value, compared.scale);
         }
         rows.push_back({name, "1e-9", std::to_string(deviation.values) + " values of " + reference.file.filename().string() +
                                           ", beyond the rounding of their last digit",
                         deviation.largest * 1e9, must * 1e9, {}, false, 3});
     }
+    return {};
 }
 
 // ---- tables
@@ -218,7 +262,9 @@ Result<void> plot_observer(const fs::path& file, const calibration::Procedure& p
     plot.x_label = "cycles per degree";
     plot.y_label = "sensitivity";
     plot.x_range = {0.4, 20};
-    const CsfTable table = procedure.table(name);
+    const auto made = procedure.table(name);
+    if (!made) return made.error();
+    const CsfTable& table = *made;
     const glm::vec3 colours[] = {{0.1f, 0.3f, 0.8f}, {0.8f, 0.2f, 0.1f}, {0.3f, 0.6f, 0.1f}, {0.5f, 0.3f, 0.6f}};
     std::size_t colour = 0;
     for (const double degrees : {0.0, 5.0, 10.0, 20.0}) {
@@ -253,20 +299,24 @@ Result<std::vector<BenchRow>> bench_csf(const SensitivityBenchOptions& options) 
     std::vector<BenchRow> rows;
     constexpr double castle_must = 1e-6, classical_must = 1e-9, table_must = 0.5; // relative, relative, %
     const char* const none = "no reference figures: run it in the checkout, or name their folder by --reference";
-    if (const auto reference = find_reference(options.reference, {"csf_golden.csv", "csf_castle_stela_grid.csv"}))
-        compare(*reference, {{CsfModel::castle, {"castle", "S_castle_ach"}}, {CsfModel::stela, {"stela", "S_stela"}}}, castle_must, rows);
-    else rows.push_back({"deviation of castle and stela", "relative", none, {}, castle_must, {}, false, 0});
+    if (const auto reference = find_reference(options.reference, {"csf_golden.csv", "csf_castle_stela_grid.csv"})) {
+        const auto compared =
+            compare(*reference, {{CsfModel::castle, {"castle", "S_castle_ach"}}, {CsfModel::stela, {"stela", "S_stela"}}}, castle_must, rows);
+        if (!compared) return compared.error();
+    } else rows.push_back({"deviation of castle and stela", "relative", none, {}, castle_must, {}, false, 0});
     const double scale = 1 / perception::relative_models_peak;
-    if (const auto reference = find_reference(options.reference, {"csf_classical_golden.csv", "csf_classical_grid.csv"}))
-        compare(*reference,
-                {{CsfModel::daly, {"daly", "daly93"}},
-                 {CsfModel::barten_1989, {"barten_1989", "barten89_pdiff"}, 1, false},
-                 {CsfModel::barten_1999, {"barten_1999", "barten99"}, 1, false},
-                 {CsfModel::barten_2004, {"barten_2004", "barten04"}, 1, false},
-                 {CsfModel::mannos_sakrison, {"mannos_sakrison"}, scale * mannos_sakrison_peak, false},
-                 {CsfModel::rushmeier, {"rushmeier"}, scale * rushmeier_peak, false}},
-                classical_must, rows);
-    else rows.push_back({"deviation of the classical models", "relative", none, {}, classical_must, {}, false, 0});
+    if (const auto reference = find_reference(options.reference, {"csf_classical_golden.csv", "csf_classical_grid.csv"})) {
+        const auto compared = compare(
+            *reference,
+            {{CsfModel::daly, {"daly", "daly93"}},
+             {CsfModel::barten_1989, {"barten_1989", "barten89_pdiff"}, 1, false},
+             {CsfModel::barten_1999, {"barten_1999", "barten99"}, 1, false},
+             {CsfModel::barten_2004, {"barten_2004", "barten04"}, 1, false},
+             {CsfModel::mannos_sakrison, {"mannos_sakrison"}, scale * mannos_sakrison_peak, false},
+             {CsfModel::rushmeier, {"rushmeier"}, scale * rushmeier_peak, false}},
+            classical_must, rows);
+        if (!compared) return compared.error();
+    } else rows.push_back({"deviation of the classical models", "relative", none, {}, classical_must, {}, false, 0});
 
     BenchRow tables{"error of the tables", "%", "the largest of all models in random places where S > 1: ", 0, table_must, {}, false, 2};
     ProgressBar bar("tables");

@@ -87,9 +87,9 @@ struct LightRig::Reader {
         bool any = rig.ambient_ > 0;
         for (const json& value : **lights) {
             if (auto ok = read_light(*object, value); !ok) return ok;
-            const Light& light = rig.lights_.back();
-            any = any || light.at_rest.intensity > 0 ||
-                  std::any_of(light.keys.begin(), light.keys.end(), [](const Key& key) { return key.intensity > 0; });
+            const Light& light = rig.lights_.back(); // keyframes take the intensity's place
+            any = any || (light.keys.empty() ? light.at_rest.intensity > 0
+                                             : std::any_of(light.keys.begin(), light.keys.end(), [](const Key& key) { return key.intensity > 0; }));
         }
         if (!any)
             return object->error("the scene is black: give key \"ambient\" or the \"intensity\" of one of the lights a value above 0");

@@ -2,6 +2,7 @@
 #include <calibration/procedure.h>
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <cmath>
 #include <numbers>
@@ -22,6 +23,8 @@ using perception::Random;
 
 constexpr int most_places = 1000, most_trials = 100'000, most_settings = 1000;
 constexpr double widest_eccentricity_deg = 90;
+constexpr double brightest_cdm2 = 1e6;
+constexpr std::uint64_t exact_integers = std::uint64_t{1} << 53; // what JSON keeps
 constexpr double two_sided_95 = 1.959964; // standard deviations
 
 // Sweeps over all places until the beliefs keep still; more than enough, as each answer changes little.
@@ -35,6 +38,10 @@ constexpr double usual_lapse = 0.01;
 
 // Settings scatter at least so much (log10 units): a few that happen to agree do not make a place certain.
 constexpr double least_scatter = 0.04;
+// Thresholds are looked for up to so far above the highest that is expected (log10 units), where the standard grid ends below it: a place
+// of which nothing is seen keeps what is believed of it, in place of the grid's end.
+constexpr double room_above_expected = 0.5, farthest_log10_threshold = 12;
+
 // Of seeing nothing at the highest contrast, however far below it the threshold is believed to be.
 constexpr double least_chance = 1e-6;
 
@@ -65,12 +72,13 @@ bool fits(const perception::Display& display, const GratingPlace& place) {
 
 std::string_view name(Method method) { return method == Method::two_interval ? "2ifc" : "adjustment"; }
 
-CalibrationPlan plan_for(const perception::Display& display, const CsfTable& expected) {
+CalibrationPlan plan_for(const perception::Display& display, const CsfTable& expected, std::optional<Luminance> luminance) {
     CalibrationPlan plan;
     const double black = perception::black_level(display).value(), white = perception::to_luminance(display, 1).value();
-    plan.luminance = Luminance((black + white) / 2);
-    plan.highest_contrast = (white - black) / (white + black);
-    const double finest = perception::pixels_per_degree(display).value() / pixels_per_cycle;
+    plan.luminance = luminance.value_or(Luminance((black + white) / 2));
+    const double mean = plan.luminance.value();
+    plan.highest_contrast = luminance ? std::min(mean - black, white - mean) / mean : (white - black) / (white + black);
+    const double finest = perception::coarsest_pixels_per_degree(display).value() / pixels_per_cycle;
     std::vector<double> frequencies;
     for (double f = 0.5; f <= std::min(16.0, finest); f *= 2) frequencies.push_back(f);
     if (frequencies.empty()) frequencies.push_back(finest);
@@ -107,8 +115,9 @@ Result<void> validate(const CalibrationPlan& plan) {
         return invalid("There must be 1 to 100,000 trials, not " + std::to_string(plan.trials) + ".");
     if (plan.settings < 2 || plan.settings > most_settings)
         return invalid("There must be 2 to 1000 settings a place, not " + std::to_string(plan.settings) + ".");
-    if (!(plan.luminance.value() > 0 && std::isfinite(plan.luminance.value())))
-        return invalid("The luminance must be above 0 cd/m2, not " + to_text(plan.luminance.value()) + ".");
+    if (!(plan.luminance.value() > 0 && plan.luminance.value() <= brightest_cdm2))
+        return invalid("The luminance must be above 0 and at most 1e6 cd/m2, not " + to_text(plan.luminance.value()) + ".");
+    if (plan.seed > exact_integers) return invalid("The seed must be at most 2^53, not " + std::to_string(plan.seed) + ".");
     if (!(plan.highest_contrast > 0 && plan.highest_contrast <= 1))
         return invalid("The highest contrast must lie in 0..1, not " + to_text(plan.highest_contrast) + ".");
     return {};
@@ -131,6 +140,18 @@ Result<Procedure> Procedure::create(CalibrationPlan plan, CsfTable expected) {
         grid.slope.assign(std::begin(possible_slopes), std::end(possible_slopes));
         grid.lapse = {usual_lapse};
     }
+    double highest_threshold = 0;
+    for (std::size_t i = 0; i < plan.places.size(); ++i) {
+        const double threshold = -log10_expected(expected, plan.places[i], plan.luminance);
+        if (!(threshold >= lowest_log10_contrast))
+            return invalid(in_brackets("places", i) + ": a sensitivity of " + to_text(std::pow(10, -threshold)) +
+                           " is expected, but none above " + to_text(std::round(std::pow(10, -lowest_log10_contrast))) + " can be measured.");
+        highest_threshold = std::max(highest_threshold, std::min(threshold, farthest_log10_threshold));
+    }
+    std::vector<double>& thresholds = grid.log10_threshold;
+    const double step = thresholds[1] - thresholds[0];
+    while (thresholds.back() < highest_threshold + room_above_expected)
+        thresholds.push_back(thresholds.front() + step * static_cast<double>(thresholds.size()));
     std::erase_if(grid.log10_contrast, [&](double c) { return c > std::log10(plan.highest_contrast); });
     if (grid.log10_contrast.empty())
         return invalid("The display's highest contrast, " + to_text(plan.highest_contrast) + ", shows nothing that could be measured.");
@@ -198,7 +219,8 @@ void Procedure::choose(int interval) {
 
 void Procedure::set(double contrast) {
     assert(plan_.method == Method::adjustment && contrast > 0);
-    take({next().place, std::log10(std::min(contrast, plan_.highest_contrast)), contrast < plan_.highest_contrast});
+    const double log10_contrast = std::log10(std::min(contrast, plan_.highest_contrast));
+    take({next().place, std::max(log10_contrast, lowest_log10_contrast), contrast < plan_.highest_contrast});
     combine();
 }
 
@@ -212,6 +234,8 @@ void Procedure::take(const Answer& answer) {
 void Procedure::combine() {
     if (plan_.method == Method::adjustment) weigh_settings();
     const std::vector<double>& thresholds = quests_.front().grid().log10_threshold;
+    // A grid does not tell thresholds apart that lie within a step of each other: they are spread as evenly over it.
+    const double least_deviation = (thresholds[1] - thresholds[0]) / std::sqrt(12.0);
     std::vector<double> prior(thresholds.size());
     // Of the slope and the lapse rate, which are the observer's and not the place's: what the answers of all places say.
     std::vector<std::vector<double>> evidence;
@@ -236,7 +260,7 @@ void Procedure::combine() {
             const double before = field_.belief(i).mean;
             believe_others(i);
             const QuestPlus::Belief belief = quests_[i].log10_threshold();
-            field_.set_own(i, {-belief.mean, belief.deviation});
+            field_.set_own(i, {-belief.mean, std::max(belief.deviation, least_deviation)});
             change = std::max(change, std::abs(field_.belief(i).mean - before));
         }
         if (change < still) break;
@@ -289,7 +313,7 @@ std::vector<PlaceEstimate> Procedure::estimates() const {
     return result;
 }
 
-CsfTable Procedure::table(std::string source) const {
+Result<CsfTable> Procedure::table(std::string source) const {
     perception::CsfSamples samples;
     samples.source = std::move(source);
     for (int i = -16; i <= 24; ++i) samples.frequency_cpd.push_back(std::exp2(i / 4.0)); // quarter octaves, 1/16 to 64
@@ -315,9 +339,7 @@ CsfTable Procedure::table(std::string source) const {
                 const double value = log10_expected(expected_, place, Luminance(luminance)) + deviations[e * frequencies + f];
                 samples.sensitivity.push_back(std::pow(10, std::max(value, least_log10)));
             }
-    auto table = CsfTable::create(std::move(samples));
-    assert(table); // finite and positive by construction
-    return std::move(*table);
+    return CsfTable::create(std::move(samples));
 }
 
 // ---- state --------------------------------------------------------------------------------------------------------
@@ -325,6 +347,22 @@ CsfTable Procedure::table(std::string source) const {
 namespace {
 
 constexpr std::string_view state_format = "unseen-calibration";
+
+// FNV-1a over all numbers of a table, in hexadecimal. As floats, since another machine's logarithms may differ in a double's last bits.
+std::string hash_of(const CsfTable& table) {
+    std::uint64_t hash = 0xcbf29ce484222325u;
+    const auto add = [&](std::uint32_t bits) {
+        for (int byte = 0; byte < 4; ++byte) hash = (hash ^ ((bits >> (8 * byte)) & 0xff)) * 0x100000001b3u;
+    };
+    const perception::CsfSamples& s = table.samples();
+    for (const std::vector<double>* values : {&s.frequency_cpd, &s.eccentricity_deg, &s.luminance_cdm2, &s.sensitivity}) {
+        add(static_cast<std::uint32_t>(values->size()));
+        for (const double value : *values) add(std::bit_cast<std::uint32_t>(static_cast<float>(value)));
+    }
+    std::string text(16, '0');
+    for (std::size_t digit = 0; digit < text.size(); ++digit) text[digit] = "0123456789abcdef"[(hash >> (60 - 4 * digit)) & 15];
+    return text;
+}
 
 Result<std::vector<std::vector<double>>> read_rows(const JsonObject& object, const char* key, std::size_t width) {
     const auto array = object.array(key);
@@ -351,11 +389,10 @@ Result<CalibrationPlan> read_plan(const JsonObject& object) {
     const auto method = read_method(object);
     if (!method) return method.error();
     plan.method = *method;
-    constexpr double exact_integers = 9007199254740992.0; // 2^53
-    const auto seed = object.number("seed", {.minimum = 0, .maximum = exact_integers, .whole = true});
+    const auto seed = object.number("seed", {.minimum = 0, .maximum = static_cast<double>(exact_integers), .whole = true});
     const auto trials = object.number("trials", {.minimum = 1, .maximum = most_trials, .whole = true});
     const auto settings = object.number("settings", {.minimum = 2, .maximum = most_settings, .whole = true});
-    const auto luminance = object.number("luminance_cdm2", {.minimum = 0, .maximum = 1e6, .minimum_allowed = false});
+    const auto luminance = object.number("luminance_cdm2", {.minimum = 0, .maximum = brightest_cdm2, .minimum_allowed = false});
     const auto contrast = object.number("highest_contrast", {.minimum = 0, .maximum = 1, .minimum_allowed = false});
     for (const auto* number : {&seed, &trials, &settings, &luminance, &contrast})
         if (!*number) return number->error();
@@ -381,7 +418,8 @@ Result<void> Procedure::save(const std::filesystem::path& file) const {
             ",\n\"highest_contrast\": " + to_text(plan_.highest_contrast) + ",\n\"places\": [";
     for (std::size_t i = 0; i < plan_.places.size(); ++i)
         text += (i > 0 ? ", [" : "[") + to_text(plan_.places[i].frequency_cpd) + ", " + to_text(plan_.places[i].eccentricity_deg) + "]";
-    text += "],\n\"answers\": [";
+    text += "],\n\"expected\": " + to_json(expected_.samples().source) + ",\n\"expected_hash\": " + to_json(hash_of(expected_));
+    text += ",\n\"answers\": [";
     for (std::size_t i = 0; i < answers_.size(); ++i)
         text += (i > 0 ? ",\n[" : "\n[") + std::to_string(answers_[i].place) + ", " + to_text(answers_[i].log10_contrast) + ", " +
                 (answers_[i].is_right ? "1" : "0") + "]";
@@ -390,13 +428,19 @@ Result<void> Procedure::save(const std::filesystem::path& file) const {
 
 Result<Procedure> Procedure::resume(const std::filesystem::path& file, CsfTable expected) {
     const auto object = JsonObject::read(file, {"format", "version", "method", "seed", "trials", "settings", "luminance_cdm2",
-                                                "highest_contrast", "places", "answers"});
+                                                "highest_contrast", "places", "expected", "expected_hash", "answers"});
     if (!object) return object.error();
     std::string format = "missing";
     if (auto ok = object->get("format", format); !ok) return ok.error();
     if (format != state_format)
         return object->key_error("format", "must be \"unseen-calibration\": this is no interrupted calibration");
     if (auto version = object->number("version", {.minimum = 1, .maximum = 1, .whole = true}); !version) return version.error();
+    std::string begun_with = "another", hash = hash_of(expected);
+    if (auto ok = object->get("expected", begun_with); !ok) return ok.error();
+    if (auto ok = object->get("expected_hash", hash); !ok) return ok.error();
+    if (hash != hash_of(expected))
+        return object->key_error("expected", "is " + to_json(begun_with) + ", but the expected table is " + to_json(expected.samples().source) +
+                                                 ": go on with the one that the calibration was begun with");
     auto plan = read_plan(*object);
     if (!plan) return plan.error();
     auto procedure = create(std::move(*plan), std::move(expected));
@@ -419,7 +463,7 @@ Result<Procedure> Procedure::resume(const std::filesystem::path& file, CsfTable 
             const std::size_t due = procedure->next().place;
             if (static_cast<std::size_t>(row[0]) != due) return object->key_error(where, "is not of the place whose turn it was");
         }
-        procedure->take({static_cast<std::size_t>(row[0]), row[1], row[2] == 1});
+        procedure->take({static_cast<std::size_t>(row[0]), std::max(row[1], lowest_log10_contrast), row[2] == 1});
         procedure->combine(); // each time, so that beliefs come out to the last bit as if there had been no break
     }
     return procedure;

@@ -21,7 +21,7 @@ struct Key {
     double Psychometric::* of_psychometric = nullptr;
     double least, most;
 };
-// The ranges keep thresholds within what a procedure can measure.
+// Wider than people differ; whether the thresholds that come of it can be measured, check_measurable() says.
 constexpr Key keys[] = {
     {"gain", &SimulatedObserver::gain, nullptr, 1e-2, 1e2},
     {"frequency", &SimulatedObserver::frequency, nullptr, 0.1, 10},
@@ -80,6 +80,17 @@ double SimulatedObserver::set(const Trial& trial, const CalibrationPlan& plan) c
     const double threshold = -std::log10(sensitivity(trial.grating, plan.luminance));
     const double setting = threshold + scatter * chance(seed, trial.number).normal() + (trial.is_ascending ? delay : -delay);
     return std::min(std::pow(10, setting), plan.highest_contrast);
+}
+
+Result<void> check_measurable(const SimulatedObserver& observer, const CalibrationPlan& plan) {
+    for (const GratingPlace& place : plan.places) {
+        const double sensitivity = observer.sensitivity(place, plan.luminance);
+        if (!(std::log10(sensitivity) <= -lowest_log10_contrast))
+            return invalid("observer: the sensitivity at " + to_text(place.frequency_cpd) + " cpd and " + to_text(place.eccentricity_deg) +
+                           " degrees is " + to_text(std::round(sensitivity)) + ", but none above " +
+                           to_text(std::round(std::pow(10, -lowest_log10_contrast))) + " can be measured: give a lower gain.");
+    }
+    return {};
 }
 
 Result<SimulatedObserver> simulated_observer(std::string_view description, std::uint64_t seed) {

@@ -7,11 +7,12 @@
 
 #include <glm/geometric.hpp>
 
+#include "fold_screen.h"
+
 namespace unseen::perception {
 
 namespace {
 
-constexpr double degrees_per_radian = 180 / std::numbers::pi;
 constexpr std::size_t chunk = 256; // nodes whose gratings are looked up at once
 
 double angle_between(glm::dvec3 a, glm::dvec3 b) { return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)); }
@@ -56,22 +57,15 @@ LuebkeHallenCriterion::LuebkeHallenCriterion(const vdtree::VertexTree& tree, con
     up_ = placement.direction_to_mesh(frame.up);
     back_ = placement.direction_to_mesh(frame.back);
 
-    const Display& display = options.display;
-    const double tan_physical =
-        std::tan(to_radians(physical_field(display, view.height)).value() / 2);
-    const double tan_camera = std::tan(view.fov_y_degrees * std::numbers::pi / 360);
-    screen_scale_ = tan_physical / tan_camera;
-    // The field's default is the physical one, computed by way of degrees: rounding is no magnification.
-    constexpr double rounding = 1e-9;
-    if (std::abs(screen_scale_ - 1) < rounding) screen_scale_ = 1;
-    pixel_deg_ = 1 / pixels_per_degree(display).value();
-    black_ = black_level(display).value();
-    span_ = to_luminance(display, 1).value() - black_;
+    const Screen screen(view, options);
+    screen_scale_ = screen.scale;
+    pixel_deg_ = screen.pixel_deg;
+    black_ = black_level(options.display).value();
+    span_ = to_luminance(options.display, 1).value() - black_;
     if (options.gaze_px) {
         has_gaze_ = true;
-        const double pitch_over_distance = display.pixel_pitch.value() / display.distance.value();
-        gaze_ = glm::normalize(glm::dvec3((options.gaze_px->x - view.width * 0.5) * pitch_over_distance,
-                                          (view.height * 0.5 - options.gaze_px->y) * pitch_over_distance, -1));
+        gaze_ = glm::normalize(glm::dvec3((options.gaze_px->x - view.width * 0.5) * screen.pitch_over_distance,
+                                          (view.height * 0.5 - options.gaze_px->y) * screen.pitch_over_distance, -1));
     }
 }
 

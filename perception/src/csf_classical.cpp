@@ -57,11 +57,6 @@ double daly_branch(double cpd, double cdm2, double area_deg2) {
 
 // ---- Barten ---------------------------------------------------------------------------------------------------------
 
-double barten_1989(double cpd, double cdm2) {
-    const double width = 0.3 * std::pow(1 + 100 / cdm2, 0.15);
-    return 440 * std::pow(1 + 0.7 / cdm2, -0.2) * cpd * damping(width * cpd);
-}
-
 // 1 - exp(-x), which would be 0 for small x if written like that.
 double rising(double x) { return -std::expm1(-x); }
 
@@ -108,6 +103,9 @@ double barten_1999(double cpd, double cdm2, double area_deg2) {
 
 } // namespace
 
+Barten1989::Barten1989(double cdm2) : amplitude_(440 * std::pow(1 + 0.7 / cdm2, -0.2)), width_(0.3 * std::pow(1 + 100 / cdm2, 0.15)) {}
+double Barten1989::operator()(double cpd) const { return amplitude_ * cpd * damping(width_ * cpd); }
+
 double daly_ceiling(const Stimulus& s) { return daly_branch(s.frequency.value(), s.luminance.value(), s.area.value()); }
 
 double daly_eccentric(const Stimulus& s) {
@@ -122,7 +120,7 @@ bool is_relative(CsfModel model) { return model == CsfModel::mannos_sakrison || 
 double classical_at_fovea(CsfModel model, const Stimulus& s) {
     const double cpd = s.frequency.value(), cdm2 = s.luminance.value(), area_deg2 = s.area.value();
     switch (model) {
-    case CsfModel::barten_1989: return barten_1989(cpd, cdm2);
+    case CsfModel::barten_1989: return Barten1989(cdm2)(cpd);
     case CsfModel::barten_1999: return barten_1999(cpd, cdm2, area_deg2);
     case CsfModel::barten_2004: return barten_2004(cpd, cdm2, area_deg2);
     case CsfModel::mannos_sakrison: return mannos_sakrison(cpd) * (relative_models_peak / mannos_sakrison_peak);

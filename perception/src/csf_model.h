@@ -24,6 +24,15 @@ Luminance castle_transient_kink();
 
 // At the fovea, static.
 double classical_at_fovea(CsfModel model, const Stimulus& stimulus);
+// Barten 1989 at one luminance, for many frequencies.
+class Barten1989 {
+public:
+    explicit Barten1989(double cdm2);
+    double operator()(double cpd) const;
+
+private:
+    double amplitude_, width_;
+};
 // The shape over frequency only: luminance and area do not matter.
 bool is_relative(CsfModel model);
 // Daly's model, static, is the smaller of two branches, the first of which knows no eccentricity.

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
-#include <charconv>
 #include <cmath>
 #include <initializer_list>
 #include <limits>
@@ -11,14 +10,12 @@
 #include <perception/csf.h>
 
 #include "csf_model.h"
+#include "number_text.h"
 
 namespace unseen::perception {
 
 namespace {
 
-// Neighbouring samples closer than this (octaves, or degrees) are no measurement but a slip, and would make the slope
-// between them meaningless in float.
-constexpr double smallest_spacing = 1e-4;
 // Buckets of the constant-time search per sample of an axis: enough for one sample or none per bucket on the usual
 // axes, although they are denser near the fovea.
 constexpr std::size_t buckets_per_sample = 16;
@@ -53,12 +50,6 @@ constexpr double transient_per_decade = 72, transient_decades = 0.8;
 // daly's frequencies scale with 1 + 0.24 e: steps of this in the logarithm of that.
 constexpr double daly_eccentricity_scale = 0.24, daly_log_step = 0.065;
 
-std::string number(double value) {
-    std::array<char, 32> text;
-    const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
-    return std::string(text.data(), end);
-}
-
 Error bad(std::string message) {
     return Error{ErrorCode::invalid_argument, "contrast sensitivity table: " + std::move(message)};
 }
@@ -76,7 +67,7 @@ std::vector<double> log2_of(std::span<const double> values) {
 }
 
 // What no table of an eye has, by orders of magnitude: values beyond are a slip.
-constexpr double most_cpd = 1e4, most_degrees = 180, most_cdm2 = 1e10, most_sensitive = 1e6;
+constexpr double most_cpd = 1e4, most_degrees = CsfTable::highest_eccentricity.value(), most_cdm2 = 1e10, most_sensitive = 1e6;
 
 // `positions` are the values as interpolation sees them: their logarithms, or themselves.
 Result<void> check_axis(std::string_view field, std::span<const double> values, std::span<const double> positions, double highest) {
@@ -86,9 +77,9 @@ Result<void> check_axis(std::string_view field, std::span<const double> values, 
             return bad(place + " must be a finite number in its range, but is " + number(values[i]));
         }
         if (values[i] > highest) return bad(place + " must be at most " + number(highest) + ", but is " + number(values[i]));
-        if (i > 0 && !(positions[i] - positions[i - 1] >= smallest_spacing)) {
+        if (i > 0 && !(positions[i] - positions[i - 1] >= CsfTable::smallest_spacing)) {
             return bad(place + " is " + number(values[i]) + " after " + number(values[i - 1]) +
-                       ": the values must rise from sample to sample, by at least " + number(smallest_spacing) +
+                       ": the values must rise from sample to sample, by at least " + number(CsfTable::smallest_spacing) +
                        (values.data() == positions.data() ? " degrees" : " octaves"));
         }
     }
@@ -117,7 +108,7 @@ std::vector<double> model_frequencies(CsfModel model, const CsfConditions& condi
         const auto next = std::ranges::upper_bound(cpd, kink.value());
         if (next == cpd.begin() || next == cpd.end()) continue;
         const auto is_apart = [&](double other) {
-            return std::abs(std::log2(other / kink.value())) > 2 * smallest_spacing;
+            return std::abs(std::log2(other / kink.value())) > 2 * CsfTable::smallest_spacing;
         };
         if (is_apart(*next) && is_apart(*(next - 1))) cpd.insert(next, kink.value());
     }

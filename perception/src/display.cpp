@@ -2,19 +2,13 @@
 #include <perception/display.h>
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
 #include <numbers>
 
+#include "number_text.h"
+
 namespace unseen::perception {
 namespace {
-
-std::string number(double value) {
-    std::array<char, 32> text;
-    const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
-    return std::string(text.data(), end);
-}
 
 Error bad(std::string message) { return Error{ErrorCode::invalid_argument, "display: " + std::move(message)}; }
 
@@ -130,8 +124,16 @@ Result<void> validate(const Display& d) {
     return {};
 }
 
-PixelsPerDegree pixels_per_degree(const Display& display) {
-    if (display.lens.empty()) return PixelsPerDegree(1 / physical_field(display, 1).value());
+PixelsPerDegree pixels_per_degree(const Display& display) { return PixelsPerDegree(1 / physical_field(display, 1).value()); }
+
+PixelsPerDegree coarsest_pixels_per_degree(const Display& display) {
+    double least = pixels_per_degree(display).value();
+    for (const PixelsPerDegreeAt& at : display.lens) least = std::min(least, at.pixels_per_degree);
+    return PixelsPerDegree(least);
+}
+
+PixelsPerDegree finest_pixels_per_degree(const Display& display) {
+    if (display.lens.empty()) return pixels_per_degree(display);
     double most = 0;
     for (const PixelsPerDegreeAt& at : display.lens) most = std::max(most, at.pixels_per_degree);
     return PixelsPerDegree(most);
@@ -142,9 +144,9 @@ PixelsPerDegree pixels_per_degree_at(const Display& display, Degrees from_centre
     const std::vector<PixelsPerDegreeAt>& lens = display.lens;
     if (lens.empty()) {
         constexpr double nearly_grazing_deg = 89.9;
-        const double a = to_radians(Degrees(std::min(angle_deg, nearly_grazing_deg))).value();
-        const double ppd = 1 / physical_field(display, 1).value();
-        const double delta = to_radians(Degrees(0.5 / ppd)).value();
+        const double ppd = pixels_per_degree(display).value(), delta_deg = std::min(0.5 / ppd, nearly_grazing_deg);
+        const double a = to_radians(Degrees(std::min(angle_deg, nearly_grazing_deg - delta_deg))).value();
+        const double delta = to_radians(Degrees(delta_deg)).value();
         // tan(a + d) - tan a = sin d / (cos(a + d) cos a), without cancellation.
         return PixelsPerDegree(ppd * std::cos(delta) / (std::cos(a + delta) * std::cos(a)));
     }

@@ -11,7 +11,6 @@
 
 #include "fold_screen.h"
 #include "luminance_classes.h"
-#include "sound_parents.h"
 #include "stage_distances.h"
 
 namespace unseen::perception {
@@ -104,7 +103,7 @@ Pattern rounded(Pattern p) {
 class Eye {
 public:
     Eye(const CsfTable& csf, double eccentricity_deg, double luminance_cdm2, const Screen& screen) : screen_(screen) {
-        const double highest_cpd = 1 / (2 * screen.pixel_deg);
+        const double highest_cpd = screen.highest_cpd;
         std::vector<Band> bands;
         for (double low = lowest_table_cpd; low < highest_cpd; low *= frequency_step)
             bands.push_back({std::min(low * frequency_step, highest_cpd),
@@ -385,7 +384,7 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
     const std::span<const vdtree::FoldError> errors = tree.fold_errors();
     if (errors.empty())
         return Error{ErrorCode::invalid_argument, "The errors of the tree's folds have not been measured (vdtree::with_fold_errors)."};
-    if (const auto sound = check_parents(tree); !sound) return sound.error();
+    if (const auto sound = check_arguments(tree, view, options); !sound) return sound.error();
     const NodeId nodes = tree.interior_count();
     const Screen screen(view, options);
     const Levels levels(options.display);

@@ -14,7 +14,6 @@
 
 #include "fold_classes.h"
 #include "fold_screen.h"
-#include "sound_parents.h"
 
 namespace unseen::perception {
 
@@ -279,7 +278,7 @@ bool classify(const vdtree::VertexTree& tree, const Rings& rings, const FoldTest
 
 Result<DistanceCriterion> make_criterion(const vdtree::VertexTree& tree, const Rings& rings, std::vector<float> lengths, const vdtree::View& view,
                                          const FoldTestOptions& options) {
-    if (const auto sound = check_parents(tree); !sound) return sound.error();
+    if (const auto sound = check_arguments(tree, view, options); !sound) return sound.error();
     const Screen screen(view, options);
     const Classes classes(options.display);
     const bool has_chroma = !rings.chroma.empty();
@@ -310,7 +309,7 @@ Result<DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTree& tree
 
 Result<DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree& tree, const vdtree::CutRings& cut_rings,
                                                        const vdtree::View& view, const FoldTestOptions& options) {
-    if (const auto sound = check_parents(tree); !sound) return sound.error();
+    if (const auto sound = check_arguments(tree, view, options); !sound) return sound.error();
     Rings rings{cut_rings.luminance, {}, cut_rings.mean_shift};
     if (options.chroma) {
         rings.chroma = cut_rings.chroma;

@@ -8,9 +8,9 @@
 
 #include <perception/criterion.h>
 
-namespace unseen::perception {
+#include "sound_parents.h"
 
-inline constexpr double degrees_per_radian = 180 / std::numbers::pi;
+namespace unseen::perception {
 
 inline constexpr double degrees_per_bin = 0.5;  // of eccentricity on the screen
 inline constexpr std::size_t bin_count = 128;   // up to 64 degrees; beyond, sensitivity is taken as there
@@ -25,10 +25,27 @@ inline double to_power_of_pooling(double seen) { return seen * seen * seen * std
 // Covers the rounding of a reach to float.
 inline constexpr double reach_rounding = 1e-6;
 
+// What has to hold before a fold test computes with its arguments; and before it walks up a tree, too.
+inline Result<void> check_arguments(const vdtree::View& view, const FoldTestOptions& options) {
+    if (auto ok = validate(options.display); !ok) return ok;
+    if (auto ok = vdtree::validate(view); !ok) return ok;
+    if (options.gaze_px && !(std::isfinite(options.gaze_px->x) && std::isfinite(options.gaze_px->y)))
+        return Error{ErrorCode::invalid_argument, "fold test: the gaze must be a finite position in pixels"};
+    const vdtree::LuminanceRange behind = options.scene.behind.value_or(vdtree::LuminanceRange{});
+    for (const float relative : {options.scene.darkest, options.scene.brightest, behind.lo, behind.hi})
+        if (!std::isfinite(relative)) return Error{ErrorCode::invalid_argument, "fold test: the scene's luminances must be finite"};
+    return {};
+}
+inline Result<void> check_arguments(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options) {
+    if (auto ok = check_arguments(view, options); !ok) return ok;
+    return check_parents(tree);
+}
+
 // The camera's and the display's geometry, as far as the test needs it.
 struct Screen {
     double scale = 1;     // tangent on the screen over tangent in the camera
-    double pixel_deg = 0; // one pixel at the screen's centre
+    double pixel_deg = 0;   // the largest: what a change fills at least
+    double highest_cpd = 0; // of the finest pixels
     double pitch_over_distance = 0;
     double largest_magnification = 1, least_magnification = 1; // of angles, from the camera to the screen
 
@@ -38,7 +55,8 @@ struct Screen {
         scale = tan_physical / tan_camera;
         constexpr double same = 1e-9; // the default field is the physical one by way of degrees
         if (std::abs(scale - 1) < same) scale = 1;
-        pixel_deg = 1 / pixels_per_degree(options.display).value();
+        pixel_deg = 1 / coarsest_pixels_per_degree(options.display).value();
+        highest_cpd = nyquist(finest_pixels_per_degree(options.display)).value();
         pitch_over_distance = options.display.pixel_pitch.value() / options.display.distance.value();
         // From the axis to the farthest corner of the window, or to the gaze if that is farther.
         const double aspect = static_cast<double>(view.width) / view.height;

@@ -16,10 +16,11 @@
 #include <perception/random.h>
 #include <vdtree/atomic_file.h>
 
+#include "number_text.h"
+
 namespace unseen::perception {
 namespace {
 
-constexpr double degrees_per_radian = 180 / std::numbers::pi;
 constexpr std::size_t most_samples = 10'000'000;
 
 // Of fixations and saccades, see the header.
@@ -32,11 +33,6 @@ constexpr double seconds_per_degree = 0.0022, least_saccade_s = 0.021;
 constexpr double margins_deg[] = {0, 0.25, 0.5, 0.75, 1, 1.5, 2, 3, 4, 6, 8, 12, 15, 20, 30, 45, 60};
 
 Error invalid(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
-
-std::string number(double value) {
-    std::array<char, 32> text;
-    return std::string(text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr);
-}
 
 // What is wrong with a sample after another, or nothing.
 std::string complaint_about(const GazeSample& sample, const GazeSample* before) {
@@ -270,16 +266,27 @@ TrackedGaze GazeTracker::at(double time_s) const {
 // ---- tables -------------------------------------------------------------------------------------------------------
 
 CsfTable widened(const CsfTable& table, Degrees margin) {
-    assert(margin.value() >= 0);
+    assert(!(margin.value() < 0));
     if (margin.value() == 0) return table;
-    CsfSamples samples = table.samples();
+    const CsfSamples& samples = table.samples();
     const auto plane = static_cast<std::ptrdiff_t>(samples.luminance_cdm2.size() * samples.frequency_cpd.size());
-    for (double& e : samples.eccentricity_deg) e += margin.value();
-    samples.eccentricity_deg.insert(samples.eccentricity_deg.begin(), 0.0);
-    const std::vector<double> fovea(samples.sensitivity.begin(), samples.sensitivity.begin() + plane);
-    samples.sensitivity.insert(samples.sensitivity.begin(), fovea.begin(), fovea.end());
-    auto made = CsfTable::create(std::move(samples));
-    assert(made); // as good as the table it came from
+    const double shift = std::max(margin.value(), CsfTable::smallest_spacing); // NaN stays
+    CsfSamples wide{samples.source, samples.frequency_cpd, {0.0}, samples.luminance_cdm2, {}};
+    wide.sensitivity.assign(samples.sensitivity.begin(), samples.sensitivity.begin() + plane);
+    for (auto column = samples.sensitivity.begin(); const double e : samples.eccentricity_deg) {
+        const double degrees = e + shift;
+        // The sum's rounding can bring columns too near to each other.
+        if (degrees <= CsfTable::highest_eccentricity.value() && degrees - wide.eccentricity_deg.back() >= CsfTable::smallest_spacing) {
+            wide.eccentricity_deg.push_back(degrees);
+            wide.sensitivity.insert(wide.sensitivity.end(), column, column + plane);
+        } else {
+            std::transform(column, column + plane, wide.sensitivity.end() - plane, wide.sensitivity.end() - plane,
+                           [](double left_out, double last) { return std::max(left_out, last); });
+        }
+        column += plane;
+    }
+    auto made = CsfTable::create(std::move(wide));
+    assert(made); // the columns of a table, at eccentricities that a table can have
     return std::move(*made);
 }
 

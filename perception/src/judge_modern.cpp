@@ -155,6 +155,7 @@ struct Range {
 struct Conditions {
     CsfModel model = CsfModel::castle;
     const CsfTable* table = nullptr; // in the model's place
+    Metres distance;                 // of the screen
     double ppd = 0;
     double beta = 0;
     Range log10_luminance;
@@ -168,6 +169,7 @@ double static_sensitivity(const Conditions& c, double freq_cpd, double luminance
     stimulus.eccentricity = Degrees(eccentricity);
     stimulus.area = patch_area(stimulus.frequency);
     stimulus.field = VisualField::worst;
+    stimulus.distance = c.distance;
     const double s = c.table ? c.table->sensitivity(stimulus.frequency, stimulus.eccentricity, stimulus.luminance)
                              : sensitivity(c.model, stimulus);
     return s > sensitivity_floor ? s : sensitivity_floor;
@@ -414,6 +416,8 @@ void spread(const Plane& band, int level, Plane& full, Merge merge) {
 
 Result<void> check(const JudgeOptions& options) {
     if (auto ok = validate(options.display); !ok) return ok;
+    if (!options.csf_table && !is_achromatic(options.csf))
+        return judge_argument_error("judge", std::string(name(options.csf)) + " is sensitivity to colour, not to luminance contrast");
     if (!(options.beta >= 1 && options.beta <= 20))
         return judge_argument_error("judge", "beta must lie between 1 and 20");
     if (options.gaze_px && !(std::isfinite(options.gaze_px->x) && std::isfinite(options.gaze_px->y))) {
@@ -428,7 +432,7 @@ double contrast_floor(const Display& display) { return std::max(black_level(disp
 Conditions conditions_for(const Image& reference, const JudgeOptions& options, const Eccentricity& eccentricity) {
     const auto [low, high] = std::minmax_element(reference.values.begin(), reference.values.end());
     const double floor_cdm2 = contrast_floor(options.display);
-    return {options.csf, options.csf_table, pixels_per_degree(options.display).value(), options.beta,
+    return {options.csf, options.csf_table, options.display.distance, pixels_per_degree(options.display).value(), options.beta,
             {std::log10(std::max(static_cast<double>(*low), floor_cdm2)),
              std::log10(std::max(static_cast<double>(*high), floor_cdm2))},
             eccentricity.largest()};

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "csf_model.h"
 #include "judge_input.h"
 
 namespace unseen::perception {
@@ -37,21 +38,6 @@ double tvi(double luminance) {
     else y = x - 1.255;
     return std::pow(10.0, y);
 }
-
-// Barten 1989: 440 (1 + .7/L)^-.2 rho exp(-b rho) sqrt(1 + .06 exp(b rho)), with the exponentials joined under the
-// root: apart, their product is infinity times 0 in dim light at high frequencies.
-class Barten1989 {
-public:
-    explicit Barten1989(double luminance)
-        : a_(440 * std::pow(1 + 0.7 / luminance, -0.2)), b_(0.3 * std::pow(1 + 100 / luminance, 0.15)) {}
-    double operator()(double freq_cpd) const {
-        const double falloff = std::exp(-b_ * freq_cpd);
-        return a_ * freq_cpd * std::sqrt(falloff * (falloff + 0.06));
-    }
-
-private:
-    double a_, b_;
-};
 
 // Daly 1993, s = 0.7 and b = 4, with the rounded constants of the program.
 double masking(double normalised_contrast) {

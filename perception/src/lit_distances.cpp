@@ -79,6 +79,7 @@ void make_growing(DistanceCriterion::Parts& parts) {
 
 Result<vdtree::DistanceCriterion> lit_distances(const vdtree::VertexTree& tree, std::shared_ptr<const vdtree::LightBounds> bounds,
                                                 const vdtree::View& view, const FoldTestOptions& options) {
+    if (const auto sound = check_arguments(view, options); !sound) return sound.error();
     const Screen screen(view, options);
     const ContrastClasses levels = classes_of(options.display);
     const SceneLuminance scene = options.scene;

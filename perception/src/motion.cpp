@@ -17,7 +17,6 @@ namespace unseen::perception {
 namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-constexpr double degrees_per_radian = 180 / std::numbers::pi;
 // Daly 1998: the share of a target's speed that the eye keeps up with, its drift, and its greatest speed in pursuit.
 constexpr double pursuit_gain = 0.82;
 constexpr double drift_deg_s = 0.15, greatest_pursuit_deg_s = 80;

@@ -100,7 +100,7 @@ std::vector<float> stage_distances(const vdtree::VertexTree& tree, const Screen&
 
     std::vector<float> distances(stages.size() * bins);
     for (std::size_t bin = 0; bin < bins && !stages.empty(); ++bin) {
-        const Eye eye(csf, static_cast<double>(bin) * degrees_per_bin, brightest, 1 / (2 * screen.pixel_deg));
+        const Eye eye(csf, static_cast<double>(bin) * degrees_per_bin, brightest, screen.highest_cpd);
         for (std::size_t stage = 0; stage < stages.size(); ++stage) {
             const double on_screen = eye.largest_angle(stages[stage], first, last, contrast_factor);
             const double seen = on_screen / screen.largest_magnification / degrees_per_radian;

@@ -72,6 +72,77 @@ TEST_F(CalibrateCommandTest, RepeatsWithItsSeedAndResumes) {
     EXPECT_TRUE(read_text(path("a.json")) == read_text(path("d.json")));
 }
 
+// A state's plan stays as it is: what is given and says otherwise is named.
+TEST_F(CalibrateCommandTest, GoesOnOnlyAsItWasBegun) {
+    const auto with = [&](std::vector<std::string> more) {
+        more.insert(more.begin(), {"calibrate", "--simulate", "castle", "--date", "now", "--resume", "state.json"});
+        return run(more);
+    };
+    ASSERT_EQ(with({"--trials", "30", "--seed", "4", "--frequencies", "1", "4", "--eccentricities", "0", "10", "-o", "a.json"}).status, 0);
+    const auto takes_half_away = [&] {
+        Json state = Json::parse(read_text(path("state.json")));
+        state["answers"].erase(state["answers"].begin() + 15, state["answers"].end());
+        write_text(path("state.json"), state.dump());
+    };
+    takes_half_away();
+    const std::vector<std::pair<std::vector<std::string>, const char*>> differing = {
+        {{"--method", "adjustment"}, "--method (it was 2ifc)"},
+        {{"--trials", "40"}, "--trials (it was 30)"},
+        {{"--settings", "9"}, "--settings (it was 7)"},
+        {{"--seed", "5"}, "--seed (it was 4)"},
+        {{"--luminance", "30"}, "--luminance (it was 50.25)"},
+        {{"--frequencies", "1", "2", "--eccentricities", "0", "10"}, "--frequencies and --eccentricities"},
+        {{"--trials", "40", "--seed", "5"}, "--trials (it was 30), --seed (it was 4)"},
+        {{"--csf", "stela"}, "go on with the one that the calibration was begun with"}};
+    for (const auto& [more, expected] : differing) {
+        const Outcome outcome = with(more);
+        EXPECT_EQ(outcome.status, 1) << expected;
+        EXPECT_THAT(outcome.err, IsAnErrorForPeople());
+        EXPECT_THAT(outcome.err, HasSubstr("state.json"));
+        EXPECT_THAT(outcome.err, HasSubstr(expected));
+    }
+    // The simulated observer, too, goes on with the seed that is kept; and what is given again may be.
+    EXPECT_EQ(with({"-o", "b.json"}).status, 0);
+    EXPECT_TRUE(read_text(path("a.json")) == read_text(path("b.json")));
+    takes_half_away();
+    EXPECT_EQ(with({"--trials", "30", "--seed", "4", "--frequencies", "4", "1", "--eccentricities", "0", "10", "-o", "c.json"}).status, 0);
+    EXPECT_TRUE(read_text(path("a.json")) == read_text(path("c.json")));
+}
+
+// Places are chosen by what is seen at the luminance that is shown.
+TEST_F(CalibrateCommandTest, PlacesAreVisibleAtTheLuminanceThatIsGiven) {
+    const auto places = [&](const char* luminance) {
+        const Outcome outcome = run({"calibrate", "--simulate", "castle", "--trials", "1", "--luminance", luminance, "--json", "-"});
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        const Json json = outcome.json();
+        for (const Json& row : json["measured"]) EXPECT_GE(row["true_sensitivity"].get<double>() * json["highest_contrast"].get<double>(), 3);
+        return json["measured"].size();
+    };
+    EXPECT_LT(places("0.6"), places("50"));
+}
+
+TEST_F(CalibrateCommandTest, WhereNothingIsSeenThereIsNoError) {
+    const std::vector<std::string> words = {"calibrate", "--simulate", "castle", "--trials", "20", "--frequencies", "60", "--eccentricities", "40"};
+    const Outcome outcome = run(words);
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_THAT(outcome.out, HasSubstr("this observer can see none of it"));
+    std::vector<std::string> with_json = words;
+    with_json.insert(with_json.end(), {"--json", "-"});
+    EXPECT_TRUE(run(with_json).json()["rms_error_db"].is_null());
+}
+
+// Settings that all agree make a place as certain as the grid is fine, and no more.
+TEST_F(CalibrateCommandTest, ManySettingsThatAgreeStayFinite) {
+    const Outcome outcome = run({"calibrate", "--simulate", "castle:gain=20,scatter=0,delay=0", "--method", "adjustment", "--settings", "300",
+                                 "--frequencies", "2", "--eccentricities", "0", "--json", "-", "-o", "X.JSON"});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_LT(outcome.json()["rms_error_db"], 0.2);
+    const Json row = outcome.json()["measured"][0];
+    EXPECT_LT(row["low"], row["true_sensitivity"]);
+    EXPECT_GT(row["high"], row["true_sensitivity"]);
+    EXPECT_TRUE(fs::exists(path("X.JSON")));
+}
+
 TEST_F(CalibrateCommandTest, AdjustsToo) {
     const Outcome outcome = run({"calibrate", "--simulate", "castle:gain=0.5", "--method", "adjustment", "--json", "-"});
     ASSERT_EQ(outcome.status, 0) << outcome.err;
@@ -112,7 +183,7 @@ TEST_F(CalibrateCommandTest, RefusesWhatMakesNoSense) {
         {"--simulate", "castle", "--trials", "0"},   {"--simulate", "castle", "--trials", "1.5"}, {"--simulate", "castle", "--trials", "nan"},
         {"--simulate", "castle", "--seed", "-1"},    {"--simulate", "castle", "--method", "3ifc"}, {"--simulate", "castle", "-o", "x.txt"},
         {"--simulate", "castle", "--chart"},         {"--photometer", "p.csv"},                   {"--chart", "-o", "x.json"},
-        {"--simulate", "castle", "--luminance", "0"}};
+        {"--simulate", "castle", "--luminance", "0"}, {"--simulate", "castle", "--frequencies", "4"}};
     for (std::vector<std::string> words : wrong) {
         words.insert(words.begin(), "calibrate");
         const Outcome outcome = run(words);
@@ -125,7 +196,11 @@ TEST_F(CalibrateCommandTest, RefusesWhatMakesNoSense) {
         {{"--simulate", "castle:age=40"}, "age"},
         {{"--simulate", "missing.json"}, "missing.json"},
         {{"--simulate", "castle", "--luminance", "1e5"}, "--luminance"},
-        {{"--simulate", "castle", "--frequencies", "4"}, "--eccentricities"},
+        {{"--simulate", "castle:gain=100"}, "0 degrees is 11746, but none above 3162 can be measured"},
+        {{"--simulate", "castle", "-o", "/nonexistent/me.json"}, "/nonexistent"},
+        {{"--simulate", "castle", "--json", "/nonexistent/me.json"}, "/nonexistent"},
+        {{"--simulate", "castle", "--resume", "/nonexistent/me.json"}, "/nonexistent"},
+        {{"--simulate", "castle", "--resume", "s.json", "-o", "s.json"}, "s.json' is named for two outputs"},
         {{"--simulate", "castle", "--frequencies", "4", "4", "--eccentricities", "0"}, "places[1]"},
         {{"--simulate", "castle", "--resume", "bad.json"}, "bad.json"},
         {{"--photometer", "missing.csv", "-o", "d.json"}, "missing.csv"},

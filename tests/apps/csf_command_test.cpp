@@ -70,6 +70,7 @@ TEST_F(CsfCommandTest, MotionMakesFineDetailFadeAndPursuitBringsItBack) {
 TEST_F(CsfCommandTest, ContradictionsAreRefused) {
     const std::vector<std::pair<std::vector<std::string>, std::string>> bad = {
         {{"--temporal", "8", "--velocity", "1"}, "exclude each other"},
+        {{"--model", "stela", "--csf", "castle"}, "--model and --csf exclude each other"},
         {{"--velocity", "-1"}, "0 or more"},
         {{"--pursuit"}, "--velocity"},
         {{"--distance", "0"}, "above 0"},

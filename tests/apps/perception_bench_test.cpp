@@ -102,6 +102,31 @@ TEST_F(PerceptionBenchTest, EffectsAreComparedWithoutEach) {
     EXPECT_THAT(people.out, HasSubstr("no silhouettes"));
 }
 
+// A machine without any OpenGL driver, which the EGL dispatcher's search path can pretend.
+TEST_F(PerceptionBenchTest, NumbersNeedNoOpenGl) {
+    setenv("__EGL_VENDOR_LIBRARY_DIRS", "/nonexistent", 1);
+    const Outcome numbers = run({"bench", "perception", "--quick", "--only", "csf", "--json", "-"});
+    const Outcome pictures = run({"bench", "perception", "--quick", "--only", "savings", "--mesh", "ball.vdt", "--window", "96"});
+    unsetenv("__EGL_VENDOR_LIBRARY_DIRS");
+    EXPECT_EQ(numbers.status, 0) << numbers.err;
+    EXPECT_FALSE(numbers.json()["rows"].empty());
+    EXPECT_EQ(pictures.status, 1);
+    EXPECT_THAT(pictures.err, HasSubstr("No OpenGL"));
+}
+
+TEST_F(PerceptionBenchTest, BadReferencesAreNamedWithTheirLine) {
+    fs::create_directory(path("figures"));
+    for (const auto& [cell, column] : {std::pair("4x", "frequency"), {"", "frequency"}, {"nan", "frequency"}, {"1e999", "frequency"}}) {
+        write_text(path("figures") / "csf_golden.csv", "# a remark\nfrequency,luminance,area,eccentricity,castle,stela\n4,100,1,0,200,200\n" +
+                                                           std::string(cell) + ",100,1,0,200,200\n");
+        const Outcome outcome = run({"bench", "perception", "--quick", "--only", "csf", "--reference", "figures"});
+        EXPECT_EQ(outcome.status, 1) << cell;
+        EXPECT_THAT(outcome.err, HasSubstr("csf_golden.csv: line 4: '" + std::string(cell) + "' in column '" + column + "' is no number"));
+    }
+    write_text(path("figures") / "csf_golden.csv", "frequency,luminance,area,eccentricity,castle,stela\n4,1e+2,1.0,0,2.0e+02,2e2\n");
+    EXPECT_EQ(run({"bench", "perception", "--quick", "--only", "csf", "--reference", "figures"}).err.find("no number"), std::string::npos);
+}
+
 TEST_F(PerceptionBenchTest, RefusesWrongUsage) {
     for (const std::vector<std::string>& words : std::vector<std::vector<std::string>>{
              {"--only", "saving"}, {"--window", "1"}, {"--second-judge", "castle-red-green"}, {"--reference", "missing"}}) {

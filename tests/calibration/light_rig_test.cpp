@@ -99,7 +99,9 @@ TEST_F(LightRigTest, NamesTheFileAndTheKeyOfWhatIsWrong) {
                             Case{"{\"ambient\": 1}", "lights"},
                             Case{"[1]", "must hold a JSON object"},
                             Case{"{\"lights\": []}", "black"},
-                            Case{"{\"lights\": [{\"type\": \"headlight\", \"intensity\": 0}]}", "black"}}) {
+                            Case{"{\"lights\": [{\"type\": \"headlight\", \"intensity\": 0}]}", "black"},
+                            Case{R"({"lights": [{"type": "directional", "direction": [0, 0, 1], "intensity": 1, "keyframes": [
+                                     {"time_s": 0, "intensity": 0}, {"time_s": 1, "intensity": 0}]}]})", "black"}}) {
         const std::string found = complaint(bad.text);
         EXPECT_NE(found.find("lights.json"), std::string::npos) << bad.text;
         EXPECT_NE(found.find(bad.key), std::string::npos) << found;

@@ -12,6 +12,7 @@
 namespace unseen::calibration {
 namespace {
 
+using perception::CsfSamples;
 using perception::CsfTable;
 using perception::CyclesPerDegree;
 using perception::Degrees;
@@ -64,6 +65,15 @@ TEST_F(ProcedureTest, ThePlanFitsTheDisplay) {
         EXPECT_LT(place.eccentricity_deg, perception::physical_field(display, 1600).value());
     }
     EXPECT_NEAR(plan.luminance.value(), 50.25, 1e-9);
+    // At a luminance near the display's black less is seen, and less contrast can be shown.
+    const CalibrationPlan dim = plan_for(display, CsfTable::standard(), Luminance(0.6));
+    EXPECT_EQ(dim.luminance.value(), 0.6);
+    EXPECT_NEAR(dim.highest_contrast, 0.1 / 0.6, 1e-9);
+    EXPECT_LT(dim.places.size(), plan.places.size());
+    // A headset's patches are drawn as a flat picture and seen through a lens: the coarser of both counts.
+    perception::Display headset = display;
+    headset.lens = {{0, 40}, {50, 20}};
+    for (const GratingPlace& place : plan_for(headset, CsfTable::standard()).places) EXPECT_GE(20 / place.frequency_cpd, pixels_per_cycle - 0.01);
     perception::Display small = display;
     small.width_px = small.height_px = 200; // 5.8 degrees
     for (const GratingPlace& place : plan_for(small, CsfTable::standard()).places) {
@@ -147,6 +157,75 @@ TEST_F(ProcedureTest, WhatIsNotEvenSeenAtTheHighestContrastIsNoThreshold) {
     for (const PlaceEstimate& e : procedure.estimates()) EXPECT_LT(e.sensitivity(), 1.2);
 }
 
+CalibrationPlan one_place(Method method, int settings = 7) {
+    CalibrationPlan plan = default_plan();
+    plan.method = method;
+    plan.places = {{2, 0}};
+    plan.settings = settings;
+    return plan;
+}
+
+// Settings below the lowest contrast count as it; that they all agree makes no place infinitely certain.
+TEST_F(ProcedureTest, ABeliefIsAtLeastAsWideAsTheGrid) {
+    const CalibrationPlan plan = one_place(Method::adjustment, 300);
+    for (const double setting : {7.6e-5, 1e-3, 0.031}) { // the first below the lowest contrast, the others off and on the grid
+        Procedure procedure = begin(plan);
+        while (!procedure.is_done()) procedure.set(setting);
+        const PlaceEstimate e = procedure.estimates().front();
+        constexpr double half_a_step = 0.0125; // log10 units
+        const double measurable = std::max(std::log10(setting), lowest_log10_contrast);
+        EXPECT_NEAR(e.log10_sensitivity.mean, -measurable, 2 * half_a_step) << setting;
+        EXPECT_GT(e.log10_sensitivity.deviation, half_a_step / 2) << setting;
+        EXPECT_LE(procedure.answers().back().log10_contrast, std::log10(plan.highest_contrast));
+        EXPECT_GE(procedure.answers().back().log10_contrast, lowest_log10_contrast);
+        const auto table = procedure.table("agreed");
+        ASSERT_TRUE(table) << table.error().message;
+        EXPECT_NEAR(std::log10(table->sensitivity(CyclesPerDegree(2), Degrees(0), plan.luminance)), e.log10_sensitivity.mean, half_a_step);
+    }
+}
+
+// Places where nothing is seen must not pull the others towards the grid's end.
+TEST_F(ProcedureTest, WhatIsFarFromVisibleIsNotPutAtTheGridsEnd) {
+    for (const Method method : {Method::two_interval, Method::adjustment}) {
+        CalibrationPlan plan = default_plan();
+        plan.method = method;
+        plan.places.clear();
+        for (const double e : {0.0, 20.0, 40.0})
+            for (const double f : {0.5, 2.0, 8.0, 16.0, 32.0}) plan.places.push_back({f, e});
+        Procedure procedure = begin(plan);
+        const SimulatedObserver observer = observer_of("castle", 1);
+        while (!procedure.is_done()) answer(procedure, observer);
+        for (const PlaceEstimate& e : procedure.estimates()) {
+            const double truth = observer.sensitivity(e.place, plan.luminance);
+            if (truth < 0.01) {
+                EXPECT_LT(e.sensitivity(), 0.3) << e.place.frequency_cpd << " cpd " << e.place.eccentricity_deg << " deg";
+            }
+        }
+        EXPECT_LT(rms_error_db(procedure, observer), 1.2);
+    }
+}
+
+TEST_F(ProcedureTest, WhatCannotBeMeasuredIsRefused) {
+    const CalibrationPlan plan = one_place(Method::two_interval);
+    EXPECT_TRUE(check_measurable(observer_of("castle:gain=20", 1), plan));
+    const auto refused = check_measurable(observer_of("castle:gain=100", 1), plan);
+    ASSERT_FALSE(refused);
+    EXPECT_THAT(refused.error().message, AllOf(HasSubstr("2 cpd"), HasSubstr("3162")));
+    CsfSamples samples = CsfTable::standard().samples();
+    for (double& s : samples.sensitivity) s *= 1000;
+    const auto procedure = Procedure::create(plan, *CsfTable::create(samples));
+    ASSERT_FALSE(procedure);
+    EXPECT_THAT(procedure.error().message, AllOf(HasSubstr("places[0]"), HasSubstr("3162")));
+    // A table that ends at the largest sensitivity there can be, elsewhere: the deviation carries it beyond.
+    samples = CsfTable::standard().samples();
+    for (std::size_t i = 0; i < samples.sensitivity.size(); ++i)
+        if (i % samples.frequency_cpd.size() == 0) samples.sensitivity[i] = 1e6;
+    auto steep = Procedure::create(one_place(Method::adjustment), *CsfTable::create(samples));
+    ASSERT_TRUE(steep);
+    while (!steep->is_done()) steep->set(1e-3);
+    EXPECT_FALSE(steep->table("beyond"));
+}
+
 TEST_F(ProcedureTest, IntervalsHoldTheTruthAboutAsOftenAsTheySay) {
     int inside = 0, all = 0;
     for (std::uint64_t seed = 1; seed <= 4; ++seed) {
@@ -193,7 +272,9 @@ TEST_F(ProcedureTest, TheTableAgreesWithTheEstimates) {
     Procedure procedure = begin(default_plan());
     const SimulatedObserver observer = observer_of("castle:gain=0.5", 1);
     while (!procedure.is_done()) answer(procedure, observer);
-    const CsfTable table = procedure.table("me");
+    const auto made = procedure.table("me");
+    ASSERT_TRUE(made) << made.error().message;
+    const CsfTable& table = *made;
     EXPECT_EQ(table.samples().source, "me");
     constexpr double between_samples = 0.01; // of a quarter octave, a few degrees, a quarter of a decade
     for (const PlaceEstimate& e : procedure.estimates()) {
@@ -202,7 +283,7 @@ TEST_F(ProcedureTest, TheTableAgreesWithTheEstimates) {
         EXPECT_NEAR(value / e.sensitivity(), 1, between_samples) << e.place.frequency_cpd << " " << e.place.eccentricity_deg;
     }
     // Without any answers it is the expected one.
-    const CsfTable blank = begin(default_plan()).table("");
+    const CsfTable blank = *begin(default_plan()).table("");
     EXPECT_NEAR(blank.sensitivity(CyclesPerDegree(4), Degrees(10), Luminance(10)) /
                     CsfTable::standard().sensitivity(CyclesPerDegree(4), Degrees(10), Luminance(10)), 1, between_samples);
 }
@@ -232,6 +313,16 @@ TEST_F(ProcedureTest, RunsRepeatAndResume) {
         }
         EXPECT_EQ(second->estimates()[3].sensitivity(), whole.estimates()[3].sensitivity());
     }
+    // Not with another table than it was begun with; files that do not say which it was take any.
+    const auto file = folder() / "state.json";
+    const auto other_table = Procedure::resume(file, CsfTable::from_model(perception::CsfModel::stela));
+    ASSERT_FALSE(other_table);
+    EXPECT_THAT(other_table.error().message, AllOf(HasSubstr("state.json"), HasSubstr("castle"), HasSubstr("stela")));
+    std::string old = read(file);
+    const auto from = old.find("\"expected\""), to = old.find("\"answers\"");
+    ASSERT_LT(from, to);
+    old.erase(from, to - from);
+    EXPECT_TRUE(Procedure::resume(write(old, "old.json"), CsfTable::from_model(perception::CsfModel::stela)));
     CalibrationPlan other = default_plan();
     other.seed = 43;
     const Trial a = begin(default_plan()).next(), b = begin(other).next();
@@ -250,6 +341,10 @@ TEST_F(ProcedureTest, RefusesPlansThatAreNone) {
     EXPECT_THAT(error_of([](CalibrationPlan& p) { p.places[1] = p.places[0]; }), HasSubstr("places[1] is there twice"));
     EXPECT_THAT(error_of([=](CalibrationPlan& p) { p.places[2].frequency_cpd = nan; }), HasSubstr("places[2]: the frequency"));
     EXPECT_THAT(error_of([](CalibrationPlan& p) { p.places[2].eccentricity_deg = -1; }), HasSubstr("places[2]: the eccentricity"));
+    EXPECT_THAT(error_of([](CalibrationPlan& p) { p.places[2].frequency_cpd = 65; }), HasSubstr("places[2]: the frequency"));
+    EXPECT_THAT(error_of([](CalibrationPlan& p) { p.places[2].eccentricity_deg = 91; }), HasSubstr("places[2]: the eccentricity"));
+    EXPECT_THAT(error_of([](CalibrationPlan& p) { p.seed = (std::uint64_t{1} << 53) + 1; }), HasSubstr("seed"));
+    EXPECT_THAT(error_of([](CalibrationPlan& p) { p.luminance = Luminance(2e6); }), HasSubstr("luminance"));
     EXPECT_THAT(error_of([](CalibrationPlan& p) { p.trials = 0; }), HasSubstr("trials"));
     EXPECT_THAT(error_of([](CalibrationPlan& p) { p.settings = 1; }), HasSubstr("settings"));
     EXPECT_THAT(error_of([=](CalibrationPlan& p) { p.luminance = Luminance(nan); }), HasSubstr("luminance"));

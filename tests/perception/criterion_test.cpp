@@ -1,7 +1,9 @@
 // The fold test of Luebke and Hallen in its safe form: known gratings, monotony, and the holes of the literal rule.
 #include <perception/criterion.h>
 
+#include <algorithm>
 #include <cmath>
+#include <memory>
 #include <random>
 
 #include <glm/geometric.hpp>
@@ -128,6 +130,80 @@ TEST_F(LuebkeHallen, EqualsItsFormula) {
         ++finite;
     }
     EXPECT_GT(finite, 500);
+}
+
+// A change fills a whole pixel, and in a headset it may lie where these are largest.
+TEST_F(LuebkeHallen, CountsPixelsAsTheLensMakesThem) {
+    const View view = window(display_, {0, 0, 2000}); // rings are smaller than a pixel
+    const double ppd = pixels_per_degree(display_).value();
+    FoldTestOptions flat, headset;
+    flat.display = headset.display = display_;
+    headset.display.lens = {{0, 2 * ppd}, {50, ppd / 2}};
+    const std::vector<float> on_flat = costs_of(tree(), LuebkeHallenCriterion(tree(), view, flat));
+    const std::vector<float> on_headset = costs_of(tree(), LuebkeHallenCriterion(tree(), view, headset));
+    int doubled = 0;
+    for (NodeId n = 0; n < tree().interior_count(); ++n) {
+        ASSERT_GE(on_headset[n], on_flat[n]) << n;
+        const vdtree::Sphere s = tree().bounds()[n].ring;
+        const double distance = glm::length(view.eye - tree().origin() - glm::dvec3(s.centre));
+        if (on_flat[n] == 0 || !(2 * std::asin(s.radius / distance) * 180 / M_PI < 1 / ppd)) continue;
+        EXPECT_NEAR(on_headset[n] / on_flat[n], 2, 1e-5) << n;
+        ++doubled;
+    }
+    EXPECT_GT(doubled, 100);
+}
+
+// The test by errors looks at all that the display can show: in a headset up to where its pixels are finest.
+TEST_F(LuebkeHallen, ErrorsAreSeenUpToTheFinestPixels) {
+    const auto measured = vdtree::with_fold_errors(tree(), 1);
+    ASSERT_TRUE(measured);
+    const View view = window(display_, {0, 0, 20});
+    const auto reach_of = [&](std::vector<PixelsPerDegreeAt> lens) {
+        FoldTestOptions options;
+        options.display = display_;
+        set_pixels_per_degree(options.display, PixelsPerDegree(8)); // the picture's: coarse
+        options.display.lens = std::move(lens);
+        auto made = error_distances(*measured, view, options);
+        EXPECT_TRUE(made) << made.error().message;
+        return made->parts().reach;
+    };
+    const std::vector<float> flat = reach_of({}), coarse = reach_of({{0, 8}, {50, 4}}), fine = reach_of({{0, 32}, {50, 4}});
+    ASSERT_EQ(flat.size(), coarse.size());
+    for (std::size_t i = 0; i < flat.size(); ++i) EXPECT_NEAR(coarse[i], flat[i], 1e-3f * std::abs(flat[i]));
+    const auto farthest = [](const std::vector<float>& reach) { // of what is seen from somewhere, and not from everywhere
+        float most = 0;
+        for (const float r : reach)
+            if (r < vdtree::DistanceCriterion::always_visible) most = std::max(most, r);
+        return most;
+    };
+    EXPECT_GT(farthest(fine), 1.5f * farthest(flat));
+}
+
+TEST_F(LuebkeHallen, DistanceFormsRefuseWhatIsNoDisplayViewGazeOrScene) {
+    const auto measured = vdtree::with_fold_errors(tree(), 1);
+    ASSERT_TRUE(measured);
+    const auto light_bounds = vdtree::LightBounds::measure(*measured);
+    ASSERT_TRUE(light_bounds);
+    const auto bounds = std::make_shared<const vdtree::LightBounds>(*light_bounds);
+    const vdtree::CutRings rings = vdtree::bound_cut_rings(*measured);
+    const auto count_made = [&](auto change) {
+        View view = window(display_, {0, 0, 5});
+        FoldTestOptions options;
+        options.display = display_;
+        change(view, options);
+        return int(luebke_hallen_distances(*measured, view, options).has_value()) + int(error_distances(*measured, view, options).has_value()) +
+               int(luebke_hallen_safe_distances(*measured, rings, view, options).has_value()) +
+               int(lit_distances(*measured, bounds, view, options).has_value());
+    };
+    const float nan = std::nanf("");
+    EXPECT_EQ(count_made([](View&, FoldTestOptions&) {}), 4);
+    EXPECT_EQ(count_made([](View&, FoldTestOptions& o) { o.display.black = Luminance(-1); }), 0);
+    EXPECT_EQ(count_made([&](View&, FoldTestOptions& o) { o.display.peak = Luminance(double(nan)); }), 0);
+    EXPECT_EQ(count_made([](View& v, FoldTestOptions&) { v.height = 0; }), 0);
+    EXPECT_EQ(count_made([&](View& v, FoldTestOptions&) { v.fov_y_degrees = double(nan); }), 0);
+    EXPECT_EQ(count_made([&](View&, FoldTestOptions& o) { o.gaze_px = glm::dvec2(0, double(nan)); }), 0);
+    EXPECT_EQ(count_made([&](View&, FoldTestOptions& o) { o.scene.brightest = nan; }), 0);
+    EXPECT_EQ(count_made([&](View&, FoldTestOptions& o) { o.scene.behind = vdtree::LuminanceRange{nan, 1}; }), 0);
 }
 
 TEST_F(LuebkeHallen, IsInfiniteWithTheEyeInsideTheSphereAndOrdersThose) {

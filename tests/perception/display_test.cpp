@@ -168,6 +168,21 @@ TEST(Display, PixelsPerDegreeGrowAsideOnFlatScreens) {
         EXPECT_EQ(pixels_per_degree_at(display, Degrees(-angle)), pixels_per_degree_at(display, Degrees(angle)));
     }
     EXPECT_TRUE(std::isfinite(pixels_per_degree_at(display, Degrees(90)).value()));
+    EXPECT_EQ(coarsest_pixels_per_degree(display), pixels_per_degree(display));
+    EXPECT_EQ(finest_pixels_per_degree(display), pixels_per_degree(display));
+    // Pixels of half a degree and more reach beyond a right angle from where thin ones do not.
+    for (const double coarse : {4.0, 1.0, 0.1, 0.0056}) {
+        Display wall = display;
+        set_pixels_per_degree(wall, PixelsPerDegree(coarse));
+        double before = 0;
+        for (const double angle : {0.0, 45.0, 80.0, 89.0, 89.8, 89.9, 89.95, 90.0, 180.0}) {
+            const double here = pixels_per_degree_at(wall, Degrees(angle)).value();
+            EXPECT_TRUE(std::isfinite(here)) << coarse << " " << angle;
+            EXPECT_GE(here, before * (1 - rounding)) << coarse << " " << angle;
+            EXPECT_GT(here, 0) << coarse << " " << angle;
+            before = here;
+        }
+    }
 }
 
 TEST(Display, HeadsetsHaveThePixelsOfTheirLens) {
@@ -175,7 +190,14 @@ TEST(Display, HeadsetsHaveThePixelsOfTheirLens) {
     display.lens = {{0, 20}, {20, 18}, {50, 12}};
     display.field_deg = 100;
     ASSERT_TRUE(validate(display));
-    EXPECT_EQ(pixels_per_degree(display).value(), 20);
+    // The picture's, at its centre; what a change fills; and what no detail is finer than.
+    EXPECT_NEAR(pixels_per_degree(display).value(), 34.3569, 5e-5);
+    EXPECT_EQ(coarsest_pixels_per_degree(display).value(), 12);
+    EXPECT_EQ(finest_pixels_per_degree(display).value(), 20);
+    Display coarse = display;
+    coarse.pixel_pitch = coarse.pixel_pitch * 4;
+    EXPECT_NEAR(coarsest_pixels_per_degree(coarse).value(), 34.3569 / 4, 1e-3) << "the picture is coarser than the panel";
+    EXPECT_EQ(finest_pixels_per_degree(coarse).value(), 20);
     EXPECT_DOUBLE_EQ(pixels_per_degree_at(display, Degrees(10)).value(), 19);
     EXPECT_DOUBLE_EQ(pixels_per_degree_at(display, Degrees(35)).value(), 15);
     EXPECT_DOUBLE_EQ(pixels_per_degree_at(display, Degrees(80)).value(), 12);

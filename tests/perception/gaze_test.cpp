@@ -223,5 +223,42 @@ TEST_F(GazeTest, WidenedTablesSeeAsTheGazeMightBe) {
                 table.sensitivity(CyclesPerDegree(4), Degrees(6), Luminance(50)), 1e-9);
 }
 
+// Of two frequencies and one luminance; the lower frequency's sensitivities are as given.
+CsfTable table_over(std::vector<double> eccentricities, const std::vector<double>& sensitivities) {
+    CsfSamples samples{"test", {1, 2}, std::move(eccentricities), {50}, {}};
+    for (const double s : sensitivities) samples.sensitivity.insert(samples.sensitivity.end(), {s, s / 2});
+    auto table = CsfTable::create(std::move(samples));
+    EXPECT_TRUE(table) << table.error().message;
+    return std::move(*table);
+}
+double seen(const CsfTable& table, double eccentricity) { return table.sensitivity(CyclesPerDegree(1), Degrees(eccentricity), Luminance(50)); }
+
+TEST_F(GazeTest, WidenedTablesEndWhereNothingIsFartherAside) {
+    const CsfTable falling = table_over({0, 20, 60, 170}, {200, 100, 10, 1});
+    const CsfTable wide = widened(falling, head_only_margin); // 170 + 15 degrees are none
+    EXPECT_EQ(wide.samples().eccentricity_deg, (std::vector<double>{0, 15, 35, 75}));
+    for (const double e : {0.0, 15.0, 35.0, 75.0}) EXPECT_NEAR(seen(wide, e), seen(falling, std::max(0.0, e - 15)), 1e-9) << e;
+    EXPECT_NEAR(seen(wide, 180), 10, 1e-9) << "sees more than it would at 165 degrees";
+    // A viewer who sees better far aside must not lose that.
+    EXPECT_NEAR(seen(widened(table_over({0, 20, 60, 170}, {200, 100, 10, 50}), Degrees(15)), 180), 50, 1e-9);
+    // As far as a margin goes, and beyond.
+    for (const double margin : {120.0, 179.99, 180.0, 1e300, std::numeric_limits<double>::infinity(), std::nan("")})
+        EXPECT_NEAR(seen(widened(falling, Degrees(margin)), 100), 200, 1e-9) << margin;
+}
+
+TEST_F(GazeTest, MarginsAreAtLeastAsLargeAsATablesSteps) {
+    const CsfTable table = table_over({0, 20}, {200, 100});
+    for (const double margin : {1e-300, 5e-5, 1e-4}) {
+        const CsfTable wide = widened(table, Degrees(margin));
+        EXPECT_NEAR(wide.samples().eccentricity_deg[1], 1e-4, 1e-12);
+        EXPECT_GE(seen(wide, 10), seen(table, 10));
+    }
+    EXPECT_EQ(widened(table, Degrees(0)).samples().eccentricity_deg, table.samples().eccentricity_deg);
+    // Steps that are just large enough lose that to the sum's rounding.
+    const CsfTable fine = table_over({0, 1e-4, 20}, {200, 300, 100});
+    ASSERT_LT((15 + 1e-4) - 15, 1e-4);
+    EXPECT_GE(seen(widened(fine, Degrees(15)), 15), 300 * (1 - 1e-9));
+}
+
 } // namespace
 } // namespace unseen::perception

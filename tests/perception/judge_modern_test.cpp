@@ -240,6 +240,36 @@ TEST(JudgeModern, TakesAViewersOwnTableInPlaceOfTheModel) {
     EXPECT_LT(judge_modern(reference, test, options)->max_ratio, 0.6 * by_model); // less masking makes up for some
 }
 
+// The images are the flat picture that is drawn for a headset: its lens is none of their business.
+TEST(JudgeModern, TakesTheAnglesOfThePictureWhateverTheLens) {
+    constexpr int side = 256;
+    const Image reference = flat(side, side, 20), test = draw({8, 0.1, 20, 0, 0}, side);
+    JudgeOptions options = looking_aside(10, side);
+    const double without = judge_modern(reference, test, options)->max_ratio;
+    options.display.lens = {{0, 2 * default_ppd()}, {50, 1.2 * default_ppd()}};
+    EXPECT_EQ(judge_modern(reference, test, options)->max_ratio, without);
+}
+
+// Daly's model depends on the distance of what is looked at.
+TEST(ThresholdMapModern, IsOfTheDisplaysDistance) {
+    constexpr int side = 256;
+    for (const double metres : {0.5, 3.0}) {
+        JudgeOptions options = looking_aside(28, side);
+        options.csf = CsfModel::daly;
+        options.display.distance = Metres(metres);
+        set_pixels_per_degree(options.display, PixelsPerDegree(default_ppd()));
+        const auto map = threshold_map_modern(flat(side, side, 20), options);
+        ASSERT_TRUE(map) << map.error().message;
+        double best = 0;
+        for (int k = 0; k < 8; ++k) {
+            const double cpd = (k == 0 ? 1 : 0.3228 * std::exp2(1 - k)) * default_ppd() / 2;
+            best = std::max(best, sensitivity(CsfModel::daly, stimulus_of({.distance = Metres(metres)}, CyclesPerDegree(cpd), Degrees(28), Luminance(20))));
+        }
+        constexpr double base_band = 0.02; // which may know a better frequency
+        EXPECT_NEAR(map->at(side / 2, side / 2) * best / 20, 1, base_band) << metres;
+    }
+}
+
 TEST(ThresholdMapModern, OnFlatFieldsIsTheClosedForm) {
     constexpr double tolerance = 1e-3; // of the judge's tables
     constexpr int side = 1024;
@@ -318,6 +348,12 @@ TEST(JudgeModern, RefusesBadInput) {
     options = {};
     options.display.distance = Metres(-1);
     EXPECT_FALSE(judge_modern(good, good, options));
+    options = {};
+    options.csf = CsfModel::castle_yellow_violet; // of colour
+    EXPECT_FALSE(judge_modern(good, good, options));
+    EXPECT_FALSE(threshold_map_modern(good, options));
+    options.csf_table = &CsfTable::standard(); // in the model's place
+    EXPECT_TRUE(judge_modern(good, good, options));
 }
 
 } // namespace

@@ -13,10 +13,10 @@ namespace unseen::calibration {
 
 // A code value that looks as bright as an area of which the share `white` is white and the rest black.
 struct BrightnessMatch {
-    double white = 0.5, code = 0.5; // both within 0..1
+    double white = 0.5, code = 0.5; // both above 0 and below 1
 };
 
-// The gamma for which code^gamma = white fits best, in least squares of the logarithms. Fails on values outside of 0..1, and where
+// The gamma for which code^gamma = white fits best, in least squares of the logarithms. Fails on other values, on none, and where
 // the gamma would lie outside of 0.5..5: something else than a gamma was measured.
 Result<double> fit_gamma(std::span<const BrightnessMatch> matches);
 

@@ -27,6 +27,9 @@ struct SimulatedObserver {
     double set(const Trial& trial, const CalibrationPlan& plan) const; // a contrast, at most the highest
 };
 
+// Fails where the observer sees more at one of the plan's places than can be measured: contrasts below the lowest.
+Result<void> check_measurable(const SimulatedObserver& observer, const CalibrationPlan& plan);
+
 // "NAME[:key=value,...]": NAME is a CSF model or the file of an observer profile; the keys are gain, frequency, eccentricity, slope,
 // lapse, scatter, delay. Such as "castle:gain=0.7,slope=3". The error names the key.
 Result<SimulatedObserver> simulated_observer(std::string_view description, std::uint64_t seed);

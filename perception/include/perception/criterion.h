@@ -44,6 +44,7 @@ struct FoldTestOptions {
 //            eye inside the sphere or the sphere across the camera's plane)
 // so cost = v*/v: v the viewer's distance from the screen, v* the distance from which the fold is invisible.
 // Silhouette nodes: a mixed facing mask, or an irregular edge in the ring.
+// Preconditions: validate() accepts the display and vdtree::validate() the view; the gaze and the scene's luminances are finite.
 class LuebkeHallenCriterion {
 public:
     LuebkeHallenCriterion(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options,
@@ -58,7 +59,7 @@ private:
     glm::dvec3 right_, up_;
     bool has_gaze_ = false;
     double screen_scale_ = 1;     // tangent on the screen over tangent in the camera
-    double pixel_deg_ = 0;        // one pixel at the screen's centre
+    double pixel_deg_ = 0;        // the largest pixel
     double black_ = 0, span_ = 1; // cd/m2 = black + span * relative
     SceneLuminance scene_;
 };
@@ -68,6 +69,8 @@ private:
 // an octave and of a sixteenth of the display's range, eccentricity down to half degrees, and the magnification is the window's
 // largest, so folds cost at least what they do above; a cut keeps a few per cent more triangles. Facing is told by the slabs
 // alone. Cost: 10 ns a node, and 90 ns for every class in use and eccentricity.
+// This and the tests in distance form below fail where a precondition of the above does not hold, and on trees from damaged files; the
+// Luebke-Hallen tests, too, where the chroma is asked for of a tree with a texture, whose colours are not looked at.
 Result<vdtree::DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTree& tree, const vdtree::View& view,
                                                           const FoldTestOptions& options);
 
@@ -92,18 +95,20 @@ Result<vdtree::DistanceCriterion> lit_distances(const vdtree::VertexTree& tree, 
 SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBounds& bounds, const vdtree::Lighting& lighting,
                          glm::dvec3 eye, float background);
 
-// The test by errors: what a fold changes in fact, not what could change within its ring. In distance form, like the above. The tree
-// needs fold_errors() (vdtree::with_fold_errors).
+// The test by errors: what a fold changes in fact, not what could change within its ring. In distance form, like the above. Fails, too,
+// where the tree has no fold_errors() (vdtree::with_fold_errors).
 //
 // With D the angular width of what changes: twice the larger of the support's radius and the extent; h, eY and their means hm, em of
 // FoldError, in cd/m2 where they are luminances; the ring's range lo1..hi1 and its sphere's r1; L the middle of the range; S the
 // table's conservative form; and by eccentricity. A pattern is invisible where what the bands of an octave each see of it, c(rho) S(rho),
 // comes to less than 1 in their sum of powers of 3.5:
-//   patch       c = 1.6 (em + (hi1 - lo1) min(1, hm / r1)) / L, and in parts half as wide four times that, up to the largest,
+//   patch       c = 1.9 (em + (hi1 - lo1) min(1, hm / r1)) / L, and in parts half as wide four times that, up to the largest,
 //               (eY + (hi1 - lo1) min(1, h / r1)) / L;  c(rho) = c max over n = 1, 2, 4 of min(1, (n D rho)^2) / n
 //   drift       of areas 2^k times as wide, k = 1 up to the mesh's size, W:  c = drift / 2^(k fading / 2);  c(rho) = c min(1, (W rho)^2)
-//   silhouette  a strip of width w, the angle of 1.35 h, that changes between the ring's luminance and anything in the scene, with the
+//   silhouette  a strip of width w, the angle of 1.4 h, that changes between the ring's luminance and anything in the scene, with the
 //               contrast cs over the pair's mean:  c(rho) = cs min(1, 2 rho w)
+// Where the tree has fold_stages(), a node folds as well from where nobody can tell the whole mesh from the mesh in the node's stage, by
+// pictures of both: seldom near, but most of it far away.
 // rho goes up to the display's limit: below a pixel a fold counts by the share of the pixel that it covers, so from far enough away
 // everything folds, and drawing must be antialiased. Measured, not proven: see docs/perception.md for where it fails. Open and
 // irregular rings are silhouettes. Cost: as luebke_hallen_distances().

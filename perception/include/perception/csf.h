@@ -100,16 +100,21 @@ Stimulus stimulus_of(const CsfConditions& conditions, CyclesPerDegree frequency,
 // eccentricity and log luminance; outside of the axes clamped to their ends.
 struct CsfSamples {
     std::string source;                   // what filled it: model and conditions, or observer and date
-    std::vector<double> frequency_cpd;    // strictly ascending, > 0
-    std::vector<double> eccentricity_deg; // strictly ascending, from 0 on
-    std::vector<double> luminance_cdm2;   // strictly ascending, > 0
-    std::vector<double> sensitivity;      // > 0; [(e * luminances + l) * frequencies + f]
+    std::vector<double> frequency_cpd;    // two or more, ascending, > 0 and at most 1e4
+    std::vector<double> eccentricity_deg; // ascending from 0 to at most 180
+    std::vector<double> luminance_cdm2;   // ascending, > 0 and at most 1e10
+    std::vector<double> sensitivity;      // > 0 and at most 1e6; [(e * luminances + l) * frequencies + f]
 };
 
 class CsfTable {
 public:
-    // Checks the samples; the error names the field and the index. Then prepares the conservative form below.
+    // Checks the samples: the ranges above, and that each axis rises by `smallest_spacing` at least from sample to sample. The
+    // error names the field and the index. Then prepares the conservative form below.
     static Result<CsfTable> create(CsfSamples samples);
+    // Of neighbours on an axis, in octaves or degrees: closer ones are no measurement but a slip, and would make the slope
+    // between them meaningless in float.
+    static constexpr double smallest_spacing = 1e-4;
+    static constexpr Degrees highest_eccentricity{180};
     // Filled from a model under fixed conditions, for patches of patch_area(frequency): 1/16 to 64 cpd, 0 to 120 deg,
     // 1e-3 to 1e4 cd/m2, within 0.5% of the closed form wherever S > 1. An error where the conditions are outside of
     // the model's domain. Cost: 20 to 400 ms, 1 to 30 MB; daly's is the largest.

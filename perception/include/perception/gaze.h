@@ -81,6 +81,7 @@ inline constexpr double saccade_speed_deg_s = 50; // faster than any pursuit of 
 // The same trace and options give the same run.
 class GazeTracker {
 public:
+    // Preconditions: validate() accepts the options and the display, and the window is at least 1x1 pixels.
     GazeTracker(GazeTrace trace, const TrackerOptions& options, const Display& display, int width_px, int height_px);
     TrackedGaze at(double time_s) const;
 
@@ -100,14 +101,17 @@ Result<void> validate(const TrackerOptions& options);
 // Without a tracker the head alone says where the viewer looks: the eyes stay within so much of straight ahead.
 inline constexpr Degrees head_only_margin{15};
 
-// The table as it is for a viewer whose gaze is known to a margin only: S'(e) = S(max(0, e - margin)). Precondition: margin >= 0.
+// The table as it is for a viewer whose gaze is known to a margin only: S'(e) = S(max(0, e - margin)), up to the 180 degrees that a table
+// can have; beyond the last column that stays below them, what it sees or one that is left out, whichever is more. Margins below
+// CsfTable::smallest_spacing count as it, but for 0. Where the margin is 180 degrees or more, infinite or NaN, everything is seen as
+// it is best seen anywhere. Precondition: not below 0.
 CsfTable widened(const CsfTable& table, Degrees margin);
 
 // Keeps widened tables. Margins are rounded up to one of a few, so that not every frame needs a table of its own.
 class WidenedTables {
 public:
     explicit WidenedTables(CsfTable table) : table_(std::move(table)) {}
-    // Empty where the margin is so wide that everything may be looked at. The table lives as long as this.
+    // Null where the margin is so wide that everything may be looked at, or NaN. The table lives as long as this.
     const CsfTable* at(Degrees margin);
 
 private:

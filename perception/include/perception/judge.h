@@ -12,9 +12,9 @@
 namespace unseen::perception {
 
 struct JudgeOptions {
-    Display display = {};
+    Display display = {};                     // of headsets: the images are the flat picture, not the panel's
     std::optional<glm::dvec2> gaze_px = {};   // pixels from the top left, may lie outside; none: all foveal
-    CsfModel csf = CsfModel::castle;
+    CsfModel csf = CsfModel::castle;          // an achromatic one, from the display's distance
     const CsfTable* csf_table = nullptr;      // a viewer's own sensitivity in the model's place; must outlive the call
     double beta = 3.5;                        // Minkowski exponent over the bands; V = 1 is 75% detection
 };
@@ -29,7 +29,8 @@ struct Judgement {
 // The modern map, in double. Both images are luminance in cd/m2 and of one size. A decimated Laplacian pyramid with its
 // base band; Weber contrast of the difference against the reference's local luminance; sensitivity by pixel and
 // band (luminance, eccentricity, area pi (1.5 / rho)^2); Daly masking from the reference alone; Minkowski sum over the
-// bands. A hit in a low band counts its whole block. A NaN or negative luminance is an error.
+// bands. A hit in a low band counts its whole block. A NaN or negative luminance is an error, and so are options that are none: a display
+// that validate() refuses, a gaze that is not finite, a sensitivity to colour, a beta outside of 1 to 20.
 // Calibrated: a Gabor patch of 1.5 cycles radius reaches V = 1 within 3 dB of contrast 1 / S at any frequency between
 // 0.5 cpd and the display's limit, since a band's contrast is tilted by the slope of S within it (see the source).
 // Cost: about 0.4 s and 70 bytes a pixel for 1024 x 1024 pixels on one core.
@@ -46,7 +47,6 @@ Result<Image> threshold_map_modern(const Image& reference, const JudgeOptions& o
 // reference alone.
 struct Rpg99Options {
     double field_degrees = 45;
-    double peak_cdm2 = 100;
     bool masked_by_both = true;
 };
 struct Rpg99Map {

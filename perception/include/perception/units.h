@@ -40,8 +40,9 @@ using CyclesPerDegree = Quantity<struct CyclesPerDegreeUnit>;
 using PixelsPerDegree = Quantity<struct PixelsPerDegreeUnit>;
 using MichelsonContrast = Quantity<struct MichelsonContrastUnit>; // (Lmax - Lmin) / (Lmax + Lmin), 0..1
 
+inline constexpr double degrees_per_radian = 180 / std::numbers::pi;
 constexpr Radians to_radians(Degrees a) { return Radians(a.value() * (std::numbers::pi / 180)); }
-constexpr Degrees to_degrees(Radians a) { return Degrees(a.value() * (180 / std::numbers::pi)); }
+constexpr Degrees to_degrees(Radians a) { return Degrees(a.value() * degrees_per_radian); }
 constexpr CyclesPerDegree nyquist(PixelsPerDegree p) { return CyclesPerDegree(p.value() / 2); }
 
 inline namespace literals {
