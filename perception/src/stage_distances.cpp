@@ -16,6 +16,9 @@ namespace {
 
 using vdtree::FoldStage;
 
+// The worst direction may lie between those of the pictures. Found by comparing pictures.
+constexpr double between_directions = 1.15;
+
 // The angles, in degrees, that the mesh's sphere is seen under, from far to near.
 constexpr double least_angle = 0.01, angle_step = 1.0905077326652577; // an eighth of an octave
 constexpr std::size_t angle_count = 96;                              // up to 38 degrees
@@ -53,7 +56,7 @@ public:
     double largest_angle(const FoldStage& stage, std::size_t first_background, std::size_t last_background, double contrast_factor) const {
         for (std::size_t i = 0; i < angle_count; ++i)
             for (std::size_t k = first_background; k <= last_background; ++k)
-                if (!(visibility(stage.contrast[k], bands_[i]) * contrast_factor <= 1)) return i > 0 ? angle(i - 1) : 0;
+                if (!(visibility(stage.contrast[k], bands_[i]) * contrast_factor * between_directions <= 1)) return i > 0 ? angle(i - 1) : 0;
         return angle(angle_count - 1);
     }
 

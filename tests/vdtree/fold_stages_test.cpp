@@ -111,7 +111,7 @@ TEST(FoldStages, GoFromFineToTheRoot) {
 // An outline that moves by a hundredth of a cell changes the light of its cells by about that: no single sample that it passes counts as a whole cell.
 TEST(FoldStages, ShowSmallMovesOfOutlinesAsSmall) {
     const VertexTree tree = built(grey(shapes::bumpy_sphere(5, 0), 0.1f));
-    EXPECT_LT(largest(tree.fold_stages().front(), background(1)), 0.25f);
+    EXPECT_LT(largest(tree.fold_stages().front(), background(1)), 0.5f); // with one sample a cell: 2.7
     EXPECT_GT(largest(tree.fold_stages().front(), background(1)), 0);
 }
 
