@@ -16,9 +16,8 @@ namespace {
 
 using vdtree::FoldStage;
 
-// The largest contrasts of every band lie in other places, and in pictures from other directions; of all of them together a view shows no more than
-// this. Found by comparing pictures.
-constexpr double share_in_a_view = 0.7;
+// The worst direction may lie between those of the pictures. Found by comparing pictures.
+constexpr double between_directions = 1.15;
 
 // The angles, in degrees, that the mesh's sphere is seen under, from far to near.
 constexpr double least_angle = 0.01, angle_step = 1.0905077326652577; // an eighth of an octave
@@ -34,15 +33,17 @@ using Bands = std::array<Band, finer_bands + FoldStage::band_count>;
 
 class Eye {
 public:
-    Eye(const CsfTable& csf, double eccentricity_deg, Luminance luminance, double highest_cpd) {
+    // Of the brightest of the mesh, and of what is behind it.
+    Eye(const CsfTable& csf, double eccentricity_deg, Luminance mesh, Luminance behind, double highest_cpd) {
         for (std::size_t i = 0; i < angle_count; ++i) {
             for (std::size_t b = 0; b < bands_[i].size(); ++b) {
                 const double octaves_finer = b < finer_bands ? static_cast<double>(finer_bands - b) : 0;
                 const double cycles = FoldStage::frequency(b < finer_bands ? 0 : b - finer_bands) * std::exp2(octaves_finer);
+                const double luminance = behind.value() + share_of_mesh(cycles) * std::max(mesh.value() - behind.value(), 0.0);
                 const double cpd = cycles / angle(i);
                 const double at = std::max(std::min(cpd, highest_cpd), lowest_table_cpd);
                 const double sensitivity = share_on_display(cpd / highest_cpd) *
-                                           csf.monotone_sensitivity(CyclesPerDegree(at), Degrees(eccentricity_deg), luminance);
+                                           csf.monotone_sensitivity(CyclesPerDegree(at), Degrees(eccentricity_deg), Luminance(luminance));
                 for (std::size_t row = 0; row < FoldStage::masks.size(); ++row) {
                     const double mask = b < finer_bands ? 0 : static_cast<double>(FoldStage::masks[row]);
                     bands_[i][b][row] = std::exp2(octaves_finer) * sensitivity / daly_elevation(mask * sensitivity);
@@ -55,7 +56,7 @@ public:
     double largest_angle(const FoldStage& stage, std::size_t first_background, std::size_t last_background, double contrast_factor) const {
         for (std::size_t i = 0; i < angle_count; ++i)
             for (std::size_t k = first_background; k <= last_background; ++k)
-                if (!(visibility(stage.contrast[k], bands_[i]) * contrast_factor * share_in_a_view <= 1)) return i > 0 ? angle(i - 1) : 0;
+                if (!(visibility(stage.contrast[k], bands_[i]) * contrast_factor * between_directions <= 1)) return i > 0 ? angle(i - 1) : 0;
         return angle(angle_count - 1);
     }
 
@@ -67,6 +68,10 @@ private:
         const double x = times_highest * std::numbers::pi / 2;
         return x > 0 ? std::sin(x) / x : 1;
     }
+
+    // Of the mean luminance around a place that a band looks at, which adapts to it, a mesh that fills its whole sphere makes up at most this: the
+    // pyramid's kernel is about a Gaussian of the deviation 1 / (sqrt(8) cycles) in diameters of the sphere.
+    static double share_of_mesh(double cycles) { return 1 - std::exp(-cycles * cycles); }
 
     static double visibility(const float (&contrast)[FoldStage::band_count][FoldStage::masks.size()], const Bands& bands) {
         double sum = 0;
@@ -90,7 +95,8 @@ std::vector<float> stage_distances(const vdtree::VertexTree& tree, const Screen&
     std::size_t first = 0, last = FoldStage::backgrounds.size() - 1; // the nearest ones that are not brighter, and not darker
     while (first < last && FoldStage::backgrounds[first + 1] <= behind.lo) ++first;
     while (last > first && FoldStage::backgrounds[last - 1] >= behind.hi) --last;
-    const Luminance brightest = to_luminance(options.display, static_cast<double>(std::max(tree.luminance_range().hi, behind.hi)));
+    const Luminance brightest = to_luminance(options.display, static_cast<double>(tree.luminance_range().hi));
+    const Luminance brightest_behind = to_luminance(options.display, static_cast<double>(behind.hi));
     const double black = black_level(options.display).value(), span = to_luminance(options.display, 1).value() - black;
     // On darker displays contrasts are larger than those of the pictures.
     const double least = std::max(black / span, 1.0 / 4096);
@@ -100,7 +106,7 @@ std::vector<float> stage_distances(const vdtree::VertexTree& tree, const Screen&
 
     std::vector<float> distances(stages.size() * bins);
     for (std::size_t bin = 0; bin < bins && !stages.empty(); ++bin) {
-        const Eye eye(csf, static_cast<double>(bin) * degrees_per_bin, brightest, screen.highest_cpd);
+        const Eye eye(csf, static_cast<double>(bin) * degrees_per_bin, brightest, brightest_behind, screen.highest_cpd);
         for (std::size_t stage = 0; stage < stages.size(); ++stage) {
             const double on_screen = eye.largest_angle(stages[stage], first, last, contrast_factor);
             const double seen = on_screen / screen.largest_magnification / degrees_per_radian;

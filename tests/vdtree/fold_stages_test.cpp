@@ -77,6 +77,25 @@ TEST(Pyramid, BandsHaveTheirGainAtTheirFrequency) {
     }
 }
 
+// What sensitivities far away count on: of the mean over the area that a band looks at, a disc as wide as the mesh makes up no more than under a Gaussian.
+TEST(Pyramid, MeansAreThoseUnderAGaussian) {
+    constexpr std::size_t side = 128;
+    constexpr double margin = 1.05, radius = side / (2 * margin);
+    Plane plane(side);
+    for (std::size_t y = 0; y < side; ++y)
+        for (std::size_t x = 0; x < side; ++x)
+            plane.row(y)[x] = std::hypot(static_cast<double>(x) - side / 2.0 + 0.5, static_cast<double>(y) - side / 2.0 + 0.5) < radius ? 1.0f : 0.0f;
+    for (std::size_t band = 0; band < FoldStage::band_count; ++band) {
+        const Plane next = reduce(plane);
+        const Plane mean = expand(next, plane.side);
+        const double most = static_cast<double>(*std::max_element(mean.values.begin(), mean.values.end()));
+        const double frequency = FoldStage::frequency(band), gaussian = 1 - std::exp(-frequency * frequency);
+        EXPECT_LT(most, 1.1 * gaussian) << band;
+        if (band >= 5) { EXPECT_GT(most, 0.5 * gaussian) << band; }
+        plane = next;
+    }
+}
+
 TEST(FoldStages, GoFromFineToTheRoot) {
     const VertexTree tree = built(shapes::torus(48, 24));
     const auto errors = tree.fold_errors();
@@ -87,6 +106,13 @@ TEST(FoldStages, GoFromFineToTheRoot) {
     // Coarse stages show more.
     const std::size_t dark = background(0);
     EXPECT_LT(largest(tree.fold_stages().front(), dark), largest(tree.fold_stages().back(), dark));
+}
+
+// An outline that moves by a hundredth of a cell changes the light of its cells by about that: no single sample that it passes counts as a whole cell.
+TEST(FoldStages, ShowSmallMovesOfOutlinesAsSmall) {
+    const VertexTree tree = built(grey(shapes::bumpy_sphere(5, 0), 0.1f));
+    EXPECT_LT(largest(tree.fold_stages().front(), background(1)), 0.5f); // with one sample a cell: 2.7
+    EXPECT_GT(largest(tree.fold_stages().front(), background(1)), 0);
 }
 
 // What cannot be told from its background, nor from what is left of it, shows nothing in any stage.

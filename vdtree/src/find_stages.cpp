@@ -4,10 +4,13 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <numeric>
 #include <optional>
 
 #include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include "drift.h"
@@ -18,21 +21,23 @@ namespace unseen::vdtree {
 namespace {
 
 constexpr std::size_t side = 128;       // of pictures, in cells
+constexpr std::size_t cell_samples = 4; // along each side of a cell; with one, what single samples jump by at outlines hides what folds change
+constexpr std::size_t samples = side * cell_samples;
 constexpr float margin = 1.05f;         // of the picture around the mesh's sphere: proxies may stand out of it
 constexpr std::size_t direction_count = 26;
-constexpr double first_share = 0.57;    // of the nodes that the first stage leaves; finer ones are for near views, which go by other bounds
+constexpr double first_share = 0.8;     // of the nodes that the first stage leaves; finer ones are for near views, which go by other bounds
 constexpr double stages_per_halving = 2;
 constexpr double fewest_left = 4;       // nodes; then all fold
 constexpr float outline_contrast = 0.3f; // of a typical outline: what a distance between surfaces changes of the light
 
-// From where a picture is taken: the mesh's sphere fills it, but for the margin.
+// From where a picture is taken: the mesh's sphere fills it, but for the margin. Lengths are in samples.
 struct Camera {
     glm::vec3 centre, right, up, towards;
-    float cells_per_length;
+    float samples_per_length;
 
     glm::vec3 place(const glm::vec3& p) const {
-        const glm::vec3 q = (p - centre) * cells_per_length;
-        return {glm::dot(q, right) + side / 2.0f, glm::dot(q, up) + side / 2.0f, glm::dot(q, towards)};
+        const glm::vec3 q = (p - centre) * samples_per_length;
+        return {glm::dot(q, right) + samples / 2.0f, glm::dot(q, up) + samples / 2.0f, glm::dot(q, towards)};
     }
 };
 
@@ -46,11 +51,11 @@ Camera camera(const Sphere& sphere, std::size_t number) {
     c.towards = {s * std::cos(angle), s * std::sin(angle), z};
     c.right = glm::normalize(glm::cross(std::abs(c.towards.y) < 0.9f ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0), c.towards));
     c.up = glm::cross(c.towards, c.right);
-    c.cells_per_length = side / (2 * margin * sphere.radius);
+    c.samples_per_length = samples / (2 * margin * sphere.radius);
     return c;
 }
 
-// Before an unlit background: the light that comes from each cell, and whether the mesh covers it.
+// Before an unlit background: the light that comes from each cell, and the share of it that the mesh covers.
 struct Picture {
     Plane light{side}, cover{side};
 
@@ -62,47 +67,83 @@ struct Picture {
     }
 };
 
+// The nearest surface at a sample.
+struct Surface {
+    float height = -std::numeric_limits<float>::infinity(); // towards the eye
+    float light = 0;
+};
+
 class Painter {
 public:
-    Painter(const VertexTree& tree, const Camera& camera)
-        : camera_(camera), positions_(tree.positions()), luminance_(tree.luminance()), height_(side * side, -std::numeric_limits<float>::infinity()) {}
+    // The surfaces' memory is used again.
+    Painter(const VertexTree& tree, const Camera& camera, std::vector<Surface>& surfaces)
+        : camera_(camera), positions_(tree.positions()), luminance_(tree.luminance()), closedness_(tree.closedness()), surfaces_(surfaces) {
+        surfaces_.assign(samples * samples, {});
+    }
 
-    // The nearest surface at the middle of every cell. Triangles over nodes.
-    void draw(std::span<const Triangle> triangles) {
+    // Triangles over nodes.
+    Picture draw(std::span<const Triangle> triangles) {
         for (const Triangle& t : triangles)
             draw(t, camera_.place(positions_[t[0]]), camera_.place(positions_[t[1]]), camera_.place(positions_[t[2]]));
+        Picture picture;
+        constexpr float share = 1.0f / (cell_samples * cell_samples);
+        for (std::size_t cell = 0; cell < side * side; ++cell) {
+            const Surface* const first = surfaces_.data() + cell / side * cell_samples * samples + cell % side * cell_samples;
+            float light = 0, covered = 0;
+            for (std::size_t y = 0; y < cell_samples; ++y) {
+                for (std::size_t x = 0; x < cell_samples; ++x) {
+                    const Surface& at = first[y * samples + x];
+                    light += at.light;
+                    covered += at.height > Surface{}.height ? 1.0f : 0.0f;
+                }
+            }
+            picture.light.values[cell] = share * light;
+            picture.cover.values[cell] = share * covered;
+        }
+        return picture;
     }
-    Picture& picture() { return picture_; }
 
 private:
-    struct Cells {
-        std::size_t first, end;
-    };
-    // Whose middles lie between the least and the most.
-    static Cells between(float a, float b, float c) {
-        const float low = std::ceil(std::min({a, b, c}) - 0.5f), high = std::floor(std::max({a, b, c}) - 0.5f) + 1;
-        if (!(low < high)) return {0, 0};
-        return {static_cast<std::size_t>(std::clamp(low, 0.0f, static_cast<float>(side))),
-                static_cast<std::size_t>(std::clamp(high, 0.0f, static_cast<float>(side)))};
+    // How many samples of a row, or rows, lie before a place: the rounding of floats that every processor has.
+    static std::size_t count_before(float place) {
+        if (!(place > 0)) return 0;
+        if (place >= samples) return samples;
+        const int whole = static_cast<int>(place);
+        return static_cast<std::size_t>(whole + (static_cast<float>(whole) < place));
+    }
+    // Of a row's samples: edges that run up meet them one after the other, not all of a column at once.
+    static float offset_of_row(std::size_t row) {
+        constexpr float golden_ratio = 0.618034f;
+        const float all = golden_ratio * static_cast<float>(row);
+        return all - static_cast<float>(static_cast<int>(all));
     }
 
     void draw(const Triangle& t, const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {
-        const Cells columns = between(a.x, b.x, c.x), rows = between(a.y, b.y, c.y);
-        if (columns.first >= columns.end || rows.first >= rows.end) return; // most, of fine meshes
-        const float area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-        if (!(std::abs(area) > 0)) return;
+        const std::size_t first = count_before(std::min({a.y, b.y, c.y}) - 0.5f), end = count_before(std::max({a.y, b.y, c.y}) - 0.5f);
+        if (first >= end) return; // many, of fine meshes
+        const float left = std::min({a.x, b.x, c.x}), right = std::max({a.x, b.x, c.x});
+        const float inverse = 1 / ((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x));
+        if (!std::isfinite(inverse) || (closedness_ == Closedness::closed_outward && inverse < 0) ||
+            (closedness_ == Closedness::closed_inward && inverse > 0)) // as renderers do
+            return;
         const float of_a = luminance_[t[0]], of_b = luminance_[t[1]], of_c = luminance_[t[2]];
-        for (std::size_t y = rows.first; y < rows.end; ++y) {
-            for (std::size_t x = columns.first; x < columns.end; ++x) {
-                const float px = static_cast<float>(x) + 0.5f - a.x, py = static_cast<float>(y) + 0.5f - a.y;
-                const float v = (px * (c.y - a.y) - py * (c.x - a.x)) / area, w = ((b.x - a.x) * py - (b.y - a.y) * px) / area, u = 1 - v - w;
-                if (!(u >= 0 && v >= 0 && w >= 0)) continue;
-                const std::size_t cell = y * side + x;
+        const glm::vec2 v_by = inverse * glm::vec2(c.y - a.y, a.x - c.x), w_by = inverse * glm::vec2(a.y - b.y, b.x - a.x);
+        for (std::size_t y = first; y < end; ++y) {
+            // Of a corner's weight, as it grows along the row: where it is no longer, or not yet, negative.
+            const float offset = offset_of_row(y), py = static_cast<float>(y) + 0.5f - a.y;
+            float low = left - a.x, high = right - a.x;
+            for (const auto& [at_start, by] : {std::pair(py * v_by.y, v_by.x), std::pair(py * w_by.y, w_by.x), std::pair(1 - py * (v_by.y + w_by.y), -v_by.x - w_by.x)}) {
+                if (by > 0) low = std::max(low, -at_start / by);
+                else if (by < 0) high = std::min(high, -at_start / by);
+                else if (at_start < 0) high = low;
+            }
+            Surface* const row = surfaces_.data() + y * samples;
+            const std::size_t last = count_before(high + a.x - offset);
+            for (std::size_t x = count_before(low + a.x - offset); x < last; ++x) {
+                const float px = static_cast<float>(static_cast<int>(x)) + offset - a.x;
+                const float v = px * v_by.x + py * v_by.y, w = px * w_by.x + py * w_by.y, u = 1 - v - w;
                 const float height = u * a.z + v * b.z + w * c.z;
-                if (!(height > height_[cell])) continue;
-                height_[cell] = height;
-                picture_.light.values[cell] = u * of_a + v * of_b + w * of_c;
-                picture_.cover.values[cell] = 1;
+                if (height > row[x].height) row[x] = {height, u * of_a + v * of_b + w * of_c};
             }
         }
     }
@@ -110,8 +151,8 @@ private:
     const Camera& camera_;
     std::span<const glm::vec3> positions_;
     std::span<const Unorm16> luminance_;
-    Picture picture_;
-    std::vector<float> height_; // towards the eye
+    Closedness closedness_;
+    std::vector<Surface>& surfaces_;
 };
 
 // A picture in bands of frequency.
@@ -144,11 +185,14 @@ private:
     std::array<Band, FoldStage::band_count> bands_;
 };
 
+// Of a grating's amplitude, in cycles a cell: cells show the mean over their area.
+double share_in_cells(double frequency) { return std::sin(std::numbers::pi * frequency) / (std::numbers::pi * frequency); }
+
 // Raises the contrasts to those of a difference of pictures.
 void include(const Bands& mesh, const Bands& difference, FoldStage& stage) {
     for (std::size_t b = 0; b < FoldStage::band_count; ++b) {
         const Bands::Band &whole = mesh[b], &change = difference[b];
-        const float inverse_gain = 1 / static_cast<float>(band_gain(b));
+        const float inverse_gain = 1 / static_cast<float>(band_gain(b) * share_in_cells(nominal_frequency(b)));
         for (std::size_t i = 0; i < change.light.values.size(); ++i) {
             const float light = change.light.values[i], cover = change.cover.values[i];
             if (light == 0 && cover == 0) continue;
@@ -180,15 +224,15 @@ public:
         const std::size_t count = order();
         std::vector<std::optional<Picture>> pictures(direction_count);
         std::vector<std::optional<Bands>> bands(direction_count);
-        for_each_picture([&](std::size_t i, const Picture& picture) {
-            pictures[i] = picture;
+        for_each_picture([&](std::size_t i, Picture picture) {
             bands[i].emplace(picture);
+            pictures[i] = std::move(picture);
         });
         std::vector<FoldStage> stages(count);
         for (std::size_t stage = 0; stage < count; ++stage) {
             fold(stage);
             std::vector<FoldStage> found(direction_count);
-            for_each_picture([&](std::size_t i, Picture& picture) {
+            for_each_picture([&](std::size_t i, Picture picture) {
                 picture.subtract(*pictures[i]);
                 include(*bands[i], Bands(picture), found[i]);
             });
@@ -232,9 +276,7 @@ private:
     template <class F>
     void for_each_picture(F&& f) {
         tbb::parallel_for(std::size_t{0}, direction_count, [&](std::size_t i) {
-            Painter painter(tree_, cameras_[i]);
-            painter.draw(triangles_);
-            f(i, painter.picture());
+            f(i, Painter(tree_, cameras_[i], surfaces_.local()).draw(triangles_));
         });
     }
 
@@ -251,6 +293,7 @@ private:
     std::span<const NodeId> parents_;
     std::vector<Triangle> triangles_; // as folded, over nodes
     std::vector<Camera> cameras_;
+    tbb::enumerable_thread_specific<std::vector<Surface>> surfaces_;
 };
 
 } // namespace
