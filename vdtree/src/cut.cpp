@@ -422,18 +422,32 @@ void Cut::end_changes(AdjustStats& stats) {
 
 // ---- other cuts as wholes
 
-void Cut::change_to(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
+bool Cut::are_few_changes(std::span<const std::uint64_t> unfolded) const {
     std::size_t changes = 0;
     for (std::size_t word = 0; word < unfolded_.size(); ++word)
         changes += static_cast<std::size_t>(std::popcount(unfolded_[word] ^ unfolded[word]));
-    if (changes < few_changes(triangle_count_)) replay(unfolded, stats);
-    else become(std::move(unfolded), stats);
+    return changes < few_changes(triangle_count_);
+}
+
+void Cut::change_to(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
+    if (!are_few_changes(unfolded)) return become(std::move(unfolded), stats);
+    begin_changes();
+    replay(unfolded);
+    end_changes(stats);
+}
+
+void Cut::change_further(std::vector<std::uint64_t> unfolded) {
+    if (are_few_changes(unfolded)) return replay(unfolded);
+    const std::vector<FoldChange> before = std::move(changes_);
+    AdjustStats ignored; // all changes are counted at the end
+    become(std::move(unfolded), ignored);
+    --revision_; // one for all of them
+    changes_.insert(changes_.begin(), before.begin(), before.end());
 }
 
 // Node numbers ascend from parents to children: unfolds run upward through them, so every node is active when its turn comes,
 // and folds run downward.
-void Cut::replay(std::span<const std::uint64_t> unfolded, AdjustStats& stats) {
-    begin_changes();
+void Cut::replay(std::span<const std::uint64_t> unfolded) {
     for (std::size_t word = 0; word < unfolded.size(); ++word)
         for (std::uint64_t bits = unfolded[word] & ~unfolded_[word]; bits; bits &= bits - 1)
             apply_unfold(static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))));
@@ -444,7 +458,6 @@ void Cut::replay(std::span<const std::uint64_t> unfolded, AdjustStats& stats) {
             bits &= ~(std::uint64_t{1} << highest);
         }
     }
-    end_changes(stats);
 }
 
 // The proxies of all leaves, in order: what is folded under unfolded nodes stands for its leaves, and other leaves for themselves.

@@ -30,7 +30,7 @@ struct AdjustStats {
     std::uint64_t unfolds = 0;
     Index triangles = 0;
     float max_fold_cost = 0;      // the largest cost among the folded nodes that can be seen; 0 without folds. With
-                                  // hysteresis, and without a budget: not more than this
+                                  // hysteresis, and without a budget: not more than this. Infinite where a time limit has left it unknown
     bool is_complete = true;      // false: the time limit has left something to do
 };
 
@@ -46,8 +46,9 @@ struct FollowOptions {
     // exceed the least by this factor; then a frame costs what changes, and slow motions do not flicker.
     float hysteresis = 1;
 
-    // At most so long, as near as the clock and a batch of tests allow; what is left to do is done at the next calls, worst folds
-    // first. Results then depend on the machine's speed.
+    // At most so long, as near as the clock and a step of some tests or changes allow (a step of each is always done); what is left to do is
+    // kept for the next calls, worst folds first. Results then depend on the machine's speed. The clock does not divide: the change of the whole
+    // cut after a jump, and in the call after it, finding what is to be watched. A budget without hysteresis starts anew in every call.
     std::optional<double> milliseconds = {};
 
     // Nodes whose ring faces away fold at no cost. Only for surfaces that are closed and consistently oriented (inside out or not: the
@@ -145,7 +146,9 @@ private:
     void assign_changed(const std::vector<std::uint64_t>& unfolded);
     void assign_all(std::span<const std::uint64_t> unfolded);
     void change_to(std::vector<std::uint64_t> unfolded, AdjustStats& stats);
-    void replay(std::span<const std::uint64_t> unfolded, AdjustStats& stats);
+    void change_further(std::vector<std::uint64_t> unfolded); // within changes in steps
+    bool are_few_changes(std::span<const std::uint64_t> unfolded) const;
+    void replay(std::span<const std::uint64_t> unfolded);
     std::span<const NodeId> children_of(NodeId node);
 
     const VertexTree* tree_;
