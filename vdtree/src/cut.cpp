@@ -161,21 +161,22 @@ Decision decide_by_budget(const VertexTree& tree, NodeTester& test, Index budget
     return decision;
 }
 
-// Sorts the triangles of an extracted mesh by their input triangle, so that the input's groups and materials are runs again.
-void group_by_range(const Cut& cut, Mesh& mesh) {
+// The corners of the cut's triangles in the order of the input, in which groups and materials are runs; these are appended to `ranges`. (The
+// index buffer's order follows from the history of the cut.)
+std::vector<NodeId> corners_by_range(const Cut& cut, std::vector<MeshRange>& ranges) {
     const VertexTree& tree = cut.tree();
     const auto first = tree.first_triangle();
-    std::vector<std::pair<Index, Index>> order; // input triangle, triangle of the mesh
-    order.reserve(mesh.triangles.size());
+    std::vector<std::pair<Index, Index>> order; // input triangle, triangle of the tree
+    order.reserve(cut.triangle_count());
     for (NodeId node = 0; node < tree.interior_count(); ++node) {
         if (!cut.is_unfolded(node)) continue;
-        for (Index t = first[node]; t < first[node + 1]; ++t)
-            order.emplace_back(tree.source_triangles()[t], static_cast<Index>(order.size()));
+        for (Index t = first[node]; t < first[node + 1]; ++t) order.emplace_back(tree.source_triangles()[t], t);
     }
     std::sort(order.begin(), order.end());
-    std::vector<Triangle> sorted(order.size());
-    for (std::size_t i = 0; i < order.size(); ++i) sorted[i] = mesh.triangles[order[i].second];
-    mesh.triangles = std::move(sorted);
+    std::vector<NodeId> corners;
+    corners.reserve(3 * order.size());
+    for (const auto& [source, triangle] : order)
+        for (const Index leaf : tree.triangles()[triangle]) corners.push_back(cut.proxy_of_leaf(leaf));
     for (const MeshRange& range : tree.ranges()) {
         const auto place = [&](std::uint64_t source) {
             const auto found = std::partition_point(order.begin(), order.end(),
@@ -185,8 +186,9 @@ void group_by_range(const Cut& cut, Mesh& mesh) {
         MeshRange left = range;
         left.first_triangle = place(range.first_triangle);
         left.triangle_count = place(range.first_triangle + range.triangle_count) - left.first_triangle;
-        if (left.triangle_count > 0) mesh.ranges.push_back(std::move(left));
+        if (left.triangle_count > 0) ranges.push_back(std::move(left));
     }
+    return corners;
 }
 
 } // namespace
@@ -707,8 +709,10 @@ std::uint64_t Cut::byte_size() const noexcept {
 
 Mesh extract_mesh(const Cut& cut) {
     const VertexTree& tree = cut.tree();
-    const auto indices = cut.indices();
     Mesh mesh;
+    std::vector<NodeId> by_range;
+    if (!tree.ranges().empty()) by_range = corners_by_range(cut, mesh.ranges);
+    const std::span<const NodeId> indices = tree.ranges().empty() ? cut.indices() : by_range;
     std::vector<Index> vertex_of_node(tree.node_count(), no_node);
     std::vector<NodeId> used;
     mesh.triangles.resize(cut.triangle_count());
@@ -730,7 +734,6 @@ Mesh extract_mesh(const Cut& cut) {
     gather(tree.normals(), mesh.normals);
     gather(tree.colours(), mesh.colours);
     gather(tree.uvs(), mesh.uvs);
-    if (!tree.ranges().empty()) group_by_range(cut, mesh);
     return mesh;
 }
 
