@@ -185,6 +185,26 @@ TEST(FoldErrors, AreTheSameForAnyNumberOfThreads) {
     EXPECT_TRUE(std::ranges::equal(one->luminance(), four->luminance()));
 }
 
+// Lengths in any unit: the same errors, but for the unit.
+TEST(FoldErrors, DoNotDependOnTheUnit) {
+    const Mesh mesh = shapes::in_floats(shapes::together(shapes::bumpy_sphere(3, 0.03), shapes::placed(shapes::cube(4), 0.5, {0.9, 0.1, 0})));
+    const VertexTree tree = built(mesh);
+    for (const int power : {-110, -60, 60, 110}) {
+        Mesh other = mesh;
+        for (glm::dvec3& p : other.positions) p *= std::ldexp(1.0, power);
+        const VertexTree scaled = built(other);
+        ASSERT_EQ(scaled.interior_count(), tree.interior_count()) << power;
+        ASSERT_TRUE(std::ranges::equal(scaled.parents(), tree.parents())) << power;
+        EXPECT_TRUE(std::ranges::equal(scaled.luminance(), tree.luminance())) << power;
+        EXPECT_TRUE(std::ranges::equal(scaled.fold_stages(), tree.fold_stages())) << power;
+        for (NodeId node = 0; node < tree.interior_count(); ++node) {
+            FoldError expected = tree.fold_errors()[node];
+            for (float* length : {&expected.distance, &expected.mean_distance, &expected.extent}) *length = std::ldexp(*length, power);
+            ASSERT_EQ(scaled.fold_errors()[node], expected) << "2^" << power << ", node " << node;
+        }
+    }
+}
+
 TEST(FoldErrors, AreFiniteForHardMeshes) {
     for (const Mesh& mesh : {shapes::single_triangle(), shapes::all_coincident(200), shapes::with_zero_areas(), shapes::non_manifold_fan(5),
                              shapes::moebius_strip(20)}) {
