@@ -745,6 +745,37 @@ TEST(FollowBadInput, IsRefusedAndChangesNothing) {
     EXPECT_EQ(state_of(cut), before);
 }
 
+TEST(FollowBadInput, ACriterionOfAnotherTreeIsRefused) {
+    const VertexTree tree = built(shapes::bumpy_sphere(4)), other = built(shapes::bumpy_sphere(2));
+    const DistanceCriterion criterion = rich_criterion(other, 2, false);
+    const Viewpoint viewpoint{.eye = {3, 0, 0}};
+    Cut cut(tree), fits(other);
+    EXPECT_FALSE(cut.follow(criterion, viewpoint));
+    EXPECT_FALSE(cut.follow(criterion, viewpoint, {.triangle_budget = 100}));
+    EXPECT_FALSE(test_every_node(tree, criterion, viewpoint));
+    EXPECT_FALSE(find_every_cost(tree, criterion, viewpoint));
+    const SceneObject objects[] = {{fits, criterion, viewpoint}, {cut, criterion, viewpoint}};
+    EXPECT_FALSE(follow_scene(objects, 100));
+    EXPECT_EQ(cut.triangle_count() + fits.triangle_count(), 0u);
+    EXPECT_TRUE(fits.follow(criterion, viewpoint));
+}
+
+TEST(FollowLifetimes, ACutAndItsCopiesOutliveTheTreeGiven) {
+    auto tree = std::make_unique<VertexTree>(built(shapes::bumpy_sphere(3)));
+    const DistanceCriterion criterion = rich_criterion(*tree, 2, false);
+    Cut cut(*tree), expected(*tree);
+    ASSERT_TRUE(cut.follow(criterion, {.eye = {3, 0, 0}}));
+    static_cast<void>(cut.indices());
+    const VertexTree kept = std::move(*tree);
+    tree.reset();
+    Cut moved = std::move(cut);
+    ASSERT_TRUE(moved.follow(criterion, {.eye = {3, 0.01, 0}}));
+    ASSERT_TRUE(expected.follow(criterion, {.eye = {3, 0.01, 0}}));
+    EXPECT_EQ(std::addressof(moved.tree().data()), std::addressof(kept.data()));
+    EXPECT_EQ(state_of(moved), state_of(expected));
+    EXPECT_EQ(triangles_of(moved.indices()), gathered(moved));
+}
+
 TEST(FollowBadInput, CriteriaThatDoNotFitAreRefused) {
     const VertexTree tree = built(shapes::bumpy_sphere(3));
     using Parts = DistanceCriterion::Parts;

@@ -211,7 +211,7 @@ struct Cut::Indices {
 };
 
 Cut::Cut(const VertexTree& tree)
-    : tree_(&tree), unfolded_((tree.interior_count() + 63) / 64), proxy_(tree.leaf_count(), VertexTree::root()),
+    : tree_(std::make_shared<const VertexTree>(tree.share())), unfolded_((tree.interior_count() + 63) / 64), proxy_(tree.leaf_count(), VertexTree::root()),
       revision_(first_revision()) {}
 Cut::Cut(Cut&&) noexcept = default;
 Cut& Cut::operator=(Cut&&) noexcept = default;
@@ -584,8 +584,11 @@ bool is_finite(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) &
 // Far enough away that squares of distances still fit floats.
 constexpr double farthest_eye = 1e18; // mesh units
 
-Result<void> check(const Viewpoint& viewpoint, const DistanceCriterion& criterion) {
-    const auto invalid = [](const char* what) { return Error{ErrorCode::invalid_argument, what}; };
+Result<void> check(const VertexTree& tree, const Viewpoint& viewpoint, const DistanceCriterion& criterion) {
+    const auto invalid = [](std::string what) { return Error{ErrorCode::invalid_argument, std::move(what)}; };
+    if (criterion.interior_count() != tree.interior_count())
+        return invalid("The criterion is for a tree of " + std::to_string(criterion.interior_count()) + " interior nodes, and this one has " +
+                       std::to_string(tree.interior_count()) + "; make one for this tree.");
     if (!is_finite(viewpoint.eye)) return invalid("The eye's position is not finite.");
     if (!(glm::length(viewpoint.eye) <= farthest_eye)) return invalid("The eye is more than 1e18 mesh units away.");
     constexpr double unit_slack = 1e-3; // directions given with three digits
@@ -621,7 +624,7 @@ Result<void> check(const FollowOptions& options) {
 } // namespace
 
 Result<AdjustStats> Cut::follow(const DistanceCriterion& criterion, const Viewpoint& viewpoint, const FollowOptions& options) {
-    if (const auto valid = check(viewpoint, criterion); !valid) return valid.error();
+    if (const auto valid = check(*tree_, viewpoint, criterion); !valid) return valid.error();
     if (const auto valid = check(options); !valid) return valid.error();
     if (!follower_) follower_ = std::make_unique<CutFollower>(*tree_);
     return follower_->follow(*this, criterion, viewpoint, options);
@@ -629,7 +632,7 @@ Result<AdjustStats> Cut::follow(const DistanceCriterion& criterion, const Viewpo
 
 Result<std::vector<std::uint64_t>> test_every_node(const VertexTree& tree, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
                                                    const FollowOptions& options) {
-    if (const auto valid = check(viewpoint, criterion); !valid) return valid.error();
+    if (const auto valid = check(tree, viewpoint, criterion); !valid) return valid.error();
     if (const auto valid = check(options); !valid) return valid.error();
     FoldTester tester(tree, criterion, options.cull_back_faces, options.threshold);
     tester.look_from(viewpoint, 1);
@@ -640,7 +643,7 @@ Result<std::vector<std::uint64_t>> test_every_node(const VertexTree& tree, const
 
 Result<std::vector<float>> find_every_cost(const VertexTree& tree, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
                                            const FollowOptions& options) {
-    if (const auto valid = check(viewpoint, criterion); !valid) return valid.error();
+    if (const auto valid = check(tree, viewpoint, criterion); !valid) return valid.error();
     if (const auto valid = check(options); !valid) return valid.error();
     FoldTester tester(tree, criterion, options.cull_back_faces, options.threshold);
     tester.look_from(viewpoint, 1);
@@ -658,13 +661,13 @@ Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objec
     std::vector<const FoldTester*> tests;
     for (std::size_t i = 0; i < objects.size(); ++i) {
         const SceneObject& object = objects[i];
-        if (const auto valid = check(object.viewpoint, object.criterion); !valid)
+        if (const auto valid = check(*object.cut.tree_, object.viewpoint, object.criterion); !valid)
             return Error{valid.error().code, "Object " + std::to_string(i) + ": " + valid.error().message};
         for (std::size_t other = 0; other < i; ++other)
             if (&objects[other].cut == &object.cut)
                 return Error{ErrorCode::invalid_argument, "Objects " + std::to_string(other) + " and " + std::to_string(i) +
                                                               " share one cut; give each its own."};
-        trees.push_back(object.cut.tree_);
+        trees.push_back(object.cut.tree_.get());
         testers.push_back(std::make_unique<FoldTester>(*object.cut.tree_, object.criterion, object.cull_back_faces, 1.0f, false));
         testers.back()->look_from(object.viewpoint, 1);
         tests.push_back(testers.back().get());
