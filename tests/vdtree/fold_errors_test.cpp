@@ -16,6 +16,7 @@
 
 #include "shapes.h"
 #include "temp_folder.h"
+#include "vertex_tree_data.h"
 
 namespace unseen::vdtree {
 namespace {
@@ -203,6 +204,31 @@ TEST(FoldErrors, DoNotDependOnTheUnit) {
             ASSERT_EQ(scaled.fold_errors()[node], expected) << "2^" << power << ", node " << node;
         }
     }
+}
+
+TEST(FoldErrors, AreVerified) {
+    const VertexTree tree = built(shapes::bumpy_sphere(2, 0.03));
+    EXPECT_TRUE(verify(tree));
+    const auto with = [&](auto&& change) {
+        std::vector<FoldError> errors(tree.fold_errors().begin(), tree.fold_errors().end());
+        change(errors[VertexTree::root()]);
+        const auto copy_of = [](const auto& values) { return std::vector(values.begin(), values.end()); };
+        const TreeLuminance& given = tree.data().light;
+        auto data = std::make_shared<VertexTree::Data>();
+        data->geometry = tree.data().geometry;
+        data->light.luminance = copy_of(given.luminance);
+        data->light.support_range = copy_of(given.support_range);
+        data->light.ring_range = copy_of(given.ring_range);
+        data->light.adaptation = copy_of(given.adaptation);
+        data->light.fold_errors = std::move(errors);
+        return VertexTree(std::move(data));
+    };
+    EXPECT_TRUE(verify(with([](FoldError&) {})));
+    EXPECT_FALSE(verify(with([](FoldError& e) { e.distance = 0; })));
+    EXPECT_FALSE(verify(with([](FoldError& e) { e.luminance = -1; })));
+    EXPECT_FALSE(verify(with([](FoldError& e) { e.extent *= 0.01f; })));
+    EXPECT_FALSE(verify(with([](FoldError& e) { e.drift = std::nanf(""); })));
+    EXPECT_FALSE(verify(with([](FoldError& e) { e.facing = {}; })));
 }
 
 TEST(FoldErrors, AreFiniteForHardMeshes) {
