@@ -110,7 +110,7 @@ void CutFollower::start_at(const Viewpoint& viewpoint) {
     length_per_radian_ = 2 * std::max(distance, least);
     set_farthest(distance + static_cast<double>(root.radius));
     watch_nothing();
-    watched_.use_lights(tester_->uses_lights());
+    watched_.use_lights(tester_->has_lights());
     watched_.move_to(viewpoint.eye, 0);
     look_from(viewpoint);
 }

@@ -30,6 +30,9 @@ constexpr std::size_t triangles_compared = 16; // of each surface, at equal step
 constexpr std::size_t most_fine_triangles = 64; // in rings of more, some neighbours are folded
 constexpr float contact_reach = 6; // times the distance by which folds move a surface: then parts that near may pass through each other
 constexpr float least_sine = 0.1f; // of the angle at which parts meet: flatter ones count as this
+// Trees are some tens of nodes deep. Up deeper ones, as only made-up ones are, neighbours are folded no farther than this, so that no tree costs the
+// square of its depth.
+constexpr int most_steps = 1024;
 constexpr Index leaves_of_part = 4096;   // of a subtree that one task measures
 
 struct Point {
@@ -255,7 +258,8 @@ private:
     NodeId stand_in(Index leaf, NodeId node) const {
         NodeId at = interior_ + leaf;
         const int most = much_more * luminance_span(node);
-        for (NodeId up = parents_[at]; up != no_node && is_larger(node, up) && luminance_span(up) <= most; up = parents_[at]) at = up;
+        int steps = 0;
+        for (NodeId up = parents_[at]; up != no_node && is_larger(node, up) && luminance_span(up) <= most && ++steps <= most_steps; up = parents_[at]) at = up;
         return at;
     }
     int luminance_span(NodeId node) const { return support_luminance_[node].hi.value - support_luminance_[node].lo.value; }
