@@ -34,7 +34,7 @@ constexpr float least_threshold = 1e-30f;
 constexpr std::size_t changes_at_once = 16;
 constexpr double longest_limit_ms = 1e9; // more is no limit
 // Of the time that a fresh start has, so much is for decisions; the rest is for changing the cut to them.
-constexpr double deciding_share = 0.5;
+constexpr double deciding_share = 0.6;
 // Blocks whose due nodes are tested, with what folds for it, between two looks at the clock: some microseconds.
 constexpr std::size_t blocks_at_once = 16;
 
