@@ -30,12 +30,12 @@ constexpr std::size_t no_material = std::numeric_limits<std::size_t>::max(), unu
 
 // By triangle: the number of its material, or of the first one that looks the same.
 std::vector<std::size_t> materials_of_triangles(const vdtree::ReadResult& read) {
-    using Look = std::tuple<std::filesystem::path, std::string, vdtree::Wrap, vdtree::Wrap, std::array<float, 4>>;
+    using Look = std::tuple<std::filesystem::path, const std::string*, vdtree::Wrap, vdtree::Wrap, std::array<float, 4>>;
     std::map<Look, std::size_t> first;
     std::map<std::string, std::size_t> numbers;
     for (std::size_t i = 0; i < read.materials.size(); ++i) {
         const Material& m = read.materials[i];
-        const Look look{m.image, m.image_bytes, m.wrap_u, m.wrap_v, {m.colour.r, m.colour.g, m.colour.b, m.colour.a}};
+        const Look look{m.image, m.image_bytes.get(), m.wrap_u, m.wrap_v, {m.colour.r, m.colour.g, m.colour.b, m.colour.a}};
         numbers.emplace(m.name, first.try_emplace(look, i).first->second);
     }
     std::vector<std::size_t> of(read.mesh.triangles.size(), no_material);
@@ -78,9 +78,9 @@ public:
         const bool is_embedded = material.image.empty();
         const std::filesystem::path file =
             is_embedded ? std::filesystem::path(mesh_file_.string() + ": the image of material '" + material.name + "'") : mesh_file_.parent_path() / material.image;
-        auto [entry, is_new] = images_.try_emplace({file, material.wrap_u, material.wrap_v});
+        auto [entry, is_new] = images_.try_emplace({material.image, material.image_bytes.get(), material.wrap_u, material.wrap_v});
         if (is_new) {
-            auto texture = is_embedded ? decode_texture(material.image_bytes, file, from_top_) : read_texture(file, from_top_);
+            auto texture = is_embedded ? decode_texture(*material.image_bytes, file, from_top_) : read_texture(file, from_top_);
             if (!texture) return Error{texture.error().code, with_advice(texture.error().message)};
             entry->second = std::move(*texture);
             entry->second.wrap_u = material.wrap_u;
@@ -92,7 +92,7 @@ public:
 private:
     std::filesystem::path mesh_file_;
     bool from_top_;
-    std::map<std::tuple<std::filesystem::path, vdtree::Wrap, vdtree::Wrap>, Texture> images_;
+    std::map<std::tuple<std::filesystem::path, const std::string*, vdtree::Wrap, vdtree::Wrap>, Texture> images_;
 };
 
 // Multiplies materials' colours into those of the vertices.

@@ -121,7 +121,7 @@ struct Renderer::Impl {
     Context::Impl* context;
     TriangleDrawer drawer;
     UnitFrame frame;
-    const void* tree = nullptr; // told apart by its arrays' address, which moving a tree does not change
+    std::optional<vdtree::VertexTree> tree; // kept, so that no other one comes to its data's address, by which it is known
     glm::dvec3 origin = glm::dvec3(0);
     vdtree::Closedness closedness = vdtree::Closedness::open;
     std::vector<glm::mat4> matrices; // of the samples
@@ -149,7 +149,7 @@ Result<Camera> Renderer::Impl::prepare(const vdtree::Cut& cut, Moved moved, cons
     }
     if (!cut.tree().texture().empty() && !moved.empty())
         return invalid("Textures do not glide: draw the cut instead of the geomorph, or the tree without its texture.");
-    if (std::addressof(cut.tree().data()) != tree)
+    if (std::addressof(cut.tree().data()) != std::addressof(tree->data()))
         return invalid("The cut belongs to another tree than the renderer's; make a renderer for that tree.");
     const Camera camera = camera_for(view, placement, origin, frame);
     if (!is_finite(camera.clip_from_unit))
@@ -200,7 +200,7 @@ Result<Renderer> Renderer::create(Context& context, const vdtree::VertexTree& tr
     }
     auto impl = std::make_unique<Impl>(context.impl_.get(), std::move(*drawer));
     impl->frame = frame;
-    impl->tree = std::addressof(tree.data());
+    impl->tree = tree.share();
     impl->origin = tree.origin();
     impl->closedness = tree.closedness();
     if (auto made = impl->gl_result("Bringing the tree to the GPU"); !made)

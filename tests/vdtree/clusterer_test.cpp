@@ -194,6 +194,25 @@ private:
     int rank_, size_;
 };
 
+TEST(Clusterers, OfOnesOwnAreCheckedAndHaveNoTeam) {
+    const Mesh mesh = shapes::single_triangle();
+    const auto with_root = [&](Index root) {
+        return build_tree(mesh.view(), [&](const ClusterInput&) -> Result<Clustering> { return Clustering{{3, 3, 3, root}, {}}; });
+    };
+    EXPECT_TRUE(with_root(3));
+    EXPECT_FALSE(with_root(0));
+    EXPECT_FALSE(with_root(1000000));
+    Mailboxes mail;
+    ThreadTeam team(mail, 0, 2);
+    bool was_called = false;
+    const auto own = [&](const ClusterInput&) -> Result<Clustering> {
+        was_called = true;
+        return Clustering{{3, 3, 3, 3}, {}};
+    };
+    EXPECT_FALSE(build_tree(mesh.view(), own, {.team = &team}));
+    EXPECT_FALSE(was_called);
+}
+
 TEST(Clusterers, MakeTheSameWithATeamOfAnySize) {
     for (const Hard& hard : hard_meshes) {
         SCOPED_TRACE(hard.name);

@@ -547,6 +547,28 @@ TEST(ExtractMesh, KeepsEveryTriangleInItsRange) {
     }
 }
 
+// The index buffer's order is another one when it has been patched.
+TEST(ExtractMesh, DoesNotDependOnTheHistoryOfTheCut) {
+    const VertexTree tree = built(shapes::with_attributes(shapes::bumpy_sphere(4, 0.03)));
+    ASSERT_FALSE(tree.ranges().empty());
+    const auto criterion = extent_criterion(tree, View{}, 100);
+    ASSERT_TRUE(criterion);
+    Cut cut(tree);
+    int patched = 0;
+    for (int frame = 0; frame < 60; ++frame) {
+        const Viewpoint viewpoint{.eye = {0, 0.3, 3 + 0.01 * frame}};
+        ASSERT_TRUE(cut.follow(*criterion, viewpoint));
+        static_cast<void>(cut.indices());
+        patched += cut.index_writes() && !cut.index_writes()->empty();
+        Cut fresh(tree);
+        ASSERT_TRUE(fresh.follow(*criterion, viewpoint));
+        const Mesh mesh = extract_mesh(cut), expected = extract_mesh(fresh);
+        ASSERT_EQ(mesh.positions, expected.positions) << "frame " << frame;
+        ASSERT_EQ(mesh.triangles, expected.triangles) << "frame " << frame;
+    }
+    EXPECT_GT(patched, 20);
+}
+
 TEST(ExtractMesh, IsEmptyForAFoldedCut) {
     const VertexTree tree = built(shapes::with_attributes(shapes::cube(2)));
     const Mesh nothing = extract_mesh(Cut(tree));

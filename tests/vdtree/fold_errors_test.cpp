@@ -16,6 +16,7 @@
 
 #include "shapes.h"
 #include "temp_folder.h"
+#include "vertex_tree_data.h"
 
 namespace unseen::vdtree {
 namespace {
@@ -183,6 +184,51 @@ TEST(FoldErrors, AreTheSameForAnyNumberOfThreads) {
     ASSERT_TRUE(one && four);
     EXPECT_TRUE(std::ranges::equal(one->fold_errors(), four->fold_errors()));
     EXPECT_TRUE(std::ranges::equal(one->luminance(), four->luminance()));
+}
+
+// Lengths in any unit: the same errors, but for the unit.
+TEST(FoldErrors, DoNotDependOnTheUnit) {
+    const Mesh mesh = shapes::in_floats(shapes::together(shapes::bumpy_sphere(3, 0.03), shapes::placed(shapes::cube(4), 0.5, {0.9, 0.1, 0})));
+    const VertexTree tree = built(mesh);
+    for (const int power : {-110, -60, 60, 110}) {
+        Mesh other = mesh;
+        for (glm::dvec3& p : other.positions) p *= std::ldexp(1.0, power);
+        const VertexTree scaled = built(other);
+        ASSERT_EQ(scaled.interior_count(), tree.interior_count()) << power;
+        ASSERT_TRUE(std::ranges::equal(scaled.parents(), tree.parents())) << power;
+        EXPECT_TRUE(std::ranges::equal(scaled.luminance(), tree.luminance())) << power;
+        EXPECT_TRUE(std::ranges::equal(scaled.fold_stages(), tree.fold_stages())) << power;
+        for (NodeId node = 0; node < tree.interior_count(); ++node) {
+            FoldError expected = tree.fold_errors()[node];
+            for (float* length : {&expected.distance, &expected.mean_distance, &expected.extent}) *length = std::ldexp(*length, power);
+            ASSERT_EQ(scaled.fold_errors()[node], expected) << "2^" << power << ", node " << node;
+        }
+    }
+}
+
+TEST(FoldErrors, AreVerified) {
+    const VertexTree tree = built(shapes::bumpy_sphere(2, 0.03));
+    EXPECT_TRUE(verify(tree));
+    const auto with = [&](auto&& change) {
+        std::vector<FoldError> errors(tree.fold_errors().begin(), tree.fold_errors().end());
+        change(errors[VertexTree::root()]);
+        const auto copy_of = [](const auto& values) { return std::vector(values.begin(), values.end()); };
+        const TreeLuminance& given = tree.data().light;
+        auto data = std::make_shared<VertexTree::Data>();
+        data->geometry = tree.data().geometry;
+        data->light.luminance = copy_of(given.luminance);
+        data->light.support_range = copy_of(given.support_range);
+        data->light.ring_range = copy_of(given.ring_range);
+        data->light.adaptation = copy_of(given.adaptation);
+        data->light.fold_errors = std::move(errors);
+        return VertexTree(std::move(data));
+    };
+    EXPECT_TRUE(verify(with([](FoldError&) {})));
+    EXPECT_FALSE(verify(with([](FoldError& e) { e.distance = 0; })));
+    EXPECT_FALSE(verify(with([](FoldError& e) { e.luminance = -1; })));
+    EXPECT_FALSE(verify(with([](FoldError& e) { e.extent *= 0.01f; })));
+    EXPECT_FALSE(verify(with([](FoldError& e) { e.drift = std::nanf(""); })));
+    EXPECT_FALSE(verify(with([](FoldError& e) { e.facing = {}; })));
 }
 
 TEST(FoldErrors, AreFiniteForHardMeshes) {

@@ -45,7 +45,7 @@ float largest(const FoldStage& stage, std::size_t background) {
     return most;
 }
 
-double sum(const Plane& plane) {
+double sum(const Raster& plane) {
     double all = 0;
     for (const float value : plane.values) all += static_cast<double>(value);
     return all;
@@ -54,7 +54,7 @@ double sum(const Plane& plane) {
 // Every sample's weight in the next level is a quarter, also at the border, where that reaches farther out.
 TEST(Pyramid, KeepsLight) {
     for (const std::size_t side : {5u, 8u, 31u, 128u}) {
-        Plane plane(side);
+        Raster plane(side);
         for (std::size_t i = 0; i < plane.values.size(); ++i) plane.values[i] = static_cast<float>((i * 7919) % 101);
         EXPECT_NEAR(4 * sum(reduce(plane)) / sum(plane), 1, 1e-5) << side;
     }
@@ -63,12 +63,12 @@ TEST(Pyramid, KeepsLight) {
 TEST(Pyramid, BandsHaveTheirGainAtTheirFrequency) {
     constexpr std::size_t side = 512;
     for (const std::size_t level : {1u, 2u, 3u}) {
-        Plane plane(side);
+        Raster plane(side);
         const double omega = 2 * std::numbers::pi * nominal_frequency(level);
         for (std::size_t y = 0; y < side; ++y)
             for (std::size_t x = 0; x < side; ++x) plane.row(y)[x] = static_cast<float>(std::sin(omega * static_cast<double>(x)));
         for (std::size_t i = 0; i < level; ++i) plane = reduce(plane);
-        const Plane mean = expand(reduce(plane), plane.side);
+        const Raster mean = expand(reduce(plane), plane.side);
         float amplitude = 0;
         const std::size_t middle = plane.side / 2;
         for (std::size_t y = middle - 2; y < middle + 2; ++y)
@@ -81,13 +81,13 @@ TEST(Pyramid, BandsHaveTheirGainAtTheirFrequency) {
 TEST(Pyramid, MeansAreThoseUnderAGaussian) {
     constexpr std::size_t side = 128;
     constexpr double margin = 1.05, radius = side / (2 * margin);
-    Plane plane(side);
+    Raster plane(side);
     for (std::size_t y = 0; y < side; ++y)
         for (std::size_t x = 0; x < side; ++x)
             plane.row(y)[x] = std::hypot(static_cast<double>(x) - side / 2.0 + 0.5, static_cast<double>(y) - side / 2.0 + 0.5) < radius ? 1.0f : 0.0f;
     for (std::size_t band = 0; band < FoldStage::band_count; ++band) {
-        const Plane next = reduce(plane);
-        const Plane mean = expand(next, plane.side);
+        const Raster next = reduce(plane);
+        const Raster mean = expand(next, plane.side);
         const double most = static_cast<double>(*std::max_element(mean.values.begin(), mean.values.end()));
         const double frequency = FoldStage::frequency(band), gaussian = 1 - std::exp(-frequency * frequency);
         EXPECT_LT(most, 1.1 * gaussian) << band;

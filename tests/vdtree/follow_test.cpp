@@ -541,6 +541,116 @@ TEST(FollowInTime, FinishesLaterWhatTheTimeDidNotReach) {
     EXPECT_EQ(state_of(hurried), state_of(whole));
 }
 
+// The largest cost of a folded node under unfolded ones (or of the root).
+float largest_cost_of(const Cut& cut, const DistanceCriterion& criterion, const Viewpoint& viewpoint) {
+    const auto costs = find_every_cost(cut.tree(), criterion, viewpoint);
+    if (!costs) throw std::runtime_error(costs.error().message);
+    float largest = 0;
+    for (NodeId node = 0; node < cut.tree().interior_count(); node = cut.is_unfolded(node) ? node + 1 : cut.tree().subtree_end()[node])
+        if (!cut.is_unfolded(node)) largest = std::max(largest, (*costs)[node]);
+    return largest;
+}
+
+// Even without any time every call does a step of tests and one of unfolds, and none does again what one before it has done.
+TEST(FollowInTime, AStillViewIsDoneInSmallStepsWithoutTestsInVain) {
+    const VertexTree tree = built(shapes::bumpy_sphere(5, 0.02));
+    for (const bool with_gaze : {false, true}) {
+        const DistanceCriterion criterion = rich_criterion(tree, 10, with_gaze);
+        Viewpoint viewpoint{.eye = {2, 1, 2}};
+        if (with_gaze) viewpoint.gaze = glm::normalize(glm::dvec3(-2, -1, -2));
+        Cut whole(tree), hurried(tree);
+        const auto at_once = whole.follow(criterion, viewpoint);
+        ASSERT_TRUE(at_once);
+        std::uint64_t tests = 0, unfolds = 0;
+        std::size_t calls = 0;
+        for (bool is_complete = false; !is_complete && calls < 10000; ++calls) {
+            const auto stats = hurried.follow(criterion, viewpoint, {.milliseconds = 0.0});
+            ASSERT_TRUE(stats);
+            is_complete = stats->is_complete;
+            tests += stats->node_tests;
+            unfolds += stats->unfolds;
+            EXPECT_EQ(stats->folds, 0u);
+            ASSERT_EQ(support::fault_in_cut(hurried), "");
+        }
+        EXPECT_EQ(state_of(hurried), state_of(whole));
+        EXPECT_EQ(unfolds, at_once->unfolds);
+        EXPECT_LT(tests, 2 * at_once->node_tests);
+        EXPECT_LT(calls, at_once->unfolds / 8);
+    }
+}
+
+// A moving view has something to test in every frame; still the cut gets as fine as where there is time enough.
+TEST(FollowInTime, TestsDoNotKeepAMovingCutFromUnfolding) {
+    const VertexTree tree = built(shapes::bumpy_sphere(5, 0.02));
+    const DistanceCriterion criterion = rich_criterion(tree, 10, false);
+    Cut whole(tree), hurried(tree);
+    for (int frame = 0; frame < 2000; ++frame) {
+        const double angle = frame * 0.02;
+        const Viewpoint viewpoint{.eye = 4.0 * glm::dvec3(std::sin(angle), 0.3, std::cos(angle))};
+        const auto followed = hurried.follow(criterion, viewpoint, {.milliseconds = 0.0});
+        ASSERT_TRUE(followed && whole.follow(criterion, viewpoint));
+        if (frame > 0 && hurried.triangle_count() < whole.triangle_count() / 2) {
+            EXPECT_GT(followed->unfolds, 0u) << "frame " << frame;
+        }
+    }
+    EXPECT_GT(hurried.triangle_count(), whole.triangle_count() / 2);
+}
+
+TEST(FollowInTime, TellsTheLargestCostOfWhatItLeaves) {
+    const VertexTree tree = built(shapes::bumpy_sphere(5, 0.02));
+    const DistanceCriterion criterion = rich_criterion(tree, 10, false);
+    Viewpoint viewpoint{.eye = {2, 1, 2}};
+    for (const std::optional<Index> budget : {std::optional<Index>(), std::optional<Index>(6000)}) {
+        Cut cut(tree);
+        int finite = 0, calls = 0;
+        for (int moves = 0; moves < 4; ++moves) {
+            bool is_complete = false;
+            for (; !is_complete && calls < 10000; ++calls) {
+                const FollowOptions options{.triangle_budget = budget, .hysteresis = budget ? 1.1f : 1, .milliseconds = 0.0};
+                const auto stats = cut.follow(criterion, viewpoint, options);
+                ASSERT_TRUE(stats);
+                const float largest = largest_cost_of(cut, criterion, viewpoint);
+                ASSERT_GE(stats->max_fold_cost, largest * (1 - 1e-5f)) << "call " << calls; // the rounding of a test
+                EXPECT_LE(stats->triangles, budget.value_or(tree.triangle_count()));
+                is_complete = stats->is_complete;
+                finite += !is_complete && std::isfinite(stats->max_fold_cost);
+                EXPECT_TRUE(!is_complete || budget || stats->max_fold_cost <= 1);
+            }
+            viewpoint.eye += glm::dvec3(-0.1, 0.05, 0);
+        }
+        EXPECT_GT(finite, calls / 10);
+    }
+}
+
+// From inside, where every fold is seen from anywhere, to where few are.
+TEST(FollowBudget, WithHysteresisComesBackFromInfiniteCosts) {
+    const VertexTree tree = built(shapes::bumpy_sphere(5, 0.02));
+    const DistanceCriterion criterion = rich_criterion(tree, 9, false);
+    constexpr Index budget = 60;
+    constexpr float hysteresis = 1.1f;
+    Cut steady(tree), exact(tree), replica(tree);
+    int fewer = 0;
+    for (int frame = 0; frame < 400; ++frame) {
+        const Viewpoint viewpoint{.eye = {0.3 + 0.01 * frame, 0, 0}};
+        const auto with = steady.follow(criterion, viewpoint, {.triangle_budget = budget, .hysteresis = hysteresis});
+        const auto without = exact.follow(criterion, viewpoint, {.triangle_budget = budget});
+        ASSERT_TRUE(with && without);
+        EXPECT_LE(with->triangles, budget) << "frame " << frame;
+        fewer += with->triangles < without->triangles / 2;
+        // Whatever the call did in between: one list of all changes.
+        std::uint64_t folds = 0;
+        for (const FoldChange& change : steady.changes()) {
+            ASSERT_TRUE(change.folded ? replica.fold(change.node) : replica.unfold(change.node)) << "frame " << frame;
+            folds += change.folded;
+        }
+        ASSERT_EQ(state_of(steady), state_of(replica)) << "frame " << frame;
+        EXPECT_EQ(with->folds, folds);
+        EXPECT_EQ(with->unfolds, steady.changes().size() - folds);
+        ASSERT_EQ(triangles_of(steady.indices()), gathered(steady)) << "frame " << frame;
+    }
+    EXPECT_LT(fewer, 10);
+}
+
 TEST(FollowScene, SharesABudgetAmongObjects) {
     const VertexTree near_tree = built(shapes::bumpy_sphere(4, 0.03)), far_tree = built(shapes::torus(40, 20));
     const DistanceCriterion near_criterion = rich_criterion(near_tree, 1, false), far_criterion = rich_criterion(far_tree, 2, false);
@@ -633,6 +743,37 @@ TEST(FollowBadInput, IsRefusedAndChangesNothing) {
     EXPECT_EQ(state_of(cut), before);
     EXPECT_TRUE(cut.follow(criterion, {.eye = {3, 0, 0}}));
     EXPECT_EQ(state_of(cut), before);
+}
+
+TEST(FollowBadInput, ACriterionOfAnotherTreeIsRefused) {
+    const VertexTree tree = built(shapes::bumpy_sphere(4)), other = built(shapes::bumpy_sphere(2));
+    const DistanceCriterion criterion = rich_criterion(other, 2, false);
+    const Viewpoint viewpoint{.eye = {3, 0, 0}};
+    Cut cut(tree), fits(other);
+    EXPECT_FALSE(cut.follow(criterion, viewpoint));
+    EXPECT_FALSE(cut.follow(criterion, viewpoint, {.triangle_budget = 100}));
+    EXPECT_FALSE(test_every_node(tree, criterion, viewpoint));
+    EXPECT_FALSE(find_every_cost(tree, criterion, viewpoint));
+    const SceneObject objects[] = {{fits, criterion, viewpoint}, {cut, criterion, viewpoint}};
+    EXPECT_FALSE(follow_scene(objects, 100));
+    EXPECT_EQ(cut.triangle_count() + fits.triangle_count(), 0u);
+    EXPECT_TRUE(fits.follow(criterion, viewpoint));
+}
+
+TEST(FollowLifetimes, ACutAndItsCopiesOutliveTheTreeGiven) {
+    auto tree = std::make_unique<VertexTree>(built(shapes::bumpy_sphere(3)));
+    const DistanceCriterion criterion = rich_criterion(*tree, 2, false);
+    Cut cut(*tree), expected(*tree);
+    ASSERT_TRUE(cut.follow(criterion, {.eye = {3, 0, 0}}));
+    static_cast<void>(cut.indices());
+    const VertexTree kept = std::move(*tree);
+    tree.reset();
+    Cut moved = std::move(cut);
+    ASSERT_TRUE(moved.follow(criterion, {.eye = {3, 0.01, 0}}));
+    ASSERT_TRUE(expected.follow(criterion, {.eye = {3, 0.01, 0}}));
+    EXPECT_EQ(std::addressof(moved.tree().data()), std::addressof(kept.data()));
+    EXPECT_EQ(state_of(moved), state_of(expected));
+    EXPECT_EQ(triangles_of(moved.indices()), gathered(moved));
 }
 
 TEST(FollowBadInput, CriteriaThatDoNotFitAreRefused) {

@@ -124,6 +124,31 @@ TEST(Lights, ThatCannotBeAreRefusedByTheNameOfTheirField) {
     EXPECT_NE(complaint(two).find("at most 16"), std::string::npos);
 }
 
+// Whatever is taken, its luminances are numbers, and bounds of them hold.
+TEST(Lights, AtTheEndsOfWhatIsTakenMakeNumbers) {
+    constexpr double farthest = 1e18, brightest = 1e12;
+    EXPECT_FALSE(validate(lit_by(point({2 * farthest, 0, 0}, 1, 1))));
+    EXPECT_FALSE(validate(lit_by(point({}, 1, 2 * farthest))));
+    EXPECT_FALSE(validate(lit_by(point({}, 2 * brightest, 1))));
+    const glm::dvec3 eye(0, 0, 3), normal(0, 0, 1);
+    VertexCone cone;
+    cone.albedo = {0.5f, 0.8f};
+    const Sphere sphere{{0, 0, 0}, 0.1f};
+    for (const double height : {0.05, 1.0, 1e9, farthest})
+        for (const double distance : {1e-18, 1.0, farthest})
+            for (const double intensity : {0.0, 1.0, brightest})
+                for (const bool is_spot : {false, true}) {
+                    LightSource light = is_spot ? spot({0, 0, height}, {0, 0, -1}, 20, 40) : point({0, 0, height}, 1, 1);
+                    light.intensity = intensity, light.distance = distance;
+                    Lighting lighting = lit_by(light, 0.1);
+                    lighting.specular = 0.2;
+                    ASSERT_TRUE(validate(lighting));
+                    const LuminanceRange range = lit_range(lighting, cone, sphere, eye);
+                    const double least = lit_luminance(lighting, {}, normal, 0.5, eye), most = lit_luminance(lighting, {}, normal, 0.8, eye);
+                    ASSERT_TRUE(range.lo <= least && most <= range.hi) << height << " " << distance << " " << intensity << ": " << range.lo << " " << range.hi;
+                }
+}
+
 TEST(Lights, AtAVertexOrInsideAreRefused) {
     const VertexTree tree = std::move(*build_tree(shapes::torus(24, 12).view(), {.threads = 1}));
     const glm::dvec3 vertex(tree.positions()[tree.interior_count()]);

@@ -3,6 +3,7 @@
 
 #include "mesh_files.h"
 #include "mesh_readers.h"
+#include "text_scanner.h"
 
 #include <atomic>
 #include <cstdlib>
@@ -210,6 +211,21 @@ TEST(MalformedMesh, PlyHeadersAreChecked) {
     EXPECT_THAT(error_of(replaced(file, "element vertex 4\n", ""), "a.ply"), HasSubstr("before the first element"));
     EXPECT_THAT(error_of(replaced(file, "element face 1", "element face 0"), "a.ply"), HasSubstr("no faces"));
     EXPECT_THAT(error_of(replaced(file, "elem", "e\0em"s), "a.ply"), HasSubstr("line 4"));
+}
+
+// By their own digits: what a locale makes of them does not count.
+TEST(MalformedMesh, NumbersBeyondDoublesAreInfiniteOrZero) {
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    const std::string zeros(400, '0');
+    const std::pair<std::string, double> cases[] = {{"1e400", infinity}, {"-1.5E+400", -infinity}, {"0.001e400", infinity}, {"1" + zeros, infinity},
+                                                    {"-1" + zeros + ".5", -infinity}, {"1e-400", 0}, {"-2.5e-400", 0}, {"1000e-400", 0},
+                                                    {"0." + zeros + "1", 0}, {"1e99999999999999999999", infinity}, {"1e-99999999999999999999", 0},
+                                                    {"0." + zeros + "1e-5", 0}, {"+1e400", infinity}};
+    for (const auto& [text, expected] : cases) {
+        double value = 1;
+        EXPECT_TRUE(to_number(text, value)) << text;
+        EXPECT_EQ(value, expected) << text;
+    }
 }
 
 TEST(MalformedMesh, CoordinatesMustBeFinite) {

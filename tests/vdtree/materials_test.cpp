@@ -5,6 +5,7 @@
 
 #include <vdtree/mesh_io.h>
 
+#include "mesh_files.h"
 #include "temp_folder.h"
 
 namespace unseen::vdtree {
@@ -85,6 +86,40 @@ TEST_F(Materials, ThatCannotBeReadAreNotedAndBadOnesAreNot) {
     const auto result = read("newmtl a\nKd nan\n", "m.mtl", without);
     ASSERT_TRUE(result);
     EXPECT_TRUE(result->materials.empty());
+}
+
+// A file of many materials over one image, or over many images of one buffer view, is not much larger when it has been read.
+TEST_F(Materials, OfGltfShareTheirImage) {
+    constexpr int count = 200;
+    const std::string picture(1 << 20, 'x');
+    const auto glb = [&](bool has_one_image) {
+        std::string primitives, materials, textures, images;
+        for (int i = 0; i < count; ++i) {
+            const std::string comma = i > 0 ? "," : "", number = std::to_string(i);
+            primitives += comma + R"({"attributes":{"POSITION":0},"indices":1,"material":)" + number + "}";
+            materials += comma + R"({"name":"same","pbrMetallicRoughness":{"baseColorTexture":{"index":)" + number + "}}}";
+            textures += comma + R"({"source":)" + (has_one_image ? "0" : number) + "}";
+            if (i == 0 || !has_one_image) images += comma + R"({"bufferView":2,"mimeType":"image/png"})";
+        }
+        return mesh_files::glb(R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],"meshes":[{"primitives":[)" +
+                                   primitives + R"(]}],"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},)" +
+                                   R"({"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}],"bufferViews":[{"buffer":0,"byteLength":36},)" +
+                                   R"({"buffer":0,"byteOffset":36,"byteLength":6},{"buffer":0,"byteOffset":44,"byteLength":1048576}],"buffers":[)" +
+                                   R"({"byteLength":1048620}],"materials":[)" + materials + R"(],"textures":[)" + textures + R"(],"images":[)" + images + "]}",
+                               mesh_files::gltf_triangle_data() + "  " + picture);
+    };
+    write("one.glb", glb(true));
+    const auto one = read_mesh(folder_ / "one.glb");
+    ASSERT_TRUE(one) << one.error().message;
+    ASSERT_EQ(one->materials.size(), std::size_t{count});
+    ASSERT_TRUE(one->materials[0].image_bytes);
+    EXPECT_EQ(*one->materials[0].image_bytes, picture);
+    for (const Material& material : one->materials) EXPECT_EQ(material.image_bytes, one->materials[0].image_bytes);
+    write("many.glb", glb(false));
+    const auto many = read_mesh(folder_ / "many.glb");
+    EXPECT_TRUE(!many && many.error().message.find("far more than the file holds") != std::string::npos);
+    EXPECT_EQ(one->materials[0].name, "same");
+    EXPECT_EQ(one->materials[7].name, "same (material 7)");
 }
 
 } // namespace

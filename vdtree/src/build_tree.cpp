@@ -172,6 +172,8 @@ Result<void> check(const Clustering& c, std::size_t vertices) {
         return invalid("The clustering has " + std::to_string(c.positions.size()) + " proxies for " +
                        std::to_string(c.parents.size() - vertices) + " clusters.");
     const std::size_t root = c.parents.size() - 1;
+    if (c.parents[root] != root)
+        return invalid("The last cluster, " + std::to_string(root) + ", is the root and has the parent " + std::to_string(c.parents[root]) + "; the root's is its own number.");
     for (std::size_t i = 0; i < root; ++i) {
         if (!(c.parents[i] > i && c.parents[i] <= root) || c.parents[i] < vertices)
             return invalid("Cluster " + std::to_string(i) + " has the parent " + std::to_string(c.parents[i]) +
@@ -455,6 +457,10 @@ Result<Value> with_builder(const MeshView& mesh, const BuildOptions& options, Wo
     return work(builder);
 }
 
+Result<VertexTree> build_with(const MeshView& mesh, Clusterer clusterer, const BuildOptions& options) {
+    return with_builder<VertexTree>(mesh, options, [&](TreeBuilder& builder) { return builder.build(clusterer); });
+}
+
 } // namespace
 
 std::string_view name(ClustererKind kind) { return kind == ClustererKind::quadric ? "quadric" : "octree"; }
@@ -469,7 +475,9 @@ Result<void> check_buildable(const MeshView& mesh, const BuildOptions& options) 
 }
 
 Result<VertexTree> build_tree(const MeshView& mesh, Clusterer clusterer, const BuildOptions& options) {
-    return with_builder<VertexTree>(mesh, options, [&](TreeBuilder& builder) { return builder.build(clusterer); });
+    if (options.team)
+        return Error{ErrorCode::invalid_argument, "A team helps with quadric clustering only: leave it out where the clustering is your own."};
+    return build_with(mesh, clusterer, options);
 }
 
 Result<void> help_build_tree(const MeshView& mesh, const BuildOptions& options) {
@@ -484,7 +492,7 @@ Result<VertexTree> build_tree(const MeshView& mesh, const BuildOptions& options)
         return options.progress(clustering_begins + share * (clustering_ends - clustering_begins), stage);
     };
     const Progress progress = options.progress ? Progress(report) : Progress();
-    return build_tree(
+    return build_with(
         mesh,
         [&](const ClusterInput& input) {
             return options.clusterer == ClustererKind::octree ? cluster_octree(input, progress)

@@ -11,6 +11,7 @@
 #include <tbb/parallel_for.h>
 
 #include "leaf_triangles.h"
+#include "scaled_geometry.h"
 
 namespace unseen::vdtree {
 
@@ -19,7 +20,9 @@ namespace {
 using Corners = std::array<glm::vec3, 3>;
 
 constexpr float near_share = 0.25f; // of a triangle's size: no triangles of a smooth surface come so near but neighbours
-constexpr int most_nodes = 4000; // looked at for one triangle: amid more than that, it counts as touching one
+// Looked at for one triangle: amid more than these, it counts as touching one.
+constexpr int most_nodes = 4000;
+constexpr std::size_t most_triangles = 16000; // so that no vertex of very many triangles costs their square
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
 float unit(float part, float whole) { return whole > 0 ? std::clamp(part / whole, 0.0f, 1.0f) : 0.0f; }
@@ -109,9 +112,12 @@ struct Box {
 class ContactFinder {
 public:
     explicit ContactFinder(const VertexTree& tree)
-        : tree_(tree), interior_(tree.interior_count()), triangles_(tree.triangles()), positions_(tree.positions().subspan(interior_)),
+        : tree_(tree), interior_(tree.interior_count()), triangles_(tree.triangles()), scale_(unit_scale(tree.bounding_sphere().radius)),
           luminance_(tree.luminance().subspan(interior_)),
           first_triangle_(tree.first_triangle()), boxes_(interior_), of_leaf_(tree) {
+        const auto leaves = tree.positions().subspan(interior_);
+        positions_.assign(leaves.begin(), leaves.end());
+        for (glm::vec3& p : positions_) p *= scale_;
         for (NodeId node = interior_; node-- > 0;) {
             for (Index t = first_triangle_[node]; t < first_triangle_[node + 1]; ++t) boxes_[node].include(box_of(corners(t)));
             if (node > 0) boxes_[tree.parents()[node]].include(boxes_[node]);
@@ -123,7 +129,7 @@ public:
         std::vector<Contact> all(interior_);
         const std::span<const NodeId> parents = tree_.parents();
         for (Index t = 0; t < contacts.size(); ++t)
-            for (const Index leaf : triangles_[t]) all[parents[interior_ + leaf]].include(contacts[t]);
+            for (const Index leaf : triangles_[t]) all[parents[interior_ + leaf]].include({contacts[t].gap / scale_, contacts[t].sine});
         for (NodeId node = interior_; node-- > 1;) all[parents[node]].include(all[node]);
         return all;
     }
@@ -133,16 +139,11 @@ private:
         std::vector<Contact> contacts(triangles_.size());
         constexpr Index piece = 1024;
         tbb::parallel_for(Index{0}, static_cast<Index>((triangles_.size() + piece - 1) / piece), [&](Index i) {
-            Scratch scratch;
-            for (Index t = i * piece; t < std::min<std::size_t>(triangles_.size(), std::size_t{i + 1} * piece); ++t) contacts[t] = find(t, scratch);
+            std::vector<NodeId> waiting;
+            for (Index t = i * piece; t < std::min<std::size_t>(triangles_.size(), std::size_t{i + 1} * piece); ++t) contacts[t] = find(t, waiting);
         });
         return contacts;
     }
-
-    struct Scratch {
-        std::vector<Index> neighbours; // leaves of neighbouring triangles, ascending
-        std::vector<NodeId> waiting;
-    };
 
     Corners corners(Index triangle) const {
         const Triangle& t = triangles_[triangle];
@@ -154,15 +155,25 @@ private:
     }
     static Box box_of(const Corners& c) { return {glm::min(c[0], glm::min(c[1], c[2])), glm::max(c[0], glm::max(c[1], c[2]))}; }
 
-    void collect_neighbours(Index triangle, std::vector<Index>& leaves) const {
-        leaves.clear();
-        for (const Index leaf : triangles_[triangle])
-            for (const Index t : of_leaf_.around(leaf)) leaves.insert(leaves.end(), triangles_[t].begin(), triangles_[t].end());
-        std::sort(leaves.begin(), leaves.end());
-        leaves.erase(std::unique(leaves.begin(), leaves.end()), leaves.end());
+    // Whether a corner of the one is a corner of the other, or shares a triangle with one. Adds what it looked at.
+    bool are_neighbours(const Triangle& a, const Triangle& b, std::size_t& looked_at) const {
+        for (const Index leaf : a)
+            if (leaf == b[0] || leaf == b[1] || leaf == b[2]) return true;
+        for (const Index leaf : a) {
+            for (const Index other : b) {
+                const bool is_less = of_leaf_.around(leaf).size() < of_leaf_.around(other).size();
+                const Index wanted = is_less ? other : leaf;
+                for (const Index t : of_leaf_.around(is_less ? leaf : other)) {
+                    ++looked_at;
+                    if (const Triangle& at = triangles_[t]; at[0] == wanted || at[1] == wanted || at[2] == wanted) return true;
+                    if (looked_at > most_triangles) return false;
+                }
+            }
+        }
+        return false;
     }
 
-    Contact find(Index triangle, Scratch& scratch) const {
+    Contact find(Index triangle, std::vector<NodeId>& waiting) const {
         const Corners own = corners(triangle);
         const glm::vec3 centre = (own[0] + own[1] + own[2]) / 3.0f;
         const float near = near_share * std::max({glm::length(own[0] - centre), glm::length(own[1] - centre), glm::length(own[2] - centre)});
@@ -170,17 +181,18 @@ private:
         if (!(near > 0)) return contact;
         const Box around = box_of(own).wider(near);
         int nodes = 0;
-        collect_neighbours(triangle, scratch.neighbours);
-        const auto is_neighbour = [&](Index leaf) { return std::binary_search(scratch.neighbours.begin(), scratch.neighbours.end(), leaf); };
-        scratch.waiting.assign(1, VertexTree::root());
-        while (!scratch.waiting.empty()) {
-            const NodeId node = scratch.waiting.back();
-            scratch.waiting.pop_back();
+        std::size_t looked_at = 0; // triangles
+        waiting.assign(1, VertexTree::root());
+        while (!waiting.empty()) {
+            const NodeId node = waiting.back();
+            waiting.pop_back();
             if (++nodes > most_nodes) return {0, 0};
             for (Index other = first_triangle_[node]; other < first_triangle_[node + 1]; ++other) {
                 const Triangle& t = triangles_[other];
                 const Corners its = corners(other);
-                if (!around.meets(box_of(its)) || std::any_of(t.begin(), t.end(), is_neighbour)) continue;
+                const bool is_other = around.meets(box_of(its)) && !are_neighbours(triangles_[triangle], t, looked_at);
+                if (++looked_at > most_triangles) return {0, 0};
+                if (!is_other) continue;
                 const glm::vec3 way = way_between(own, its);
                 const float gap = glm::length(way);
                 if (!(gap < near) || is_beside(own, its, way)) continue;
@@ -188,7 +200,7 @@ private:
                 if (!is_alike) contact.include({gap, sine_between(own, its)});
             }
             tree_.for_each_child(node, [&](NodeId child) {
-                if (child < interior_ && around.meets(boxes_[child])) scratch.waiting.push_back(child);
+                if (child < interior_ && around.meets(boxes_[child])) waiting.push_back(child);
             });
         }
         return contact;
@@ -197,7 +209,8 @@ private:
     const VertexTree& tree_;
     NodeId interior_;
     std::span<const Triangle> triangles_;
-    std::span<const glm::vec3> positions_; // of leaves
+    float scale_;                          // in which they are measured
+    std::vector<glm::vec3> positions_;     // of leaves
     std::span<const Unorm16> luminance_;   // likewise
     std::span<const Index> first_triangle_;
     std::vector<Box> boxes_; // by interior node

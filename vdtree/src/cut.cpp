@@ -161,21 +161,22 @@ Decision decide_by_budget(const VertexTree& tree, NodeTester& test, Index budget
     return decision;
 }
 
-// Sorts the triangles of an extracted mesh by their input triangle, so that the input's groups and materials are runs again.
-void group_by_range(const Cut& cut, Mesh& mesh) {
+// The corners of the cut's triangles in the order of the input, in which groups and materials are runs; these are appended to `ranges`. (The
+// index buffer's order follows from the history of the cut.)
+std::vector<NodeId> corners_by_range(const Cut& cut, std::vector<MeshRange>& ranges) {
     const VertexTree& tree = cut.tree();
     const auto first = tree.first_triangle();
-    std::vector<std::pair<Index, Index>> order; // input triangle, triangle of the mesh
-    order.reserve(mesh.triangles.size());
+    std::vector<std::pair<Index, Index>> order; // input triangle, triangle of the tree
+    order.reserve(cut.triangle_count());
     for (NodeId node = 0; node < tree.interior_count(); ++node) {
         if (!cut.is_unfolded(node)) continue;
-        for (Index t = first[node]; t < first[node + 1]; ++t)
-            order.emplace_back(tree.source_triangles()[t], static_cast<Index>(order.size()));
+        for (Index t = first[node]; t < first[node + 1]; ++t) order.emplace_back(tree.source_triangles()[t], t);
     }
     std::sort(order.begin(), order.end());
-    std::vector<Triangle> sorted(order.size());
-    for (std::size_t i = 0; i < order.size(); ++i) sorted[i] = mesh.triangles[order[i].second];
-    mesh.triangles = std::move(sorted);
+    std::vector<NodeId> corners;
+    corners.reserve(3 * order.size());
+    for (const auto& [source, triangle] : order)
+        for (const Index leaf : tree.triangles()[triangle]) corners.push_back(cut.proxy_of_leaf(leaf));
     for (const MeshRange& range : tree.ranges()) {
         const auto place = [&](std::uint64_t source) {
             const auto found = std::partition_point(order.begin(), order.end(),
@@ -185,8 +186,9 @@ void group_by_range(const Cut& cut, Mesh& mesh) {
         MeshRange left = range;
         left.first_triangle = place(range.first_triangle);
         left.triangle_count = place(range.first_triangle + range.triangle_count) - left.first_triangle;
-        if (left.triangle_count > 0) mesh.ranges.push_back(std::move(left));
+        if (left.triangle_count > 0) ranges.push_back(std::move(left));
     }
+    return corners;
 }
 
 } // namespace
@@ -209,7 +211,7 @@ struct Cut::Indices {
 };
 
 Cut::Cut(const VertexTree& tree)
-    : tree_(&tree), unfolded_((tree.interior_count() + 63) / 64), proxy_(tree.leaf_count(), VertexTree::root()),
+    : tree_(std::make_shared<const VertexTree>(tree.share())), unfolded_((tree.interior_count() + 63) / 64), proxy_(tree.leaf_count(), VertexTree::root()),
       revision_(first_revision()) {}
 Cut::Cut(Cut&&) noexcept = default;
 Cut& Cut::operator=(Cut&&) noexcept = default;
@@ -422,18 +424,32 @@ void Cut::end_changes(AdjustStats& stats) {
 
 // ---- other cuts as wholes
 
-void Cut::change_to(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
+bool Cut::are_few_changes(std::span<const std::uint64_t> unfolded) const {
     std::size_t changes = 0;
     for (std::size_t word = 0; word < unfolded_.size(); ++word)
         changes += static_cast<std::size_t>(std::popcount(unfolded_[word] ^ unfolded[word]));
-    if (changes < few_changes(triangle_count_)) replay(unfolded, stats);
-    else become(std::move(unfolded), stats);
+    return changes < few_changes(triangle_count_);
+}
+
+void Cut::change_to(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
+    if (!are_few_changes(unfolded)) return become(std::move(unfolded), stats);
+    begin_changes();
+    replay(unfolded);
+    end_changes(stats);
+}
+
+void Cut::change_further(std::vector<std::uint64_t> unfolded) {
+    if (are_few_changes(unfolded)) return replay(unfolded);
+    const std::vector<FoldChange> before = std::move(changes_);
+    AdjustStats ignored; // all changes are counted at the end
+    become(std::move(unfolded), ignored);
+    --revision_; // one for all of them
+    changes_.insert(changes_.begin(), before.begin(), before.end());
 }
 
 // Node numbers ascend from parents to children: unfolds run upward through them, so every node is active when its turn comes,
 // and folds run downward.
-void Cut::replay(std::span<const std::uint64_t> unfolded, AdjustStats& stats) {
-    begin_changes();
+void Cut::replay(std::span<const std::uint64_t> unfolded) {
     for (std::size_t word = 0; word < unfolded.size(); ++word)
         for (std::uint64_t bits = unfolded[word] & ~unfolded_[word]; bits; bits &= bits - 1)
             apply_unfold(static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))));
@@ -444,7 +460,6 @@ void Cut::replay(std::span<const std::uint64_t> unfolded, AdjustStats& stats) {
             bits &= ~(std::uint64_t{1} << highest);
         }
     }
-    end_changes(stats);
 }
 
 // The proxies of all leaves, in order: what is folded under unfolded nodes stands for its leaves, and other leaves for themselves.
@@ -578,8 +593,11 @@ bool is_finite(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) &
 // Far enough away that squares of distances still fit floats.
 constexpr double farthest_eye = 1e18; // mesh units
 
-Result<void> check(const Viewpoint& viewpoint, const DistanceCriterion& criterion) {
-    const auto invalid = [](const char* what) { return Error{ErrorCode::invalid_argument, what}; };
+Result<void> check(const VertexTree& tree, const Viewpoint& viewpoint, const DistanceCriterion& criterion) {
+    const auto invalid = [](std::string what) { return Error{ErrorCode::invalid_argument, std::move(what)}; };
+    if (criterion.interior_count() != tree.interior_count())
+        return invalid("The criterion is for a tree of " + std::to_string(criterion.interior_count()) + " interior nodes, and this one has " +
+                       std::to_string(tree.interior_count()) + "; make one for this tree.");
     if (!is_finite(viewpoint.eye)) return invalid("The eye's position is not finite.");
     if (!(glm::length(viewpoint.eye) <= farthest_eye)) return invalid("The eye is more than 1e18 mesh units away.");
     constexpr double unit_slack = 1e-3; // directions given with three digits
@@ -615,7 +633,7 @@ Result<void> check(const FollowOptions& options) {
 } // namespace
 
 Result<AdjustStats> Cut::follow(const DistanceCriterion& criterion, const Viewpoint& viewpoint, const FollowOptions& options) {
-    if (const auto valid = check(viewpoint, criterion); !valid) return valid.error();
+    if (const auto valid = check(*tree_, viewpoint, criterion); !valid) return valid.error();
     if (const auto valid = check(options); !valid) return valid.error();
     if (!follower_) follower_ = std::make_unique<CutFollower>(*tree_);
     return follower_->follow(*this, criterion, viewpoint, options);
@@ -623,7 +641,7 @@ Result<AdjustStats> Cut::follow(const DistanceCriterion& criterion, const Viewpo
 
 Result<std::vector<std::uint64_t>> test_every_node(const VertexTree& tree, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
                                                    const FollowOptions& options) {
-    if (const auto valid = check(viewpoint, criterion); !valid) return valid.error();
+    if (const auto valid = check(tree, viewpoint, criterion); !valid) return valid.error();
     if (const auto valid = check(options); !valid) return valid.error();
     FoldTester tester(tree, criterion, options.cull_back_faces, options.threshold);
     tester.look_from(viewpoint, 1);
@@ -634,7 +652,7 @@ Result<std::vector<std::uint64_t>> test_every_node(const VertexTree& tree, const
 
 Result<std::vector<float>> find_every_cost(const VertexTree& tree, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
                                            const FollowOptions& options) {
-    if (const auto valid = check(viewpoint, criterion); !valid) return valid.error();
+    if (const auto valid = check(tree, viewpoint, criterion); !valid) return valid.error();
     if (const auto valid = check(options); !valid) return valid.error();
     FoldTester tester(tree, criterion, options.cull_back_faces, options.threshold);
     tester.look_from(viewpoint, 1);
@@ -652,13 +670,13 @@ Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objec
     std::vector<const FoldTester*> tests;
     for (std::size_t i = 0; i < objects.size(); ++i) {
         const SceneObject& object = objects[i];
-        if (const auto valid = check(object.viewpoint, object.criterion); !valid)
+        if (const auto valid = check(*object.cut.tree_, object.viewpoint, object.criterion); !valid)
             return Error{valid.error().code, "Object " + std::to_string(i) + ": " + valid.error().message};
         for (std::size_t other = 0; other < i; ++other)
             if (&objects[other].cut == &object.cut)
                 return Error{ErrorCode::invalid_argument, "Objects " + std::to_string(other) + " and " + std::to_string(i) +
                                                               " share one cut; give each its own."};
-        trees.push_back(object.cut.tree_);
+        trees.push_back(object.cut.tree_.get());
         testers.push_back(std::make_unique<FoldTester>(*object.cut.tree_, object.criterion, object.cull_back_faces, 1.0f, false));
         testers.back()->look_from(object.viewpoint, 1);
         tests.push_back(testers.back().get());
@@ -703,8 +721,10 @@ std::uint64_t Cut::byte_size() const noexcept {
 
 Mesh extract_mesh(const Cut& cut) {
     const VertexTree& tree = cut.tree();
-    const auto indices = cut.indices();
     Mesh mesh;
+    std::vector<NodeId> by_range;
+    if (!tree.ranges().empty()) by_range = corners_by_range(cut, mesh.ranges);
+    const std::span<const NodeId> indices = tree.ranges().empty() ? cut.indices() : by_range;
     std::vector<Index> vertex_of_node(tree.node_count(), no_node);
     std::vector<NodeId> used;
     mesh.triangles.resize(cut.triangle_count());
@@ -726,7 +746,6 @@ Mesh extract_mesh(const Cut& cut) {
     gather(tree.normals(), mesh.normals);
     gather(tree.colours(), mesh.colours);
     gather(tree.uvs(), mesh.uvs);
-    if (!tree.ranges().empty()) group_by_range(cut, mesh);
     return mesh;
 }
 

@@ -33,6 +33,10 @@ constexpr float least_threshold = 1e-30f;
 // What so many changes read is fetched ahead: some hundred cache lines, of which the first-level cache holds several times as many.
 constexpr std::size_t changes_at_once = 16;
 constexpr double longest_limit_ms = 1e9; // more is no limit
+// Of the time that a fresh start has, so much is for decisions; the rest is for changing the cut to them.
+constexpr double deciding_share = 0.6;
+// Blocks whose due nodes are tested, with what folds for it, between two looks at the clock: some microseconds.
+constexpr std::size_t blocks_at_once = 16;
 
 } // namespace
 
@@ -61,16 +65,20 @@ AdjustStats CutFollower::follow(Cut& cut, const DistanceCriterion& criterion, co
                                 const FollowOptions& options) {
     stats_ = {};
     time_limit_.reset();
-    if (options.milliseconds && *options.milliseconds < longest_limit_ms)
-        time_limit_ = std::chrono::steady_clock::now() +
-                      std::chrono::nanoseconds(static_cast<std::int64_t>(*options.milliseconds * 1e6));
+    if (options.milliseconds && *options.milliseconds < longest_limit_ms) {
+        begin_ = std::chrono::steady_clock::now();
+        time_limit_ = begin_ + std::chrono::nanoseconds(static_cast<std::int64_t>(*options.milliseconds * 1e6));
+    }
     const bool is_same = is_same_request(criterion, options);
     if (!is_same) prepare(criterion, options);
     else if (tested_ != criterion.object_id()) make_tester(criterion);
     Motion motion = is_same ? FoldTester::motion(tree_, viewpoint_, viewpoint, length_per_radian_)
                             : Motion{std::numeric_limits<double>::infinity(), 0};
     if (criterion.parts().lit) motion = with_lights(motion, viewpoint);
-    if (is_same && was_complete_ && motion.position == 0 && motion.facing == 0 && motion.light == 0) { // nothing can have changed
+    const bool is_still = is_same && motion.position == 0 && motion.facing == 0 && motion.light == 0;
+    are_costs_of_view_ = waiting_.empty() || (are_costs_of_view_ && is_still);
+    const float cost_before = max_fold_cost_;
+    if (is_still && was_complete_) { // nothing can have changed
         cut.begin_changes();
         cut.end_changes(stats_);
     } else if (options.triangle_budget) {
@@ -80,7 +88,9 @@ AdjustStats CutFollower::follow(Cut& cut, const DistanceCriterion& criterion, co
     }
     viewpoint_ = viewpoint;
     was_complete_ = stats_.is_complete;
-    stats_.max_fold_cost = options.triangle_budget ? max_fold_cost_ : options.threshold;
+    // What is known of a view holds while it stands still.
+    if (is_still && !stats_.is_complete) max_fold_cost_ = std::min(max_fold_cost_, std::max(cost_before, threshold_));
+    stats_.max_fold_cost = max_fold_cost_;
     return stats_;
 }
 
@@ -99,8 +109,8 @@ void CutFollower::start_at(const Viewpoint& viewpoint) {
     // Of a turn of the gaze as much is made as of twice the shift that the same turn would take: gazes mostly go with the view.
     length_per_radian_ = 2 * std::max(distance, least);
     set_farthest(distance + static_cast<double>(root.radius));
-    watched_.clear();
-    watched_.use_lights(tester_->uses_lights());
+    watch_nothing();
+    watched_.use_lights(tester_->has_lights());
     watched_.move_to(viewpoint.eye, 0);
     look_from(viewpoint);
 }
@@ -130,6 +140,7 @@ void CutFollower::follow_threshold(Cut& cut, const Viewpoint& viewpoint, const M
     }
     move_to(viewpoint, motion);
     step(cut, motion);
+    max_fold_cost_ = largest_cost_left();
 }
 
 // ---- budgets
@@ -144,34 +155,37 @@ void CutFollower::follow_budget(Cut& cut, const Viewpoint& viewpoint, const Moti
     const Sphere& root = tree_.bounds()[VertexTree::root()].ring;
     set_farthest(glm::length(viewpoint.eye - glm::dvec3(root.centre)) + static_cast<double>(root.radius));
     move_to(viewpoint, motion);
-    if (watched_.empty()) watch_all(cut, Deadlines::now);
     cut.begin_changes();
+    if (watched_.empty()) watch_all(cut, Deadlines::now);
     keep_within_budget(cut);
     cut.end_changes(stats_);
-    max_fold_cost_ = threshold_;
 }
 
-void CutFollower::start_with_budget(Cut& cut) {
+void CutFollower::start_with_budget(Cut& cut) { cut.change_to(decide_with_budget(), stats_); }
+
+// The best cut within the budget. What to watch for hysteresis is left to the next call.
+std::vector<std::uint64_t> CutFollower::decide_with_budget() {
     const VertexTree* const tree = &tree_;
     const FoldTester* const tester = &*tester_;
-    const auto is_out = [this] { return is_out_of_time(); };
+    const auto is_out = [this] { return is_out_of_deciding_time(); };
     BudgetLimits limits{*options_.triangle_budget, options_.fill_budget, false, {}};
     if (time_limit_) limits.is_out_of_time = is_out;
     BudgetDecision decision = decide_budget({&tree, 1}, {&tester, 1}, limits);
     stats_.node_tests += decision.node_tests;
     stats_.is_complete = decision.is_complete;
     max_fold_cost_ = decision.max_seen_cost;
-    cut.change_to(std::move(decision.unfolded[0]), stats_);
     is_tracking_ = true;
-    watched_.clear(); // left to the next frame, as after a jump
-    if (options_.hysteresis <= 1 || options_.fill_budget) return;
-    threshold_ = std::max(decision.threshold, least_threshold);
-    tester_->set_threshold(threshold_);
+    watch_nothing();
+    if (keeping_factor() > 1) {
+        threshold_ = std::max(decision.threshold, least_threshold);
+        tester_->set_threshold(threshold_);
+    }
+    return std::move(decision.unfolded[0]);
 }
 
 // Of the hysteresis, half (as a factor: its root) keeps nodes unfolded, and half of the rest keeps the threshold.
 float CutFollower::keeping_factor() const {
-    return options_.triangle_budget && options_.hysteresis > 1 ? std::sqrt(options_.hysteresis) : 1;
+    return options_.triangle_budget && options_.hysteresis > 1 && !options_.fill_budget ? std::sqrt(options_.hysteresis) : 1;
 }
 
 // Steps at the threshold there is, and moves it where the triangles have become too many, or so few that a better one
@@ -184,22 +198,23 @@ void CutFollower::keep_within_budget(Cut& cut) {
     settle_due(cut);
     constexpr int most_rounds = 24;
     bool was_above = false;
-    for (int round = 0; round < most_rounds; ++round) {
+    for (int round = 0;; ++round) {
         const double triangles = cut.triangle_count();
-        if (triangles > budget) {
-            was_above = true;
-            change_threshold(cut, static_cast<float>(std::clamp(std::sqrt(triangles / budget) * 1.002, 1.005, 1.1)));
-        } else if (triangles < enough && !was_above && threshold_ > least_threshold) {
-            change_threshold(cut, 1 / static_cast<float>(std::clamp(std::sqrt(budget / std::max(triangles, 1.0)) * 0.99, 1.005, 1.1)));
-        } else {
+        const bool is_above = triangles > budget || !waiting_.empty(); // for what waits in time there is no room
+        const bool are_few = triangles < enough && !was_above && threshold_ > least_threshold;
+        max_fold_cost_ = largest_cost_left();
+        if (!is_above && !are_few) return;
+        if (!is_all_tested_ || (round > 0 && is_out_of_time())) {
+            stats_.is_complete = false;
             return;
         }
+        // Jumps in the number of triangles, or a threshold that nothing leads down from: from scratch.
+        if (round == most_rounds || !std::isfinite(threshold_)) break;
+        was_above |= is_above;
+        change_threshold(cut, is_above ? static_cast<float>(std::clamp(std::sqrt(triangles / budget) * 1.002, 1.005, 1.1))
+                                       : 1 / static_cast<float>(std::clamp(std::sqrt(budget / std::max(triangles, 1.0)) * 0.99, 1.005, 1.1)));
     }
-    if (cut.triangle_count() > budget) { // jumps in the number of triangles: from scratch
-        cut.end_changes(stats_);
-        start_with_budget(cut);
-        cut.begin_changes();
-    }
+    cut.change_further(decide_with_budget());
 }
 
 void CutFollower::change_threshold(Cut& cut, float factor) {
@@ -215,7 +230,8 @@ void CutFollower::change_threshold(Cut& cut, float factor) {
 // Deadlines are left to the first frame that needs some: after a jump there may be another one.
 void CutFollower::start_over(Cut& cut) {
     is_tracking_ = true;
-    watched_.clear();
+    max_fold_cost_ = threshold_;
+    watch_nothing();
     cut.change_to(decide_all(), stats_);
 }
 
@@ -228,25 +244,33 @@ std::vector<std::uint64_t> CutFollower::decide_all() {
     return unfolded;
 }
 
-// The worst folds first, as far as the time goes; all live nodes are due at the next call.
+// The worst folds first, as far as the time goes; the next call finds what to watch.
 void CutFollower::start_in_time(Cut& cut) {
     const VertexTree* const tree = &tree_;
     const FoldTester* const tester = &*tester_;
-    const auto is_out = [this] { return is_out_of_time(); };
+    const auto is_out = [this] { return is_out_of_deciding_time(); };
     BudgetLimits limits;
     limits.only_unfolding = true;
     limits.is_out_of_time = is_out;
     BudgetDecision decision = decide_budget({&tree, 1}, {&tester, 1}, limits);
     stats_.node_tests += decision.node_tests;
     stats_.is_complete = decision.is_complete;
+    max_fold_cost_ = decision.max_seen_cost;
     cut.change_to(std::move(decision.unfolded[0]), stats_);
     is_tracking_ = true;
-    watch_all(cut, Deadlines::now);
+    watch_nothing();
+}
+
+void CutFollower::watch_nothing() {
+    watched_.clear();
+    waiting_.clear();
+    are_costs_of_view_ = is_all_tested_ = true;
+    next_due_ = 0;
 }
 
 // What can change next, from a cut of which nothing is watched: all due, or tested, with what folds and unfolds for it.
 void CutFollower::watch_all(const Cut& cut, Deadlines deadlines) {
-    watched_.clear();
+    watch_nothing();
     find_border(cut);
     watched_.reserve(next_wave_.size());
     for (std::size_t first = 0; first < next_wave_.size(); first += piece_tests) {
@@ -289,6 +313,10 @@ void CutFollower::find_border(const Cut& cut) {
 
 bool CutFollower::is_out_of_time() const { return time_limit_ && std::chrono::steady_clock::now() >= *time_limit_; }
 
+bool CutFollower::is_out_of_deciding_time() const {
+    return std::chrono::steady_clock::now() - begin_ >= deciding_share * (*time_limit_ - begin_);
+}
+
 // ---- from frame to frame
 
 void CutFollower::step(Cut& cut, const Motion& motion) {
@@ -301,32 +329,68 @@ void CutFollower::step(Cut& cut, const Motion& motion) {
         cut.end_changes(stats_);
         return;
     }
-    if (watched_.empty()) watch_all(cut, Deadlines::now);
+    if (time_limit_) {
+        cut.begin_changes();
+        if (watched_.empty()) watch_all(cut, Deadlines::now);
+        settle_in_time(cut);
+        cut.end_changes(stats_);
+        return;
+    }
     const auto due = watched_.collect_due();
-    if (static_cast<double>(due.size()) > most_due * static_cast<double>(watched_.size()) && !time_limit_) return start_over(cut);
+    if (static_cast<double>(due.size()) > most_due * static_cast<double>(watched_.size())) return start_over(cut);
     cut.begin_changes();
     settle(cut, due);
     cut.end_changes(stats_);
 }
 
 void CutFollower::settle_due(Cut& cut) {
-    settle(cut, watched_.collect_due());
+    if (time_limit_) settle_in_time(cut);
+    else settle(cut, watched_.collect_due());
 }
 
 // Tests what is due, folds what has to go, and unfolds what has to come, with all that follows above and under it.
 void CutFollower::settle(Cut& cut, std::span<const Slot> due) {
     begin_settling();
-    // In pieces, between which the clock is looked at; what is not reached stays due.
-    constexpr std::size_t piece = 2048;
-    for (std::size_t first = 0; first < due.size(); first += piece) {
-        if (first > 0 && is_out_of_time()) {
-            stats_.is_complete = false;
-            for (const Slot slot : due.subspan(first)) watched_.stay_due(slot);
-            break;
-        }
-        test_due(due.subspan(first, std::min(piece, due.size() - first)));
-    }
+    constexpr std::size_t piece = 2048; // what their tests read and write stays in the cache
+    for (std::size_t first = 0; first < due.size(); first += piece) test_due(due.subspan(first, std::min(piece, due.size() - first)));
     end_settling(cut);
+}
+
+// The same in small steps, as many as the time is enough for: at least one of tests and folds, and one of unfolds. Both get the same time,
+// for what is not tested keeps what is unfolded from being right, and unfolds alone make the cut better. What is left to do is kept.
+void CutFollower::settle_in_time(Cut& cut) {
+    using Clock = std::chrono::steady_clock;
+    begin_settling();
+    if (waiting_.size() > watched_.size()) drop_idle();
+    watched_.find_due_blocks(next_due_);
+    std::size_t looked_at = 0; // blocks; splitting some adds to them
+    Clock::duration testing{}, unfolding{};
+    Clock::time_point now = Clock::now();
+    for (int steps = 0;; ++steps) {
+        const auto left = watched_.due_blocks().subspan(looked_at);
+        const bool can_unfold = find_worst(cut);
+        if (left.empty() && !can_unfold) break;
+        constexpr int least_steps = 2;
+        if (steps >= least_steps && now >= *time_limit_) break;
+        const bool tests = !left.empty() && (!can_unfold || testing <= unfolding);
+        if (tests) {
+            const std::size_t count = std::min(left.size(), blocks_at_once);
+            test_due(watched_.collect_due(left.first(count)));
+            looked_at += count;
+            finish_folding(cut);
+            let_wave_wait();
+        } else {
+            unfold_worst(cut);
+        }
+        const Clock::time_point after = Clock::now();
+        (tests ? testing : unfolding) += after - now;
+        now = after;
+    }
+    const auto left = watched_.due_blocks().subspan(looked_at);
+    is_all_tested_ = left.empty();
+    next_due_ = left.empty() ? 0 : left.front();
+    stats_.is_complete = is_all_tested_ && waiting_.empty();
+    watched_.restart_clocks(longest_run * length_per_radian_);
 }
 
 void CutFollower::begin_settling() {
@@ -335,11 +399,22 @@ void CutFollower::begin_settling() {
     wave_.clear();
 }
 
-void CutFollower::end_settling(Cut& cut) {
+void CutFollower::finish_folding(Cut& cut) {
     while (!folding_.empty() || !parents_.empty()) {
         fold_wave(cut);
         test_parents(cut);
     }
+}
+
+void CutFollower::end_settling(Cut& cut) {
+    finish_folding(cut);
+    for (const Waiting& waiting : waiting_) { // of calls with a time limit
+        if (!waits(waiting.node)) continue;
+        watched_.set_waiting(watched_.slot_of(waiting.node), false);
+        wave_.push_back(waiting.node);
+    }
+    waiting_.clear();
+    is_all_tested_ = true;
     unfold_wave(cut);
     watched_.restart_clocks(longest_run * length_per_radian_);
 }
@@ -366,7 +441,9 @@ void CutFollower::test_slots(std::span<const Slot> slots) {
         const FoldCandidate& candidate = watched_[slots[i]];
         const Verdict& verdict = verdicts_[i];
         set_deadlines(slots[i], verdict);
-        if (candidate.is_unfolded && !verdict.unfolded) folding_.push_back(candidate.node);
+        if (candidate.is_waiting) {
+            if (!verdict.unfolded) watched_.set_waiting(slots[i], false);
+        } else if (candidate.is_unfolded && !verdict.unfolded) folding_.push_back(candidate.node);
         else if (candidate.is_unfolded && stands_by_a_hair(verdict)) ask_parent(candidate.node);
         else if (verdict.unfolded && !candidate.is_unfolded && tree_.is_sound(candidate.node)) wave_.push_back(candidate.node);
     }
@@ -454,40 +531,110 @@ void CutFollower::use_threshold_of(bool unfolded) {
     if (keeping > 1) tester_->set_threshold(unfolded ? threshold_ / keeping : threshold_);
 }
 
-// What unfolds, and then what unfolds under it. Where the time ends, the rest stays due.
-void CutFollower::unfold_wave(Cut& cut) {
+void CutFollower::apply_unfold(Cut& cut, NodeId node) {
+    cut.apply_unfold(node);
+    watched_.set_unfolded(watched_.slot_of(node), true);
+    if (node != VertexTree::root() && !watches_ancestors_) watched_.remove(tree_.parents()[node]);
+    unfolding_.push_back(node);
+}
+
+// Watches and tests the children of what has unfolded; those that unfold make the next wave.
+void CutFollower::test_children() {
     const auto subtree_end = tree_.subtree_end();
+    next_wave_.clear();
+    for (const NodeId node : unfolding_) {
+        for (NodeId child = node + 1; child < subtree_end[node]; child = subtree_end[child]) {
+            watched_.insert(tester_->candidate(child), watched_.slot_of(node));
+            next_wave_.push_back(child);
+        }
+    }
+    wave_slots_.clear();
+    for (const NodeId node : next_wave_) wave_slots_.push_back(watched_.slot_of(node)); // inserting may have moved them
+    test_slots(wave_slots_);
+}
+
+// What unfolds, and then what unfolds under it.
+void CutFollower::unfold_wave(Cut& cut) {
     std::sort(wave_.begin(), wave_.end());
-    constexpr std::size_t times_checked = 64; // unfolds between two looks at the clock: some microseconds
-    std::size_t unfolded = 0;
     while (!wave_.empty()) {
-        next_wave_.clear();
         unfolding_.clear();
         for (std::size_t i = 0; i < wave_.size(); ++i) {
             const NodeId node = wave_[i];
             if (i % changes_at_once == 0) prefetch_changes(cut, std::span(wave_).subspan(i, std::min(changes_at_once, wave_.size() - i)), false);
             if (watched_.slot_of(node) == no_slot) continue; // an ancestor has folded
-            if ((++unfolded % times_checked) == 0 && is_out_of_time()) stats_.is_complete = false;
-            if (!stats_.is_complete) {
-                set_deadlines(watched_.slot_of(node), Verdict{});
-                continue;
-            }
-            cut.apply_unfold(node);
-            watched_.set_unfolded(watched_.slot_of(node), true);
-            if (node != VertexTree::root() && !watches_ancestors_) watched_.remove(tree_.parents()[node]);
-            unfolding_.push_back(node);
+            apply_unfold(cut, node);
         }
         wave_.clear();
-        for (const NodeId node : unfolding_) {
-            for (NodeId child = node + 1; child < subtree_end[node]; child = subtree_end[child]) {
-                watched_.insert(tester_->candidate(child), watched_.slot_of(node));
-                next_wave_.push_back(child);
-            }
-        }
-        wave_slots_.clear();
-        for (const NodeId node : next_wave_) wave_slots_.push_back(watched_.slot_of(node)); // inserting may have moved them
-        test_slots(wave_slots_); // refills the wave
+        test_children();
     }
+}
+
+// ---- in time
+
+bool CutFollower::waits(NodeId node) const {
+    const Slot slot = watched_.slot_of(node);
+    return slot != no_slot && watched_[slot].is_waiting;
+}
+
+// The wave waits for its turn, the worst first.
+void CutFollower::let_wave_wait() {
+    std::erase_if(wave_, [&](NodeId node) { return watched_.slot_of(node) == no_slot; }); // an ancestor has folded
+    costs_.resize(wave_.size());
+    seen_costs_.resize(wave_.size());
+    unfolds_.resize((wave_.size() + 63) / 64);
+    if (waiting_.empty()) are_costs_of_view_ = true;
+    if (!wave_.empty()) tester_->find_costs(wave_, {costs_.data(), seen_costs_.data(), unfolds_.data()});
+    for (std::size_t i = 0; i < wave_.size(); ++i) {
+        watched_.set_waiting(watched_.slot_of(wave_[i]), true);
+        const float cost = seen_costs_[i] >= 0 ? seen_costs_[i] : std::numeric_limits<float>::infinity();
+        waiting_.push_back({cost, wave_[i]});
+        std::push_heap(waiting_.begin(), waiting_.end());
+    }
+    wave_.clear();
+}
+
+NodeId CutFollower::pop_waiting() {
+    std::pop_heap(waiting_.begin(), waiting_.end());
+    const NodeId node = waiting_.back().node;
+    waiting_.pop_back();
+    return node;
+}
+
+// Brings what waits to the top; false where there is none, or no room for it in a budget.
+bool CutFollower::find_worst(const Cut& cut, Index more) {
+    while (!waiting_.empty() && !waits(waiting_.front().node)) pop_waiting();
+    if (waiting_.empty()) return false;
+    const auto first = tree_.first_triangle();
+    const NodeId node = waiting_.front().node;
+    return !options_.triangle_budget || std::uint64_t{cut.triangle_count()} + more + (first[node + 1] - first[node]) <= *options_.triangle_budget;
+}
+
+void CutFollower::unfold_worst(Cut& cut) {
+    Index triangles = 0;
+    while (wave_.size() < changes_at_once && find_worst(cut, triangles)) {
+        const NodeId node = pop_waiting();
+        watched_.set_waiting(watched_.slot_of(node), false);
+        triangles += tree_.first_triangle()[node + 1] - tree_.first_triangle()[node];
+        wave_.push_back(node);
+    }
+    prefetch_changes(cut, wave_, false);
+    unfolding_.clear();
+    for (const NodeId node : wave_) apply_unfold(cut, node);
+    wave_.clear();
+    test_children();
+    let_wave_wait();
+}
+
+// Forgets what does not wait any more.
+void CutFollower::drop_idle() {
+    std::erase_if(waiting_, [&](const Waiting& waiting) { return !waits(waiting.node); });
+    std::make_heap(waiting_.begin(), waiting_.end());
+}
+
+// No more than this costs any node that is folded, if the view is that of the last tests.
+float CutFollower::largest_cost_left() const {
+    if (!is_all_tested_ || !are_costs_of_view_) return std::numeric_limits<float>::infinity();
+    return waiting_.empty() ? threshold_ : std::max(threshold_, waiting_.front().cost);
 }
 
 // ---- slots
@@ -515,6 +662,6 @@ void CutFollower::set_deadlines(Slot slot, const Verdict& verdict) {
     watched_.set_deadlines(slot, {verdict.unfolded, less_hair(position_slack), less_hair(verdict.facing_slack), less_hair(verdict.light_slack)});
 }
 
-std::uint64_t CutFollower::byte_size() const noexcept { return watched_.byte_size(); }
+std::uint64_t CutFollower::byte_size() const noexcept { return watched_.byte_size() + sizeof(Waiting) * waiting_.capacity(); }
 
 } // namespace unseen::vdtree

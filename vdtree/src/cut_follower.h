@@ -49,7 +49,9 @@ private:
     void keep_within_budget(Cut& cut);
     void change_threshold(Cut& cut, float factor);
     void start_with_budget(Cut& cut);
+    std::vector<std::uint64_t> decide_with_budget();
     void start_over(Cut& cut);
+    bool is_out_of_deciding_time() const;
     void start_in_time(Cut& cut);
     enum class Deadlines { now, found };
     void watch_all(const Cut& cut, Deadlines deadlines);
@@ -59,7 +61,9 @@ private:
     bool is_out_of_time() const;
     void settle_due(Cut& cut);
     void settle(Cut& cut, std::span<const Slot> due);
+    void settle_in_time(Cut& cut);
     void begin_settling();
+    void finish_folding(Cut& cut);
     void end_settling(Cut& cut);
     void test_due(std::span<const Slot> slots);
     void test_slots(std::span<const Slot> slots);
@@ -71,6 +75,16 @@ private:
     void ask_parent(NodeId node);
     float keeping_factor() const;
     void unfold_wave(Cut& cut);
+    void test_children();
+    void unfold_worst(Cut& cut);
+    void let_wave_wait();
+    bool waits(NodeId node) const;
+    NodeId pop_waiting();
+    bool find_worst(const Cut& cut, Index more = 0);
+    void drop_idle();
+    float largest_cost_left() const;
+    void watch_nothing();
+    void apply_unfold(Cut& cut, NodeId node);
     bool has_unfolded_child(NodeId node, std::span<const std::uint64_t> unfolded) const;
     Slot near_children_of(NodeId node) const;
     void set_deadlines(Slot slot, const Verdict& verdict);
@@ -93,15 +107,29 @@ private:
     double length_per_radian_ = 1;
     double farthest_ = 1;          // of the tree's points from the eye; no slack is longer
     float hair_ = 0;               // more than the rounding of any node's test, mesh units
+    std::chrono::steady_clock::time_point begin_; // of the call
     std::optional<std::chrono::steady_clock::time_point> time_limit_;
     float longest_slack_ = 1;
     WatchList watched_;
+
+    // What the time did not reach: watched nodes that are to unfold, the worst first, with some that are not so any more (see waits()).
+    struct Waiting {
+        float cost;
+        NodeId node;
+        bool operator<(const Waiting& other) const { return cost != other.cost ? cost < other.cost : node > other.node; }
+    };
+    std::vector<Waiting> waiting_;     // a heap
+    bool are_costs_of_view_ = true;    // those of waiting_, or from a viewpoint before
+    bool is_all_tested_ = true;        // that was due
+    WatchList::BlockId next_due_ = 0;  // where to look on
 
     // Of one frame.
     std::vector<NodeId> wave_, next_wave_, unfolding_, folding_, parents_;
     std::vector<Slot> kept_, wave_slots_;
     std::vector<FoldCandidate> parent_candidates_;
     std::vector<Verdict> verdicts_;
+    std::vector<float> costs_, seen_costs_;
+    std::vector<std::uint64_t> unfolds_;
     TreeDecider decider_;
     AdjustStats stats_;
 };

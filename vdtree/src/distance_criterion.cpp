@@ -165,6 +165,7 @@ Result<DistanceCriterion> DistanceCriterion::create(const VertexTree& tree, Part
     if (const auto valid = check(tree, parts); !valid) return valid.error();
     for (float& reach : parts.reach) reach = std::clamp(reach, never_visible, always_visible);
     DistanceCriterion criterion(std::move(parts));
+    criterion.interior_count_ = tree.interior_count();
     // With lights the ranges nest but for rounding, which may lift a child by a class.
     criterion.is_monotone_ = !criterion.parts_.lit && is_monotone_in(tree, criterion.parts_);
     return criterion;

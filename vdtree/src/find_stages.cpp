@@ -57,7 +57,7 @@ Camera camera(const Sphere& sphere, std::size_t number) {
 
 // Before an unlit background: the light that comes from each cell, and the share of it that the mesh covers.
 struct Picture {
-    Plane light{side}, cover{side};
+    Raster light{side}, cover{side};
 
     void subtract(const Picture& other) {
         for (std::size_t i = 0; i < light.values.size(); ++i) {
@@ -159,12 +159,12 @@ private:
 class Bands {
 public:
     struct Band {
-        Plane light, cover;           // less the means
-        Plane mean_light, mean_cover; // over wider areas
+        Raster light, cover;           // less the means
+        Raster mean_light, mean_cover; // over wider areas
     };
 
     explicit Bands(const Picture& picture) {
-        Plane light = picture.light, cover = picture.cover;
+        Raster light = picture.light, cover = picture.cover;
         for (Band& band : bands_) {
             band.light = std::move(light), band.cover = std::move(cover);
             light = split(band.light, band.mean_light);
@@ -175,8 +175,8 @@ public:
 
 private:
     // Takes the mean away; returns the next level.
-    static Plane split(Plane& plane, Plane& mean) {
-        Plane next = reduce(plane);
+    static Raster split(Raster& plane, Raster& mean) {
+        Raster next = reduce(plane);
         mean = expand(next, plane.side);
         for (std::size_t i = 0; i < plane.values.size(); ++i) plane.values[i] -= mean.values[i];
         return next;

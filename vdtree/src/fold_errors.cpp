@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
+#include <string>
 
 #include <glm/geometric.hpp>
 #include <tbb/parallel_for.h>
@@ -13,6 +15,7 @@
 #include "find_stages.h"
 #include "keep_light.h"
 #include "leaf_triangles.h"
+#include "scaled_geometry.h"
 #include "vertex_tree_data.h"
 
 namespace unseen::vdtree {
@@ -27,6 +30,9 @@ constexpr std::size_t triangles_compared = 16; // of each surface, at equal step
 constexpr std::size_t most_fine_triangles = 64; // in rings of more, some neighbours are folded
 constexpr float contact_reach = 6; // times the distance by which folds move a surface: then parts that near may pass through each other
 constexpr float least_sine = 0.1f; // of the angle at which parts meet: flatter ones count as this
+// Trees are some tens of nodes deep. Up deeper ones, as only made-up ones are, neighbours are folded no farther than this, so that no tree costs the
+// square of its depth.
+constexpr int most_steps = 1024;
 constexpr Index leaves_of_part = 4096;   // of a subtree that one task measures
 
 struct Point {
@@ -252,7 +258,8 @@ private:
     NodeId stand_in(Index leaf, NodeId node) const {
         NodeId at = interior_ + leaf;
         const int most = much_more * luminance_span(node);
-        for (NodeId up = parents_[at]; up != no_node && is_larger(node, up) && luminance_span(up) <= most; up = parents_[at]) at = up;
+        int steps = 0;
+        for (NodeId up = parents_[at]; up != no_node && is_larger(node, up) && luminance_span(up) <= most && ++steps <= most_steps; up = parents_[at]) at = up;
         return at;
     }
     int luminance_span(NodeId node) const { return support_luminance_[node].hi.value - support_luminance_[node].lo.value; }
@@ -460,6 +467,11 @@ void include_proxies(const VertexTree& tree, std::span<const Unorm16> luminance,
     }
 }
 
+bool are_finite(const FoldError& e) {
+    const float values[] = {e.distance, e.mean_distance, e.luminance, e.mean_luminance, e.extent, e.drift};
+    return std::all_of(std::begin(values), std::end(values), [](float value) { return std::isfinite(value); });
+}
+
 } // namespace
 
 Result<VertexTree> with_fold_errors(const VertexTree& tree, int threads) {
@@ -468,15 +480,13 @@ Result<VertexTree> with_fold_errors(const VertexTree& tree, int threads) {
         return Error{ErrorCode::unsupported, "What folds change of a texture is not measured: take another fold test, or the tree without its texture."};
     const auto copy_of = [](const auto& values) { return std::vector(values.begin(), values.end()); };
     const VertexTree::Data& given = tree.data();
-    std::vector<Unorm16> luminance = light_keeping_luminance(tree);
-    std::vector<PackedRange> support = copy_of(given.light.support_range);
-    include_proxies(tree, luminance, support);
+    // Measured is in units in which no product of lengths overflows or vanishes.
+    const float scale = unit_scale(tree.bounding_sphere().radius);
     const auto data = std::make_shared<VertexTree::Data>();
-    data->geometry = given.geometry;
-    data->checks = given.checks;
+    data->geometry = scale == 1 ? given.geometry : scaled_geometry(given.geometry, scale);
     TreeLuminance& light = data->light;
-    light.luminance = std::move(luminance);
-    light.support_range = std::move(support);
+    light.luminance = copy_of(given.light.luminance);
+    light.support_range = copy_of(given.light.support_range);
     light.ring_range = copy_of(given.light.ring_range);
     light.adaptation = copy_of(given.light.adaptation);
     light.ring_chroma = copy_of(given.light.ring_chroma);
@@ -484,16 +494,29 @@ Result<VertexTree> with_fold_errors(const VertexTree& tree, int threads) {
     light.prelit = given.light.prelit;
     light.range = given.light.range;
 
-    VertexTree measured(data);
+    const VertexTree measured(data); // nobody else has it
+    std::vector<Unorm16> luminance = light_keeping_luminance(measured);
+    std::vector<PackedRange> support = copy_of(given.light.support_range);
+    include_proxies(tree, luminance, support);
+    light.luminance = std::move(luminance);
+    light.support_range = std::move(support);
     std::vector<FoldError> errors(tree.interior_count());
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
     arena.execute([&] {
         Measurer(measured, errors).run();
         find_drift(measured, errors);
-        light.fold_stages = find_stages(measured, errors); // nobody else has the tree yet
+        light.fold_stages = find_stages(measured, errors);
     });
+    for (NodeId node = 0; node < errors.size(); ++node) {
+        FoldError& e = errors[node];
+        for (float* length : {&e.distance, &e.mean_distance, &e.extent}) *length /= scale;
+        if (!are_finite(e))
+            return Error{ErrorCode::unsupported, "What folding node " + std::to_string(node) + " changes is beyond all numbers: the mesh is too large."};
+    }
     light.fold_errors = std::move(errors);
-    return measured;
+    data->geometry = given.geometry;
+    data->checks = given.checks;
+    return VertexTree(data);
 }
 
 } // namespace unseen::vdtree

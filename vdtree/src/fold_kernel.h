@@ -89,7 +89,8 @@ struct alignas(64) FoldCandidate {
     Sphere ring;             // whose facing counts
     NormalSlabs slabs;       // of the directions in the ring
     std::uint8_t flags = 0;  // NodeFlags
-    bool is_unfolded = false; // for the one who keeps it; tests do not ask
+    bool is_unfolded : 1 = false; // for the one who keeps it; tests do not ask
+    bool is_waiting : 1 = false;  // likewise: to be unfolded
     NodeId node = no_node;
 };
 static_assert(sizeof(FoldCandidate) == 64);

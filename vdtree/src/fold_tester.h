@@ -48,7 +48,6 @@ public:
     void look_from(const Viewpoint& viewpoint, double length_per_radian);
 
     bool uses_gaze() const noexcept { return view_.has_gaze; } // from the current viewpoint
-    bool uses_lights() const noexcept { return lit_.has_value(); }
 
     FoldCandidate candidate(NodeId node) const;
     void prefetch(NodeId node) const; // what candidate(node) will read

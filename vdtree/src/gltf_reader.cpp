@@ -9,6 +9,8 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <string>
+#include <unordered_map>
 #include <vector>
 
 #include <glm/geometric.hpp>
@@ -39,8 +41,9 @@ constexpr std::uint64_t bytes_per_index = sizeof(Index) * 3; // in a strip an in
 // The colours and images of materials, straight from the document.
 class MaterialReader {
 public:
-    MaterialReader(const json& document, const Buffers& buffers, std::vector<std::string>& warnings)
-        : document_(document), buffers_(buffers), warnings_(warnings) {}
+    // `spend` is told of all bytes of images, and fails where they are too many.
+    MaterialReader(const json& document, const Buffers& buffers, std::vector<std::string>& warnings, FunctionRef<void(std::uint64_t)> spend)
+        : document_(document), buffers_(buffers), warnings_(warnings), spend_(spend) {}
 
     // Alpha counts where it is not said to be ignored.
     Material read(std::size_t index, std::string name) {
@@ -114,7 +117,7 @@ private:
         if (const json* uri = member(image, "uri")) {
             if (!uri->is_string()) fail(where_ + ": its uri is no text; correct the JSON.");
             const auto& text = uri->get_ref<const std::string&>();
-            if (text.starts_with("data:")) material.image_bytes = Buffers::decode_data(text, where_);
+            if (text.starts_with("data:")) material.image_bytes = shared(image, [&] { return Buffers::decode_data(text, where_); });
             else material.image = Buffers::below_folder(text, where_);
             return;
         }
@@ -131,12 +134,25 @@ private:
             fail(of_image + " ends behind its buffer; the data are cut short or the JSON is wrong.");
         }
         if (length == 0) fail(of_image + " is empty; correct the JSON.");
-        material.image_bytes = buffers_[buffer].substr(offset, length);
+        material.image_bytes = shared(image, [&] { return std::string(buffers_[buffer].substr(offset, length)); });
+    }
+
+    // Each image is copied once, however many materials have it.
+    template <class F>
+    std::shared_ptr<const std::string> shared(const json& image, F&& bytes) {
+        auto& known = images_[&image];
+        if (!known) {
+            known = std::make_shared<const std::string>(bytes());
+            spend_(known->size());
+        }
+        return known;
     }
 
     const json& document_;
     const Buffers& buffers_;
     std::vector<std::string>& warnings_;
+    FunctionRef<void(std::uint64_t)> spend_;
+    std::map<const json*, std::shared_ptr<const std::string>> images_;
     std::string where_;
 };
 
@@ -204,7 +220,9 @@ public:
     SceneReader(const MeshSource& source, const tinygltf::Model& model, const Buffers& buffers)
         : source_(source), model_(model), accessors_(model, buffers),
           bytes_left_(std::max(min_bytes_out,
-                               max_bytes_out_per_byte_in * (source.bytes.size() + buffers.external_bytes()))) {}
+                               max_bytes_out_per_byte_in * (source.bytes.size() + buffers.external_bytes()))) {
+        for (std::size_t i = 0; i < model.materials.size(); ++i) first_of_name_.try_emplace(model.materials[i].name, i);
+    }
 
     // Empty where the caller cancelled.
     std::optional<ReadResult> read() {
@@ -226,6 +244,13 @@ public:
     void read_materials(MaterialReader& reader, ReadResult& result) const {
         for (const std::size_t index : used_materials_)
             result.materials.push_back(reader.read(index, material_name(static_cast<int>(index))));
+    }
+
+    void spend(std::uint64_t count, std::uint64_t bytes_each) {
+        if (bytes_each > 0 && count > bytes_left_ / bytes_each) {
+            fail("its instances and shared data multiply to far more than the file holds; split the scene.");
+        }
+        bytes_left_ -= count * bytes_each;
     }
 
 private:
@@ -327,13 +352,6 @@ private:
         return {find("POSITION"), find("NORMAL"), find("TEXCOORD_0"), find("COLOR_0")};
     }
 
-    void spend(std::uint64_t count, std::uint64_t bytes_each) {
-        if (count > bytes_left_ / bytes_each) {
-            fail("its instances and shared data multiply to far more than the file holds; split the scene.");
-        }
-        bytes_left_ -= count * bytes_each;
-    }
-
     void add_vertices(const VertexSource& from, const Placement& placement) {
         Mesh& mesh = result_.mesh;
         const std::size_t first = mesh.positions.size();
@@ -427,9 +445,7 @@ private:
                  std::to_string(model_.materials.size()) + "; correct the JSON.");
         }
         const std::string& name = model_.materials[index].name;
-        const auto has_name = [&](const tinygltf::Material& other) { return other.name == name; };
-        const auto first = std::find_if(model_.materials.begin(), model_.materials.end(), has_name);
-        if (!name.empty() && first != model_.materials.begin() + static_cast<std::ptrdiff_t>(index)) return name + " (" + numbered("material", index) + ")";
+        if (!name.empty() && first_of_name_.at(name) != index) return name + " (" + numbered("material", index) + ")";
         return name.empty() ? numbered("material", index) : name;
     }
 
@@ -439,6 +455,7 @@ private:
     ReadResult result_;
     std::vector<bool> reached_;
     std::set<std::size_t> used_materials_;
+    std::unordered_map<std::string, std::size_t> first_of_name_; // of materials
     std::uint64_t bytes_left_;
     std::uint64_t skipped_primitives_ = 0;
 };
@@ -456,7 +473,8 @@ Result<ReadResult> read_document(const MeshSource& source) {
     if (!result) return cancelled(source);
     result->uvs_from_top = true;
     if (source.options.materials) {
-        MaterialReader materials(document, buffers, result->warnings);
+        const auto spend = [&](std::uint64_t bytes) { scene.spend(1, bytes); };
+        MaterialReader materials(document, buffers, result->warnings, spend);
         scene.read_materials(materials, *result);
     }
     if (reduced.has_skins) result->warnings.push_back("skins were ignored; the mesh is in its bind pose.");

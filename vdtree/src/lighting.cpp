@@ -21,22 +21,23 @@ constexpr double unit_rounding = 1e-6;
 constexpr double least_edge = 1e-5;
 // A light so near to a vertex, in radii of the tree, lies on it.
 constexpr double least_light_distance = 1e-4;
+// Squares of places and distances fit floats, and so does the light of one light anywhere.
+constexpr double farthest = 1e18;  // mesh units
+constexpr double brightest = 1e12; // relative luminance
 // What a change of intensity counts as, in radians for a change of its logarithm.
 constexpr double radians_per_log_intensity = 8;
-
-bool is_finite(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 Error invalid(const std::string& field, const std::string& must) { return {ErrorCode::invalid_argument, field + " must " + must + "."}; }
 
 Result<void> validate(const LightSource& light, const std::string& name) {
     using Kind = LightSource::Kind;
-    if (!(light.intensity >= 0) || !std::isfinite(light.intensity)) return invalid(name + ".intensity", "be a finite number, 0 or more");
+    if (!(light.intensity >= 0 && light.intensity <= brightest)) return invalid(name + ".intensity", "be a number from 0 to 1e12");
     const bool has_direction = light.kind != Kind::point, has_position = light.kind != Kind::directional;
     if (has_direction && !(std::abs(glm::length(light.direction) - 1) <= unit_rounding))
         return invalid(name + ".direction", "have a length, and be finite");
     if (!has_position) return {};
-    if (!is_finite(light.position)) return invalid(name + ".position", "be finite");
-    if (!(light.distance > 0) || !std::isfinite(light.distance)) return invalid(name + ".distance", "be positive and finite");
+    if (!(glm::length(light.position) <= farthest)) return invalid(name + ".position", "be finite, and at most 1e18 mesh units away");
+    if (!(light.distance > 0 && light.distance <= farthest)) return invalid(name + ".distance", "be positive, and at most 1e18 mesh units");
     if (light.kind == Kind::point) return {};
     if (!(light.outer_cosine >= -1 && light.inner_cosine <= 1 && light.inner_cosine - light.outer_cosine >= least_edge))
         return invalid(name + ".inner_degrees", "be less than outer_degrees, by a degree or so, and outer_degrees at most 180");

@@ -15,6 +15,8 @@ namespace {
 constexpr float range_rounding = 1e-5f;
 constexpr float position_rounding = 1e-6f; // of centres, as a share
 constexpr float tiny = 1e-30f;
+constexpr float brightest = 1e12f; // relative luminance; what the least facing and albedo that are not 0 leave of it is still beyond 1
+constexpr float largest_ratio = 1e15f; // of distances
 
 // How far a light may move for the rates to hold, and what they grow by until then.
 constexpr float longest_turn = 0.5f;    // radians, of directional lights: intensities change by exp(0.5 / 8) at most, 0.129 a unit
@@ -115,8 +117,9 @@ UNSEEN_INLINE void add(const KernelLights& all, const KernelLights::Light& light
     } else {
         float near, far;
         l = towards(centre, radius + light.inexact, light.position, all.radius, near, far);
-        most = light.intensity / squared(near);
-        least = l.anywhere ? 0.0f : light.intensity / squared(far);
+        // So near that a float would not hold it, a light is as bright as any.
+        most = std::min(brightest, light.intensity * squared(std::min(light.distance / near, largest_ratio)));
+        least = l.anywhere ? 0.0f : std::min(brightest, light.intensity * squared(std::min(light.distance / far, largest_ratio)));
         most_rate = square_rate * all.radius / near + intensity_rate;
         least_rate = square_rate * all.radius / far + intensity_rate;
         // Both fall with the distance: their difference changes by the difference of the changes.
@@ -283,7 +286,7 @@ KernelLights::KernelLights(const Lighting& lighting, glm::dvec3 eye_, double tre
         }
         light.intensity = static_cast<float>(from.intensity);
         light.inexact = static_cast<float>(float_rounding * size(from.position));
-        if (from.kind != LightSource::Kind::directional) light.intensity = static_cast<float>(from.intensity * from.distance * from.distance);
+        light.distance = static_cast<float>(from.distance);
         if (from.kind == LightSource::Kind::spot) {
             light.inner_cosine = static_cast<float>(from.inner_cosine);
             light.outer_cosine = static_cast<float>(from.outer_cosine);

@@ -15,7 +15,7 @@ struct KernelLights {
     struct Light {
         LightSource::Kind kind;
         float direction[3], position[3];
-        float intensity;             // of point lights and spots at distance 1
+        float intensity, distance;   // of point lights and spots: at that distance
         float inner_cosine, outer_cosine, fade; // of a spot; most change of its step in a radian
         float inexact;               // a bound of the position's rounding, mesh units
     };

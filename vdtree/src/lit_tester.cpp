@@ -68,8 +68,8 @@ UNSEEN_INLINE void LitTester::find_classes(LitFindings& lit) const {
     for (std::int32_t moved = 1; moved;) {
         moved = 0;
         for (std::size_t i = 0; i < kernel_lanes; ++i) {
-            const std::int32_t c = (lit.contrast[i] < contrast_count - 1) & (at(contrasts_, lit.contrast[i]) < contrast[i]);
-            const std::int32_t l = (lit.luminance[i] < luminance_count - 1) & (at(luminances_, lit.luminance[i]) < luminance[i]);
+            const std::int32_t c = (lit.contrast[i] < contrast_count - 1) & !(contrast[i] <= at(contrasts_, lit.contrast[i])); // so is what is no number
+            const std::int32_t l = (lit.luminance[i] < luminance_count - 1) & !(luminance[i] <= at(luminances_, lit.luminance[i]));
             lit.contrast[i] += c;
             lit.luminance[i] += l;
             moved |= c | l;
@@ -136,7 +136,7 @@ UNSEEN_INLINE void LitTester::find_room(LitFindings& lit) const {
         float motion = left >= fine_rate * fine_cap ? fine_cap + beyond : left / fine_rate;
         motion = batch.rise_rate[i] * motion > room ? room / batch.rise_rate[i] : motion;
         motion = std::min(motion, batch.cap[i]) * (1 - slack_rounding);
-        lit.slack[i] = left > 0 && room > 0 ? length_ * motion : 0.0f;
+        lit.slack[i] = left > 0 && room > 0 && motion > 0 ? length_ * motion : 0.0f;
     }
 }
 

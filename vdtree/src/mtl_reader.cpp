@@ -2,7 +2,8 @@
 #include "mesh_readers.h"
 #include "text_scanner.h"
 
-#include <algorithm>
+#include <string>
+#include <unordered_set>
 
 namespace unseen::vdtree {
 
@@ -11,7 +12,9 @@ namespace {
 class MtlReader {
 public:
     MtlReader(std::string_view bytes, const std::string& name, std::vector<Material>& materials, std::vector<std::string>& warnings)
-        : bytes_(bytes), name_(name), materials_(materials), warnings_(warnings) {}
+        : bytes_(bytes), name_(name), materials_(materials), warnings_(warnings) {
+        for (const Material& m : materials) names_.insert(m.name);
+    }
 
     Result<void> read() {
         if (const std::size_t nul = bytes_.find('\0'); nul != std::string_view::npos)
@@ -43,7 +46,7 @@ private:
     Material& material() { return materials_.back(); }
 
     void begin(std::string_view name) {
-        is_open_ = std::none_of(materials_.begin(), materials_.end(), [&](const Material& m) { return m.name == name; });
+        is_open_ = names_.emplace(name).second;
         if (is_open_) materials_.push_back({.name = std::string(name)});
     }
 
@@ -104,6 +107,7 @@ private:
     const std::string& name_;
     std::vector<Material>& materials_;
     std::vector<std::string>& warnings_;
+    std::unordered_set<std::string> names_; // of all materials so far
     bool is_open_ = false;
 };
 

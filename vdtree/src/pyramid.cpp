@@ -24,7 +24,7 @@ double kernel_response(double omega) {
 
 } // namespace
 
-Plane reduce(const Plane& plane) {
+Raster reduce(const Raster& plane) {
     const std::size_t side = plane.side, next_side = place_in_next(side) + steps_outside;
     const auto is_inside = [&](std::ptrdiff_t at) { return at >= 0 && at < static_cast<std::ptrdiff_t>(side); };
     std::vector<float> narrow(side * next_side); // half as wide, as high
@@ -40,7 +40,7 @@ Plane reduce(const Plane& plane) {
     const auto row = [&](std::ptrdiff_t y) {
         return is_inside(y) ? narrow.data() + static_cast<std::size_t>(y) * next_side : nothing.data();
     };
-    Plane next(next_side);
+    Raster next(next_side);
     for_each_next(side, [&](std::size_t i, std::ptrdiff_t c) {
         const float *a = row(c - 2), *b = row(c - 1), *middle = row(c), *d = row(c + 1), *e = row(c + 2);
         float* const out = next.row(i);
@@ -49,7 +49,7 @@ Plane reduce(const Plane& plane) {
     return next;
 }
 
-Plane expand(const Plane& next, std::size_t side) {
+Raster expand(const Raster& next, std::size_t side) {
     std::vector<float> low(next.side * side); // as wide, half as high
     for (std::size_t y = 0; y < next.side; ++y) {
         const float* const in = next.row(y);
@@ -59,7 +59,7 @@ Plane expand(const Plane& next, std::size_t side) {
             out[x] = 2 * (x % 2 == 1 ? tap1 * (in[k] + in[k + 1]) : tap0 * in[k] + tap2 * (in[k - 1] + in[k + 1]));
         }
     }
-    Plane plane(side);
+    Raster plane(side);
     for (std::size_t y = 0; y < side; ++y) {
         const float *above = low.data() + (place_in_next(y) - 1) * side, *at = above + side, *below = at + side;
         float* const out = plane.row(y);

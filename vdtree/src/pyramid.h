@@ -7,12 +7,12 @@
 
 namespace unseen::vdtree {
 
-struct Plane {
+struct Raster {
     std::size_t side = 0;
     std::vector<float> values; // by row
 
-    Plane() = default;
-    explicit Plane(std::size_t n) : side(n), values(n * n) {}
+    Raster() = default;
+    explicit Raster(std::size_t n) : side(n), values(n * n) {}
     float* row(std::size_t y) { return values.data() + y * side; }
     const float* row(std::size_t y) const { return values.data() + y * side; }
 };
@@ -22,9 +22,9 @@ inline constexpr std::size_t steps_outside = 2;
 inline std::size_t place_in_next(std::size_t at) { return at / 2 + steps_outside; }
 
 // Smoothed, at half the resolution.
-Plane reduce(const Plane& plane);
+Raster reduce(const Raster& plane);
 // Back to the resolution of a level with so many samples a side.
-Plane expand(const Plane& next, std::size_t side);
+Raster expand(const Raster& next, std::size_t side);
 
 // The frequency that a level's band (the level less its next one, expanded) is named after, in cycles a sample of the first level; and
 // by how much the band changes the amplitude of a grating of that frequency.

@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdint>
-#include <cstdlib>
-#include <string>
+#include <limits>
 #include <string_view>
 #include <system_error>
 
@@ -15,6 +14,31 @@ inline bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c ==
 inline bool is_newline(char c) { return c == '\n' || c == '\r'; }
 inline bool is_space(char c) { return is_blank(c) || is_newline(c); }
 
+// What a decimal number stands for that is too large for a double, or too small: infinity or 0, of its sign. (Not strtod, which obeys
+// the locale.)
+inline double out_of_range_number(std::string_view digits) {
+    const bool is_negative = digits.starts_with('-');
+    if (is_negative) digits.remove_prefix(1);
+    const std::size_t e = std::min(digits.find_first_of("eE"), digits.size());
+    const std::string_view mantissa = digits.substr(0, e);
+    std::int64_t exponent = 0;
+    if (e < digits.size()) {
+        const bool is_down = digits.substr(e + 1).starts_with('-');
+        std::string_view of = digits.substr(e + 1);
+        if (of.starts_with('-') || of.starts_with('+')) of.remove_prefix(1);
+        constexpr std::int64_t most = std::int64_t{1} << 60; // beyond what any text's digits make up for
+        const auto [end, error] = std::from_chars(of.data(), of.data() + of.size(), exponent);
+        if (error != std::errc() || exponent > most) exponent = most;
+        if (is_down) exponent = -exponent;
+    }
+    // The place of the first digit that is not 0.
+    const std::size_t point = std::min(mantissa.find('.'), mantissa.size()), first = mantissa.find_first_of("123456789");
+    if (first == std::string_view::npos) return is_negative ? -0.0 : 0.0;
+    exponent += static_cast<std::int64_t>(point) - static_cast<std::int64_t>(first);
+    const double value = exponent > 0 ? std::numeric_limits<double>::infinity() : 0.0;
+    return is_negative ? -value : value;
+}
+
 // Parses a number at `first`, with an optional leading '+', which std::from_chars does not know. Returns the end of
 // the number, or nullptr where there is none. Too large becomes infinite, too small 0.
 inline const char* parse_number(const char* first, const char* last, double& value) {
@@ -23,7 +47,7 @@ inline const char* parse_number(const char* first, const char* last, double& val
         if (first != last && *first == '-') return nullptr;
     }
     const auto [end, error] = std::from_chars(first, last, value);
-    if (error == std::errc::result_out_of_range) value = std::strtod(std::string(first, end).c_str(), nullptr);
+    if (error == std::errc::result_out_of_range) value = out_of_range_number({first, end});
     return error == std::errc::invalid_argument ? nullptr : end;
 }
 

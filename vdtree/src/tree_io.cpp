@@ -16,6 +16,7 @@
 
 #include <vdtree/atomic_file.h>
 
+#include "byte_order.h"
 #include "mapped_file.h"
 #include "mask_pool.h"
 #include "node_check.h"
@@ -71,20 +72,12 @@ std::uint64_t pages_of(const Section& s) {
     return (s.count * s.element_bytes + page_bytes - 1) / page_bytes;
 }
 
-void swap_components(std::byte* data, std::size_t bytes, std::size_t component) {
-    if (component < 2) return;
-    for (std::size_t i = 0; i + component <= bytes; i += component) std::reverse(data + i, data + i + component);
-}
-
-// Turns a whole number of a section's elements into the other byte order.
-void swap_elements(std::byte* data, std::size_t bytes, const Section& s) {
-    if (s.element_bytes == sizeof(FoldError)) {
-        for (std::size_t at = 0; at < bytes; at += sizeof(FoldError)) swap_components(data + at, offsetof(FoldError, facing), s.component_bytes);
-        return;
-    }
-    if (s.element_bytes != sizeof(NodeBounds)) return swap_components(data, bytes, s.component_bytes);
-    for (std::size_t at = 0; at < bytes; at += sizeof(NodeBounds)) // all else in it are single bytes
-        swap_components(data + at, sizeof(Sphere), s.component_bytes);
+// A section's elements, of which fold errors and bounds begin with floats and end with single bytes.
+ElementLayout layout_of(const Section& s) {
+    const std::size_t numbers = s.element_bytes == sizeof(FoldError)    ? offsetof(FoldError, facing)
+                                : s.element_bytes == sizeof(NodeBounds) ? sizeof(Sphere)
+                                                                        : s.element_bytes;
+    return {s.element_bytes, numbers, s.component_bytes};
 }
 
 // Walks every stored array of a tree, in file order: f(name, vector).
@@ -244,7 +237,7 @@ private:
         const auto page = data_[section].subspan(at, std::min<std::size_t>(page_bytes, data_[section].size() - at));
         if constexpr (std::endian::native == std::endian::little) return page;
         swapped_.assign(page.begin(), page.end());
-        swap_elements(swapped_.data(), swapped_.size(), sections_[section]);
+        swap_elements(swapped_.data(), swapped_.size(), at, layout_of(sections_[section]));
         return swapped_;
     }
 
@@ -407,7 +400,7 @@ Result<void> Reader::read_section(std::string_view name, std::vector<T>& out) {
             return fail("The file ends within section " + std::string(name) + "; it was cut short while it was read.");
         if (checksum(bytes + at, size) != checksums_[page])
             return fail("Page " + std::to_string(at / page_bytes) + " of section " + std::string(name) + " is damaged.");
-        if constexpr (std::endian::native == std::endian::big) swap_elements(bytes + at, size, *section);
+        if constexpr (std::endian::native == std::endian::big) swap_elements(bytes + at, size, at, layout_of(*section));
     }
     return {};
 }

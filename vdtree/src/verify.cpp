@@ -63,6 +63,11 @@ private:
         const glm::vec3 proxy = g_.positions[node];
         expect(contains(g_.support_spheres[node], proxy, 0), "the support's sphere does not contain the proxy.");
         expect(contains(g_.bounds[node].ring, proxy, 0), "the ring's sphere does not contain the proxy.");
+        if (!l_.fold_errors.empty()) {
+            const FoldError& e = l_.fold_errors[node];
+            const float values[] = {e.distance, e.mean_distance, e.luminance, e.mean_luminance, e.extent, e.drift};
+            expect(std::ranges::all_of(values, [](float value) { return value >= 0 && std::isfinite(value); }), "a fold error is no number of 0 or more.");
+        }
         const Unorm16 y = l_.luminance[node];
         expect(contains(l_.support_range[node], {y, y}), "the support's luminance does not contain the proxy's.");
         if (pyramid_) {
@@ -78,6 +83,13 @@ private:
             expect(glm::distance(glm::dvec3(p), glm::dvec3(proxy)) <= g_.displacement[node] * (1 + slack),
                    "a leaf moves farther than the displacement.");
         }
+    }
+
+    void check_errors(NodeId node, NodeId child) {
+        const FoldError &own = l_.fold_errors[node], &below = l_.fold_errors[child];
+        expect(own.distance >= below.distance && own.luminance >= below.luminance && own.extent >= below.extent, "a child's fold error is larger.");
+        expect(own.facing.includes(below.facing), "a child's fold moves outlines seen from elsewhere.");
+        expect(own.stage >= below.stage, "a child folds in a later stage.");
     }
 
     void check_children(NodeId node) {
@@ -97,6 +109,7 @@ private:
             expect((g_.bounds[child].flags & ~g_.bounds[node].flags) == 0, "a child has other flags.");
             expect(g_.displacement[node] >= g_.displacement[child], "a child's displacement is larger.");
             expect(l_.adaptation[node] >= l_.adaptation[child], "a child's adaptation luminance is higher.");
+            if (!l_.fold_errors.empty()) check_errors(node, child);
             expect(contains(l_.support_range[node], l_.support_range[child]), "a child's support luminance sticks out.");
             expect(contains(l_.ring_range[node], l_.ring_range[child]), "a child's ring luminance sticks out.");
             expect(!pyramid_ || contains(g_.ring_texture[node], g_.ring_texture[child]), "a child's texture sticks out.");

@@ -191,6 +191,7 @@ void WatchList::split(BlockId block) {
     for (std::size_t i = 0; i < block_slots; ++i) slots[i] = static_cast<Slot>(block * block_slots + i);
     std::ranges::nth_element(slots, slots.begin() + block_slots / 2, {}, [&](Slot slot) { return candidates_[slot].node; });
     const BlockId other = new_block();
+    looked_at_.push_back(other);
     std::array<Slacks, block_slots> left; // by the block as it is
     for (std::size_t i = 0; i < block_slots; ++i) left[i] = slacks_of(slots[i]);
     for (std::size_t i = block_slots / 2; i < block_slots; ++i) {
@@ -309,21 +310,28 @@ void WatchList::set_due_by_lights(BlockId block, float clock) {
 }
 
 std::span<const WatchList::Slot> WatchList::collect_due() {
+    find_due_blocks(0);
+    return collect_due(looked_at_);
+}
+
+void WatchList::find_due_blocks(BlockId first) {
     if (has_lights_) set_all_due_by_lights();
     due_blocks_.resize((blocks_.size() + 63) / 64);
     // In floats the clock may be a little late.
-    const float facing = rounded_up(facing_clock_), position = position_clock_float_;
-    find_due(position, facing, spheres_, earliest_, due_blocks_.data());
+    find_due(position_clock_float_, rounded_up(facing_clock_), spheres_, earliest_, due_blocks_.data());
     looked_at_.clear();
     for (std::size_t word = 0; word < due_blocks_.size(); ++word)
         for (std::uint64_t bits = due_blocks_[word]; bits; bits &= bits - 1)
             looked_at_.push_back(static_cast<BlockId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))));
-    if (const std::size_t room = looked_at_.size() * block_slots; due_.size() < room) due_.resize(room);
-    // The blocks keep the earliest deadlines of what is not due; those of the others come back when they are set.
-    return std::span(due_).first(look_at_blocks(looked_at_, position, facing, blocks_.data(), unfolded_.data(), spheres_, earliest_, due_.data()));
+    std::ranges::rotate(looked_at_, std::ranges::lower_bound(looked_at_, first));
 }
 
-void WatchList::stay_due(Slot slot) { set_deadlines(slot, {((unfolded_[slot / block_slots] >> (slot % block_slots)) & 1) != 0}); }
+std::span<const WatchList::Slot> WatchList::collect_due(std::span<const BlockId> blocks) {
+    if (const std::size_t room = blocks.size() * block_slots; due_.size() < room) due_.resize(room);
+    // The blocks keep the earliest deadlines of what is not due; those of the others come back when they are set.
+    return std::span(due_).first(look_at_blocks(blocks, position_clock_float_, rounded_up(facing_clock_), blocks_.data(), unfolded_.data(), spheres_,
+                                                earliest_, due_.data()));
+}
 
 std::uint64_t WatchList::byte_size() const noexcept {
     return sizeof(FoldCandidate) * candidates_.capacity() + sizeof(Slot) * slots_of_nodes_.capacity() + sizeof(BlockDues) * blocks_.capacity() +

@@ -42,6 +42,7 @@ public:
     const FoldCandidate& operator[](Slot slot) const noexcept { return candidates_[slot]; }
     std::span<const FoldCandidate> candidates() const noexcept { return candidates_; }
     void set_unfolded(Slot slot, bool is_unfolded) noexcept { candidates_[slot].is_unfolded = is_unfolded; }
+    void set_waiting(Slot slot, bool is_waiting) noexcept { candidates_[slot].is_waiting = is_waiting; }
 
     // For what happens to nodes next: first these, for some nodes at once, then those.
     void prefetch_slot(NodeId node) const noexcept { prefetch(&slots_of_nodes_[node]); }
@@ -76,14 +77,18 @@ public:
     // Sets back what has grown beyond `longest`, so that deadlines in floats stay fine enough.
     void restart_clocks(double longest);
 
-    // The slots that are due, until the next call. These get new deadlines, or stay_due().
+    // The slots that are due, until the next call. These get new deadlines.
     std::span<const Slot> collect_due();
-    void stay_due(Slot slot);
+    // The same some blocks at a time; what lies in blocks that are not asked for stays due. Finds the blocks, from number `first` on and round
+    // to it again; blocks that are split join the others at the end.
+    using BlockId = std::uint32_t;
+    void find_due_blocks(BlockId first);
+    std::span<const BlockId> due_blocks() const noexcept { return looked_at_; }
+    std::span<const Slot> collect_due(std::span<const BlockId> blocks);
 
     std::uint64_t byte_size() const noexcept;
 
 private:
-    using BlockId = std::uint32_t;
     static constexpr std::size_t appended_slots = 12; // a quarter is left for what comes later
     static constexpr std::uint16_t full = 0xffff;
     static constexpr float never = std::numeric_limits<float>::infinity();

@@ -67,6 +67,7 @@ struct BuildOptions {
 // Drops triangles that use a vertex twice (counted in the tree); fails where none is left, on non-finite positions and on
 // indices out of range. Memory: about 220 bytes a triangle while building.
 Result<VertexTree> build_tree(const MeshView& mesh, const BuildOptions& options = {});
+// Fails with a team, too, for there is nothing to help a clustering of one's own with.
 Result<VertexTree> build_tree(const MeshView& mesh, Clusterer clusterer, const BuildOptions& options = {});
 
 // Whether build_tree() would take these, without building anything.

@@ -30,7 +30,7 @@ struct AdjustStats {
     std::uint64_t unfolds = 0;
     Index triangles = 0;
     float max_fold_cost = 0;      // the largest cost among the folded nodes that can be seen; 0 without folds. With
-                                  // hysteresis, and without a budget: not more than this
+                                  // hysteresis, and without a budget: not more than this. Infinite where a time limit has left it unknown
     bool is_complete = true;      // false: the time limit has left something to do
 };
 
@@ -46,8 +46,9 @@ struct FollowOptions {
     // exceed the least by this factor; then a frame costs what changes, and slow motions do not flicker.
     float hysteresis = 1;
 
-    // At most so long, as near as the clock and a batch of tests allow; what is left to do is done at the next calls, worst folds
-    // first. Results then depend on the machine's speed.
+    // At most so long, as near as the clock and a step of some tests or changes allow (a step of each is always done); what is left to do is
+    // kept for the next calls, worst folds first. Results then depend on the machine's speed. The clock does not divide: the change of the whole
+    // cut after a jump, and in the call after it, finding what is to be watched. A budget without hysteresis starts anew in every call.
     std::optional<double> milliseconds = {};
 
     // Nodes whose ring faces away fold at no cost. Only for surfaces that are closed and consistently oriented (inside out or not: the
@@ -70,7 +71,7 @@ struct IndexWrite {
 // Not thread-safe; several cuts over one tree may be used from several threads.
 class Cut {
 public:
-    // Starts wholly folded: no triangle. The tree must outlive the cut.
+    // Starts wholly folded: no triangle. Keeps the tree's data, whatever becomes of the object given.
     explicit Cut(const VertexTree& tree);
     Cut(Cut&&) noexcept;
     Cut& operator=(Cut&&) noexcept;
@@ -98,7 +99,13 @@ public:
     // Makes the cut that a criterion in distance form asks for, from where the last call left it: unfolds where the cost is above
     // the threshold, top-down. The result does not depend on the state before; the cost does: it goes with what changes, and a view that
     // stands still costs nothing. Another criterion, or a jump of the viewpoint, tests every node in use once.
-    // Fails, and changes nothing, where the viewpoint is not finite or an option out of range.
+    // Fails, and changes nothing, where
+    //   the criterion was made for a tree of another number of interior nodes,
+    //   the eye is not finite, or more than 1e18 mesh units from the tree's origin,
+    //   the gaze or a plane's normal is not of unit length (within a thousandth), or a plane's offset not finite,
+    //   an occluder is not finite or around the eye, or there are some and the criterion is of support spheres,
+    //   the criterion is of lights, and these are not valid (see validate()),
+    //   an option is out of its range.
     Result<AdjustStats> follow(const DistanceCriterion& criterion, const Viewpoint& viewpoint,
                                const FollowOptions& options = {});
 
@@ -145,10 +152,12 @@ private:
     void assign_changed(const std::vector<std::uint64_t>& unfolded);
     void assign_all(std::span<const std::uint64_t> unfolded);
     void change_to(std::vector<std::uint64_t> unfolded, AdjustStats& stats);
-    void replay(std::span<const std::uint64_t> unfolded, AdjustStats& stats);
+    void change_further(std::vector<std::uint64_t> unfolded); // within changes in steps
+    bool are_few_changes(std::span<const std::uint64_t> unfolded) const;
+    void replay(std::span<const std::uint64_t> unfolded);
     std::span<const NodeId> children_of(NodeId node);
 
-    const VertexTree* tree_;
+    std::shared_ptr<const VertexTree> tree_; // a handle of its own, whose place moves of the cut do not change
     std::vector<std::uint64_t> unfolded_;  // one bit per interior node
     std::vector<NodeId> proxy_;            // by leaf: the active node that stands for it
     Index triangle_count_ = 0;
@@ -170,11 +179,11 @@ struct SceneObject {
 
 // Makes the cuts of several objects the best within one number of triangles: unfolds in descending cost over all of them, ties by the
 // earlier object and then by node number, down to cost 0. Returns one entry an object; max_fold_cost is the scene's.
-// Fails, and changes nothing, where a viewpoint is not finite or a cut is named twice.
+// Fails, and changes nothing, where Cut::follow() would, or a cut is named twice.
 Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objects, Index triangle_budget);
 
 // Which interior nodes the criterion unfolds from a viewpoint, each tested by itself, whatever is above it: one bit a node, the first
-// node's lowest. Of the options, the threshold and back faces count. Fails where the viewpoint is not finite. What it says of damaged nodes
+// node's lowest. Of the options, the threshold and back faces count. Fails where Cut::follow() does. What it says of damaged nodes
 // (see VertexTree::is_sound) means nothing. Cost: some ten nanoseconds a node.
 Result<std::vector<std::uint64_t>> test_every_node(const VertexTree& tree, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
                                                    const FollowOptions& options = {});

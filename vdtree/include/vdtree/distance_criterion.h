@@ -69,6 +69,7 @@ public:
     static Result<DistanceCriterion> create(const VertexTree& tree, Parts parts);
 
     const Parts& parts() const noexcept { return parts_; }
+    NodeId interior_count() const noexcept { return interior_count_; } // of the tree that it was made for
     bool uses_silhouettes() const noexcept { return uses_silhouettes_; }
     // Whether no node's reach exceeds its parent's. Then a cut needs to watch only its border; else every node above it, too.
     bool is_monotone() const noexcept { return is_monotone_; }
@@ -90,6 +91,7 @@ private:
     explicit DistanceCriterion(Parts parts);
 
     Parts parts_;
+    NodeId interior_count_ = 0;
     bool uses_silhouettes_ = false, is_monotone_ = false;
     std::uint64_t id_;
     ObjectId object_id_;

@@ -48,7 +48,7 @@ struct MovedVertex {
 // bytes an interior node, and about 200 bytes a gliding vertex.
 class Geomorph {
 public:
-    // The tree must outlive the geomorph. Fails where an option is negative or NaN, or the time infinite.
+    // Keeps the tree's data. Fails where an option is negative or NaN, or the time infinite.
     static Result<Geomorph> create(const VertexTree& tree, const GeomorphOptions& options = {});
 
     // Lets `seconds` go by, then takes up what has changed of the followed cut since the last step; glides that begin

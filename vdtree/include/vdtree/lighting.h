@@ -42,7 +42,7 @@ struct Lighting {
 inline constexpr std::size_t most_lights = 16;
 inline constexpr double most_shininess = 1024;
 
-// Finite, not negative, directions of unit length, angles in order, not all dark. The error names the field, as in
+// Not negative, intensities up to 1e12, distances and places up to 1e18 mesh units, directions of unit length, angles in order, not all dark. The error names the field, as in
 // "lights[2].distance".
 Result<void> validate(const Lighting& lighting);
 

@@ -10,6 +10,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -35,10 +36,10 @@ struct Material {
     std::string name;                 // of the MeshRange; different for all materials of a file
     glm::vec4 colour = glm::vec4(1);  // linear RGB, 0..1, that vertex colours and texture are multiplied with; alpha
     std::filesystem::path image = {}; // beside the mesh file, or below; empty: none
-    std::string image_bytes = {};     // the image file itself, where the mesh file holds it
+    std::shared_ptr<const std::string> image_bytes = {}; // the image file itself, where the mesh file holds it; shared by all materials that have it; or null
     Wrap wrap_u = Wrap::repeat, wrap_v = Wrap::repeat;
 
-    bool has_image() const { return !image.empty() || !image_bytes.empty(); }
+    bool has_image() const { return !image.empty() || image_bytes; }
 };
 
 struct ReadResult {

@@ -154,18 +154,23 @@ public:
     Sphere bounding_sphere() const noexcept; // of the triangles' corners
     LuminanceRange luminance_range() const noexcept; // of all that is drawn
 
-    // Luminance and its bounds under another light; everything else is shared with this tree. Cost: one pass over the
+    // Luminance and its bounds under another light, without fold_errors() and fold_stages(), which were measured under this one; everything
+    // else is shared with this tree. Cost: one pass over the
     // triangles and the nodes. A pre-lit mesh (with colours) is shaded by its colours times the light.
     const Light& light() const noexcept;
     bool is_prelit() const noexcept; // luminance comes from the colours alone
     // Fails where check() does.
     Result<VertexTree> relit(const Light& light) const;
 
-    // The same tree without its texture, under its light, with luminance and bounds of its vertices alone; everything else is shared.
+    // The same tree without its texture, under its light, with luminance and bounds of its vertices alone; everything else is shared, but for
+    // fold_errors() and fold_stages(), which it has not.
     // Vertices without colours then have the default albedo, lit. Fails where check() does. Cost: as relit().
     Result<VertexTree> untextured() const;
 
     std::uint64_t byte_size() const noexcept; // of all arrays; those of a mapped tree are resident only where they were used
+
+    // Another handle to the same data, which lives as long as one of them.
+    VertexTree share() const { return VertexTree(data_); }
 
     struct Data; // the arrays, for the builder and the file reader
     explicit VertexTree(std::shared_ptr<const Data> data);
@@ -179,7 +184,8 @@ private:
 };
 
 // Checks everything that the tree promises: that spheres, masks, slabs, intervals and displacements contain what they
-// should and nest, and that every triangle vanishes where it is said to. The error names the first offender.
+// should and nest, and that every triangle vanishes where it is said to. Displacements are compared with the first 4096 leaves of a node; of
+// fold errors, that they are numbers and nest. The error names the first offender.
 // Cost: leaves times depth.
 Result<void> verify(const VertexTree& tree);
 
