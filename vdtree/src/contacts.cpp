@@ -22,7 +22,8 @@ using Corners = std::array<glm::vec3, 3>;
 constexpr float near_share = 0.25f; // of a triangle's size: no triangles of a smooth surface come so near but neighbours
 // Looked at for one triangle: amid more than these, it counts as touching one.
 constexpr int most_nodes = 4000;
-constexpr std::size_t most_triangles = 16000; // so that no vertex of very many triangles costs their square
+constexpr std::size_t most_triangles = 16000; // around corners: no vertex of very many triangles costs their square
+constexpr std::size_t most_boxes = std::size_t{1} << 32; // of all triangles together, in trees so flat that nodes have very many: some seconds
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
 float unit(float part, float whole) { return whole > 0 ? std::clamp(part / whole, 0.0f, 1.0f) : 0.0f; }
@@ -114,7 +115,8 @@ public:
     explicit ContactFinder(const VertexTree& tree)
         : tree_(tree), interior_(tree.interior_count()), triangles_(tree.triangles()), scale_(unit_scale(tree.bounding_sphere().radius)),
           luminance_(tree.luminance().subspan(interior_)),
-          first_triangle_(tree.first_triangle()), boxes_(interior_), of_leaf_(tree) {
+          first_triangle_(tree.first_triangle()), boxes_(interior_), of_leaf_(tree),
+          boxes_a_triangle_(std::max(most_triangles, most_boxes / std::max<std::size_t>(triangles_.size(), 1))) {
         const auto leaves = tree.positions().subspan(interior_);
         positions_.assign(leaves.begin(), leaves.end());
         for (glm::vec3& p : positions_) p *= scale_;
@@ -181,7 +183,7 @@ private:
         if (!(near > 0)) return contact;
         const Box around = box_of(own).wider(near);
         int nodes = 0;
-        std::size_t looked_at = 0; // triangles
+        std::size_t looked_at = 0, boxes = 0;
         waiting.assign(1, VertexTree::root());
         while (!waiting.empty()) {
             const NodeId node = waiting.back();
@@ -190,9 +192,9 @@ private:
             for (Index other = first_triangle_[node]; other < first_triangle_[node + 1]; ++other) {
                 const Triangle& t = triangles_[other];
                 const Corners its = corners(other);
-                const bool is_other = around.meets(box_of(its)) && !are_neighbours(triangles_[triangle], t, looked_at);
-                if (++looked_at > most_triangles) return {0, 0};
-                if (!is_other) continue;
+                if (++boxes > boxes_a_triangle_) return {0, 0};
+                if (!around.meets(box_of(its)) || are_neighbours(triangles_[triangle], t, looked_at)) continue;
+                if (looked_at > most_triangles) return {0, 0};
                 const glm::vec3 way = way_between(own, its);
                 const float gap = glm::length(way);
                 if (!(gap < near) || is_beside(own, its, way)) continue;
@@ -215,6 +217,7 @@ private:
     std::span<const Index> first_triangle_;
     std::vector<Box> boxes_; // by interior node
     LeafTriangles of_leaf_;
+    std::size_t boxes_a_triangle_; // at most
 };
 
 } // namespace
