@@ -62,13 +62,18 @@ public:
         brightest_ = std::max(range.hi, scene.background);
         pixel_deg_ = 1 / perception::coarsest_pixels_per_degree(scene.display).value();
         has_gaze_ = what.gaze_px.has_value() && viewpoint.gaze.has_value();
+        ahead_ = scene.placement.direction_to_mesh(-vdtree::camera_frame(scene.view).back);
+        const double half_screen_deg = perception::physical_field(scene.display, scene.view.height).value() / 2;
+        magnification_ = std::tan(half_screen_deg / perception::degrees_per_radian) / std::tan(scene.view.fov_y_degrees / 2 / perception::degrees_per_radian);
+        if (has_gaze_) gaze_on_screen_ = on_screen(*viewpoint.gaze);
     }
 
     double frequency(NodeId node) const {
         const vdtree::Sphere& ring = tree_.bounds()[node].ring;
-        const double distance = glm::length(glm::dvec3(ring.centre) - viewpoint_.eye);
-        const double extent = ring.radius < distance ? 2 * std::asin(ring.radius / distance) * perception::degrees_per_radian : 180;
-        return 1 / (2 * std::max(extent, pixel_deg_));
+        const glm::dvec3 to_centre = glm::dvec3(ring.centre) - viewpoint_.eye;
+        const double distance = glm::length(to_centre);
+        const double angle = ring.radius < distance ? 2 * std::asin(ring.radius / distance) * perception::degrees_per_radian : 180;
+        return 1 / (2 * std::clamp(angle * largest_magnification(to_centre), pixel_deg_, 180.0));
     }
 
     double contrast(NodeId node) const {
@@ -90,17 +95,34 @@ public:
         const glm::dvec3 to_centre = glm::dvec3(ring.centre) - viewpoint_.eye;
         const double distance = glm::length(to_centre);
         if (!has_gaze_ || !(ring.radius < distance)) return 0;
-        const double angle = std::atan2(glm::length(glm::cross(to_centre, *viewpoint_.gaze)), glm::dot(to_centre, *viewpoint_.gaze));
-        return std::max(0.0, angle - std::asin(ring.radius / distance)) * perception::degrees_per_radian;
+        const glm::dvec3 seen = on_screen(to_centre);
+        const double angle = std::atan2(glm::length(glm::cross(seen, gaze_on_screen_)), glm::dot(seen, gaze_on_screen_));
+        return std::max(0.0, angle - std::asin(ring.radius / distance) * largest_magnification(to_centre)) * perception::degrees_per_radian;
     }
 
 private:
+    // Where the viewer sees on the screen what the camera sees there.
+    glm::dvec3 on_screen(glm::dvec3 direction) const {
+        const double depth = glm::dot(direction, ahead_);
+        return depth > 0 ? depth * ahead_ + magnification_ * (direction - depth * ahead_) : direction;
+    }
+    // Of small angles there, along the radius or across it.
+    double largest_magnification(glm::dvec3 direction) const {
+        const double depth = glm::dot(direction, ahead_), m = magnification_;
+        if (!(depth > 0)) return std::max(m, 1 / m);
+        const glm::dvec3 aside = direction - depth * ahead_;
+        const double t2 = glm::dot(aside, aside) / (depth * depth), across_squared = (1 + t2) / (1 + m * m * t2);
+        return m * std::max(across_squared, std::sqrt(across_squared));
+    }
+
     const Scene& scene_;
     const vdtree::VertexTree& tree_;
     const vdtree::Viewpoint& viewpoint_;
     float darkest_ = 0, brightest_ = 1;
     double pixel_deg_ = 0;
     bool has_gaze_ = false;
+    glm::dvec3 ahead_{0}, gaze_on_screen_{0};
+    double magnification_ = 1; // of tangents, from the camera to the screen
 };
 
 // ---- colours

@@ -126,6 +126,7 @@ void check(const RenderArguments& a) {
         if (a.out.empty()) refuse("-o is required (or --path).");
         if (a.map && !is_for_people(a.out)) refuse("--show draws pictures for people: -o must end in .png.");
         if (a.map == FoldMap::cost && a.what.mode == Mode::full) refuse("--show cost and --full exclude each other: nothing is folded.");
+        if (a.map == FoldMap::contrast && !a.view.lights.empty()) refuse("--show contrast is of the mesh's own light, and excludes --lights.");
         if (a.map == FoldMap::eccentricity && !a.what.gaze_px && o.gaze.source == GazeSource::none)
             refuse("--show eccentricity needs --gaze: without one all counts as looked at.");
         if (!o.csv.empty() || !o.plot.empty() || o.threshold != 1 || !o.draws || o.geomorph_seconds)

@@ -350,6 +350,21 @@ TEST_F(RenderCommandTest, MapsShowWhatFoldsCost) {
     const std::vector<std::string> aside = {"--gaze", "1191", "80"};
     for (const std::string map : {"cost", "frequency", "contrast", "eccentricity"}) EXPECT_GT(share_of_colour(map, aside), 0.05) << map;
     EXPECT_GT(share_of_colour("cost", aside), share_of_colour("cost", {})) << "more is folded in the corner of the eye";
+    // Angles are those on the screen: whatever field the camera shows there, the same place has nearly the same colour.
+    for (const std::string field : {"4.65", "20"}) render({"--show", "eccentricity", "--gaze", "1191", "80", "--fov", field, "--triangles", "60"}, field + ".png");
+    const auto usual = read_image(path("4.65.png")), wide = read_image(path("20.png"));
+    ASSERT_TRUE(wide && usual);
+    double difference = 0, places = 0;
+    for (int y = 0; y < 160; ++y) {
+        for (int x = 0; x < 200; ++x) {
+            const auto is_coloured = [&](const auto& image) { return image.at(x, y, 0) != image.at(x, y, 1); };
+            if (!is_coloured(wide->image) || !is_coloured(usual->image)) continue;
+            ++places;
+            for (int k = 0; k < 3; ++k) difference += std::abs(static_cast<double>(wide->image.at(x, y, k) - usual->image.at(x, y, k)));
+        }
+    }
+    EXPECT_GT(places, 2000);
+    EXPECT_LT(difference / places, 0.1);
     EXPECT_EQ(run({"render", "ball.vdt", "-o", "map.png", "--show", "eccentricity"}).status, 2) << "of which gaze?";
     EXPECT_EQ(run({"render", "ball.vdt", "-o", "map.png", "--show", "cost", "--full"}).status, 2);
     EXPECT_FALSE(fs::exists(path("map.png")));
@@ -376,6 +391,7 @@ TEST_F(RenderCommandTest, WrongUsageIsStatusTwo) {
                                                {"sheet", "ball.vdt", "-o", "out.png", "--full"},
                                                {"render", "ball.vdt", "--path", "orbit:0:2", "--threshold", "2", "--triangles", "20"},
                                                {"render", "ball.vdt", "--path", "orbit:0:2", "-o", "%d/o.png"},
+                                               {"render", "ball.vdt", "-o", "out.png", "--show", "contrast", "--lights", "l.json"},
                                                {"view", "ball.vdt", "--frames", "0"},
                                                {"view", "ball.vdt", "--gaze", "1", "2", "--gaze-mode", "head"},
                                                {"view", "ball.vdt", "--lights", "l.json", "--geomorph", "1"},
