@@ -176,9 +176,10 @@ struct Lanes {
         Ints row, other_row, bin;
     };
     static UNSEEN_INLINE Floats slack(const KernelView& view, const SlackQuery& of) {
-        const auto& [gap, inward, eccentricity, length, other_length, row, other_row, bin] = of;
+        const Floats &gap = of.gap, &inward = of.inward, &eccentricity = of.eccentricity;
+        const Ints& bin = of.bin;
         const auto within = [&](const Ints& at) UNSEEN_INLINE_LAMBDA {
-            return max_of(distances(view, row, at, length), distances(view, other_row, at, other_length));
+            return max_of(distances(view, of.row, at, of.length), distances(view, of.other_row, at, of.other_length));
         };
         const Ints outward_bins = __builtin_convertvector(inward, Ints); // reaches shrink away from the gaze
         const Floats degrees = all(1 / view.bins_per_radian);
