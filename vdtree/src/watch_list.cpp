@@ -323,7 +323,7 @@ void WatchList::find_due_blocks(BlockId first) {
     for (std::size_t word = 0; word < due_blocks_.size(); ++word)
         for (std::uint64_t bits = due_blocks_[word]; bits; bits &= bits - 1)
             looked_at_.push_back(static_cast<BlockId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))));
-    std::ranges::rotate(looked_at_, std::ranges::lower_bound(looked_at_, first));
+    std::rotate(looked_at_.begin(), std::ranges::lower_bound(looked_at_, first), looked_at_.end());
 }
 
 std::span<const WatchList::Slot> WatchList::collect_due(std::span<const BlockId> blocks) {
