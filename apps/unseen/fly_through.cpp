@@ -299,10 +299,9 @@ std::string complaint_about_picture_names(const std::string& pattern) {
 }
 
 Result<void> fly_through(const std::string& model, const ViewOptions& view, const DisplayOptions& display, const FlyThroughOptions& options) {
-    if (const auto ready = check_outputs({model, options.path, options.gaze.trace, view.lights, view.texture.file, display.file, display.csf},
-                                         {options.csv, options.plot, options.json});
-        !ready)
-        return ready;
+    std::vector<std::string> inputs = inputs_of(model, view, display);
+    inputs.insert(inputs.end(), {options.path, options.gaze.trace});
+    if (const auto ready = check_outputs(inputs, {options.csv, options.plot, options.json}); !ready) return ready;
     const auto path = CameraPath::read(options.path, view.up.value_or(vdtree::View().up));
     if (!path) return path.error();
     if (path->has_gaze() && (options.what.gaze_px || options.gaze.source != GazeSource::none))

@@ -23,7 +23,11 @@ bool is_same(const std::string& a, const std::string& b) {
 
 } // namespace
 
-Result<void> check_outputs(std::initializer_list<std::string> inputs, std::initializer_list<std::string> outputs) {
+std::vector<std::string> inputs_of(const std::string& model, const ViewOptions& view, const DisplayOptions& display) {
+    return {model, view.lights, view.texture.file, display.file, display.csf};
+}
+
+Result<void> check_outputs(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs) {
     for (auto output = outputs.begin(); output != outputs.end(); ++output) {
         if (std::any_of(inputs.begin(), inputs.end(), [&](const std::string& input) { return is_same(input, *output); }))
             return Error{ErrorCode::invalid_argument, "'" + *output + "' is read: give the output another name."};

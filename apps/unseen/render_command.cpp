@@ -45,8 +45,7 @@ Result<int> run_flight(RenderArguments& a) {
 
 Result<int> run(RenderArguments& a) {
     if (!a.flight.path.empty()) return run_flight(a);
-    if (const auto ready = check_outputs({a.model, a.view.lights, a.view.texture.file, a.display.file, a.display.csf}, {a.out, a.json}); !ready)
-        return ready.error();
+    if (const auto ready = check_outputs(inputs_of(a.model, a.view, a.display), {a.out, a.json}); !ready) return ready.error();
     const auto gaze = GazePlayer::create(a.flight.gaze);
     if (!gaze) return gaze.error();
     auto report = JsonReport::open(a.json);

@@ -224,8 +224,7 @@ void print(const std::vector<Column>& columns) {
 }
 
 Result<int> run(const SheetArguments& a) {
-    if (const auto ready = check_outputs({a.model, a.view.lights, a.view.texture.file, a.display.file, a.display.csf}, {a.out, a.json}); !ready)
-        return ready.error();
+    if (const auto ready = check_outputs(inputs_of(a.model, a.view, a.display), {a.out, a.json}); !ready) return ready.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     auto context = render::Context::headless();

@@ -25,8 +25,7 @@ struct SimplifyArguments {
 constexpr double nothing_drawn = std::numeric_limits<double>::quiet_NaN();
 
 Result<int> run(SimplifyArguments& a) {
-    if (const auto ready = check_outputs({a.model, a.view.lights, a.view.texture.file, a.display.file, a.display.csf}, {a.out, a.json}); !ready)
-        return ready.error();
+    if (const auto ready = check_outputs(inputs_of(a.model, a.view, a.display), {a.out, a.json}); !ready) return ready.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     auto scene = load_scene(a.model, a.view, a.display);

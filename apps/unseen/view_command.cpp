@@ -19,9 +19,9 @@ struct ViewArguments {
 };
 
 Result<int> run(ViewArguments& a) {
-    if (const auto ready = check_outputs({a.model, a.view.lights, a.view.texture.file, a.display.file, a.display.csf, a.gaze.trace}, {a.viewer.screenshot});
-        !ready)
-        return ready.error();
+    std::vector<std::string> inputs = inputs_of(a.model, a.view, a.display);
+    inputs.push_back(a.gaze.trace);
+    if (const auto ready = check_outputs(inputs, {a.viewer.screenshot}); !ready) return ready.error();
     auto gaze = GazePlayer::create(a.gaze);
     if (!gaze) return gaze.error();
     // Not to be seen before there is something to see.

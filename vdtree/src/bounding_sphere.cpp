@@ -302,7 +302,7 @@ void BallLanes::find_points() {
     find_farthest_points(std::span(rows_).first(row_count_), from_, farthest_);
 }
 
-DSphere BallLanes::farthest(std::size_t lane) const { 
+DSphere BallLanes::farthest(std::size_t lane) const {
     DSphere out{rows_[static_cast<std::size_t>(farthest_.row[lane])].at(lane), 0};
     if (spheres_[lane].empty()) return out;
     double most = std::sqrt(farthest_.squared[lane]);
