@@ -224,9 +224,7 @@ void simulate(Procedure& procedure, const SimulatedObserver& observer) {
 
 Result<perception::CsfTable> expected_table(const CalibrateArguments& a, const perception::Display& display) {
     if (a.display.csf.empty()) return perception::CsfTable::standard();
-    auto choice = choose_csf(a.display.csf);
-    if (!choice) return choice.error();
-    return choice->model ? perception::CsfTable::from_model(*choice->model, {.distance = display.distance}) : *std::move(choice->table);
+    return csf_table(a.display.csf, display);
 }
 
 Result<Procedure> begin_or_resume(const CalibrateArguments& a, const perception::Display& display) {

@@ -129,6 +129,12 @@ Result<CsfChoice> choose_csf(const std::string& model_or_file) {
     return CsfChoice{{}, std::move(*table)};
 }
 
+Result<perception::CsfTable> csf_table(const std::string& model_or_file, const perception::Display& display) {
+    auto choice = choose_csf(model_or_file);
+    if (!choice) return choice.error();
+    return choice->model ? perception::CsfTable::from_model(*choice->model, {.distance = display.distance}) : *std::move(choice->table);
+}
+
 const perception::CsfTable* Scene::csf_table(perception::Degrees margin) const {
     if (margin.value() == 0) return &csf_table();
     if (!kept.widened_tables) kept.widened_tables = std::make_unique<perception::WidenedTables>(csf_table());
@@ -174,9 +180,7 @@ Result<Surroundings> read_surroundings(const ViewOptions& view, const DisplayOpt
     if (!background) return background.error();
     Surroundings around{*shown_on, *background, {}, {}};
     if (!display.csf.empty()) {
-        auto choice = choose_csf(display.csf);
-        if (!choice) return choice.error();
-        auto table = choice->model ? perception::CsfTable::from_model(*choice->model, {.distance = shown_on->distance}) : *std::move(choice->table);
+        auto table = csf_table(display.csf, *shown_on);
         if (!table) return table.error();
         around.csf = std::move(*table);
     }

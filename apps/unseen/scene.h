@@ -72,6 +72,8 @@ struct CsfChoice {
     std::optional<perception::CsfTable> table; // of the file; where a model is named, none
 };
 Result<CsfChoice> choose_csf(const std::string& model_or_file);
+// Its table, of a model for the display's distance.
+Result<perception::CsfTable> csf_table(const std::string& model_or_file, const perception::Display& display);
 
 // Fails on a file that cannot be read, and on options that contradict the model or the display.
 Result<Scene> load_scene(const std::filesystem::path& model, const ViewOptions& view, const DisplayOptions& display);
