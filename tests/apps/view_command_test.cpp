@@ -142,6 +142,15 @@ TEST_F(ViewCommandTest, FoldingCanBeginAtTheFullModel) {
     EXPECT_EQ(ended(), 0) << errors();
 }
 
+TEST_F(ViewCommandTest, AClosedWindowTakesNoKeysAndHarmsNobody) {
+    if (!open({"--full"})) GTEST_SKIP() << "no window: " << errors();
+    window().title_with("full");
+    window().press(XK_q);
+    ASSERT_EQ(ended(), 0) << errors();
+    window().press(XK_w);
+    EXPECT_EQ(window().title(), "");
+}
+
 TEST_F(ViewCommandTest, ResetGoesBackToTheFirstView) {
     if (!open({"--screenshot", "reset.png"})) GTEST_SKIP() << "no window: " << errors();
     window().title_with("imperceptible"); // a budget's cut depends on the way, within its hysteresis

@@ -32,7 +32,8 @@ public:
         char* arguments[] = {program, displayfd, descriptor.data(), screen, zero, size, nolisten, tcp, nullptr};
         posix_spawn_file_actions_t quiet;
         posix_spawn_file_actions_init(&quiet);
-        posix_spawn_file_actions_addopen(&quiet, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+        // Not the test's own: who reads them would wait for the server, too, where a test dies without stopping it.
+        for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) posix_spawn_file_actions_addopen(&quiet, stream, "/dev/null", O_WRONLY, 0);
         const int failed = posix_spawnp(&process_, program, &quiet, nullptr, arguments, environ);
         posix_spawn_file_actions_destroy(&quiet);
         close(ends[1]);
