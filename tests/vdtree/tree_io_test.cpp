@@ -204,7 +204,7 @@ TEST_F(TreeIo, SaysWhatIsWrongWithTheHeader) {
     EXPECT_FALSE(is_tree_file(file_));
 
     std::string bad = good;
-    for (const std::uint32_t version : {0u, 1u, 3u, ~0u}) {
+    for (const std::uint32_t version : {0u, 2u, 4u, ~0u}) {
         support::store(bad, TreeFile::version_at, version);
         TreeFile::seal(bad);
         expect_refused(bad, "version " + std::to_string(version) + " of the format");

@@ -20,7 +20,7 @@ constexpr float levels_per_octave = 1;   // of the order in which nodes fold
 constexpr int most_levels = 40;
 constexpr float flat_share = 0.5f; // of a surface's area that its vector area must come to; else its parts count without cancelling
 constexpr float spread = 1;        // standard deviations by which what is folded may differ from all that could be
-constexpr float least_contrast = 1e-3f; // relative luminance: below, errors do not order the folds any more
+constexpr float least_contrast = 2e-3f; // relative luminance: below, errors do not order the folds any more
 constexpr float darkest = 0.01f; // relative luminance of areas; about a display's black
 constexpr float least_side = 0.25f; // of a surface's area, as seen: less is not what the mean is taken of
 constexpr std::size_t most_fading = 3;
@@ -58,7 +58,7 @@ private:
     void order() {
         order_.resize(interior_);
         for (NodeId node = interior_; node-- > 0;) {
-            const float own = changed_radius(tree_, errors_, node) * std::sqrt(errors_[node].mean_luminance + least_contrast);
+            const float own = changed_radius(tree_, errors_, node) * std::sqrt(errors_[node].wide_luminance + least_contrast);
             order_[node] = std::max(order_[node], own);
             if (node > 0) order_[parents_[node]] = std::max(order_[parents_[node]], order_[node]);
         }

@@ -28,7 +28,7 @@ constexpr std::size_t direction_count = 26;
 constexpr double first_share = 0.8;     // of the nodes that the first stage leaves; finer ones are for near views, which go by other bounds
 constexpr double stages_per_halving = 2;
 constexpr double fewest_left = 4;       // nodes; then all fold
-constexpr float outline_contrast = 0.3f; // of a typical outline: what a distance between surfaces changes of the light
+constexpr float outline_contrast = 0.6f; // of a typical outline: what a distance between surfaces changes of the light
 
 // From where a picture is taken: the mesh's sphere fills it, but for the margin. Lengths are in samples.
 struct Camera {
@@ -247,7 +247,7 @@ private:
         std::vector<float> light(interior_); // that the fold changes, as the side of a square of it
         for (NodeId node = interior_; node-- > 0;) {
             const FoldError& e = errors_[node];
-            const float own = outline_contrast * e.mean_distance + changed_radius(tree_, errors_, node) * e.mean_luminance;
+            const float own = outline_contrast * e.mean_distance + changed_radius(tree_, errors_, node) * e.wide_luminance;
             light[node] = std::max(light[node], own);
             if (node > 0) light[parents_[node]] = std::max(light[parents_[node]], light[node]);
         }

@@ -13,6 +13,7 @@
 #include "contacts.h"
 #include "drift.h"
 #include "find_stages.h"
+#include "fold_picture.h"
 #include "keep_light.h"
 #include "leaf_triangles.h"
 #include "scaled_geometry.h"
@@ -34,11 +35,17 @@ constexpr float least_sine = 0.1f; // of the angle at which parts meet: flatter 
 // square of its depth.
 constexpr int most_steps = 1024;
 constexpr Index leaves_of_part = 4096;   // of a subtree that one task measures
+constexpr Index most_triangles_drawn = 4096; // of the mesh's own, in a picture; in place of more, those of the children
+// Half of a picture's side, in widths of what changes. Half an octave apart, so that nothing lies between bands.
+constexpr std::array<float, 2> picture_sizes = {1.5f, 2.1f};
+// Of a sine, whose mean is 2 / pi of it: 1.6; and more where neighbours err alike. Found by comparing pictures.
+constexpr float amplitude_of_mean = 1.9f;
+// An outline moves with the folds beside it, too. Found by comparing pictures.
+constexpr float moved_by_neighbours = 1.4f;
+// A mean over some cells is less than the largest shift of an outline that curves. Found by comparing pictures.
+constexpr float peak_of_shift = 1.2f;
 
-struct Point {
-    glm::vec3 position;
-    float luminance;
-};
+using Point = LitPoint;
 
 struct Difference {
     float distance = 0, luminance = 0;
@@ -219,6 +226,7 @@ private:
         Surface before_surface, after_surface;
         std::vector<Sample> samples;
         std::vector<Child> children;
+        FoldPicture picture;
 
         void clear() {
             for (auto* surface : {&before, &after, &fine_before, &fine_after}) surface->clear();
@@ -343,27 +351,98 @@ private:
             mean.include(over_fine_before.value());
             mean.include(over_fine_after.value());
         }
-        NormalSlabs facing = turned.slabs();
-        float extent = 0;
+        const float reach = mean_reach(scratch.after, proxy) / 2;
+        FoldError& error = errors_[node];
+        error.extent = reach;
+        error.mean_distance = mean.distance;
+        error.facing = turned.slabs();
+        const Drawn drawn = draw(node, scratch, std::max(support_[node].radius, reach));
+        if (drawn.is_height_field) {
+            error.distance = std::max(peak_of_shift * drawn.shift, mean.distance);
+            error.luminance = drawn.largest;
+            error.wide_luminance = drawn.wide;
+        } else { // something may be under what was drawn
+            error.distance = moved_by_neighbours * worst.distance;
+            error.luminance = std::max(drawn.largest, worst.luminance);
+            error.wide_luminance = std::max(drawn.wide, amplitude_of_mean * mean.luminance);
+        }
         tree_.for_each_child(node, [&](NodeId child) {
             if (tree_.is_leaf(child)) return;
-            worst.include({errors_[child].distance, errors_[child].luminance});
-            facing |= errors_[child].facing;
-            extent = std::max(extent, errors_[child].extent);
+            error.distance = std::max(error.distance, errors_[child].distance);
+            error.extent = std::max(error.extent, errors_[child].extent);
+            error.facing |= errors_[child].facing;
         });
         // Where parts meet, a fold moves the line along which the one hides the other, like an outline, whatever they face: the farther, the
         // flatter they meet.
         const Contact& contact = contacts_[node];
-        if (worst.distance > 0 && contact.gap < contact_reach * worst.distance) {
-            facing = NormalSlabs::everything();
-            worst.distance = std::max(worst.distance, std::min(worst.distance / std::max(contact.sine, least_sine), tree_.bounds()[node].ring.radius));
+        if (error.distance > 0 && contact.gap < contact_reach * error.distance) {
+            error.facing = NormalSlabs::everything();
+            error.distance = std::max(error.distance, std::min(error.distance / std::max(contact.sine, least_sine), tree_.bounds()[node].ring.radius));
         }
-        errors_[node].distance = worst.distance;
-        errors_[node].luminance = worst.luminance;
-        errors_[node].mean_distance = mean.distance;
-        errors_[node].mean_luminance = mean.luminance;
-        errors_[node].facing = facing;
-        errors_[node].extent = std::max(mean_reach(scratch.after, proxy) / 2, extent);
+    }
+
+    struct Drawn {
+        bool is_height_field = false;
+        float shift = 0;
+        float largest = 0, wide = 0; // amplitudes: see FoldError
+    };
+
+    // Compares pictures of the mesh with those of the folded surface: with folded neighbours, and with none folded.
+    Drawn draw(NodeId node, Scratch& scratch, float width) const {
+        glm::vec3 normal(0);
+        for (const Ring& t : scratch.after) {
+            const glm::vec3 a = t.corner[0].position;
+            normal += glm::cross(t.corner[1].position - a, t.corner[2].position - a);
+        }
+        const float length = glm::length(normal);
+        if (!(length > 0) || !(width > 0)) return {};
+        FoldPicture& picture = scratch.picture;
+        Drawn drawn{.is_height_field = true};
+        const auto compare = [&](std::span<const Ring> folded) {
+            picture.clear(FoldPicture::Layer::folded);
+            for (const Ring& t : folded) picture.draw(FoldPicture::Layer::folded, t.corner[0], t.corner[1], t.corner[2]);
+            drawn.shift = std::max(drawn.shift, picture.shift());
+            const std::array<float, FoldPicture::bands> amplitudes = picture.amplitudes();
+            for (std::size_t band = 0; band < amplitudes.size(); ++band) {
+                drawn.largest = std::max(drawn.largest, amplitudes[band]);
+                drawn.wide = std::max(drawn.wide, amplitudes[band] / share_in_wave(2 * width / picture.wavelength(band)));
+            }
+        };
+        for (const float size : picture_sizes) {
+            picture.look(positions_[node], normal / length, size * width);
+            draw_mesh(node, scratch, picture);
+            compare(scratch.after);
+            if (scratch.fine_before.size() <= most_fine_triangles) compare(scratch.fine_after);
+            drawn.is_height_field &= picture.is_height_field();
+        }
+        drawn.largest = std::max(drawn.largest, drawn.wide);
+        return drawn;
+    }
+
+    // The mesh around the support.
+    void draw_mesh(NodeId node, const Scratch& scratch, FoldPicture& picture) const {
+        const auto draw = [&](Index t) {
+            const Triangle& corners = triangles_[t];
+            picture.draw(FoldPicture::Layer::mesh, leaf_point(corners[0]), leaf_point(corners[1]), leaf_point(corners[2]));
+        };
+        const Index first = first_triangle_[node], end = first_triangle_[tree_.subtree_end()[node]]; // those that vanish in the support
+        if (end - first > most_triangles_drawn) {
+            for (const Ring& t : scratch.before) picture.draw(FoldPicture::Layer::mesh, t.corner[0], t.corner[1], t.corner[2]);
+            return;
+        }
+        for (Index t = first; t < end; ++t) draw(t);
+        for (const Index t : crossing_[node])
+            if (t < first || t >= end) draw(t);
+    }
+
+    // What waves see of a patch, `waves` of theirs wide, of one grating's amplitude; of patches side by side whose signs differ at random, 1 / n of the
+    // amplitude over n times the width; and of its parts half as wide, four times the amplitude.
+    static float share_in_wave(float waves) {
+        if (waves >= 1) return std::exp2(2 * std::floor(std::log2(waves)));
+        constexpr float most_side_by_side = 4;
+        float share = 0;
+        for (float side = 1; side <= most_side_by_side; side *= 2) share = std::max(share, std::min(1.0f, side * side * waves * waves) / side);
+        return share;
     }
 
     // The mean distance of the ring's other corners from the proxy.
@@ -468,7 +547,7 @@ void include_proxies(const VertexTree& tree, std::span<const Unorm16> luminance,
 }
 
 bool are_finite(const FoldError& e) {
-    const float values[] = {e.distance, e.mean_distance, e.luminance, e.mean_luminance, e.extent, e.drift};
+    const float values[] = {e.distance, e.mean_distance, e.luminance, e.wide_luminance, e.extent, e.drift};
     return std::all_of(std::begin(values), std::end(values), [](float value) { return std::isfinite(value); });
 }
 

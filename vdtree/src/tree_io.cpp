@@ -27,7 +27,7 @@ namespace unseen::vdtree {
 namespace {
 
 constexpr std::array<char, 8> magic = {'U', 'N', 'S', 'E', 'E', 'N', 'V', 'T'};
-constexpr std::uint32_t format_version = 2;
+constexpr std::uint32_t format_version = 3;
 constexpr std::uint64_t page_bytes = 1 << 20;
 constexpr std::uint32_t most_sections = 64;
 constexpr std::size_t most_stages = 256; // that a byte can name
@@ -517,7 +517,7 @@ Result<void> Reader::check_values(const TreeGeometry& g, const TreeLuminance& l)
     for (const ChromaRange& r : l.ring_chroma)
         if (!(r.lo.x <= r.hi.x && r.lo.y <= r.hi.y)) return fail("A range of chroma ends before it begins.");
     for (const FoldError& e : l.fold_errors)
-        for (const float value : {e.distance, e.mean_distance, e.luminance, e.mean_luminance, e.extent, e.drift})
+        for (const float value : {e.distance, e.mean_distance, e.luminance, e.wide_luminance, e.extent, e.drift})
             if (!(value >= 0) || !std::isfinite(value)) return fail("An error of a fold is negative or not finite.");
     for (const FoldError& e : l.fold_errors)
         if (!l.fold_stages.empty() && e.stage >= l.fold_stages.size()) return fail("A node folds in a stage that is not there.");

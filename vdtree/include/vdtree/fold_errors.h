@@ -10,17 +10,22 @@ namespace unseen::vdtree {
 
 class VertexTree;
 
-// Of an interior node. The mesh's own surface in the node's support, and the surface before the fold, are compared with the ring of
-// triangles around the proxy: while the neighbours are folded as far as nodes that are no larger than this one and not much richer in
-// luminance, about the cut in which nodes fold in the order of what they cost; and while none is. Points compared: the children's
-// proxies, leaves spread over the support, the leaves that were worst in the children, and three points of the edges that the fold
-// moves, before it with the surface after it and the other way.
+// Of an interior node: what shows where it is folded instead of the mesh's own surface, while its neighbours are folded as far as nodes that are no larger
+// than this one and not much richer in luminance, about the cut in which nodes fold in the order of what they cost; and while none is.
+// Compared are small pictures of both surfaces, seen along the node's normal; and points: the children's proxies, leaves spread over the
+// support, the leaves that were worst in the children, and three points of the edges that the fold moves, before it with the surface after
+// it and the other way.
 //
-// A measurement, not a bound over all cuts: neighbours may be folded in other ways, and the worst point may lie between those compared.
+// A measurement, not a bound over all cuts: neighbours may be folded in other ways, and the pictures' cells and the points are few.
 struct FoldError {
-    // The largest found, no less than the children's, and the mean over the points that were not chosen for their errors.
-    float distance = 0, mean_distance = 0;   // mesh units: to the nearest point of the other surface
-    float luminance = 0, mean_luminance = 0; // relative, 0..1: the difference to that point
+    // By how far an outline moves: the largest difference of the surfaces' heights, in the mean over a seventh of the width; where one part
+    // of the surface is under another, the largest distance of a point from the other surface. No less than the children's. And the mean
+    // distance of points. Mesh units.
+    float distance = 0, mean_distance = 0;
+    // Relative, 0..1: what bands of spatial frequency see, as the amplitude of a grating. A band sees no more than of a patch as wide as the node
+    // of the amplitude `wide`, side by side with others like it of random signs, and of parts 2^-k as wide of 4^k times that, up to the
+    // largest amplitude.
+    float luminance = 0, wide_luminance = 0;
     // Mesh units: half the mean distance of the ring's other corners from the proxy. What a fold changes is largest at the vertex and fades
     // to nothing at these, so it is about as wide as this, in a radius, also where the support is small in a ring of long triangles.
     // No less than the children's.
