@@ -25,7 +25,10 @@ std::uint64_t bytes_of(const Array<T>& a) {
 
 constexpr PackedRange empty_range{{Unorm16::largest}, {0}};
 
-PackedRange unite(PackedRange a, PackedRange b) { return {std::min(a.lo, b.lo), std::max(a.hi, b.hi)}; }
+PackedRange unite(PackedRange a, PackedRange b) {
+    const int lo = a.lo.value < b.lo.value ? a.lo.value : b.lo.value, hi = a.hi.value > b.hi.value ? a.hi.value : b.hi.value;
+    return {{static_cast<std::uint16_t>(lo)}, {static_cast<std::uint16_t>(hi)}};
+}
 PackedRange unite(PackedRange a, Unorm16 y) { return unite(a, PackedRange{y, y}); }
 
 // Rounded up: eyes adapted to more light see no less.
