@@ -19,15 +19,15 @@ using Ints = int __attribute__((vector_size(16)));
 
 // The slabs' axes, as NormalSlabs has them; the last one is none.
 constexpr float s = 0.57735026918962576f;
-using Along = float __attribute__((vector_size(32)));
-using Units = int __attribute__((vector_size(32)));
-constexpr Along axis_x = {1, 0, 0, s, -s, s, s, 0};
-constexpr Along axis_y = {0, 1, 0, s, s, -s, s, 0};
-constexpr Along axis_z = {0, 0, 1, s, s, s, -s, 0};
+using EightFloats = float __attribute__((vector_size(32)));
+using EightInts = int __attribute__((vector_size(32)));
+constexpr EightFloats axis_x = {1, 0, 0, s, -s, s, s, 0};
+constexpr EightFloats axis_y = {0, 1, 0, s, s, -s, s, 0};
+constexpr EightFloats axis_z = {0, 0, 1, s, s, s, -s, 0};
 constexpr Ints is_axis = {-1, -1, -1, 0}; // of the second four
 
 // 128 more than the least whole units not below `along`.
-[[gnu::always_inline]] inline Units reached(Along along) { return 255 - __builtin_convertvector(units - margin - along, Units); }
+[[gnu::always_inline]] inline EightInts reached(EightFloats along) { return 255 - __builtin_convertvector(units - margin - along, EightInts); }
 
 // Which of the eight rows, as in cell_of().
 inline double row(double along, double b0, double b1, double b2) {
@@ -96,8 +96,8 @@ template <std::size_t capacity>
     }
     // Whole units outward: what is cut off is below the ends of the scale. Four numbers of eight bits are shifted into each lane.
     for (std::size_t i = 0; i < batch.count; ++i) {
-        const Along along = x[i] * axis_x + y[i] * axis_y + z[i] * axis_z;
-        const Units reach = reached(along) | reached(-along) << 8;
+        const EightFloats along = x[i] * axis_x + y[i] * axis_y + z[i] * axis_z;
+        const EightInts reach = reached(along) | reached(-along) << 8;
         Ints first, second;
         std::memcpy(&first, &reach, sizeof first);
         std::memcpy(&second, reinterpret_cast<const char*>(&reach) + sizeof first, sizeof second);

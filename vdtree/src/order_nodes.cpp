@@ -155,7 +155,8 @@ void find_vanishing(std::span<const Triangle> triangles, const NodeOrder& nodes,
         at[i] = shape.parents[shape.node_of_leaf(a ^ b ^ c ^ low[i] ^ high[i])];
         left[i] = static_cast<std::uint8_t>(i);
     }
-    for (int step = 0; count > 0 && step < 16; ++step) {
+    constexpr int most_steps = 16; // then jumps are quicker: the tree may be deep
+    for (int step = 0; count > 0 && step < most_steps; ++step) {
         std::size_t kept = 0;
         for (std::size_t j = 0; j < count; ++j) {
             const std::uint8_t i = left[j];
