@@ -143,7 +143,7 @@ void find_vanishing(std::span<const Triangle> triangles, const NodeOrder& nodes,
     const TreeShape& shape = nodes.shape;
     std::array<NodeId, most> at;
     std::array<Index, most> low, high;
-    const auto found = [&](std::size_t i, NodeId node) { return (shape.first_leaf[node] <= low[i]) | (high[i] < shape.leaf_end[node]); };
+    const auto found = [&](std::size_t i, NodeId node) { return (shape.first_leaf[node] <= low[i]) + (high[i] < shape.leaf_end[node]) > 0; };
     std::array<std::uint8_t, most> left;
     std::size_t count = triangles.size();
     for (std::size_t i = 0; i < count; ++i) {
