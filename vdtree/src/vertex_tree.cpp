@@ -11,6 +11,7 @@
 #include "chroma.h"
 #include "mask_pool.h"
 #include "node_check.h"
+#include "packed_range.h"
 #include "texture_bounds.h"
 #include "tree_parts.h"
 
@@ -25,10 +26,6 @@ std::uint64_t bytes_of(const Array<T>& a) {
 
 constexpr PackedRange empty_range{{Unorm16::largest}, {0}};
 
-PackedRange unite(PackedRange a, PackedRange b) {
-    const int lo = a.lo.value < b.lo.value ? a.lo.value : b.lo.value, hi = a.hi.value > b.hi.value ? a.hi.value : b.hi.value;
-    return {{static_cast<std::uint16_t>(lo)}, {static_cast<std::uint16_t>(hi)}};
-}
 PackedRange unite(PackedRange a, Unorm16 y) { return unite(a, PackedRange{y, y}); }
 
 // Rounded up: eyes adapted to more light see no less.
@@ -38,10 +35,6 @@ Unorm16 middle(PackedRange r) { return {static_cast<std::uint16_t>((r.lo.value +
 PackedRange shortened(PackedRange ring, PackedRange spread) {
     const int hi = ring.lo.value + (spread.hi.value - spread.lo.value);
     return {ring.lo, {static_cast<std::uint16_t>(std::min<int>(ring.hi.value, hi))}};
-}
-
-TreeLinks links_of(const TreeGeometry& g) {
-    return {g.parents, g.first_leaf, g.leaf_end, g.subtree_end};
 }
 
 // By leaf: the luminance of the triangles around, its own where there is none, and a third of their area, in double against
