@@ -266,8 +266,36 @@ private:
 
     void measure(NodeId node, Scratch& scratch) {
         crossing_[node] = crossing(node);
-        const Index begin = first_leaf_[node], end = leaf_end_[node];
         const Point proxy = point(node);
+        NormalSlabs facing = lay_out(node, scratch).slabs();
+        if (scratch.after.empty()) scratch.after.push_back({{proxy, proxy, proxy}, 7}); // all of it vanishes
+        Worst worst;
+        const Worst mean = compare_surfaces(node, scratch, worst);
+        float extent = 0;
+        tree_.for_each_child(node, [&](NodeId child) {
+            if (tree_.is_leaf(child)) return;
+            worst.include({errors_[child].distance, errors_[child].luminance});
+            facing |= errors_[child].facing;
+            extent = std::max(extent, errors_[child].extent);
+        });
+        // Where parts meet, a fold moves the line along which the one hides the other, like an outline, whatever they face: the farther, the
+        // flatter they meet.
+        const Contact& contact = contacts_[node];
+        if (worst.distance > 0 && contact.gap < contact_reach * worst.distance) {
+            facing = NormalSlabs::everything();
+            worst.distance = std::max(worst.distance, std::min(worst.distance / std::max(contact.sine, least_sine), tree_.bounds()[node].ring.radius));
+        }
+        errors_[node].distance = worst.distance;
+        errors_[node].luminance = worst.luminance;
+        errors_[node].mean_distance = mean.distance;
+        errors_[node].mean_luminance = mean.luminance;
+        errors_[node].facing = facing;
+        errors_[node].extent = std::max(mean_reach(scratch.after, proxy) / 2, extent);
+    }
+
+    // Puts the ring before and after the fold, coarse and fine, into `scratch`; returns what its triangles face.
+    NormalReach lay_out(NodeId node, Scratch& scratch) {
+        const Index begin = first_leaf_[node], end = leaf_end_[node];
         const auto is_inside = [&](Index leaf) { return leaf - begin < end - begin; };
         scratch.clear();
         tree_.for_each_child(node, [&](NodeId child) {
@@ -312,16 +340,18 @@ private:
             if (t >= first_triangle_[node] && t < first_triangle_[node + 1]) continue; // vanishes here
             Ring fine = whole;
             for (std::size_t k = 0; k < 3; ++k)
-                if ((whole.inside >> k) & 1) fine.corner[k] = proxy;
+                if ((whole.inside >> k) & 1) fine.corner[k] = point(node);
             add(scratch.fine_after, fine);
             if (are_distinct(shown)) add(scratch.after, after);
         }
+        return turned;
+    }
 
-        if (scratch.after.empty()) scratch.after.push_back({{proxy, proxy, proxy}, 7}); // all of it vanishes
+    // Raises the worst errors to those between the surfaces; returns the mean ones.
+    Worst compare_surfaces(NodeId node, Scratch& scratch, Worst& worst) {
         scratch.before_surface.assign(scratch.before);
         scratch.after_surface.assign(scratch.after);
         add_samples(node, scratch);
-        Worst worst;
         Mean over_leaves, over_before, over_after;
         for (Sample& sample : scratch.samples) {
             sample.error = scratch.after_surface.compare(sample.point);
@@ -343,27 +373,7 @@ private:
             mean.include(over_fine_before.value());
             mean.include(over_fine_after.value());
         }
-        NormalSlabs facing = turned.slabs();
-        float extent = 0;
-        tree_.for_each_child(node, [&](NodeId child) {
-            if (tree_.is_leaf(child)) return;
-            worst.include({errors_[child].distance, errors_[child].luminance});
-            facing |= errors_[child].facing;
-            extent = std::max(extent, errors_[child].extent);
-        });
-        // Where parts meet, a fold moves the line along which the one hides the other, like an outline, whatever they face: the farther, the
-        // flatter they meet.
-        const Contact& contact = contacts_[node];
-        if (worst.distance > 0 && contact.gap < contact_reach * worst.distance) {
-            facing = NormalSlabs::everything();
-            worst.distance = std::max(worst.distance, std::min(worst.distance / std::max(contact.sine, least_sine), tree_.bounds()[node].ring.radius));
-        }
-        errors_[node].distance = worst.distance;
-        errors_[node].luminance = worst.luminance;
-        errors_[node].mean_distance = mean.distance;
-        errors_[node].mean_luminance = mean.luminance;
-        errors_[node].facing = facing;
-        errors_[node].extent = std::max(mean_reach(scratch.after, proxy) / 2, extent);
+        return mean;
     }
 
     // The mean distance of the ring's other corners from the proxy.

@@ -47,91 +47,119 @@ Ancestors::Ancestors(const TreeShape& shape) : shape_(shape), jump_(shape.interi
     }
 }
 
-NodeOrder order_nodes(const Clustering& clustering, Index vertices, Index lone) {
-    const Index clusters = static_cast<Index>(clustering.parents.size()), root = clusters - 1;
-    const std::span<const Index> parents = clustering.parents;
+namespace {
 
-    // Up: children have lower numbers than their parents.
-    std::vector<ClusterPlace> places(clusters - vertices);
-    const auto place = [&](Index cluster) -> ClusterPlace& { return places[cluster - vertices]; };
-    const auto expect = [&](Index cluster) { prefetch(&place(parents[cluster])); };
-    for (Index v = 0; v < vertices; ++v) {
-        expect(std::min(v + ahead, root));
-        ClusterPlace& up = place(parents[v]);
-        ++up.children;
-        ++up.leaves;
-    }
-    for (Index c = vertices; c < clusters; ++c) {
-        expect(std::min(c + ahead, root));
-        ClusterPlace& here = place(c);
-        if (here.children > 1) ++here.nodes;
-        if (c == root) break;
-        ClusterPlace& up = place(parents[c]);
-        ++up.children;
-        up.leaves += here.leaves;
-        up.nodes += here.nodes;
+class NodeOrderer {
+public:
+    NodeOrderer(const Clustering& clustering, Index vertices, Index lone)
+        : parents_(clustering.parents), vertices_(vertices), lone_(lone), root_(static_cast<Index>(parents_.size()) - 1), places_(parents_.size() - vertices) {}
+
+    NodeOrder run() {
+        count_up();
+        make_room();
+        number_down();
+        if (lone_ > 0) hang_in_lone_vertices();
+        return std::move(order_);
     }
 
-    NodeOrder order;
-    TreeShape& shape = order.shape;
-    const NodeId extra = lone > 1 ? 2 : lone; // the root above the clustering's, and the lone vertices' node
-    const NodeId interior = place(root).nodes + extra;
-    const NodeId top = lone > 0 ? 0 : no_node;
-    shape.parents.resize(std::size_t{interior} + vertices + lone);
-    shape.first_leaf.resize(interior);
-    shape.leaf_end.resize(interior);
-    shape.subtree_end.resize(interior);
-    shape.made.resize(interior);
-    order.leaf_of_vertex.resize(std::size_t{vertices} + lone);
-    order.node_of_cluster.assign(clusters - vertices, no_node);
-    const auto open = [&](NodeId node, NodeId parent, Index first_leaf, Index leaf_end, NodeId subtree_end,
-                          Index made) {
+private:
+    ClusterPlace& place(Index cluster) { return places_[cluster - vertices_]; }
+    void expect(Index cluster) { prefetch(&place(parents_[cluster])); }
+
+    // Children have lower numbers than their parents.
+    void count_up() {
+        for (Index v = 0; v < vertices_; ++v) {
+            expect(std::min(v + ahead, root_));
+            ClusterPlace& up = place(parents_[v]);
+            ++up.children;
+            ++up.leaves;
+        }
+        for (Index c = vertices_; c <= root_; ++c) {
+            expect(std::min(c + ahead, root_));
+            ClusterPlace& here = place(c);
+            if (here.children > 1) ++here.nodes;
+            if (c == root_) break;
+            ClusterPlace& up = place(parents_[c]);
+            ++up.children;
+            up.leaves += here.leaves;
+            up.nodes += here.nodes;
+        }
+    }
+
+    void make_room() {
+        const NodeId extra = lone_ > 1 ? 2 : lone_; // the root above the clustering's, and the lone vertices' node
+        interior_ = place(root_).nodes + extra;
+        top_ = lone_ > 0 ? 0 : no_node;
+        TreeShape& shape = order_.shape;
+        shape.parents.resize(std::size_t{interior_} + vertices_ + lone_);
+        shape.first_leaf.resize(interior_);
+        shape.leaf_end.resize(interior_);
+        shape.subtree_end.resize(interior_);
+        shape.made.resize(interior_);
+        order_.leaf_of_vertex.resize(std::size_t{vertices_} + lone_);
+        order_.node_of_cluster.assign(places_.size(), no_node);
+    }
+
+    void open(NodeId node, NodeId parent, Index first_leaf, Index leaf_end, NodeId subtree_end, Index made) {
+        TreeShape& shape = order_.shape;
         shape.parents[node] = parent;
         shape.first_leaf[node] = first_leaf;
         shape.leaf_end[node] = leaf_end;
         shape.subtree_end[node] = subtree_end;
         shape.made[node] = made;
-    };
-    const auto put_leaf = [&](Index vertex, Index leaf, NodeId parent) {
-        order.leaf_of_vertex[vertex] = leaf;
-        shape.parents[shape.node_of_leaf(leaf)] = parent;
-    };
+    }
+    void put_leaf(Index vertex, Index leaf, NodeId parent) {
+        order_.leaf_of_vertex[vertex] = leaf;
+        order_.shape.parents[order_.shape.node_of_leaf(leaf)] = parent;
+    }
 
-    // Down: the last child takes the last leaves and nodes of its parent.
-    for (Index c = root; c >= vertices; --c) {
-        expect(c - std::min(c, ahead));
-        ClusterPlace& here = place(c);
-        const NodeId parent = c == root ? top : place(parents[c]).node;
-        Index leaf_end = vertices;
-        NodeId node_end = interior - (lone > 1 ? 1 : 0);
-        if (c != root) {
-            ClusterPlace& up = place(parents[c]);
-            leaf_end = up.leaves;
-            node_end = up.nodes;
-            up.leaves -= here.leaves;
-            up.nodes -= here.nodes;
+    // The last child takes the last leaves and nodes of its parent.
+    void number_down() {
+        for (Index c = root_; c >= vertices_; --c) {
+            expect(c - std::min(c, ahead));
+            ClusterPlace& here = place(c);
+            const NodeId parent = c == root_ ? top_ : place(parents_[c]).node;
+            Index leaf_end = vertices_;
+            NodeId node_end = interior_ - (lone_ > 1 ? 1 : 0);
+            if (c != root_) {
+                ClusterPlace& up = place(parents_[c]);
+                leaf_end = up.leaves;
+                node_end = up.nodes;
+                up.leaves -= here.leaves;
+                up.nodes -= here.nodes;
+            }
+            here.node = parent;
+            if (here.children > 1) {
+                here.node = order_.node_of_cluster[c - vertices_] = node_end - here.nodes;
+                open(here.node, parent, leaf_end - here.leaves, leaf_end, node_end, c);
+            }
+            here.leaves = leaf_end;
+            here.nodes = node_end;
         }
-        here.node = parent;
-        if (here.children > 1) {
-            here.node = order.node_of_cluster[c - vertices] = node_end - here.nodes;
-            open(here.node, parent, leaf_end - here.leaves, leaf_end, node_end, c);
+        for (Index v = vertices_; v-- > 0;) {
+            expect(v - std::min(v, ahead));
+            ClusterPlace& up = place(parents_[v]);
+            put_leaf(v, --up.leaves, up.node);
         }
-        here.leaves = leaf_end;
-        here.nodes = node_end;
     }
-    for (Index v = vertices; v-- > 0;) {
-        expect(v - std::min(v, ahead));
-        ClusterPlace& up = place(parents[v]);
-        put_leaf(v, --up.leaves, up.node);
+
+    void hang_in_lone_vertices() {
+        const NodeId group = lone_ > 1 ? interior_ - 1 : top_;
+        open(top_, no_node, 0, vertices_ + lone_, interior_, never);
+        if (group != top_) open(group, top_, vertices_, vertices_ + lone_, interior_, never - 1);
+        for (Index i = 0; i < lone_; ++i) put_leaf(vertices_ + i, vertices_ + i, group);
     }
-    if (lone > 0) {
-        const NodeId group = lone > 1 ? interior - 1 : top;
-        open(top, no_node, 0, vertices + lone, interior, never);
-        if (group != top) open(group, top, vertices, vertices + lone, interior, never - 1);
-        for (Index i = 0; i < lone; ++i) put_leaf(vertices + i, vertices + i, group);
-    }
-    return order;
-}
+
+    std::span<const Index> parents_; // by cluster
+    Index vertices_, lone_, root_;
+    std::vector<ClusterPlace> places_; // by cluster that is no vertex
+    NodeId interior_ = 0, top_ = no_node; // how many nodes; the root where there are lone vertices
+    NodeOrder order_;
+};
+
+} // namespace
+
+NodeOrder order_nodes(const Clustering& clustering, Index vertices, Index lone) { return NodeOrderer(clustering, vertices, lone).run(); }
 
 namespace {
 
