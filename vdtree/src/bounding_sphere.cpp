@@ -297,159 +297,164 @@ struct Bases {
     }
 };
 
-// Four lanes at a time (an extension that GCC and Clang share).
-constexpr std::size_t width = 4;
-using Doubles = double __attribute__((vector_size(8 * width)));
-using Masks = std::int64_t __attribute__((vector_size(8 * width)));
+// `width` lanes at a time: as many as the processor's registers hold (an extension that GCC and Clang share).
+template <std::size_t width>
+struct Kernel {
+    // GCC 12 overlooks such attributes in `using`.
+    typedef double Doubles __attribute__((vector_size(8 * width)));
+    typedef std::int64_t Masks __attribute__((vector_size(8 * width)));
+    static_assert(sizeof(Doubles) == 8 * width && sizeof(Masks) == 8 * width);
 
-UNSEEN_INLINE Doubles load(const Lane& from, std::size_t first) {
-    Doubles out;
-    std::memcpy(&out, &from[first], sizeof out);
-    return out;
-}
-template <class Vector, class T>
-UNSEEN_INLINE void store(Vector v, std::array<T, lanes>& to, std::size_t first) {
-    std::memcpy(&to[first], &v, sizeof v);
-}
-UNSEEN_INLINE Doubles root(Doubles v) {
+    UNSEEN_INLINE static Doubles load(const Lane& from, std::size_t first) {
+        Doubles out;
+        std::memcpy(&out, &from[first], sizeof out);
+        return out;
+    }
+    template <class Vector, class T>
+    UNSEEN_INLINE static void store(Vector v, std::array<T, lanes>& to, std::size_t first) {
+        std::memcpy(&to[first], &v, sizeof v);
+    }
+    UNSEEN_INLINE static Doubles root(Doubles v) {
 #ifdef __SSE2__
-    __m128d halves[2];
-    std::memcpy(halves, &v, sizeof v);
-    for (__m128d& half : halves) half = _mm_sqrt_pd(half);
-    std::memcpy(&v, halves, sizeof v);
+        __m128d pairs[width / 2];
+        std::memcpy(pairs, &v, sizeof v);
+        for (__m128d& pair : pairs) pair = _mm_sqrt_pd(pair);
+        std::memcpy(&v, pairs, sizeof v);
 #else
-    for (std::size_t i = 0; i < width; ++i) v[i] = std::sqrt(v[i]);
+        for (std::size_t i = 0; i < width; ++i) v[i] = std::sqrt(v[i]);
 #endif
-    return v;
-}
-
-struct Points {
-    Doubles x, y, z;
-};
-UNSEEN_INLINE Points operator+(Points a, Points b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-UNSEEN_INLINE Points operator-(Points a, Points b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-UNSEEN_INLINE Points operator*(Points a, Doubles b) { return {a.x * b, a.y * b, a.z * b}; }
-UNSEEN_INLINE Points operator/(Points a, Doubles b) { return {a.x / b, a.y / b, a.z / b}; }
-UNSEEN_INLINE Doubles squared(Points v) { return v.x * v.x + v.y * v.y + v.z * v.z; }
-UNSEEN_INLINE Points cross(Points a, Points b) { return {a.y * b.z - b.y * a.z, a.z * b.x - b.z * a.x, a.x * b.y - b.x * a.y}; }
-UNSEEN_INLINE Points choose(Masks which, Points a, Points b) { return {which ? a.x : b.x, which ? a.y : b.y, which ? a.z : b.z}; }
-UNSEEN_INLINE Points load(const Row& row, std::size_t first) { return {load(row.x, first), load(row.y, first), load(row.z, first)}; }
-UNSEEN_INLINE void store(Points v, Row& to, std::size_t first) { store(v.x, to.x, first), store(v.y, to.y, first), store(v.z, to.z, first); }
-
-// Balls, and how far they reach from somewhere.
-struct FarBalls {
-    Points centre;
-    Doubles radius, squared, sphere_reach, reach;
-};
-
-UNSEEN_INLINE FarBalls farthest_in(const Sets& sets, Points from, std::size_t first) {
-    FarBalls out{Points{}, Doubles{}, Doubles{} - 1, Doubles{} - 1, Doubles{}};
-    for (const Row& row : sets.points) {
-        const Points p = load(row, first);
-        const Doubles distance = squared(p - from);
-        const Masks farther = distance > out.squared;
-        out.squared = farther ? distance : out.squared;
-        out.centre = choose(farther, p, out.centre);
+        return v;
     }
-    out.reach = root(out.squared);
-    for (const BallRow& row : sets.spheres) {
-        const Points p = load(row, first);
-        const Doubles radius = load(row.radius, first), reach = root(squared(p - from)) + radius;
-        out.sphere_reach = reach > out.sphere_reach ? reach : out.sphere_reach;
-        const Masks farther = reach > out.reach;
-        out.reach = farther ? reach : out.reach;
-        out.centre = choose(farther, p, out.centre);
-        out.radius = farther ? radius : out.radius;
+
+    struct Points {
+        Doubles x, y, z;
+
+        UNSEEN_INLINE friend Points operator+(Points a, Points b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+        UNSEEN_INLINE friend Points operator-(Points a, Points b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+        UNSEEN_INLINE friend Points operator*(Points a, Doubles b) { return {a.x * b, a.y * b, a.z * b}; }
+        UNSEEN_INLINE friend Points operator/(Points a, Doubles b) { return {a.x / b, a.y / b, a.z / b}; }
+    };
+    UNSEEN_INLINE static Doubles squared(Points v) { return v.x * v.x + v.y * v.y + v.z * v.z; }
+    UNSEEN_INLINE static Points cross(Points a, Points b) { return {a.y * b.z - b.y * a.z, a.z * b.x - b.z * a.x, a.x * b.y - b.x * a.y}; }
+    UNSEEN_INLINE static Points choose(Masks which, Points a, Points b) { return {which ? a.x : b.x, which ? a.y : b.y, which ? a.z : b.z}; }
+    UNSEEN_INLINE static Points load(const Row& row, std::size_t first) { return {load(row.x, first), load(row.y, first), load(row.z, first)}; }
+    UNSEEN_INLINE static void store(Points v, Row& to, std::size_t first) { store(v.x, to.x, first), store(v.y, to.y, first), store(v.z, to.z, first); }
+
+    // Balls, and how far they reach from somewhere.
+    struct FarBalls {
+        Points centre;
+        Doubles radius, squared, sphere_reach, reach;
+    };
+
+    UNSEEN_INLINE static FarBalls farthest_in(const Sets& sets, Points from, std::size_t first) {
+        FarBalls out{Points{}, Doubles{}, Doubles{} - 1, Doubles{} - 1, Doubles{}};
+        for (const Row& row : sets.points) {
+            const Points p = load(row, first);
+            const Doubles distance = squared(p - from);
+            const Masks farther = distance > out.squared;
+            out.squared = farther ? distance : out.squared;
+            out.centre = choose(farther, p, out.centre);
+        }
+        out.reach = root(out.squared);
+        for (const BallRow& row : sets.spheres) {
+            const Points p = load(row, first);
+            const Doubles radius = load(row.radius, first), reach = root(squared(p - from)) + radius;
+            out.sphere_reach = reach > out.sphere_reach ? reach : out.sphere_reach;
+            const Masks farther = reach > out.reach;
+            out.reach = farther ? reach : out.reach;
+            out.centre = choose(farther, p, out.centre);
+            out.radius = farther ? radius : out.radius;
+        }
+        return out;
     }
-    return out;
-}
 
-UNSEEN_INLINE void store(const FarBalls& far, FarthestOfLanes& out, std::size_t first) {
-    store(far.centre, out.ball, first);
-    store(far.radius, out.ball.radius, first);
-    store(far.squared, out.squared, first);
-    store(far.sphere_reach, out.sphere_reach, first);
-    store(far.reach, out.reach, first);
-}
+    UNSEEN_INLINE static void store(const FarBalls& far, FarthestOfLanes& out, std::size_t first) {
+        store(far.centre, out.ball, first);
+        store(far.radius, out.ball.radius, first);
+        store(far.squared, out.squared, first);
+        store(far.sphere_reach, out.sphere_reach, first);
+        store(far.reach, out.reach, first);
+    }
 
-struct PairBases {
-    Points p, q, centre;
-    Doubles radius;
-    Masks is_pair; // else it is a single ball
+    struct PairBases {
+        Points p, q, centre;
+        Doubles radius;
+        Masks is_pair; // else it is a single ball
+    };
+
+    // As Basis(a, b).
+    UNSEEN_INLINE static PairBases pair_up(const FarBalls& a, const FarBalls& b) {
+        const Points apart = b.centre - a.centre;
+        const Doubles distance = root(squared(apart));
+        const Masks is_a = distance + b.radius <= a.radius, is_b = distance + a.radius <= b.radius;
+        const Points direction = apart / (distance > 0 ? distance : Doubles{} + 1);
+        PairBases out;
+        out.p = a.centre - direction * a.radius;
+        out.q = b.centre + direction * b.radius;
+        out.centre = choose(is_a, a.centre, choose(is_b, b.centre, (out.p + out.q) * (Doubles{} + 0.5)));
+        out.radius = is_a ? a.radius : is_b ? b.radius : (distance + a.radius + b.radius) * 0.5;
+        out.is_pair = ~(is_a | is_b);
+        return out;
+    }
+
+    // As Basis::add() of what sticks out by more than a share of the radius.
+    UNSEEN_INLINE static void add_to_pairs(const PairBases& pair, const FarBalls& far, double slack, Bases& bases, std::size_t first) {
+        const Doubles limit = pair.radius * (1 + slack);
+        const Masks grows = (far.squared > limit * limit) | (far.sphere_reach > limit);
+        // The point: of a sphere, the one on the far side.
+        const Points away = far.centre - pair.centre;
+        const Doubles length = root(squared(away));
+        const Points p = far.centre + away / (length > 0 ? length : Doubles{} + 1) * far.radius;
+        // Around it and one of the others, if that has the third in it.
+        const Points a = pair.p - p, b = pair.q - p, half_a = a * (Doubles{} + 0.5), half_b = b * (Doubles{} + 0.5);
+        const Doubles aa = squared(half_a), bb = squared(half_b);
+        const double tight = 1 + 2 * containment_slack;
+        const Masks with_a = squared(pair.q - (p + half_a)) <= aa * tight, with_b = (squared(pair.p - (p + half_b)) <= bb * tight) & ~with_a;
+        // Around all three.
+        const Points normal = cross(a, b);
+        const Doubles length_a = squared(a), length_b = squared(b), flat = squared(normal);
+        const Masks with_both = flat > least_flatness * length_a * length_b;
+        const Points offset = cross(b * length_a - a * length_b, normal) / (2 * (with_both ? flat : Doubles{} + 1));
+
+        const Masks stays_pair = with_a | with_b, added = grows & pair.is_pair & (stays_pair | with_both);
+        const Points centre = p + choose(with_a, half_a, choose(with_b, half_b, offset));
+        const Doubles radius = root(with_a ? aa : with_b ? bb : squared(offset));
+        store(choose(added & with_b, pair.q, pair.p), bases.points[0], first);
+        store(choose(added & stays_pair, p, pair.q), bases.points[1], first);
+        store(p, bases.points[2], first);
+        store(choose(added, centre, pair.centre), bases.sphere, first);
+        store(added ? radius : pair.radius, bases.sphere.radius, first);
+        store((pair.is_pair & 2) | (added & ~stays_pair & 1), bases.count, first);
+        store(grows, bases.growing, first);
+        store(added, bases.added, first);
+    }
+
+    UNSEEN_INLINE static void find_farthest(const Sets& sets, const Row& from, FarthestOfLanes& out) {
+        for (std::size_t first = 0; first < lanes; first += width) store(farthest_in(sets, load(from, first), first), out, first);
+    }
+
+    // What most lanes need, as grow_basis() does it: a pair far apart, and what sticks out farthest from the sphere around it. `far`: from its centre.
+    UNSEEN_INLINE static void begin(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& out) {
+        for (std::size_t first = 0; first < lanes; first += width) {
+            const FarBalls one = farthest_in(sets, Points{}, first);
+            const PairBases pair = pair_up(one, farthest_in(sets, one.centre, first));
+            const FarBalls far = farthest_in(sets, pair.centre, first);
+            add_to_pairs(pair, far, slack, bases, first);
+            store(far, out, first);
+        }
+    }
 };
-
-// As Basis(a, b).
-UNSEEN_INLINE PairBases pair_up(const FarBalls& a, const FarBalls& b) {
-    const Points apart = b.centre - a.centre;
-    const Doubles distance = root(squared(apart));
-    const Masks is_a = distance + b.radius <= a.radius, is_b = distance + a.radius <= b.radius;
-    const Points direction = apart / (distance > 0 ? distance : Doubles{} + 1);
-    PairBases out;
-    out.p = a.centre - direction * a.radius;
-    out.q = b.centre + direction * b.radius;
-    out.centre = choose(is_a, a.centre, choose(is_b, b.centre, (out.p + out.q) * (Doubles{} + 0.5)));
-    out.radius = is_a ? a.radius : is_b ? b.radius : (distance + a.radius + b.radius) * 0.5;
-    out.is_pair = ~(is_a | is_b);
-    return out;
-}
-
-// As Basis::add() of what sticks out by more than a share of the radius.
-UNSEEN_INLINE void add_to_pairs(const PairBases& pair, const FarBalls& far, double slack, Bases& bases, std::size_t first) {
-    const Doubles limit = pair.radius * (1 + slack);
-    const Masks grows = (far.squared > limit * limit) | (far.sphere_reach > limit);
-    // The point: of a sphere, the one on the far side.
-    const Points away = far.centre - pair.centre;
-    const Doubles length = root(squared(away));
-    const Points p = far.centre + away / (length > 0 ? length : Doubles{} + 1) * far.radius;
-    // Around it and one of the others, if that has the third in it.
-    const Points a = pair.p - p, b = pair.q - p, half_a = a * (Doubles{} + 0.5), half_b = b * (Doubles{} + 0.5);
-    const Doubles aa = squared(half_a), bb = squared(half_b);
-    const double tight = 1 + 2 * containment_slack;
-    const Masks with_a = squared(pair.q - (p + half_a)) <= aa * tight, with_b = (squared(pair.p - (p + half_b)) <= bb * tight) & ~with_a;
-    // Around all three.
-    const Points normal = cross(a, b);
-    const Doubles length_a = squared(a), length_b = squared(b), flat = squared(normal);
-    const Masks with_both = flat > least_flatness * length_a * length_b;
-    const Points offset = cross(b * length_a - a * length_b, normal) / (2 * (with_both ? flat : Doubles{} + 1));
-
-    const Masks stays_pair = with_a | with_b, added = grows & pair.is_pair & (stays_pair | with_both);
-    const Points centre = p + choose(with_a, half_a, choose(with_b, half_b, offset));
-    const Doubles radius = root(with_a ? aa : with_b ? bb : squared(offset));
-    store(choose(added & with_b, pair.q, pair.p), bases.points[0], first);
-    store(choose(added & stays_pair, p, pair.q), bases.points[1], first);
-    store(p, bases.points[2], first);
-    store(choose(added, centre, pair.centre), bases.sphere, first);
-    store(added ? radius : pair.radius, bases.sphere.radius, first);
-    store((pair.is_pair & 2) | (added & ~stays_pair & 1), bases.count, first);
-    store(grows, bases.growing, first);
-    store(added, bases.added, first);
-}
-
-UNSEEN_INLINE void find_farthest(const Sets& sets, const Row& from, FarthestOfLanes& out) {
-    for (std::size_t first = 0; first < lanes; first += width) store(farthest_in(sets, load(from, first), first), out, first);
-}
-
-// What most lanes need, as grow_basis() does it: a pair far apart, and what sticks out farthest from the sphere around it. `far`: from its centre.
-UNSEEN_INLINE void begin_in(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& out) {
-    for (std::size_t first = 0; first < lanes; first += width) {
-        const FarBalls one = farthest_in(sets, Points{}, first);
-        const PairBases pair = pair_up(one, farthest_in(sets, one.centre, first));
-        const FarBalls far = farthest_in(sets, pair.centre, first);
-        add_to_pairs(pair, far, slack, bases, first);
-        store(far, out, first);
-    }
-}
 
 using FindFarthest = void(const Sets& sets, const Row& from, FarthestOfLanes& out);
 using Begin = void(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far);
-void find_with_any(const Sets& sets, const Row& from, FarthestOfLanes& out) { find_farthest(sets, from, out); }
-void begin_with_any(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far) { begin_in(sets, slack, bases, far); }
+void find_with_any(const Sets& sets, const Row& from, FarthestOfLanes& out) { Kernel<2>::find_farthest(sets, from, out); }
+void begin_with_any(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far) { Kernel<2>::begin(sets, slack, bases, far); }
 
 // Neither has fused operations, so both give the same bits.
 #if defined(__x86_64__) && defined(__GNUC__)
 
-[[gnu::target("avx2")]] void find_with_avx2(const Sets& sets, const Row& from, FarthestOfLanes& out) { find_farthest(sets, from, out); }
-[[gnu::target("avx2")]] void begin_with_avx2(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far) { begin_in(sets, slack, bases, far); }
+[[gnu::target("avx2")]] void find_with_avx2(const Sets& sets, const Row& from, FarthestOfLanes& out) { Kernel<4>::find_farthest(sets, from, out); }
+[[gnu::target("avx2")]] void begin_with_avx2(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far) { Kernel<4>::begin(sets, slack, bases, far); }
 const bool has_avx2 = __builtin_cpu_supports("avx2");
 FindFarthest* const find = has_avx2 ? find_with_avx2 : find_with_any;
 Begin* const begin_bases = has_avx2 ? begin_with_avx2 : begin_with_any;
