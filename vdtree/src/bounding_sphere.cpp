@@ -10,6 +10,14 @@
 
 #include <glm/geometric.hpp>
 
+#ifdef __SSE2__
+#include <immintrin.h>
+#endif
+
+// Vectors wider than the target's are only handed to functions that are inlined.
+#pragma GCC diagnostic ignored "-Wpsabi"
+#define UNSEEN_INLINE [[gnu::always_inline]] inline
+
 namespace unseen::vdtree {
 
 namespace {
@@ -47,6 +55,11 @@ public:
             sphere_ = {(points_[0] + points_[1]) * 0.5, (distance + a.radius + b.radius) * 0.5};
             count_ = 2;
         }
+    }
+
+    // Of what is on the sphere, which is the smallest around it; with no points, a single ball.
+    Basis(std::span<const glm::dvec3> points, const DSphere& sphere) : count_(static_cast<int>(points.size())), sphere_(sphere) {
+        std::copy(points.begin(), points.end(), points_.begin());
     }
 
     const DSphere& sphere() const { return sphere_; }
@@ -250,108 +263,248 @@ DSphere enclosing_sphere(std::span<const glm::dvec3> points, std::span<const DSp
 namespace {
 
 constexpr std::size_t lanes = BallLanes::lanes;
+using Lane = BallLanes::Lane;
+using Row = BallLanes::Row;
+using BallRow = BallLanes::BallRow;
 
-// Of each lane, the first of the points that are farthest from `from`.
-[[gnu::always_inline]] inline void find_in(std::span<const BallLanes::Row> rows, const BallLanes::Row& from, BallLanes::FarthestPoints& out) {
-    // Four numbers at a time (an extension that GCC and Clang share).
-    constexpr std::size_t width = 4;
-    using Doubles = double __attribute__((vector_size(8 * width)));
-    using Integers = std::int64_t __attribute__((vector_size(8 * width)));
-    for (std::size_t first = 0; first < lanes; first += width) {
-        Doubles centre_x, centre_y, centre_z, x, y, z, farthest = {-1, -1, -1, -1};
-        std::memcpy(&centre_x, &from.x[first], sizeof x);
-        std::memcpy(&centre_y, &from.y[first], sizeof y);
-        std::memcpy(&centre_z, &from.z[first], sizeof z);
-        Integers number = {}, found = {};
-        for (const BallLanes::Row& row : rows) {
-            std::memcpy(&x, &row.x[first], sizeof x);
-            std::memcpy(&y, &row.y[first], sizeof y);
-            std::memcpy(&z, &row.z[first], sizeof z);
-            x -= centre_x, y -= centre_y, z -= centre_z;
-            const Doubles squared = x * x + y * y + z * z;
-            const Integers is_farther = squared > farthest;
-            farthest = is_farther ? squared : farthest;
-            found = is_farther ? number : found;
-            number += 1;
-        }
-        std::memcpy(&out.squared[first], &farthest, sizeof farthest);
-        std::memcpy(&out.row[first], &found, sizeof found);
+// The sets of all lanes. Those that lack a sphere have one that reaches nowhere.
+struct Sets {
+    std::span<const Row> points;
+    std::span<const BallRow> spheres;
+};
+
+// Of each lane, what reaches farthest from somewhere.
+struct FarthestOfLanes {
+    BallRow ball;       // the first point of those that are farthest, or a sphere that reaches farther
+    Lane squared;       // the distance of that point
+    Lane sphere_reach;  // to the farthest far side of a sphere; negative: there is none
+    Lane reach;
+
+    bool sticks_out(std::size_t lane, double radius) const { return squared[lane] > radius * radius || sphere_reach[lane] > radius; }
+};
+
+// A basis of each lane while it has up to three points.
+struct Bases {
+    Row points[3];
+    BallRow sphere;
+    std::array<std::int64_t, lanes> count;  // 0: a single ball
+    std::array<std::int64_t, lanes> growing; // whether something stuck out
+    std::array<std::int64_t, lanes> added;   // and is in the basis now
+
+    Basis basis(std::size_t lane) const {
+        const std::array<glm::dvec3, 3> all = {points[0].at(lane), points[1].at(lane), points[2].at(lane)};
+        return {std::span(all).first(static_cast<std::size_t>(count[lane])), sphere.ball(lane)};
     }
-}
+};
 
-using FindFarthestPoints = void(std::span<const BallLanes::Row> rows, const BallLanes::Row& from, BallLanes::FarthestPoints& out);
-void find_with_any(std::span<const BallLanes::Row> rows, const BallLanes::Row& from, BallLanes::FarthestPoints& out) { find_in(rows, from, out); }
+// `width` lanes at a time: as many as the processor's registers hold (an extension that GCC and Clang share).
+template <std::size_t width>
+struct Kernel {
+    // GCC 12 overlooks such attributes in `using`.
+    typedef double Doubles __attribute__((vector_size(8 * width)));
+    typedef std::int64_t Masks __attribute__((vector_size(8 * width)));
+    static_assert(sizeof(Doubles) == 8 * width && sizeof(Masks) == 8 * width);
+
+    UNSEEN_INLINE static Doubles load(const Lane& from, std::size_t first) {
+        Doubles out;
+        std::memcpy(&out, &from[first], sizeof out);
+        return out;
+    }
+    template <class Vector, class T>
+    UNSEEN_INLINE static void store(Vector v, std::array<T, lanes>& to, std::size_t first) {
+        std::memcpy(&to[first], &v, sizeof v);
+    }
+    UNSEEN_INLINE static Doubles root(Doubles v) {
+#ifdef __SSE2__
+        __m128d pairs[width / 2];
+        std::memcpy(pairs, &v, sizeof v);
+        for (__m128d& pair : pairs) pair = _mm_sqrt_pd(pair);
+        std::memcpy(&v, pairs, sizeof v);
+#else
+        for (std::size_t i = 0; i < width; ++i) v[i] = std::sqrt(v[i]);
+#endif
+        return v;
+    }
+
+    struct Points {
+        Doubles x, y, z;
+
+        UNSEEN_INLINE friend Points operator+(Points a, Points b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+        UNSEEN_INLINE friend Points operator-(Points a, Points b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+        UNSEEN_INLINE friend Points operator*(Points a, Doubles b) { return {a.x * b, a.y * b, a.z * b}; }
+        UNSEEN_INLINE friend Points operator/(Points a, Doubles b) { return {a.x / b, a.y / b, a.z / b}; }
+    };
+    UNSEEN_INLINE static Doubles squared(Points v) { return v.x * v.x + v.y * v.y + v.z * v.z; }
+    UNSEEN_INLINE static Points cross(Points a, Points b) { return {a.y * b.z - b.y * a.z, a.z * b.x - b.z * a.x, a.x * b.y - b.x * a.y}; }
+    UNSEEN_INLINE static Points choose(Masks which, Points a, Points b) { return {which ? a.x : b.x, which ? a.y : b.y, which ? a.z : b.z}; }
+    UNSEEN_INLINE static Points load(const Row& row, std::size_t first) { return {load(row.x, first), load(row.y, first), load(row.z, first)}; }
+    UNSEEN_INLINE static void store(Points v, Row& to, std::size_t first) { store(v.x, to.x, first), store(v.y, to.y, first), store(v.z, to.z, first); }
+
+    // Balls, and how far they reach from somewhere.
+    struct FarBalls {
+        Points centre;
+        Doubles radius, squared, sphere_reach, reach;
+    };
+
+    UNSEEN_INLINE static FarBalls farthest_in(const Sets& sets, Points from, std::size_t first) {
+        FarBalls out{Points{}, Doubles{}, Doubles{} - 1, Doubles{} - 1, Doubles{}};
+        for (const Row& row : sets.points) {
+            const Points p = load(row, first);
+            const Doubles distance = squared(p - from);
+            const Masks farther = distance > out.squared;
+            out.squared = farther ? distance : out.squared;
+            out.centre = choose(farther, p, out.centre);
+        }
+        out.reach = root(out.squared);
+        for (const BallRow& row : sets.spheres) {
+            const Points p = load(row, first);
+            const Doubles radius = load(row.radius, first), reach = root(squared(p - from)) + radius;
+            out.sphere_reach = reach > out.sphere_reach ? reach : out.sphere_reach;
+            const Masks farther = reach > out.reach;
+            out.reach = farther ? reach : out.reach;
+            out.centre = choose(farther, p, out.centre);
+            out.radius = farther ? radius : out.radius;
+        }
+        return out;
+    }
+
+    UNSEEN_INLINE static void store(const FarBalls& far, FarthestOfLanes& out, std::size_t first) {
+        store(far.centre, out.ball, first);
+        store(far.radius, out.ball.radius, first);
+        store(far.squared, out.squared, first);
+        store(far.sphere_reach, out.sphere_reach, first);
+        store(far.reach, out.reach, first);
+    }
+
+    struct PairBases {
+        Points p, q, centre;
+        Doubles radius;
+        Masks is_pair; // else it is a single ball
+    };
+
+    // As Basis(a, b).
+    UNSEEN_INLINE static PairBases pair_up(const FarBalls& a, const FarBalls& b) {
+        const Points apart = b.centre - a.centre;
+        const Doubles distance = root(squared(apart));
+        const Masks is_a = distance + b.radius <= a.radius, is_b = distance + a.radius <= b.radius;
+        const Points direction = apart / (distance > 0 ? distance : Doubles{} + 1);
+        PairBases out;
+        out.p = a.centre - direction * a.radius;
+        out.q = b.centre + direction * b.radius;
+        out.centre = choose(is_a, a.centre, choose(is_b, b.centre, (out.p + out.q) * (Doubles{} + 0.5)));
+        out.radius = is_a ? a.radius : is_b ? b.radius : (distance + a.radius + b.radius) * 0.5;
+        out.is_pair = ~(is_a | is_b);
+        return out;
+    }
+
+    // As Basis::add() of what sticks out by more than a share of the radius.
+    UNSEEN_INLINE static void add_to_pairs(const PairBases& pair, const FarBalls& far, double slack, Bases& bases, std::size_t first) {
+        const Doubles limit = pair.radius * (1 + slack);
+        const Masks grows = (far.squared > limit * limit) | (far.sphere_reach > limit);
+        // The point: of a sphere, the one on the far side.
+        const Points away = far.centre - pair.centre;
+        const Doubles length = root(squared(away));
+        const Points p = far.centre + away / (length > 0 ? length : Doubles{} + 1) * far.radius;
+        // Around it and one of the others, if that has the third in it.
+        const Points a = pair.p - p, b = pair.q - p, half_a = a * (Doubles{} + 0.5), half_b = b * (Doubles{} + 0.5);
+        const Doubles aa = squared(half_a), bb = squared(half_b);
+        const double tight = 1 + 2 * containment_slack;
+        const Masks with_a = squared(pair.q - (p + half_a)) <= aa * tight, with_b = (squared(pair.p - (p + half_b)) <= bb * tight) & ~with_a;
+        // Around all three.
+        const Points normal = cross(a, b);
+        const Doubles length_a = squared(a), length_b = squared(b), flat = squared(normal);
+        const Masks with_both = flat > least_flatness * length_a * length_b;
+        const Points offset = cross(b * length_a - a * length_b, normal) / (2 * (with_both ? flat : Doubles{} + 1));
+
+        const Masks stays_pair = with_a | with_b, added = grows & pair.is_pair & (stays_pair | with_both);
+        const Points centre = p + choose(with_a, half_a, choose(with_b, half_b, offset));
+        const Doubles radius = root(with_a ? aa : with_b ? bb : squared(offset));
+        store(choose(added & with_b, pair.q, pair.p), bases.points[0], first);
+        store(choose(added & stays_pair, p, pair.q), bases.points[1], first);
+        store(p, bases.points[2], first);
+        store(choose(added, centre, pair.centre), bases.sphere, first);
+        store(added ? radius : pair.radius, bases.sphere.radius, first);
+        store((pair.is_pair & 2) | (added & ~stays_pair & 1), bases.count, first);
+        store(grows, bases.growing, first);
+        store(added, bases.added, first);
+    }
+
+    UNSEEN_INLINE static void find_farthest(const Sets& sets, const Row& from, FarthestOfLanes& out) {
+        for (std::size_t first = 0; first < lanes; first += width) store(farthest_in(sets, load(from, first), first), out, first);
+    }
+
+    // What most lanes need, as grow_basis() does it: a pair far apart, and what sticks out farthest from the sphere around it. `far`: from its centre.
+    UNSEEN_INLINE static void begin(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& out) {
+        for (std::size_t first = 0; first < lanes; first += width) {
+            const FarBalls one = farthest_in(sets, Points{}, first);
+            const PairBases pair = pair_up(one, farthest_in(sets, one.centre, first));
+            const FarBalls far = farthest_in(sets, pair.centre, first);
+            add_to_pairs(pair, far, slack, bases, first);
+            store(far, out, first);
+        }
+    }
+};
+
+using FindFarthest = void(const Sets& sets, const Row& from, FarthestOfLanes& out);
+using Begin = void(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far);
+void find_with_any(const Sets& sets, const Row& from, FarthestOfLanes& out) { Kernel<2>::find_farthest(sets, from, out); }
+void begin_with_any(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far) { Kernel<2>::begin(sets, slack, bases, far); }
 
 // Neither has fused operations, so both give the same bits.
 #if defined(__x86_64__) && defined(__GNUC__)
 
-[[gnu::target("avx2")]] void find_with_avx2(std::span<const BallLanes::Row> rows, const BallLanes::Row& from, BallLanes::FarthestPoints& out) {
-    find_in(rows, from, out);
-}
-FindFarthestPoints* const find_farthest_points = __builtin_cpu_supports("avx2") ? find_with_avx2 : find_with_any;
+[[gnu::target("avx2")]] void find_with_avx2(const Sets& sets, const Row& from, FarthestOfLanes& out) { Kernel<4>::find_farthest(sets, from, out); }
+[[gnu::target("avx2")]] void begin_with_avx2(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far) { Kernel<4>::begin(sets, slack, bases, far); }
+const bool has_avx2 = __builtin_cpu_supports("avx2");
+FindFarthest* const find = has_avx2 ? find_with_avx2 : find_with_any;
+Begin* const begin_bases = has_avx2 ? begin_with_avx2 : begin_with_any;
 
 #else
 
-FindFarthestPoints* const find_farthest_points = find_with_any;
+FindFarthest* const find = find_with_any;
+Begin* const begin_bases = begin_with_any;
 
 #endif
 
 } // namespace
 
-void BallLanes::find_points() {
-    find_farthest_points(std::span(rows_).first(row_count_), from_, farthest_);
-}
-
-DSphere BallLanes::farthest(std::size_t lane) const {
-    DSphere out{rows_[static_cast<std::size_t>(farthest_.row[lane])].at(lane), 0};
-    if (spheres_[lane].empty()) return out;
-    double most = std::sqrt(farthest_.squared[lane]);
-    for (const DSphere& s : spheres_[lane]) {
-        const double reach = glm::distance(s.centre, from_.at(lane)) + s.radius;
-        if (reach > most) most = reach, out = s;
+void BallLanes::fill_up(std::size_t used) {
+    const auto end = static_cast<std::ptrdiff_t>(used);
+    row_count_ = *std::max_element(counts_.begin(), counts_.begin() + end);
+    sphere_count_ = *std::max_element(sphere_counts_.begin(), sphere_counts_.begin() + end);
+    for (std::size_t lane = 0; lane < used; ++lane) {
+        for (std::size_t i = counts_[lane]; i < row_count_; ++i) rows_[i].put(lane, glm::dvec3(0));
+        for (std::size_t i = sphere_counts_[lane]; i < sphere_count_; ++i)
+            spheres_[i].put(lane, glm::dvec3(0), -std::numeric_limits<double>::infinity());
     }
-    return out;
-}
-
-double BallLanes::reach(std::size_t lane) const {
-    double most = std::sqrt(farthest_.squared[lane]);
-    for (const DSphere& s : spheres_[lane]) most = std::max(most, glm::distance(s.centre, from_.at(lane)) + s.radius);
-    return most;
-}
-
-bool BallLanes::sticks_out(std::size_t lane, double radius) const {
-    if (farthest_.squared[lane] > radius * radius) return true;
-    const auto sticks_out = [&](const DSphere& s) { return glm::distance(s.centre, from_.at(lane)) + s.radius > radius; };
-    return std::any_of(spheres_[lane].begin(), spheres_[lane].end(), sticks_out);
 }
 
 void BallLanes::enclose(double slack, std::span<Sphere> out) {
     const std::size_t used = out.size();
-    row_count_ = *std::max_element(counts_.begin(), counts_.begin() + static_cast<std::ptrdiff_t>(used));
-    for (std::size_t lane = 0; lane < used; ++lane)
-        for (std::size_t i = counts_[lane]; i < row_count_; ++i) rows_[i].put(lane, glm::dvec3(0));
-
-    // As grow_basis() does.
-    std::array<DSphere, lanes> one;
+    fill_up(used);
+    const Sets sets{std::span(rows_).first(row_count_), std::span(spheres_).first(sphere_count_)};
+    Bases begun;
+    FarthestOfLanes far;
+    begin_bases(sets, slack, begun, far);
+    Row from = begun.sphere;
     std::array<Basis, lanes> bases;
-    from_ = {};
-    find_points();
-    for (std::size_t lane = 0; lane < used; ++lane) one[lane] = farthest(lane);
-    for (std::size_t lane = 0; lane < used; ++lane) from_.put(lane, one[lane].centre);
-    find_points();
+    unsigned growing = 0;
     for (std::size_t lane = 0; lane < used; ++lane) {
-        bases[lane] = Basis(one[lane], farthest(lane));
-        from_.put(lane, bases[lane].sphere().centre);
+        if (!begun.growing[lane]) continue;
+        growing |= 1u << lane;
+        bases[lane] = begun.basis(lane);
+        if (begun.added[lane]) continue;
+        bases[lane].add(far.ball.ball(lane));
+        from.put(lane, bases[lane].sphere().centre);
     }
-    unsigned growing = (1u << used) - 1;
-    for (int round = 0; growing != 0 && round < most_rounds; ++round) {
-        find_points();
+    for (int round = 1; growing != 0 && round < most_rounds; ++round) {
+        find(sets, from, far);
         for (unsigned rest = growing; rest != 0; rest &= rest - 1) {
             const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
             Basis& basis = bases[lane];
-            if (sticks_out(lane, basis.sphere().radius * (1 + slack))) {
-                basis.add(farthest(lane));
-                from_.put(lane, basis.sphere().centre);
+            if (far.sticks_out(lane, basis.sphere().radius * (1 + slack))) {
+                basis.add(far.ball.ball(lane));
+                from.put(lane, basis.sphere().centre);
             } else {
                 growing &= ~(1u << lane);
             }
@@ -359,11 +512,11 @@ void BallLanes::enclose(double slack, std::span<Sphere> out) {
     }
 
     for (std::size_t lane = 0; lane < used; ++lane) {
-        out[lane].centre = glm::vec3(from_.at(lane) + origins_[lane]);
-        from_.put(lane, glm::dvec3(out[lane].centre) - origins_[lane]);
+        out[lane].centre = glm::vec3(from.at(lane) + origins_[lane]);
+        from.put(lane, glm::dvec3(out[lane].centre) - origins_[lane]);
     }
-    find_points();
-    for (std::size_t lane = 0; lane < used; ++lane) out[lane].radius = round_up(reach(lane));
+    find(sets, from, far);
+    for (std::size_t lane = 0; lane < used; ++lane) out[lane].radius = round_up(far.reach[lane]);
 }
 
 float round_up(double distance) {
@@ -372,7 +525,7 @@ float round_up(double distance) {
     const double needed = distance * (1 + 8 * std::numeric_limits<double>::epsilon());
     const float out = static_cast<float>(needed);
     // The next float, if need be; of the largest, infinity.
-    return static_cast<double>(out) < needed ? std::bit_cast<float>(std::bit_cast<std::uint32_t>(out) + 1) : out;
+    return std::bit_cast<float>(std::bit_cast<std::uint32_t>(out) + (static_cast<double>(out) < needed ? 1u : 0u));
 }
 
 Sphere round_outward(const DSphere& sphere) {

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -39,8 +38,7 @@ public:
 
     // Begins a lane's set with a point, which the others are measured from.
     void begin(std::size_t lane, glm::vec3 point) {
-        counts_[lane] = 0;
-        spheres_[lane].clear();
+        counts_[lane] = sphere_counts_[lane] = 0;
         origins_[lane] = glm::dvec3(point);
         add(lane, point);
     }
@@ -57,45 +55,44 @@ public:
         for (const Index i : which) rows[next++].put(lane, glm::dvec3(points[i]) - origin);
     }
     void add(std::size_t lane, const Sphere& sphere) {
-        spheres_[lane].push_back({glm::dvec3(sphere.centre) - origins_[lane], static_cast<double>(sphere.radius)});
+        const std::size_t next = sphere_counts_[lane]++;
+        if (next == spheres_.size()) spheres_.resize(2 * next + 2);
+        spheres_[next].put(lane, glm::dvec3(sphere.centre) - origins_[lane], static_cast<double>(sphere.radius));
     }
-    void forget_spheres(std::size_t lane) { spheres_[lane].clear(); }
+    void forget_spheres(std::size_t lane) { sphere_counts_[lane] = 0; }
 
     // For as many lanes as there are in `out`, from the first on: each sphere contains everything, and its radius exceeds the smallest one by a
     // relative `slack` at most, but for the rounding of the centre to floats.
     void enclose(double slack, std::span<Sphere> out);
 
+    using Lane = std::array<double, lanes>; // a number of each lane
+
     // A point of each lane.
     struct alignas(64) Row {
-        std::array<double, lanes> x, y, z;
+        Lane x, y, z;
 
         void put(std::size_t lane, glm::dvec3 p) { x[lane] = p.x, y[lane] = p.y, z[lane] = p.z; }
         glm::dvec3 at(std::size_t lane) const { return {x[lane], y[lane], z[lane]}; }
     };
+    // A ball of each lane.
+    struct BallRow : Row {
+        Lane radius;
 
-    // Of each lane, one of the points that are farthest from somewhere.
-    struct FarthestPoints {
-        std::array<double, lanes> squared; // distances
-        std::array<std::int64_t, lanes> row;
+        void put(std::size_t lane, glm::dvec3 p, double r) { Row::put(lane, p), radius[lane] = r; }
+        DSphere ball(std::size_t lane) const { return {at(lane), radius[lane]}; }
     };
 
 private:
     void make_room(std::size_t rows) {
         if (rows > rows_.size()) rows_.resize(2 * rows);
     }
-    // Looks from where `from_` says, for what is asked of single lanes then.
-    void find_points();
-    DSphere farthest(std::size_t lane) const;
-    double reach(std::size_t lane) const; // to the farthest far side
-    bool sticks_out(std::size_t lane, double radius) const;
+    void fill_up(std::size_t used);
 
-    std::size_t row_count_ = 0; // of the rows, those that were filled up for all lanes
-    std::vector<Row> rows_;     // relative to the lanes' first points
-    std::array<std::size_t, lanes> counts_{};
+    std::size_t row_count_ = 0, sphere_count_ = 0; // of the rows, those that were filled up for all lanes
+    std::vector<Row> rows_;                        // relative to the lanes' first points
+    std::vector<BallRow> spheres_;                 // relative, too
+    std::array<std::size_t, lanes> counts_{}, sphere_counts_{};
     std::array<glm::dvec3, lanes> origins_{};
-    std::array<std::vector<DSphere>, lanes> spheres_; // relative, too
-    Row from_{};
-    FarthestPoints farthest_{};
 };
 
 // The sphere in floats, grown so that it contains the given one in exact arithmetic.

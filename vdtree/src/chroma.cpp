@@ -33,7 +33,7 @@ glm::vec2 drawn_chroma(const glm::vec4& colour, float luminance) {
 
 std::vector<ChromaRange> derive_ring_chroma(const TreeGeometry& g, const TreeParts& parts, std::span<const Unorm16> luminance) {
     if (g.colours.empty()) return {};
-    const TreeLinks tree{g.parents, g.first_leaf, g.leaf_end, g.subtree_end};
+    const TreeLinks tree = links_of(g);
     const NodeId interior = tree.interior();
     std::vector<glm::vec2> chroma(luminance.size());
     std::atomic<bool> is_grey{true};

@@ -11,6 +11,7 @@
 
 #include "budget.h"
 #include "cut_follower.h"
+#include "finite.h"
 #include "index_buffer.h"
 #include "prefetch.h"
 
@@ -587,8 +588,6 @@ AdjustStats Cut::adjust(FoldCriterion criterion, const AdjustOptions& options) {
 }
 
 namespace {
-
-bool is_finite(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 // Far enough away that squares of distances still fit floats.
 constexpr double farthest_eye = 1e18; // mesh units

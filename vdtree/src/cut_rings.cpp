@@ -13,6 +13,7 @@
 
 #include "chroma.h"
 #include "contacts.h"
+#include "packed_range.h"
 #include "texture_bounds.h"
 #include "texture_fit.h"
 #include "tree_parts.h"
@@ -41,8 +42,6 @@ struct Box {
         return glm::length(glm::max(glm::abs(glm::dvec3(low) - p), glm::abs(glm::dvec3(high) - p)));
     }
 };
-
-PackedRange unite(PackedRange a, PackedRange b) { return {std::min(a.lo, b.lo), std::max(a.hi, b.hi)}; }
 
 // An area, and what is drawn there times the area.
 template <class Light> // luminance, or luminance and chroma
@@ -117,7 +116,7 @@ class RingBounder {
 public:
     explicit RingBounder(const VertexTree& tree)
         : tree_(tree), g_(*tree.data().geometry), l_(tree.data().light), interior_(tree.interior_count()), vertices_(tree),
-          parts_({g_.parents, g_.first_leaf, g_.leaf_end, g_.subtree_end}), around_(interior_), left_(interior_) {
+          parts_(links_of(g_)), around_(interior_), left_(interior_) {
         parts_.assign_triangles(g_.first_triangle, g_.triangles);
     }
 

@@ -3,6 +3,9 @@
 #include <bit>
 #include <cstring>
 
+// Vectors of eight floats are passed between functions of this file only, all of which are inlined.
+#pragma GCC diagnostic ignored "-Wpsabi"
+
 namespace unseen::vdtree {
 
 namespace {
@@ -16,13 +19,15 @@ using Ints = int __attribute__((vector_size(16)));
 
 // The slabs' axes, as NormalSlabs has them; the last one is none.
 constexpr float s = 0.57735026918962576f;
-constexpr Floats axis_x[2] = {{1, 0, 0, s}, {-s, s, s, 0}};
-constexpr Floats axis_y[2] = {{0, 1, 0, s}, {s, -s, s, 0}};
-constexpr Floats axis_z[2] = {{0, 0, 1, s}, {s, s, -s, 0}};
+using EightFloats = float __attribute__((vector_size(32)));
+using EightInts = int __attribute__((vector_size(32)));
+constexpr EightFloats axis_x = {1, 0, 0, s, -s, s, s, 0};
+constexpr EightFloats axis_y = {0, 1, 0, s, s, -s, s, 0};
+constexpr EightFloats axis_z = {0, 0, 1, s, s, s, -s, 0};
 constexpr Ints is_axis = {-1, -1, -1, 0}; // of the second four
 
 // 128 more than the least whole units not below `along`.
-inline Ints reached(Floats along) { return 255 - __builtin_convertvector(units - margin - along, Ints); }
+[[gnu::always_inline]] inline EightInts reached(EightFloats along) { return 255 - __builtin_convertvector(units - margin - along, EightInts); }
 
 // Which of the eight rows, as in cell_of().
 inline double row(double along, double b0, double b1, double b2) {
@@ -91,11 +96,12 @@ template <std::size_t capacity>
     }
     // Whole units outward: what is cut off is below the ends of the scale. Four numbers of eight bits are shifted into each lane.
     for (std::size_t i = 0; i < batch.count; ++i) {
-        const Floats first = x[i] * axis_x[0] + y[i] * axis_y[0] + z[i] * axis_z[0],
-                     second = x[i] * axis_x[1] + y[i] * axis_y[1] + z[i] * axis_z[1];
-        const Ints reach = reached(first) | reached(-first) << 8 |
-                           ((reached(second) | reached(-second) << 8) & is_axis) << 16;
-        batch.reach[i] = std::bit_cast<Directions::Reach>(reach);
+        const EightFloats along = x[i] * axis_x + y[i] * axis_y + z[i] * axis_z;
+        const EightInts reach = reached(along) | reached(-along) << 8;
+        Ints first, second;
+        std::memcpy(&first, &reach, sizeof first);
+        std::memcpy(&second, reinterpret_cast<const char*>(&reach) + sizeof first, sizeof second);
+        batch.reach[i] = std::bit_cast<Directions::Reach>(first | (second & is_axis) << 16);
     }
 }
 

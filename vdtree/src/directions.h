@@ -94,11 +94,12 @@ public:
 
     bool full() const noexcept { return count_ == capacity; }
     std::size_t size() const noexcept { return count_; }
-    void push(Corner a, Corner b, Corner c) noexcept {
+    // Without a branch on whether it counts.
+    void push_if(bool counts, Corner a, Corner b, Corner c) noexcept {
         triangles_[count_][0] = a;
         triangles_[count_][1] = b;
         triangles_[count_][2] = c;
-        ++count_;
+        count_ += counts;
     }
 
     // Measures what was pushed and empties the batch; the results stay until the next call.

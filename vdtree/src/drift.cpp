@@ -24,6 +24,7 @@ constexpr float least_contrast = 2e-3f; // relative luminance: below, errors do 
 constexpr float darkest = 0.01f; // relative luminance of areas; about a display's black
 constexpr float least_side = 0.25f; // of a surface's area, as seen: less is not what the mean is taken of
 constexpr std::size_t most_fading = 3;
+constexpr int most_ancestors = 4096; // of a node, from the nearest on, that are looked at: trees may be as deep as they have vertices
 
 class DriftFinder {
 public:
@@ -139,7 +140,8 @@ private:
         if (!(radius > 0)) return;
         std::array<float, most_fading + 1> amounts{};
         float sum = 0, count = 0;
-        for (NodeId up = parents_[node]; up != no_node; up = parents_[up]) {
+        int left = most_ancestors;
+        for (NodeId up = parents_[node]; up != no_node && left > 0; up = parents_[up], --left) {
             const float octaves = std::log2(tree_.support_spheres()[up].radius / radius);
             if (order_[up] <= up_to || !(octaves >= 1)) continue;
             const float shift = found_[up].shift / std::max(surfaces_[up].luminance(), darkest);

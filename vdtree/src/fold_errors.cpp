@@ -274,8 +274,44 @@ private:
 
     void measure(NodeId node, Scratch& scratch) {
         crossing_[node] = crossing(node);
-        const Index begin = first_leaf_[node], end = leaf_end_[node];
         const Point proxy = point(node);
+        const NormalSlabs facing = lay_out(node, scratch).slabs();
+        if (scratch.after.empty()) scratch.after.push_back({{proxy, proxy, proxy}, 7}); // all of it vanishes
+        Worst worst;
+        const Worst mean = compare_surfaces(node, scratch, worst);
+        const float reach = mean_reach(scratch.after, proxy) / 2;
+        FoldError& error = errors_[node];
+        error.extent = reach;
+        error.mean_distance = mean.distance;
+        error.facing = facing;
+        const Drawn drawn = draw(node, scratch, std::max(support_[node].radius, reach));
+        if (drawn.is_height_field) {
+            error.distance = std::max(peak_of_shift * drawn.shift, mean.distance);
+            error.luminance = drawn.largest;
+            error.wide_luminance = drawn.wide;
+        } else { // something may be under what was drawn
+            error.distance = moved_by_neighbours * worst.distance;
+            error.luminance = std::max(drawn.largest, worst.luminance);
+            error.wide_luminance = std::max(drawn.wide, amplitude_of_mean * mean.luminance);
+        }
+        tree_.for_each_child(node, [&](NodeId child) {
+            if (tree_.is_leaf(child)) return;
+            error.distance = std::max(error.distance, errors_[child].distance);
+            error.extent = std::max(error.extent, errors_[child].extent);
+            error.facing |= errors_[child].facing;
+        });
+        // Where parts meet, a fold moves the line along which the one hides the other, like an outline, whatever they face: the farther, the
+        // flatter they meet.
+        const Contact& contact = contacts_[node];
+        if (error.distance > 0 && contact.gap < contact_reach * error.distance) {
+            error.facing = NormalSlabs::everything();
+            error.distance = std::max(error.distance, std::min(error.distance / std::max(contact.sine, least_sine), tree_.bounds()[node].ring.radius));
+        }
+    }
+
+    // Puts the ring before and after the fold, coarse and fine, into `scratch`; returns what its triangles face.
+    NormalReach lay_out(NodeId node, Scratch& scratch) {
+        const Index begin = first_leaf_[node], end = leaf_end_[node];
         const auto is_inside = [&](Index leaf) { return leaf - begin < end - begin; };
         scratch.clear();
         tree_.for_each_child(node, [&](NodeId child) {
@@ -320,16 +356,18 @@ private:
             if (t >= first_triangle_[node] && t < first_triangle_[node + 1]) continue; // vanishes here
             Ring fine = whole;
             for (std::size_t k = 0; k < 3; ++k)
-                if ((whole.inside >> k) & 1) fine.corner[k] = proxy;
+                if ((whole.inside >> k) & 1) fine.corner[k] = point(node);
             add(scratch.fine_after, fine);
             if (are_distinct(shown)) add(scratch.after, after);
         }
+        return turned;
+    }
 
-        if (scratch.after.empty()) scratch.after.push_back({{proxy, proxy, proxy}, 7}); // all of it vanishes
+    // Raises the worst errors to those between the surfaces; returns the mean ones.
+    Worst compare_surfaces(NodeId node, Scratch& scratch, Worst& worst) {
         scratch.before_surface.assign(scratch.before);
         scratch.after_surface.assign(scratch.after);
         add_samples(node, scratch);
-        Worst worst;
         Mean over_leaves, over_before, over_after;
         for (Sample& sample : scratch.samples) {
             sample.error = scratch.after_surface.compare(sample.point);
@@ -351,34 +389,7 @@ private:
             mean.include(over_fine_before.value());
             mean.include(over_fine_after.value());
         }
-        const float reach = mean_reach(scratch.after, proxy) / 2;
-        FoldError& error = errors_[node];
-        error.extent = reach;
-        error.mean_distance = mean.distance;
-        error.facing = turned.slabs();
-        const Drawn drawn = draw(node, scratch, std::max(support_[node].radius, reach));
-        if (drawn.is_height_field) {
-            error.distance = std::max(peak_of_shift * drawn.shift, mean.distance);
-            error.luminance = drawn.largest;
-            error.wide_luminance = drawn.wide;
-        } else { // something may be under what was drawn
-            error.distance = moved_by_neighbours * worst.distance;
-            error.luminance = std::max(drawn.largest, worst.luminance);
-            error.wide_luminance = std::max(drawn.wide, amplitude_of_mean * mean.luminance);
-        }
-        tree_.for_each_child(node, [&](NodeId child) {
-            if (tree_.is_leaf(child)) return;
-            error.distance = std::max(error.distance, errors_[child].distance);
-            error.extent = std::max(error.extent, errors_[child].extent);
-            error.facing |= errors_[child].facing;
-        });
-        // Where parts meet, a fold moves the line along which the one hides the other, like an outline, whatever they face: the farther, the
-        // flatter they meet.
-        const Contact& contact = contacts_[node];
-        if (error.distance > 0 && contact.gap < contact_reach * error.distance) {
-            error.facing = NormalSlabs::everything();
-            error.distance = std::max(error.distance, std::min(error.distance / std::max(contact.sine, least_sine), tree_.bounds()[node].ring.radius));
-        }
+        return mean;
     }
 
     struct Drawn {

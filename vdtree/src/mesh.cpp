@@ -2,15 +2,14 @@
 #include <vdtree/mesh.h>
 
 #include <algorithm>
-#include <cmath>
+
+#include "finite.h"
 
 namespace unseen::vdtree {
 
 namespace {
 
 Error invalid(const std::string& what) { return {ErrorCode::malformed_data, what}; }
-
-bool is_finite(const glm::dvec3& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 
 Result<void> check_length(const char* name, std::size_t length, std::size_t vertices) {
     if (length == 0 || length == vertices) return {};

@@ -1,6 +1,7 @@
 // Finds out what a file is, has it read, and does what all formats share.
 #include <vdtree/mesh_io.h>
 
+#include "finite.h"
 #include "mesh_readers.h"
 #include "text_scanner.h"
 
@@ -192,8 +193,6 @@ std::string in_quotes(std::string_view text) {
 std::string counted_were(std::uint64_t count, const std::string& noun) {
     return std::to_string(count) + " " + noun + (count == 1 ? " was" : "s were");
 }
-
-bool is_finite(const glm::vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 float srgb_to_linear(float encoded) {
     // 0.04045 and not 0.03928: the value of IEC 61966-2-1, where the two branches meet.

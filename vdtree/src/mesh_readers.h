@@ -69,8 +69,6 @@ float linear_to_srgb(float linear);
 // Decodes the colour channels as the options say; alpha is linear in every format.
 glm::vec4 decode_colour(glm::vec4 encoded, ColourEncoding encoding);
 
-bool is_finite(const glm::vec3& v);
-
 // What a vertex without the attribute gets in a mesh where others have it.
 constexpr glm::vec3 missing_normal{0.0f};
 constexpr glm::vec4 missing_colour{1.0f};

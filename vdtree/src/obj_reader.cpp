@@ -1,5 +1,6 @@
 // Wavefront OBJ: polygons with positions, UVs, normals, groups and material names. Two passes over the text: vertices
 // first, so that polygons can be cut by their positions, then faces.
+#include "finite.h"
 #include "mesh_readers.h"
 #include "polygon_triangulator.h"
 #include "text_scanner.h"

@@ -1,4 +1,5 @@
 // STL, ASCII and binary. Facets keep their own three vertices: nothing is welded.
+#include "finite.h"
 #include "mesh_readers.h"
 #include "text_scanner.h"
 

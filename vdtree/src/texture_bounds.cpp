@@ -14,8 +14,6 @@ constexpr double largest = Unorm16::largest;
 Unorm16 down(double units) { return {static_cast<std::uint16_t>(std::clamp(std::floor(units), 0.0, largest))}; }
 Unorm16 up(double units) { return {static_cast<std::uint16_t>(std::clamp(std::ceil(units), 0.0, largest))}; }
 
-TreeLinks links_of(const TreeGeometry& g) { return {g.parents, g.first_leaf, g.leaf_end, g.subtree_end}; }
-
 } // namespace
 
 PackedRange product(PackedRange luminance, PackedRange texture) {

@@ -36,7 +36,7 @@ constexpr double least_determinant = 1e-12;
 } // namespace
 
 TextureFits::TextureFits(const TreeGeometry& g, const TreeParts& parts) : g_(&g) {
-    const TreeLinks tree{g.parents, g.first_leaf, g.leaf_end, g.subtree_end};
+    const TreeLinks tree = links_of(g);
     const NodeId interior = tree.interior();
     std::vector<Moments> around(tree.leaves()), sums(interior);
     // Around each leaf's own coordinates, lest small rings far from 0 lose their digits: moved to the parent's where they are summed.

@@ -37,6 +37,12 @@ struct TreeLinks {
     }
 };
 
+// Of a tree's arrays.
+template <class Arrays>
+TreeLinks links_of(const Arrays& tree) {
+    return {tree.parents, tree.first_leaf, tree.leaf_end, tree.subtree_end};
+}
+
 // The same while the tree is being built.
 struct TreeShape {
     std::vector<NodeId> parents;
@@ -45,7 +51,7 @@ struct TreeShape {
     std::vector<NodeId> subtree_end;
     std::vector<Index> made; // by interior node: when the clusterer made it: its cluster's number, higher than its children's
 
-    TreeLinks links() const { return {parents, first_leaf, leaf_end, subtree_end}; }
+    TreeLinks links() const { return links_of(*this); }
     NodeId interior() const { return links().interior(); }
     Index leaves() const { return links().leaves(); }
     NodeId node_of_leaf(Index leaf) const { return interior() + leaf; }

@@ -11,6 +11,7 @@
 #include "chroma.h"
 #include "mask_pool.h"
 #include "node_check.h"
+#include "packed_range.h"
 #include "texture_bounds.h"
 #include "tree_parts.h"
 
@@ -25,7 +26,6 @@ std::uint64_t bytes_of(const Array<T>& a) {
 
 constexpr PackedRange empty_range{{Unorm16::largest}, {0}};
 
-PackedRange unite(PackedRange a, PackedRange b) { return {std::min(a.lo, b.lo), std::max(a.hi, b.hi)}; }
 PackedRange unite(PackedRange a, Unorm16 y) { return unite(a, PackedRange{y, y}); }
 
 // Rounded up: eyes adapted to more light see no less.
@@ -35,10 +35,6 @@ Unorm16 middle(PackedRange r) { return {static_cast<std::uint16_t>((r.lo.value +
 PackedRange shortened(PackedRange ring, PackedRange spread) {
     const int hi = ring.lo.value + (spread.hi.value - spread.lo.value);
     return {ring.lo, {static_cast<std::uint16_t>(std::min<int>(ring.hi.value, hi))}};
-}
-
-TreeLinks links_of(const TreeGeometry& g) {
-    return {g.parents, g.first_leaf, g.leaf_end, g.subtree_end};
 }
 
 // By leaf: the luminance of the triangles around, its own where there is none, and a third of their area, in double against
@@ -123,6 +119,25 @@ private:
     std::vector<Sums> before_; // by leaf: over those before it
 };
 
+void light_leaves(const TreeGeometry& g, const Light& light, bool prelit, bool textured, std::span<Unorm16> luminance) {
+    constexpr NodeId grain = 4096; // leaves
+    const NodeId interior = static_cast<NodeId>(g.first_leaf.size()), nodes = static_cast<NodeId>(luminance.size());
+    tbb::parallel_for(tbb::blocked_range<NodeId>(interior, nodes, grain), [&](const auto& range) {
+        for (NodeId node = range.begin(); node < range.end(); ++node)
+            luminance[node] = Unorm16::nearest(
+                vertex_luminance(g.normals[node], g.colours.empty() ? nullptr : &g.colours[node], light, prelit, textured));
+    });
+}
+
+// What a node and all below it are multiplied with, or show.
+PackedRange range_below(const TreeGeometry& g, const Shades& shades, NodeId node) {
+    const NodeId interior = static_cast<NodeId>(g.first_leaf.size());
+    PackedRange range = empty_range;
+    for (NodeId below = node; below < g.subtree_end[node]; ++below) range = unite(range, shades[below]);
+    for (Index leaf = g.first_leaf[node]; leaf < g.leaf_end[node]; ++leaf) range = unite(range, shades[interior + leaf]);
+    return range;
+}
+
 // Whether all leaves of a node lie at one point, its proxy's: then folding it moves nothing.
 bool is_coincident(const TreeGeometry& g, NodeId node) { return g.support_spheres[node].radius == 0; }
 
@@ -142,21 +157,13 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
     textured = textured && !g.texels.empty();
     const TreeLinks tree = links_of(g);
     const NodeId interior = tree.interior();
-    const Index leaves = tree.leaves();
     LuminanceArrays<Vector> out;
-    out.luminance.resize(std::size_t{interior} + leaves);
+    out.luminance.resize(g.parents.size());
     out.support_range.resize(interior);
     out.ring_range.resize(interior);
     out.adaptation.resize(interior);
 
-    constexpr Index grain = 4096; // leaves
-    tbb::parallel_for(tbb::blocked_range<Index>(0, leaves, grain), [&](const auto& range) {
-        for (Index leaf = range.begin(); leaf < range.end(); ++leaf) {
-            const NodeId node = interior + leaf;
-            out.luminance[node] = Unorm16::nearest(
-                vertex_luminance(g.normals[node], g.colours.empty() ? nullptr : &g.colours[node], light, prelit, textured));
-        }
-    });
+    light_leaves(g, light, prelit, textured, out.luminance);
     const Shades shades(g, out.luminance, textured);
     const LeafSurroundings leaf = survey_leaves(g, parts, shades);
     // A proxy's luminance is the area-weighted mean of its leaves: folds keep the mean of their surroundings.
@@ -190,10 +197,7 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
             if (is_coincident(g, node) && !(textured && moves_texture[node])) {
                 // Nothing moves; a pixel of the ring changes by the spread of the coincident vertices at most. The
                 // contrast of that is largest on the ring's darkest luminance.
-                PackedRange spread = support;
-                for (NodeId below = node; textured && below < g.subtree_end[node]; ++below) spread = unite(spread, shades[below]);
-                for (Index l = g.first_leaf[node]; textured && l < g.leaf_end[node]; ++l) spread = unite(spread, shades[interior + l]);
-                ring = shortened(ring, spread);
+                ring = shortened(ring, textured ? unite(support, range_below(g, shades, node)) : support);
             }
             out.support_range[node] = support;
             if (textured) {

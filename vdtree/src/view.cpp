@@ -5,13 +5,12 @@
 #include <numbers>
 #include <string>
 
+#include "finite.h"
 #include "unit_vector.h"
 
 namespace unseen::vdtree {
 
 namespace {
-
-bool is_finite(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 // The least sine of the angle between `up` and the line of sight: below it the picture's roll is rounding noise.
 constexpr double least_up_sine = 1e-6;

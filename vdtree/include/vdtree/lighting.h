@@ -42,8 +42,8 @@ struct Lighting {
 inline constexpr std::size_t most_lights = 16;
 inline constexpr double most_shininess = 1024;
 
-// Not negative, intensities up to 1e12, distances and places up to 1e18 mesh units, directions of unit length, angles in order, not all dark. The error names the field, as in
-// "lights[2].distance".
+// Not negative, intensities up to 1e12, distances and places up to 1e18 mesh units, directions of unit length, angles in order, not all
+// dark. The error names the field, as in "lights[2].distance".
 Result<void> validate(const Lighting& lighting);
 
 // validate(), and no light at a vertex, where its direction is not defined, or within a closed surface, of which it can light nothing
