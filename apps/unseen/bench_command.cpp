@@ -12,6 +12,7 @@
 #include "effects_bench.h"
 #include "engine_bench.h"
 #include "options.h"
+#include "output_files.h"
 #include "perception_bench.h"
 #include "report.h"
 #include "terminal.h"
@@ -54,6 +55,7 @@ std::vector<std::uint64_t> parse_sizes(std::string_view list) {
 }
 
 Result<int> run(EngineArguments& a) {
+    if (const auto ready = check_outputs({a.options.mesh}, {a.json}); !ready) return ready.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     const auto result = bench_engine(a.options);
@@ -112,6 +114,9 @@ std::vector<std::string> achromatic_models() {
 }
 
 Result<int> run(PerceptionArguments& a) {
+    std::vector<std::string> inputs = a.options.meshes;
+    inputs.insert(inputs.end(), a.options.others.begin(), a.options.others.end());
+    if (const auto ready = check_outputs(inputs, {a.json}); !ready) return ready.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     const auto result = bench_perception(a.options);
@@ -160,6 +165,7 @@ struct EffectsArguments {
 };
 
 Result<int> run(EffectsArguments& a) {
+    if (const auto ready = check_outputs(a.options.meshes, {a.json}); !ready) return ready.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     const auto result = bench_effects(a.options);

@@ -339,7 +339,14 @@ void check(const CalibrateArguments& a) {
     if (!a.out.empty() && !has_ending(a.out, ending)) refuse("-o must end in " + ending + ", not '" + a.out + "'.");
     if (a.frequencies.empty() != a.eccentricities.empty()) refuse("--frequencies and --eccentricities need each other.");
     if (!a.photometer.empty() && a.out.empty()) refuse("--photometer needs -o DISPLAY.json for what was measured.");
-    if ((a.chart || a.gamma || !a.photometer.empty()) && !a.json.empty()) refuse("--json is for observers.");
+    const bool is_of_display = a.chart || a.gamma || !a.photometer.empty();
+    if (is_of_display && !a.json.empty()) refuse("--json is for observers.");
+    const bool has_plan = a.method || a.seed || a.trials || a.settings || a.luminance || !a.frequencies.empty();
+    if (is_of_display && (has_plan || !a.state.empty()))
+        refuse("--method, --seed, --trials, --settings, --luminance, --frequencies, --eccentricities and --resume are for observers.");
+    if (a.trials && a.method == Method::adjustment) refuse("--trials is for --method 2ifc: with adjustment, say --settings.");
+    const bool may_be_adjustment = a.method ? *a.method == Method::adjustment : !a.state.empty(); // of a file, its own
+    if (a.settings && !may_be_adjustment) refuse("--settings needs --method adjustment.");
 }
 
 } // namespace

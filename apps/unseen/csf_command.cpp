@@ -17,6 +17,7 @@
 
 #include "command.h"
 #include "options.h"
+#include "output_files.h"
 #include "plot.h"
 #include "scene.h"
 #include "terminal.h"
@@ -278,6 +279,7 @@ Result<int> run_plot(const CsfArguments& a, const Observer& observer) {
 // -------------------------------------------------------------------------------------------------------------------
 
 Result<int> run(const CsfArguments& a) {
+    if (const auto ready = check_outputs({a.csf, a.csv}, {a.plot, a.save}); !ready) return ready.error();
     const auto observer = Observer::create(a);
     if (!observer) return observer.error();
     if (!a.save.empty()) {

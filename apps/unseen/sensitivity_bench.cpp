@@ -228,6 +228,7 @@ Result<void> plot_models(const fs::path& file) {
 
 // ---- observers
 
+// The last four are of other shapes than the castleCSF that is expected of everybody.
 constexpr const char* observers[] = {"castle",
                                      "castle:gain=0.7",
                                      "castle:gain=1.6,frequency=1.3,eccentricity=0.7",
@@ -235,7 +236,11 @@ constexpr const char* observers[] = {"castle",
                                      "stela",
                                      "stela:gain=0.5,frequency=1.2",
                                      "castle:slope=2,lapse=0.03",
-                                     "castle:slope=5,lapse=0"};
+                                     "castle:slope=5,lapse=0",
+                                     "barten-1999:gain=0.5,frequency=0.8",
+                                     "barten-2004",
+                                     "daly:gain=0.6",
+                                     "daly:frequency=1.3,slope=3"};
 
 // Root mean square over the places that the observer can see.
 double error_db(const calibration::Procedure& procedure, const calibration::SimulatedObserver& observer) {
@@ -334,7 +339,7 @@ Result<std::vector<BenchRow>> bench_csf(const SensitivityBenchOptions& options) 
 }
 
 Result<std::vector<BenchRow>> bench_observers(const SensitivityBenchOptions& options) {
-    const int runs = options.quick ? 1 : 8;
+    const int runs = options.quick ? 1 : 24;
     constexpr int few = 200, many = 400;
     const perception::Display display;
     std::vector<ObserverErrors> at_few, at_many;

@@ -75,6 +75,7 @@ Result<PhotometerTable> read_photometer(const std::filesystem::path& file) {
     };
     for (std::string line; std::getline(stream, line);) {
         if (++number > most_rows) return complain("there are too many lines");
+        if (number == 1 && line.starts_with("\xef\xbb\xbf")) line.erase(0, 3); // a byte order mark, which spreadsheets write
         const std::string_view text = trimmed(line);
         if (text.empty() || text.starts_with('#')) continue;
         if (!has_header) {

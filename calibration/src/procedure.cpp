@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <utility>
 
 #include <perception/random.h>
 
@@ -152,9 +153,11 @@ Result<Procedure> Procedure::create(CalibrationPlan plan, CsfTable expected) {
     const double step = thresholds[1] - thresholds[0];
     while (thresholds.back() < highest_threshold + room_above_expected)
         thresholds.push_back(thresholds.front() + step * static_cast<double>(thresholds.size()));
-    std::erase_if(grid.log10_contrast, [&](double c) { return c > std::log10(plan.highest_contrast); });
+    const double highest = std::log10(plan.highest_contrast);
+    std::erase_if(grid.log10_contrast, [&](double c) { return c > highest; });
     if (grid.log10_contrast.empty())
         return invalid("The display's highest contrast, " + to_text(plan.highest_contrast) + ", shows nothing that could be measured.");
+    if (grid.log10_contrast.back() < highest) grid.log10_contrast.push_back(highest);
     auto blank = QuestPlus::create(grid);
     if (!blank) return blank.error();
     return Procedure(std::move(plan), std::move(expected), std::move(*blank));
@@ -172,21 +175,56 @@ Trial Procedure::next() const {
     trial.phase_deg = 360 * random.uniform();
     trial.interval = random.uniform() < 0.5 ? 1 : 2;
     if (plan_.method == Method::adjustment) return next_adjustment(trial);
-    // Now and then the place that was asked least, so that no place rests on what the others say about it.
+    // Now and then the place that was asked least, so that no place rests on what the others say about it; of those that may be visible.
     constexpr int round = 4;
-    const auto least_asked = static_cast<std::size_t>(std::min_element(asked_.begin(), asked_.end()) - asked_.begin());
+    constexpr double hardly_visible = 0.02; // chance
+    const Prospect prospect = look_ahead();
+    std::size_t least_asked = 0;
+    const auto rank = [&](std::size_t i) { return std::pair(prospect.visible[i] < hardly_visible, asked_[i]); };
+    for (std::size_t i = 1; i < quests_.size(); ++i)
+        if (rank(i) < rank(least_asked)) least_asked = i;
     const bool is_for_all = trial.number % round == round - 1;
     double most = -1;
     for (std::size_t i = 0; i < quests_.size(); ++i) {
         if (is_for_all && i != least_asked) continue;
-        const QuestPlus::Choice choice = quests_[i].next();
-        if (!(choice.gain_bits > most)) continue;
-        most = choice.gain_bits;
-        trial.place = i;
-        trial.contrast = std::pow(10, choice.log10_contrast);
+        const std::vector<double> pulled = field_.pulled_by(i);
+        quests_[i].forecast([&](const QuestPlus::Forecast& answer) {
+            const double gain = gain_of(answer, pulled, prospect);
+            if (!(gain > most)) return;
+            most = gain;
+            trial.place = i;
+            trial.contrast = std::min(std::pow(10, answer.log10_contrast), plan_.highest_contrast);
+        });
     }
     trial.grating = plan_.places[trial.place];
     return trial;
+}
+
+Procedure::Prospect Procedure::look_ahead() const {
+    Prospect prospect;
+    for (std::size_t i = 0; i < quests_.size(); ++i) {
+        const SensitivityField::Belief belief = field_.belief(i);
+        const double above = (belief.mean + std::log10(plan_.highest_contrast)) / belief.deviation;
+        prospect.visible.push_back(std::erfc(-above / std::numbers::sqrt2) / 2);
+        const double mean = quests_[i].log10_threshold().mean;
+        for (const double of_function : quests_[i].log10_thresholds()) prospect.shifts.push_back(of_function - mean);
+    }
+    return prospect;
+}
+
+// The variance of a threshold is expected to become smaller by the square of its covariance with the answer over the answer's variance.
+// Places vary together by what they say about each other, and by the slope that they have in common.
+double Procedure::gain_of(const QuestPlus::Forecast& answer, const std::vector<double>& pulled, const Prospect& prospect) {
+    const std::size_t functions = answer.right.size();
+    const double right = std::accumulate(answer.right.begin(), answer.right.end(), 0.0);
+    if (!(right > 0 && right < 1)) return 0;
+    double sum = 0;
+    for (std::size_t place = 0; place < pulled.size(); ++place) {
+        double covariance = pulled[place] * answer.pull;
+        for (std::size_t f = 0; f < functions; ++f) covariance += answer.right[f] * prospect.shifts[place * functions + f];
+        sum += prospect.visible[place] * covariance * covariance;
+    }
+    return sum / (right * (1 - right));
 }
 
 // Rounds over all places, each in an order of its own; a place is approached from below and from above in turn.

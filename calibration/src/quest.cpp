@@ -1,4 +1,4 @@
-// QUEST+: a posterior on a grid, and the mutual information of stimuli's answers and parameters.
+// QUEST+: a posterior on a grid, and what stimuli's answers are expected to tell of the threshold.
 #include <calibration/quest.h>
 
 #include <algorithm>
@@ -13,11 +13,6 @@ namespace unseen::calibration {
 namespace {
 
 Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
-
-// -p log2 p, 0 at 0.
-double surprise(double p) { return p > 0 ? -p * std::log2(p) : 0; }
-
-double entropy_of_answer(double p) { return surprise(p) + surprise(1 - p); }
 
 Result<void> check_axis(const std::vector<double>& axis, const std::string& name) {
     if (axis.empty()) return invalid("QUEST+: " + name + " has no values.");
@@ -53,7 +48,7 @@ Result<void> validate(const Psychometric& f) {
 QuestGrid standard_grid() {
     QuestGrid grid;
     for (int i = 0; i <= 160; ++i) grid.log10_threshold.push_back(-3.5 + 0.025 * i);
-    for (int i = 0; i <= 35; ++i) grid.log10_contrast.push_back(-3.5 + 0.1 * i);
+    for (int i = 0; i <= 70; ++i) grid.log10_contrast.push_back(-3.5 + 0.05 * i);
     grid.slope = {Psychometric().slope};
     grid.lapse = {Psychometric().lapse};
     return grid;
@@ -62,8 +57,7 @@ QuestGrid standard_grid() {
 struct QuestPlus::Tables {
     QuestGrid grid;
     std::vector<Psychometric> functions; // by lapse and slope
-    // By stimulus and combination: the probability of a right answer, and the entropy of the answer in bits.
-    std::vector<float> right, entropy;
+    std::vector<float> right; // by stimulus and combination: the probability of a right answer
 
     std::size_t combinations() const { return functions.size() * grid.log10_threshold.size(); }
 };
@@ -86,14 +80,10 @@ Result<QuestPlus> QuestPlus::create(const QuestGrid& grid) {
             if (auto ok = validate(tables->functions.back()); !ok) return ok.error();
         }
     tables->right.reserve(grid.log10_contrast.size() * tables->combinations());
-    tables->entropy.reserve(tables->right.capacity());
     for (const double contrast : grid.log10_contrast)
         for (const Psychometric& function : tables->functions)
-            for (const double threshold : grid.log10_threshold) {
-                const double right = function.probability(contrast - threshold);
-                tables->right.push_back(static_cast<float>(right));
-                tables->entropy.push_back(static_cast<float>(entropy_of_answer(right)));
-            }
+            for (const double threshold : grid.log10_threshold)
+                tables->right.push_back(static_cast<float>(function.probability(contrast - threshold)));
     return QuestPlus(std::move(tables));
 }
 
@@ -160,28 +150,57 @@ QuestPlus::Belief QuestPlus::log10_threshold() const {
     return belief;
 }
 
-double QuestPlus::entropy_bits() const {
-    double sum = 0;
-    for (const double p : posterior_) sum += surprise(p);
-    return sum;
+std::vector<double> QuestPlus::log10_thresholds() const {
+    const std::vector<double>& values = tables_->grid.log10_threshold;
+    std::vector<double> means;
+    for (std::size_t f = 0; f < tables_->functions.size(); ++f) {
+        double sum = 0, weight = 0;
+        for (std::size_t t = 0; t < values.size(); ++t) {
+            sum += posterior_[f * values.size() + t] * values[t];
+            weight += posterior_[f * values.size() + t];
+        }
+        means.push_back(weight > 0 ? sum / weight : log10_threshold().mean);
+    }
+    return means;
 }
 
-// The expected entropy after an answer is that of now less the information that the answer carries about the
-// parameters: the entropy of the answer, less that which is left when the parameters are known.
-QuestPlus::Choice QuestPlus::next() const {
-    Choice best;
-    best.gain_bits = -1;
-    const std::size_t combinations = posterior_.size();
+void QuestPlus::forecast(FunctionRef<void(const Forecast&)> f) const {
+    const std::vector<double>& thresholds = tables_->grid.log10_threshold;
+    const std::size_t count = thresholds.size(), functions = tables_->functions.size();
+    const std::vector<double> means = log10_thresholds();
+    std::vector<double> off_mean; // by combination, weighted
+    for (std::size_t i = 0; i < posterior_.size(); ++i) off_mean.push_back(posterior_[i] * (thresholds[i % count] - means[i / count]));
+    std::vector<double> by_function(functions);
     for (std::size_t s = 0; s < tables_->grid.log10_contrast.size(); ++s) {
-        const float *const right = &tables_->right[s * combinations], *const entropy = &tables_->entropy[s * combinations];
-        double expected_right = 0, known = 0;
-        for (std::size_t i = 0; i < combinations; ++i) {
-            expected_right += posterior_[i] * static_cast<double>(right[i]);
-            known += posterior_[i] * static_cast<double>(entropy[i]);
+        const float* right = &tables_->right[s * posterior_.size()];
+        double pull = 0;
+        for (std::size_t function = 0, i = 0; function < functions; ++function) {
+            double sum = 0;
+            for (std::size_t t = 0; t < count; ++t, ++i) {
+                sum += posterior_[i] * static_cast<double>(right[i]);
+                pull += off_mean[i] * static_cast<double>(right[i]);
+            }
+            by_function[function] = sum;
         }
-        const double gain = std::max(0.0, entropy_of_answer(std::min(1.0, expected_right)) - known);
-        if (gain > best.gain_bits) best = {tables_->grid.log10_contrast[s], gain};
+        f({tables_->grid.log10_contrast[s], by_function, pull});
     }
+}
+
+// The variance that is expected after an answer is that of now, less that of the means after either answer.
+QuestPlus::Choice QuestPlus::next() const {
+    const double mean = log10_threshold().mean;
+    const std::vector<double> means = log10_thresholds();
+    Choice best;
+    best.gain = -1;
+    forecast([&](const Forecast& answer) {
+        double right = 0, covariance = answer.pull;
+        for (std::size_t f = 0; f < means.size(); ++f) {
+            right += answer.right[f];
+            covariance += answer.right[f] * (means[f] - mean);
+        }
+        const double gain = right > 0 && right < 1 ? covariance * covariance / (right * (1 - right)) : 0;
+        if (gain > best.gain) best = {answer.log10_contrast, gain};
+    });
     return best;
 }
 

@@ -7,15 +7,20 @@
 namespace unseen::calibration {
 namespace {
 
+using Site = SensitivityField::Site;
+
 // Standard deviations of an observer from the expected one, in log10 units (0.05 is 1 dB). Observers of one age differ by
 // about 6 dB in gain; the rest is chosen wide enough for the published models to be reached from one another.
 constexpr double gain = 0.3;
 constexpr double tilt_per_octave = 0.08;
 constexpr double cutoff_per_cpd = 0.015;
 constexpr double decline_per_degree = 0.012;
-constexpr double fall_per_cpd_degree = 0.003;
-constexpr double local = 0.08;
+constexpr double fall_per_cpd_degree = 0.006; // castleCSF's nasal and temporal fields lie 0.011 apart
+constexpr double share_of_loss = 0.2;
+constexpr double local = 0.07, local_share_of_loss = 0.16;
 constexpr double local_octaves = 1.5; // length over which it stays alike; also in octaves of 2 deg + eccentricity
+// What lies lower is not seen at any contrast, and need not vary more.
+constexpr double most_loss = 2.5;
 
 constexpr double middle_cpd = 3; // near the peak of sensitivity, where tilting leaves the gain as it is
 constexpr double fovea_deg = 2;
@@ -25,19 +30,22 @@ constexpr double jitter = 1e-6;
 double octaves(const GratingPlace& p) { return std::log2(p.frequency_cpd / middle_cpd); }
 double aside(const GratingPlace& p) { return std::log2(1 + p.eccentricity_deg / fovea_deg); }
 
-double shape_covariance(const GratingPlace& a, const GratingPlace& b) {
+double shape_covariance(const Site& a, const Site& b) {
     const auto square = [](double x) { return x * x; };
-    const double fa = a.frequency_cpd, fb = b.frequency_cpd, ea = a.eccentricity_deg, eb = b.eccentricity_deg;
-    return square(gain) + square(tilt_per_octave) * octaves(a) * octaves(b) + square(cutoff_per_cpd) * fa * fb +
-           square(decline_per_degree) * ea * eb + square(fall_per_cpd_degree) * fa * ea * fb * eb;
+    const double fa = a.place.frequency_cpd, fb = b.place.frequency_cpd, ea = a.place.eccentricity_deg, eb = b.place.eccentricity_deg;
+    return square(gain) + square(tilt_per_octave) * octaves(a.place) * octaves(b.place) + square(cutoff_per_cpd) * fa * fb +
+           square(decline_per_degree) * ea * eb + square(fall_per_cpd_degree) * fa * ea * fb * eb +
+           square(share_of_loss) * a.loss * b.loss;
 }
 
-double local_covariance(const GratingPlace& a, const GratingPlace& b) {
-    const double du = (octaves(a) - octaves(b)) / local_octaves, dv = (aside(a) - aside(b)) / local_octaves;
-    return local * local * std::exp(-(du * du + dv * dv) / 2);
+double local_deviation_of(const Site& s) { return local + local_share_of_loss * s.loss; }
+
+double local_covariance(const Site& a, const Site& b) {
+    const double du = (octaves(a.place) - octaves(b.place)) / local_octaves, dv = (aside(a.place) - aside(b.place)) / local_octaves;
+    return local_deviation_of(a) * local_deviation_of(b) * std::exp(-(du * du + dv * dv) / 2);
 }
 
-double covariance(const GratingPlace& a, const GratingPlace& b) { return shape_covariance(a, b) + local_covariance(a, b); }
+double covariance(const Site& a, const Site& b) { return shape_covariance(a, b) + local_covariance(a, b); }
 
 // The lower factor of a symmetric positive definite matrix, in place; the upper part is left as it is.
 void factorise(std::vector<double>& m, std::size_t n) {
@@ -71,17 +79,26 @@ std::vector<double> weighted_factor(const std::vector<double>& prior, const std:
 
 } // namespace
 
-SensitivityField::SensitivityField(std::vector<GratingPlace> places, const perception::CsfTable& table,
-                                   perception::Luminance luminance)
-    : places_(std::move(places)), precision_(places_.size(), 0.0), shift_(places_.size(), 0.0) {
-    const std::size_t n = places_.size();
-    prior_.resize(n * n);
-    for (std::size_t i = 0; i < n; ++i) {
-        expected_.push_back(std::log10(table.sensitivity(perception::CyclesPerDegree(places_[i].frequency_cpd),
-                                                         perception::Degrees(places_[i].eccentricity_deg), luminance)));
-        for (std::size_t j = 0; j < n; ++j) prior_[i * n + j] = covariance(places_[i], places_[j]) + (i == j ? jitter : 0.0);
+SensitivityField::SensitivityField(const std::vector<GratingPlace>& places, perception::CsfTable expected, perception::Luminance luminance)
+    : table_(std::move(expected)), luminance_(luminance), precision_(places.size(), 0.0), shift_(places.size(), 0.0) {
+    for (const GratingPlace& place : places) {
+        sites_.push_back(site(place));
+        expected_.push_back(log10_expected(place));
     }
+    const std::size_t n = places.size();
+    prior_.resize(n * n);
+    for (std::size_t i = 0; i < n; ++i)
+        for (std::size_t j = 0; j < n; ++j) prior_[i * n + j] = covariance(sites_[i], sites_[j]) + (i == j ? jitter : 0.0);
     update();
+}
+
+double SensitivityField::log10_expected(const GratingPlace& at) const {
+    return std::log10(
+        table_.sensitivity(perception::CyclesPerDegree(at.frequency_cpd), perception::Degrees(at.eccentricity_deg), luminance_));
+}
+
+Site SensitivityField::site(const GratingPlace& at) const {
+    return {at, std::clamp(log10_expected({middle_cpd, 0}) - log10_expected(at), 0.0, most_loss)};
 }
 
 SensitivityField::Belief SensitivityField::belief(std::size_t i) const {
@@ -93,6 +110,12 @@ SensitivityField::Belief SensitivityField::without_own(std::size_t i) const {
     // At least the posterior's own precision is left: a factor's can exceed it by rounding only.
     const double rest = std::max(1 / variance - precision_[i], 1e-9 / variance);
     return {expected_[i] + (mean_[i] / variance - shift_[i]) / rest, std::sqrt(1 / rest)};
+}
+
+std::vector<double> SensitivityField::pulled_by(std::size_t i) const {
+    std::vector<double> shares;
+    for (std::size_t j = 0; j < size(); ++j) shares.push_back(covariance_[i * size() + j] / covariance_[i * size() + i]);
+    return shares;
 }
 
 void SensitivityField::set_own(std::size_t i, const Belief& with_own) {
@@ -173,14 +196,15 @@ SensitivityField::Belief predict(const std::vector<double>& prior, const std::ve
 
 SensitivityField::Belief SensitivityField::deviation(const GratingPlace& at) const {
     std::vector<double> with_places;
-    for (const GratingPlace& p : places_) with_places.push_back(covariance(at, p));
-    return predict(prior_, precision_, shift_, with_places, covariance(at, at));
+    const Site here = site(at);
+    for (const Site& s : sites_) with_places.push_back(covariance(here, s));
+    return predict(prior_, precision_, shift_, with_places, covariance(here, here));
 }
 
 SensitivityField::Belief SensitivityField::local_deviation(std::size_t i) const {
     std::vector<double> with_places;
-    for (const GratingPlace& p : places_) with_places.push_back(local_covariance(places_[i], p));
-    return predict(prior_, precision_, shift_, with_places, local_covariance(places_[i], places_[i]));
+    for (const Site& s : sites_) with_places.push_back(local_covariance(sites_[i], s));
+    return predict(prior_, precision_, shift_, with_places, local_covariance(sites_[i], sites_[i]));
 }
 
 } // namespace unseen::calibration

@@ -44,6 +44,17 @@ TEST_F(BenchCommandTest, MeasuresEveryRow) {
     EXPECT_THAT(again.err, ::testing::Not(HasSubstr("building ball-1472.vdt"))) << "it is kept";
 }
 
+TEST_F(BenchCommandTest, DoesNotWriteOverItsMesh) {
+    write_ball("ball.obj");
+    const std::string before = read_text(path("ball.obj"));
+    for (const char* bench : {"engine", "perception", "effects"}) {
+        const Outcome outcome = run({"bench", bench, "--quick", "--mesh", "ball.obj", "--json", "ball.obj"});
+        EXPECT_EQ(outcome.status, 1) << bench;
+        EXPECT_THAT(outcome.err, HasSubstr("ball.obj' is read"));
+    }
+    EXPECT_EQ(read_text(path("ball.obj")), before);
+}
+
 TEST_F(BenchCommandTest, RefusesWrongSizes) {
     for (const std::string sizes : {"", "0", "70k,70k", "70k,1k", "nan", "1e99", "50", "70q"})
         EXPECT_EQ(run({"bench", "engine", "--sizes", sizes}).status, 2) << sizes;

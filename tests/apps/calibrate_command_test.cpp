@@ -183,7 +183,9 @@ TEST_F(CalibrateCommandTest, RefusesWhatMakesNoSense) {
         {"--simulate", "castle", "--trials", "0"},   {"--simulate", "castle", "--trials", "1.5"}, {"--simulate", "castle", "--trials", "nan"},
         {"--simulate", "castle", "--seed", "-1"},    {"--simulate", "castle", "--method", "3ifc"}, {"--simulate", "castle", "-o", "x.txt"},
         {"--simulate", "castle", "--chart"},         {"--photometer", "p.csv"},                   {"--chart", "-o", "x.json"},
-        {"--simulate", "castle", "--luminance", "0"}, {"--simulate", "castle", "--frequencies", "4"}};
+        {"--simulate", "castle", "--luminance", "0"}, {"--simulate", "castle", "--frequencies", "4"},
+        {"--simulate", "castle", "--settings", "9"}, {"--simulate", "castle", "--method", "adjustment", "--trials", "9"},
+        {"--chart", "--seed", "2"},                  {"--gamma", "--resume", "state.json"}};
     for (std::vector<std::string> words : wrong) {
         words.insert(words.begin(), "calibrate");
         const Outcome outcome = run(words);

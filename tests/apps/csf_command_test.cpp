@@ -184,6 +184,14 @@ TEST_F(CsfCommandTest, TablesCanBeSavedAndUsed) {
     EXPECT_EQ(sensitivity(by_file), sensitivity(by_model));
 }
 
+// A measured profile says more than its table: it must not be lost to it.
+TEST_F(CsfCommandTest, ATableIsNotWrittenOverTheOneThatIsRead) {
+    ASSERT_EQ(run({"csf", "--table", "--save-table", "table.json"}).status, 0);
+    const Outcome outcome = run({"csf", "--csf", "table.json", "--save-table", "./table.json"});
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_THAT(outcome.err, HasSubstr("table.json' is read"));
+}
+
 TEST_F(CsfCommandTest, ATableKeepsItsMotion) {
     ASSERT_EQ(
         run({"csf", "--model", "barten-1999", "--table", "--velocity", "5", "--save-table", "moving.json"}).status, 0);

@@ -34,6 +34,9 @@ TEST_F(DisplayFit, APhotometersTableBecomesTheDisplay) {
     for (int code = 0; code <= 255; code += 15) text += std::to_string(code) + "," + std::to_string(luminance(code / 255.0)) + "\n";
     const auto table = read_photometer(write(text, "p.csv"));
     ASSERT_TRUE(table) << table.error().message;
+    const auto from_spreadsheet = read_photometer(write("\xef\xbb\xbf" "code,cdm2\r\n0,0.5\r\n128,20\r\n255,80\r\n", "bom.csv"));
+    ASSERT_TRUE(from_spreadsheet) << from_spreadsheet.error().message;
+    EXPECT_EQ(from_spreadsheet->luminance, std::vector<double>({0.5, 20, 80}));
     const auto display = with_photometer(perception::Display(), *table);
     ASSERT_TRUE(display) << display.error().message;
     EXPECT_NEAR(display->peak.value(), 180, 1e-4);

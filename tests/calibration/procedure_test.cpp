@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include <gmock/gmock.h>
 
@@ -82,38 +83,39 @@ TEST_F(ProcedureTest, ThePlanFitsTheDisplay) {
     }
 }
 
-struct Case {
-    const char* observer;
-    double db_at_200, db_at_400; // root mean square over the runs
-};
+// Some near the expected castleCSF, some of other gains, scales, slopes and lapse rates; and of other shapes: Barten's models fall faster towards
+// coarse gratings, Daly's declines aside by another law.
+constexpr const char* other_shapes[] = {"barten-1999:gain=0.5,frequency=0.8", "barten-2004", "daly:gain=0.6", "daly:frequency=1.3,slope=3"};
+constexpr const char* observers[] = {"castle",
+                                     "stela:gain=0.7",
+                                     "castle:gain=1.6,frequency=1.3,eccentricity=0.7",
+                                     "castle:gain=0.35,frequency=0.75,eccentricity=1.5",
+                                     "castle:slope=2,lapse=0.03",
+                                     other_shapes[0],
+                                     other_shapes[1],
+                                     other_shapes[2],
+                                     other_shapes[3]};
 
-// What is owed: 1.5 dB in 400 trials. In 200 the mean over seeds is below 1 dB for observers near the expected shape, and up to 1.3 for
-// the others (docs/calibration.md); two runs scatter about it by a quarter.
+// What is owed: 1.5 dB in 400 trials, of every run. In 200 the mean over seeds is about 1 dB (docs/calibration.md), two runs scatter about
+// it by a quarter, and observers of other shapes take some trials more.
 TEST_F(ProcedureTest, FindsTheSensitivityOfSimulatedObservers) {
-    const Case cases[] = {{"castle", 1.25, 1.0},
-                          {"stela:gain=0.7", 1.25, 1.0},
-                          {"castle:gain=1.6,frequency=1.3,eccentricity=0.7", 1.25, 1.0},
-                          {"castle:gain=0.35,frequency=0.75,eccentricity=1.5", 2.0, 1.5},
-                          {"castle:slope=2,lapse=0.03", 1.3, 1.3}};
-    for (const Case& c : cases) {
-        double at_200 = 0, at_400 = 0;
+    double mean_at_200 = 0;
+    for (const char* description : observers) {
         constexpr int runs = 2;
         for (std::uint64_t seed = 1; seed <= runs; ++seed) {
             CalibrationPlan plan = default_plan();
             plan.trials = 400;
             plan.seed = seed;
             Procedure procedure = begin(plan);
-            const SimulatedObserver observer = observer_of(c.observer, 100 + seed);
+            const SimulatedObserver observer = observer_of(description, 100 + seed);
             while (!procedure.is_done()) {
-                if (procedure.answers().size() == 200) at_200 += std::pow(rms_error_db(procedure, observer), 2);
+                if (procedure.answers().size() == 200) mean_at_200 += rms_error_db(procedure, observer) / (runs * std::size(observers));
                 answer(procedure, observer);
             }
-            at_400 += std::pow(rms_error_db(procedure, observer), 2);
+            EXPECT_LT(rms_error_db(procedure, observer), 1.5) << description << ", seed " << seed;
         }
-        EXPECT_LT(std::sqrt(at_200 / runs), c.db_at_200) << c.observer;
-        EXPECT_LT(std::sqrt(at_400 / runs), c.db_at_400) << c.observer;
-        RecordProperty(c.observer, std::to_string(std::sqrt(at_200 / runs)));
     }
+    EXPECT_LT(mean_at_200, 1.1);
 }
 
 TEST_F(ProcedureTest, AdjustmentFindsItToo) {
@@ -227,20 +229,28 @@ TEST_F(ProcedureTest, WhatCannotBeMeasuredIsRefused) {
 }
 
 TEST_F(ProcedureTest, IntervalsHoldTheTruthAboutAsOftenAsTheySay) {
-    int inside = 0, all = 0;
-    for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-        CalibrationPlan plan = default_plan();
-        plan.seed = seed;
-        Procedure procedure = begin(plan);
-        const SimulatedObserver observer = observer_of("stela:gain=0.8", 200 + seed);
-        while (!procedure.is_done()) answer(procedure, observer);
-        for (const PlaceEstimate& e : procedure.estimates()) {
-            const double truth = observer.sensitivity(e.place, plan.luminance);
-            inside += e.low() <= truth && truth <= e.high();
-            ++all;
-        }
-    }
-    EXPECT_GT(inside, 0.88 * all); // of 95%
+    const auto share_inside = [](std::span<const char* const> descriptions, int runs) {
+        int inside = 0, all = 0;
+        for (const char* description : descriptions)
+            for (int run = 1; run <= runs; ++run) {
+                CalibrationPlan plan = default_plan();
+                plan.seed = static_cast<std::uint64_t>(run);
+                Procedure procedure = begin(plan);
+                const SimulatedObserver observer = observer_of(description, 200 + plan.seed);
+                while (!procedure.is_done()) answer(procedure, observer);
+                for (const PlaceEstimate& e : procedure.estimates()) {
+                    const double truth = observer.sensitivity(e.place, plan.luminance);
+                    if (truth * plan.highest_contrast < 1) continue; // has no threshold
+                    inside += e.low() <= truth && truth <= e.high();
+                    ++all;
+                }
+            }
+        return inside / static_cast<double>(all);
+    };
+    // Of 95%.
+    constexpr const char* near_the_expected[] = {"stela:gain=0.8"};
+    EXPECT_GT(share_inside(near_the_expected, 4), 0.9);
+    EXPECT_GT(share_inside(other_shapes, 2), 0.88);
 }
 
 // A notch of 6 dB an octave wide: the shape's parameters cannot follow it, the places' own answers must.

@@ -76,8 +76,8 @@ TEST(QuestPlus, PosteriorsFollowTheReferenceTrace) {
     }
 }
 
-// The definition: for both answers the posterior's entropy, weighted by how likely they are.
-TEST(QuestPlus, TheNextStimulusLeavesTheLeastExpectedEntropy) {
+// The definition: for both answers the posterior's variance, weighted by how likely they are.
+TEST(QuestPlus, TheNextStimulusLeavesTheLeastExpectedVariance) {
     QuestGrid grid;
     for (int i = 0; i <= 40; ++i) grid.log10_threshold.push_back(-3 + 0.05 * i);
     grid.slope = {2, 3.5, 5};
@@ -85,10 +85,11 @@ TEST(QuestPlus, TheNextStimulusLeavesTheLeastExpectedEntropy) {
     for (int i = 0; i <= 20; ++i) grid.log10_contrast.push_back(-3 + 0.1 * i);
     auto quest = QuestPlus::create(grid);
     ASSERT_TRUE(quest);
+    const auto variance = [](const QuestPlus& q) { return q.log10_threshold().deviation * q.log10_threshold().deviation; };
     const std::pair<double, bool> answers[] = {{-1.5, true}, {-2, true}, {-2.5, false}, {-2.2, true}, {-2.4, false}, {-1.9, true}};
     for (const auto& [contrast, is_right] : answers) {
         const auto choice = quest->next();
-        const double now = quest->entropy_bits();
+        const double now = variance(*quest);
         double least = std::numeric_limits<double>::infinity(), of_choice = 0;
         for (const double stimulus : grid.log10_contrast) {
             double right = 0;
@@ -101,13 +102,13 @@ TEST(QuestPlus, TheNextStimulusLeavesTheLeastExpectedEntropy) {
             for (const bool answer : {true, false}) {
                 QuestPlus after = *quest;
                 after.update(stimulus, answer);
-                expected += (answer ? right : 1 - right) * after.entropy_bits();
+                expected += (answer ? right : 1 - right) * variance(after);
             }
             least = std::min(least, expected);
             if (stimulus == choice.log10_contrast) of_choice = expected;
         }
         EXPECT_NEAR(of_choice, least, 1e-6);
-        EXPECT_NEAR(now - choice.gain_bits, of_choice, 1e-6);
+        EXPECT_NEAR(now - choice.gain, of_choice, 1e-6);
         quest->update(contrast, is_right);
     }
 }

@@ -1,10 +1,12 @@
-// QUEST+ (Watson 2017): an adaptive measurement of a psychometric function on a grid of its parameters.
+// QUEST+ (Watson 2017): an adaptive measurement of a psychometric function on a grid of its parameters. Stimuli are chosen for the
+// threshold alone (King-Smith et al. 1994), of which slope and lapse rate are only disturbances.
 #pragma once
 
 #include <memory>
 #include <span>
 #include <vector>
 
+#include <vdtree/function_ref.h>
 #include <vdtree/result.h>
 
 namespace unseen::calibration {
@@ -32,7 +34,7 @@ struct QuestGrid {
     double guess = 0.5, at_threshold = 0.82;
 };
 
-// Thresholds 10^-3.5 to 10^0.5 in steps of 0.025, contrasts 10^-3.5 to 1 in steps of 0.1, slope and lapse as by default.
+// Thresholds 10^-3.5 to 10^0.5 in steps of 0.025, contrasts 10^-3.5 to 1 in steps of 0.05, slope and lapse as by default.
 QuestGrid standard_grid();
 
 // Copies share the grid's tables. Cost: a function value for each combination of parameters in update(), and two
@@ -61,12 +63,23 @@ public:
         double mean = 0, deviation = 0, mode = 0;
     };
     Belief log10_threshold() const;
-    double entropy_bits() const;
 
-    // The stimulus whose answer leaves the least entropy to expect; of equals the first.
+    // The same by pair of slope and lapse, each as if it were known.
+    std::vector<double> log10_thresholds() const;
+
+    // What the answer to each stimulus is expected to tell.
+    struct Forecast {
+        double log10_contrast = 0;
+        std::span<const double> right; // probability of each pair of slope and lapse, and of a right answer
+        double pull = 0;               // covariance of a right answer and log10_threshold, were the pair known
+    };
+    // Calls f(Forecast) for all stimuli in turn.
+    void forecast(FunctionRef<void(const Forecast&)> f) const;
+
+    // The stimulus whose answer leaves the least variance of log10_threshold to expect; of equals the first.
     struct Choice {
         double log10_contrast = 0;
-        double gain_bits = 0; // by which the expected entropy is below that of now; 0 or more
+        double gain = 0; // by which the expected variance is below that of now; 0 or more
     };
     Choice next() const;
 

@@ -15,10 +15,13 @@ struct GratingPlace {
 };
 
 // A Gaussian process over log10 sensitivity: an expected table, plus a deviation d(f, e) of mean 0 and covariance
-//   gain^2 + tilt^2 u u' + cutoff^2 f f' + decline^2 e e' + fall^2 (f e)(f' e') + local^2 exp(-du^2 / 2 lu^2 - dv^2 / 2 lv^2)
-// with u octaves from 3 cpd, and v = log2(1 + e / 2 deg). The first five terms are a shape with five parameters: how sensitive
-// the observer is, how steep over frequency, how fine, how fast it falls aside; the last lets every place differ from it.
-// So what is measured in one place tells about the others, and what does not fit the shape still comes through.
+//   gain^2 + tilt^2 u u' + cutoff^2 f f' + decline^2 e e' + fall^2 (f e)(f' e') + loss^2 s s'
+//   + local(s) local(s') exp(-du^2 / 2 lu^2 - dv^2 / 2 lv^2)
+// with u octaves from 3 cpd, v = log2(1 + e / 2 deg), and s what the expected observer has lost here, log10 units below the
+// sensitivity to 3 cpd in the fovea. The first six terms are a shape with six parameters: how sensitive the observer is, how steep
+// over frequency, how fine, how fast it falls aside, and how much of every loss is there; the last lets every place differ from it,
+// the more, the more is lost. So what is measured in one place tells about the others, and what does not fit the shape still
+// comes through.
 //
 // Answers come in as likelihoods by place, and are combined by expectation propagation (Minka 2001) with one Gaussian
 // factor for each place. Cost of set_own(): places^2, of a prediction places^3.
@@ -29,10 +32,9 @@ public:
     };
 
     // `expected` gives the mean at `luminance`.
-    SensitivityField(std::vector<GratingPlace> places, const perception::CsfTable& expected, perception::Luminance luminance);
+    SensitivityField(const std::vector<GratingPlace>& places, perception::CsfTable expected, perception::Luminance luminance);
 
-    std::size_t size() const noexcept { return places_.size(); }
-    const GratingPlace& place(std::size_t i) const noexcept { return places_[i]; }
+    std::size_t size() const noexcept { return sites_.size(); }
     double expected(std::size_t i) const noexcept { return expected_[i]; } // log10 sensitivity
 
     // What the other places say about this one: the belief without this place's own answers.
@@ -41,16 +43,28 @@ public:
     // The deviation from the expected table anywhere, and its parts: the shape, and what is local.
     Belief deviation(const GratingPlace& at) const;
     Belief local_deviation(std::size_t i) const;
+    // By how much the beliefs of all places move where that of place i does by one.
+    std::vector<double> pulled_by(std::size_t i) const;
 
     // A place's own answers as a Gaussian factor that makes this belief of the one without them: moments of the product
     // of without_own() and the answers' likelihood. Then all beliefs are computed anew.
     void set_own(std::size_t i, const Belief& with_own);
 
+    // A place, and what the expected observer has lost there.
+    struct Site {
+        GratingPlace place;
+        double loss = 0;
+    };
+
 private:
+    double log10_expected(const GratingPlace& at) const;
+    Site site(const GratingPlace& at) const;
     void update();
     void change_factor(std::size_t i, double more_precision, double more_shift);
 
-    std::vector<GratingPlace> places_;
+    perception::CsfTable table_;
+    perception::Luminance luminance_;
+    std::vector<Site> sites_;
     std::vector<double> expected_;
     std::vector<double> prior_;     // covariance of the deviations, square
     std::vector<double> precision_; // of the places' own factors
