@@ -2,6 +2,7 @@
 #include <vdtree/fold_errors.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <span>
 
@@ -14,6 +15,7 @@
 #include <vdtree/tree_io.h>
 #include <vdtree/view.h>
 
+#include "fold_picture.h"
 #include "shapes.h"
 #include "temp_folder.h"
 #include "vertex_tree_data.h"
@@ -175,6 +177,46 @@ TEST(FoldErrors, CountFarMoreWherePartsMeetFlat) {
         return most;
     };
     EXPECT_GT(most_of(both), 7 * most_of(alone));
+}
+
+// A narrow bright ridge, along which all folds lose light: what is drawn when all nodes up to a size are folded differs by no more than was measured,
+// though none of the folds does all of it.
+TEST(FoldErrors, CountWhatNeighboursAddUpTo) {
+    Mesh mesh = shapes::icosphere(5);
+    for (const glm::dvec3& p : mesh.positions) {
+        const double across = (p.y - 0.2 * p.x) / 0.08;
+        const auto grey = static_cast<float>(0.3 + 0.4 * std::exp(-across * across));
+        mesh.colours.push_back({grey, grey, grey, 1});
+    }
+    const VertexTree tree = built(mesh);
+    const auto corner = [&](NodeId node) { return LitPoint{tree.positions()[node], tree.luminance()[node]}; };
+    const auto is_folded = [&](NodeId node, NodeId with) { return tree.support_spheres()[node].radius <= tree.support_spheres()[with].radius; };
+    std::size_t compared = 0, within = 0;
+    for (NodeId node = 1; node < tree.interior_count(); node += 7) {
+        const Index leaves = tree.leaf_end()[node] - tree.first_leaf()[node];
+        const FoldError& error = tree.fold_errors()[node];
+        if (leaves > 16 || error.luminance < 0.02f) continue;
+        const float width = std::max(tree.support_spheres()[node].radius, error.extent);
+        FoldPicture picture;
+        picture.look(tree.positions()[node], glm::normalize(tree.positions()[node] + glm::vec3(tree.origin())), 1.5f * width);
+        for (const Triangle& t : tree.triangles()) {
+            std::array<NodeId, 3> whole{}, drawn{};
+            bool is_near = false;
+            for (std::size_t k = 0; k < 3; ++k) {
+                whole[k] = drawn[k] = tree.interior_count() + t[k];
+                is_near |= glm::distance(tree.positions()[whole[k]], tree.positions()[node]) < 6 * width;
+                for (NodeId up = tree.parents()[drawn[k]]; up != no_node && is_folded(up, node); up = tree.parents()[up]) drawn[k] = up;
+            }
+            if (!is_near) continue;
+            picture.draw(FoldPicture::Layer::mesh, corner(whole[0]), corner(whole[1]), corner(whole[2]));
+            picture.draw(FoldPicture::Layer::folded, corner(drawn[0]), corner(drawn[1]), corner(drawn[2]));
+        }
+        const auto amplitudes = picture.amplitudes();
+        ++compared;
+        within += *std::max_element(amplitudes.begin(), amplitudes.end()) <= 1.25f * error.luminance;
+    }
+    EXPECT_GT(compared, 20u);
+    EXPECT_GE(within * 10, compared * 9) << within << " of " << compared;
 }
 
 TEST(FoldErrors, AreTheSameForAnyNumberOfThreads) {
