@@ -19,6 +19,7 @@
 
 #include "fold_tester.h"
 #include "follow_tools.h"
+#include "index_buffer.h"
 #include "shapes.h"
 #include "tree_checks.h"
 
@@ -774,6 +775,39 @@ TEST(FollowLifetimes, ACutAndItsCopiesOutliveTheTreeGiven) {
     EXPECT_EQ(std::addressof(moved.tree().data()), std::addressof(kept.data()));
     EXPECT_EQ(state_of(moved), state_of(expected));
     EXPECT_EQ(triangles_of(moved.indices()), gathered(moved));
+}
+
+// What folds have taken the last triangle from still has its list when patching is given up in their midst.
+TEST(FollowIndices, PatchingThatIsGivenUpLeavesNoListsBehind) {
+    Mesh halves = leaves(200); // one triangle of each
+    for (std::size_t i = 0; 2 * i < halves.triangles.size(); ++i) halves.triangles[i] = halves.triangles[2 * i];
+    halves.triangles.resize(halves.triangles.size() / 2);
+    const VertexTree tree = built(shapes::unwelded(halves));
+    Cut whole(tree), folded(tree);
+    whole.unfold_all();
+    folded.unfold_all();
+    std::vector<std::uint64_t> unfolded((tree.interior_count() + 63) / 64);
+    std::vector<NodeId> proxies(tree.leaf_count());
+    for (NodeId node = 0; node < tree.interior_count(); ++node) unfolded[node / 64] |= std::uint64_t{1} << (node % 64);
+    for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf) proxies[leaf] = whole.proxy_of_leaf(leaf);
+    IndexBuffer buffer(tree);
+    for (const bool gives_up : {true, false}) {
+        buffer.gather(unfolded, proxies, whole.triangle_count());
+        buffer.make_lists();
+        ASSERT_TRUE(buffer.can_patch());
+        buffer.begin_patch();
+        for (NodeId node = tree.interior_count(); node-- > 0;) {
+            if (tree.subtree_end()[node] != node + 1) continue; // all children are leaves
+            std::vector<NodeId> children;
+            tree.for_each_child(node, [&](NodeId child) { children.push_back(child); });
+            buffer.fold(node, children);
+            folded.fold(node);
+        }
+        if (gives_up) buffer.drop_lists();
+    }
+    buffer.end_patch();
+    EXPECT_LT(folded.triangle_count(), whole.triangle_count());
+    EXPECT_EQ(triangles_of(buffer.indices()), gathered(folded));
 }
 
 TEST(FollowBadInput, CriteriaThatDoNotFitAreRefused) {

@@ -24,7 +24,7 @@ namespace {
 constexpr std::size_t batch_size = 1024;
 
 // Patching the index buffer around one change costs about as much as gathering so many triangles.
-constexpr std::size_t triangles_per_patch = 40;
+constexpr std::size_t triangles_per_patch = 60;
 std::size_t few_changes(Index triangles) { return std::max<std::size_t>(triangles / triangles_per_patch, 16); }
 
 // All leaves in order are gone through in the time in which those of so many times fewer changes are found.
@@ -333,24 +333,27 @@ bool Cut::is_patching() {
     return false;
 }
 
-// Reads follow from reads: links, lists, and what is drawn. Those of many changes are made to overlap. Leaves the children in soon_.
+// Reads follow from reads: links, lists, and what is drawn. Those of many changes are made to overlap. Leaves the children in soon_, where
+// those of each node end.
 void Cut::prefetch_changes(std::span<const NodeId> nodes, bool folds) {
     const auto first_leaf = tree_->first_leaf(), leaf_end = tree_->leaf_end(), first_triangle = tree_->first_triangle();
     const auto subtree_end = tree_->subtree_end();
-    const auto prefetch_links = [&](NodeId node) {
+    const auto prefetch_leaves = [&](NodeId node) {
         prefetch(&first_leaf[node]);
         prefetch(&leaf_end[node]);
-        prefetch(&subtree_end[node]);
     };
     for (const NodeId node : nodes) {
-        prefetch_links(node);
+        prefetch_leaves(node);
+        prefetch(&subtree_end[node]);
         prefetch(&first_triangle[node]);
     }
     for (const NodeId node : nodes) // the first child is the node's neighbour; the next one, which most nodes have, is anywhere
-        if (const NodeId child = node + 1; child < subtree_end[node] && subtree_end[child] < subtree_end[node]) prefetch_links(subtree_end[child]);
+        if (const NodeId child = node + 1; child < subtree_end[node] && subtree_end[child] < subtree_end[node]) prefetch_leaves(subtree_end[child]);
     soon_.clear();
+    soon_ends_.clear();
     for (const NodeId node : nodes) {
         tree_->for_each_child(node, [&](NodeId child) { soon_.push_back(child); });
+        soon_ends_.push_back(soon_.size());
         prefetch(&proxy_[first_leaf[node]]);
         prefetch(&proxy_[leaf_end[node] - 1]);
     }
@@ -373,25 +376,24 @@ void Cut::prefetch_changes(std::span<const NodeId> nodes, bool folds) {
     };
     if (!folds) for_each_third([&](Index leaf) { prefetch(&proxy_[leaf]); });
     buffer.prefetch_corners(active);
+    if (folds) return;
     others_.clear();
-    if (folds) buffer.find_others(soon_, others_);
-    else for_each_third([&](Index leaf) { others_.push_back(proxy_[leaf]); });
+    for_each_third([&](Index leaf) { others_.push_back(proxy_[leaf]); });
     buffer.prefetch_places(others_);
     buffer.prefetch_lists(others_);
 }
 
-void Cut::apply_unfold(NodeId node) {
+void Cut::apply_unfold(NodeId node, std::span<const NodeId> children) {
     set_unfolded(node);
     changes_.push_back({node, false});
-    const auto children = children_of(node);
     for (const NodeId child : children) assign(child);
     if (is_patching()) indices_->buffer.unfold(node, children, proxy_);
 }
 
-void Cut::apply_fold(NodeId node) {
+void Cut::apply_fold(NodeId node, std::span<const NodeId> children) {
     set_folded(node);
     changes_.push_back({node, true});
-    if (is_patching()) indices_->buffer.fold(node, children_of(node));
+    if (is_patching()) indices_->buffer.fold(node, children);
     assign(node);
 }
 
@@ -699,7 +701,7 @@ std::span<const NodeId> Cut::indices() const {
         indices_->is_stale = false;
         indices_->change_version();
         // When little has changed twice, little will change next; a frame after a jump has enough to do.
-        if (indices_->quiet_frames > 1) indices_->buffer.make_lists(unfolded_);
+        if (indices_->quiet_frames > 1) indices_->buffer.make_lists();
     }
     return indices_->buffer.indices();
 }

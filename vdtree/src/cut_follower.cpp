@@ -30,13 +30,14 @@ constexpr double longest_step = 0.125;
 constexpr double longest_light_step = 0.5; // radians; likewise
 // A budget that holds everything has the threshold 0; this stands for it.
 constexpr float least_threshold = 1e-30f;
-// What so many changes read is fetched ahead: some hundred cache lines, of which the first-level cache holds several times as many.
-constexpr std::size_t changes_at_once = 16;
+// What so many changes read is fetched ahead: some two thousand cache lines, of which the second-level cache holds several times as many.
+constexpr std::size_t changes_at_once = 64;
 constexpr double longest_limit_ms = 1e9; // more is no limit
 // Of the time that a fresh start has, so much is for decisions; the rest is for changing the cut to them.
 constexpr double deciding_share = 0.6;
 // Blocks whose due nodes are tested, with what folds for it, between two looks at the clock: some microseconds.
 constexpr std::size_t blocks_at_once = 16;
+constexpr std::size_t unfolds_in_time = 16; // likewise
 
 } // namespace
 
@@ -434,18 +435,23 @@ void CutFollower::test_due(std::span<const Slot> slots) {
 }
 
 void CutFollower::test_slots(std::span<const Slot> slots) {
-    verdicts_.resize(slots.size());
-    tester_->test(watched_.candidates(), slots, verdicts_);
     stats_.node_tests += slots.size();
-    for (std::size_t i = 0; i < slots.size(); ++i) {
-        const FoldCandidate& candidate = watched_[slots[i]];
-        const Verdict& verdict = verdicts_[i];
-        set_deadlines(slots[i], verdict);
-        if (candidate.is_waiting) {
-            if (!verdict.unfolded) watched_.set_waiting(slots[i], false);
-        } else if (candidate.is_unfolded && !verdict.unfolded) folding_.push_back(candidate.node);
-        else if (candidate.is_unfolded && stands_by_a_hair(verdict)) ask_parent(candidate.node);
-        else if (verdict.unfolded && !candidate.is_unfolded && tree_.is_sound(candidate.node)) wave_.push_back(candidate.node);
+    TestBatch tested{};
+    for (std::size_t first = 0; first < slots.size(); first += kernel_lanes) {
+        const auto batch = slots.subspan(first, std::min(kernel_lanes, slots.size() - first));
+        tester_->test(watched_.candidates(), slots, first, tested);
+        watched_.set_deadlines(batch, tested, {longest_slack_, hair_});
+        for (std::size_t i = 0; i < batch.size(); ++i) {
+            const FoldCandidate& candidate = watched_[batch[i]];
+            const bool unfolds = (tested.unfolded >> i) & 1;
+            // Mostly all stays as it is. What was folded or unfolded before, nobody could foretell, so nothing branches on that.
+            if (!(candidate.is_waiting | (candidate.is_unfolded != unfolds) | (unfolds & stands_by_a_hair(tested, i)))) continue;
+            if (candidate.is_waiting) {
+                if (!unfolds) watched_.set_waiting(batch[i], false);
+            } else if (candidate.is_unfolded && !unfolds) folding_.push_back(candidate.node);
+            else if (candidate.is_unfolded && stands_by_a_hair(tested, i)) ask_parent(candidate.node);
+            else if (unfolds && !candidate.is_unfolded && tree_.is_sound(candidate.node)) wave_.push_back(candidate.node);
+        }
     }
 }
 
@@ -482,9 +488,17 @@ void CutFollower::fold_wave(Cut& cut) {
         if (i % changes_at_once == 0) prefetch_changes(cut, std::span(folding_).subspan(i, std::min(changes_at_once, folding_.size() - i)), true);
         const NodeId node = folding_[i];
         if (!cut.is_unfolded_interior(node)) continue;
-        cut.fold_below(node, [&](NodeId folded) {
-            for (NodeId child = folded + 1; child < subtree_end[folded]; child = subtree_end[child]) watched_.remove(child);
-        });
+        const auto children = cut.fetched_children(i % changes_at_once);
+        const auto has_fold = [&](NodeId child) { return !tree_.is_leaf(child) && cut.is_unfolded_interior(child); };
+        if (std::ranges::none_of(children, has_fold)) { // nearly always
+            cut.apply_fold(node, children);
+            for (const NodeId child : children)
+                if (!tree_.is_leaf(child)) watched_.remove(child);
+        } else {
+            cut.fold_below(node, [&](NodeId folded) {
+                for (NodeId child = folded + 1; child < subtree_end[folded]; child = subtree_end[child]) watched_.remove(child);
+            });
+        }
         watched_.set_unfolded(watched_.slot_of(node), false);
         ask_parent(node);
     }
@@ -531,41 +545,39 @@ void CutFollower::use_threshold_of(bool unfolded) {
     if (keeping > 1) tester_->set_threshold(unfolded ? threshold_ / keeping : threshold_);
 }
 
-void CutFollower::apply_unfold(Cut& cut, NodeId node) {
-    cut.apply_unfold(node);
+// Watches the children of what has unfolded, too: they are the next wave.
+void CutFollower::apply_unfold(Cut& cut, NodeId node, std::span<const NodeId> children) {
+    cut.apply_unfold(node, children);
     watched_.set_unfolded(watched_.slot_of(node), true);
     if (node != VertexTree::root() && !watches_ancestors_) watched_.remove(tree_.parents()[node]);
-    unfolding_.push_back(node);
+    for (const NodeId child : children) {
+        if (tree_.is_leaf(child)) continue;
+        watched_.insert(tester_->candidate(child), watched_.slot_of(node));
+        next_wave_.push_back(child);
+    }
 }
 
-// Watches and tests the children of what has unfolded; those that unfold make the next wave.
-void CutFollower::test_children() {
-    const auto subtree_end = tree_.subtree_end();
-    next_wave_.clear();
-    for (const NodeId node : unfolding_) {
-        for (NodeId child = node + 1; child < subtree_end[node]; child = subtree_end[child]) {
-            watched_.insert(tester_->candidate(child), watched_.slot_of(node));
-            next_wave_.push_back(child);
-        }
-    }
+// Those of the next wave that unfold make the one after it.
+void CutFollower::test_next_wave() {
     wave_slots_.clear();
     for (const NodeId node : next_wave_) wave_slots_.push_back(watched_.slot_of(node)); // inserting may have moved them
+    next_wave_.clear();
     test_slots(wave_slots_);
 }
 
 // What unfolds, and then what unfolds under it.
 void CutFollower::unfold_wave(Cut& cut) {
     std::sort(wave_.begin(), wave_.end());
+    next_wave_.clear();
     while (!wave_.empty()) {
-        unfolding_.clear();
         for (std::size_t i = 0; i < wave_.size(); ++i) {
             const NodeId node = wave_[i];
             if (i % changes_at_once == 0) prefetch_changes(cut, std::span(wave_).subspan(i, std::min(changes_at_once, wave_.size() - i)), false);
             if (watched_.slot_of(node) == no_slot) continue; // an ancestor has folded
-            apply_unfold(cut, node);
+            apply_unfold(cut, node, cut.fetched_children(i % changes_at_once));
         }
         wave_.clear();
-        test_children();
+        test_next_wave();
     }
 }
 
@@ -611,17 +623,17 @@ bool CutFollower::find_worst(const Cut& cut, Index more) {
 
 void CutFollower::unfold_worst(Cut& cut) {
     Index triangles = 0;
-    while (wave_.size() < changes_at_once && find_worst(cut, triangles)) {
+    while (wave_.size() < unfolds_in_time && find_worst(cut, triangles)) {
         const NodeId node = pop_waiting();
         watched_.set_waiting(watched_.slot_of(node), false);
         triangles += tree_.first_triangle()[node + 1] - tree_.first_triangle()[node];
         wave_.push_back(node);
     }
     prefetch_changes(cut, wave_, false);
-    unfolding_.clear();
-    for (const NodeId node : wave_) apply_unfold(cut, node);
+    next_wave_.clear();
+    for (std::size_t i = 0; i < wave_.size(); ++i) apply_unfold(cut, wave_[i], cut.fetched_children(i));
     wave_.clear();
-    test_children();
+    test_next_wave();
     let_wave_wait();
 }
 

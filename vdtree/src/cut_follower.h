@@ -72,10 +72,13 @@ private:
     void test_parents(const Cut& cut);
     void use_threshold_of(bool unfolded);
     bool stands_by_a_hair(const Verdict& verdict) const { return !(std::min({verdict.position_slack, verdict.facing_slack, verdict.light_slack}) > hair_); }
+    bool stands_by_a_hair(const TestBatch& tested, std::size_t lane) const {
+        return !(std::min(tested.position_slack[lane], tested.facing_slack[lane]) > hair_) || (tester_->has_lights() && !(tested.light_slack[lane] > hair_));
+    }
     void ask_parent(NodeId node);
     float keeping_factor() const;
     void unfold_wave(Cut& cut);
-    void test_children();
+    void test_next_wave();
     void unfold_worst(Cut& cut);
     void let_wave_wait();
     bool waits(NodeId node) const;
@@ -84,7 +87,7 @@ private:
     void drop_idle();
     float largest_cost_left() const;
     void watch_nothing();
-    void apply_unfold(Cut& cut, NodeId node);
+    void apply_unfold(Cut& cut, NodeId node, std::span<const NodeId> children);
     bool has_unfolded_child(NodeId node, std::span<const std::uint64_t> unfolded) const;
     Slot near_children_of(NodeId node) const;
     void set_deadlines(Slot slot, const Verdict& verdict);

@@ -64,7 +64,7 @@ private:
 
     // The interior children of unfolding_ wait. Most nodes have at most two: the node's neighbour, and one that is anywhere.
     void add_children(std::span<const NodeId> subtree_end) {
-        constexpr std::size_t far = 32, near = 16; // nodes between a prefetch and its use
+        constexpr std::size_t far = 64, near = 32; // nodes between a prefetch and its use
         const std::size_t count = unfolding_.size();
         const auto first_child = [&](NodeId node) { return node + 1 < subtree_end[node] ? node + 1 : node; }; // or itself
         for (std::size_t i = 0; i < std::min(far, count); ++i) prefetch(&subtree_end[unfolding_[i]]);

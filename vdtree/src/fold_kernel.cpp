@@ -79,6 +79,12 @@ struct Vectors {
     }
 #endif
 
+    static UNSEEN_INLINE float least_of(Floats values) {
+        const Floats half = __builtin_shufflevector(values, values, 2, 3, 0, 1);
+        values = values < half ? values : half;
+        return std::min(values[0], values[1]);
+    }
+
     // Four floats of each lane's record become four registers, one of each record's first floats, and so on.
     template <class At>
     static UNSEEN_INLINE void load_columns(At at, Floats* columns) {
@@ -108,6 +114,11 @@ struct Vectors {
     static UNSEEN_INLINE Floats root_of(const Floats& square) { return __builtin_ia32_sqrtps256(square); }
     static UNSEEN_INLINE std::uint32_t bits_of(const Ints& mask) {
         return static_cast<std::uint32_t>(__builtin_ia32_movmskps256(reinterpret_cast<Floats>(mask)));
+    }
+
+    static UNSEEN_INLINE float least_of(const Floats& values) {
+        const auto low = __builtin_shufflevector(values, values, 0, 1, 2, 3), high = __builtin_shufflevector(values, values, 4, 5, 6, 7);
+        return four_wide::Vectors::least_of(low < high ? low : high);
     }
 
     template <class At>
@@ -150,13 +161,14 @@ struct Kernel {
     decltype(&vdtree::find_cost_bounds) find_cost_bounds;
     decltype(&vdtree::move_blocks) move_blocks;
     decltype(&vdtree::look_at_blocks) look_at_blocks;
+    decltype(&vdtree::find_dues) find_dues;
     decltype(&vdtree::find_due) find_due;
 };
 
 template <class Of>
 constexpr Kernel kernel_of() {
     return {Of::measure, Of::find_slacks, Of::finish_slacks, Of::facing_gaps, Of::test, Of::decide, Of::decide_range, Of::find_costs,
-            Of::find_cost_bounds, Of::move_blocks, Of::look_at_blocks, Of::find_due};
+            Of::find_cost_bounds, Of::move_blocks, Of::look_at_blocks, Of::find_dues, Of::find_due};
 }
 
 Kernel best_kernel() {
@@ -206,6 +218,8 @@ std::size_t look_at_blocks(std::span<const std::uint32_t> which, float position_
                            const std::uint16_t* unfolded, const BlockSpheres& spheres, BlockDeadlines& deadlines, std::uint32_t* due) noexcept {
     return kernel.look_at_blocks(which, position_clock, facing_clock, dues, unfolded, spheres, deadlines, due);
 }
+
+void find_dues(const TestBatch& tested, DueBatch& dues) noexcept { kernel.find_dues(tested, dues); }
 
 void find_due(float position_clock, float facing_clock, const BlockSpheres& spheres, const BlockDeadlines& deadlines,
               std::uint64_t* due) noexcept {

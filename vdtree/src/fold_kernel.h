@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -95,11 +96,13 @@ struct alignas(64) FoldCandidate {
 };
 static_assert(sizeof(FoldCandidate) == 64);
 
-// Verdicts on up to sixteen candidates without lights, with their slacks (see Verdict in fold_tester.h); a bit a lane.
+// Verdicts on up to sixteen candidates, with their slacks (see Verdict in fold_tester.h); a bit a lane.
 struct TestBatch {
     alignas(64) float position_slack[kernel_lanes], facing_slack[kernel_lanes];
+    alignas(64) float light_slack[kernel_lanes]; // where there are lights
     std::uint32_t unfolded = 0;
 };
+// Without lights.
 void test(const KernelView& view, std::span<const FoldCandidate* const> lanes, TestBatch& tested) noexcept;
 
 // The same in stages, for those that do something in between.
@@ -229,6 +232,20 @@ struct alignas(64) BlockDues {
 // `due` has room for block_slots a block. Returns how many are due.
 std::size_t look_at_blocks(std::span<const std::uint32_t> which, float position_clock, float facing_clock, const BlockDues* dues,
                            const std::uint16_t* unfolded, const BlockSpheres& spheres, BlockDeadlines& deadlines, std::uint32_t* due) noexcept;
+
+// The deadlines of up to sixteen slots that were tested.
+struct DueBatch {
+    // Of their blocks, now: what their distances have changed by beyond the sphere's, and that one's distance.
+    alignas(64) float passed[kernel_lanes], distance[kernel_lanes];
+    float facing_clock;  // or a little less
+    float longest;       // no slack of distances is longer
+    float hair;          // slacks of unfolded nodes are shortened by this
+    alignas(64) float position[kernel_lanes], facing[kernel_lanes]; // out
+};
+// Of what a deadline for distances is summed from: a dozen roundings of floats, when it is set and when it is compared.
+inline constexpr float sum_rounding = 4e-6f;
+inline constexpr float just_less = 1 - std::numeric_limits<float>::epsilon(); // times a number: at least a unit in the last place less
+void find_dues(const TestBatch& tested, DueBatch& dues) noexcept;
 
 // One bit a block: a deadline has come.
 void find_due(float position_clock, float facing_clock, const BlockSpheres& spheres, const BlockDeadlines& deadlines,

@@ -13,11 +13,7 @@ struct Lanes {
     static UNSEEN_INLINE Floats abs_of(const Floats& a) { return max_of(a, -a); }
     static UNSEEN_INLINE Floats all(float a) { return Floats{} + a; }
 
-    static UNSEEN_INLINE float least_of(const Floats& values) {
-        float least = values[0];
-        for (std::size_t lane = 1; lane < width; ++lane) least = std::min(least, values[lane]);
-        return least;
-    }
+    static UNSEEN_INLINE float least_of(const Floats& values) { return Vectors::least_of(values); }
 
     // A register of what the lanes have. (By way of an array, the processor would wait for its stores.)
     template <class Register, class Of>
@@ -569,7 +565,7 @@ struct Lanes {
         std::size_t last;
         UNSEEN_INLINE NodeId operator()(std::size_t i) const { return nodes[std::min(i, last)]; }
         UNSEEN_INLINE void prefetch(std::size_t i) const {
-            constexpr std::size_t ahead = 32; // nodes between a prefetch and its use
+            constexpr std::size_t ahead = 64; // nodes between a prefetch and its use
             for (std::size_t lane = 0; lane < width; ++lane) prefetch_node(arrays, (*this)(i + ahead + lane));
         }
     };
@@ -727,9 +723,10 @@ UNSEEN_INLINE std::size_t look_at_blocks(std::span<const std::uint32_t> which, f
     using Floats = Vectors::Floats;
     using Ints = Vectors::Ints;
     const Floats never = L::all(std::numeric_limits<float>::infinity());
+    constexpr std::uint32_t none_due = 1u << block_slots; // keeps a count of zeros defined
     std::size_t count = 0;
     for (std::size_t at = 0; at < which.size(); ++at) {
-        constexpr std::size_t ahead = 12; // blocks between a prefetch and its use
+        constexpr std::size_t ahead = 40; // blocks between a prefetch and its use
         if (at + ahead < which.size()) {
             prefetch(dues[which[at + ahead]].position);
             prefetch(dues[which[at + ahead]].facing);
@@ -749,10 +746,30 @@ UNSEEN_INLINE std::size_t look_at_blocks(std::span<const std::uint32_t> which, f
             next_facing = L::min_of(next_facing, is_due ? never : facing);
         }
         deadlines.set(block, L::least_of(next_recede), L::least_of(next_approach), L::least_of(next_facing));
-        for (; bits; bits &= bits - 1)
-            due[count++] = block * static_cast<std::uint32_t>(block_slots) + static_cast<std::uint32_t>(std::countr_zero(bits));
+        // How many slots are due, nobody could foretell: a few places are written in any case, those too many by the next block again.
+        const std::uint32_t first = block * static_cast<std::uint32_t>(block_slots);
+        std::uint32_t* const next = due + count;
+        count += static_cast<std::size_t>(std::popcount(bits));
+        constexpr std::size_t mostly = 4;
+        for (std::size_t i = 0; i < mostly; ++i, bits &= bits - 1) next[i] = first + static_cast<std::uint32_t>(std::countr_zero(bits | none_due));
+        for (std::size_t i = mostly; bits; ++i, bits &= bits - 1) next[i] = first + static_cast<std::uint32_t>(std::countr_zero(bits));
     }
     return count;
+}
+
+UNSEEN_INLINE void find_dues(const TestBatch& tested, DueBatch& dues) {
+    using L = Lanes;
+    using Floats = Vectors::Floats;
+    const Floats none = L::all(0);
+    for (std::size_t i = 0; i < kernel_lanes; i += L::width) {
+        const auto unfolded = L::mask_of(tested.unfolded, i);
+        const Floats passed = L::load(dues.passed + i), distance = L::load(dues.distance + i);
+        const Floats hair = unfolded ? L::all(dues.hair) : none;
+        const Floats left = L::max_of(L::min_of(L::all(dues.longest), L::load(tested.position_slack + i)) - hair, none);
+        const Floats slack = left - sum_rounding * (passed + distance + L::min_of(left, distance));
+        L::store(dues.position + i, passed + slack + (unfolded ? distance : -distance));
+        L::store(dues.facing + i, (dues.facing_clock + L::max_of(L::load(tested.facing_slack + i) - hair, none)) * just_less);
+    }
 }
 
 UNSEEN_INLINE void find_due(float position, float facing, const BlockSpheres& spheres, const BlockDeadlines& deadlines, std::uint64_t* due) {
@@ -766,7 +783,7 @@ UNSEEN_INLINE void find_due(float position, float facing, const BlockSpheres& sp
             const auto distance = L::load(&spheres.distance[i]), passed = L::load(&spheres.error[i]) + position;
             const auto is_due = (L::load(&deadlines.recede[i]) <= passed + distance) | (L::load(&deadlines.approach[i]) <= passed - distance) |
                                 (L::load(&deadlines.facing[i]) <= facing);
-            if (L::any(is_due)) bits |= std::uint64_t{L::bits_of(is_due)} << (i - first);
+            bits |= std::uint64_t{L::bits_of(is_due)} << (i - first);
         }
         for (; i < end; ++i) {
             const float distance = spheres.distance[i], passed = spheres.error[i] + position;
@@ -810,6 +827,7 @@ struct Kernels {
                                       std::uint32_t* due) noexcept {
         return blocks::look_at_blocks(which, position_clock, facing_clock, dues, unfolded, spheres, deadlines, due);
     }
+    static void find_dues(const TestBatch& tested, DueBatch& dues) noexcept { blocks::find_dues(tested, dues); }
     static void find_due(float position_clock, float facing_clock, const BlockSpheres& spheres, const BlockDeadlines& deadlines,
                          std::uint64_t* due) noexcept {
         blocks::find_due(position_clock, facing_clock, spheres, deadlines, due);

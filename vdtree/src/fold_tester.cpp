@@ -112,19 +112,16 @@ void FoldTester::prefetch(NodeId node) const {
     if (lit_) lit_->prefetch(node);
 }
 
-void FoldTester::test(std::span<const FoldCandidate> candidates, std::span<const std::uint32_t> which, std::span<Verdict> verdicts) const {
-    std::array<const FoldCandidate*, kernel_lanes> lanes;
+void FoldTester::test(std::span<const FoldCandidate> candidates, std::span<const std::uint32_t> which, std::size_t first, TestBatch& tested) const {
     constexpr std::size_t ahead = 2 * kernel_lanes; // candidates between a prefetch and its use
-    for (std::size_t i = 0; i < std::min(ahead, which.size()); ++i) vdtree::prefetch(&candidates[which[i]]);
-    for (std::size_t first = 0; first < which.size(); first += kernel_lanes) {
-        const std::size_t count = std::min(kernel_lanes, which.size() - first);
-        for (std::size_t i = first + ahead; i < std::min(first + ahead + kernel_lanes, which.size()); ++i) vdtree::prefetch(&candidates[which[i]]);
-        for (std::size_t i = 0; i < count; ++i) lanes[i] = &candidates[which[first + i]];
-        if (lit_)
-            for (std::size_t i = first + kernel_lanes; i < std::min(first + 2 * kernel_lanes, which.size()); ++i)
-                lit_->prefetch(candidates[which[i]].node);
-        test_batch({lanes.data(), count}, &verdicts[first], false);
-    }
+    const std::size_t count = std::min(kernel_lanes, which.size() - first);
+    for (std::size_t i = first == 0 ? 0 : first + ahead; i < std::min(first + ahead + kernel_lanes, which.size()); ++i)
+        vdtree::prefetch(&candidates[which[i]]);
+    std::array<const FoldCandidate*, kernel_lanes> lanes;
+    for (std::size_t i = 0; i < count; ++i) lanes[i] = &candidates[which[first + i]];
+    if (!lit_) return vdtree::test(view_, {lanes.data(), count}, tested);
+    for (std::size_t i = first + kernel_lanes; i < std::min(first + 2 * kernel_lanes, which.size()); ++i) lit_->prefetch(candidates[which[i]].node);
+    test_in_stages({lanes.data(), count}, tested, nullptr);
 }
 
 void FoldTester::test(std::span<const FoldCandidate> candidates, std::span<Verdict> verdicts) const {
@@ -310,19 +307,19 @@ void FoldTester::leave_room_for_lights(LitFindings& lit, FoldBatch& batch, const
 }
 
 void FoldTester::test_batch(Lanes lanes, Verdict* verdicts, bool costs) const {
-    if (lit_ || costs) return test_in_stages(lanes, verdicts, costs);
     TestBatch tested;
-    vdtree::test(view_, lanes, tested);
+    if (lit_ || costs) test_in_stages(lanes, tested, costs ? verdicts : nullptr);
+    else vdtree::test(view_, lanes, tested);
     for (std::size_t i = 0; i < lanes.size(); ++i) {
         verdicts[i].position_slack = tested.position_slack[i];
         verdicts[i].facing_slack = tested.facing_slack[i];
-        verdicts[i].light_slack = infinity;
+        verdicts[i].light_slack = lit_ ? tested.light_slack[i] : infinity;
         verdicts[i].unfolded = (tested.unfolded >> i) & 1;
     }
 }
 
-// For lights, and for costs.
-void FoldTester::test_in_stages(Lanes lanes, Verdict* verdicts, bool costs) const {
+// For lights, and for costs, where these are asked for.
+void FoldTester::test_in_stages(Lanes lanes, TestBatch& tested, Verdict* costs) const {
     FoldBatch batch;
     load(lanes, batch);
     LitFindings lit;
@@ -337,18 +334,16 @@ void FoldTester::test_in_stages(Lanes lanes, Verdict* verdicts, bool costs) cons
     if (lit_) leave_room_for_lights(lit, batch, findings);
     if (view_.has_gaze) find_position_slacks(batch, findings);
     finish_slacks(view_, batch, findings);
-    for (std::size_t i = 0; i < lanes.size(); ++i) {
-        verdicts[i].position_slack = findings.position_slack[i];
-        verdicts[i].facing_slack = findings.facing_slack[i];
-        verdicts[i].light_slack = lit_ ? lit.slack[i] : infinity;
-        verdicts[i].unfolded = (findings.unfolded >> i) & 1;
-    }
+    std::copy_n(findings.position_slack, kernel_lanes, tested.position_slack);
+    std::copy_n(findings.facing_slack, kernel_lanes, tested.facing_slack);
+    if (lit_) std::copy_n(lit.slack, kernel_lanes, tested.light_slack);
+    tested.unfolded = findings.unfolded;
     if (!costs) return;
     if (lit_) std::copy_n(lit.row, kernel_lanes, batch.interior_row);
     for (std::size_t i = 0; i < lanes.size(); ++i) {
-        verdicts[i].cost = verdicts[i].seen_cost = 0;
+        costs[i].cost = costs[i].seen_cost = 0;
         const std::uint32_t bit = 1u << i;
-        if ((batch.is_inside & bit) && !(findings.away & bit)) set_costs(verdicts[i], batch, i, findings.silhouettes & bit);
+        if ((batch.is_inside & bit) && !(findings.away & bit)) set_costs(costs[i], batch, i, findings.silhouettes & bit);
     }
 }
 

@@ -52,8 +52,9 @@ public:
     FoldCandidate candidate(NodeId node) const;
     void prefetch(NodeId node) const; // what candidate(node) will read
 
-    // One verdict for each of `which` of the candidates, or for each node. Cost: some ten nanoseconds each.
-    void test(std::span<const FoldCandidate> candidates, std::span<const std::uint32_t> which, std::span<Verdict> verdicts) const;
+    // Tests those of the candidates that `which` names from place `first` on, up to sixteen, and fetches some after them ahead.
+    void test(std::span<const FoldCandidate> candidates, std::span<const std::uint32_t> which, std::size_t first, TestBatch& tested) const;
+    // One verdict for each candidate, or for each node. Cost: some ten nanoseconds each.
     void test(std::span<const FoldCandidate> candidates, std::span<Verdict> verdicts) const;
     void test(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const;
     // Only whether they unfold, one bit each; the same verdicts.
@@ -80,7 +81,7 @@ private:
 
     void test_nodes(std::span<const NodeId> nodes, std::span<Verdict> verdicts, bool costs) const;
     void test_batch(Lanes lanes, Verdict* verdicts, bool costs) const;
-    void test_in_stages(Lanes lanes, Verdict* verdicts, bool costs) const;
+    void test_in_stages(Lanes lanes, TestBatch& tested, Verdict* costs) const;
     void find_facings(Lanes lanes, const FoldBatch& batch, bool costs, Findings& findings) const;
     void find_position_slacks(const FoldBatch& batch, Findings& findings) const;
     void light(Lanes lanes, FoldBatch& batch, LitFindings& lit) const;

@@ -19,56 +19,75 @@ unsigned log2_size_for(std::uint32_t corners) {
     return std::max<unsigned>(least_log2_size, static_cast<unsigned>(std::bit_width(corners)));
 }
 
-template <class F>
-void for_each_set(std::span<const std::uint64_t> bits, F&& f) {
-    for (std::size_t word = 0; word < bits.size(); ++word)
-        for (std::uint64_t left = bits[word]; left; left &= left - 1)
-            f(static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(left))));
-}
-
 } // namespace
 
-// Calls f(node) for the nodes that have triangles to show, in order, with their triangles on the way.
-template <class F>
-void IndexBuffer::for_each_unfolded(std::span<const std::uint64_t> unfolded, F&& f) {
-    nodes_.clear();
-    for_each_set(unfolded, [&](NodeId node) { nodes_.push_back(node); });
+// Brings leaves_ to what unfolded nodes show: what showed there before is copied, word by word of them.
+void IndexBuffer::find_leaves(std::span<const std::uint64_t> unfolded, Index triangles) {
     const auto first = tree_->first_triangle();
-    const auto triangles = tree_->triangles();
-    constexpr std::size_t far = 16, near = 8; // nodes between a prefetch and its use
-    for (std::size_t i = 0; i < nodes_.size(); ++i) {
-        if (i + far < nodes_.size()) prefetch(&first[nodes_[i + far]]);
-        if (i + near < nodes_.size()) prefetch(triangles.data() + first[nodes_[i + near]]);
-        f(nodes_[i]);
+    const auto corners = tree_->triangles();
+    shown_by_.resize(unfolded.size()); // by none before the first time
+    places_.resize(unfolded.size() + 1);
+    // First which triangles come: most nodes have two or less, and nobody could foretell how many, so nothing branches on that.
+    constexpr Index mostly = 2;
+    coming_.resize(std::size_t{triangles} + mostly);
+    runs_.clear();
+    next_leaves_.resize(triangles);
+    Index* next = coming_.data();
+    Index place = 0, kept_from = 0, kept = 0; // what is to be copied to before `place`
+    const auto copy_kept = [&] {
+        std::copy_n(leaves_.begin() + kept_from, kept, next_leaves_.begin() + (place - kept));
+        kept = 0;
+    };
+    for (std::size_t word = 0; word < unfolded.size(); ++word) {
+        const Index from = places_[word], count = places_[word + 1] - from;
+        places_[word] = place;
+        if (unfolded[word] == shown_by_[word]) {
+            if (kept == 0) kept_from = from;
+            kept += count;
+            place += count;
+            continue;
+        }
+        copy_kept();
+        shown_by_[word] = unfolded[word];
+        Index* const begin = next;
+        for (std::uint64_t left = unfolded[word]; left; left &= left - 1) {
+            const std::size_t node = word * 64 + static_cast<std::size_t>(std::countr_zero(left));
+            const Index t0 = first[node], t1 = first[node + 1];
+            for (Index i = 0; i < mostly; ++i) next[i] = t0 + i;
+            for (Index t = t0 + mostly; t < t1; ++t) next[t - t0] = t;
+            next += t1 - t0;
+        }
+        const auto come = static_cast<Index>(next - begin);
+        if (!runs_.empty() && runs_.back().place + runs_.back().count == place) runs_.back().count += come;
+        else runs_.push_back({place, come});
+        place += come;
     }
+    copy_kept();
+    places_.back() = place;
+    constexpr std::size_t ahead = 128; // triangles between a prefetch and its use
+    const Index* coming = coming_.data();
+    for (const Run& run : runs_)
+        for (Index i = 0; i < run.count; ++i, ++coming) {
+            if (coming + ahead < next) prefetch(&corners[coming[ahead]]);
+            next_leaves_[run.place + i] = corners[*coming];
+        }
+    leaves_.swap(next_leaves_);
 }
 
 void IndexBuffer::gather(std::span<const std::uint64_t> unfolded, std::span<const NodeId> proxies, Index triangles) {
     drop_lists();
+    find_leaves(unfolded, triangles);
     indices_.resize(std::size_t{3} * triangles);
-    const auto first = tree_->first_triangle();
-    const auto corners = tree_->triangles();
-    // First which triangles: most nodes have two or less, and nobody could foretell how many, so nothing branches on that.
-    constexpr Index mostly = 2;
-    shown_.resize(std::size_t{triangles} + mostly);
-    Index* next = shown_.data();
-    for_each_set(unfolded, [&](NodeId node) {
-        const Index begin = first[node], end = first[node + 1];
-        for (Index i = 0; i < mostly; ++i) next[i] = begin + i;
-        for (Index t = begin + mostly; t < end; ++t) next[t - begin] = t;
-        next += end - begin;
-    });
-    constexpr std::size_t far = 32, near = 12; // triangles between a prefetch and its use
     NodeId* out = indices_.data();
+    constexpr std::size_t ahead = 32; // triangles between a prefetch and its use
     for (std::size_t i = 0; i < triangles; ++i) {
-        if (i + far < triangles) prefetch(&corners[shown_[i + far]]);
-        if (i + near < triangles)
-            for (const Index leaf : corners[shown_[i + near]]) prefetch(&proxies[leaf]);
-        for (const Index leaf : corners[shown_[i]]) *out++ = proxies[leaf];
+        if (i + ahead < triangles)
+            for (const Index leaf : leaves_[i + ahead]) prefetch(&proxies[leaf]);
+        for (const Index leaf : leaves_[i]) *out++ = proxies[leaf];
     }
 }
 
-void IndexBuffer::make_lists(std::span<const std::uint64_t> unfolded) {
+void IndexBuffer::make_lists() {
     // Only what is shown is touched, so that the cost does not go with the tree.
     if (block_of_node_.empty()) block_of_node_.assign(tree_->node_count(), no_block);
     constexpr std::size_t ahead = 16; // corners between a prefetch and its use
@@ -99,24 +118,20 @@ void IndexBuffer::make_lists(std::span<const std::uint64_t> unfolded) {
     // Counts become blocks, in the order in which the buffer first shows the nodes, so that neighbours lie together.
     Block end = 0;
     Index corner = 0;
-    const auto first = tree_->first_triangle();
-    const auto triangles = tree_->triangles();
-    for_each_unfolded(unfolded, [&](NodeId at) {
-        for (Index t = first[at]; t < first[at + 1]; ++t) {
-            for (const Index leaf : triangles[t]) {
-                prefetch_ahead(corner);
-                std::uint32_t& block = block_of_node_[indices_[corner]];
-                if (block & is_count) {
-                    const unsigned log2_size = log2_size_for(block & ~is_count);
-                    *entries(end) = {log2_size, 0};
-                    block = end;
-                    end += Block{1} << log2_size;
-                }
-                Entry* const head = entries(block);
-                head[++head->leaf] = {corner++, leaf};
+    for (const Triangle& triangle : leaves_) {
+        for (const Index leaf : triangle) {
+            prefetch_ahead(corner);
+            std::uint32_t& block = block_of_node_[indices_[corner]];
+            if (block & is_count) {
+                const unsigned log2_size = log2_size_for(block & ~is_count);
+                *entries(end) = {log2_size, 0};
+                block = end;
+                end += Block{1} << log2_size;
             }
+            Entry* const head = entries(block);
+            head[++head->leaf] = {corner++, leaf};
         }
-    });
+    }
 }
 
 // A node has a list only while a corner shows it.
@@ -125,11 +140,14 @@ void IndexBuffer::drop_lists() noexcept {
     has_lists_ = false;
     for (const NodeId node : indices_)
         if (node != no_node) block_of_node_[node] = no_block;
+    for (const IndexWrite& removal : removals_) block_of_node_[removal.value] = no_block;
+    removals_.clear();
 }
 
-void IndexBuffer::write(Index corner, NodeId node) {
-    indices_[corner] = node;
-    writes_.push_back({corner, node});
+// For the writes of one change, so that they need not look for it one by one.
+IndexWrite* IndexBuffer::room_for(std::size_t writes) {
+    if (const std::size_t count = write_count_ + writes; writes_.size() < count) writes_.resize(count + count / 2);
+    return writes_.data() + write_count_;
 }
 
 std::span<IndexBuffer::Entry> IndexBuffer::list(Block block) {
@@ -171,13 +189,28 @@ void IndexBuffer::append(NodeId node, Entry entry) {
     ++entries(block)->leaf;
 }
 
+// Of nodes that fold has taken the list of, nothing is left to remove.
 void IndexBuffer::remove(NodeId node, Index corner) {
     const Block block = block_of_node_[node];
     const auto shown = list(block);
-    *std::find_if(shown.begin(), shown.end(), [&](const Entry& entry) { return entry.corner == corner; }) = shown.back();
+    const auto found = std::find_if(shown.begin(), shown.end(), [&](const Entry& entry) { return entry.corner == corner; });
+    if (found == shown.end()) return;
+    *found = shown.back();
     if (--entries(block)->leaf > 0) return;
     discard(block);
     block_of_node_[node] = no_block;
+}
+
+// What waits, with what that reads on its way ahead of time.
+void IndexBuffer::remove_all() {
+    constexpr std::size_t far = 32, near = 16; // removals between a prefetch and its use
+    for (std::size_t i = 0; i < removals_.size(); ++i) {
+        if (i + far < removals_.size()) prefetch(&block_of_node_[removals_[i + far].value]);
+        if (i + near < removals_.size())
+            if (const Block block = block_of_node_[removals_[i + near].value]; block != no_block) prefetch(entries(block));
+        remove(removals_[i].value, removals_[i].place);
+    }
+    removals_.clear();
 }
 
 void IndexBuffer::replace(NodeId node, Index corner, Index by) {
@@ -196,62 +229,107 @@ Index IndexBuffer::new_triangle() {
     return triangle;
 }
 
+// A list of its own for a node that has none.
+void IndexBuffer::give(NodeId node, std::span<const Entry> shown) {
+    if (shown.empty()) return;
+    const auto count = static_cast<std::uint32_t>(shown.size());
+    const Block block = allocate(log2_size_for(count));
+    entries(block)->leaf = count;
+    std::copy(shown.begin(), shown.end(), entries(block) + 1);
+    block_of_node_[node] = block;
+}
+
+// Nobody could foretell which triangles vanish, and which corners are whose: nothing branches on that, here and below.
 void IndexBuffer::fold(NodeId node, std::span<const NodeId> children) {
-    // The triangles that vanish are those that show the node twice now.
-    scratch_.clear();
-    vanished_.clear();
+    std::size_t most = 0;
+    for (const NodeId child : children) most += list(block_of_node_[child]).size();
+    scratch_.resize(most);
+    vanished_.resize(most);
+    NodeId* const indices = indices_.data();
+    IndexWrite* written = room_for(4 * most); // a vanishing triangle is of two corners at least
+    std::size_t count = 0, vanished = 0, kept = 0;
     for (const NodeId child : children) {
         const Block block = block_of_node_[child];
         for (const Entry& entry : list(block)) {
-            const Index triangle = entry.corner / 3, c0 = triangle * 3;
-            const int shown = (indices_[c0] == node) + (indices_[c0 + 1] == node) + (indices_[c0 + 2] == node);
-            write(entry.corner, node);
-            scratch_.push_back(entry);
-            if (shown == 1) vanished_.push_back(triangle);
+            const Index c0 = entry.corner / 3 * 3;
+            const bool is_shown = indices[entry.corner] == child; // else it waits for its removal
+            // The triangles that vanish are those that show the node twice now.
+            const bool is_second = (indices[c0] == node) + (indices[c0 + 1] == node) + (indices[c0 + 2] == node) == 1;
+            indices[entry.corner] = is_shown ? node : no_node;
+            *written = {entry.corner, node};
+            written += is_shown;
+            scratch_[count] = entry;
+            count += is_shown;
+            vanished_[vanished] = c0;
+            vanished += is_shown & is_second;
         }
         discard(block);
         block_of_node_[child] = no_block;
     }
-    for (const Index triangle : vanished_) {
-        const Index c0 = triangle * 3;
+    for (std::size_t i = 0; i < vanished; ++i) {
+        const Index c0 = vanished_[i];
         for (Index corner = c0; corner < c0 + 3; ++corner) {
-            if (indices_[corner] != node) remove(indices_[corner], corner);
-            write(corner, no_node);
+            if (indices[corner] != node) removals_.push_back({corner, indices[corner]});
+            indices[corner] = no_node;
+            *written++ = {corner, no_node};
         }
-        holes_.push_back(triangle);
+        holes_.push_back(c0 / 3);
     }
-    std::erase_if(scratch_, [&](const Entry& entry) { return indices_[entry.corner] == no_node; });
+    take_room_until(written);
+    for (std::size_t i = 0; i < count; ++i) {
+        const Entry entry = scratch_[i];
+        scratch_[kept] = entry;
+        kept += indices[entry.corner] == node;
+    }
     block_of_node_[node] = no_block;
-    if (scratch_.empty()) return;
-    const auto count = static_cast<std::uint32_t>(scratch_.size());
-    const Block block = allocate(log2_size_for(count));
-    entries(block)->leaf = count;
-    std::copy(scratch_.begin(), scratch_.end(), entries(block) + 1);
-    block_of_node_[node] = block;
+    give(node, std::span(scratch_).first(kept));
 }
 
 void IndexBuffer::unfold(NodeId node, std::span<const NodeId> children, std::span<const NodeId> proxies) {
-    // Children have their leaves in ascending order, so a corner's child is found by its leaf; the proxies know it.
+    remove_all();
+    const auto first_leaf = tree_->first_leaf(), leaf_end = tree_->leaf_end();
+    // The corners under the node, those of the triangles that come last.
     const Block block = block_of_node_[node];
     const auto shown = list(block);
-    scratch_.assign(shown.begin(), shown.end()); // appending moves the pool
+    scratch_.assign(shown.begin(), shown.end());
     discard(block);
     block_of_node_[node] = no_block;
-    for (const NodeId child : children) block_of_node_[child] = no_block;
-    for (const Entry& entry : scratch_) {
-        const NodeId child = proxies[entry.leaf];
-        write(entry.corner, child);
-        append(child, entry);
-    }
-    for (Index t = tree_->first_triangle()[node]; t < tree_->first_triangle()[node + 1]; ++t) {
-        const Index triangle = new_triangle();
+    const Index first_triangle = tree_->first_triangle()[node], triangle_end = tree_->first_triangle()[node + 1];
+    IndexWrite* written = room_for(scratch_.size() + std::size_t{3} * (triangle_end - first_triangle));
+    for (Index t = first_triangle; t < triangle_end; ++t) {
+        const Index c0 = new_triangle() * 3;
         for (Index k = 0; k < 3; ++k) {
-            const Entry entry{triangle * 3 + k, tree_->triangles()[t][k]};
-            const NodeId proxy = proxies[entry.leaf];
-            write(entry.corner, proxy);
-            append(proxy, entry);
+            const Entry entry{c0 + k, tree_->triangles()[t][k]};
+            if (entry.leaf - first_leaf[node] < leaf_end[node] - first_leaf[node]) {
+                scratch_.push_back(entry);
+            } else {
+                const NodeId other = proxies[entry.leaf];
+                indices_[entry.corner] = other;
+                *written++ = {entry.corner, other};
+                append(other, entry);
+            }
         }
     }
+    // Every child takes its own.
+    dealt_.resize(scratch_.size());
+    NodeId* const indices = indices_.data();
+    for (const NodeId child : children) {
+        const bool is_leaf = tree_->is_leaf(child);
+        const Index begin = is_leaf ? child - tree_->interior_count() : first_leaf[child];
+        const Index leaves = is_leaf ? 1 : leaf_end[child] - begin;
+        std::size_t count = 0;
+        for (const Entry& entry : scratch_) {
+            dealt_[count] = entry;
+            count += entry.leaf - begin < leaves;
+        }
+        for (std::size_t i = 0; i < count; ++i) {
+            indices[dealt_[i].corner] = child;
+            *written++ = {dealt_[i].corner, child};
+        }
+        block_of_node_[child] = no_block;
+        give(child, std::span(dealt_).first(count));
+    }
+    take_room_until(written);
 }
 
 void IndexBuffer::prefetch_places(std::span<const NodeId> active) const {
@@ -273,41 +351,36 @@ void IndexBuffer::prefetch_corners(std::span<const NodeId> active) const {
     }
 }
 
-void IndexBuffer::find_others(std::span<const NodeId> children, std::vector<NodeId>& others) const {
-    for (std::size_t i = 0; i + 1 < children.size(); ++i) {
-        const Block block = block_of_node_[children[i]];
-        if (block == no_block) continue;
-        const NodeId neighbour = children[i + 1];
-        const Entry* const head = entries(block);
-        const std::uint32_t count = std::min<std::uint32_t>(head->leaf, (1u << least_log2_size) - 1);
-        for (std::uint32_t e = 1; e <= count; ++e) {
-            const NodeId* const shown = &indices_[head[e].corner / 3 * 3];
-            if (shown[0] != neighbour && shown[1] != neighbour && shown[2] != neighbour) continue;
-            for (int k = 0; k < 3; ++k)
-                if (shown[k] != neighbour && shown[k] != children[i]) others.push_back(shown[k]);
-        }
-    }
-}
-
 void IndexBuffer::end_patch() {
+    remove_all();
     std::size_t end = indices_.size() / 3;
+    // What fills the holes, and its lists.
+    moving_.clear();
+    for (std::size_t corner = indices_.size() - 3 * std::min(holes_.size(), end); corner < indices_.size(); ++corner)
+        if (indices_[corner] != no_node) moving_.push_back(indices_[corner]);
+    prefetch_places(moving_);
+    prefetch_lists(moving_);
+    IndexWrite* written = room_for(3 * holes_.size());
     for (const Index hole : holes_) {
         while (end > 0 && is_hole(static_cast<Index>(end - 1))) --end;
         if (hole >= end) continue;
         --end;
         for (Index k = 0; k < 3; ++k) {
             const Index to = hole * 3 + k, from = static_cast<Index>(end) * 3 + k;
-            write(to, indices_[from]);
+            indices_[to] = indices_[from];
+            *written++ = {to, indices_[from]};
             replace(indices_[from], from, to);
         }
     }
+    take_room_until(written);
     while (end > 0 && is_hole(static_cast<Index>(end - 1))) --end;
     holes_.clear();
     indices_.resize(3 * end);
 }
 
 std::uint64_t IndexBuffer::byte_size() const noexcept {
-    std::uint64_t bytes = sizeof(NodeId) * indices_.capacity() + sizeof(Block) * block_of_node_.capacity() +
+    std::uint64_t bytes = sizeof(NodeId) * indices_.capacity() + sizeof(Triangle) * (leaves_.capacity() + next_leaves_.capacity()) +
+                          sizeof(std::uint64_t) * shown_by_.capacity() + sizeof(Index) * (places_.capacity() + coming_.capacity()) + sizeof(Block) * block_of_node_.capacity() +
                           sizeof(Line) * pool_.capacity() + sizeof(IndexWrite) * writes_.capacity();
     for (const auto& blocks : free_blocks_) bytes += sizeof(Block) * blocks.capacity();
     return bytes;

@@ -217,22 +217,13 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
     return done;
 }
 
-VertexTree::VertexTree(std::shared_ptr<const Data> data) : data_(std::move(data)), checks_(data_->checks.get()) {}
+VertexTree::VertexTree(std::shared_ptr<const Data> data) : data_(std::move(data)), checks_(data_->checks.get()) {
+    const TreeGeometry& g = *data_->geometry;
+    links_ = {g.parents, g.subtree_end, g.first_leaf, g.leaf_end, g.first_triangle, g.triangles};
+}
 VertexTree::VertexTree(VertexTree&&) noexcept = default;
 VertexTree& VertexTree::operator=(VertexTree&&) noexcept = default;
 VertexTree::~VertexTree() = default;
-
-NodeId VertexTree::node_count() const noexcept { return static_cast<NodeId>(data_->geometry->parents.size()); }
-NodeId VertexTree::interior_count() const noexcept { return static_cast<NodeId>(data_->geometry->first_leaf.size()); }
-NodeId VertexTree::leaf_count() const noexcept { return node_count() - interior_count(); }
-Index VertexTree::triangle_count() const noexcept { return static_cast<Index>(data_->geometry->triangles.size()); }
-
-std::span<const NodeId> VertexTree::parents() const noexcept { return data_->geometry->parents; }
-std::span<const Index> VertexTree::first_leaf() const noexcept { return data_->geometry->first_leaf; }
-std::span<const Index> VertexTree::leaf_end() const noexcept { return data_->geometry->leaf_end; }
-std::span<const NodeId> VertexTree::subtree_end() const noexcept { return data_->geometry->subtree_end; }
-std::span<const Index> VertexTree::first_triangle() const noexcept { return data_->geometry->first_triangle; }
-std::span<const Triangle> VertexTree::triangles() const noexcept { return data_->geometry->triangles; }
 
 glm::dvec3 VertexTree::origin() const noexcept { return data_->geometry->origin; }
 std::span<const glm::vec3> VertexTree::positions() const noexcept { return data_->geometry->positions; }

@@ -14,10 +14,6 @@ namespace unseen::vdtree {
 
 namespace {
 
-// Of what a deadline for distances is summed from: a dozen roundings of floats, when it is set and when it is compared.
-constexpr float sum_rounding = 4e-6f;
-constexpr float just_less = 1 - std::numeric_limits<float>::epsilon(); // times a number: at least a unit in the last place less
-
 float rounded_down(double clock) { return clock > 0 ? std::nextafter(static_cast<float>(clock), 0.0f) : 0.0f; }
 float rounded_up(double clock) { return std::nextafter(static_cast<float>(clock), std::numeric_limits<float>::infinity()); }
 
@@ -227,6 +223,33 @@ void WatchList::set_deadlines(Slot slot, const Slacks& slacks) {
     earliest_light_[block] = std::min(earliest_light_[block], light);
 }
 
+void WatchList::set_deadlines(std::span<const Slot> slots, const TestBatch& tested, const Cutting& cutting) {
+    DueBatch dues;
+    dues.facing_clock = facing_clock_down_;
+    dues.longest = cutting.longest;
+    dues.hair = cutting.hair;
+    for (std::size_t i = 0; i < kernel_lanes; ++i) {
+        const std::size_t block = slots[i < slots.size() ? i : 0] / block_slots;
+        dues.passed[i] = spheres_.error[block] + position_clock_float_;
+        dues.distance[i] = spheres_.distance[block];
+    }
+    find_dues(tested, dues);
+    for (std::size_t i = 0; i < slots.size(); ++i) {
+        const std::size_t block = slots[i] / block_slots, place = slots[i] % block_slots;
+        const std::uint32_t unfolded = (tested.unfolded >> i) & 1;
+        blocks_[block].position[place] = dues.position[i];
+        blocks_[block].facing[place] = dues.facing[i];
+        unfolded_[block] = static_cast<std::uint16_t>((unfolded_[block] & ~(1u << place)) | (unfolded << place));
+        float& earliest = (unfolded ? earliest_.recede : earliest_.approach)[block];
+        earliest = std::min(earliest, dues.position[i]);
+        earliest_.facing[block] = std::min(earliest_.facing[block], dues.facing[i]);
+        if (!has_lights_) continue;
+        const float light = (light_clock_down_ + std::max(tested.light_slack[i] - (unfolded ? cutting.hair : 0), 0.0f)) * just_less;
+        light_dues_[block].light[place] = light;
+        earliest_light_[block] = std::min(earliest_light_[block], light);
+    }
+}
+
 void WatchList::set_clocks(double position, double facing) {
     position_clock_ = position;
     facing_clock_ = facing;
@@ -319,10 +342,13 @@ void WatchList::find_due_blocks(BlockId first) {
     due_blocks_.resize((blocks_.size() + 63) / 64);
     // In floats the clock may be a little late.
     find_due(position_clock_float_, rounded_up(facing_clock_), spheres_, earliest_, due_blocks_.data());
-    looked_at_.clear();
+    std::size_t count = 0;
+    for (const std::uint64_t word : due_blocks_) count += static_cast<std::size_t>(std::popcount(word));
+    looked_at_.resize(count);
+    BlockId* next = looked_at_.data();
     for (std::size_t word = 0; word < due_blocks_.size(); ++word)
         for (std::uint64_t bits = due_blocks_[word]; bits; bits &= bits - 1)
-            looked_at_.push_back(static_cast<BlockId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))));
+            *next++ = static_cast<BlockId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
     std::rotate(looked_at_.begin(), std::ranges::lower_bound(looked_at_, first), looked_at_.end());
 }
 

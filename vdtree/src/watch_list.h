@@ -68,6 +68,12 @@ public:
         float position = 0, facing = 0, light = 0;
     };
     void set_deadlines(Slot slot, const Slacks& slacks);
+    // The same for up to sixteen slots that were tested, with slacks cut to what serves: none of distances is longer than `longest`, and
+    // those of unfolded nodes are shortened by `hair`.
+    struct Cutting {
+        float longest, hair;
+    };
+    void set_deadlines(std::span<const Slot> slots, const TestBatch& tested, const Cutting& cutting);
 
     // The eye goes to a place, and the facing clock on. In place of that, or besides:
     void move_to(const glm::dvec3& eye, double facing);

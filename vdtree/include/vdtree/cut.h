@@ -142,9 +142,14 @@ private:
     void begin_changes();
     bool is_patching();
     void prefetch_changes(std::span<const NodeId> nodes, bool folds);
-    void apply_unfold(NodeId node);
+    std::span<const NodeId> fetched_children(std::size_t i) const { // of the i-th of those nodes
+        return std::span(soon_).first(soon_ends_[i]).subspan(i == 0 ? 0 : soon_ends_[i - 1]);
+    }
+    void apply_unfold(NodeId node) { apply_unfold(node, children_of(node)); }
+    void apply_unfold(NodeId node, std::span<const NodeId> children);
     void fold_below(NodeId node, FunctionRef<void(NodeId)> on_fold); // tells each node, descendants first
-    void apply_fold(NodeId node);
+    void apply_fold(NodeId node) { apply_fold(node, children_of(node)); }
+    void apply_fold(NodeId node, std::span<const NodeId> children);
     void end_changes(AdjustStats& stats);
     friend Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objects, Index triangle_budget);
     void become(std::vector<std::uint64_t> unfolded, AdjustStats& stats);
@@ -164,6 +169,7 @@ private:
     std::vector<FoldChange> changes_;
     std::uint64_t revision_;               // of the state: one more for what changes_ tells, two for what nobody knows
     std::vector<NodeId> children_, soon_, others_; // scratch
+    std::vector<std::size_t> soon_ends_;
     std::unique_ptr<CutFollower> follower_;
     struct Indices;
     mutable std::unique_ptr<Indices> indices_; // made when it is first asked for

@@ -91,10 +91,10 @@ public:
     ~VertexTree();
 
     // Sizes. A tree has at least three leaves and one triangle.
-    NodeId node_count() const noexcept;
-    NodeId interior_count() const noexcept;
-    NodeId leaf_count() const noexcept;
-    Index triangle_count() const noexcept;
+    NodeId node_count() const noexcept { return static_cast<NodeId>(links_.parents.size()); }
+    NodeId interior_count() const noexcept { return static_cast<NodeId>(links_.first_leaf.size()); }
+    NodeId leaf_count() const noexcept { return node_count() - interior_count(); }
+    Index triangle_count() const noexcept { return static_cast<Index>(links_.triangles.size()); }
     bool is_leaf(NodeId node) const noexcept { return node >= interior_count(); }
     static constexpr NodeId root() noexcept { return 0; }
 
@@ -109,12 +109,12 @@ public:
     // Structure. By node: the parent (no_node for the root). By interior node: the leaves supported,
     // [first_leaf, leaf_end), the end of its subtree among the interior nodes, and its triangles,
     // [first_triangle[n], first_triangle[n + 1]) (one longer than the nodes).
-    std::span<const NodeId> parents() const noexcept;
-    std::span<const Index> first_leaf() const noexcept;
-    std::span<const Index> leaf_end() const noexcept;
-    std::span<const NodeId> subtree_end() const noexcept;
-    std::span<const Index> first_triangle() const noexcept;
-    std::span<const Triangle> triangles() const noexcept; // corners are leaf numbers, oriented like the input
+    std::span<const NodeId> parents() const noexcept { return links_.parents; }
+    std::span<const Index> first_leaf() const noexcept { return links_.first_leaf; }
+    std::span<const Index> leaf_end() const noexcept { return links_.leaf_end; }
+    std::span<const NodeId> subtree_end() const noexcept { return links_.subtree_end; }
+    std::span<const Index> first_triangle() const noexcept { return links_.first_triangle; }
+    std::span<const Triangle> triangles() const noexcept { return links_.triangles; } // corners are leaf numbers, oriented like the input
 
     // Calls f(child) for each child of an interior node in depth-first order. Cost: the number of children.
     template <class F>
@@ -181,6 +181,13 @@ private:
 
     std::shared_ptr<const Data> data_;
     NodeChecks* checks_ = nullptr; // of data_
+    // Of data_, too, for these are asked for node by node.
+    struct Links {
+        std::span<const NodeId> parents, subtree_end;
+        std::span<const Index> first_leaf, leaf_end, first_triangle;
+        std::span<const Triangle> triangles;
+    };
+    Links links_;
 };
 
 // Checks everything that the tree promises: that spheres, masks, slabs, intervals and displacements contain what they
@@ -199,7 +206,7 @@ void VertexTree::for_each_child(NodeId node, F&& f) const {
         if (child < skip[node] && first[child] == leaf) {
             f(child);
             leaf = end[child];
-            child = skip[child];
+            if (leaf < end[node]) child = skip[child];
         } else {
             f(static_cast<NodeId>(interior_count() + leaf));
             ++leaf;
