@@ -35,7 +35,8 @@ constexpr int steepest_spike = 8 * contrasts_per_octave; // sharper ones count a
 // Of a mean distance, which shifts what a ring shows: of a sine, whose mean is 2 / pi of it, 1.6; and more where neighbours err alike.
 constexpr double amplitude_of_mean = 1.9;
 
-// A picture of 64 samples a pixel tells no finer shifts of an outline than this: half the step of one sample.
+// A picture of 64 samples a pixel tells no finer shifts of an outline than this: half the step of one sample. Where pixels are so coarse that half of what
+// can be seen is less, it would take more samples, not more triangles.
 constexpr double sampled_shift_px = 0.5 / 64;
 // The widest mesh there can be, in widths of a node: also where nodes have none.
 constexpr float widest = 1e9f;
@@ -123,8 +124,7 @@ public:
     double strip_reach(double contrast) const {
         const double invisible_deg = 0.5 * least_visible_width(strips_, contrast);
         if (!std::isfinite(invisible_deg)) return 0;
-        const double pixel_deg = 0.5 / screen_.highest_cpd;
-        const double width_deg = std::max(invisible_deg - sampled_shift_px * pixel_deg, invisible_deg / 2);
+        const double width_deg = std::max(invisible_deg - sampled_shift_px * screen_.pixel_deg, invisible_deg / 2);
         return (1 + reach_rounding) * degrees_per_radian * screen_.largest_magnification / width_deg;
     }
 

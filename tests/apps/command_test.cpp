@@ -465,7 +465,7 @@ TEST_F(SimplifyTest, TakesMeshesToo) {
 }
 
 TEST_F(SimplifyTest, ReadsDisplaysAndViewers) {
-    write_text(path("far.json"), R"({"width_px": 1920, "height_px": 1080, "diagonal_m": 0.6, "viewing_distance_m": 3,
+    write_text(path("far.json"), R"({"width_px": 1920, "height_px": 1080, "diagonal_m": 0.6, "viewing_distance_m": 12,
                                      "peak_cdm2": 100, "black_cdm2": 0.5})");
     ASSERT_EQ(run({"csf", "--table", "--model", "stela", "--save-table", "stela.json"}).status, 0);
     EXPECT_LT(simplify({"--display", "far.json"})["triangles"], simplify({"--distance", "0.3"})["triangles"]);

@@ -110,7 +110,7 @@ TEST(FoldErrors, FindAStep) {
         }
         if (support.hi - support.lo > 0.5f) {
             ++mixed;
-            EXPECT_GT(errors[node].luminance, 0.2f) << node;
+            EXPECT_GT(errors[node].luminance, 0.15f) << node;
         }
     }
     EXPECT_GT(flat, 20);
@@ -179,8 +179,8 @@ TEST(FoldErrors, CountFarMoreWherePartsMeetFlat) {
     EXPECT_GT(most_of(both), 7 * most_of(alone));
 }
 
-// A narrow bright ridge, along which all folds lose light: what is drawn when all nodes up to a size are folded differs by no more than was measured,
-// though none of the folds does all of it.
+// A narrow bright ridge, along which all folds lose light: what is drawn when all nodes like one are folded differs by no more than was measured of one of
+// them, though no fold does all of it.
 TEST(FoldErrors, CountWhatNeighboursAddUpTo) {
     Mesh mesh = shapes::icosphere(5);
     for (const glm::dvec3& p : mesh.positions) {
@@ -190,13 +190,17 @@ TEST(FoldErrors, CountWhatNeighboursAddUpTo) {
     }
     const VertexTree tree = built(mesh);
     const auto corner = [&](NodeId node) { return LitPoint{tree.positions()[node], tree.luminance()[node]}; };
-    const auto is_folded = [&](NodeId node, NodeId with) { return tree.support_spheres()[node].radius <= tree.support_spheres()[with].radius; };
+    const auto span = [&](NodeId node) { return tree.support_luminance()[node].hi - tree.support_luminance()[node].lo; };
+    const auto is_folded = [&](NodeId node, NodeId with) {
+        return tree.support_spheres()[node].radius <= tree.support_spheres()[with].radius && span(node) <= 2 * span(with);
+    };
     std::size_t compared = 0, within = 0;
     for (NodeId node = 1; node < tree.interior_count(); node += 7) {
         const Index leaves = tree.leaf_end()[node] - tree.first_leaf()[node];
         const FoldError& error = tree.fold_errors()[node];
         if (leaves > 16 || error.luminance < 0.02f) continue;
         const float width = std::max(tree.support_spheres()[node].radius, error.extent);
+        float counted = 0; // by the nodes that are folded there
         FoldPicture picture;
         picture.look(tree.positions()[node], glm::normalize(tree.positions()[node] + glm::vec3(tree.origin())), 1.5f * width);
         for (const Triangle& t : tree.triangles()) {
@@ -204,19 +208,21 @@ TEST(FoldErrors, CountWhatNeighboursAddUpTo) {
             bool is_near = false;
             for (std::size_t k = 0; k < 3; ++k) {
                 whole[k] = drawn[k] = tree.interior_count() + t[k];
-                is_near |= glm::distance(tree.positions()[whole[k]], tree.positions()[node]) < 6 * width;
+                is_near |= glm::distance(tree.positions()[whole[k]], tree.positions()[node]) < 3 * width;
                 for (NodeId up = tree.parents()[drawn[k]]; up != no_node && is_folded(up, node); up = tree.parents()[up]) drawn[k] = up;
             }
             if (!is_near) continue;
+            for (const NodeId at : drawn)
+                if (!tree.is_leaf(at)) counted = std::max(counted, tree.fold_errors()[at].luminance);
             picture.draw(FoldPicture::Layer::mesh, corner(whole[0]), corner(whole[1]), corner(whole[2]));
             picture.draw(FoldPicture::Layer::folded, corner(drawn[0]), corner(drawn[1]), corner(drawn[2]));
         }
         const auto amplitudes = picture.amplitudes();
         ++compared;
-        within += *std::max_element(amplitudes.begin(), amplitudes.end()) <= 1.25f * error.luminance;
+        within += *std::max_element(amplitudes.begin(), amplitudes.end()) <= 1.25f * counted;
     }
     EXPECT_GT(compared, 20u);
-    EXPECT_GE(within * 10, compared * 9) << within << " of " << compared;
+    EXPECT_GE(within * 20, compared * 19) << within << " of " << compared;
 }
 
 TEST(FoldErrors, AreTheSameForAnyNumberOfThreads) {
