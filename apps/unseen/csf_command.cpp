@@ -317,6 +317,10 @@ void check(const CsfArguments& a) {
     if (a.stimulus.temporal && a.stimulus.velocity)
         refuse("--temporal and --velocity exclude each other: give one of them.");
     if (a.is_pursued && !a.stimulus.velocity && a.csv.empty()) refuse("--pursuit needs --velocity.");
+    if (!a.plot.empty() && a.stimulus.frequency) refuse("--plot draws all frequencies: leave --frequency away.");
+    if (!a.save.empty() && (a.stimulus.frequency || a.stimulus.luminance || a.stimulus.eccentricity))
+        refuse("--save-table holds all frequencies, luminances and eccentricities: leave these options away.");
+    if (a.stimulus.distance && a.csf.empty() && a.model_name != name(CsfModel::daly)) refuse("--distance is for --model daly: the others know none.");
     if (outputs > 0) return;
     if (!a.stimulus.frequency) refuse("--frequency is required, or else --csv, --plot or --save-table.");
     if (!a.stimulus.luminance) refuse("--luminance is required, or else --csv, --plot or --save-table.");

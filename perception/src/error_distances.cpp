@@ -32,12 +32,12 @@ constexpr double frequency_step = 1.0905077326652577; // an eighth of an octave
 
 constexpr int steepest_spike = 8 * contrasts_per_octave; // sharper ones count as this: a sixteenth of the width
 
-// Of a mean distance, which shifts what a ring shows: of a sine, whose mean is 2 / pi of it, 1.6; and more where neighbours err alike.
-constexpr double amplitude_of_mean = 1.9;
+// Of a sine, whose mean is 2 / pi of it: of the distances that shift what a ring shows.
+constexpr double amplitude_of_mean = 1.6;
 
-// A picture of 64 samples a pixel tells no finer shifts of an outline than this: half the step of one sample. Where pixels are so coarse that half of what
+// A picture of 64 samples a pixel tells no finer shifts of an outline than this: the step of one sample. Where pixels are so coarse that half of what
 // can be seen is less, it would take more samples, not more triangles.
-constexpr double sampled_shift_px = 0.5 / 64;
+constexpr double sampled_shift_px = 1.0 / 64;
 // The widest mesh there can be, in widths of a node: also where nodes have none.
 constexpr float widest = 1e9f;
 
@@ -85,7 +85,7 @@ Pattern above(const Pattern& a, const Pattern& b) {
 
 // Few patterns are to stand for many: rounded up, onto one grid, so that what is above two of them is there, too.
 Pattern rounded(Pattern p) {
-    constexpr int typical_step = contrasts_per_octave / 8, spike_step = contrasts_per_octave, drift_step = contrasts_per_octave / 4;
+    constexpr int typical_step = contrasts_per_octave / 8, spike_step = contrasts_per_octave / 4, drift_step = contrasts_per_octave / 8;
     const auto up = [](int value, int step) { return std::min((value + step - 1) / step * step, contrast_count - 1); };
     if (p.typical != no_contrast) {
         p.typical = up(p.typical, typical_step);

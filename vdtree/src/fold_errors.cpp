@@ -38,12 +38,11 @@ constexpr Index leaves_of_part = 4096;   // of a subtree that one task measures
 constexpr Index most_triangles_drawn = 4096; // of the mesh's own, in a picture; in place of more, those of the children
 // Half of a picture's side, in widths of what changes. Half an octave apart, so that nothing lies between bands.
 constexpr std::array<float, 2> picture_sizes = {1.5f, 2.1f};
+constexpr float longest_ring = 4; // radius, in widths: of longer ones, pictures do not show enough
 // Of a sine, whose mean is 2 / pi of it: 1.6; and more where neighbours err alike. Found by comparing pictures.
 constexpr float amplitude_of_mean = 1.9f;
 // An outline moves with the folds beside it, too. Found by comparing pictures.
 constexpr float moved_by_neighbours = 1.4f;
-// A mean over some cells is less than the largest shift of an outline that curves. Found by comparing pictures.
-constexpr float peak_of_shift = 1.2f;
 
 using Point = LitPoint;
 
@@ -284,13 +283,14 @@ private:
         error.extent = reach;
         error.mean_distance = mean.distance;
         error.facing = facing;
-        const Drawn drawn = draw(node, scratch, std::max(support_[node].radius, reach));
-        if (drawn.is_height_field) {
-            error.distance = std::max(peak_of_shift * drawn.shift, mean.distance);
+        const float width = std::max(support_[node].radius, reach);
+        const Drawn drawn = draw(node, scratch, width);
+        if (drawn.is_height_field && tree_.bounds()[node].ring.radius <= longest_ring * width) {
+            error.distance = std::max(drawn.shift, mean.distance);
             error.luminance = drawn.largest;
             error.wide_luminance = drawn.wide;
-        } else { // something may be under what was drawn
-            error.distance = moved_by_neighbours * worst.distance;
+        } else { // something may be under what was drawn, or beside it
+            error.distance = std::max(drawn.shift, moved_by_neighbours * worst.distance);
             error.luminance = std::max(drawn.largest, worst.luminance);
             error.wide_luminance = std::max(drawn.wide, amplitude_of_mean * mean.luminance);
         }
@@ -301,11 +301,12 @@ private:
             error.facing |= errors_[child].facing;
         });
         // Where parts meet, a fold moves the line along which the one hides the other, like an outline, whatever they face: the farther, the
-        // flatter they meet.
+        // flatter they meet. That is nothing that a mean over cells would tell.
         const Contact& contact = contacts_[node];
-        if (error.distance > 0 && contact.gap < contact_reach * error.distance) {
+        const float moved = std::max(error.distance, moved_by_neighbours * worst.distance);
+        if (moved > 0 && contact.gap < contact_reach * moved) {
             error.facing = NormalSlabs::everything();
-            error.distance = std::max(error.distance, std::min(error.distance / std::max(contact.sine, least_sine), tree_.bounds()[node].ring.radius));
+            error.distance = std::max(moved, std::min(moved / std::max(contact.sine, least_sine), tree_.bounds()[node].ring.radius));
         }
     }
 
