@@ -47,7 +47,7 @@ static_assert(sizeof(FoldError) == 40);
 // the light which the surface sends out: a mean of the leaves loses where the surface curves, and many folds together would show.
 // Bounds of support luminance grow with them; everything else is shared with the given tree. Fails where check() does, and
 // on trees with a texture, of which nothing is measured.
-// Cost: some 20 us a node, and a second; in parallel. The result does not depend on the threads. `threads`: 0: all cores.
+// Cost: some 50 us a node, and a second; in parallel. The result does not depend on the threads. `threads`: 0: all cores.
 Result<VertexTree> with_fold_errors(const VertexTree& tree, int threads = 0);
 
 } // namespace unseen::vdtree
