@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include <glm/geometric.hpp>
+
+#include "pyramid.h"
 
 namespace unseen::vdtree {
 namespace {
@@ -15,20 +16,6 @@ constexpr float nothing = -std::numeric_limits<float>::infinity(); // seen in a 
 // Of the pyramid (Burt and Adelson 1983, a = 0.4), of which no cell is left out.
 constexpr std::array<float, 3> kernel = {0.4f, 0.25f, 0.05f}; // by distance in steps
 constexpr std::size_t longest_step = std::size_t{1} << (FoldPicture::bands - 1), margin = (kernel.size() - 1) * longest_step;
-
-double response(double radians_a_step) { return 0.4 + 0.5 * std::cos(radians_a_step) + 0.1 * std::cos(2 * radians_a_step); }
-
-// Where each band's response is largest.
-constexpr float wave_in_cells(std::size_t band) { return band == 0 ? 2 : 2 / 0.3228f * static_cast<float>(std::size_t{1} << (band - 1)); }
-
-// What a band keeps of a grating of its own frequency.
-float gain(std::size_t band) {
-    const double radians_a_cell = 2 * std::numbers::pi / static_cast<double>(wave_in_cells(band));
-    double passed = 1;
-    for (std::size_t finer = 0; finer < band; ++finer) passed *= response(radians_a_cell * std::exp2(static_cast<double>(finer)));
-    const double back = response(radians_a_cell * std::exp2(static_cast<double>(band)));
-    return static_cast<float>(std::abs(passed) * (1 - back * back));
-}
 
 // Outside of the picture all is 0.
 #if defined(__x86_64__) && defined(__GNUC__)
@@ -106,12 +93,12 @@ void FoldPicture::draw(Layer layer, const LitPoint& a, const LitPoint& b, const 
 
 bool FoldPicture::is_seen(std::size_t cell) const { return pictures_[0].height[cell] > nothing && pictures_[1].height[cell] > nothing; }
 
-float FoldPicture::wavelength(std::size_t band) const { return wave_in_cells(band) * cell_; }
+float FoldPicture::wavelength(std::size_t band) const { return cell_ / static_cast<float>(nominal_frequency(band)); }
 
 std::array<float, FoldPicture::bands> FoldPicture::amplitudes() const {
     static const std::array<float, bands> gains = [] {
         std::array<float, bands> all;
-        for (std::size_t band = 0; band < bands; ++band) all[band] = gain(band);
+        for (std::size_t band = 0; band < bands; ++band) all[band] = static_cast<float>(band_gain(band));
         return all;
     }();
     Cells low, lower, back;
