@@ -181,6 +181,15 @@ private:
             for (Frustum& frustum : viewpoint_.frusta)
                 for (unsigned planes = in_.below(4); planes > 0; --planes) frustum.planes.push_back({in_.direction(), radius * in_.between(-2, 3)});
         }
+        if (in_.below(2) == 0) {
+            const double step = std::pow(10.0, in_.between(-4, 0));
+            for (Frustum& frustum : viewpoint_.frusta)
+                for (Plane& plane : frustum.planes) {
+                    if (const glm::dvec3 turned = plane.normal + step * in_.direction(); glm::length(turned) > 0.1)
+                        plane.normal = glm::normalize(turned);
+                    plane.offset += step * radius * in_.between(-1, 1);
+                }
+        }
         if (in_.below(6) == 0) {
             viewpoint_.occluders.clear();
             for (unsigned count = in_.below(4); count > 0; --count)

@@ -248,6 +248,56 @@ TEST_P(Follow, EqualsTheCutFromScratchOnStraightWays) {
     }
 }
 
+// Views of parts of the model, some two at a time, that turn, go on and zoom by steps of all sizes, with the eye or apart from
+// it: nodes are due by planes that cut the model, and blocks of them go in and out.
+TEST_P(Follow, EqualsTheCutFromScratchInFrustaThatCutTheModel) {
+    const VertexTree tree = built(GetParam().make());
+    const Sphere sphere = tree.bounding_sphere();
+    const glm::dvec3 centre = tree.origin() + glm::dvec3(sphere.centre);
+    const DistanceCriterion criterion = rich_criterion(tree, 5, false);
+    std::mt19937_64 random(31);
+    int cut_frames = 0, all_frames = 0; // in which a frustum makes a difference
+    for (int way = 0; way < frame_count() / 13; ++way) {
+        const std::size_t count = 1 + way % 2;
+        const double pace = std::pow(10.0, -1 - 2 * random_unit(random));
+        glm::dvec3 eye = (1.1 + 4 * random_unit(random)) * sphere.radius * random_direction(random);
+        const glm::dvec3 step = way % 3 == 0 ? glm::dvec3(0) : pace * sphere.radius * random_direction(random);
+        std::vector<glm::dvec3> targets(count), turns(count);
+        std::vector<double> fields(count), zooms(count);
+        for (std::size_t i = 0; i < count; ++i) {
+            targets[i] = 0.8 * sphere.radius * random_unit(random) * random_direction(random);
+            turns[i] = way % 5 == 0 ? glm::dvec3(0) : pace * sphere.radius * random_direction(random);
+            fields[i] = 3 + 40 * random_unit(random);
+            zooms[i] = 1 + pace * (random_unit(random) - 0.5);
+        }
+        Cut cut(tree);
+        for (int frame = 0; frame < 30; ++frame) {
+            Viewpoint viewpoint{.eye = glm::dvec3(sphere.centre) + eye};
+            for (std::size_t i = 0; i < count; ++i) {
+                View view;
+                view.eye = centre + (i == 0 ? eye : -eye);
+                view.target = centre + targets[i];
+                view.up = {0.1, 1, 0.05};
+                view.fov_y_degrees = std::min(fields[i], 170.0);
+                ASSERT_TRUE(validate(view));
+                viewpoint.frusta.push_back(frustum_of(tree, view));
+                targets[i] += turns[i];
+                fields[i] *= zooms[i];
+            }
+            ASSERT_TRUE(cut.follow(criterion, viewpoint));
+            const std::vector<bool> expected = from_scratch(tree, criterion, viewpoint, {});
+            ASSERT_EQ(state_of(cut), expected) << "way " << way << ", frame " << frame;
+            viewpoint.frusta.clear();
+            cut_frames += expected != from_scratch(tree, criterion, viewpoint, {});
+            ++all_frames;
+            eye += step;
+        }
+    }
+    if (GetParam().has_small_rings) {
+        EXPECT_GT(cut_frames, all_frames / 2);
+    }
+}
+
 #ifdef NDEBUG // else an assertion tells
 TEST_P(Follow, EqualsTheCutFromScratchUnderACriterionThatIsNotMonotone) {
     const VertexTree tree = built(GetParam().make());
@@ -357,6 +407,36 @@ TEST(FollowStill, CostsNothingAndChangesNothing) {
         EXPECT_EQ(stats->folds + stats->unfolds, 0u);
         EXPECT_TRUE(cut.changes().empty());
     }
+}
+
+// By distances alone, so that tests of planes would show: where a camera's frustum shows all of the model, they are seldom.
+TEST(FollowFrustum, AddsHardlyATestWhereItShowsAllOfTheModel) {
+    const VertexTree tree = built(shapes::bumpy_sphere(5, 0.03));
+    const Sphere sphere = tree.bounding_sphere();
+    DistanceCriterion::Parts parts;
+    parts.reach = {40};
+    const auto criterion = DistanceCriterion::create(tree, std::move(parts));
+    ASSERT_TRUE(criterion);
+    std::uint64_t tests[2] = {};
+    Cut cuts[2] = {Cut(tree), Cut(tree)};
+    constexpr int frames = 90, warm_up = 2; // then there are deadlines
+    for (int degrees = 0; degrees < frames; ++degrees) {
+        const double angle = degrees * std::numbers::pi / 180;
+        const View view = frame_sphere(tree.origin() + glm::dvec3(sphere.centre), sphere.radius,
+                                       {std::sin(angle), 0.3, std::cos(angle)}, 0.9, {});
+        Viewpoint viewpoint{.eye = eye_in_tree(tree, view, {})};
+        for (const bool with_frustum : {false, true}) {
+            if (with_frustum) viewpoint.frusta = {frustum_of(tree, view)};
+            const auto stats = cuts[with_frustum].follow(*criterion, viewpoint);
+            ASSERT_TRUE(stats);
+            if (degrees >= warm_up) tests[with_frustum] += stats->node_tests;
+        }
+        ASSERT_EQ(state_of(cuts[0]), state_of(cuts[1])) << degrees << " degrees";
+    }
+    EXPECT_GT(cuts[0].triangle_count(), tree.triangle_count() / 8);
+    EXPECT_LT(cuts[0].triangle_count(), tree.triangle_count());
+    EXPECT_GT(tests[0], std::uint64_t{frames});
+    EXPECT_LE(static_cast<double>(tests[1]), 1.1 * static_cast<double>(tests[0]));
 }
 
 TEST(FollowChanges, ReplayToTheSameCut) {

@@ -74,9 +74,10 @@ AdjustStats CutFollower::follow(Cut& cut, const DistanceCriterion& criterion, co
     if (!is_same) prepare(criterion, options);
     else if (tested_ != criterion.object_id()) make_tester(criterion);
     Motion motion = is_same ? FoldTester::motion(tree_, viewpoint_, viewpoint, length_per_radian_)
-                            : Motion{std::numeric_limits<double>::infinity(), 0};
+                            : Motion{.position = std::numeric_limits<double>::infinity()};
     if (criterion.parts().lit) motion = with_lights(motion, viewpoint);
-    const bool is_still = is_same && motion.position == 0 && motion.facing == 0 && motion.light == 0;
+    const bool is_still =
+        is_same && motion.position == 0 && motion.facing == 0 && motion.planes == 0 && motion.light == 0;
     are_costs_of_view_ = waiting_.empty() || (are_costs_of_view_ && is_still);
     const float cost_before = max_fold_cost_;
     if (is_still && was_complete_) { // nothing can have changed
@@ -111,9 +112,9 @@ void CutFollower::start_at(const Viewpoint& viewpoint) {
     length_per_radian_ = 2 * std::max(distance, least);
     set_farthest(distance + static_cast<double>(root.radius));
     watch_nothing();
-    watched_.use_lights(tester_->has_lights());
-    watched_.move_to(viewpoint.eye, 0);
     look_from(viewpoint);
+    watched_.use(tester_->has_lights(), tester_->has_planes());
+    watched_.move_to(viewpoint.eye, 0);
 }
 
 void CutFollower::move_to(const Viewpoint& viewpoint, const Motion& motion) {
@@ -122,6 +123,7 @@ void CutFollower::move_to(const Viewpoint& viewpoint, const Motion& motion) {
     if (tester_->uses_gaze()) watched_.advance(motion.position, motion.facing);
     else watched_.move_to(viewpoint.eye, motion.facing);
     watched_.advance_lights(motion.light);
+    watched_.advance_planes(motion.planes, tester_->view(), hair_);
 }
 
 void CutFollower::look_from(const Viewpoint& viewpoint) {
@@ -671,7 +673,8 @@ void CutFollower::set_deadlines(Slot slot, const Verdict& verdict) {
     const float hair = verdict.unfolded ? hair_ : 0;
     const float position_slack = std::min(verdict.position_slack, longest_slack_);
     const auto less_hair = [&](float slack) { return std::max(slack - hair, 0.0f); };
-    watched_.set_deadlines(slot, {verdict.unfolded, less_hair(position_slack), less_hair(verdict.facing_slack), less_hair(verdict.light_slack)});
+    watched_.set_deadlines(slot, {verdict.unfolded, less_hair(position_slack), less_hair(verdict.facing_slack),
+                                  less_hair(verdict.plane_slack), less_hair(verdict.light_slack)});
 }
 
 std::uint64_t CutFollower::byte_size() const noexcept { return watched_.byte_size() + sizeof(Waiting) * waiting_.capacity(); }

@@ -71,9 +71,14 @@ private:
     void fold_wave(Cut& cut);
     void test_parents(const Cut& cut);
     void use_threshold_of(bool unfolded);
-    bool stands_by_a_hair(const Verdict& verdict) const { return !(std::min({verdict.position_slack, verdict.facing_slack, verdict.light_slack}) > hair_); }
+    bool stands_by_a_hair(const Verdict& verdict) const {
+        return !(std::min({verdict.position_slack, verdict.facing_slack, verdict.plane_slack, verdict.light_slack}) >
+                 hair_);
+    }
     bool stands_by_a_hair(const TestBatch& tested, std::size_t lane) const {
-        return !(std::min(tested.position_slack[lane], tested.facing_slack[lane]) > hair_) || (tester_->has_lights() && !(tested.light_slack[lane] > hair_));
+        return !(std::min({tested.position_slack[lane], tested.facing_slack[lane], tested.plane_slack[lane]}) >
+                 hair_) ||
+               (tester_->has_lights() && !(tested.light_slack[lane] > hair_));
     }
     void ask_parent(NodeId node);
     float keeping_factor() const;

@@ -160,6 +160,7 @@ struct Kernel {
     decltype(&vdtree::find_costs) find_costs;
     decltype(&vdtree::find_cost_bounds) find_cost_bounds;
     decltype(&vdtree::move_blocks) move_blocks;
+    decltype(&vdtree::keep_inside) keep_inside;
     decltype(&vdtree::look_at_blocks) look_at_blocks;
     decltype(&vdtree::find_dues) find_dues;
     decltype(&vdtree::find_due) find_due;
@@ -167,8 +168,9 @@ struct Kernel {
 
 template <class Of>
 constexpr Kernel kernel_of() {
-    return {Of::measure, Of::find_slacks, Of::finish_slacks, Of::facing_gaps, Of::test, Of::decide, Of::decide_range, Of::find_costs,
-            Of::find_cost_bounds, Of::move_blocks, Of::look_at_blocks, Of::find_dues, Of::find_due};
+    return {Of::measure,     Of::find_slacks,    Of::finish_slacks, Of::facing_gaps,      Of::test,
+            Of::decide,      Of::decide_range,   Of::find_costs,    Of::find_cost_bounds, Of::move_blocks,
+            Of::keep_inside, Of::look_at_blocks, Of::find_dues,     Of::find_due};
 }
 
 Kernel best_kernel() {
@@ -212,6 +214,11 @@ void decide_range(const KernelView& view, const NodeArrays& arrays, NodeId first
 
 void move_blocks(const float (&eye_high)[3], const float (&eye_low)[3], float path, BlockSpheres& spheres) noexcept {
     kernel.move_blocks(eye_high, eye_low, path, spheres);
+}
+
+void keep_inside(const KernelView& view, float hair, const KernelClock& clock, const BlockSpheres& spheres,
+                 float* deadlines) noexcept {
+    kernel.keep_inside(view, hair, clock, spheres, deadlines);
 }
 
 std::size_t look_at_blocks(std::span<const std::uint32_t> which, float position_clock, float facing_clock, const BlockDues* dues,

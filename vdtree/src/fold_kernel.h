@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <limits>
@@ -99,6 +100,7 @@ static_assert(sizeof(FoldCandidate) == 64);
 // Verdicts on up to sixteen candidates, with their slacks (see Verdict in fold_tester.h); a bit a lane.
 struct TestBatch {
     alignas(64) float position_slack[kernel_lanes], facing_slack[kernel_lanes];
+    alignas(64) float plane_slack[kernel_lanes]; // without planes: huge
     alignas(64) float light_slack[kernel_lanes]; // where there are lights
     std::uint32_t unfolded = 0;
 };
@@ -120,8 +122,9 @@ struct FoldBatch {
     alignas(64) float gap[kernel_lanes];       // of the sphere: distance - radius
     alignas(64) float eccentricity[kernel_lanes]; // radians, of the sphere's nearest point; 0 from inside, and without gaze
     alignas(64) std::int32_t bin[kernel_lanes];
-    alignas(64) float height[kernel_lanes];    // of the sphere's top over the lowest plane of the best frustum, or what stands out from
-                                               // behind the best occluder, where that is less; negative: out of sight
+    alignas(64) float height[kernel_lanes];    // of the sphere's top over the lowest plane of the best frustum
+    alignas(64) float uncovered[kernel_lanes]; // how far it stands out from behind the best occluder; negative, like heights:
+                                               // out of sight
     alignas(64) float interior[kernel_lanes], silhouette[kernel_lanes]; // the distances within which the node unfolds
     // A bit a lane: in sight; within the interior's distance; facing has to be found out.
     std::uint32_t is_inside = 0, is_near = 0, is_asked = 0;
@@ -144,11 +147,12 @@ struct Findings {
     std::uint32_t away = 0;                         // facing away; folded whatever the distance
     alignas(64) float facing_slack[kernel_lanes];   // by facing alone
     alignas(64) float position_slack[kernel_lanes]; // with a gaze, from find_slacks(); else out
+    alignas(64) float plane_slack[kernel_lanes];    // out
 };
 // Slacks are shortened so that rounding in a later test cannot change a verdict before its time: by less than this share of the
 // distance and the radius.
 inline constexpr float test_rounding = 2e-5f;
-// Brings both slacks of all lanes to what they are in all, 0 or more.
+// Brings the slacks of all lanes to what they are in all, 0 or more.
 void finish_slacks(const KernelView& view, const FoldBatch& batch, Findings& findings) noexcept;
 
 // Sixteen rings: their slabs, the vectors from the centres of their spheres to the eye, and the spheres' radii.
@@ -203,6 +207,20 @@ struct BlockSpheres {
 };
 // The eye goes by `path` to a new place.
 void move_blocks(const float (&eye_high)[3], const float (&eye_low)[3], float path, BlockSpheres& spheres) noexcept;
+
+inline float rounded_down(double clock) { return clock > 0 ? std::nextafter(static_cast<float>(clock), 0.0f) : 0.0f; }
+inline float rounded_up(double clock) {
+    return std::nextafter(static_cast<float>(clock), std::numeric_limits<float>::infinity());
+}
+// A clock in floats: not later than it is, and not earlier.
+struct KernelClock {
+    float early = 0, late = std::numeric_limits<float>::min();
+};
+inline KernelClock kernel_clock(double now) { return {rounded_down(now), rounded_up(now)}; }
+// Defers deadlines by planes, one a block, that have come although the block is wholly inside a frustum: to when the centre
+// of one of its nodes may be less than `hair` inside. `hair`: more than the rounding of any node's test, and of this.
+void keep_inside(const KernelView& view, float hair, const KernelClock& clock, const BlockSpheres& spheres,
+                 float* deadlines) noexcept;
 
 // When distances that grow, or shrink, and the facing clock may change something.
 struct BlockDeadlines {

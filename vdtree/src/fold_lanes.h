@@ -76,7 +76,7 @@ struct Lanes {
         Ints interior_row, silhouette_row;
     };
     struct Measures {
-        Floats to_eye[3], distance, gap, eccentricity, interior, silhouette, height;
+        Floats to_eye[3], distance, gap, eccentricity, interior, silhouette, height, uncovered;
         Ints bin, is_inside, is_near, is_asked;
     };
     // By how much nodes stand out from behind the occluder that hides most of them. A sphere around c is hidden by one of radius R around b
@@ -101,6 +101,21 @@ struct Lanes {
         return least;
     }
 
+    // Of a point, by its vector to the eye: over the lowest plane of the best frustum.
+    static UNSEEN_INLINE Floats height(const KernelView& view, const Floats (&to_eye)[3]) {
+        Floats best = all(view.planes.empty() ? huge : -huge);
+        for (std::size_t f = 0; f + 1 < view.first_plane.size(); ++f) {
+            Floats lowest = all(huge);
+            for (std::size_t p = view.first_plane[f]; p < view.first_plane[f + 1]; ++p) {
+                const KernelView::Plane& plane = view.planes[p];
+                lowest = min_of(lowest, plane.offset - (to_eye[0] * plane.normal[0] + to_eye[1] * plane.normal[1] +
+                                                        to_eye[2] * plane.normal[2]));
+            }
+            best = max_of(best, lowest);
+        }
+        return best;
+    }
+
     static UNSEEN_INLINE Measures measure(const KernelView& view, const Nodes& of) {
         Measures m;
         Floats* const e = m.to_eye;
@@ -120,19 +135,13 @@ struct Lanes {
         m.interior = distances(view, of.interior_row, m.bin, of.length);
         m.silhouette = view.nobody ? m.interior : max_of(m.interior, distances(view, of.silhouette_row, m.bin, of.silhouette_length));
 
-        m.height = all(view.planes.empty() ? huge : -huge);
-        for (std::size_t f = 0; f + 1 < view.first_plane.size(); ++f) {
-            Floats lowest = all(huge);
-            for (std::size_t p = view.first_plane[f]; p < view.first_plane[f + 1]; ++p) {
-                const KernelView::Plane& plane = view.planes[p];
-                lowest = min_of(lowest, plane.offset - (e[0] * plane.normal[0] + e[1] * plane.normal[1] + e[2] * plane.normal[2]));
-            }
-            m.height = max_of(m.height, lowest + of.radius);
-        }
+        m.height = height(view, m.to_eye) + of.radius;
+        m.uncovered = all(huge);
         // Far nodes fold anyway.
-        if (!view.occluders.empty() && (view.everybody || any(m.gap < m.silhouette))) m.height = min_of(m.height, uncovered(view, m, of.radius));
+        if (!view.occluders.empty() && (view.everybody || any(m.gap < m.silhouette)))
+            m.uncovered = uncovered(view, m, of.radius);
 
-        m.is_inside = m.height >= 0;
+        m.is_inside = (m.height >= 0) & (m.uncovered >= 0);
         m.is_near = m.gap < m.interior;
         m.is_asked = view.everybody ? m.is_inside : m.is_inside & (m.gap < m.silhouette);
         if (!view.near_ones_too && !view.everybody) m.is_asked &= ~m.is_near;
@@ -153,6 +162,7 @@ struct Lanes {
         store(batch.interior + first, m.interior);
         store(batch.silhouette + first, m.silhouette);
         store(batch.height + first, m.height);
+        store(batch.uncovered + first, m.uncovered);
         batch.is_inside |= bits_of(m.is_inside) << first;
         batch.is_near |= bits_of(m.is_near) << first;
         batch.is_asked |= bits_of(m.is_asked) << first;
@@ -206,20 +216,26 @@ struct Lanes {
                                                 load(batch.bin + i)}));
     }
 
-    // Brings both slacks to what they are in all.
+    // Brings the slacks to what they are in all. What is outside may be so by its height, or else by an occluder.
+    struct Found {
+        Floats position, facing, distance, radius, height, uncovered;
+    };
     struct Slacks {
-        Floats position, facing;
+        Floats position, facing, planes;
     };
     struct Verdicts {
         Ints unfolded, outside, away;
     };
-    static UNSEEN_INLINE Slacks finished(const Slacks& found, const Verdicts& verdicts, const Floats& distance, const Floats& radius, const Floats& height) {
-        const Floats inexact = (distance + radius) * position_rounding;
+    static UNSEEN_INLINE Slacks finished(const Found& found, const Verdicts& verdicts) {
+        const Floats inexact = (found.distance + found.radius) * position_rounding;
         const Floats position = verdicts.outside | verdicts.away ? all(huge) : max_of(found.position - inexact, all(0));
-        Floats facing = found.facing - distance * facing_rounding;
-        facing = verdicts.unfolded ? min_of(facing, height - inexact) : facing;
-        facing = verdicts.outside ? -height - inexact : facing;
-        return {position, max_of(facing, all(0))};
+        Floats facing = found.facing - found.distance * facing_rounding;
+        facing = verdicts.unfolded ? min_of(facing, found.uncovered - inexact) : facing;
+        facing = verdicts.outside ? (found.height < 0 ? all(huge) : -found.uncovered - inexact) : facing;
+        const Floats planes = verdicts.unfolded                       ? found.height - inexact
+                              : verdicts.outside & (found.height < 0) ? -found.height - inexact
+                                                                      : all(huge);
+        return {position, max_of(facing, all(0)), max_of(planes, all(0))};
     }
 
     static UNSEEN_INLINE void finish_slacks(const KernelView& view, const FoldBatch& batch, Findings& findings, std::size_t first) {
@@ -231,11 +247,13 @@ struct Lanes {
             const Floats gap = load(batch.gap + first), reach = silhouettes ? load(batch.silhouette + first) : load(batch.interior + first);
             position = unfolded ? reach - gap : gap - reach;
         }
-        const Slacks slacks = finished({position, load(findings.facing_slack + first)},
-                                       {unfolded, ~mask_of(batch.is_inside, first), mask_of(findings.away, first)}, load(batch.distance + first),
-                                       load(batch.radius + first), load(batch.height + first));
+        const Slacks slacks =
+            finished({position, load(findings.facing_slack + first), load(batch.distance + first),
+                      load(batch.radius + first), load(batch.height + first), load(batch.uncovered + first)},
+                     {unfolded, ~mask_of(batch.is_inside, first), mask_of(findings.away, first)});
         store(findings.position_slack + first, slacks.position);
         store(findings.facing_slack + first, slacks.facing);
+        store(findings.plane_slack + first, slacks.planes);
     }
     static UNSEEN_INLINE void finish_slacks(const KernelView& view, const FoldBatch& batch, Findings& findings) {
         for (std::size_t first = 0; first < kernel_lanes; first += width) finish_slacks(view, batch, findings, first);
@@ -471,9 +489,11 @@ struct Lanes {
             const Floats reach = silhouettes ? m.silhouette : m.interior;
             position = unfolded ? reach - m.gap : m.gap - reach;
         }
-        const Slacks slacks = finished({position, facing}, {unfolded, ~m.is_inside, away}, m.distance, of.nodes.radius, m.height);
+        const Slacks slacks = finished({position, facing, m.distance, of.nodes.radius, m.height, m.uncovered},
+                                       {unfolded, ~m.is_inside, away});
         store(tested.position_slack + first, slacks.position);
         store(tested.facing_slack + first, slacks.facing);
+        store(tested.plane_slack + first, slacks.planes);
         tested.unfolded |= bits_of(unfolded) << first;
     }
     static UNSEEN_INLINE void test(const KernelView& view, std::span<const FoldCandidate* const> lanes, TestBatch& tested) {
@@ -717,6 +737,32 @@ UNSEEN_INLINE void move_blocks(const float (&eye_high)[3], const float (&eye_low
     for (std::size_t v = 4; v < 6; ++v) std::copy_n(rest[v], count - i, values[v]->begin() + static_cast<std::ptrdiff_t>(i));
 }
 
+UNSEEN_INLINE void keep_inside(const KernelView& view, float hair, const KernelClock& clock,
+                               const BlockSpheres& spheres, float* deadlines) {
+    using L = Lanes;
+    using Floats = Vectors::Floats;
+    const auto keep = [&](const float* x, const float* y, const float* z, const float* radius,
+                          float* deadline) UNSEEN_INLINE_LAMBDA {
+        const Floats before = L::load(deadline);
+        if (!L::any(before <= clock.late)) return;
+        const Floats to_eye[3] = {(view.eye_high[0] - L::load(x)) + view.eye_low[0],
+                                  (view.eye_high[1] - L::load(y)) + view.eye_low[1],
+                                  (view.eye_high[2] - L::load(z)) + view.eye_low[2]};
+        const Floats slack = L::height(view, to_eye) - L::load(radius) - hair;
+        L::store(deadline, (before <= clock.late) & (slack > 0) ? (clock.early + slack) * just_less : before);
+    };
+    const std::size_t count = spheres.x.size();
+    std::size_t i = 0;
+    for (; i + L::width <= count; i += L::width)
+        keep(&spheres.x[i], &spheres.y[i], &spheres.z[i], &spheres.radius[i], deadlines + i);
+    if (i == count) return;
+    float rest[5][L::width] = {};
+    const float* const values[5] = {&spheres.x[i], &spheres.y[i], &spheres.z[i], &spheres.radius[i], deadlines + i};
+    for (std::size_t v = 0; v < 5; ++v) std::copy_n(values[v], count - i, rest[v]);
+    keep(rest[0], rest[1], rest[2], rest[3], rest[4]);
+    std::copy_n(rest[4], count - i, deadlines + i);
+}
+
 UNSEEN_INLINE std::size_t look_at_blocks(std::span<const std::uint32_t> which, float position_clock, float facing_clock, const BlockDues* dues,
                                          const std::uint16_t* unfolded, const BlockSpheres& spheres, BlockDeadlines& deadlines, std::uint32_t* due) {
     using L = Lanes;
@@ -821,6 +867,10 @@ struct Kernels {
     }
     static void move_blocks(const float (&eye_high)[3], const float (&eye_low)[3], float path, BlockSpheres& spheres) noexcept {
         blocks::move_blocks(eye_high, eye_low, path, spheres);
+    }
+    static void keep_inside(const KernelView& view, float hair, const KernelClock& clock, const BlockSpheres& spheres,
+                            float* deadlines) noexcept {
+        blocks::keep_inside(view, hair, clock, spheres, deadlines);
     }
     static std::size_t look_at_blocks(std::span<const std::uint32_t> which, float position_clock, float facing_clock, const BlockDues* dues,
                                       const std::uint16_t* unfolded, const BlockSpheres& spheres, BlockDeadlines& deadlines,

@@ -313,6 +313,7 @@ void FoldTester::test_batch(Lanes lanes, Verdict* verdicts, bool costs) const {
     for (std::size_t i = 0; i < lanes.size(); ++i) {
         verdicts[i].position_slack = tested.position_slack[i];
         verdicts[i].facing_slack = tested.facing_slack[i];
+        verdicts[i].plane_slack = tested.plane_slack[i];
         verdicts[i].light_slack = lit_ ? tested.light_slack[i] : infinity;
         verdicts[i].unfolded = (tested.unfolded >> i) & 1;
     }
@@ -336,6 +337,7 @@ void FoldTester::test_in_stages(Lanes lanes, TestBatch& tested, Verdict* costs) 
     finish_slacks(view_, batch, findings);
     std::copy_n(findings.position_slack, kernel_lanes, tested.position_slack);
     std::copy_n(findings.facing_slack, kernel_lanes, tested.facing_slack);
+    std::copy_n(findings.plane_slack, kernel_lanes, tested.plane_slack);
     if (lit_) std::copy_n(lit.slack, kernel_lanes, tested.light_slack);
     tested.unfolded = findings.unfolded;
     if (!costs) return;
@@ -366,7 +368,8 @@ void FoldTester::set_costs(Verdict& verdict, std::int32_t row, std::int32_t bin,
 }
 
 Motion FoldTester::motion(const VertexTree& tree, const Viewpoint& from, const Viewpoint& to, double length_per_radian) {
-    constexpr Motion jump{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+    constexpr Motion jump{.position = std::numeric_limits<double>::infinity(),
+                          .facing = std::numeric_limits<double>::infinity()};
     if (from.gaze.has_value() != to.gaze.has_value() || from.frusta.size() != to.frusta.size() || from.occluders != to.occluders)
         return jump;
     const Sphere& root = tree.bounds()[VertexTree::root()].ring; // contains the centres of all spheres
@@ -405,13 +408,14 @@ Motion FoldTester::motion(const VertexTree& tree, const Viewpoint& from, const V
         for (std::size_t p = 0; p < before.size(); ++p) {
             const glm::dvec3 turn = after[p].normal - before[p].normal;
             const double change = std::abs(glm::dot(turn, centre) + after[p].offset - before[p].offset) + glm::length(turn) * radius;
-            motion.facing = std::max(motion.facing, change);
+            motion.planes = std::max(motion.planes, change);
         }
     }
     // Rounding of all this in double, far below what the slacks leave for floats; a comparison with NaN must not stand still.
     motion.position *= 1 + 1e-9;
     motion.facing *= 1 + 1e-9;
-    return std::isnan(motion.position + motion.facing) ? jump : motion;
+    motion.planes *= 1 + 1e-9;
+    return std::isnan(motion.position + motion.facing + motion.planes) ? jump : motion;
 }
 
 } // namespace unseen::vdtree

@@ -15,10 +15,12 @@
 namespace unseen::vdtree {
 
 // What a test found. The verdict holds while the position clock has advanced by less than `position_slack`, the facing
-// clock by less than `facing_slack` and the lights' by less than `light_slack` (mesh units, 0 or more; see Motion).
+// clock by less than `facing_slack`, the planes' by less than `plane_slack` and the lights' by less than `light_slack` (mesh
+// units, 0 or more; see Motion).
 struct Verdict {
     float position_slack = 0;
     float facing_slack = 0;
+    float plane_slack = 0; // without planes: huge
     float light_slack = 0; // without lights it counts for nothing
     float cost = 0;      // D over the distance, by which budgets go; infinite where the eye is inside
     float seen_cost = 0; // not less than the class's least cost: folded where at most the threshold
@@ -28,7 +30,8 @@ struct Verdict {
 // How much a move from one viewpoint to another advances the clocks.
 struct Motion {
     double position = 0; // bounds the change of every node's distance; rotations of the gaze count as lengths
-    double facing = 0;   // the path of the eye, or the change of a height over a frustum's plane where that is more
+    double facing = 0;   // the path of the eye
+    double planes = 0;   // bounds the change of the height of any node's centre over any plane of the frusta
     double light = 0;    // of the lights, in lengths; see light_weight
 };
 
@@ -47,7 +50,10 @@ public:
     // position clock; any positive value will do, and it must be the same for verdicts and motions.
     void look_from(const Viewpoint& viewpoint, double length_per_radian);
 
-    bool uses_gaze() const noexcept { return view_.has_gaze; } // from the current viewpoint
+    // From the current viewpoint.
+    const KernelView& view() const noexcept { return view_; }
+    bool uses_gaze() const noexcept { return view_.has_gaze; }
+    bool has_planes() const noexcept { return !view_.planes.empty(); }
 
     FoldCandidate candidate(NodeId node) const;
     void prefetch(NodeId node) const; // what candidate(node) will read

@@ -12,13 +12,6 @@
 
 namespace unseen::vdtree {
 
-namespace {
-
-float rounded_down(double clock) { return clock > 0 ? std::nextafter(static_cast<float>(clock), 0.0f) : 0.0f; }
-float rounded_up(double clock) { return std::nextafter(static_cast<float>(clock), std::numeric_limits<float>::infinity()); }
-
-} // namespace
-
 template <class F>
 void WatchList::for_each_used(BlockId block, F&& f) const {
     for (std::uint32_t left = used_[block]; left; left &= left - 1)
@@ -36,15 +29,14 @@ void WatchList::clear() {
     unfolded_.clear();
     spheres_.clear();
     earliest_.clear();
-    light_dues_.clear();
-    earliest_light_.clear();
+    lights_.clear();
+    planes_.clear();
     free_blocks_.clear();
     looked_at_.clear();
     size_ = 0;
     first_unplaced_ = 0;
     path_ = 0;
     set_clocks(0, 0);
-    set_light_clock(0);
 }
 
 void WatchList::reserve(std::size_t nodes) {
@@ -56,9 +48,8 @@ void WatchList::reserve(std::size_t nodes) {
     unfolded_.reserve(blocks);
     spheres_.reserve(blocks);
     earliest_.reserve(blocks);
-    if (!has_lights_) return;
-    light_dues_.reserve(blocks);
-    earliest_light_.reserve(blocks);
+    for (SideDeadlines* side : {&lights_, &planes_})
+        if (side->is_used()) side->reserve(blocks);
 }
 
 // ---- slots
@@ -73,17 +64,14 @@ WatchList::BlockId WatchList::new_block() {
         candidates_.resize(candidates_.size() + block_slots);
         spheres_.push_back();
         earliest_.push_back(never);
-        if (has_lights_) {
-            light_dues_.emplace_back();
-            earliest_light_.push_back(never);
-        }
+        for (SideDeadlines* side : {&lights_, &planes_})
+            if (side->is_used()) side->push_back();
     } else {
         block = free_blocks_.back();
         free_blocks_.pop_back();
     }
     std::ranges::fill(blocks_[block].position, never);
     std::ranges::fill(blocks_[block].facing, never);
-    if (has_lights_) std::ranges::fill(light_dues_[block].light, never);
     return block;
 }
 
@@ -131,12 +119,12 @@ void WatchList::remove(NodeId node) {
     const BlockId block = static_cast<BlockId>(slot / block_slots);
     const std::size_t place = slot % block_slots;
     blocks_[block].position[place] = blocks_[block].facing[place] = never;
-    if (has_lights_) light_dues_[block].light[place] = never;
+    for (SideDeadlines* side : {&lights_, &planes_})
+        if (side->is_used()) side->remove(block, place);
     used_[block] = static_cast<std::uint16_t>(used_[block] & ~(1u << place));
     --size_;
     if (used_[block] != 0) return;
-    earliest_.set(block, never, never, never);
-    if (has_lights_) earliest_light_[block] = never;
+    reset_earliest(block);
     free_blocks_.push_back(block);
 }
 
@@ -171,6 +159,12 @@ void WatchList::include(BlockId block, const FoldCandidate& candidate) {
     spheres_.radius[block] = std::max(spheres_.radius[block], glm::length(away) + inexact);
 }
 
+void WatchList::reset_earliest(BlockId block) {
+    earliest_.set(block, never, never, never);
+    for (SideDeadlines* side : {&lights_, &planes_})
+        if (side->is_used()) side->reset_earliest(block);
+}
+
 // What is left of them now.
 WatchList::Slacks WatchList::slacks_of(Slot slot) const noexcept {
     const std::size_t block = slot / block_slots, place = slot % block_slots;
@@ -178,8 +172,9 @@ WatchList::Slacks WatchList::slacks_of(Slot slot) const noexcept {
     const bool unfolded = (unfolded_[block] >> place) & 1;
     const float passed = spheres_.error[block] + position_clock_float_, distance = spheres_.distance[block];
     const float position = (dues.position[place] - passed) + (unfolded ? -distance : distance) - sum_rounding * (passed + distance);
-    const float light = has_lights_ ? std::max(light_dues_[block].light[place] - light_clock_down_, 0.0f) : 0.0f;
-    return {unfolded, std::max(position, 0.0f), std::max(dues.facing[place] - facing_clock_down_, 0.0f), light};
+    const auto left = [&](const SideDeadlines& side) { return side.is_used() ? side.left(block, place) : 0.0f; };
+    return {unfolded, std::max(position, 0.0f), std::max(dues.facing[place] - facing_clock_float_.early, 0.0f),
+            left(planes_), left(lights_)};
 }
 
 void WatchList::split(BlockId block) {
@@ -197,8 +192,7 @@ void WatchList::split(BlockId block) {
     }
     place(block);
     place(other);
-    earliest_.set(block, never, never, never);
-    if (has_lights_) earliest_light_[block] = never;
+    reset_earliest(block);
     for (std::size_t i = 0; i < block_slots; ++i) set_deadlines(slots[i], left[i]);
 }
 
@@ -210,22 +204,20 @@ void WatchList::set_deadlines(Slot slot, const Slacks& slacks) {
     const float passed = spheres_.error[block] + position_clock_float_, distance = spheres_.distance[block];
     const float slack = slacks.position - sum_rounding * (passed + distance + std::min(slacks.position, distance));
     const float position = passed + slack + (slacks.unfolded ? distance : -distance);
-    const float facing = (facing_clock_down_ + slacks.facing) * just_less;
+    const float facing = (facing_clock_float_.early + slacks.facing) * just_less;
     blocks_[block].position[place] = position;
     blocks_[block].facing[place] = facing;
     unfolded_[block] = static_cast<std::uint16_t>((unfolded_[block] & ~(1u << place)) | (std::uint32_t{slacks.unfolded} << place));
     float& earliest = (slacks.unfolded ? earliest_.recede : earliest_.approach)[block];
     earliest = std::min(earliest, position);
     earliest_.facing[block] = std::min(earliest_.facing[block], facing);
-    if (!has_lights_) return;
-    const float light = (light_clock_down_ + slacks.light) * just_less;
-    light_dues_[block].light[place] = light;
-    earliest_light_[block] = std::min(earliest_light_[block], light);
+    if (lights_.is_used()) lights_.set(block, place, slacks.unfolded, slacks.light);
+    if (planes_.is_used()) planes_.set(block, place, slacks.unfolded, slacks.planes);
 }
 
 void WatchList::set_deadlines(std::span<const Slot> slots, const TestBatch& tested, const Cutting& cutting) {
     DueBatch dues;
-    dues.facing_clock = facing_clock_down_;
+    dues.facing_clock = facing_clock_float_.early;
     dues.longest = cutting.longest;
     dues.hair = cutting.hair;
     for (std::size_t i = 0; i < kernel_lanes; ++i) {
@@ -243,10 +235,9 @@ void WatchList::set_deadlines(std::span<const Slot> slots, const TestBatch& test
         float& earliest = (unfolded ? earliest_.recede : earliest_.approach)[block];
         earliest = std::min(earliest, dues.position[i]);
         earliest_.facing[block] = std::min(earliest_.facing[block], dues.facing[i]);
-        if (!has_lights_) continue;
-        const float light = (light_clock_down_ + std::max(tested.light_slack[i] - (unfolded ? cutting.hair : 0), 0.0f)) * just_less;
-        light_dues_[block].light[place] = light;
-        earliest_light_[block] = std::min(earliest_light_[block], light);
+        const auto less_hair = [&](float slack) { return std::max(slack - (unfolded ? cutting.hair : 0), 0.0f); };
+        if (lights_.is_used()) lights_.set(block, place, unfolded, less_hair(tested.light_slack[i]));
+        if (planes_.is_used()) planes_.set(block, place, unfolded, less_hair(tested.plane_slack[i]));
     }
 }
 
@@ -254,12 +245,7 @@ void WatchList::set_clocks(double position, double facing) {
     position_clock_ = position;
     facing_clock_ = facing;
     position_clock_float_ = static_cast<float>(position);
-    facing_clock_down_ = rounded_down(facing);
-}
-
-void WatchList::set_light_clock(double light) {
-    light_clock_ = light;
-    light_clock_down_ = rounded_down(light);
+    facing_clock_float_ = kernel_clock(facing);
 }
 
 void WatchList::move_to(const glm::dvec3& eye, double facing) {
@@ -276,60 +262,47 @@ void WatchList::move_to(const glm::dvec3& eye, double facing) {
 }
 
 void WatchList::restart_clocks(double longest) {
-    if (!(std::max({position_clock_, facing_clock_, light_clock_, path_}) > longest)) return;
-    const double position = position_clock_, facing = facing_clock_, light = light_clock_;
+    lights_.restart(longest);
+    planes_.restart(longest);
+    if (!(std::max({position_clock_, facing_clock_, path_}) > longest)) return;
+    const double position = position_clock_, facing = facing_clock_;
     for (BlockId block = 0; block < blocks_.size(); ++block) {
         std::array<Slacks, block_slots> left;
         for_each_used(block, [&](Slot slot) { left[slot % block_slots] = slacks_of(slot); });
         spheres_.error[block] = 0;
-        earliest_.set(block, never, never, never);
-        if (has_lights_) earliest_light_[block] = never;
+        reset_earliest(block);
         set_clocks(0, 0);
-        set_light_clock(0);
         for_each_used(block, [&](Slot slot) { set_deadlines(slot, left[slot % block_slots]); });
         set_clocks(position, facing);
-        set_light_clock(light);
     }
     set_clocks(0, 0);
-    set_light_clock(0);
     path_ = 0;
 }
 
-// What is due by the lights is due by the facing clock from now on.
-void WatchList::set_all_due_by_lights() {
-    const float clock = rounded_up(light_clock_);
-    looked_at_.clear();
-    for (BlockId block = 0; block < earliest_light_.size(); ++block)
-        if (earliest_light_[block] <= clock) looked_at_.push_back(block);
+void WatchList::advance_lights(double light) {
+    if (!lights_.is_used()) return;
+    lights_.advance(light);
+    hand_over(lights_);
+}
+
+void WatchList::advance_planes(double planes, const KernelView& view, float hair) {
+    if (!planes_.is_used()) return;
+    planes_.advance(planes);
+    keep_inside(view, hair, planes_.clock(), spheres_, planes_.earliest_unfolded());
+    hand_over(planes_);
+}
+
+void WatchList::hand_over(SideDeadlines& side) {
+    side.find_due_blocks(looked_at_);
     for (std::size_t i = 0; i < looked_at_.size(); ++i) {
         constexpr std::size_t ahead = 12; // blocks between a prefetch and its use
         if (i + ahead < looked_at_.size()) {
-            prefetch(&light_dues_[looked_at_[i + ahead]]);
+            side.prefetch(looked_at_[i + ahead]);
             prefetch(blocks_[looked_at_[i + ahead]].facing);
         }
-        set_due_by_lights(looked_at_[i], clock);
+        const BlockId block = looked_at_[i];
+        if (side.hand_over(block, unfolded_[block], blocks_[block])) earliest_.facing[block] = -never;
     }
-}
-
-void WatchList::set_due_by_lights(BlockId block, float clock) {
-    using Floats = float __attribute__((vector_size(16))); // an extension that GCC and Clang share
-    const Floats none = Floats{} + never;
-    Floats earliest = none;
-    bool any = false;
-    for (std::size_t i = 0; i < block_slots; i += 4) {
-        Floats light, facing;
-        std::memcpy(&light, &light_dues_[block].light[i], sizeof light);
-        std::memcpy(&facing, &blocks_[block].facing[i], sizeof facing);
-        const auto is_due = light <= clock;
-        any |= (is_due[0] | is_due[1] | is_due[2] | is_due[3]) != 0;
-        facing = is_due ? -none : facing;
-        light = is_due ? none : light;
-        earliest = light < earliest ? light : earliest;
-        std::memcpy(&light_dues_[block].light[i], &light, sizeof light);
-        std::memcpy(&blocks_[block].facing[i], &facing, sizeof facing);
-    }
-    earliest_light_[block] = std::min(std::min(earliest[0], earliest[1]), std::min(earliest[2], earliest[3]));
-    if (any) earliest_.facing[block] = -never;
 }
 
 std::span<const WatchList::Slot> WatchList::collect_due() {
@@ -338,10 +311,9 @@ std::span<const WatchList::Slot> WatchList::collect_due() {
 }
 
 void WatchList::find_due_blocks(BlockId first) {
-    if (has_lights_) set_all_due_by_lights();
     due_blocks_.resize((blocks_.size() + 63) / 64);
     // In floats the clock may be a little late.
-    find_due(position_clock_float_, rounded_up(facing_clock_), spheres_, earliest_, due_blocks_.data());
+    find_due(position_clock_float_, facing_clock_float_.late, spheres_, earliest_, due_blocks_.data());
     std::size_t count = 0;
     for (const std::uint64_t word : due_blocks_) count += static_cast<std::size_t>(std::popcount(word));
     looked_at_.resize(count);
@@ -355,14 +327,14 @@ void WatchList::find_due_blocks(BlockId first) {
 std::span<const WatchList::Slot> WatchList::collect_due(std::span<const BlockId> blocks) {
     if (const std::size_t room = blocks.size() * block_slots; due_.size() < room) due_.resize(room);
     // The blocks keep the earliest deadlines of what is not due; those of the others come back when they are set.
-    return std::span(due_).first(look_at_blocks(blocks, position_clock_float_, rounded_up(facing_clock_), blocks_.data(), unfolded_.data(), spheres_,
-                                                earliest_, due_.data()));
+    return std::span(due_).first(look_at_blocks(blocks, position_clock_float_, facing_clock_float_.late, blocks_.data(),
+                                                unfolded_.data(), spheres_, earliest_, due_.data()));
 }
 
 std::uint64_t WatchList::byte_size() const noexcept {
-    return sizeof(FoldCandidate) * candidates_.capacity() + sizeof(Slot) * slots_of_nodes_.capacity() + sizeof(BlockDues) * blocks_.capacity() +
-           2 * sizeof(std::uint16_t) * used_.capacity() + spheres_.byte_size() + earliest_.byte_size() +
-           sizeof(LightDues) * light_dues_.capacity() + sizeof(float) * earliest_light_.capacity();
+    return sizeof(FoldCandidate) * candidates_.capacity() + sizeof(Slot) * slots_of_nodes_.capacity() +
+           sizeof(BlockDues) * blocks_.capacity() + 2 * sizeof(std::uint16_t) * used_.capacity() +
+           spheres_.byte_size() + earliest_.byte_size() + lights_.byte_size() + planes_.byte_size();
 }
 
 } // namespace unseen::vdtree

@@ -11,7 +11,7 @@
 
 #include "fold_kernel.h"
 #include "fold_tester.h"
-#include "prefetch.h"
+#include "side_deadlines.h"
 
 namespace unseen::vdtree {
 
@@ -20,7 +20,8 @@ namespace unseen::vdtree {
 // on which side of them the eye comes nearer, and by how much, far better than a bound on the eye's path would tell.
 //
 // Every slot has two deadlines: for the distance when it grows (where the node is unfolded) or shrinks (where it is folded), and for
-// the facing clock; every block knows the earliest ones. Where there are lights, it has a third one, for their own clock.
+// the facing clock; every block knows the earliest ones. Where there are lights, or planes of frusta, it has another one for
+// their own clock.
 // A full block is split in two, by node numbers, which keeps neighbours together.
 class WatchList {
 public:
@@ -34,7 +35,10 @@ public:
     std::size_t size() const noexcept { return size_; }
     void clear();
     // Only while it is empty.
-    void use_lights(bool are_there) noexcept { has_lights_ = are_there; }
+    void use(bool lights, bool planes) noexcept {
+        lights_.use(lights);
+        planes_.use(planes);
+    }
     void reserve(std::size_t nodes);
 
     // Slots hold until the next insert(). Nothing has one before the first reserve().
@@ -51,7 +55,8 @@ public:
         if (slot == no_slot) return;
         prefetch(blocks_[slot / block_slots].position);
         prefetch(blocks_[slot / block_slots].facing);
-        if (has_lights_) prefetch(&light_dues_[slot / block_slots]);
+        for (const SideDeadlines* side : {&lights_, &planes_})
+            if (side->is_used()) side->prefetch(slot / block_slots);
     }
 
     // A node that is not watched yet, into the block of `near` (or one of its own, where that is no_slot). Its deadlines are set next.
@@ -65,7 +70,7 @@ public:
     // distances change; else only shrinking ones.
     struct Slacks {
         bool unfolded = false;
-        float position = 0, facing = 0, light = 0;
+        float position = 0, facing = 0, planes = 0, light = 0;
     };
     void set_deadlines(Slot slot, const Slacks& slacks);
     // The same for up to sixteen slots that were tested, with slacks cut to what serves: none of distances is longer than `longest`, and
@@ -79,7 +84,10 @@ public:
     void move_to(const glm::dvec3& eye, double facing);
     // All distances, and what else slacks for them cover, may have changed by so much, whichever way; the facing clock goes on.
     void advance(double position, double facing) { set_clocks(position_clock_ + position, facing_clock_ + facing); }
-    void advance_lights(double light) { set_light_clock(light_clock_ + light); }
+    // Where these are used; what is due by them is due by the facing clock from then on. Planes: heights over those of `view`
+    // may have changed by so much; what is unfolded in blocks wholly inside a frustum needs no test. `hair`: see keep_inside().
+    void advance_lights(double light);
+    void advance_planes(double planes, const KernelView& view, float hair);
     // Sets back what has grown beyond `longest`, so that deadlines in floats stay fine enough.
     void restart_clocks(double longest);
 
@@ -99,21 +107,16 @@ private:
     static constexpr std::uint16_t full = 0xffff;
     static constexpr float never = std::numeric_limits<float>::infinity();
 
-    struct alignas(64) LightDues {
-        float light[block_slots];
-    };
-
     BlockId new_block();
     void place(BlockId block);
     void split(BlockId block);
+    void reset_earliest(BlockId block);
     Slacks slacks_of(Slot slot) const noexcept;
     Slot take(BlockId block, const FoldCandidate& candidate);
     void include(BlockId block, const FoldCandidate& candidate);
     float distance_to(const glm::vec3& point) const noexcept;
     void set_clocks(double position, double facing);
-    void set_light_clock(double light);
-    void set_all_due_by_lights();
-    void set_due_by_lights(BlockId block, float clock);
+    void hand_over(SideDeadlines& side);
     template <class F>
     void for_each_used(BlockId block, F&& f) const;
 
@@ -127,9 +130,7 @@ private:
     std::vector<std::uint16_t> unfolded_;  // likewise: growing distances change the verdict
     BlockSpheres spheres_;
     BlockDeadlines earliest_;              // not later than any slot's
-    bool has_lights_ = false;
-    std::vector<LightDues> light_dues_;    // where there are lights, like the next
-    std::vector<float> earliest_light_;
+    SideDeadlines lights_, planes_;
     std::vector<BlockId> free_blocks_, looked_at_;
     std::vector<std::uint64_t> due_blocks_;
     std::vector<Slot> due_;
@@ -139,9 +140,8 @@ private:
     float eye_high_[3] = {}, eye_low_[3] = {};
     double path_ = 0;                      // since the clocks were restarted
     double position_clock_ = 0, facing_clock_ = 0;
-    float position_clock_float_ = 0, facing_clock_down_ = 0;
-    double light_clock_ = 0;
-    float light_clock_down_ = 0;
+    float position_clock_float_ = 0;
+    KernelClock facing_clock_float_;
 };
 
 } // namespace unseen::vdtree
