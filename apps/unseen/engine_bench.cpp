@@ -16,6 +16,7 @@
 #include <subdivide.h>
 #include <vdtree/criteria.h>
 #include <vdtree/cut.h>
+#include <vdtree/fold_errors.h>
 #include <vdtree/mesh_io.h>
 #include <vdtree/tree_io.h>
 
@@ -39,6 +40,7 @@ constexpr double most_of_mesh = 0.5;             // at small meshes: so much of 
 constexpr double fill = 0.9;                     // of the window's height
 constexpr int sphere_rows = 466;                 // 868,624 triangles, about as many as the dragon
 constexpr double orbit_steps[] = {0.1, 1, 5};    // degrees a frame
+constexpr double most_tests_of_frustum = 1.15;   // in those without, where all of the model is in the window
 
 double share_below(std::vector<double> values, double share) {
     if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
@@ -196,17 +198,38 @@ Result<vdtree::VertexTree> tree_of_size(const Workshop& shop, const NamedMesh& b
     return load_tree(file);
 }
 
+// The same tree with the errors of its folds, for the fold test 'error'; measured where it is not kept.
+Result<vdtree::VertexTree> with_errors(const Workshop& shop, const NamedMesh& base, const vdtree::VertexTree& tree) {
+    const fs::path file = shop / (base.name + "-" + std::to_string(tree.triangle_count()) + "-fold-errors.vdt");
+    std::error_code unknown;
+    if (fs::exists(file, unknown))
+        if (auto kept = load_tree(file); kept) return kept;
+    print_note("measuring fold errors ...");
+    auto measured = vdtree::with_fold_errors(tree);
+    if (!measured) return measured.error();
+    if (const auto written = vdtree::write_tree(file, *measured); !written) return written.error();
+    return measured;
+}
+
 // ---- views
+
+enum class FoldTest { luebke_hallen, error };
+std::string name_of(FoldTest test) { return test == FoldTest::error ? "error" : "luebke-hallen"; }
 
 // The model in the window of the default display, around the vertical axis.
 class Orbit {
 public:
-    Orbit(const vdtree::VertexTree& tree, bool with_gaze) : tree_(tree) {
+    struct Kind {
+        FoldTest test = FoldTest::luebke_hallen;
+        bool with_gaze = false, with_frustum = false;
+    };
+
+    Orbit(const vdtree::VertexTree& tree, const Kind& kind) : tree_(tree), kind_(kind) {
         window_.fov_y_degrees = perception::physical_field(options_.display, window_.height).value();
         const vdtree::LuminanceRange range = tree.luminance_range();
         const auto background = static_cast<float>(perception::to_relative(options_.display, perception::Luminance(20)));
         options_.scene = {std::min(range.lo, background), std::max(range.hi, background)};
-        if (!with_gaze) return;
+        if (!kind.with_gaze) return;
         options_.gaze_px = gaze_aside(options_.display, window_, usual_degrees_aside);
     }
 
@@ -216,16 +239,18 @@ public:
         return vdtree::frame_sphere(tree_.origin() + glm::dvec3(sphere.centre), sphere.radius,
                                     {std::sin(angle), 0, std::cos(angle)}, fill, window_);
     }
-    // All of the model is in the window: nothing to cull.
+    // All of the model is in the window: there is nothing to cull, with a frustum or without.
     vdtree::Viewpoint at(double degrees) const {
-        return perception::viewpoint_of(tree_, view(degrees), options_, {}, false);
+        return perception::viewpoint_of(tree_, view(degrees), options_, {}, kind_.with_frustum);
     }
     Result<vdtree::DistanceCriterion> criterion() const {
+        if (kind_.test == FoldTest::error) return perception::error_distances(tree_, view(0), options_);
         return perception::luebke_hallen_distances(tree_, view(0), options_);
     }
 
 private:
     const vdtree::VertexTree& tree_;
+    Kind kind_;
     perception::FoldTestOptions options_;
     vdtree::View window_;
 };
@@ -235,8 +260,8 @@ private:
 // Follows one criterion; errors (there are none for views that are made here) end the program's run.
 class Subject {
 public:
-    static Result<Subject> create(const vdtree::VertexTree& tree, bool with_gaze) {
-        Orbit orbit(tree, with_gaze);
+    static Result<Subject> create(const vdtree::VertexTree& tree, const Orbit::Kind& kind) {
+        Orbit orbit(tree, kind);
         auto criterion = orbit.criterion();
         if (!criterion) return criterion.error();
         return Subject(tree, orbit, std::move(*criterion));
@@ -465,7 +490,7 @@ private:
     Result<void> measure_cuts(std::uint64_t size, const vdtree::VertexTree& tree, Json& json) {
         print_note("measuring cuts at " + size_name(size) + " triangles ...");
         const Pinned pinned;
-        auto subject = Subject::create(tree, false);
+        auto subject = Subject::create(tree, {});
         if (!subject) return subject.error();
         // The same at all sizes that have it.
         const auto smaller = static_cast<double>(std::min<std::size_t>(tree.triangle_count(), base_.mesh.triangles.size()));
@@ -500,6 +525,7 @@ private:
                                     " tests a frame",
                                 orbits[i].median_us, must[i], aim[i], false, 1});
         if (auto gazing = measure_gaze(subject.tree()); !gazing) return gazing;
+        if (auto compared = measure_frusta(subject.tree(), active); !compared) return compared;
         growth_place_ = at_main_.size();
         at_main_.push_back({"still view", "us", "", still_us(subject, options_.quick ? 20 : 200), 1, 0.1, false, 3});
         at_main_.push_back({"teleport, " + size_name(main_size()), "ms", "to the other side", jump_ms, 3, 1, false, 2});
@@ -531,11 +557,41 @@ private:
     }
 
     Result<void> measure_gaze(const vdtree::VertexTree& tree) {
-        const auto subject = Subject::create(tree, true);
+        const auto subject = Subject::create(tree, {.with_gaze = true});
         if (!subject) return subject.error();
         const OrbitFigures f = measure_orbit(*subject, 1, options_.quick ? 20 : 200);
         at_main_.push_back({"the same, gaze " + shortest(usual_degrees_aside) + " degrees aside, 1 degree a frame", "us",
                             rounded(f.triangles, 6) + " active triangles, threshold 1", f.median_us, {}, {}, false, 1});
+        return {};
+    }
+
+    // What users run: both fold tests, with the window's frustum and without.
+    Result<void> measure_frusta(const vdtree::VertexTree& plain, vdtree::Index active) {
+        const auto measured = with_errors(shop_, base_, plain);
+        if (!measured) return measured.error();
+        const int frames = options_.quick ? 40 : 400;
+        for (const FoldTest test : {FoldTest::luebke_hallen, FoldTest::error}) {
+            const std::string of = "fold test " + name_of(test) + ", 1 degree a frame";
+            double tests[2] = {};
+            for (const bool with_frustum : {false, true}) {
+                auto subject = Subject::create(test == FoldTest::error ? *measured : plain,
+                                               {.test = test, .with_frustum = with_frustum});
+                if (!subject) return subject.error();
+                const vdtree::Index triangles = subject->aim_for(active);
+                const OrbitFigures f = measure_orbit(*subject, 1, frames);
+                const std::string name = of + (with_frustum ? ", with the frustum" : ", without frustum");
+                const std::string note = grouped(triangles) + " active triangles, all in the window; " +
+                                         rounded(f.changes, 4) + " changes a frame";
+                at_main_.push_back({name, "us", note, f.median_us, {}, {}, false, 1});
+                at_main_.push_back({name, "tests", note, f.tests, {}, {}, false, 0});
+                tests[with_frustum] = f.tests;
+            }
+            BenchRow row{
+                of + ", tests with the frustum over without", "x", "", {}, most_tests_of_frustum, 1.02, false, 2};
+            if (tests[0] > 0) row.value = tests[1] / tests[0];
+            else row.note = "nothing was tested without a frustum";
+            at_main_.push_back(row);
+        }
         return {};
     }
 

@@ -1,5 +1,5 @@
-// Cuts that follow a view, by the perceptual test with silhouettes: what one frame takes with its index buffer, and what it
-// goes with. `unseen bench engine` prints the same against what is promised.
+// Cuts that follow a view, by the perceptual test with silhouettes and by the default one: what one frame takes with its index buffer, and
+// what it goes with. `unseen bench engine` prints the same against what is promised.
 #include <benchmark/benchmark.h>
 
 #include <cmath>
@@ -7,6 +7,7 @@
 
 #include <perception/criterion.h>
 #include <vdtree/cut.h>
+#include <vdtree/fold_errors.h>
 
 #include "bench_mesh.h"
 
@@ -19,7 +20,8 @@ using vdtree::Cut;
 constexpr double most_of_mesh = 0.5, wanted_active = 1e5;
 
 struct Subject {
-    Subject(const vdtree::VertexTree& tree_, bool gazes) : tree(tree_), options(fold_test(gazes)), criterion(make()) {
+    Subject(const vdtree::VertexTree& tree_, bool gazes, bool by_errors = false, bool frustum = false)
+        : tree(tree_), options(fold_test(gazes)), with_frustum(frustum), criterion(make(by_errors)) {
         if (gazes) return; // as it comes out at threshold 1
         const double wanted = std::min(wanted_active, most_of_mesh * tree.triangle_count());
         Cut cut(tree);
@@ -37,11 +39,13 @@ struct Subject {
         return follow(cut, degrees, following);
     }
     vdtree::AdjustStats follow(Cut& cut, double degrees, const vdtree::FollowOptions& following) const {
-        return *cut.follow(criterion, perception::viewpoint_of(tree, orbit(tree, degrees), options, {}, false), following);
+        return *cut.follow(criterion, perception::viewpoint_of(tree, orbit(tree, degrees), options, {}, with_frustum),
+                           following);
     }
 
     const vdtree::VertexTree& tree;
     perception::FoldTestOptions options;
+    bool with_frustum;
     vdtree::DistanceCriterion criterion;
     float threshold = 1;
 
@@ -51,7 +55,10 @@ private:
         if (gazes) test.gaze_px = glm::dvec2(1603, 512); // 29 degrees aside
         return test;
     }
-    vdtree::DistanceCriterion make() const { return *perception::luebke_hallen_distances(tree, orbit(tree, 0), options); }
+    vdtree::DistanceCriterion make(bool by_errors) const {
+        return *(by_errors ? perception::error_distances : perception::luebke_hallen_distances)(tree, orbit(tree, 0),
+                                                                                                options);
+    }
 };
 
 const Subject& subject(bool gazes, bool large) {
@@ -61,27 +68,58 @@ const Subject& subject(bool gazes, bool large) {
     return foveal_large;
 }
 
-void follow_orbit(benchmark::State& state, bool gazes, bool large) {
-    const Subject& s = subject(gazes, large);
+const vdtree::VertexTree& tree_with_errors() {
+    static const vdtree::VertexTree measured = *vdtree::with_fold_errors(tree());
+    return measured;
+}
+
+void follow_orbit_of(benchmark::State& state, const Subject& s) {
     Cut cut(s.tree);
-    double degrees = 0, changes = 0, triangles = 0;
+    double degrees = 0, changes = 0, tests = 0, triangles = 0;
     const double step = static_cast<double>(state.range(0)) / 10;
     const auto next = [&] {
         const auto stats = s.follow(cut, degrees += step);
         benchmark::DoNotOptimize(cut.indices().data());
         changes += static_cast<double>(stats.folds + stats.unfolds);
+        tests += static_cast<double>(stats.node_tests);
         triangles = stats.triangles;
     };
     for (int warm_up = 0; warm_up < 5; ++warm_up) next();
-    changes = 0;
+    changes = tests = 0;
     for (auto _ : state) next();
     state.counters["changes"] = benchmark::Counter(changes, benchmark::Counter::kAvgIterations);
+    state.counters["tests"] = benchmark::Counter(tests, benchmark::Counter::kAvgIterations);
     state.counters["triangles"] = triangles;
 }
+void follow_orbit(benchmark::State& state, bool gazes, bool large) { follow_orbit_of(state, subject(gazes, large)); }
 BENCHMARK_CAPTURE(follow_orbit, foveal, false, false)->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(follow_orbit, gaze, true, false)->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(follow_orbit, foveal_of_16_times_the_mesh, false, true)
     ->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
+
+// All of the model is in the window.
+void follow_orbit_in_frustum(benchmark::State& state) {
+    static const Subject in_frustum(tree(), false, false, true);
+    follow_orbit_of(state, in_frustum);
+}
+BENCHMARK(follow_orbit_in_frustum)->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
+
+void follow_orbit_by_errors(benchmark::State& state, bool with_frustum) {
+    static const Subject without(tree_with_errors(), false, true, false), with(tree_with_errors(), false, true, true);
+    follow_orbit_of(state, with_frustum ? with : without);
+}
+BENCHMARK_CAPTURE(follow_orbit_by_errors, without_frustum, false)
+    ->ArgName("tenth_degrees")
+    ->Arg(1)
+    ->Arg(10)
+    ->Arg(50)
+    ->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(follow_orbit_by_errors, with_frustum, true)
+    ->ArgName("tenth_degrees")
+    ->Arg(1)
+    ->Arg(10)
+    ->Arg(50)
+    ->Unit(benchmark::kMicrosecond);
 
 void follow_still(benchmark::State& state) {
     const Subject& s = subject(false, false);
