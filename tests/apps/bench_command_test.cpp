@@ -36,7 +36,7 @@ TEST_F(BenchCommandTest, MeasuresEveryRow) {
             EXPECT_EQ(row["holds_aim"].get<bool>() && !row["holds_must"].get<bool>(), false) << name;
         }
     }
-    EXPECT_GE(with_bounds, 18);
+    EXPECT_GE(with_bounds, 20);
     EXPECT_TRUE(fs::exists(path("kept/ball-5000.vdt")));
     const Outcome again = run({"bench", "engine", "--quick", "--mesh", "ball.obj", "--sizes", "1472", "--keep", "kept"});
     EXPECT_EQ(again.status, 0) << again.err;
