@@ -58,7 +58,7 @@ public:
     }
 
     // Prints a row, and returns the wireframe as code values.
-    perception::Image run(const char* name, vdtree::FoldCriterion criterion, vdtree::Index budget) {
+    perception::Image run(const char* name, const vdtree::FoldCriterion& criterion, vdtree::Index budget) {
         vdtree::Cut cut(tree_);
         vdtree::AdjustOptions adjust;
         adjust.triangle_budget = budget;

@@ -12,7 +12,7 @@ namespace unseen::app {
 // One of the textures, and the coordinates at which it is looked up.
 struct AtlasPart {
     std::string name; // for messages
-    const vdtree::Texture* texture;
+    const vdtree::Texture* texture; // the caller's; must outlive the call of make_atlas()
     vdtree::UvBox used;
 };
 

@@ -82,7 +82,7 @@ double full_tests_per_second(const vdtree::VertexTree& tree, const vdtree::Dista
     return median(rates);
 }
 
-AimedThreshold aim_for(vdtree::Index triangles, FunctionRef<vdtree::Index(float)> follow) {
+AimedThreshold aim_for(vdtree::Index triangles, const FunctionRef<vdtree::Index(float)>& follow) {
     double low = -20, high = 20; // log2
     AimedThreshold aimed;
     constexpr int steps = 24;

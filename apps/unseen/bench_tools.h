@@ -52,6 +52,6 @@ struct AimedThreshold {
     float threshold = 1;
     vdtree::Index triangles = 0;
 };
-AimedThreshold aim_for(vdtree::Index triangles, FunctionRef<vdtree::Index(float)> follow);
+AimedThreshold aim_for(vdtree::Index triangles, const FunctionRef<vdtree::Index(float)>& follow);
 
 } // namespace unseen::app

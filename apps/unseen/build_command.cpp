@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <thread>
@@ -41,7 +42,7 @@ constexpr int most_threads = 1024;
 
 Result<void> write(const std::string& file, const vdtree::VertexTree& tree) {
     ProgressBar bar("writing " + file);
-    return vdtree::write_tree(file, tree, bar);
+    return vdtree::write_tree(file, tree, std::ref(bar));
 }
 
 // The most memory that this process has had resident, or nothing where the system does not tell.

@@ -16,7 +16,7 @@ inline constexpr int exit_usage = 2;
 // A verb: its options, which its parser checks as far as they can be checked without reading a file (impossible ones
 // end the parse), and the work, which returns the exit status.
 struct Command {
-    CLI::App* parser = nullptr;
+    CLI::App* parser = nullptr; // of the App given, which keeps it
     std::function<Result<int>()> run;
 };
 

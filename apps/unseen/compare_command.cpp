@@ -68,13 +68,11 @@ Result<Verdict> judge_modern(const CompareArguments& a, const Pair& pair, const 
     perception::JudgeOptions options;
     options.display = display;
     options.gaze_px = a.gaze_px;
-    CsfChoice choice;
     if (!a.display.csf.empty()) {
         auto chosen = choose_csf(a.display.csf);
         if (!chosen) return chosen.error();
-        choice = std::move(*chosen);
-        if (choice.model) options.csf = *choice.model;
-        if (choice.table) options.csf_table = &*choice.table;
+        if (chosen->model) options.csf = *chosen->model;
+        if (chosen->table) options.csf_table = std::make_shared<const perception::CsfTable>(*std::move(chosen->table));
     }
     auto judgement = perception::judge_modern(reference, test, options);
     if (!judgement) return judgement.error();

@@ -51,7 +51,7 @@ Effect silhouette_effect(const Scene& scene, const WhatOptions& what) {
 
 Effect csf_effect(const Scene& scene, const WhatOptions& what) {
     if (!is_perceptual(what)) return {"csf table", false, "only the perceptual fold test looks sensitivity up"};
-    return {"csf table", scene.csf.has_value(),
+    return {"csf table", scene.csf != nullptr,
             scene.csf ? "by --csf: " + scene.csf->samples().source
                       : "the standard observer is used, castleCSF"};
 }

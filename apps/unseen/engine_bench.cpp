@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <tuple>
@@ -109,7 +110,7 @@ Result<NamedMesh> base_mesh(const EngineBenchOptions& options) {
 Result<vdtree::Mesh> simplified(const vdtree::Mesh& mesh, std::uint64_t triangles) {
     vdtree::BuildOptions building;
     ProgressBar bar("simplifying");
-    building.progress = bar;
+    building.progress = std::ref(bar);
     const auto tree = vdtree::build_tree(mesh.view(), building);
     if (!tree) return tree.error();
     const vdtree::Sphere sphere = tree->bounding_sphere();
@@ -128,7 +129,7 @@ Result<vdtree::Mesh> mesh_of_size(const vdtree::Mesh& base, std::uint64_t triang
     ProgressBar bar("subdividing");
     SubdivideOptions options;
     options.triangles = triangles;
-    options.progress = bar;
+    options.progress = std::ref(bar);
     return subdivide(base, options);
 }
 

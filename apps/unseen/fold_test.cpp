@@ -17,13 +17,15 @@ perception::FoldTestOptions test_options(const Scene& scene, const WhatOptions& 
     perception::FoldTestOptions test;
     test.display = scene.display;
     test.scene = scene_luminance(scene);
-    test.csf = &scene.csf_table();
+    test.csf = scene.csf;
     test.chroma = what.chroma;
     if (!what.gaze_px) return test;
-    const perception::CsfTable* around_gaze = scene.csf_table(perception::Degrees(what.gaze_margin_deg));
-    if (!around_gaze) return test;
+    if (what.gaze_margin_deg != 0) {
+        auto around_gaze = scene.csf_table(perception::Degrees(what.gaze_margin_deg));
+        if (!around_gaze) return test;
+        test.csf = std::move(around_gaze);
+    }
     test.gaze_px = what.gaze_px;
-    test.csf = around_gaze;
     return test;
 }
 
@@ -71,7 +73,7 @@ struct Key {
     std::optional<double> farthest_gaze_px = {};
     perception::SceneLuminance scene = {0, 0};
     bool is_lit = false, chroma = false;
-    const perception::CsfTable* csf = nullptr;
+    std::shared_ptr<const perception::CsfTable> csf = {}; // kept, so that no other table comes to its address
     int width = 0, height = 0;
     double fov_y_degrees = 0;
     bool operator==(const Key&) const = default;
@@ -199,7 +201,7 @@ bool goes_by_distances(const Scene& scene, const WhatOptions& what) {
     return what.fill_budget || what.milliseconds || what.chroma || is_lit || has_distance_form_only;
 }
 
-void with_node_test(const Scene& scene, const WhatOptions& what, FunctionRef<void(vdtree::FoldCriterion)> use) {
+void with_node_test(const Scene& scene, const WhatOptions& what, const FunctionRef<void(const vdtree::FoldCriterion&)>& use) {
     switch (what.test()) {
     case FoldTest::extent: return use(vdtree::ExtentCriterion(scene.tree, scene.view, tolerance_px(what), scene.placement));
     case FoldTest::displacement: return use(vdtree::DisplacementCriterion(scene.tree, scene.view, tolerance_px(what), scene.placement));
@@ -230,7 +232,7 @@ Result<std::vector<float>> fold_costs(const Scene& scene, const WhatOptions& wha
     std::vector<vdtree::NodeId> nodes(scene.tree.interior_count());
     std::iota(nodes.begin(), nodes.end(), vdtree::NodeId(0));
     std::vector<float> costs(nodes.size());
-    with_node_test(scene, what, [&](vdtree::FoldCriterion criterion) { criterion(scene.tree, nodes, costs); });
+    with_node_test(scene, what, [&](const vdtree::FoldCriterion& criterion) { criterion(scene.tree, nodes, costs); });
     return costs;
 }
 

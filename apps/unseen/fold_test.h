@@ -38,7 +38,7 @@ bool is_perceptual(const WhatOptions& what); // also of the mode full
 bool goes_by_distances(const Scene& scene, const WhatOptions& what);
 
 // Calls `use` with the test that asks about each node; precondition: there is one.
-void with_node_test(const Scene& scene, const WhatOptions& what, FunctionRef<void(vdtree::FoldCriterion)> use);
+void with_node_test(const Scene& scene, const WhatOptions& what, const FunctionRef<void(const vdtree::FoldCriterion&)>& use);
 
 // The scene keeps the last one that was asked for: views that differ in eye and gaze alone have the same.
 Result<std::shared_ptr<const vdtree::DistanceCriterion>> distance_criterion(const Scene& scene, const WhatOptions& what);

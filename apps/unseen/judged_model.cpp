@@ -22,7 +22,7 @@ bool needs_errors(FoldTest test) { return test == FoldTest::error; }
 Result<JudgedModel> JudgedModel::create(render::Context& context, std::string name, vdtree::VertexTree tree, int window_px,
                                         perception::CsfModel second) {
     JudgedModel model;
-    model.context_ = &context;
+    model.context_ = context.share();
     model.name_ = std::move(name);
     model.second_ = second;
     model.view_.width = model.view_.height = window_px;
@@ -34,7 +34,7 @@ Result<JudgedModel> JudgedModel::create(render::Context& context, std::string na
     return model;
 }
 
-Result<JudgedModel::Stand> JudgedModel::make_stand(Scene scene) const {
+Result<JudgedModel::Stand> JudgedModel::make_stand(Scene scene) {
     Stand stand{std::make_unique<Scene>(std::move(scene)), nullptr};
     auto renderer = render::Renderer::create(*context_, stand.scene->tree);
     if (!renderer) return renderer.error();

@@ -30,7 +30,7 @@ struct Verdicts {
 
 class JudgedModel {
 public:
-    // The context must outlive the model.
+    // Keeps a handle to the context.
     static Result<JudgedModel> create(render::Context& context, std::string name, vdtree::VertexTree tree, int window_px,
                                       perception::CsfModel second = usual_second);
 
@@ -64,12 +64,12 @@ private:
     };
     JudgedModel() = default;
     Result<Stand*> stand(FoldTest test);
-    Result<Stand> make_stand(Scene scene) const;
+    Result<Stand> make_stand(Scene scene);
     Result<Picture> draw(Stand& stand, const WhatOptions& what, bool wireframe);
     Result<const perception::Image*> full();
     Result<perception::Judgement> judge(const Picture& picture, const WhatOptions& what, Judge judge);
 
-    render::Context* context_ = nullptr;
+    std::optional<render::Context> context_;
     std::string name_;
     perception::CsfModel second_ = usual_second;
     ViewOptions view_;

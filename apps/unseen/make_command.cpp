@@ -1,4 +1,5 @@
 // unseen make: meshes made of other meshes.
+#include <functional>
 #include <memory>
 
 #include <subdivide.h>
@@ -24,14 +25,14 @@ struct SubdivideArguments {
 Result<vdtree::Mesh> subdivide_with_progress(vdtree::Mesh mesh, const SubdivideArguments& a) {
     ProgressBar bar("subdividing");
     SubdivideOptions options = a.options;
-    options.progress = bar;
+    options.progress = std::ref(bar);
     if (a.triangles > 0) options.triangles = a.triangles;
     return subdivide(std::move(mesh), options);
 }
 
 Result<void> write(const std::string& file, const vdtree::Mesh& mesh) {
     ProgressBar bar("writing " + file);
-    return vdtree::write_mesh(file, mesh.view(), bar);
+    return vdtree::write_mesh(file, mesh.view(), std::ref(bar));
 }
 
 Result<int> run(const SubdivideArguments& a) {

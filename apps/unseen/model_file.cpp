@@ -1,5 +1,7 @@
 #include "model_file.h"
 
+#include <functional>
+
 #include "progress_bar.h"
 #include "terminal.h"
 
@@ -8,7 +10,7 @@ namespace unseen::app {
 Result<vdtree::ReadResult> read_mesh_file(const std::filesystem::path& file, const vdtree::ReadOptions& options) {
     ProgressBar bar("reading " + file.filename().string());
     vdtree::ReadOptions shown = options;
-    shown.progress = bar;
+    shown.progress = std::ref(bar);
     auto read = vdtree::read_mesh(file, shown);
     if (!read) return read;
     for (const std::string& warning : read->warnings) print_warning(file.string() + ": " + warning);
@@ -17,7 +19,7 @@ Result<vdtree::ReadResult> read_mesh_file(const std::filesystem::path& file, con
 
 Result<vdtree::VertexTree> build_tree_of(vdtree::ReadResult&& read, vdtree::BuildOptions options) {
     ProgressBar bar("building");
-    options.progress = bar;
+    options.progress = std::ref(bar);
     options.dropped_before = read.dropped_triangles;
     return vdtree::build_tree(read.mesh.view(), options);
 }
@@ -46,7 +48,7 @@ Result<vdtree::VertexTree> with_texture(Result<vdtree::VertexTree> tree, const s
 Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file, const TextureOptions& texture) {
     if (vdtree::is_tree_file(file)) {
         ProgressBar bar("reading " + file.filename().string());
-        return with_texture(vdtree::read_tree(file, bar), file, texture);
+        return with_texture(vdtree::read_tree(file, std::ref(bar)), file, texture);
     }
     auto read = read_textured_mesh(file, {}, texture);
     if (!read) return read.error();

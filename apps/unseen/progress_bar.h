@@ -9,7 +9,7 @@
 namespace unseen::app {
 
 // Draws itself on stderr where that is a terminal, and is silent otherwise. Gone when it is destroyed. Hand it over as
-// a Progress callback; it never cancels.
+// a Progress callback by std::ref(); it never cancels.
 class ProgressBar {
 public:
     explicit ProgressBar(std::string title);

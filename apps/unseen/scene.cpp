@@ -135,8 +135,7 @@ Result<perception::CsfTable> csf_table(const std::string& model_or_file, const p
     return choice->model ? perception::CsfTable::from_model(*choice->model, {.distance = display.distance}) : *std::move(choice->table);
 }
 
-const perception::CsfTable* Scene::csf_table(perception::Degrees margin) const {
-    if (margin.value() == 0) return &csf_table();
+std::shared_ptr<const perception::CsfTable> Scene::csf_table(perception::Degrees margin) const {
     if (!kept.widened_tables) kept.widened_tables = std::make_unique<perception::WidenedTables>(csf_table());
     return kept.widened_tables->at(margin);
 }
@@ -169,7 +168,7 @@ namespace {
 struct Surroundings {
     perception::Display display;
     float background = 0;
-    std::optional<perception::CsfTable> csf;
+    std::shared_ptr<const perception::CsfTable> csf;
     std::optional<calibration::LightRig> rig;
 };
 
@@ -182,7 +181,7 @@ Result<Surroundings> read_surroundings(const ViewOptions& view, const DisplayOpt
     if (!display.csf.empty()) {
         auto table = csf_table(display.csf, *shown_on);
         if (!table) return table.error();
-        around.csf = std::move(*table);
+        around.csf = std::make_shared<const perception::CsfTable>(std::move(*table));
     }
     if (!view.lights.empty()) {
         auto read = calibration::LightRig::read(view.lights);

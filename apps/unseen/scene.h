@@ -27,7 +27,7 @@ struct Scene {
     vdtree::VertexTree tree; // changed by replace_tree() only, once the scene is made
     vdtree::Similarity placement = {};
     perception::Display display = {};
-    std::optional<perception::CsfTable> csf = {}; // what --csf names; empty: the standard table
+    std::shared_ptr<const perception::CsfTable> csf = {}; // what --csf names; null: the standard table
     vdtree::View view = {};
     float background = 0;             // relative luminance
     bool is_relit = false;            // the light is not the one that the tree was built for
@@ -37,13 +37,12 @@ struct Scene {
     std::optional<calibration::LightRig> rig = {};
     std::optional<vdtree::Lighting> lighting = {}; // as of the view and the time of light_at()
     std::shared_ptr<const vdtree::LightBounds> light_bounds = {};
-    const vdtree::Lighting* lights() const { return lighting ? &*lighting : nullptr; } // to draw with
 
     const perception::CsfTable& csf_table() const { return csf ? *csf : perception::CsfTable::standard(); }
 
     // Made when they are first asked for, and kept.
-    // For gazes that are known to a margin only; null where the margin is so wide that everything may be looked at.
-    const perception::CsfTable* csf_table(perception::Degrees margin) const;
+    // For gazes that are known to a margin only, above 0; null where the margin is so wide that everything may be looked at.
+    std::shared_ptr<const perception::CsfTable> csf_table(perception::Degrees margin) const;
     std::span<const vdtree::Sphere> inner_spheres() const; // of vdtree::inner_spheres()
     const vdtree::CutRings& cut_rings() const;
 

@@ -91,7 +91,7 @@ Result<void> draw_pictures(Column& column, const vdtree::Cut& cut, const Scene& 
     render::DrawOptions options;
     options.samples = a.samples;
     options.background = scene.background;
-    options.lighting = scene.lights();
+    options.lighting = scene.lighting;
     const auto whole = renderer.draw(cut, scene.view, options, scene.placement);
     if (!whole) return whole.error();
     column.draw_ms = whole->draw_ms;
@@ -112,7 +112,7 @@ Result<void> judge(Column& column, const Column& full, const Scene& scene) {
     perception::JudgeOptions options;
     options.display = scene.display;
     options.gaze_px = column.what.gaze_px;
-    options.csf_table = scene.csf ? &*scene.csf : nullptr;
+    options.csf_table = scene.csf;
     auto judgement = perception::judge_modern(full.luminance, column.luminance, options);
     if (!judgement) return judgement.error();
     column.judgement = std::move(*judgement);

@@ -38,7 +38,7 @@ vdtree::AdjustStats adjust(vdtree::Cut& cut, const Scene& scene, const WhatOptio
     vdtree::AdjustOptions options;
     if (purpose == Purpose::picture) options.visibility = visibility;
     if (what.mode == Mode::budget) options.triangle_budget = what.triangles;
-    with_node_test(scene, what, [&](vdtree::FoldCriterion criterion) { stats = cut.adjust(criterion, options); });
+    with_node_test(scene, what, [&](const vdtree::FoldCriterion& criterion) { stats = cut.adjust(criterion, options); });
     return stats;
 }
 

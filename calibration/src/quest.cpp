@@ -164,7 +164,7 @@ std::vector<double> QuestPlus::log10_thresholds() const {
     return means;
 }
 
-void QuestPlus::forecast(FunctionRef<void(const Forecast&)> f) const {
+void QuestPlus::forecast(const FunctionRef<void(const Forecast&)>& f) const {
     const std::vector<double>& thresholds = tables_->grid.log10_threshold;
     const std::size_t count = thresholds.size(), functions = tables_->functions.size();
     const std::vector<double> means = log10_thresholds();

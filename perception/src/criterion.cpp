@@ -50,7 +50,7 @@ glm::dvec3 on_screen(glm::dvec3 direction, double scale) {
 
 LuebkeHallenCriterion::LuebkeHallenCriterion(const vdtree::VertexTree& tree, const vdtree::View& view,
                                              const FoldTestOptions& options, const vdtree::Similarity& placement)
-    : csf_(options.csf ? options.csf : &CsfTable::standard()), eye_(vdtree::eye_in_tree(tree, view, placement)),
+    : csf_(options.csf), eye_(vdtree::eye_in_tree(tree, view, placement)),
       scene_(options.scene) {
     const vdtree::CameraFrame frame = vdtree::camera_frame(view);
     right_ = placement.direction_to_mesh(frame.right);
@@ -116,7 +116,7 @@ void LuebkeHallenCriterion::operator()(const vdtree::VertexTree& tree, std::span
             contrast[i] = static_cast<float>((hi - lo) / (hi + lo));
             luminance[i] = static_cast<float>(black_ + span_ * adaptation);
         }
-        csf_->highest_visible_log2_frequency(std::span(contrast).first(count), std::span(eccentricity).first(count),
+        csf().highest_visible_log2_frequency(std::span(contrast).first(count), std::span(eccentricity).first(count),
                                              std::span(luminance).first(count), std::span(log2_frequency).first(count));
         for (std::size_t i = 0; i < count; ++i) {
             const float frequency = std::exp2(log2_frequency[i]); // 0 where nothing can be seen

@@ -290,12 +290,12 @@ CsfTable widened(const CsfTable& table, Degrees margin) {
     return std::move(*made);
 }
 
-const CsfTable* WidenedTables::at(Degrees margin) {
+std::shared_ptr<const CsfTable> WidenedTables::at(Degrees margin) {
     const auto rounded = std::find_if(std::begin(margins_deg), std::end(margins_deg), [&](double m) { return m >= margin.value(); });
     if (rounded == std::end(margins_deg)) return nullptr;
-    std::unique_ptr<CsfTable>& kept = widened_[*rounded];
-    if (!kept) kept = std::make_unique<CsfTable>(widened(table_, Degrees(*rounded)));
-    return kept.get();
+    std::shared_ptr<const CsfTable>& kept = widened_[*rounded];
+    if (!kept) kept = std::make_shared<const CsfTable>(widened(table_, Degrees(*rounded)));
+    return kept;
 }
 
 } // namespace unseen::perception

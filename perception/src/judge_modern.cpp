@@ -154,7 +154,7 @@ struct Range {
 // What the weights of all bands depend on.
 struct Conditions {
     CsfModel model = CsfModel::castle;
-    const CsfTable* table = nullptr; // in the model's place
+    std::shared_ptr<const CsfTable> table; // in the model's place; or null
     Metres distance;                 // of the screen
     double ppd = 0;
     double beta = 0;

@@ -23,7 +23,7 @@ Result<void> check_version(const std::string& version) {
 
 } // namespace
 
-Context::Context(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Context::Context(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Context::Context(Context&&) noexcept = default;
 Context& Context::operator=(Context&&) noexcept = default;
 Context::~Context() = default;
@@ -43,7 +43,7 @@ Result<Context> Context::window(const WindowOptions& options) {
 }
 
 Result<Context> Context::adopt(std::unique_ptr<Platform> platform) {
-    auto impl = std::make_unique<Impl>();
+    auto impl = std::make_shared<Impl>();
     impl->platform = std::move(platform);
     impl->version = gl_text(GL_VERSION);
     impl->renderer_name = gl_text(GL_RENDERER);
@@ -52,6 +52,8 @@ Result<Context> Context::adopt(std::unique_ptr<Platform> platform) {
     impl->errors.attach();
     return Context(std::move(impl));
 }
+
+Context Context::share() const { return Context(impl_); }
 
 Result<void> Context::make_current() {
     return impl_->platform->make_current();

@@ -1,4 +1,4 @@
-// What a context holds, shared with the renderer: it stays where it is when the Context moves.
+// What a context holds, shared by its handles and by what draws in it.
 #pragma once
 
 #include <memory>

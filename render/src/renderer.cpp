@@ -113,12 +113,12 @@ std::vector<LitVertex> lit_vertices_of(const vdtree::VertexTree& tree) {
 } // namespace
 
 struct Renderer::Impl {
-    Impl(Context::Impl* context_, TriangleDrawer drawer_) : context(context_), drawer(std::move(drawer_)) {}
+    Impl(std::shared_ptr<Context::Impl> context_, TriangleDrawer drawer_) : context(std::move(context_)), drawer(std::move(drawer_)) {}
     Impl(const Impl&) = delete;
     Impl& operator=(const Impl&) = delete;
     ~Impl() { static_cast<void>(context->platform->make_current()); } // for the drawer's objects, which go next
 
-    Context::Impl* context;
+    std::shared_ptr<Context::Impl> context; // first, and so gone last
     TriangleDrawer drawer;
     UnitFrame frame;
     std::optional<vdtree::VertexTree> tree; // kept, so that no other one comes to its data's address, by which it is known
@@ -173,7 +173,7 @@ Result<Camera> Renderer::Impl::prepare(const vdtree::Cut& cut, Moved moved, cons
 
 SurfaceStyle Renderer::Impl::style(const DrawOptions& options, const Camera& camera) const {
     return {options.shading, options.wireframe, cull_for(closedness, camera.eye_inside), options.background,
-            options.lighting != nullptr};
+            options.lighting.has_value()};
 }
 
 Result<void> Renderer::Impl::gl_result(const char* what) {
@@ -198,7 +198,7 @@ Result<Renderer> Renderer::create(Context& context, const vdtree::VertexTree& tr
         static_cast<void>(context.impl_->errors.take_new()); // the drawer's error says it better
         return drawer.error();
     }
-    auto impl = std::make_unique<Impl>(context.impl_.get(), std::move(*drawer));
+    auto impl = std::make_unique<Impl>(context.impl_, std::move(*drawer));
     impl->frame = frame;
     impl->tree = tree.share();
     impl->origin = tree.origin();

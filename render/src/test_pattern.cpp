@@ -41,12 +41,12 @@ Result<void> check(const TestPattern& p) {
 } // namespace
 
 struct TestPatternDrawer::Impl {
-    Impl(Context::Impl* context_, Program program_) : context(context_), program(std::move(program_)) {}
+    Impl(std::shared_ptr<Context::Impl> context_, Program program_) : context(std::move(context_)), program(std::move(program_)) {}
     Impl(const Impl&) = delete;
     Impl& operator=(const Impl&) = delete;
     ~Impl() { static_cast<void>(context->platform->make_current()); } // for the objects, which go next
 
-    Context::Impl* context;
+    std::shared_ptr<Context::Impl> context; // first, and so gone last
     Program program;
     Buffer levels;
     VertexArray no_arrays;
@@ -74,7 +74,7 @@ Result<TestPatternDrawer> TestPatternDrawer::create(Context& context, std::span<
                                     {ShaderSource::Stage::fragment, shaders::test_pattern_frag}};
     auto program = Program::build("test pattern", sources);
     if (!program) return program.error();
-    auto impl = std::make_unique<Impl>(context.impl_.get(), std::move(*program));
+    auto impl = std::make_unique<Impl>(context.impl_, std::move(*program));
     impl->levels = Buffer::create("code luminances");
     impl->no_arrays = VertexArray::create("full screen");
     glNamedBufferStorage(impl->levels.id(), sizeof(levels), levels.data(), 0);

@@ -264,7 +264,7 @@ Result<void> TriangleDrawer::set_moved(const VertexArrays& vertices, std::span<c
     return {};
 }
 
-Result<void> TriangleDrawer::set_lights(LightUniforms lights, FunctionRef<std::vector<LitVertex>()> vertices) {
+Result<void> TriangleDrawer::set_lights(LightUniforms lights, const FunctionRef<std::vector<LitVertex>()>& vertices) {
     lights_ = std::move(lights);
     if (lit_vertices_)
         return {};

@@ -75,7 +75,7 @@ public:
     Result<void> set_moved(const VertexArrays& vertices, std::span<const vdtree::MovedVertex> moved);
 
     // For all lit draws until the next call. `vertices`: as many as the drawer has; called when lights are first set.
-    Result<void> set_lights(LightUniforms lights, FunctionRef<std::vector<LitVertex>()> vertices);
+    Result<void> set_lights(LightUniforms lights, const FunctionRef<std::vector<LitVertex>()>& vertices);
 
     // By the last set_triangles() and set_moved().
     std::uint64_t uploaded_bytes() const noexcept { return indices_.uploaded_bytes() + moves_.size() * sizeof(VertexMove); }

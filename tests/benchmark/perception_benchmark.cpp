@@ -17,7 +17,7 @@ std::vector<vdtree::NodeId> all_nodes() {
     return nodes;
 }
 
-void time_tests(benchmark::State& state, vdtree::FoldCriterion criterion) {
+void time_tests(benchmark::State& state, const vdtree::FoldCriterion& criterion) {
     const std::vector<vdtree::NodeId> nodes = all_nodes();
     std::vector<float> costs(nodes.size());
     for (auto _ : state) {

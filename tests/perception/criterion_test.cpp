@@ -133,6 +133,23 @@ TEST_F(LuebkeHallen, EqualsItsFormula) {
 }
 
 // A change fills a whole pixel, and in a headset it may lie where these are largest.
+TEST_F(LuebkeHallen, KeepsTheTableThatItLooksUp) {
+    const View view = window(display_, {0, 0, 5});
+    FoldTestOptions options{.display = display_};
+    const std::vector<float> usual = costs_of(tree(), LuebkeHallenCriterion(tree(), view, options));
+    CsfSamples dull = CsfTable::standard().samples();
+    for (double& s : dull.sensitivity) s /= 4;
+    options.csf = std::make_shared<const CsfTable>(*CsfTable::create(std::move(dull)));
+    const std::weak_ptr<const CsfTable> table = options.csf;
+    {
+        const LuebkeHallenCriterion criterion(tree(), view, options);
+        options.csf.reset();
+        EXPECT_FALSE(table.expired());
+        EXPECT_LT(costs_of(tree(), criterion), usual);
+    }
+    EXPECT_TRUE(table.expired());
+}
+
 TEST_F(LuebkeHallen, CountsPixelsAsTheLensMakesThem) {
     const View view = window(display_, {0, 0, 2000}); // rings are smaller than a pixel
     const double ppd = pixels_per_degree(display_).value();

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <string>
 
@@ -228,15 +229,14 @@ TEST(JudgeModern, TakesAViewersOwnTableInPlaceOfTheModel) {
     const Image reference = noise(128, 20, 0.05, 3), test = noise(128, 20, 0.06, 4);
     JudgeOptions options = looking_aside(10, 128);
     const double by_model = judge_modern(reference, test, options)->max_ratio;
-    const CsfTable same = CsfTable::from_model(CsfModel::castle);
-    options.csf_table = &same;
+    options.csf_table = std::make_shared<const CsfTable>(CsfTable::from_model(CsfModel::castle));
     EXPECT_NEAR(judge_modern(reference, test, options)->max_ratio / by_model, 1, 0.02); // the table's own error
 
-    CsfSamples dull = same.samples();
+    CsfSamples dull = options.csf_table->samples();
     for (double& s : dull.sensitivity) s /= 4;
-    const auto dull_viewer = CsfTable::create(std::move(dull));
+    auto dull_viewer = CsfTable::create(std::move(dull));
     ASSERT_TRUE(dull_viewer);
-    options.csf_table = &*dull_viewer;
+    options.csf_table = std::make_shared<const CsfTable>(*std::move(dull_viewer));
     EXPECT_LT(judge_modern(reference, test, options)->max_ratio, 0.6 * by_model); // less masking makes up for some
 }
 
@@ -352,7 +352,7 @@ TEST(JudgeModern, RefusesBadInput) {
     options.csf = CsfModel::castle_yellow_violet; // of colour
     EXPECT_FALSE(judge_modern(good, good, options));
     EXPECT_FALSE(threshold_map_modern(good, options));
-    options.csf_table = &CsfTable::standard(); // in the model's place
+    options.csf_table = std::make_shared<const CsfTable>(CsfTable::standard()); // in the model's place
     EXPECT_TRUE(judge_modern(good, good, options));
 }
 

@@ -1,6 +1,7 @@
 // Headless contexts.
 #include "gl_test.h"
 
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -49,6 +50,17 @@ TEST_F(ContextTest, SurvivesAMove) {
     EXPECT_NE(moved.take_errors(), "");
     context() = std::move(moved); // back, for TearDown
     EXPECT_EQ(context().take_errors(), "");
+}
+
+TEST_F(ContextTest, LivesAsLongAsOneOfItsHandles) {
+    auto first = Context::headless();
+    ASSERT_TRUE(first) << first.error().message;
+    std::optional<Context> gone = std::move(*first);
+    Context second = gone->share();
+    gone.reset();
+    ASSERT_TRUE(second.make_current());
+    raise_error();
+    EXPECT_NE(second.take_errors(), "");
 }
 
 TEST_F(ContextTest, LivesBesideAnotherOne) {

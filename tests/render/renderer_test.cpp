@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include <gmock/gmock.h>
 
@@ -549,6 +550,19 @@ TEST_F(RendererTest, SurvivesMovesOfEverything) {
     context() = std::move(elsewhere);
     { const Renderer last = std::move(renderer); }
     EXPECT_EQ(context().take_errors(), "");
+}
+
+TEST_F(RendererTest, OutlivesTheHandleOfItsContext) {
+    const Scene scene(rectangle({-9, -9}, {9, 9}, 0, grey(0.5f)));
+    auto other = Context::headless();
+    ASSERT_TRUE(other) << other.error().message;
+    std::optional<Context> gone = std::move(*other);
+    auto renderer = Renderer::create(*gone, scene.tree);
+    ASSERT_TRUE(renderer) << renderer.error().message;
+    gone.reset();
+    const auto frame = renderer->draw(scene.cut, frontal_view(8, 8));
+    ASSERT_TRUE(frame) << frame.error().message;
+    EXPECT_NEAR(frame->luminance[0], 0.5, value_tolerance);
 }
 
 TEST_F(RendererTest, TakesTurnsWithARendererOfAnotherContext) {

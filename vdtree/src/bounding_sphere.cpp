@@ -198,10 +198,10 @@ private:
     glm::dvec3 origin_;
 };
 
-// Points that somebody else keeps, relative to one of them.
+// Points that somebody else keeps, relative to one of them; for the time of one call.
 class FarPoints {
 public:
-    FarPoints(glm::dvec3 origin, FunctionRef<glm::dvec3(glm::dvec3)> farthest) : origin_(origin), farthest_(farthest) {}
+    FarPoints(glm::dvec3 origin, const FunctionRef<glm::dvec3(glm::dvec3)>& farthest) : origin_(origin), farthest_(farthest) {}
 
     DSphere first() const { return {glm::dvec3(0), 0}; }
     Farthest farthest(glm::dvec3 from) const {
@@ -211,7 +211,7 @@ public:
 
 private:
     glm::dvec3 origin_;
-    FunctionRef<glm::dvec3(glm::dvec3)> farthest_;
+    const FunctionRef<glm::dvec3(glm::dvec3)>& farthest_;
 };
 
 // Grows a basis by what sticks out farthest until nothing does by more than `slack`, a share of the radius. For balls the
@@ -248,7 +248,7 @@ constexpr double sphere_slack = 1e-4;
 
 DSphere smallest_sphere(std::span<const glm::dvec3> points) { return enclose(points, {}, exact_slack); }
 
-DSphere smallest_sphere(glm::dvec3 first, FunctionRef<glm::dvec3(glm::dvec3)> farthest) {
+DSphere smallest_sphere(glm::dvec3 first, const FunctionRef<glm::dvec3(glm::dvec3)>& farthest) {
     FarPoints points(first, farthest);
     const DSphere sphere = grow_basis(points, exact_slack);
     return {sphere.centre + first, sphere.radius};

@@ -24,7 +24,7 @@ struct DSphere {
 DSphere smallest_sphere(std::span<const glm::dvec3> points);
 // Likewise of points that somebody else keeps, one of which is `first`: asks now and then, ten times or so, for the one that is farthest
 // from a place.
-DSphere smallest_sphere(glm::dvec3 first, FunctionRef<glm::dvec3(glm::dvec3 from)> farthest);
+DSphere smallest_sphere(glm::dvec3 first, const FunctionRef<glm::dvec3(glm::dvec3 from)>& farthest);
 
 // Nearly the smallest sphere that contains all points and all spheres: the radius exceeds the smallest one by a
 // relative 1e-4 at most, and contains them all.

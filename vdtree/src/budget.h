@@ -16,7 +16,7 @@ struct BudgetLimits {
     std::uint64_t triangles = std::numeric_limits<std::uint64_t>::max(); // of all trees together
     bool fill = false;            // also unfold nodes of cost 0
     bool only_unfolding = false;  // leave nodes folded that the tester's threshold does not unfold
-    FunctionRef<bool()> is_out_of_time = {}; // asked between batches
+    Callback<bool()> is_out_of_time = {}; // asked between batches
 };
 
 struct BudgetDecision {

@@ -39,11 +39,11 @@ constexpr double largest_coordinate = std::numeric_limits<float>::max() / 16;
 // Tells the caller how far the build is.
 class Reporter {
 public:
-    explicit Reporter(Progress progress) : progress_(progress) {}
+    explicit Reporter(const Progress& progress) : progress_(progress) {}
     bool cancelled(double share, const char* stage) { return progress_ && !progress_(share, stage); }
 
 private:
-    Progress progress_;
+    const Progress& progress_; // of the build's options
 };
 
 // How many threads may work, from its last use until it is destroyed.
@@ -227,13 +227,13 @@ public:
                 ThreadLimit& limit)
         : source_(source), mesh_(mesh.view), clean_(mesh), options_(options), reporter_(reporter), limit_(limit) {}
 
-    Result<VertexTree> build(Clusterer clusterer);
+    Result<VertexTree> build(const Clusterer& clusterer);
     Result<void> help();
 
 private:
     Result<void> analyse();
     std::vector<float> find_luminance() const;
-    Result<Clustering> cluster(Clusterer clusterer);
+    Result<Clustering> cluster(const Clusterer& clusterer);
     void order(const Clustering& clustering);
     void place_vertices(const Clustering& clustering);
     void bound();
@@ -257,7 +257,7 @@ private:
     std::shared_ptr<TreeGeometry> g_ = std::make_shared<TreeGeometry>();
 };
 
-Result<VertexTree> TreeBuilder::build(Clusterer clusterer) {
+Result<VertexTree> TreeBuilder::build(const Clusterer& clusterer) {
     if (reporter_.cancelled(0.0, "analysing")) return cancelled_error();
     if (const auto analysed = analyse(); !analysed) return analysed.error();
     if (reporter_.cancelled(clustering_begins, "clustering")) return cancelled_error();
@@ -313,7 +313,7 @@ std::vector<float> TreeBuilder::find_luminance() const {
     return luminance;
 }
 
-Result<Clustering> TreeBuilder::cluster(Clusterer clusterer) {
+Result<Clustering> TreeBuilder::cluster(const Clusterer& clusterer) {
     const std::vector<float> luminance = find_luminance();
     Result<Clustering> clustering = clusterer({mesh_, luminance, surface_.normals, surface_.areas, coincident_});
     if (clustering)
@@ -457,7 +457,7 @@ Result<Value> with_builder(const MeshView& mesh, const BuildOptions& options, Wo
     return work(builder);
 }
 
-Result<VertexTree> build_with(const MeshView& mesh, Clusterer clusterer, const BuildOptions& options) {
+Result<VertexTree> build_with(const MeshView& mesh, const Clusterer& clusterer, const BuildOptions& options) {
     return with_builder<VertexTree>(mesh, options, [&](TreeBuilder& builder) { return builder.build(clusterer); });
 }
 
@@ -474,7 +474,7 @@ Result<void> check_buildable(const MeshView& mesh, const BuildOptions& options) 
     return {};
 }
 
-Result<VertexTree> build_tree(const MeshView& mesh, Clusterer clusterer, const BuildOptions& options) {
+Result<VertexTree> build_tree(const MeshView& mesh, const Clusterer& clusterer, const BuildOptions& options) {
     if (options.team)
         return Error{ErrorCode::invalid_argument, "A team helps with quadric clustering only: leave it out where the clustering is your own."};
     return build_with(mesh, clusterer, options);

@@ -40,10 +40,10 @@ bool test_bit(const std::vector<std::uint64_t>& bits, NodeId i) { return (bits[i
 void set_bit(std::vector<std::uint64_t>& bits, NodeId i) { bits[i >> 6] |= std::uint64_t{1} << (i & 63); }
 void clear_bit(std::vector<std::uint64_t>& bits, NodeId i) { bits[i >> 6] &= ~(std::uint64_t{1} << (i & 63)); }
 
-// Asks the callbacks about nodes, batch by batch: whether a node can be seen, and the cost of folding it.
+// Asks the callbacks of one call about nodes, batch by batch: whether a node can be seen, and the cost of folding it.
 class NodeTester {
 public:
-    NodeTester(const VertexTree& tree, FoldCriterion criterion, VisibilityTest visibility)
+    NodeTester(const VertexTree& tree, const FoldCriterion& criterion, const VisibilityTest& visibility)
         : tree_(tree), criterion_(criterion), visibility_(visibility) {}
 
     // Costs of `nodes`, valid until the next call; 0 for those that cannot be seen.
@@ -77,8 +77,8 @@ private:
     }
 
     const VertexTree& tree_;
-    FoldCriterion criterion_;
-    VisibilityTest visibility_;
+    const FoldCriterion& criterion_;
+    const VisibilityTest& visibility_;
     std::vector<float> costs_, visible_costs_;
     std::vector<NodeId> visible_;
     std::vector<Visibility> seen_;
@@ -397,7 +397,7 @@ void Cut::apply_fold(NodeId node, std::span<const NodeId> children) {
     assign(node);
 }
 
-void Cut::fold_below(NodeId node, FunctionRef<void(NodeId)> on_fold) {
+void Cut::fold_below(NodeId node, const FunctionRef<void(NodeId)>& on_fold) {
     const NodeId end = tree_->subtree_end()[node];
     for (std::size_t word = (std::size_t{end} + 63) / 64; word-- > node / 64;) {
         std::uint64_t bits = unfolded_[word];
@@ -577,7 +577,7 @@ void Cut::assign_changed(const std::vector<std::uint64_t>& unfolded) {
     }
 }
 
-AdjustStats Cut::adjust(FoldCriterion criterion, const AdjustOptions& options) {
+AdjustStats Cut::adjust(const FoldCriterion& criterion, const AdjustOptions& options) {
     NodeTester test(*tree_, criterion, options.visibility);
     Decision decision = options.triangle_budget ? decide_by_budget(*tree_, test, *options.triangle_budget)
                                                 : decide_by_threshold(*tree_, test);

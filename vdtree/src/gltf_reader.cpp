@@ -42,8 +42,8 @@ constexpr std::uint64_t bytes_per_index = sizeof(Index) * 3; // in a strip an in
 class MaterialReader {
 public:
     // `spend` is told of all bytes of images, and fails where they are too many.
-    MaterialReader(const json& document, const Buffers& buffers, std::vector<std::string>& warnings, FunctionRef<void(std::uint64_t)> spend)
-        : document_(document), buffers_(buffers), warnings_(warnings), spend_(spend) {}
+    MaterialReader(const json& document, const Buffers& buffers, std::vector<std::string>& warnings, Callback<void(std::uint64_t)> spend)
+        : document_(document), buffers_(buffers), warnings_(warnings), spend_(std::move(spend)) {}
 
     // Alpha counts where it is not said to be ignored.
     Material read(std::size_t index, std::string name) {
@@ -151,7 +151,7 @@ private:
     const json& document_;
     const Buffers& buffers_;
     std::vector<std::string>& warnings_;
-    FunctionRef<void(std::uint64_t)> spend_;
+    Callback<void(std::uint64_t)> spend_;
     std::map<const json*, std::shared_ptr<const std::string>> images_;
     std::string where_;
 };

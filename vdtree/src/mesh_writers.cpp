@@ -97,7 +97,7 @@ void write_ply_header(Output& out, const MeshView& mesh, bool has_floats) {
              (needs_unsigned ? "uint" : "int") + " vertex_indices\nend_header\n");
 }
 
-Result<void> write_ply(Output& out, const MeshView& mesh, Progress progress) {
+Result<void> write_ply(Output& out, const MeshView& mesh, const Progress& progress) {
     const bool has_floats = are_floats(mesh);
     write_ply_header(out, mesh, has_floats);
     const auto vertex_count = static_cast<double>(mesh.positions.size());
@@ -429,7 +429,7 @@ Error cannot_write(const fs::path& file, const std::string& why) {
 
 } // namespace
 
-Result<void> write_mesh(const fs::path& file, const MeshView& mesh, Progress progress) {
+Result<void> write_mesh(const fs::path& file, const MeshView& mesh, const Progress& progress) {
     std::string ending = file.extension().string();
     for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
     if (ending != ".ply" && ending != ".obj" && ending != ".glb") {

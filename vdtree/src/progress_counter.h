@@ -28,7 +28,7 @@ public:
     bool stopped() const { return stopped_; }
 
 private:
-    Progress progress_;
+    const Progress& progress_; // of the caller, which waits for the work
     std::thread::id caller_ = std::this_thread::get_id();
     double all_;
     std::atomic<std::size_t> done_ = 0;

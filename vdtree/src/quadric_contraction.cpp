@@ -318,7 +318,7 @@ public:
     explicit Contractor(Contraction& c)
         : c_(c), live_(c.live), channels_(c.channels), stride_(quadric_stride(c.channels)) {}
 
-    void run(Index target, RoundCallback after_round) {
+    void run(Index target, const RoundCallback& after_round) {
         const std::size_t wanted = std::max<Index>(target, 1);
         if (live_.size() <= wanted) return;
         c_.merges.reserve(live_.size() - wanted);
@@ -843,13 +843,13 @@ void append(LiveClusters& to, const LiveClusters& from) {
 
 } // namespace
 
-Contraction contract_part(const PartMesh& part, Index target, RoundCallback after_round) {
+Contraction contract_part(const PartMesh& part, Index target, const RoundCallback& after_round) {
     Contraction c = PartSetup(part).run();
     Contractor(c).run(target, after_round);
     return c;
 }
 
-Contraction join(const Contraction& left, const Contraction& right, Index target, RoundCallback after_round) {
+Contraction join(const Contraction& left, const Contraction& right, Index target, const RoundCallback& after_round) {
     Contraction c;
     c.first_slot = left.first_slot;
     c.end_slot = right.end_slot;

@@ -74,7 +74,7 @@ public:
         double pull = 0;               // covariance of a right answer and log10_threshold, were the pair known
     };
     // Calls f(Forecast) for all stimuli in turn.
-    void forecast(FunctionRef<void(const Forecast&)> f) const;
+    void forecast(const FunctionRef<void(const Forecast&)>& f) const;
 
     // The stimulus whose answer leaves the least variance of log10_threshold to expect; of equals the first.
     struct Choice {

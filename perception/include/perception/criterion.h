@@ -29,7 +29,7 @@ struct FoldTestOptions {
     Display display = {};
     SceneLuminance scene = {};
     std::optional<glm::dvec2> gaze_px = {}; // in the window, from the top left; may lie outside. Default: foveal everywhere
-    const CsfTable* csf = nullptr;          // must outlive the criterion; default: CsfTable::standard()
+    std::shared_ptr<const CsfTable> csf = {}; // shared with the criteria that look it up; default: CsfTable::standard()
     // Look at colour, too, where the tree has any: the Luebke-Hallen tests in distance form then fold where sqrt((c S)^2 + (c_rg S_rg)^2 +
     // (c_yv S_yv)^2) <= 1, with the contrasts of the ring's range in both opponent directions and castleCSF's sensitivities to them.
     bool chroma = false;
@@ -52,7 +52,9 @@ public:
     void operator()(const vdtree::VertexTree& tree, std::span<const vdtree::NodeId> nodes, std::span<float> costs) const;
 
 private:
-    const CsfTable* csf_;
+    const CsfTable& csf() const { return csf_ ? *csf_ : CsfTable::standard(); }
+
+    std::shared_ptr<const CsfTable> csf_; // null: the standard one
     glm::dvec3 eye_;              // in the tree's frame, relative to its origin
     glm::dvec3 back_;             // unit, from the target to the eye, in the tree's frame
     glm::dvec3 gaze_;             // unit, from the eye; used where has_gaze_

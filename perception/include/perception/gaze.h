@@ -111,12 +111,12 @@ CsfTable widened(const CsfTable& table, Degrees margin);
 class WidenedTables {
 public:
     explicit WidenedTables(CsfTable table) : table_(std::move(table)) {}
-    // Null where the margin is so wide that everything may be looked at, or NaN. The table lives as long as this.
-    const CsfTable* at(Degrees margin);
+    // Null where the margin is so wide that everything may be looked at, or NaN.
+    std::shared_ptr<const CsfTable> at(Degrees margin);
 
 private:
     CsfTable table_;
-    std::map<double, std::unique_ptr<CsfTable>> widened_;
+    std::map<double, std::shared_ptr<const CsfTable>> widened_;
 };
 
 } // namespace unseen::perception

@@ -1,6 +1,7 @@
 // Judges of image pairs: which pixels show a visible difference. They check the fold test; they are not its model.
 #pragma once
 
+#include <memory>
 #include <optional>
 
 #include <glm/vec2.hpp>
@@ -15,7 +16,7 @@ struct JudgeOptions {
     Display display = {};                     // of headsets: the images are the flat picture, not the panel's
     std::optional<glm::dvec2> gaze_px = {};   // pixels from the top left, may lie outside; none: all foveal
     CsfModel csf = CsfModel::castle;          // an achromatic one, from the display's distance
-    const CsfTable* csf_table = nullptr;      // a viewer's own sensitivity in the model's place; must outlive the call
+    std::shared_ptr<const CsfTable> csf_table = {}; // a viewer's own sensitivity in the model's place; null: the model
     double beta = 3.5;                        // Minkowski exponent over the bands; V = 1 is 75% detection
 };
 

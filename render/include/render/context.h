@@ -23,7 +23,8 @@ struct WindowOptions {
     int samples = 8;          // a pixel, wished for; 0: exact pixels
 };
 
-// Move-only; current on the thread that made it until another one is made or used there; stays on that thread. GL debug
+// A move-only handle; current on the thread that made it until another one is made or used there; stays on that thread. What draws in it
+// keeps a handle of its own, so the context, and its window, end with the last of them. GL debug
 // output of severity medium and high is collected as errors, see take_errors(); remarks on performance are not.
 class Context {
 public:
@@ -38,6 +39,9 @@ public:
     Context(Context&&) noexcept;
     Context& operator=(Context&&) noexcept;
     ~Context();
+
+    // Another handle to the same context.
+    Context share() const;
 
     // Makes the context current again after another one was. Cheap where it already is. Everything below does it
     // itself.
@@ -54,9 +58,9 @@ private:
     friend class Renderer;
     friend class TestPatternDrawer;
     struct Impl;
-    explicit Context(std::unique_ptr<Impl> impl);
+    explicit Context(std::shared_ptr<Impl> impl);
     static Result<Context> adopt(std::unique_ptr<Platform> platform);
-    std::unique_ptr<Impl> impl_;
+    std::shared_ptr<Impl> impl_;
 };
 
 } // namespace unseen::render

@@ -28,9 +28,9 @@ struct DrawOptions {
     int samples = 16;                     // N-rooks samples a pixel, 1..256
     std::uint32_t seed = 1;               // of the sample pattern: equal for images that are compared
     float background = 0.19597990f;       // relative luminance; 20 cd/m2 on the default display
-    // Lights the vertices, in the tree's frame; null: their luminance is the tree's. Not with geomorphs. What it needs on the GPU, 8
+    // Lights the vertices, in the tree's frame; none: their luminance is the tree's. Not with geomorphs. What it needs on the GPU, 8
     // bytes a vertex, is made when it is first given.
-    const vdtree::Lighting* lighting = nullptr;
+    std::optional<vdtree::Lighting> lighting = {};
 };
 
 // A drawn frame. Row-major from the top left.
@@ -42,8 +42,8 @@ struct Frame {
     double draw_ms = 0;            // drawing of all samples and reading back, wall clock
 };
 
-// Keeps the tree's vertices on the GPU, and its texture if it has one: filtered trilinearly in linear light, and multiplied with the
-// colours. The context must be current and outlive the renderer.
+// Keeps handles to the context and to the tree's data, whatever becomes of the objects given, and the tree's vertices on the GPU, and its texture if it has one: filtered trilinearly in linear light, and multiplied with the
+// colours.
 class Renderer {
 public:
     static Result<Renderer> create(Context& context, const vdtree::VertexTree& tree);

@@ -24,9 +24,9 @@ struct Clustering {
 
 struct BuildOptions;
 
-// What a clusterer is given, besides the mesh: per-vertex luminance (relative, 0..1), unit normals and area weights.
+// What a clusterer is given, for the time of its call: the mesh, and per-vertex luminance (relative, 0..1), unit normals and area weights.
 struct ClusterInput {
-    const MeshView& mesh;
+    MeshView mesh;
     std::span<const float> luminance;
     std::span<const glm::vec3> normals;
     std::span<const double> areas;      // a third of the area of the triangles around, mesh units squared; 0: unreferenced
@@ -57,9 +57,9 @@ struct BuildOptions {
     Light light = {};
     int threads = 0; // 0: as many as there are cores. The tree does not depend on it.
     std::uint64_t dropped_before = 0; // triangles that a reader has dropped; counted with the tree's
-    Progress progress = {};
+    Progress progress = {}; // owned; copies of the options share what it refers to
     // Other processes that help to analyse the mesh and to cluster it, by help_build_tree() with the same mesh and options; this is
-    // member 0. Only where `clusterer` is quadric is there work for them. The tree does not depend on it. Do not cancel then: the others would wait for ever.
+    // member 0. The team is the caller's and must outlive the calls that get it. Only where `clusterer` is quadric is there work for them. The tree does not depend on it. Do not cancel then: the others would wait for ever.
     Team* team = nullptr;
     int threads_alone = 0; // like `threads`, for what comes after the clustering, when the team's others have gone
 };
@@ -68,7 +68,7 @@ struct BuildOptions {
 // indices out of range. Memory: about 220 bytes a triangle while building.
 Result<VertexTree> build_tree(const MeshView& mesh, const BuildOptions& options = {});
 // Fails with a team, too, for there is nothing to help a clustering of one's own with.
-Result<VertexTree> build_tree(const MeshView& mesh, Clusterer clusterer, const BuildOptions& options = {});
+Result<VertexTree> build_tree(const MeshView& mesh, const Clusterer& clusterer, const BuildOptions& options = {});
 
 // Whether build_tree() would take these, without building anything.
 Result<void> check_buildable(const MeshView& mesh, const BuildOptions& options = {});

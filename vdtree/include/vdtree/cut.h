@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <vdtree/criteria.h>
@@ -71,7 +72,8 @@ struct IndexWrite {
 // Not thread-safe; several cuts over one tree may be used from several threads.
 class Cut {
 public:
-    // Starts wholly folded: no triangle. Keeps the tree's data, whatever becomes of the object given.
+    // Starts wholly folded: no triangle. Keeps a handle of its own to the tree's data, so the tree given may go or move: the data live as
+    // long as the cut, and so does what tree() returns.
     explicit Cut(const VertexTree& tree);
     Cut(Cut&&) noexcept;
     Cut& operator=(Cut&&) noexcept;
@@ -94,7 +96,7 @@ public:
     //   Without a budget: fold where cost <= 1, top-down, so a node under a folded one is folded.
     //   With a budget: unfold in descending cost, ties by node number, while the triangles stay within the budget
     //   and the cost is above 0; among all cuts within the budget this one has the least largest cost.
-    AdjustStats adjust(FoldCriterion criterion, const AdjustOptions& options = {});
+    AdjustStats adjust(const FoldCriterion& criterion, const AdjustOptions& options = {});
 
     // Makes the cut that a criterion in distance form asks for, from where the last call left it: unfolds where the cost is above
     // the threshold, top-down. The result does not depend on the state before; the cost does: it goes with what changes, and a view that
@@ -123,7 +125,7 @@ public:
     // version `index_writes_from()` to this one.
     std::uint64_t index_version() const noexcept;
     std::uint64_t index_writes_from() const noexcept;
-    void render(RenderCallback callback) const { callback(*tree_, indices()); }
+    void render(const RenderCallback& callback) const { callback(*tree_, indices()); }
     Index triangle_count() const noexcept { return triangle_count_; }
 
     std::uint64_t byte_size() const noexcept; // of the cut itself, with its index buffer; resident bytes
@@ -147,7 +149,7 @@ private:
     }
     void apply_unfold(NodeId node) { apply_unfold(node, children_of(node)); }
     void apply_unfold(NodeId node, std::span<const NodeId> children);
-    void fold_below(NodeId node, FunctionRef<void(NodeId)> on_fold); // tells each node, descendants first
+    void fold_below(NodeId node, const FunctionRef<void(NodeId)>& on_fold); // tells each node, descendants first
     void apply_fold(NodeId node) { apply_fold(node, children_of(node)); }
     void apply_fold(NodeId node, std::span<const NodeId> children);
     void end_changes(AdjustStats& stats);
@@ -177,6 +179,11 @@ private:
 
 // One object of a scene that shares a budget.
 struct SceneObject {
+    // Refers to the cut and the criterion, which must outlive it.
+    SceneObject(Cut& cut_, const DistanceCriterion& criterion_, Viewpoint viewpoint_, bool cull_back_faces_ = false)
+        : cut(cut_), criterion(criterion_), viewpoint(std::move(viewpoint_)), cull_back_faces(cull_back_faces_) {}
+    SceneObject(Cut& cut, DistanceCriterion&& criterion, Viewpoint viewpoint, bool cull_back_faces = false) = delete;
+
     Cut& cut;
     const DistanceCriterion& criterion;
     Viewpoint viewpoint;             // in the object's own frame

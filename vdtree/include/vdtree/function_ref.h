@@ -1,6 +1,7 @@
-// A non-owning reference to a callable: two words, one indirect call, no allocation.
+// Callables as parameters (FunctionRef, a view) and as members (Callback, an owner).
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <type_traits>
 #include <utility>
@@ -10,14 +11,12 @@ namespace unseen {
 template <class Signature>
 class FunctionRef;
 
-// Refers to any callable with the signature R(Args...). The callable must outlive the reference, so
-// take it as a parameter and do not keep it. An empty reference converts to false and must not be called.
+// Refers to any callable with the signature R(Args...), for the time of one call: two words, one indirect call, no allocation. Take it as
+// `const FunctionRef<...>&`, to which temporaries bind. There is no empty one, and it can be neither copied nor assigned, so it cannot
+// be kept, neither in a member nor in a std::function: what is to be kept is a Callback.
 template <class R, class... Args>
 class FunctionRef<R(Args...)> {
 public:
-    FunctionRef() = default;
-    FunctionRef(std::nullptr_t) {}
-
     template <class F>
         requires(!std::is_same_v<std::remove_cvref_t<F>, FunctionRef> && std::is_invocable_r_v<R, F&, Args...>)
     FunctionRef(F&& callable) noexcept
@@ -25,17 +24,25 @@ public:
           call_([](void* object, Args... args) -> R {
               return (*static_cast<std::remove_reference_t<F>*>(object))(std::forward<Args>(args)...);
           }) {}
+    FunctionRef(const FunctionRef&) = delete;
+    FunctionRef& operator=(const FunctionRef&) = delete;
+    template <class F>
+    FunctionRef& operator=(F&&) = delete;
 
-    explicit operator bool() const noexcept { return call_ != nullptr; }
     R operator()(Args... args) const { return call_(object_, std::forward<Args>(args)...); }
 
 private:
-    void* object_ = nullptr;
-    R (*call_)(void*, Args...) = nullptr;
+    void* object_;
+    R (*call_)(void*, Args...);
 };
+
+// Owns a copy of its callable, so it may be kept, as in options; empty by default. To keep a reference to something that is not to be
+// copied, say so with std::ref(), which refuses temporaries: it must outlive the callback.
+template <class Signature>
+using Callback = std::function<Signature>;
 
 // Called now and then on the calling thread by long work: the share done, 0..1, and what is being done.
 // Return false to cancel; the work then ends with ErrorCode::cancelled and leaves nothing behind.
-using Progress = FunctionRef<bool(double share_done, const char* stage)>;
+using Progress = Callback<bool(double share_done, const char* stage)>;
 
 } // namespace unseen

@@ -62,6 +62,6 @@ Result<ReadResult> read_mesh(const std::filesystem::path& file, const ReadOption
 // 8 bit), UVs where present. OBJ: text with as many digits as needed to read the same values again.
 // GLB: one primitive for each material range.
 // Progress is told, and can cancel, while a PLY is written.
-Result<void> write_mesh(const std::filesystem::path& file, const MeshView& mesh, Progress progress = {});
+Result<void> write_mesh(const std::filesystem::path& file, const MeshView& mesh, const Progress& progress = {});
 
 } // namespace unseen::vdtree

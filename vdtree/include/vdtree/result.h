@@ -1,10 +1,13 @@
 // A value or the reason why there is none: what every fallible function of Unseen returns.
 //
 // The member names are those of C++23's std::expected. Libraries never print and never throw for bad
-// data; a broken precondition is a programmer's error and asserts.
+// data; a broken precondition is a programmer's error and asserts. The value of a Result that holds an error is nowhere undefined:
+// whoever asks for it has not looked, and the program ends with the error's sentence, in every build.
 #pragma once
 
 #include <cassert>
+#include <cstdio>
+#include <cstdlib>
 #include <string>
 #include <utility>
 #include <variant>
@@ -24,6 +27,12 @@ struct Error {
     ErrorCode code = ErrorCode::invalid_argument;
     std::string message;
 };
+
+// Ends the program: somebody took the value of a Result that holds this error.
+[[noreturn, gnu::cold, gnu::noinline]] inline void end_without_value(const Error& error) noexcept {
+    std::fprintf(stderr, "value() of a Result that holds an error: %s\n", error.message.c_str());
+    std::abort();
+}
 
 template <class T>
 class [[nodiscard]] Result {
@@ -50,7 +59,7 @@ public:
 
 private:
     T& checked() {
-        assert(has_value() && "value() of a Result that holds an error");
+        if (!has_value()) [[unlikely]] end_without_value(*std::get_if<1>(&state_));
         return *std::get_if<0>(&state_);
     }
     std::variant<T, Error> state_;
