@@ -58,11 +58,11 @@ public:
     }
 
     // Prints a row, and returns the wireframe as code values.
-    perception::Image run(const char* name, const vdtree::FoldCriterion& criterion, vdtree::Index budget) {
+    perception::Image run(const char* name, const vdtree::DistanceCriterion& criterion, vdtree::Index budget) {
         vdtree::Cut cut(tree_);
-        vdtree::AdjustOptions adjust;
-        adjust.triangle_budget = budget;
-        const vdtree::AdjustStats stats = cut.adjust(criterion, adjust);
+        vdtree::FollowOptions following;
+        following.triangle_budget = budget;
+        const vdtree::AdjustStats stats = expect(cut.follow(criterion, perception::viewpoint_of(tree_, view_, options_, {}, false), following));
         perception::JudgeOptions judge;
         judge.display = display_;
         const perception::Judgement judgement = expect(perception::judge_modern(reference_, luminance(cut), judge));
@@ -176,8 +176,9 @@ int main(int argc, char** argv) {
 
     const vdtree::VertexTree tree = load(file);
     Comparison comparison(tree, {direction[0], direction[1], direction[2]});
-    const vdtree::ExtentCriterion extent(tree, comparison.view(), 1);
-    const perception::LuebkeHallenCriterion perceptual(tree, comparison.view(), comparison.fold_test_options());
+    const vdtree::DistanceCriterion extent = expect(vdtree::extent_criterion(tree, comparison.view(), 1));
+    const vdtree::DistanceCriterion perceptual =
+        expect(perception::luebke_hallen_distances(tree, comparison.view(), comparison.fold_test_options()));
     const perception::Image left = comparison.run("extent", extent, budget);
     const perception::Image right = comparison.run("luebke-hallen", perceptual, budget);
     if (output.empty()) return 0;

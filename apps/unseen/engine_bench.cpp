@@ -117,10 +117,12 @@ Result<vdtree::Mesh> simplified(const vdtree::Mesh& mesh, std::uint64_t triangle
     vdtree::View view; // from so far that the extents alone count
     view.eye = tree->origin() + glm::dvec3(sphere.centre) + glm::dvec3(0, 0, 100 * sphere.radius);
     view.target = tree->origin() + glm::dvec3(sphere.centre);
-    vdtree::AdjustOptions options;
+    vdtree::FollowOptions options;
     options.triangle_budget = static_cast<vdtree::Index>(triangles);
+    const auto extent = vdtree::extent_criterion(*tree, view, 1);
+    if (!extent) return extent.error();
     vdtree::Cut cut(*tree);
-    cut.adjust(vdtree::ExtentCriterion(*tree, view, 1), options);
+    if (const auto made = cut.follow(*extent, {.eye = vdtree::eye_in_tree(*tree, view, {})}, options); !made) return made.error();
     return vdtree::extract_mesh(cut);
 }
 

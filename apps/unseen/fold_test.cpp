@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include <glm/geometric.hpp>
 
@@ -195,23 +194,6 @@ vdtree::FollowOptions follow_options(const Scene& scene, Purpose purpose) {
 
 // ---- what it asks
 
-bool goes_by_distances(const Scene& scene, const WhatOptions& what) {
-    const bool has_distance_form_only = what.test() == FoldTest::error || what.test() == FoldTest::luebke_hallen_safe;
-    const bool is_lit = scene.lighting && is_perceptual(what);
-    return what.fill_budget || what.milliseconds || what.chroma || is_lit || has_distance_form_only;
-}
-
-void with_node_test(const Scene& scene, const WhatOptions& what, const FunctionRef<void(const vdtree::FoldCriterion&)>& use) {
-    switch (what.test()) {
-    case FoldTest::extent: return use(vdtree::ExtentCriterion(scene.tree, scene.view, tolerance_px(what), scene.placement));
-    case FoldTest::displacement: return use(vdtree::DisplacementCriterion(scene.tree, scene.view, tolerance_px(what), scene.placement));
-    case FoldTest::luebke_hallen_safe: // these have the distance form only
-    case FoldTest::error:
-    case FoldTest::luebke_hallen: break;
-    }
-    use(perception::LuebkeHallenCriterion(scene.tree, scene.view, test_options(scene, what), scene.placement));
-}
-
 Result<std::shared_ptr<const vdtree::DistanceCriterion>> distance_criterion(const Scene& scene, const WhatOptions& what) {
     const Key key = key_of(scene, what);
     std::shared_ptr<const KeptCriterion>& last = scene.kept.criterion;
@@ -224,16 +206,9 @@ Result<std::shared_ptr<const vdtree::DistanceCriterion>> distance_criterion(cons
 }
 
 Result<std::vector<float>> fold_costs(const Scene& scene, const WhatOptions& what, Purpose purpose) {
-    if (goes_by_distances(scene, what)) {
-        const auto criterion = distance_criterion(scene, what);
-        if (!criterion) return criterion.error();
-        return vdtree::find_every_cost(scene.tree, **criterion, viewpoint_of(scene, what, purpose), follow_options(scene, purpose));
-    }
-    std::vector<vdtree::NodeId> nodes(scene.tree.interior_count());
-    std::iota(nodes.begin(), nodes.end(), vdtree::NodeId(0));
-    std::vector<float> costs(nodes.size());
-    with_node_test(scene, what, [&](const vdtree::FoldCriterion& criterion) { criterion(scene.tree, nodes, costs); });
-    return costs;
+    const auto criterion = distance_criterion(scene, what);
+    if (!criterion) return criterion.error();
+    return vdtree::find_every_cost(scene.tree, **criterion, viewpoint_of(scene, what, purpose), follow_options(scene, purpose));
 }
 
 } // namespace unseen::app

@@ -5,10 +5,8 @@
 #include <vector>
 
 #include <perception/criterion.h>
-#include <vdtree/criteria.h>
 #include <vdtree/cut.h>
 #include <vdtree/distance_criterion.h>
-#include <vdtree/function_ref.h>
 
 #include "options.h"
 #include "scene.h"
@@ -34,16 +32,10 @@ Result<void> settle_fold_test(Scene& scene, WhatOptions& what);
 
 bool is_perceptual(const WhatOptions& what); // also of the mode full
 
-// Whether a single cut is made by a criterion in distance form, or asks about each node.
-bool goes_by_distances(const Scene& scene, const WhatOptions& what);
-
-// Calls `use` with the test that asks about each node; precondition: there is one.
-void with_node_test(const Scene& scene, const WhatOptions& what, const FunctionRef<void(const vdtree::FoldCriterion&)>& use);
-
 // The scene keeps the last one that was asked for: views that differ in eye and gaze alone have the same.
 Result<std::shared_ptr<const vdtree::DistanceCriterion>> distance_criterion(const Scene& scene, const WhatOptions& what);
 
-// What follows a criterion in distance form: where it looks from, and whether what faces away is folded.
+// What goes with a criterion: where it looks from, and whether what faces away is folded.
 vdtree::Viewpoint viewpoint_of(const Scene& scene, const WhatOptions& what, Purpose purpose);
 vdtree::FollowOptions follow_options(const Scene& scene, Purpose purpose);
 

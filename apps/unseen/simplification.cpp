@@ -27,21 +27,6 @@ Simplification begun(const Scene& scene) {
     return result;
 }
 
-vdtree::AdjustStats adjust(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
-    vdtree::AdjustStats stats;
-    if (what.mode == Mode::full) {
-        cut.unfold_all();
-        stats.triangles = cut.triangle_count();
-        return stats;
-    }
-    const vdtree::FrustumVisibility visibility(scene.tree, scene.view, scene.placement);
-    vdtree::AdjustOptions options;
-    if (purpose == Purpose::picture) options.visibility = visibility;
-    if (what.mode == Mode::budget) options.triangle_budget = what.triangles;
-    with_node_test(scene, what, [&](const vdtree::FoldCriterion& criterion) { stats = cut.adjust(criterion, options); });
-    return stats;
-}
-
 // Cost is v*/v for the perceptual test alone; the others count pixels.
 double imperceptible_from(const Scene& scene, const WhatOptions& what, const vdtree::AdjustStats& stats) {
     if (what.mode == Mode::full) return 0;
@@ -69,15 +54,15 @@ vdtree::View widened(const vdtree::View& view) {
 } // namespace
 
 Result<Simplification> simplify(vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, Purpose purpose) {
-    if (what.mode != Mode::full && goes_by_distances(scene, what)) {
+    if (what.mode != Mode::full) {
         Follower follower;
         follower.set_hysteresis(1);
         return follower.follow(cut, scene, what, purpose);
     }
-    if (is_perceptual(what)) scene.csf_table(); // built once; not this cut's time
     Simplification result = begun(scene);
     const auto start = Clock::now();
-    result.stats = adjust(cut, scene, what, purpose);
+    cut.unfold_all();
+    result.stats.triangles = cut.triangle_count();
     result.adapt_ms = milliseconds_since(start);
     const auto adapted = Clock::now();
     static_cast<void>(cut.indices());

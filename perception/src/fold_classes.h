@@ -18,7 +18,8 @@
 
 namespace unseen::perception {
 
-inline constexpr ClassSeries contrasts{12, -9, 9}; // Michelson's
+// Michelson's: the finer classes where few other things tell rows apart.
+inline constexpr ClassSeries coarse_contrasts{12, -9, 9}, fine_contrasts{48, -9, 9};
 inline constexpr ClassSeries shifts{3, -9, 10};    // of the mean over the middle of the range
 // Of colour, in both directions.
 inline constexpr ClassSeries chroma_contrasts{3, -13, 18};
@@ -33,14 +34,14 @@ struct Level {
     std::size_t texture = 0, texture_motion = 0;         // both, or neither
 
     bool is_nothing() const { return contrast == 0 && chroma[0] == 0 && chroma[1] == 0 && texture == 0; }
-    std::size_t grey_number() const { return (shift * LuminanceClasses::count + luminance) * contrasts.count() + contrast; }
+    std::size_t grey_number() const { return (shift * LuminanceClasses::count + luminance) * fine_contrasts.count() + contrast; }
     std::uint64_t number() const {
         std::uint64_t number = texture * texture_motions.count() + texture_motion;
         for (std::size_t i = 0; i < 2; ++i)
             number = (number * chroma_shifts.count() + chroma_shift[i]) * chroma_contrasts.count() + chroma[i];
         return number * grey_count + grey_number();
     }
-    static constexpr std::size_t grey_count = shifts.count() * LuminanceClasses::count * contrasts.count();
+    static constexpr std::size_t grey_count = shifts.count() * LuminanceClasses::count * fine_contrasts.count();
 };
 
 // What a node's ring may show, before it is put into classes.
@@ -56,11 +57,13 @@ struct RingLooks {
 // What rings look like on a display, in classes.
 class Classes {
 public:
-    explicit Classes(const Display& display) : luminances_(display) {}
+    Classes(const Display& display, const ClassSeries& contrasts) : luminances_(display), contrasts_(contrasts) {}
+
+    const ClassSeries& contrasts() const { return contrasts_; }
 
     Level level(const RingLooks& looks) const {
         const bool moves_texture = looks.texture > 0 && looks.texture_motion > 0;
-        return {contrasts.of(std::max(contrast(looks.range), looks.least_contrast)), luminances_.of(luminances_.in_cdm2(looks.adaptation)),
+        return {contrasts_.of(std::max(contrast(looks.range), looks.least_contrast)), luminances_.of(luminances_.in_cdm2(looks.adaptation)),
                 shifts.of(looks.shift), {chroma_contrasts.of(looks.chroma.x), chroma_contrasts.of(looks.chroma.y)},
                 {chroma_shifts.of(looks.chroma_shift.x), chroma_shifts.of(looks.chroma_shift.y)},
                 moves_texture ? texture_contrasts.of(looks.texture) : 0, moves_texture ? texture_motions.of(looks.texture_motion) : 0};
@@ -69,7 +72,7 @@ public:
     double sum_of_contrasts(const RingLooks& looks) const {
         const Level rounded = level(looks);
         if (rounded.texture == 0) return 0;
-        return std::min(1.0, contrasts.value(rounded.contrast) + texture_contrasts.value(rounded.texture));
+        return std::min(1.0, contrasts_.value(rounded.contrast) + texture_contrasts.value(rounded.texture));
     }
     // Michelson's.
     double contrast(vdtree::LuminanceRange range) const {
@@ -92,6 +95,7 @@ public:
 
 private:
     LuminanceClasses luminances_;
+    ClassSeries contrasts_;
 };
 
 // Gives the classes in use their rows of the table, row 0 to what changes nothing. Where they are too many for the rows' numbers, all classes are
@@ -99,7 +103,8 @@ private:
 class Rows {
 public:
     // `is_grey`: of contrasts and shifts of luminance alone.
-    Rows(bool is_grey, std::size_t coarseness) : is_grey_(is_grey), coarseness_(coarseness) {
+    Rows(bool is_grey, const ClassSeries& contrasts, std::size_t coarseness)
+        : is_grey_(is_grey), contrast_count_(contrasts.count()), coarseness_(coarseness) {
         if (is_grey) grey_rows_.assign(Level::grey_count, 0);
     }
 
@@ -121,7 +126,7 @@ private:
         const auto round = [&](std::size_t& index, std::size_t count) {
             index = std::min((index + coarseness_ - 1) / coarseness_ * coarseness_, count - 1);
         };
-        round(level.contrast, contrasts.count());
+        round(level.contrast, contrast_count_);
         round(level.shift, shifts.count());
         for (std::size_t i = 0; i < 2; ++i) {
             round(level.chroma[i], chroma_contrasts.count());
@@ -132,7 +137,7 @@ private:
     }
 
     bool is_grey_;
-    std::size_t coarseness_;
+    std::size_t contrast_count_, coarseness_;
     std::vector<std::uint16_t> grey_rows_;
     std::unordered_map<std::uint64_t, std::uint16_t> rows_;
     std::vector<Level> levels_;

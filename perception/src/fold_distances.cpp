@@ -25,6 +25,15 @@ using vdtree::NodeId;
 
 constexpr float length_rounding = 1e-6f; // covers that of a mean of two floats
 
+// Of eccentricity on the screen; beyond the last one sensitivity is taken as there.
+struct Bins {
+    double degrees;
+    std::size_t count;
+
+    double at(std::size_t bin) const { return static_cast<double>(bin) * degrees; } // the nearest to the gaze
+};
+constexpr Bins coarse_bins{degrees_per_bin, bin_count}, fine_bins{degrees_per_bin / 2, 2 * bin_count};
+
 // The sensitivities that a test uses: to colour only where it looks at colour.
 struct Sensitivities {
     const CsfTable& luminance;
@@ -49,7 +58,7 @@ struct Row {
     double texture, texture_motion;
 
     Row(const Level& level, const Classes& classes)
-        : contrast(contrasts.value(level.contrast)), shift(shifts.value(level.shift)), luminance_cdm2(classes.luminance(level.luminance)),
+        : contrast(classes.contrasts().value(level.contrast)), shift(shifts.value(level.shift)), luminance_cdm2(classes.luminance(level.luminance)),
           chroma(chroma_contrasts.value(level.chroma[0]), chroma_contrasts.value(level.chroma[1])),
           chroma_shift(chroma_shifts.value(level.chroma_shift[0]), chroma_shifts.value(level.chroma_shift[1])),
           texture(texture_contrasts.value(level.texture)), texture_motion(std::min(texture_motions.value(level.texture_motion), 1.0)) {}
@@ -139,9 +148,9 @@ private:
 };
 
 // Of grey rows whose extents are the spheres' own, all at once.
-void find_largest_extents(const Row& row, const CsfTable& csf, std::span<double> extents) {
-    std::array<float, bin_count> contrast, eccentricity, luminance, log2_frequency;
-    for (std::size_t bin = 0; bin < extents.size(); ++bin) eccentricity[bin] = static_cast<float>(static_cast<double>(bin) * degrees_per_bin);
+void find_largest_extents(const Row& row, const CsfTable& csf, const Bins& bins, std::span<double> extents) {
+    std::array<float, fine_bins.count> contrast, eccentricity, luminance, log2_frequency;
+    for (std::size_t bin = 0; bin < extents.size(); ++bin) eccentricity[bin] = static_cast<float>(bins.at(bin));
     contrast.fill(static_cast<float>(row.contrast));
     luminance.fill(static_cast<float>(row.luminance_cdm2));
     csf.highest_visible_log2_frequency(std::span(contrast).first(extents.size()), std::span(eccentricity).first(extents.size()),
@@ -158,7 +167,8 @@ float reach_of(double extent_deg, const Screen& screen, bool is_around_spheres) 
     return static_cast<float>((is_around_spheres ? in_lengths : in_lengths - 1) * (1 + reach_rounding));
 }
 
-void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes& classes, const Screen& screen, const Sensitivities& see) {
+void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes& classes, const Bins& eccentricities, const Screen& screen,
+                const Sensitivities& see) {
     const std::size_t bins = parts.eccentricity_bins;
     const bool is_around_spheres = !parts.lengths.empty();
     parts.reach.assign((rows.levels().size() + 1) * bins, DistanceCriterion::never_visible);
@@ -173,14 +183,14 @@ void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes
         std::vector<double>& extents = found->second;
         if (is_new && (is_around_spheres || row.has_chroma() || row.has_texture())) {
             LargestExtents largest(row, see, screen, is_around_spheres);
-            for (std::size_t bin = 0; bin < bins; ++bin) extents[bin] = largest.at(static_cast<double>(bin) * degrees_per_bin);
+            for (std::size_t bin = 0; bin < bins; ++bin) extents[bin] = largest.at(eccentricities.at(bin));
         } else if (is_new) {
-            find_largest_extents(row, see.luminance, extents);
+            find_largest_extents(row, see.luminance, eccentricities, extents);
         }
         float *const reach = &parts.reach[(i + 1) * bins], *const least_cost = &parts.least_cost[(i + 1) * bins];
         for (std::size_t bin = 0; bin < bins; ++bin) {
             // No fold is drawn smaller than a pixel, and a shift of the mean shows from whatever distance.
-            const double eccentricity_deg = static_cast<double>(bin) * degrees_per_bin;
+            const double eccentricity_deg = eccentricities.at(bin);
             reach[bin] = reach_of(extents[bin], screen, is_around_spheres);
             least_cost[bin] = static_cast<float>(std::max(screen.pixel_deg / extents[bin], row.shift_visibility(see, eccentricity_deg)));
             // The table's own rounding must not make anything grow with the eccentricity.
@@ -280,20 +290,23 @@ Result<DistanceCriterion> make_criterion(const vdtree::VertexTree& tree, const R
                                          const FoldTestOptions& options) {
     if (const auto sound = check_arguments(tree, view, options); !sound) return sound.error();
     const Screen screen(view, options);
-    const Classes classes(options.display);
     const bool has_chroma = !rings.chroma.empty();
+    // Where contrasts and luminances alone make the rows, these are few enough, and quickly found, to be fine.
+    const bool is_fine = !has_chroma && rings.mean_shift.empty() && rings.vertices.empty() && lengths.empty();
+    const Classes classes(options.display, is_fine ? fine_contrasts : coarse_contrasts);
+    const Bins& bins = is_fine ? fine_bins : coarse_bins;
     if (!tree.texture().empty() && options.chroma)
         return Error{ErrorCode::invalid_argument, "The colours of textures are not looked at: leave the chroma out, or the texture."};
     DistanceCriterion::Parts parts;
     parts.spheres = DistanceCriterion::Spheres::ring;
-    parts.eccentricity_bins = options.gaze_px ? bin_count : 1;
-    parts.bin_degrees = degrees_per_bin / screen.least_magnification;
+    parts.eccentricity_bins = options.gaze_px ? bins.count : 1;
+    parts.bin_degrees = bins.degrees / screen.least_magnification;
     parts.lengths = std::move(lengths);
     parts.facing = rings.facing;
     for (std::size_t coarseness = 1;; coarseness *= 2) {
-        Rows rows(!has_chroma && rings.vertices.empty(), coarseness);
+        Rows rows(!has_chroma && rings.vertices.empty(), classes.contrasts(), coarseness);
         if (!classify(tree, rings, options, classes, rows, parts.classes)) continue;
-        fill_table(parts, rows, classes, screen, sensitivities_for(options, has_chroma));
+        fill_table(parts, rows, classes, bins, screen, sensitivities_for(options, has_chroma));
         return DistanceCriterion::create(tree, std::move(parts));
     }
 }

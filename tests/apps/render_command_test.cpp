@@ -89,6 +89,31 @@ std::vector<std::vector<double>> numbers_of(const std::string& csv) {
     return rows;
 }
 
+// One request, one answer: a single picture and a flight's frame from the same place are cut alike.
+TEST_F(RenderCommandTest, APictureAndAFlightMakeTheSameCut) {
+    const std::vector<std::vector<std::string>> requests = {
+        {"--fold-test", "luebke-hallen"},
+        {"--fold-test", "luebke-hallen", "--gaze", "1500", "80"},
+        {"--fold-test", "luebke-hallen", "--triangles", "500"},
+        {"--fold-test", "luebke-hallen-safe"},
+        {"--fold-test", "error"},
+        {"--pixels", "2"},
+        {"--pixels", "2", "--fold-test", "displacement"},
+    };
+    for (const std::vector<std::string>& request : requests) {
+        SCOPED_TRACE(::testing::PrintToString(request));
+        const double still = render(request, "still.png")["triangles"];
+        std::vector<std::string> flight = {"render", "ball.vdt", "--path", "orbit:0:1", "--no-draw", "--csv", "flight.csv", "--size", "200x160"};
+        flight.insert(flight.end(), request.begin(), request.end());
+        const Outcome flown = run(flight);
+        ASSERT_EQ(flown.status, 0) << flown.err;
+        const auto rows = numbers_of(read_text(path("flight.csv")));
+        ASSERT_EQ(rows.size(), 1u);
+        EXPECT_GT(still, 0);
+        EXPECT_NEAR(rows[0][1], still, 0.01 * still);
+    }
+}
+
 TEST_F(RenderCommandTest, AnOrbitFollowsWithOneCut) {
     const Outcome flown = run({"render", "ball.vdt", "--path", "orbit:2:24", "--size", "96x80", "--csv", "orbit.csv",
                                "--plot", "orbit.png", "-o", "frames/%03d.png", "--threshold", "3", "--json", "-"});

@@ -40,11 +40,12 @@ void report(benchmark::State& state, std::size_t left) {
 
 void to_a_tenth_unseen(benchmark::State& state) {
     vdtree::Cut cut(tree());
-    vdtree::AdjustOptions options;
+    const vdtree::DistanceCriterion extent = *vdtree::extent_criterion(tree(), orbit(0), 1);
+    vdtree::FollowOptions options;
     options.triangle_budget = static_cast<vdtree::Index>(wanted_triangles());
     double degrees = 0;
     for (auto _ : state) {
-        cut.adjust(vdtree::ExtentCriterion(tree(), orbit(degrees += 90), 1), options);
+        benchmark::DoNotOptimize(cut.follow(extent, {.eye = vdtree::eye_in_tree(tree(), orbit(degrees += 90), {})}, options));
         benchmark::DoNotOptimize(cut.indices().data());
     }
     report(state, cut.triangle_count());

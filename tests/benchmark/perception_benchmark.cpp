@@ -3,7 +3,6 @@
 
 #include <perception/criterion.h>
 #include <perception/judge.h>
-#include <vdtree/criteria.h>
 #include <vdtree/cut.h>
 
 #include "bench_mesh.h"
@@ -11,48 +10,31 @@
 namespace unseen::bench {
 namespace {
 
-std::vector<vdtree::NodeId> all_nodes() {
-    std::vector<vdtree::NodeId> nodes(tree().interior_count());
-    for (vdtree::NodeId n = 0; n < nodes.size(); ++n) nodes[n] = n;
-    return nodes;
-}
-
-void time_tests(benchmark::State& state, const vdtree::FoldCriterion& criterion) {
-    const std::vector<vdtree::NodeId> nodes = all_nodes();
-    std::vector<float> costs(nodes.size());
-    for (auto _ : state) {
-        criterion(tree(), nodes, costs);
-        benchmark::DoNotOptimize(costs.data());
-    }
-    state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(nodes.size()));
-}
-
-void test_extent(benchmark::State& state) { time_tests(state, vdtree::ExtentCriterion(tree(), orbit(0), 1)); }
-void test_displacement(benchmark::State& state) {
-    time_tests(state, vdtree::DisplacementCriterion(tree(), orbit(0), 1));
-}
-void test_luebke_hallen(benchmark::State& state) {
+perception::FoldTestOptions fold_test(bool gazes) {
     perception::FoldTestOptions options;
-    if (state.range(0)) options.gaze_px = glm::dvec2(1603, 512);
-    time_tests(state, perception::LuebkeHallenCriterion(tree(), orbit(0), options));
+    if (gazes) options.gaze_px = glm::dvec2(1603, 512);
+    return options;
 }
+
+vdtree::DistanceCriterion luebke_hallen(bool gazes) { return *perception::luebke_hallen_distances(tree(), orbit(0), fold_test(gazes)); }
+
+void time_tests(benchmark::State& state, const vdtree::DistanceCriterion& criterion, bool gazes) {
+    const vdtree::Viewpoint viewpoint = perception::viewpoint_of(tree(), orbit(0), fold_test(gazes), {}, false);
+    for (auto _ : state) benchmark::DoNotOptimize(vdtree::test_every_node(tree(), criterion, viewpoint));
+    state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(tree().interior_count()));
+}
+
+void test_extent(benchmark::State& state) { time_tests(state, *vdtree::extent_criterion(tree(), orbit(0), 1), false); }
+void test_displacement(benchmark::State& state) { time_tests(state, *vdtree::displacement_criterion(tree(), orbit(0), 1), false); }
+void test_luebke_hallen(benchmark::State& state) { time_tests(state, luebke_hallen(state.range(0)), state.range(0)); }
 BENCHMARK(test_extent);
 BENCHMARK(test_displacement);
 BENCHMARK(test_luebke_hallen)->ArgName("gaze")->Arg(0)->Arg(1);
 
-void adjust_luebke_hallen(benchmark::State& state) {
-    vdtree::Cut cut(tree());
-    perception::FoldTestOptions options;
-    if (state.range(0)) options.gaze_px = glm::dvec2(1603, 512);
-    double degrees = 0;
-    for (auto _ : state) {
-        degrees += 1;
-        cut.adjust(perception::LuebkeHallenCriterion(tree(), orbit(degrees), options));
-        benchmark::DoNotOptimize(cut.indices().data());
-    }
-    state.counters["triangles"] = cut.triangle_count();
+void make_luebke_hallen(benchmark::State& state) {
+    for (auto _ : state) benchmark::DoNotOptimize(luebke_hallen(state.range(0)));
 }
-BENCHMARK(adjust_luebke_hallen)->ArgName("gaze")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
+BENCHMARK(make_luebke_hallen)->ArgName("gaze")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
 
 void csf_table_from_model(benchmark::State& state) {
     for (auto _ : state) benchmark::DoNotOptimize(perception::CsfTable::from_model(perception::CsfModel::castle));

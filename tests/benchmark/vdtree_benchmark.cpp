@@ -1,5 +1,8 @@
 // Building, adjusting and gathering; rates are per input triangle, per node test and per active triangle.
+#include <cmath>
+
 #include <benchmark/benchmark.h>
+#include <glm/geometric.hpp>
 
 #include <vdtree/builder.h>
 #include <vdtree/criteria.h>
@@ -12,6 +15,10 @@ namespace {
 
 using vdtree::ClustererKind;
 using vdtree::Cut;
+using vdtree::NodeId;
+using vdtree::Sphere;
+using vdtree::VertexTree;
+using vdtree::View;
 
 void build(benchmark::State& state, ClustererKind clusterer, int threads) {
     vdtree::BuildOptions options;
@@ -31,14 +38,32 @@ BENCHMARK_CAPTURE(build, octree_1_thread, ClustererKind::octree, 1)->Unit(benchm
 BENCHMARK_CAPTURE(build, quadric_1_thread, ClustererKind::quadric, 1)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(build, quadric_2_threads, ClustererKind::quadric, 2)->Unit(benchmark::kMillisecond);
 
-// An orbit of so many tenths of a degree a frame, by node extent of one pixel.
+// Node extent in pixels, as a callback of a caller's own.
+class ExtentCosts {
+public:
+    ExtentCosts(const View& view, double tolerance_pixels)
+        : eye_(vdtree::eye_in_tree(tree(), view, {})), scale_(vdtree::pixels_per_radian(view) / tolerance_pixels) {}
+    void operator()(const VertexTree& of, std::span<const NodeId> nodes, std::span<float> costs) const {
+        for (std::size_t i = 0; i < nodes.size(); ++i) {
+            const Sphere& s = of.support_spheres()[nodes[i]];
+            const double distance = glm::length(glm::dvec3(s.centre) - eye_);
+            costs[i] = distance > s.radius ? static_cast<float>(2 * std::asin(s.radius / distance) * scale_) : vdtree::unbounded_cost(0);
+        }
+    }
+
+private:
+    glm::dvec3 eye_;
+    double scale_;
+};
+
+// An orbit of so many tenths of a degree a frame, by node extent of four pixels.
 void adjust_orbit(benchmark::State& state) {
     Cut cut(tree());
     double degrees = 0;
     std::uint64_t tests = 0;
     for (auto _ : state) {
         degrees += static_cast<double>(state.range(0)) / 10;
-        tests += cut.adjust(vdtree::ExtentCriterion(tree(), orbit(degrees), 4)).node_tests;
+        tests += cut.adjust(ExtentCosts(orbit(degrees), 4)).node_tests;
     }
     state.counters["tests/s"] = benchmark::Counter(static_cast<double>(tests), benchmark::Counter::kIsRate);
     state.counters["triangles"] = cut.triangle_count();
@@ -52,7 +77,7 @@ void adjust_budget(benchmark::State& state) {
     double degrees = 0;
     for (auto _ : state) {
         degrees += 1;
-        cut.adjust(vdtree::ExtentCriterion(tree(), orbit(degrees), 1), options);
+        cut.adjust(ExtentCosts(orbit(degrees), 1), options);
     }
 }
 BENCHMARK(adjust_budget)->Unit(benchmark::kMicrosecond);
@@ -63,7 +88,7 @@ void gather(benchmark::State& state) {
     for (auto _ : state) {
         state.PauseTiming();
         cut.fold_all();
-        cut.adjust(vdtree::ExtentCriterion(tree(), orbit(0), 4));
+        cut.adjust(ExtentCosts(orbit(0), 4));
         state.ResumeTiming();
         benchmark::DoNotOptimize(cut.indices().data());
         triangles += cut.triangle_count();

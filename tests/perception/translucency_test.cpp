@@ -62,7 +62,7 @@ Halves inner_triangles(const Cut& cut) {
     return count;
 }
 
-enum class Form { at_once, in_distances, safe, by_errors };
+enum class Form { in_distances, safe, by_errors };
 
 Result<vdtree::DistanceCriterion> criterion_of(const VertexTree& tree, const View& view, const FoldTestOptions& options, Form form) {
     if (form == Form::by_errors) return error_distances(tree, view, options);
@@ -80,19 +80,15 @@ Halves halves_of(const VertexTree& given, Form form) {
     FoldTestOptions options;
     options.scene = {0.1f, 0.9f};
     Cut cut(tree);
-    if (form == Form::at_once) {
-        cut.adjust(LuebkeHallenCriterion(tree, view, options));
-    } else {
-        const auto criterion = criterion_of(tree, view, options, form);
-        if (!criterion) throw std::runtime_error(criterion.error().message);
-        EXPECT_TRUE(criterion->is_monotone());
-        EXPECT_TRUE(cut.follow(*criterion, viewpoint_of(tree, view, options, {}, false)));
-    }
+    const auto criterion = criterion_of(tree, view, options, form);
+    if (!criterion) throw std::runtime_error(criterion.error().message);
+    EXPECT_TRUE(criterion->is_monotone());
+    EXPECT_TRUE(cut.follow(*criterion, viewpoint_of(tree, view, options, {}, false)));
     return inner_triangles(cut);
 }
 
 class Translucency : public testing::TestWithParam<Form> {};
-INSTANTIATE_TEST_SUITE_P(Forms, Translucency, testing::Values(Form::at_once, Form::in_distances, Form::safe, Form::by_errors));
+INSTANTIATE_TEST_SUITE_P(Forms, Translucency, testing::Values(Form::in_distances, Form::safe, Form::by_errors));
 
 TEST_P(Translucency, KeepsWhatTheSceneMayShowThrough) {
     const VertexTree tree = square(0.5f);

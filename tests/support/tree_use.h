@@ -32,12 +32,19 @@ inline bool use_everything(const vdtree::VertexTree& tree, bool measures_folds =
     }
     extract();
     const View view{.eye = {1, 2, 3}};
-    const ExtentCriterion extent(tree, view, 20);
-    const DisplacementCriterion displacement(tree, view, 2);
-    const FrustumVisibility frustum(tree, view);
-    cut.adjust(extent, {.visibility = frustum});
+    const auto extent = extent_criterion(tree, view, 20), displacement = displacement_criterion(tree, view, 2);
+    if (extent) (void)cut.follow(*extent, {.eye = eye_in_tree(tree, view, {}), .frusta = {frustum_of(tree, view)}}).has_value();
     extract();
-    cut.adjust(displacement, {.triangle_budget = tree.triangle_count() / 2});
+    if (displacement)
+        (void)cut.follow(*displacement, {.eye = eye_in_tree(tree, view, {})}, {.triangle_budget = tree.triangle_count() / 2}).has_value();
+    extract();
+    const FrustumVisibility frustum(tree, view);
+    const auto bright_ones = [](const VertexTree& of, std::span<const NodeId> nodes, std::span<float> costs) {
+        for (std::size_t i = 0; i < nodes.size(); ++i) costs[i] = 4 * of.luminance()[nodes[i]];
+    };
+    cut.adjust(bright_ones, {.visibility = frustum});
+    extract();
+    cut.adjust(bright_ones, {.triangle_budget = tree.triangle_count() / 2});
     extract();
     if (measures_folds) (void)with_fold_errors(tree, 1).has_value();
     (void)LightBounds::measure(tree).has_value();

@@ -70,14 +70,15 @@ void check(const VertexTree& tree, const Mesh& mesh) {
         if (!(ball.radius > 0)) break; // all at one point
         const View view = frame_sphere(tree.origin() + glm::dvec3(ball.centre), ball.radius,
                                        shapes::random_direction(random), 0.9, {});
-        const ExtentCriterion extent(tree, view, shapes::random_between(random, 2, 40));
-        const FrustumVisibility frustum(tree, view);
-        AdjustOptions options{.visibility = frustum};
+        const auto extent = extent_criterion(tree, view, shapes::random_between(random, 2, 40));
+        ASSERT_TRUE(extent) << extent.error().message;
+        const Viewpoint viewpoint{.eye = eye_in_tree(tree, view, {}), .frusta = {frustum_of(tree, view)}};
+        FollowOptions options;
         if (round % 2) options.triangle_budget = tree.triangle_count() / 3;
-        kept.adjust(extent, options);
+        ASSERT_TRUE(kept.follow(*extent, viewpoint, options));
         ASSERT_EQ(support::fault_in_cut(kept), "");
         Cut fresh(tree);
-        fresh.adjust(extent, options);
+        ASSERT_TRUE(fresh.follow(*extent, viewpoint, options));
         ASSERT_TRUE(support::sorted_triangles(kept) == support::sorted_triangles(fresh));
     }
 }

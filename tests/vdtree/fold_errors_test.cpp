@@ -83,7 +83,8 @@ TEST(FoldErrors, KeepTheLightOfACurvedSurface) {
     };
     const auto light_towards = [&](const VertexTree& tree, glm::dvec3 direction) {
         Cut cut(tree);
-        cut.adjust(ExtentCriterion(tree, frame_sphere({0, 0, 0}, 1, direction, 0.1, View{}), 16));
+        const View view = frame_sphere({0, 0, 0}, 1, direction, 0.1, View{});
+        EXPECT_TRUE(cut.follow(*extent_criterion(tree, view, 16), {.eye = eye_in_tree(tree, view, {})}));
         return mean_light(tree, cut.indices(), direction);
     };
     const auto whole_towards = [&](glm::dvec3 direction) {

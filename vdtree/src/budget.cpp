@@ -45,9 +45,9 @@ std::size_t bucket_of(float cost) { return std::bit_cast<std::uint32_t>(cost) >>
 
 class Budgeter {
 public:
-    Budgeter(std::span<const VertexTree* const> trees, std::span<const FoldTester* const> testers, const BudgetLimits& limits)
-        : trees_(trees), testers_(testers), limits_(limits), asked_(trees.size()), above_(trees.size()),
-          has_bounds_(!limits.only_unfolding && std::ranges::none_of(testers, &FoldTester::has_lights)) {
+    Budgeter(std::span<const VertexTree* const> trees, std::span<const CostSource* const> sources, const BudgetLimits& limits)
+        : trees_(trees), sources_(sources), limits_(limits), asked_(trees.size()), above_(trees.size()),
+          has_bounds_(!limits.only_unfolding && std::ranges::all_of(sources, &CostSource::has_bounds)) {
         for (const VertexTree* tree : trees) decision_.unfolded.emplace_back((std::size_t{tree->interior_count()} + 63) / 64);
     }
 
@@ -60,7 +60,7 @@ public:
 
     // From a threshold that leaves some of the budget, and on from there. None where that turns out to be no way.
     std::optional<BudgetDecision> run_from_guess() {
-        if (!has_bounds_ || limits_.is_out_of_time || !std::ranges::all_of(testers_, &FoldTester::is_monotone)) return std::nullopt;
+        if (!has_bounds_ || limits_.is_out_of_time || !std::ranges::all_of(sources_, &CostSource::is_monotone)) return std::nullopt;
         const float threshold = guess();
         if (!(threshold > 0) || !start_at(threshold)) return std::nullopt;
         BudgetDecision decision = run_buckets();
@@ -122,7 +122,7 @@ private:
         // What would unfold as an outline, but did not, is none.
         const float unfolding = threshold * (1 + decision_rounding);
         for (std::uint32_t tree = 0; tree < trees_.size(); ++tree) {
-            const auto decide = [&](std::span<const NodeId> nodes, std::uint64_t* bits) { testers_[tree]->decide_at(threshold, nodes, bits); };
+            const auto decide = [&](std::span<const NodeId> nodes, std::uint64_t* bits) { sources_[tree]->decide_at(threshold, nodes, bits); };
             decision_.unfolded[tree] = decider.run(*trees_[tree], decide, [&](std::span<const NodeId> folded) {
                 for (const NodeId node : folded) {
                     is_damaged |= !trees_[tree]->is_sound(node);
@@ -165,7 +165,7 @@ private:
         seen_costs_.resize(nodes.size());
         unfolded_.resize((nodes.size() + 63) / 64);
         if (nodes.empty()) return;
-        testers_[tree]->find_costs(nodes, {costs_.data(), seen_costs_.data(), unfolded_.data()});
+        sources_[tree]->find_costs(nodes, {costs_.data(), seen_costs_.data(), unfolded_.data()});
         decision_.node_tests += nodes.size();
     }
     Entry entry_of(std::uint32_t tree, std::size_t i) const {
@@ -202,7 +202,7 @@ private:
         if (nodes.empty()) return;
         costs_.resize(nodes.size());
         seen_costs_.resize(nodes.size());
-        testers_[tree]->find_cost_bounds(nodes, folded_at, costs_.data(), seen_costs_.data());
+        sources_[tree]->find_cost_bounds(nodes, folded_at, costs_.data(), seen_costs_.data());
         decision_.node_tests += nodes.size();
         for (std::size_t i = 0; i < nodes.size(); ++i) f(entry_of(tree, i));
         forget_asked(tree);
@@ -338,7 +338,7 @@ private:
     }
 
     std::span<const VertexTree* const> trees_;
-    std::span<const FoldTester* const> testers_;
+    std::span<const CostSource* const> sources_;
     const BudgetLimits& limits_;
     std::uint64_t triangles_ = 0;
     std::vector<std::vector<Entry>> buckets_{bucket_count};
@@ -356,10 +356,10 @@ private:
 
 } // namespace
 
-BudgetDecision decide_budget(std::span<const VertexTree* const> trees, std::span<const FoldTester* const> testers,
+BudgetDecision decide_budget(std::span<const VertexTree* const> trees, std::span<const CostSource* const> sources,
                              const BudgetLimits& limits) {
-    if (auto decision = Budgeter(trees, testers, limits).run_from_guess()) return std::move(*decision);
-    return Budgeter(trees, testers, limits).run();
+    if (auto decision = Budgeter(trees, sources, limits).run_from_guess()) return std::move(*decision);
+    return Budgeter(trees, sources, limits).run();
 }
 
 } // namespace unseen::vdtree

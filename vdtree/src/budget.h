@@ -8,14 +8,14 @@
 
 #include <vdtree/function_ref.h>
 
-#include "fold_tester.h"
+#include "cost_source.h"
 
 namespace unseen::vdtree {
 
 struct BudgetLimits {
     std::uint64_t triangles = std::numeric_limits<std::uint64_t>::max(); // of all trees together
     bool fill = false;            // also unfold nodes of cost 0
-    bool only_unfolding = false;  // leave nodes folded that the tester's threshold does not unfold
+    bool only_unfolding = false;  // leave nodes folded that their source does not unfold
     Callback<bool()> is_out_of_time = {}; // asked between batches
 };
 
@@ -33,7 +33,7 @@ struct BudgetDecision {
 // Cost: one test for each node unfolded, and its children, and half as many more. Most of them tell no more than whether a node unfolds at a
 // threshold that is guessed from a sample, or what it costs at most; the costs of outlines are asked for near the budget's end only. Where
 // the guess does not help (too little is left of the budget at it, time is limited, or nodes do not nest), all costs, from the root down.
-BudgetDecision decide_budget(std::span<const VertexTree* const> trees, std::span<const FoldTester* const> testers,
+BudgetDecision decide_budget(std::span<const VertexTree* const> trees, std::span<const CostSource* const> sources,
                              const BudgetLimits& limits);
 
 } // namespace unseen::vdtree

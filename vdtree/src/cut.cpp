@@ -6,11 +6,11 @@
 #include <cassert>
 #include <cmath>
 #include <numeric>
-#include <queue>
 #include <string>
 
 #include "budget.h"
 #include "cut_follower.h"
+#include "decide_tree.h"
 #include "finite.h"
 #include "index_buffer.h"
 #include "prefetch.h"
@@ -40,25 +40,30 @@ bool test_bit(const std::vector<std::uint64_t>& bits, NodeId i) { return (bits[i
 void set_bit(std::vector<std::uint64_t>& bits, NodeId i) { bits[i >> 6] |= std::uint64_t{1} << (i & 63); }
 void clear_bit(std::vector<std::uint64_t>& bits, NodeId i) { bits[i >> 6] &= ~(std::uint64_t{1} << (i & 63)); }
 
-// Asks the callbacks of one call about nodes, batch by batch: whether a node can be seen, and the cost of folding it.
-class NodeTester {
+// What the caller's own callbacks say: the costs of folding nodes, 0 where these cannot be seen; what is no number is infinite.
+class CallbackCosts final : public CostSource {
 public:
-    NodeTester(const VertexTree& tree, const FoldCriterion& criterion, const VisibilityTest& visibility)
+    CallbackCosts(const VertexTree& tree, const FoldCriterion& criterion, const VisibilityTest& visibility)
         : tree_(tree), criterion_(criterion), visibility_(visibility) {}
 
-    // Costs of `nodes`, valid until the next call; 0 for those that cannot be seen.
-    std::span<const float> operator()(std::span<const NodeId> nodes) {
-        costs_.assign(nodes.size(), 0.0f);
+    void find_costs(std::span<const NodeId> nodes, const NodeCosts& found) const override {
+        std::fill_n(found.unfolded, (nodes.size() + 63) / 64, 0);
+        std::fill_n(found.cost, nodes.size(), 0.0f);
         for (std::size_t begin = 0; begin < nodes.size(); begin += batch_size) {
             const auto batch = nodes.subspan(begin, std::min(batch_size, nodes.size() - begin));
-            test(batch, std::span(costs_).subspan(begin, batch.size()));
+            test(batch, std::span(found.cost + begin, batch.size()));
         }
-        return costs_;
+        for (std::size_t i = 0; i < nodes.size(); ++i) {
+            float& cost = found.cost[i];
+            cost = cost >= 0 ? cost : std::numeric_limits<float>::infinity();
+            found.unfolded[i / 64] |= std::uint64_t{cost > 1} << (i % 64);
+        }
+        if (found.seen_cost != found.cost) std::copy_n(found.cost, nodes.size(), found.seen_cost);
     }
     std::uint64_t tests() const { return tests_; }
 
 private:
-    void test(std::span<const NodeId> nodes, std::span<float> costs) {
+    void test(std::span<const NodeId> nodes, std::span<float> costs) const {
         if (!visibility_) {
             criterion_(tree_, nodes, costs);
             tests_ += nodes.size();
@@ -79,10 +84,10 @@ private:
     const VertexTree& tree_;
     const FoldCriterion& criterion_;
     const VisibilityTest& visibility_;
-    std::vector<float> costs_, visible_costs_;
-    std::vector<NodeId> visible_;
-    std::vector<Visibility> seen_;
-    std::uint64_t tests_ = 0;
+    mutable std::vector<float> visible_costs_; // scratch
+    mutable std::vector<NodeId> visible_;
+    mutable std::vector<Visibility> seen_;
+    mutable std::uint64_t tests_ = 0;
 };
 
 // What a criterion asks for: the nodes to unfold, and the largest cost among those left folded under them.
@@ -91,75 +96,25 @@ struct Decision {
     float max_fold_cost = 0;
 };
 
-bool is_below_threshold(float cost) { return cost <= 1; } // false for NaN: unfold
-
-// Top-down, a level at a time, so that the callbacks get whole batches.
-Decision decide_by_threshold(const VertexTree& tree, NodeTester& test) {
-    Decision decision{std::vector<std::uint64_t>((tree.interior_count() + 63) / 64), 0};
-    std::vector<NodeId> level{VertexTree::root()}, next;
-    while (!level.empty()) {
-        const auto costs = test(level);
-        next.clear();
-        for (std::size_t i = 0; i < level.size(); ++i) {
-            if (is_below_threshold(costs[i]) || !tree.is_sound(level[i])) {
-                decision.max_fold_cost = std::max(decision.max_fold_cost, costs[i]);
-                continue;
-            }
-            set_bit(decision.unfolded, level[i]);
-            tree.for_each_child(level[i], [&](NodeId child) {
-                if (!tree.is_leaf(child)) next.push_back(child);
-            });
-        }
-        level.swap(next);
-    }
+// Top-down, many nodes at once, so that the callbacks get whole batches.
+Decision decide_by_threshold(const VertexTree& tree, const CostSource& source) {
+    Decision decision;
+    std::vector<float> costs;
+    const auto decide = [&](std::span<const NodeId> nodes, std::uint64_t* unfolded) {
+        costs.resize(nodes.size());
+        source.find_costs(nodes, {costs.data(), costs.data(), unfolded});
+        for (std::size_t i = 0; i < nodes.size(); ++i)
+            if (costs[i] <= 1 || !tree.is_sound(nodes[i])) decision.max_fold_cost = std::max(decision.max_fold_cost, costs[i]);
+    };
+    decision.unfolded = TreeDecider().run(tree, decide, [](std::span<const NodeId>) {});
     return decision;
 }
 
-// Unfolds the node of the largest cost, ties by the lower number, while the budget holds. A node that does not fit ends
-// the walk: taking a cheaper one instead would leave the largest cost as it is.
-Decision decide_by_budget(const VertexTree& tree, NodeTester& test, Index budget) {
-    struct Candidate {
-        float cost;
-        NodeId node;
-        bool operator<(const Candidate& other) const {
-            return cost != other.cost ? cost < other.cost : node > other.node;
-        }
-    };
-    Decision decision{std::vector<std::uint64_t>((tree.interior_count() + 63) / 64), 0};
-    const auto first = tree.first_triangle();
-    std::priority_queue<Candidate> candidates;
-    std::vector<NodeId> children;
-    const auto add = [&](std::span<const NodeId> nodes) {
-        const auto costs = test(nodes);
-        for (std::size_t i = 0; i < nodes.size(); ++i) {
-            const float cost = costs[i] >= 0 ? costs[i] : std::numeric_limits<float>::infinity();
-            candidates.push({cost, nodes[i]});
-        }
-    };
-    const NodeId root = VertexTree::root();
-    add({&root, 1});
-    std::uint64_t triangles = 0;
-    float damaged = 0; // the largest cost of a node that must stay folded
-    while (!candidates.empty() && candidates.top().cost > 0) {
-        const NodeId node = candidates.top().node;
-        if (!tree.is_sound(node)) {
-            damaged = std::max(damaged, candidates.top().cost);
-            candidates.pop();
-            continue;
-        }
-        const std::uint64_t added = first[node + 1] - first[node];
-        if (triangles + added > budget) break;
-        candidates.pop();
-        triangles += added;
-        set_bit(decision.unfolded, node);
-        children.clear();
-        tree.for_each_child(node, [&](NodeId child) {
-            if (!tree.is_leaf(child)) children.push_back(child);
-        });
-        add(children);
-    }
-    decision.max_fold_cost = std::max(damaged, candidates.empty() ? 0 : candidates.top().cost);
-    return decision;
+Decision decide_by_budget(const VertexTree& tree, const CostSource& source, Index budget) {
+    const VertexTree* const trees[] = {&tree};
+    const CostSource* const sources[] = {&source};
+    BudgetDecision decision = decide_budget(trees, sources, {.triangles = budget});
+    return {std::move(decision.unfolded.front()), decision.max_seen_cost};
 }
 
 // The corners of the cut's triangles in the order of the input, in which groups and materials are runs; these are appended to `ranges`. (The
@@ -578,11 +533,11 @@ void Cut::assign_changed(const std::vector<std::uint64_t>& unfolded) {
 }
 
 AdjustStats Cut::adjust(const FoldCriterion& criterion, const AdjustOptions& options) {
-    NodeTester test(*tree_, criterion, options.visibility);
-    Decision decision = options.triangle_budget ? decide_by_budget(*tree_, test, *options.triangle_budget)
-                                                : decide_by_threshold(*tree_, test);
+    const CallbackCosts costs(*tree_, criterion, options.visibility);
+    Decision decision = options.triangle_budget ? decide_by_budget(*tree_, costs, *options.triangle_budget)
+                                                : decide_by_threshold(*tree_, costs);
     AdjustStats stats;
-    stats.node_tests = test.tests();
+    stats.node_tests = costs.tests();
     stats.max_fold_cost = decision.max_fold_cost;
     if (follower_) follower_->forget();
     change_to(std::move(decision.unfolded), stats);
@@ -668,7 +623,7 @@ Result<std::vector<float>> find_every_cost(const VertexTree& tree, const Distanc
 Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objects, Index triangle_budget) {
     std::vector<const VertexTree*> trees;
     std::vector<std::unique_ptr<FoldTester>> testers;
-    std::vector<const FoldTester*> tests;
+    std::vector<const CostSource*> tests;
     for (std::size_t i = 0; i < objects.size(); ++i) {
         const SceneObject& object = objects[i];
         if (const auto valid = check(*object.cut.tree_, object.viewpoint, object.criterion); !valid)

@@ -169,11 +169,11 @@ void CutFollower::start_with_budget(Cut& cut) { cut.change_to(decide_with_budget
 // The best cut within the budget. What to watch for hysteresis is left to the next call.
 std::vector<std::uint64_t> CutFollower::decide_with_budget() {
     const VertexTree* const tree = &tree_;
-    const FoldTester* const tester = &*tester_;
+    const CostSource* const source = &*tester_;
     const auto is_out = [this] { return is_out_of_deciding_time(); };
     BudgetLimits limits{*options_.triangle_budget, options_.fill_budget, false, {}};
     if (time_limit_) limits.is_out_of_time = is_out;
-    BudgetDecision decision = decide_budget({&tree, 1}, {&tester, 1}, limits);
+    BudgetDecision decision = decide_budget({&tree, 1}, {&source, 1}, limits);
     stats_.node_tests += decision.node_tests;
     stats_.is_complete = decision.is_complete;
     max_fold_cost_ = decision.max_seen_cost;
@@ -250,12 +250,12 @@ std::vector<std::uint64_t> CutFollower::decide_all() {
 // The worst folds first, as far as the time goes; the next call finds what to watch.
 void CutFollower::start_in_time(Cut& cut) {
     const VertexTree* const tree = &tree_;
-    const FoldTester* const tester = &*tester_;
+    const CostSource* const source = &*tester_;
     const auto is_out = [this] { return is_out_of_deciding_time(); };
     BudgetLimits limits;
     limits.only_unfolding = true;
     limits.is_out_of_time = is_out;
-    BudgetDecision decision = decide_budget({&tree, 1}, {&tester, 1}, limits);
+    BudgetDecision decision = decide_budget({&tree, 1}, {&source, 1}, limits);
     stats_.node_tests += decision.node_tests;
     stats_.is_complete = decision.is_complete;
     max_fold_cost_ = decision.max_seen_cost;

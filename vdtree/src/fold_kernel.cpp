@@ -41,7 +41,17 @@ static_assert(position_rounding <= test_rounding && facing_rounding <= test_roun
 constexpr float angle_rounding = 1e-3f;
 constexpr float slab_units = 127;                    // of NormalSlabs in 1
 constexpr float sqrt3 = 1.7320508075688772f;         // of the diagonals' coordinates
-constexpr float widest_reach = 1.25f;                // of the parallelepipeds tried
+// 1 / sqrt(s) from below, for squares s of lengths in units of slabs: tangents at 1.2 and 2, and what it is at the longest vector that any
+// parallelepiped holds: a diagonal's replaced coordinate of up to sqrt(3) + 2, and two of 1.
+struct Tangent {
+    float at_0, slope;
+};
+constexpr Tangent tangent_of(double root) { // at the square of `root`
+    constexpr double units = 127, just_less = 1 - 1e-6; // covers the rounding of the products
+    return {static_cast<float>(1.5 / (root * units) * just_less), static_cast<float>(0.5 / (root * root * root * units * units * units))};
+}
+constexpr Tangent near_tangent = tangent_of(1.0954), middle_tangent = tangent_of(1.4142);
+constexpr float least_inverse_reach = 0.25f / slab_units;
 // A node counts as hidden where a sphere of so many radii of its ring is: triangles that it shares with neighbours reach beyond the ring
 // where these are folded, too, by no more than their own size.
 constexpr float occluded_radii = 2;

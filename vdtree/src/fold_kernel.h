@@ -174,9 +174,9 @@ struct FacingBatch {
 // which everything might.
 //
 // Conservative: a positive gap is a proof. The slabs are relaxed to parallelepipeds P, any one of which may prove it:
-// min over x in P of x . (eye - centre) > radius * reach, where `reach` bounds the length of every vector in P. Parallelepipeds that
-// reach farther than `widest_reach` are not tried, so that one constant serves all: then a node without a proof has no ancestor with
-// one, for moving the centre by the difference of the radii changes x . (eye - centre) by at most reach times that.
+// min over x in P of x . (eye - centre) > radius * reach, where `reach` bounds the length of every vector in P. A node without a proof has no
+// ancestor with one: an ancestor's P contains the node's, so its reach is no less, and moving the centre by the difference of the radii
+// changes x . (eye - centre) by at most reach times that.
 struct FacingGaps {
     alignas(64) float front[kernel_lanes];
     alignas(64) float back[kernel_lanes];

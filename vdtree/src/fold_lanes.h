@@ -302,12 +302,19 @@ struct Lanes {
         }
     };
 
-    // Keeps the best of the parallelepipeds: the largest minimum, and the smallest maximum.
+    // Not more than 1 over the root of a squared reach of a parallelepiped, and falling with it: tangents, for the curve is convex.
+    static UNSEEN_INLINE Floats inverse_reach(const Floats& squared) {
+        const Floats near = max_of(near_tangent.at_0 - near_tangent.slope * squared, middle_tangent.at_0 - middle_tangent.slope * squared);
+        return max_of(near, all(least_inverse_reach));
+    }
+
+    // Keeps the best of the parallelepipeds: the largest minimum, and the smallest maximum, each over the length that vectors may have there.
     struct Best {
         Floats least, largest;
-        UNSEEN_INLINE void offer(const Floats& low, const Floats& high, const Ints& usable) {
-            least = usable ? max_of(least, low) : least;
-            largest = usable ? min_of(largest, high) : largest;
+        UNSEEN_INLINE void offer(const Floats& low, const Floats& high, const Floats& squared_reach) {
+            const Floats shorter = inverse_reach(squared_reach);
+            least = max_of(least, low * shorter);
+            largest = min_of(largest, high * shorter);
         }
     };
 
@@ -333,7 +340,6 @@ struct Lanes {
     static UNSEEN_INLINE Gaps find_gaps(const Floats (&e)[3], const Floats& radius, const Ints& asked, SlabOf slab_of) {
         const Interval slab[3] = {slab_of(0), slab_of(1), slab_of(2)};
         const Floats distance = abs_of(e[0]) + abs_of(e[1]) + abs_of(e[2]); // an upper bound
-        const Floats limit = all(widest_reach * widest_reach * slab_units * slab_units);
         Floats squared[3];
         Interval along[3];
         for (int k = 0; k < 3; ++k) {
@@ -343,10 +349,10 @@ struct Lanes {
         }
         Best best{all(-1e30f), all(1e30f)};
         best.offer(along[0].lo + along[1].lo + along[2].lo, along[0].hi + along[1].hi + along[2].hi,
-                   squared[0] + squared[1] + squared[2] <= limit);
+                   squared[0] + squared[1] + squared[2]);
         const Floats needed = radius + distance * rounding;
-        constexpr float scale = 1 / (slab_units * widest_reach), plenty = 0.125f; // of the distance
-        const auto gaps = [&]() UNSEEN_INLINE_LAMBDA { return Gaps{best.least * scale - needed, -best.largest * scale - needed}; };
+        constexpr float plenty = 0.125f; // of the distance
+        const auto gaps = [&]() UNSEEN_INLINE_LAMBDA { return Gaps{best.least - needed, -best.largest - needed}; };
         const auto is_proved = [&](const Gaps& found) UNSEEN_INLINE_LAMBDA {
             return !any(asked & ~((found.front > 0) | (found.back > 0)));
         };
@@ -356,7 +362,7 @@ struct Lanes {
         } else {
             // Where the box alone proves everything, with much to spare, the rest would only add to that.
             const Floats spare = needed + distance * plenty;
-            if (!any(~((best.least * scale > spare) | (-best.largest * scale > spare)))) return gaps();
+            if (!any(~((best.least > spare) | (-best.largest > spare)))) return gaps();
         }
         constexpr float signs[4][3] = {{1, 1, 1}, {-1, 1, 1}, {1, -1, 1}, {1, 1, -1}};
 #pragma GCC unroll 4
@@ -374,7 +380,7 @@ struct Lanes {
                 const Interval bi = turned(slab[i], si), bj = turned(slab[j], sj);
                 const Floats high = diagonal.hi * sqrt3 - bi.lo - bj.lo, low = diagonal.lo * sqrt3 - bi.hi - bj.hi;
                 const Floats reach = max_of(abs_of(low), abs_of(high));
-                best.offer(a.lo + b.lo + c.lo, a.hi + b.hi + c.hi, reach * reach + squared[i] + squared[j] <= limit);
+                best.offer(a.lo + b.lo + c.lo, a.hi + b.hi + c.hi, reach * reach + squared[i] + squared[j]);
             }
             if constexpr (signs_only) {
                 const Gaps found = gaps();

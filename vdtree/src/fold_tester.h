@@ -9,6 +9,7 @@
 #include <vdtree/distance_criterion.h>
 #include <vdtree/vertex_tree.h>
 
+#include "cost_source.h"
 #include "fold_kernel.h"
 #include "lit_tester.h"
 
@@ -35,7 +36,7 @@ struct Motion {
     double light = 0;    // of the lights, in lengths; see light_weight
 };
 
-class FoldTester {
+class FoldTester final : public CostSource {
 public:
     // Nodes unfold where their seen cost exceeds `threshold`; without `least_costs`, where their cost does. Cost: a copy of the
     // criterion's table.
@@ -66,15 +67,14 @@ public:
     // Only whether they unfold, one bit each; the same verdicts.
     void decide(std::span<const NodeId> nodes, std::uint64_t* unfolded) const;
     void decide_range(NodeId first, std::size_t count, std::uint64_t* unfolded) const;
-    // The same at another threshold. Only without least costs.
-    void decide_at(float threshold, std::span<const NodeId> nodes, std::uint64_t* unfolded) const;
+    void decide_at(float threshold, std::span<const NodeId> nodes, std::uint64_t* unfolded) const override;
     // Both costs of nodes, and whether they unfold; the same as those of test_costs().
-    void find_costs(std::span<const NodeId> nodes, const NodeCosts& costs) const;
-    // At least both costs, found without a look at what faces the eye: at a third of the price. `folded_at`, if not null, is a threshold
-    // (somewhat more than one) at which all of them are folded. Not with lights.
-    void find_cost_bounds(std::span<const NodeId> nodes, const float* folded_at, float* cost, float* seen_cost) const;
+    void find_costs(std::span<const NodeId> nodes, const NodeCosts& costs) const override;
+    // Without a look at what faces the eye: at a third of the price. Not with lights.
+    bool has_bounds() const noexcept override { return !has_lights(); }
+    void find_cost_bounds(std::span<const NodeId> nodes, const float* folded_at, float* cost, float* seen_cost) const override;
     bool has_lights() const noexcept { return lit_.has_value(); }
-    bool is_monotone() const noexcept { return criterion_.is_monotone(); }
+    bool is_monotone() const noexcept override { return criterion_.is_monotone(); }
     // The same where costs count, not only what is above the threshold: what nodes face is always found out. (In the above, the
     // costs of nodes that are far from the threshold may be those of another facing.)
     void test_costs(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const;

@@ -23,9 +23,12 @@ int main() {
     vdtree::Cut cut(*tree);
     cut.unfold_all();
     if (cut.triangle_count() != 4) return std::printf("the tetrahedron lost a face\n"), 1;
-    const auto stats = cut.adjust(perception::LuebkeHallenCriterion(*tree, view, options));
-    std::printf("%u of %u triangles, largest fold cost %g\n", stats.triangles, tree->triangle_count(),
-                static_cast<double>(stats.max_fold_cost));
+    const auto criterion = perception::luebke_hallen_distances(*tree, view, options);
+    if (!criterion) return std::printf("%s\n", criterion.error().message.c_str()), 1;
+    const auto stats = cut.follow(*criterion, perception::viewpoint_of(*tree, view, options, {}, false));
+    if (!stats) return std::printf("%s\n", stats.error().message.c_str()), 1;
+    std::printf("%u of %u triangles, largest fold cost %g\n", stats->triangles, tree->triangle_count(),
+                static_cast<double>(stats->max_fold_cost));
 #ifdef WITH_RENDER
     return render::n_rooks(16, 1).size() == 16 ? 0 : 1;
 #endif

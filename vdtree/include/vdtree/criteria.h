@@ -1,4 +1,4 @@
-// Callbacks that join the modules: fold criteria and visibility; and the geometric criteria.
+// Callbacks that join the modules: fold criteria and visibility tests of the caller's own, and what draws a cut.
 #pragma once
 
 #include <span>
@@ -10,6 +10,7 @@
 
 namespace unseen::vdtree {
 
+// A criterion of the caller's own, for Cut::adjust(). (Those of Unseen are all in distance form: DistanceCriterion.)
 // Fills the fold cost of each interior node in `nodes`: 0 and more, fold where cost <= 1, NaN unfolds. Costs must not
 // fall from a node to its parent. Called in batches on the thread that adjusts the cut; must not throw. A parameter: refers to the caller's
 // object for the time of the call.
@@ -29,7 +30,7 @@ using VisibilityTest = Callback<void(const VertexTree&, std::span<const NodeId> 
 // Called on the thread that asks for it; the indices are valid until the cut changes.
 using RenderCallback = FunctionRef<void(const VertexTree&, std::span<const NodeId> indices)>;
 
-// The eye in the tree's own frame: what the criteria share. Relative to VertexTree::origin().
+// The eye in the tree's own frame. Relative to VertexTree::origin().
 glm::dvec3 eye_in_tree(const VertexTree& tree, const View& view, const Similarity& placement);
 
 // Frustum test of the ring spheres against the window's five planes (no far plane).
@@ -44,29 +45,5 @@ private:
 
 // Projected size at the window's centre, in pixels, of an angle: pixels = angle * height / (2 tan(fov / 2)).
 double pixels_per_radian(const View& view);
-
-// Node extent, VDSlib's own measure: the angular diameter of the support's sphere in pixels over the tolerance.
-// Infinite where the eye is inside.
-class ExtentCriterion {
-public:
-    ExtentCriterion(const VertexTree& tree, const View& view, double tolerance_pixels, const Similarity& placement = {});
-    void operator()(const VertexTree& tree, std::span<const NodeId> nodes, std::span<float> costs) const;
-
-private:
-    glm::dvec3 eye_;
-    double scale_; // cost per radian
-};
-
-// Vertex displacement: the largest movement of a supported vertex, seen from the nearest point of the support's
-// sphere, in pixels over the tolerance. Infinite where the eye is inside; 0 where nothing moves.
-class DisplacementCriterion {
-public:
-    DisplacementCriterion(const VertexTree& tree, const View& view, double tolerance_pixels, const Similarity& placement = {});
-    void operator()(const VertexTree& tree, std::span<const NodeId> nodes, std::span<float> costs) const;
-
-private:
-    glm::dvec3 eye_;
-    double scale_; // cost per radian
-};
 
 } // namespace unseen::vdtree

@@ -122,10 +122,12 @@ struct Viewpoint {
     Lighting lighting = {};              // for criteria with lit classes; a valid one there
 };
 
-// Node extent by one tolerance: the support's angular diameter, seen from its sphere's nearest point on, in pixels.
+// Node extent, VDSlib's own measure: the support's sphere is seen under an angle of so many pixels at the window's centre at most. Unfolds
+// where the eye is inside.
 Result<DistanceCriterion> extent_criterion(const VertexTree& tree, const View& view, double tolerance_pixels);
 
-// Vertex displacement by one tolerance: see DisplacementCriterion.
+// Vertex displacement: the largest movement of a supported vertex, seen from the nearest point of the support's sphere, is of so many
+// pixels at most. Unfolds where the eye is inside, but never where nothing moves.
 Result<DistanceCriterion> displacement_criterion(const VertexTree& tree, const View& view, double tolerance_pixels);
 
 } // namespace unseen::vdtree
