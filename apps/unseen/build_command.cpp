@@ -15,6 +15,7 @@
 
 #include "build_team.h"
 #include "command.h"
+#include "fold_test.h"
 #include "memory_plan.h"
 #include "model_file.h"
 #include "options.h"
@@ -172,7 +173,7 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
     if (!tree) return tree.error();
     if (a.fold_errors) {
         print_note("measuring what folds change ...");
-        tree = vdtree::with_fold_errors(*tree, a.threads);
+        tree = measured(*tree, a.threads);
         if (!tree) return tree.error();
     }
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -9,7 +9,6 @@
 #include <glm/geometric.hpp>
 
 #include <perception/criterion.h>
-#include <vdtree/fold_errors.h>
 
 #include "bench_tools.h"
 #include "fold_test.h"
@@ -176,7 +175,7 @@ Result<EffectsBenchResult> bench_effects(const EffectsBenchOptions& options) {
     }
     const Pinned pinned;
     for (auto& [name, tree] : *trees) {
-        auto measured_tree = vdtree::with_fold_errors(tree, 1);
+        auto measured_tree = measured(tree, 1);
         if (!measured_tree) return measured_tree.error();
         ViewOptions view;
         view.fill = fill;

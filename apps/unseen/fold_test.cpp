@@ -5,6 +5,7 @@
 
 #include <glm/geometric.hpp>
 
+#include <vdtree/conserve_light.h>
 #include <vdtree/fold_errors.h>
 
 #include "terminal.h"
@@ -51,9 +52,9 @@ Result<void> measure_errors(Scene& scene) {
     constexpr vdtree::NodeId told_from = 20'000; // nodes; about half a second on one core
     if (scene.tree.interior_count() >= told_from)
         print_note("measuring what folds change (unseen build --fold-errors keeps that in the tree) ...");
-    auto measured = vdtree::with_fold_errors(scene.tree);
-    if (!measured) return measured.error();
-    scene.replace_tree(std::move(*measured));
+    auto tree = measured(scene.tree);
+    if (!tree) return tree.error();
+    scene.replace_tree(std::move(*tree));
     return {};
 }
 
@@ -134,6 +135,12 @@ ChosenTest suitable_test(const Scene& scene, bool chroma, bool may_measure) {
     if (chroma) return {FoldTest::luebke_hallen, "the test error does not know colours"};
     if (!scene.tree.fold_errors().empty() || (may_measure && scene.tree.interior_count() <= most_measured)) return {FoldTest::error};
     return {FoldTest::luebke_hallen, "the tree does not hold the errors of its folds, and measuring them takes long: unseen build --fold-errors"};
+}
+
+Result<vdtree::VertexTree> measured(const vdtree::VertexTree& tree, int threads) {
+    const auto conserved = vdtree::conserve_light(tree);
+    if (!conserved) return conserved.error();
+    return vdtree::with_fold_errors(*conserved, threads);
 }
 
 Result<void> settle_fold_test(Scene& scene, WhatOptions& what) {

@@ -23,6 +23,9 @@ enum class Purpose {
 // `may_measure` allows for measuring them, which it does not of a very large tree.
 ChosenTest suitable_test(const Scene& scene, bool chroma, bool may_measure);
 
+// The tree with its light conserved and the errors of its folds measured, as the test error goes by them. `threads`: 0: all cores.
+Result<vdtree::VertexTree> measured(const vdtree::VertexTree& tree, int threads = 0);
+
 // To be called before anything is cut. Where no test was asked for, takes one that is suitable; fails where one was asked for that does not know
 // the scene. Measures the errors of the tree's folds where the test goes by them and the tree does not have them: up to a minute, and the scene
 // gets another tree. Not in the mode full, which folds nothing; from there a viewer may go on to others without that.

@@ -2,8 +2,6 @@
 
 #include <cmath>
 
-#include <vdtree/fold_errors.h>
-
 #include "frame_image.h"
 
 namespace unseen::app {
@@ -45,7 +43,7 @@ Result<JudgedModel::Stand> JudgedModel::make_stand(Scene scene) {
 Result<JudgedModel::Stand*> JudgedModel::stand(FoldTest test) {
     if (!needs_errors(test)) return &plain_;
     if (!measured_.scene) {
-        auto tree = vdtree::with_fold_errors(plain_.scene->tree);
+        auto tree = measured(plain_.scene->tree);
         if (!tree) return tree.error();
         auto scene = make_scene(std::move(*tree), view_, {});
         if (!scene) return scene.error();

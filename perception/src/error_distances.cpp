@@ -83,9 +83,12 @@ Pattern above(const Pattern& a, const Pattern& b) {
     return all;
 }
 
-// Few patterns are to stand for many: rounded up, onto one grid, so that what is above two of them is there, too.
-Pattern rounded(Pattern p) {
-    constexpr int typical_step = contrasts_per_octave / 8, spike_step = contrasts_per_octave / 4, drift_step = contrasts_per_octave / 8;
+// Few patterns are to stand for many: rounded up, onto one grid, so that what is above two of them is there, too. `coarseness`: of the grid,
+// 1 or a power of two.
+Pattern rounded(Pattern p, int coarseness) {
+    constexpr int coarsest_fading = 32; // on coarser grids drift does not fade at all, which is above any that does
+    const int typical_step = coarseness * contrasts_per_octave / 8, spike_step = coarseness * contrasts_per_octave / 4;
+    const int drift_step = coarseness * contrasts_per_octave / 8;
     const auto up = [](int value, int step) { return std::min((value + step - 1) / step * step, contrast_count - 1); };
     if (p.typical != no_contrast) {
         p.typical = up(p.typical, typical_step);
@@ -93,6 +96,7 @@ Pattern rounded(Pattern p) {
     }
     if (p.drift != no_contrast) {
         p.drift = up(p.drift, drift_step);
+        if (coarseness > coarsest_fading) p.fading = 0;
     } else {
         p.fading = p.quarters = 0;
     }
@@ -190,22 +194,39 @@ private:
     Thresholds patches_, areas_, strips_;
 };
 
-// The reach of patterns by eccentricity, computed when they are first asked for.
+// The reach of patterns by eccentricity, computed when they are first asked for. Where patterns are too many for the rows' numbers, begin again with
+// coarser ones.
 class Reaches {
 public:
-    Reaches(const Levels& levels, const Screen& screen, const CsfTable& csf, std::size_t bins)
-        : levels_(levels), screen_(screen), csf_(csf), bins_(bins), discs_(luminance_count), eyes_(luminance_count) {
-        reach_.assign(bins, DistanceCriterion::never_visible); // row 0: what changes nothing
+    // `added`: rows that add() will ask for.
+    Reaches(const Levels& levels, const Screen& screen, const CsfTable& csf, std::size_t bins, std::size_t added)
+        : levels_(levels), screen_(screen), csf_(csf), bins_(bins), most_patterns_(last_row - added), discs_(luminance_count),
+          eyes_(luminance_count) {
+        begin();
     }
 
-    std::uint16_t row(const Pattern& pattern) { // rounded
+    std::uint16_t row(const Pattern& pattern) { // simplified; 0 where there is none left
         if (pattern.is_nothing()) return 0;
-        const auto [at, is_new] = rows_.try_emplace(pattern, static_cast<std::uint16_t>(rows_.size() + 1));
-        if (is_new) pattern.is_strip ? add_strip(pattern) : add_patch(pattern);
-        return at->second;
+        if (const auto known = rows_.find(pattern); known != rows_.end()) return known->second;
+        if (rows_.size() == most_patterns_) {
+            has_too_few_ = true;
+            return 0;
+        }
+        const auto row = static_cast<std::uint16_t>(rows_.size() + 1);
+        rows_.emplace(pattern, row);
+        pattern.is_strip ? add_strip(pattern) : add_patch(pattern);
+        return row;
     }
-    // Without drift that can nowhere be seen from as far as the rest.
+    bool has_too_few() const { return has_too_few_; } // of what there is, nothing is to be used then
+    // Forgets all rows. Ends well: at a coarseness of 256 each contrast is one of two, and there are no more than 16 luminances, 121 quarters and four
+    // ways to combine a typical and a largest contrast: 16,000 patches.
+    void coarsen() {
+        coarseness_ *= 2;
+        begin();
+    }
+    // On the grid, and without drift that can nowhere be seen from as far as the rest.
     Pattern simplified(Pattern p) {
+        p = rounded(p, coarseness_);
         if (p.drift == no_contrast || p.typical == no_contrast) return p;
         const Discs& tables = discs(p.luminance);
         const float* const typical = &tables.patches[static_cast<std::size_t>(p.typical) * bins_];
@@ -216,7 +237,7 @@ public:
         });
         if (is_needed) return p;
         p.drift = no_contrast;
-        return rounded(p);
+        return rounded(p, coarseness_);
     }
     // A row of distances, in lengths of its own.
     std::uint16_t add(std::span<const float> distances, float length) {
@@ -225,9 +246,16 @@ public:
     }
     std::span<const float> reach(std::uint16_t row) const { return std::span(reach_).subspan(row * bins_, bins_); }
     std::vector<float> take() { return std::move(reach_); }
-    std::size_t size() const { return rows_.size(); }
 
 private:
+    static constexpr std::size_t last_row = std::numeric_limits<std::uint16_t>::max();
+
+    void begin() {
+        rows_.clear();
+        reach_.assign(bins_, DistanceCriterion::never_visible); // row 0: what changes nothing
+        has_too_few_ = false;
+    }
+
     const Eye& eye(int luminance, std::size_t bin) {
         auto& eyes = eyes_[static_cast<std::size_t>(luminance)];
         if (eyes.empty())
@@ -298,7 +326,9 @@ private:
     const Levels& levels_;
     const Screen& screen_;
     const CsfTable& csf_;
-    std::size_t bins_;
+    std::size_t bins_, most_patterns_;
+    int coarseness_ = 1;
+    bool has_too_few_ = false;
     std::vector<Discs> discs_;
     std::vector<std::vector<Eye>> eyes_; // by luminance; by bin
     std::map<Pattern, std::uint16_t> rows_;
@@ -361,6 +391,63 @@ void cover(Reaches& reaches, Shown& a, const Shown& b) {
     a = std::isfinite(wider.length) && is_wider_less ? wider : richer;
 }
 
+// What nodes show, no less than their children: patches, and strips where they are outlines. False where the rows do not suffice.
+bool find_shown(const vdtree::VertexTree& tree, const SceneLuminance& scene, const Levels& levels, const CsfTable& csf, Reaches& reaches,
+                std::vector<Shown>& patches, std::vector<Shown>& strips) {
+    const std::span<const vdtree::FoldError> errors = tree.fold_errors();
+    const double darkest = levels.in_cdm2(scene.darkest), brightest = levels.in_cdm2(scene.brightest);
+    const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
+    const vdtree::LuminanceRange all = tree.ring_luminance()[vdtree::VertexTree::root()];
+    const int whole = levels.luminance_level(levels.in_cdm2(static_cast<double>(all.lo + all.hi) / 2));
+    const double whole_peak = csf.peak_sensitivity(Degrees(0), Luminance(levels.luminance(whole)));
+    patches.assign(tree.interior_count(), {});
+    strips.assign(tree.interior_count(), {});
+    for (NodeId node = tree.interior_count(); node-- > 0;) { // children before parents
+        const vdtree::LuminanceRange range = tree.ring_luminance()[node];
+        const double lo = levels.in_cdm2(range.lo), hi = levels.in_cdm2(range.hi), middle = (lo + hi) / 2;
+        const double r1 = tree.bounds()[node].ring.radius;
+        const auto change = [&](float luminance, double distance) {
+            if (tree.bounds()[node].flags & vdtree::translucent_ring) return brightest - darkest; // anything may show through
+            return levels.difference_in_cdm2(luminance) + (hi - lo) * (r1 > 0 ? std::min(1.0, distance / r1) : 1.0);
+        };
+        Shown patch;
+        patch.pattern.luminance = levels.luminance_level(middle);
+        patch.pattern.largest = levels.contrast_level(change(errors[node].luminance, errors[node].distance), middle);
+        const int typical = levels.contrast_level(change(errors[node].wide_luminance, amplitude_of_mean * errors[node].mean_distance), middle);
+        if (patch.pattern.largest != no_contrast)
+            patch.pattern.typical = std::clamp(typical, std::max(patch.pattern.largest - steepest_spike, 0), patch.pattern.largest);
+        patch.length = std::max(tree.support_spheres()[node].radius, errors[node].extent);
+        const int drift = levels.contrast_level(static_cast<double>(errors[node].drift), 1);
+        if (drift != no_contrast && Levels::contrast(drift) * whole_peak > 1) {
+            patch.pattern.luminance = std::max(patch.pattern.luminance, whole);
+            patch.pattern.drift = drift, patch.pattern.fading = errors[node].fading;
+            patch.pattern.quarters = static_cast<int>(std::ceil(4 * std::log2(std::max(std::min(widest, object_radius / patch.length), 1.0f))));
+        }
+        patch.pattern = reaches.simplified(patch.pattern);
+        patch.row = reaches.row(patch.pattern);
+        cover(reaches, patch, patches[node]); // the children's
+        patches[node] = patch;
+
+        Shown strip;
+        for (const auto& [bright, dark] : {std::pair(brightest, lo), std::pair(hi, darkest)}) {
+            const double mean = (bright + dark) / 2;
+            const Pattern own{.luminance = levels.luminance_level(mean), .largest = levels.contrast_level(bright - dark, mean), .is_strip = true};
+            strip.pattern = above(strip.pattern, own);
+        }
+        strip.length = errors[node].distance;
+        strip.row = reaches.row(strip.pattern);
+        cover(reaches, strip, strips[node]);
+        strips[node] = strip;
+        if (node > 0) {
+            const NodeId parent = tree.parents()[node];
+            cover(reaches, patches[parent], patch);
+            cover(reaches, strips[parent], strip);
+        }
+        if (reaches.has_too_few()) return false;
+    }
+    return true;
+}
+
 // A node folds as well where the whole mesh does, as far as the node's stage: takes the stage where that is nowhere seen from farther, unless a
 // child would then be. Children before parents.
 void fold_in_stages(const vdtree::VertexTree& tree, const Reaches& reaches, std::span<const Shown> stages, std::span<Shown> shown) {
@@ -391,7 +478,6 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
     const Screen screen(view, options);
     const Levels levels(options.display);
     const CsfTable& csf = options.csf ? *options.csf : CsfTable::standard();
-    const double darkest = levels.in_cdm2(options.scene.darkest), brightest = levels.in_cdm2(options.scene.brightest);
 
     DistanceCriterion::Parts parts;
     parts.spheres = DistanceCriterion::Spheres::ring;
@@ -402,52 +488,9 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
     parts.lengths.resize(nodes);
     parts.silhouette_lengths.resize(nodes);
     const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
-    const vdtree::LuminanceRange all = tree.ring_luminance()[vdtree::VertexTree::root()];
-    const int whole = levels.luminance_level(levels.in_cdm2(static_cast<double>(all.lo + all.hi) / 2));
-    const double whole_peak = csf.peak_sensitivity(Degrees(0), Luminance(levels.luminance(whole)));
-    Reaches reaches(levels, screen, csf, parts.eccentricity_bins);
-    std::vector<Shown> patches(nodes), strips(nodes);
-    for (NodeId node = nodes; node-- > 0;) { // children before parents
-        const vdtree::LuminanceRange range = tree.ring_luminance()[node];
-        const double lo = levels.in_cdm2(range.lo), hi = levels.in_cdm2(range.hi), middle = (lo + hi) / 2;
-        const double r1 = tree.bounds()[node].ring.radius;
-        const auto change = [&](float luminance, double distance) {
-            if (tree.bounds()[node].flags & vdtree::translucent_ring) return brightest - darkest; // anything may show through
-            return levels.difference_in_cdm2(luminance) + (hi - lo) * (r1 > 0 ? std::min(1.0, distance / r1) : 1.0);
-        };
-        Shown patch;
-        patch.pattern.luminance = levels.luminance_level(middle);
-        patch.pattern.largest = levels.contrast_level(change(errors[node].luminance, errors[node].distance), middle);
-        const int typical = levels.contrast_level(change(errors[node].wide_luminance, amplitude_of_mean * errors[node].mean_distance), middle);
-        if (patch.pattern.largest != no_contrast)
-            patch.pattern.typical = std::clamp(typical, std::max(patch.pattern.largest - steepest_spike, 0), patch.pattern.largest);
-        patch.length = std::max(tree.support_spheres()[node].radius, errors[node].extent);
-        const int drift = levels.contrast_level(static_cast<double>(errors[node].drift), 1);
-        if (drift != no_contrast && Levels::contrast(drift) * whole_peak > 1) {
-            patch.pattern.luminance = std::max(patch.pattern.luminance, whole);
-            patch.pattern.drift = drift, patch.pattern.fading = errors[node].fading;
-            patch.pattern.quarters = static_cast<int>(std::ceil(4 * std::log2(std::max(std::min(widest, object_radius / patch.length), 1.0f))));
-        }
-        patch.pattern = reaches.simplified(rounded(patch.pattern));
-        patch.row = reaches.row(patch.pattern);
-        cover(reaches, patch, patches[node]); // the children's
-        patches[node] = patch;
-
-        Shown strip;
-        for (const auto& [bright, dark] : {std::pair(brightest, lo), std::pair(hi, darkest)}) {
-            const double mean = (bright + dark) / 2;
-            const Pattern own{.luminance = levels.luminance_level(mean), .largest = levels.contrast_level(bright - dark, mean), .is_strip = true};
-            strip.pattern = above(strip.pattern, own);
-        }
-        strip.length = errors[node].distance;
-        strip.row = reaches.row(strip.pattern);
-        cover(reaches, strip, strips[node]);
-        strips[node] = strip;
-        if (node == 0) break;
-        const NodeId parent = tree.parents()[node];
-        cover(reaches, patches[parent], patch);
-        cover(reaches, strips[parent], strip);
-    }
+    Reaches reaches(levels, screen, csf, parts.eccentricity_bins, tree.fold_stages().size());
+    std::vector<Shown> patches, strips;
+    while (!find_shown(tree, options.scene, levels, csf, reaches, patches, strips)) reaches.coarsen();
     const std::vector<float> distances = stage_distances(tree, screen, options, parts.eccentricity_bins);
     if (!distances.empty() && object_radius > 0) {
         std::vector<Shown> stages;

@@ -8,10 +8,10 @@
 #include <string>
 
 #include <vdtree/builder.h>
-#include <vdtree/fold_errors.h>
 #include <vdtree/mesh_io.h>
 #include <vdtree/tree_io.h>
 
+#include "built.h"
 #include "shapes.h"
 
 namespace {
@@ -62,9 +62,7 @@ void make_trees(const fs::path& folder) {
         const auto tree = build_tree(mesh.view());
         if (!tree) throw std::runtime_error(tree.error().message);
         expect(write_tree(folder / (std::string(name) + ".vdt"), *tree));
-        const auto measured = with_fold_errors(*tree);
-        if (!measured) throw std::runtime_error(measured.error().message);
-        expect(write_tree(folder / (std::string(name) + "_measured.vdt"), *measured));
+        expect(write_tree(folder / (std::string(name) + "_measured.vdt"), support::measured(*tree)));
     }
 }
 

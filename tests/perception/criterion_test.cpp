@@ -12,10 +12,10 @@
 
 #include <vdtree/builder.h>
 #include <vdtree/cut.h>
-#include <vdtree/fold_errors.h>
 #include <vdtree/mesh_io.h>
 #include <vdtree/tree_io.h>
 
+#include "built.h"
 #include "extra_meshes.h"
 #include "luebke_hallen_oracle.h"
 #include "temp_folder.h"
@@ -151,23 +151,6 @@ TEST_F(LuebkeHallen, EqualsItsFormulaOnAFurtherMesh) {
 }
 
 // A change fills a whole pixel, and in a headset it may lie where these are largest.
-TEST_F(LuebkeHallen, KeepsTheTableThatItLooksUp) {
-    const View view = window(display_, {0, 0, 5});
-    FoldTestOptions options{.display = display_};
-    const std::vector<float> usual = costs_of(tree(), LuebkeHallenCriterion(tree(), view, options));
-    CsfSamples dull = CsfTable::standard().samples();
-    for (double& s : dull.sensitivity) s /= 4;
-    options.csf = std::make_shared<const CsfTable>(*CsfTable::create(std::move(dull)));
-    const std::weak_ptr<const CsfTable> table = options.csf;
-    {
-        const LuebkeHallenCriterion criterion(tree(), view, options);
-        options.csf.reset();
-        EXPECT_FALSE(table.expired());
-        EXPECT_LT(costs_of(tree(), criterion), usual);
-    }
-    EXPECT_TRUE(table.expired());
-}
-
 TEST_F(LuebkeHallen, CountsPixelsAsTheLensMakesThem) {
     const View view = window(display_, {0, 0, 2000}); // rings are smaller than a pixel
     const double ppd = pixels_per_degree(display_).value();
@@ -190,8 +173,7 @@ TEST_F(LuebkeHallen, CountsPixelsAsTheLensMakesThem) {
 
 // The test by errors looks at all that the display can show: in a headset up to where its pixels are finest.
 TEST_F(LuebkeHallen, ErrorsAreSeenUpToTheFinestPixels) {
-    const auto measured = vdtree::with_fold_errors(tree(), 1);
-    ASSERT_TRUE(measured);
+    const VertexTree measured = support::measured(tree());
     const View view = window(display_, {0, 0, 20});
     // By node, the distances from which it is seen where it is no outline, and where it is.
     const auto seen_from = [&](std::vector<PixelsPerDegreeAt> lens) {
@@ -199,7 +181,7 @@ TEST_F(LuebkeHallen, ErrorsAreSeenUpToTheFinestPixels) {
         options.display = display_;
         set_pixels_per_degree(options.display, PixelsPerDegree(8)); // the picture's: coarse
         options.display.lens = std::move(lens);
-        auto made = error_distances(*measured, view, options);
+        auto made = error_distances(measured, view, options);
         EXPECT_TRUE(made) << made.error().message;
         const vdtree::DistanceCriterion::Parts& parts = made->parts();
         std::vector<std::pair<float, float>> distances;
@@ -218,20 +200,19 @@ TEST_F(LuebkeHallen, ErrorsAreSeenUpToTheFinestPixels) {
 }
 
 TEST_F(LuebkeHallen, DistanceFormsRefuseWhatIsNoDisplayViewGazeOrScene) {
-    const auto measured = vdtree::with_fold_errors(tree(), 1);
-    ASSERT_TRUE(measured);
-    const auto light_bounds = vdtree::LightBounds::measure(*measured);
+    const VertexTree measured = support::measured(tree());
+    const auto light_bounds = vdtree::LightBounds::measure(measured);
     ASSERT_TRUE(light_bounds);
     const auto bounds = std::make_shared<const vdtree::LightBounds>(*light_bounds);
-    const vdtree::CutRings rings = vdtree::bound_cut_rings(*measured);
+    const vdtree::CutRings rings = vdtree::bound_cut_rings(measured);
     const auto count_made = [&](auto change) {
         View view = window(display_, {0, 0, 5});
         FoldTestOptions options;
         options.display = display_;
         change(view, options);
-        return int(luebke_hallen_distances(*measured, view, options).has_value()) + int(error_distances(*measured, view, options).has_value()) +
-               int(luebke_hallen_safe_distances(*measured, rings, view, options).has_value()) +
-               int(lit_distances(*measured, bounds, view, options).has_value());
+        return int(luebke_hallen_distances(measured, view, options).has_value()) + int(error_distances(measured, view, options).has_value()) +
+               int(luebke_hallen_safe_distances(measured, rings, view, options).has_value()) +
+               int(lit_distances(measured, bounds, view, options).has_value());
     };
     const float nan = std::nanf("");
     EXPECT_EQ(count_made([](View&, FoldTestOptions&) {}), 4);
@@ -357,13 +338,10 @@ TEST(LuebkeHallenHoles, NodesBesideTheContourAreSilhouettes) {
 // Files whose checksums are right and whose values are not, mapped, so that nobody has looked at all of them: no criterion reads or writes
 // where it must not, and what it makes can be followed.
 TEST(FoldTests, SurviveMappedTreesOfRandomLies) {
-    const auto built = vdtree::build_tree(bumpy_sphere(8).view());
-    ASSERT_TRUE(built);
-    const auto tree = vdtree::with_fold_errors(*built, 1);
-    ASSERT_TRUE(tree);
+    const VertexTree tree = support::measured(support::built(bumpy_sphere(8)));
     const support::TempFolder folder;
     const std::filesystem::path file = folder / "lie.vdt";
-    ASSERT_TRUE(vdtree::write_tree(file, *tree));
+    ASSERT_TRUE(vdtree::write_tree(file, tree));
     const std::string honest = support::read_bytes(file);
     std::mt19937_64 random(3);
     int taken = 0, refused = 0;

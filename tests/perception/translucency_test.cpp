@@ -7,7 +7,8 @@
 
 #include <vdtree/builder.h>
 #include <vdtree/cut.h>
-#include <vdtree/fold_errors.h>
+
+#include "built.h"
 
 namespace unseen::perception {
 namespace {
@@ -71,8 +72,8 @@ Result<vdtree::DistanceCriterion> criterion_of(const VertexTree& tree, const Vie
 }
 
 Halves halves_of(const VertexTree& given, Form form) {
-    const auto measured = vdtree::with_fold_errors(given);
-    const VertexTree& tree = form == Form::by_errors ? *measured : given;
+    const VertexTree measured = support::measured(given);
+    const VertexTree& tree = form == Form::by_errors ? measured : given;
     View view;
     view.width = view.height = 256;
     view.eye = {0, 0, 1968.5 / 4}; // a unit is four pixels

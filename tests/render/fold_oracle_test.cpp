@@ -11,7 +11,6 @@
 #include <perception/judge.h>
 #include <render/context.h>
 #include <render/renderer.h>
-#include <vdtree/fold_errors.h>
 
 #include "built.h"
 #include "oracle.h"
@@ -26,11 +25,7 @@ using vdtree::Mesh;
 using vdtree::VertexTree;
 using vdtree::View;
 
-VertexTree measured(const Mesh& mesh) {
-    Result<VertexTree> tree = vdtree::with_fold_errors(built(mesh));
-    if (!tree) throw std::runtime_error(tree.error().message);
-    return std::move(*tree);
-}
+VertexTree measured(const Mesh& mesh) { return support::measured(built(mesh), 0); }
 
 Mesh painted(Mesh mesh, double (*grey)(glm::dvec3)) {
     for (const glm::dvec3& p : mesh.positions) {

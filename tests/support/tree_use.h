@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include <vdtree/conserve_light.h>
 #include <vdtree/criteria.h>
 #include <vdtree/cut.h>
 #include <vdtree/cut_rings.h>
@@ -46,7 +47,10 @@ inline bool use_everything(const vdtree::VertexTree& tree, bool measures_folds =
     extract();
     cut.adjust(bright_ones, {.triangle_budget = tree.triangle_count() / 2});
     extract();
-    if (measures_folds) (void)with_fold_errors(tree, 1).has_value();
+    if (measures_folds) {
+        const auto conserved = conserve_light(tree);
+        if (conserved) (void)with_fold_errors(*conserved, 1).has_value();
+    }
     (void)LightBounds::measure(tree).has_value();
     const auto everything = DistanceCriterion::create(tree, {.reach = {DistanceCriterion::always_visible}});
     valid &= everything.has_value();

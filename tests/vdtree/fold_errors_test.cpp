@@ -15,6 +15,7 @@
 #include <vdtree/tree_io.h>
 #include <vdtree/view.h>
 
+#include "built.h"
 #include "fold_picture.h"
 #include "shapes.h"
 #include "temp_folder.h"
@@ -23,13 +24,7 @@
 namespace unseen::vdtree {
 namespace {
 
-VertexTree built(const Mesh& mesh) {
-    Result<VertexTree> tree = build_tree(mesh.view(), {.threads = 1});
-    if (!tree) throw std::runtime_error(tree.error().message);
-    Result<VertexTree> measured = with_fold_errors(*tree, 1);
-    if (!measured) throw std::runtime_error(measured.error().message);
-    return std::move(*measured);
-}
+VertexTree built(const Mesh& mesh) { return support::measured(support::built(mesh, {.threads = 1})); }
 
 // A flat square of n x n quads whose grey is a function of the place.
 template <class Grey>
@@ -61,41 +56,6 @@ TEST(FoldErrors, OfAnEvenClosedSurfaceShiftNoMean) {
     const VertexTree tree = built(mesh);
     for (const FoldError& error : tree.fold_errors()) EXPECT_LT(error.drift, 1e-4f); // sums of many areas in floats
     EXPECT_GT(tree.fold_errors()[VertexTree::root()].distance, 0);
-}
-
-// Proxies brighter than the mean of their leaves make good for what a curved surface loses.
-TEST(FoldErrors, KeepTheLightOfACurvedSurface) {
-    const Mesh mesh = shapes::icosphere(5);
-    const Result<VertexTree> plain = build_tree(mesh.view(), {.threads = 1});
-    ASSERT_TRUE(plain);
-    const VertexTree kept = built(mesh);
-    const auto mean_light = [](const VertexTree& tree, std::span<const Index> corners, glm::dvec3 direction) {
-        double light = 0, area = 0;
-        for (std::size_t i = 0; i < corners.size(); i += 3) {
-            const auto at = [&](std::size_t k) { return glm::dvec3(tree.positions()[corners[i + k]]); };
-            const auto grey = [&](std::size_t k) { return static_cast<double>(tree.luminance()[corners[i + k]]); };
-            const double facing = 0.5 * glm::dot(glm::cross(at(1) - at(0), at(2) - at(0)), direction);
-            if (facing <= 0) continue;
-            area += facing;
-            light += facing * (grey(0) + grey(1) + grey(2)) / 3;
-        }
-        return light / area;
-    };
-    const auto light_towards = [&](const VertexTree& tree, glm::dvec3 direction) {
-        Cut cut(tree);
-        const View view = frame_sphere({0, 0, 0}, 1, direction, 0.1, View{});
-        EXPECT_TRUE(cut.follow(*extent_criterion(tree, view, 16), {.eye = eye_in_tree(tree, view, {})}));
-        return mean_light(tree, cut.indices(), direction);
-    };
-    const auto whole_towards = [&](glm::dvec3 direction) {
-        Cut cut(*plain);
-        cut.unfold_all();
-        return mean_light(*plain, cut.indices(), direction);
-    };
-    const glm::dvec3 lit(plain->light().direction);
-    const double whole = whole_towards(lit);
-    EXPECT_GT(whole - light_towards(*plain, lit), 2e-3);
-    EXPECT_LT(std::abs(whole - light_towards(kept, lit)), 0.7 * std::abs(whole - light_towards(*plain, lit)));
 }
 
 // A step in luminance: nodes on it have all of it as their error, nodes far from it nothing.
@@ -231,7 +191,23 @@ TEST(FoldErrors, AreTheSameForAnyNumberOfThreads) {
     const auto one = with_fold_errors(tree, 1), four = with_fold_errors(tree, 4);
     ASSERT_TRUE(one && four);
     EXPECT_TRUE(std::ranges::equal(one->fold_errors(), four->fold_errors()));
-    EXPECT_TRUE(std::ranges::equal(one->luminance(), four->luminance()));
+}
+
+// Neither as they are built nor with their light conserved.
+TEST(FoldErrors, LeaveTheLuminancesAsTheyAre) {
+    const VertexTree means = support::built(shapes::with_attributes(shapes::torus(24, 12)));
+    const Result<VertexTree> conserved = conserve_light(means);
+    ASSERT_TRUE(conserved);
+    for (const VertexTree* tree : {&means, &*conserved}) {
+        const Result<VertexTree> measured = with_fold_errors(*tree, 1);
+        ASSERT_TRUE(measured);
+        EXPECT_FALSE(measured->fold_errors().empty());
+        EXPECT_TRUE(std::ranges::equal(measured->luminance(), tree->luminance()));
+        EXPECT_TRUE(std::ranges::equal(measured->support_luminance(), tree->support_luminance()));
+        EXPECT_TRUE(std::ranges::equal(measured->ring_luminance(), tree->ring_luminance()));
+        EXPECT_TRUE(std::ranges::equal(measured->ring_chroma(), tree->ring_chroma()));
+        EXPECT_TRUE(std::ranges::equal(measured->adaptation_luminance(), tree->adaptation_luminance()));
+    }
 }
 
 // Lengths in any unit: the same errors, but for the unit.

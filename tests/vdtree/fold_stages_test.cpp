@@ -9,10 +9,9 @@
 
 #include <gtest/gtest.h>
 
-#include <vdtree/builder.h>
-#include <vdtree/fold_errors.h>
 #include <vdtree/tree_io.h>
 
+#include "built.h"
 #include "pyramid.h"
 #include "shapes.h"
 #include "temp_folder.h"
@@ -20,13 +19,7 @@
 namespace unseen::vdtree {
 namespace {
 
-VertexTree built(const Mesh& mesh, int threads = 1) {
-    Result<VertexTree> tree = build_tree(mesh.view(), {.threads = 1});
-    if (!tree) throw std::runtime_error(tree.error().message);
-    Result<VertexTree> measured = with_fold_errors(*tree, threads);
-    if (!measured) throw std::runtime_error(measured.error().message);
-    return std::move(*measured);
-}
+VertexTree built(const Mesh& mesh, int threads = 1) { return support::measured(support::built(mesh, {.threads = 1}), threads); }
 
 Mesh grey(Mesh mesh, float luminance) {
     mesh.colours.assign(mesh.positions.size(), {luminance, luminance, luminance, 1});

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include <vdtree/builder.h>
+#include <vdtree/conserve_light.h>
 #include <vdtree/cut.h>
 #include <vdtree/cut_rings.h>
 #include <vdtree/fold_errors.h>
@@ -373,6 +374,10 @@ TEST(Textures, AreNotMeasuredByFoldErrors) {
     ASSERT_FALSE(measured);
     EXPECT_NE(measured.error().message.find("texture"), std::string::npos);
     EXPECT_TRUE(with_fold_errors(*tree.untextured()));
+    const auto conserved = conserve_light(tree);
+    ASSERT_FALSE(conserved);
+    EXPECT_NE(conserved.error().message.find("texture"), std::string::npos);
+    EXPECT_TRUE(conserve_light(*tree.untextured()));
 }
 
 } // namespace

@@ -22,7 +22,6 @@
 
 #include <vdtree/builder.h>
 #include <vdtree/cut.h>
-#include <vdtree/fold_errors.h>
 
 #include "built.h"
 #include "byte_order.h"
@@ -74,9 +73,7 @@ protected:
     // All the sections that there are: errors of folds, which nobody measures with a texture, too.
     std::string bytes_with_everything() {
         Mesh mesh = shapes::with_attributes(shapes::cube(2));
-        const auto measured = with_fold_errors(built(mesh), 1);
-        if (!measured) throw std::runtime_error(measured.error().message);
-        TreeFile::Section errors = TreeFile::parse(bytes_of(*measured))["fold_errors"];
+        TreeFile::Section errors = TreeFile::parse(bytes_of(support::measured(built(mesh))))["fold_errors"];
         mesh.texture = textures::noise(4, 3, 1);
         TreeFile file = TreeFile::parse(bytes_of(built(mesh)));
         const std::string first = errors.data.substr(0, errors.element_bytes);

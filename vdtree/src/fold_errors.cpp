@@ -14,7 +14,6 @@
 #include "drift.h"
 #include "find_stages.h"
 #include "fold_picture.h"
-#include "keep_light.h"
 #include "leaf_triangles.h"
 #include "scaled_geometry.h"
 #include "vertex_tree_data.h"
@@ -550,16 +549,6 @@ private:
     std::vector<Witnesses> witnesses_;
 };
 
-void include_proxies(const VertexTree& tree, std::span<const Unorm16> luminance, std::span<PackedRange> support) {
-    for (NodeId node = tree.interior_count(); node-- > 0;) {
-        PackedRange& own = support[node];
-        own = {std::min(own.lo, luminance[node]), std::max(own.hi, luminance[node])};
-        if (node == 0) break;
-        PackedRange& parent = support[tree.parents()[node]];
-        parent = {std::min(parent.lo, own.lo), std::max(parent.hi, own.hi)};
-    }
-}
-
 bool are_finite(const FoldError& e) {
     const float values[] = {e.distance, e.mean_distance, e.luminance, e.wide_luminance, e.extent, e.drift};
     return std::all_of(std::begin(values), std::end(values), [](float value) { return std::isfinite(value); });
@@ -571,28 +560,15 @@ Result<VertexTree> with_fold_errors(const VertexTree& tree, int threads) {
     if (const auto sound = tree.check(); !sound) return sound.error();
     if (!tree.texture().empty())
         return Error{ErrorCode::unsupported, "What folds change of a texture is not measured: take another fold test, or the tree without its texture."};
-    const auto copy_of = [](const auto& values) { return std::vector(values.begin(), values.end()); };
     const VertexTree::Data& given = tree.data();
     // Measured is in units in which no product of lengths overflows or vanishes.
     const float scale = unit_scale(tree.bounding_sphere().radius);
     const auto data = std::make_shared<VertexTree::Data>();
     data->geometry = scale == 1 ? given.geometry : scaled_geometry(given.geometry, scale);
     TreeLuminance& light = data->light;
-    light.luminance = copy_of(given.light.luminance);
-    light.support_range = copy_of(given.light.support_range);
-    light.ring_range = copy_of(given.light.ring_range);
-    light.adaptation = copy_of(given.light.adaptation);
-    light.ring_chroma = copy_of(given.light.ring_chroma);
-    light.light = given.light.light;
-    light.prelit = given.light.prelit;
-    light.range = given.light.range;
+    light = copy_without_errors(given.light);
 
     const VertexTree measured(data); // nobody else has it
-    std::vector<Unorm16> luminance = light_keeping_luminance(measured);
-    std::vector<PackedRange> support = copy_of(given.light.support_range);
-    include_proxies(tree, luminance, support);
-    light.luminance = std::move(luminance);
-    light.support_range = std::move(support);
     std::vector<FoldError> errors(tree.interior_count());
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
     arena.execute([&] {

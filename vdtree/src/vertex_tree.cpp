@@ -217,6 +217,13 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
     return done;
 }
 
+TreeLuminance copy_without_errors(const TreeLuminance& light) {
+    const auto copy_of = [](const auto& values) { return std::vector(values.begin(), values.end()); };
+    return {{copy_of(light.luminance), copy_of(light.support_range), copy_of(light.ring_range), copy_of(light.adaptation),
+             copy_of(light.ring_chroma), {}, {}},
+            light.light, light.prelit, light.textured, light.range};
+}
+
 VertexTree::VertexTree(std::shared_ptr<const Data> data) : data_(std::move(data)), checks_(data_->checks.get()) {
     const TreeGeometry& g = *data_->geometry;
     links_ = {g.parents, g.subtree_end, g.first_leaf, g.leaf_end, g.first_triangle, g.triangles};

@@ -100,6 +100,9 @@ struct VertexTree::Data {
     std::shared_ptr<NodeChecks> checks; // none: everything has been checked or comes from the builder
 };
 
+// In memory of its own, whatever the given arrays view; without fold errors and stages.
+TreeLuminance copy_without_errors(const TreeLuminance& light);
+
 class TreeParts;
 
 // Luminance of every node and the bounds over support and ring, bottom-up. `parts`: of this tree, with its triangles. Cost: one

@@ -1,0 +1,126 @@
+// The fold test by errors, where nodes differ in more ways than its table has rows.
+#include <perception/criterion.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "built.h"
+#include "shapes.h"
+#include "vertex_tree_data.h"
+
+namespace unseen::perception {
+namespace {
+
+using vdtree::FoldError;
+using vdtree::Mesh;
+using vdtree::NodeId;
+using vdtree::VertexTree;
+
+// A noisy height field of n x n quads, each vertex of a grey of its own.
+Mesh noisy_height_field(int n, std::mt19937_64& random) {
+    Mesh mesh = shapes::grid(n);
+    for (glm::dvec3& p : mesh.positions) {
+        p.z += shapes::random_between(random, 0, 1.0 / n);
+        const auto grey = static_cast<float>(std::exp2(shapes::random_between(random, -6, 0)));
+        mesh.colours.push_back({grey, grey, grey, 1});
+    }
+    return mesh;
+}
+
+VertexTree with_errors(const VertexTree& tree, std::vector<FoldError> errors) {
+    auto data = std::make_shared<VertexTree::Data>();
+    data->geometry = tree.data().geometry;
+    data->light = vdtree::copy_without_errors(tree.data().light);
+    data->light.fold_errors = std::move(errors);
+    return VertexTree(std::move(data));
+}
+
+// Errors as different as can be, which nest.
+std::vector<FoldError> various_errors(const VertexTree& tree, std::mt19937_64& random) {
+    const auto log_uniform = [&](double low, double high) {
+        return static_cast<float>(std::exp2(shapes::random_between(random, low, high)));
+    };
+    std::vector<FoldError> errors(tree.interior_count());
+    for (NodeId node = tree.interior_count(); node-- > 0;) {
+        FoldError& e = errors[node];
+        const float radius = tree.support_spheres()[node].radius;
+        e.distance = std::max(e.distance, radius * log_uniform(-8, -2));
+        e.mean_distance = e.distance * log_uniform(-3, 0);
+        e.luminance = log_uniform(-10, 0);
+        e.wide_luminance = e.luminance * log_uniform(-6, 0);
+        e.extent = std::max(e.extent, radius * log_uniform(-1, 0));
+        e.drift = log_uniform(-10, -2);
+        e.fading = static_cast<std::uint8_t>(random() % 4);
+        if (node == 0) break;
+        FoldError& above = errors[tree.parents()[node]];
+        above.distance = std::max(above.distance, e.distance);
+        above.extent = std::max(above.extent, e.extent);
+    }
+    return errors;
+}
+
+// By interior node: the longest way down to a leaf.
+std::vector<int> heights_of(const VertexTree& tree) {
+    std::vector<int> heights(tree.interior_count(), 1);
+    for (NodeId node = tree.interior_count(); node-- > 1;) {
+        int& above = heights[tree.parents()[node]];
+        above = std::max(above, heights[node] + 1);
+    }
+    return heights;
+}
+
+// Here about 80,000 patterns are rounded to fewer. The exact distances are those of nodes with no errors below them, few enough for a row each.
+TEST(ErrorDistances, OfMorePatternsThanRowsAreNoLess) {
+    constexpr std::size_t most_rows = 0x10000;
+    std::mt19937_64 random(5);
+    const VertexTree tree = support::built(noisy_height_field(320, random));
+    const std::vector<FoldError> errors = various_errors(tree, random);
+    const std::vector<int> heights = heights_of(tree);
+    vdtree::View view;
+    FoldTestOptions options;
+    view.eye = {0.5, 0.5, 3};
+    view.fov_y_degrees = physical_field(options.display, view.height).value();
+    options.gaze_px = glm::dvec2(100, 100);
+    const auto all = error_distances(with_errors(tree, errors), view, options);
+    ASSERT_TRUE(all) << all.error().message;
+    EXPECT_TRUE(all->is_monotone());
+    const vdtree::DistanceCriterion::Parts& parts = all->parts();
+    const std::size_t bins = parts.eccentricity_bins;
+    EXPECT_LE(parts.reach.size(), most_rows * bins);
+    std::size_t exact_rows = 0;
+    for (int height = 1; height <= heights[VertexTree::root()]; ++height) {
+        std::vector<FoldError> of_height(errors.size());
+        for (NodeId node = 0; node < errors.size(); ++node)
+            if (heights[node] == height) of_height[node] = errors[node];
+        const auto exact = error_distances(with_errors(tree, std::move(of_height)), view, options);
+        ASSERT_TRUE(exact) << exact.error().message;
+        const vdtree::DistanceCriterion::Parts& own = exact->parts();
+        ASSERT_LT(own.reach.size(), most_rows * bins);
+        exact_rows += own.reach.size() / bins;
+        for (NodeId node = 0; node < errors.size(); ++node) {
+            if (heights[node] != height) continue;
+            const std::size_t patch = parts.classes[node].interior * bins,
+                              own_patch = own.classes[node].interior * bins;
+            const std::size_t strip = parts.classes[node].silhouette * bins,
+                              own_strip = own.classes[node].silhouette * bins;
+            for (std::size_t bin = 0; bin < bins; ++bin) {
+                ASSERT_GE(parts.lengths[node] * parts.reach[patch + bin],
+                          own.lengths[node] * own.reach[own_patch + bin])
+                    << "node " << node << ", bin " << bin;
+                ASSERT_GE(parts.silhouette_lengths[node] * parts.reach[strip + bin],
+                          own.silhouette_lengths[node] * own.reach[own_strip + bin])
+                    << "node " << node << ", bin " << bin;
+            }
+        }
+    }
+    EXPECT_GT(exact_rows, most_rows) << "there are rows for all";
+}
+
+} // namespace
+} // namespace unseen::perception
