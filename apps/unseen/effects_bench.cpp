@@ -69,10 +69,13 @@ std::vector<Variation> variations() {
                    }});
     all.push_back({"dynamic light", "bounds over the normals in a ring in place of baked luminances: ambient 0.2, directional 0.8",
                    nullptr, true, true, false, true});
-    all.push_back({"luebke-hallen-safe", "rings of all cuts, and shifts of the mean",
-                   [](const Scene& scene, const perception::FoldTestOptions& options) {
-                       return perception::luebke_hallen_safe_distances(scene.tree, scene.cut_rings(), scene.view, options);
-                   }});
+    all.push_back(
+        {"luebke-hallen-safe", "rings of all cuts, and shifts of the mean",
+         [](const Scene& scene, const perception::FoldTestOptions& options) -> Result<vdtree::DistanceCriterion> {
+             const auto rings = scene.cut_rings();
+             if (!rings) return rings.error();
+             return perception::luebke_hallen_safe_distances(scene.tree, **rings, scene.view, options);
+         }});
     all.push_back({"error", "what folds change in fact, in place of what they could",
                    [](const Scene& scene, const perception::FoldTestOptions& options) {
                        return perception::error_distances(scene.tree, scene.view, options);

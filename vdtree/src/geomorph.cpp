@@ -1,5 +1,7 @@
 #include <vdtree/geomorph.h>
 
+#include "unchecked_links.h"
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -81,7 +83,7 @@ std::span<const FoldChange> Geomorph::changes_of(const Cut& cut) {
 
 bool Geomorph::is_jump(const Cut& cut, std::span<const FoldChange> changes) const {
     if (changes.size() <= fewest_of_a_jump) return false;
-    const auto first = cut.tree().first_triangle();
+    const auto first = unchecked_links(cut.tree()).first_triangle;
     std::uint64_t triangles = 0;
     for (const FoldChange& change : changes) triangles += first[change.node + 1] - first[change.node];
     const double shown = std::max(cut.triangle_count(), drawn_.triangle_count());
@@ -171,7 +173,7 @@ void Geomorph::begin(NodeId node, double weight) {
     const VertexTree& tree = drawn_.tree();
     if (slot_of_node_.empty()) slot_of_node_.assign(tree.interior_count(), no_slot);
     slot_of_node_[node] = static_cast<Slot>(glides_.size());
-    glides_.push_back({weight, weight == 0, tree.parents()[node], at_rest(tree, node), {}, 0, {}});
+    glides_.push_back({weight, weight == 0, unchecked_links(tree).parents[node], at_rest(tree, node), {}, 0, {}});
     tree.for_each_child(node, [&](NodeId child) { glides_.back().children.push_back(at_rest(tree, child)); });
 }
 
