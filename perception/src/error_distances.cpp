@@ -83,8 +83,8 @@ Pattern above(const Pattern& a, const Pattern& b) {
     return all;
 }
 
-// Few patterns are to stand for many: rounded up, onto one grid, so that what is above two of them is there, too. `coarseness`: of the grid,
-// 1 or a power of two.
+// Few patterns are to stand for many: rounded up, onto one grid, so that what is above two of them is there, too.
+// `coarseness`: of the grid, 1 or a power of two.
 Pattern rounded(Pattern p, int coarseness) {
     constexpr int coarsest_fading = 32; // on coarser grids drift does not fade at all, which is above any that does
     const int typical_step = coarseness * contrasts_per_octave / 8, spike_step = coarseness * contrasts_per_octave / 4;
@@ -194,8 +194,8 @@ private:
     Thresholds patches_, areas_, strips_;
 };
 
-// The reach of patterns by eccentricity, computed when they are first asked for. Where patterns are too many for the rows' numbers, begin again with
-// coarser ones.
+// The reach of patterns by eccentricity, computed when they are first asked for. Where patterns are too many for the
+// rows' numbers, begin again with coarser ones.
 class Reaches {
 public:
     // `added`: rows that add() will ask for.
@@ -217,9 +217,10 @@ public:
         pattern.is_strip ? add_strip(pattern) : add_patch(pattern);
         return row;
     }
-    bool has_too_few() const { return has_too_few_; } // of what there is, nothing is to be used then
-    // Forgets all rows. Ends well: at a coarseness of 256 each contrast is one of two, and there are no more than 16 luminances, 121 quarters and four
-    // ways to combine a typical and a largest contrast: 16,000 patches.
+    bool has_too_few() const { return has_too_few_; } // then nothing found so far is of use
+    // Forgets all rows. In the end they suffice: at a coarseness of 256 each contrast is one of two, so a typical and a
+    // largest one combine in four ways at most; with 16 luminances, 121 quarters and without fading that is 16,000
+    // patches, and there are 3,600 strips.
     void coarsen() {
         coarseness_ *= 2;
         begin();
@@ -391,8 +392,14 @@ void cover(Reaches& reaches, Shown& a, const Shown& b) {
     a = std::isfinite(wider.length) && is_wider_less ? wider : richer;
 }
 
+<<<<<<< ours
 // What nodes show, no less than their children: patches, and strips where they are outlines. False where the rows do not suffice.
 bool find_shown(const vdtree::SoundTree& tree, const SceneLuminance& scene, const Levels& levels, const CsfTable& csf, Reaches& reaches,
+=======
+// What nodes show, no less than their children: patches, and strips where they are outlines. False where the rows do
+// not suffice.
+bool find_shown(const vdtree::VertexTree& tree, const SceneLuminance& scene, const Levels& levels, const CsfTable& csf, Reaches& reaches,
+>>>>>>> theirs
                 std::vector<Shown>& patches, std::vector<Shown>& strips) {
     const std::span<const vdtree::FoldError> errors = tree.fold_errors();
     const double darkest = levels.in_cdm2(scene.darkest), brightest = levels.in_cdm2(scene.brightest);

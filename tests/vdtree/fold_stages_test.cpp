@@ -20,7 +20,9 @@
 namespace unseen::vdtree {
 namespace {
 
-VertexTree built(const Mesh& mesh, int threads = 1) { return support::measured(support::built(mesh, {.threads = 1}), threads); }
+VertexTree built(const Mesh& mesh, int threads = 1) {
+    return support::measured(support::built(mesh, {.threads = 1}), threads);
+}
 
 Mesh grey(Mesh mesh, float luminance) {
     mesh.colours.assign(mesh.positions.size(), {luminance, luminance, luminance, 1});
