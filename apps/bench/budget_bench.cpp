@@ -1,106 +1,111 @@
-// Two ways to spend one triangle budget, side by side: node extent, and the perceptual fold test.
-//
-// After figure 5 of Luebke and Hallen 2001. Prints, for each: the visible pixels against the full model, the largest
-// visibility, and the share of triangles with a corner within four pixels of the full model's contour.
-#include <cmath>
-#include <cstdio>
-#include <string>
+#include "budget_bench.h"
 
-#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+
 #include <glm/geometric.hpp>
 
 #include <perception/criterion.h>
 #include <perception/judge.h>
 #include <render/renderer.h>
-#include <vdtree/builder.h>
 #include <vdtree/cut.h>
-#include <vdtree/mesh_io.h>
-#include <vdtree/tree_io.h>
 
-#include "canvas.h"
+#include "drawing.h"
+#include "frame_image.h"
+#include "model_file.h"
+#include "terminal.h"
 
+namespace unseen::app {
 namespace {
 
-using namespace unseen;
-
+constexpr double fill = 0.9;      // of the window's height
+constexpr double background = 20; // cd/m2
 constexpr int contour_reach_px = 4;
 
-template <class T>
-T expect(Result<T> result) {
-    if (result) return std::move(*result);
-    std::fprintf(stderr, "%s\n", result.error().message.c_str());
-    std::exit(1);
-}
-
-vdtree::VertexTree load(const std::string& file) {
-    if (vdtree::is_tree_file(file)) return expect(vdtree::read_tree(file));
-    return expect(vdtree::build_tree(expect(vdtree::read_mesh(file)).mesh.view()));
-}
+// What one fold test makes of the budget.
+struct BudgetUse {
+    std::string name;
+    vdtree::Index triangles = 0;
+    std::uint64_t visible_pixels = 0; // against the full model
+    double largest = 0;               // V
+    double contour_percent = 0;       // of the triangles
+};
 
 class Comparison {
 public:
-    Comparison(const vdtree::VertexTree& tree, glm::dvec3 direction)
-        : tree_(tree), context_(expect(render::Context::headless())),
-          renderer_(expect(render::Renderer::create(context_, tree))) {
+    Comparison(const vdtree::VertexTree& tree, render::Renderer renderer, glm::dvec3 direction)
+        : tree_(tree), renderer_(std::move(renderer)) {
         vdtree::View window;
         window.fov_y_degrees = physical_field(display_, window.height).value();
         const vdtree::Sphere sphere = tree.bounding_sphere();
-        view_ = vdtree::frame_sphere(tree.origin() + glm::dvec3(sphere.centre), sphere.radius, direction, 0.9, window);
-        const auto background = static_cast<float>(to_relative(display_, perception::Luminance(20)));
-        draw_options_.background = background;
+        view_ = vdtree::frame_sphere(tree.origin() + glm::dvec3(sphere.centre), sphere.radius, direction, fill, window);
+        const auto relative = static_cast<float>(to_relative(display_, perception::Luminance(background)));
+        draw_options_.background = relative;
         options_.display = display_;
-        options_.scene = {std::min(background, tree.luminance_range().lo),
-                          std::max(background, tree.luminance_range().hi)};
-        vdtree::Cut full(tree);
-        full.unfold_all();
-        reference_ = luminance(full);
-        near_contour_ = mark_contour(full);
+        options_.scene = {std::min(relative, tree.luminance_range().lo), std::max(relative, tree.luminance_range().hi)};
     }
 
-    // Prints a row, and returns the wireframe as code values.
-    perception::Image run(const char* name, vdtree::FoldCriterion criterion, vdtree::Index budget) {
+    // The full model, which the others are compared with. To be called first.
+    Result<void> draw_reference() {
+        vdtree::Cut full(tree_);
+        full.unfold_all();
+        const auto frame = renderer_.draw(full, view_, draw_options_);
+        if (!frame) return frame.error();
+        reference_ = luminance_image(*frame, display_);
+        auto marked = mark_contour(full);
+        if (!marked) return marked.error();
+        near_contour_ = std::move(*marked);
+        return {};
+    }
+
+    struct Spent {
+        BudgetUse use;
+        perception::Image wireframe; // code values
+    };
+    Result<Spent> spend(std::string name, vdtree::FoldCriterion criterion, vdtree::Index budget) {
         vdtree::Cut cut(tree_);
         vdtree::AdjustOptions adjust;
         adjust.triangle_budget = budget;
         const vdtree::AdjustStats stats = cut.adjust(criterion, adjust);
+        const auto frame = renderer_.draw(cut, view_, draw_options_);
+        if (!frame) return frame.error();
         perception::JudgeOptions judge;
         judge.display = display_;
-        const perception::Judgement judgement = expect(perception::judge_modern(reference_, luminance(cut), judge));
-        std::printf("%-14s %9u triangles %8llu visible pixels   max V %6.2f   at the contour %5.1f%%\n", name,
-                    stats.triangles, static_cast<unsigned long long>(judgement.visible_pixels), judgement.max_ratio,
-                    100 * contour_share(cut));
-        render::DrawOptions wireframe = draw_options_;
-        wireframe.wireframe = true;
-        const render::Frame frame = expect(renderer_.draw(cut, view_, wireframe));
-        perception::Image codes{frame.width, frame.height, 3, frame.colour};
-        for (float& value : codes.values) value = static_cast<float>(encode(display_, value));
-        return codes;
+        const auto judgement = perception::judge_modern(reference_, luminance_image(*frame, display_), judge);
+        if (!judgement) return judgement.error();
+        render::DrawOptions wired = draw_options_;
+        wired.wireframe = true;
+        const auto wireframe = renderer_.draw(cut, view_, wired);
+        if (!wireframe) return wireframe.error();
+        return Spent{{std::move(name), stats.triangles, judgement->visible_pixels, judgement->max_ratio,
+                      100 * contour_share(cut)},
+                     code_image(*wireframe, display_)};
     }
 
     const vdtree::View& view() const { return view_; }
     const perception::FoldTestOptions& fold_test_options() const { return options_; }
 
 private:
-    perception::Image luminance(const vdtree::Cut& cut) {
-        const render::Frame frame = expect(renderer_.draw(cut, view_, draw_options_));
-        perception::Image image{frame.width, frame.height, 1, frame.luminance};
-        for (float& y : image.values) y = static_cast<float>(to_luminance(display_, y).value());
-        return image;
-    }
-
     // Pixels within reach of one that the model covers in part, or beside an uncovered one. The share that is uncovered is
     // the difference between a white and a black background.
-    std::vector<bool> mark_contour(const vdtree::Cut& full) {
+    Result<std::vector<bool>> mark_contour(const vdtree::Cut& full) {
         render::DrawOptions options = draw_options_;
         options.background = 0;
-        std::vector<float> uncovered = expect(renderer_.draw(full, view_, options)).luminance;
-        for (float& value : uncovered) value = -value;
+        const auto black = renderer_.draw(full, view_, options);
+        if (!black) return black.error();
         options.background = 1;
-        const render::Frame white = expect(renderer_.draw(full, view_, options));
-        for (std::size_t i = 0; i < uncovered.size(); ++i) uncovered[i] += white.luminance[i];
+        const auto white = renderer_.draw(full, view_, options);
+        if (!white) return white.error();
+        std::vector<float> uncovered;
+        for (std::size_t i = 0; i < white->luminance.size(); ++i)
+            uncovered.push_back(white->luminance[i] - black->luminance[i]);
 
         const int width = view_.width, height = view_.height;
-        const auto at = [&](int x, int y) { return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x); };
+        const auto at = [&](int x, int y) {
+            return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
+        };
         constexpr float least_share = 1e-3f; // below half a sample in 256, above the rounding of the difference
         std::vector<bool> near(uncovered.size(), false);
         for (int y = 0; y < height; ++y) {
@@ -124,7 +129,8 @@ private:
                 const int u = x + dx, v = y + dy;
                 const bool in_reach = dx * dx + dy * dy <= contour_reach_px * contour_reach_px;
                 if (in_reach && u >= 0 && v >= 0 && u < view_.width && v < view_.height)
-                    near[static_cast<std::size_t>(v) * static_cast<std::size_t>(view_.width) + static_cast<std::size_t>(u)] = true;
+                    near[static_cast<std::size_t>(v) * static_cast<std::size_t>(view_.width) +
+                         static_cast<std::size_t>(u)] = true;
             }
         }
     }
@@ -136,7 +142,8 @@ private:
         const double x = view_.width * 0.5 + scale * glm::dot(p, frame.right) / depth;
         const double y = view_.height * 0.5 - scale * glm::dot(p, frame.up) / depth;
         if (!(x >= 0 && y >= 0 && x < view_.width && y < view_.height)) return false;
-        return near_contour_[static_cast<std::size_t>(y) * static_cast<std::size_t>(view_.width) + static_cast<std::size_t>(x)];
+        return near_contour_[static_cast<std::size_t>(y) * static_cast<std::size_t>(view_.width) +
+                             static_cast<std::size_t>(x)];
     }
 
     double contour_share(const vdtree::Cut& cut) const {
@@ -151,45 +158,64 @@ private:
 
     const vdtree::VertexTree& tree_;
     perception::Display display_;
-    render::Context context_;
     render::Renderer renderer_;
     vdtree::View view_;
     render::DrawOptions draw_options_;
     perception::FoldTestOptions options_;
-    perception::Image reference_;
+    perception::Image reference_; // cd/m2
     std::vector<bool> near_contour_;
 };
 
+Result<void> write_picture(const std::string& file, const Comparison::Spent& left, const Comparison::Spent& right) {
+    constexpr int header = 40, margin = 12, text_height = 17; // pixels
+    constexpr glm::vec3 paper{1.0f}, ink{0.0f};
+    auto drawing = Drawing::create(left.wireframe.width + right.wireframe.width, left.wireframe.height + header, paper);
+    if (!drawing) return drawing.error();
+    int x = 0;
+    for (const Comparison::Spent* one : {&left, &right}) {
+        drawing->text({x + margin, margin}, one->use.name + ", " + grouped(one->use.triangles) + " triangles", ink,
+                      text_height);
+        drawing->picture({x, header}, one->wireframe);
+        x += one->wireframe.width;
+    }
+    return drawing->write(file);
+}
+
+BudgetBenchResult result_of(const std::vector<BudgetUse>& uses) {
+    BudgetBenchResult result;
+    result.table = {{"fold test", "triangles", "visible pixels", "largest V", "at the contour"}};
+    for (const BudgetUse& use : uses) {
+        result.table.push_back({use.name, grouped(use.triangles), grouped(use.visible_pixels), rounded(use.largest, 3),
+                                rounded(use.contour_percent, 3) + "%"});
+        result.tests.push_back({{"fold_test", use.name},
+                                {"triangles", use.triangles},
+                                {"visible_pixels", use.visible_pixels},
+                                {"max_ratio", number_or_null(use.largest)},
+                                {"contour_percent", use.contour_percent}});
+    }
+    return result;
+}
+
 } // namespace
 
-int main(int argc, char** argv) {
-    CLI::App app{"Compares node extent and the perceptual fold test at one triangle budget.\n"
-                 "Example: unseen_budget_comparison horse.vdt --triangles 18000 --direction 1 0 0 -o horse.png"};
-    std::string file, output;
-    vdtree::Index budget = 18000;
-    std::vector<double> direction = {1, 0, 0};
-    app.add_option("MODEL", file, "A mesh or a vertex tree")->required();
-    app.add_option("-o,--output", output, "The two wireframes side by side, a PNG");
-    app.add_option("--triangles", budget, "The budget")->capture_default_str();
-    app.add_option("--direction", direction, "From the model towards the eye")->expected(3)->capture_default_str();
-    CLI11_PARSE(app, argc, argv);
-
-    const vdtree::VertexTree tree = load(file);
-    Comparison comparison(tree, {direction[0], direction[1], direction[2]});
-    const vdtree::ExtentCriterion extent(tree, comparison.view(), 1);
-    const perception::LuebkeHallenCriterion perceptual(tree, comparison.view(), comparison.fold_test_options());
-    const perception::Image left = comparison.run("extent", extent, budget);
-    const perception::Image right = comparison.run("luebke-hallen", perceptual, budget);
-    if (output.empty()) return 0;
-
-    constexpr int header = 40; // pixels, for the labels
-    app::Canvas canvas(left.width + right.width, left.height + header, {1, 1, 1});
-    canvas.text(12, 12, "node extent, " + std::to_string(budget) + " triangles", {0, 0, 0}, 2);
-    canvas.text(left.width + 12, 12, "perceptual, " + std::to_string(budget) + " triangles", {0, 0, 0}, 2);
-    canvas.picture(0, header, left);
-    canvas.picture(left.width, header, right);
-    if (const auto written = perception::write_image(output, canvas.image()); !written) {
-        std::fprintf(stderr, "%s\n", written.error().message.c_str());
-        return 1;
-    }
+Result<BudgetBenchResult> bench_budget(const BudgetBenchOptions& options) {
+    auto context = render::Context::headless();
+    if (!context) return context.error();
+    const auto tree = load_tree(options.mesh);
+    if (!tree) return tree.error();
+    auto renderer = render::Renderer::create(*context, *tree);
+    if (!renderer) return renderer.error();
+    Comparison comparison(*tree, std::move(*renderer), options.direction);
+    if (auto drawn = comparison.draw_reference(); !drawn) return drawn.error();
+    const vdtree::ExtentCriterion extent(*tree, comparison.view(), 1);
+    const perception::LuebkeHallenCriterion perceptual(*tree, comparison.view(), comparison.fold_test_options());
+    const auto left = comparison.spend("extent", extent, options.triangles);
+    if (!left) return left.error();
+    const auto right = comparison.spend("luebke-hallen", perceptual, options.triangles);
+    if (!right) return right.error();
+    if (!options.picture.empty())
+        if (auto written = write_picture(options.picture, *left, *right); !written) return written.error();
+    return result_of({left->use, right->use});
 }
+
+} // namespace unseen::app

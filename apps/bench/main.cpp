@@ -1,4 +1,4 @@
-// unseen bench: measures this machine's Unseen.
+// The command `unseen-bench`: measures how fast, how small and how invisible Unseen is on this machine, apart from the command that people use.
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -8,21 +8,63 @@
 
 #include <perception/csf.h>
 
-#include "command.h"
+#include "bench_tools.h"
+#include "budget_bench.h"
 #include "effects_bench.h"
 #include "engine_bench.h"
 #include "options.h"
 #include "output_files.h"
 #include "perception_bench.h"
+#include "program.h"
 #include "report.h"
 #include "terminal.h"
 
 namespace unseen::app {
 namespace {
 
+// A benchmark from its options to its report: what it reads, what it writes, and the load of the machine before.
+class Session {
+public:
+    static Result<Session> open(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs,
+                                const std::string& json) {
+        std::vector<std::string> all = outputs;
+        all.push_back(json);
+        if (const auto ready = check_outputs(inputs, all); !ready) return ready.error();
+        auto report = JsonReport::open(json);
+        if (!report) return report.error();
+        const MachineLoad load = machine_load();
+        if (load.is_high()) print_note(load.advice());
+        return Session(std::move(*report), load);
+    }
+
+    // Writes the report; `print` is for people, where stdout is theirs.
+    template <class Print>
+    Result<int> close(Json json, Print print) {
+        json["load_average"] = number_or_null(load_.average);
+        if (auto ok = report_.prepare(json); !ok) return ok.error();
+        if (auto ok = report_.publish(); !ok) return ok.error();
+        if (report_.is_on_stdout()) return exit_done;
+        print();
+        if (load_.is_high()) std::printf("\nNote: %s\n", load_.advice().c_str());
+        return exit_done;
+    }
+
+private:
+    Session(JsonReport report, MachineLoad load) : report_(std::move(report)), load_(load) {}
+
+    JsonReport report_;
+    MachineLoad load_;
+};
+
+void add_targets_option(CLI::App& verb, std::string& file) {
+    verb.add_option("--targets", file,
+                    "What each figure has to reach, in place of what is built in (apps/bench/targets.json)")
+        ->type_name("FILE.json");
+}
+
 struct EngineArguments {
     EngineBenchOptions options;
-    std::string sizes = "70k,0.9M,3.5M,14M,28M", json;
+    std::string sizes = "70k,0.9M,3.5M,14M,28M", targets, json;
 };
 
 constexpr const char* quick_sizes = "70k,0.9M";
@@ -55,20 +97,20 @@ std::vector<std::uint64_t> parse_sizes(std::string_view list) {
 }
 
 Result<int> run(EngineArguments& a) {
-    if (const auto ready = check_outputs({a.options.mesh}, {a.json}); !ready) return ready.error();
-    auto report = JsonReport::open(a.json);
-    if (!report) return report.error();
+    const auto targets = Targets::read(a.targets);
+    if (!targets) return targets.error();
+    a.options.targets = *targets;
+    auto session = Session::open({a.options.mesh, a.targets}, {}, a.json);
+    if (!session) return session.error();
     const auto result = bench_engine(a.options);
     if (!result) return result.error();
-    if (auto ok = report->prepare({{"mesh", result->mesh}, {"rows", to_json(result->rows)}, {"sizes", result->sizes}}); !ok) return ok.error();
-    if (auto ok = report->publish(); !ok) return ok.error();
-    if (!report->is_on_stdout()) print(result->mesh, result->rows);
-    return exit_done;
+    return session->close({{"mesh", result->mesh}, {"rows", to_json(result->rows)}, {"sizes", result->sizes}},
+                          [&] { print(result->mesh, result->rows); });
 }
 
-Command engine_command(CLI::App& bench) {
+Command engine_command(CLI::App& app) {
     auto a = std::make_shared<EngineArguments>();
-    CLI::App* verb = bench.add_subcommand("engine", "Cuts, budgets, memory and building, against what is promised");
+    CLI::App* verb = app.add_subcommand("engine", "Cuts, budgets, memory and building, against what is promised");
     verb->add_option("--mesh", a->options.mesh, "PLY, OBJ, OFF, STL or glTF (default: the dragon, as ./quickstart gets it; "
                                                 "without it a sphere with bumps)")
         ->type_name("MESH");
@@ -76,20 +118,22 @@ Command engine_command(CLI::App& bench) {
                              ->type_name("LIST");
     verb->add_option("--keep", a->options.keep, "Keep meshes and trees there, and take those that are there")->type_name("FOLDER");
     verb->add_flag("--quick", a->options.quick, "Few frames and sizes: rough figures");
+    add_targets_option(*verb, a->targets);
     add_json_option(*verb, a->json);
     verb->callback([a, sizes] {
         if (sizes->empty() && a->options.quick) a->sizes = quick_sizes;
         a->options.sizes = parse_sizes(a->sizes);
     });
-    verb->footer("The machine should be idle. Building the largest trees takes minutes; --keep spares that the next time.\n\n"
-                 "Examples:\n  unseen bench engine --quick\n"
-                 "  unseen bench engine --mesh dragon.ply --keep /tmp/bench --json engine.json");
+    verb->footer(
+        "The machine should be idle. Building the largest trees takes minutes; --keep spares that the next time.\n\n"
+        "Examples:\n  unseen-bench engine --quick\n"
+        "  unseen-bench engine --mesh dragon.ply --keep /tmp/bench --json engine.json");
     return {verb, [a] { return run(*a); }};
 }
 
 struct PerceptionArguments {
     PerceptionBenchOptions options;
-    std::string only, json;
+    std::string only, targets, json;
 };
 
 std::vector<std::string> parse_groups(std::string_view list) {
@@ -114,28 +158,30 @@ std::vector<std::string> achromatic_models() {
 }
 
 Result<int> run(PerceptionArguments& a) {
+    const auto targets = Targets::read(a.targets);
+    if (!targets) return targets.error();
+    a.options.targets = *targets;
     std::vector<std::string> inputs = a.options.meshes;
     inputs.insert(inputs.end(), a.options.others.begin(), a.options.others.end());
-    if (const auto ready = check_outputs(inputs, {a.json}); !ready) return ready.error();
-    auto report = JsonReport::open(a.json);
-    if (!report) return report.error();
+    inputs.push_back(a.targets);
+    auto session = Session::open(inputs, {}, a.json);
+    if (!session) return session.error();
     const auto result = bench_perception(a.options);
     if (!result) return result.error();
-    if (auto ok = report->prepare({{"title", result->title}, {"rows", to_json(result->rows)}, {"views", result->views}}); !ok) return ok.error();
-    if (auto ok = report->publish(); !ok) return ok.error();
-    if (report->is_on_stdout()) return exit_done;
-    print(result->title, result->rows);
-    for (const BenchDetails& details : result->details) {
-        std::printf("\n%s\n\n", details.title.c_str());
-        print_table(details.rows);
-    }
-    return exit_done;
+    return session->close({{"title", result->title}, {"rows", to_json(result->rows)}, {"views", result->views}}, [&] {
+        print(result->title, result->rows);
+        for (const BenchDetails& details : result->details) {
+            std::printf("\n%s\n\n", details.title.c_str());
+            print_table(details.rows);
+        }
+    });
 }
 
-Command perception_command(CLI::App& bench) {
+Command perception_command(CLI::App& app) {
     auto a = std::make_shared<PerceptionArguments>();
     PerceptionBenchOptions& o = a->options;
-    CLI::App* verb = bench.add_subcommand("perception", "What fold tests save, whether it can be seen, and what it costs, against what is promised");
+    CLI::App* verb = app.add_subcommand(
+        "perception", "What fold tests save, whether it can be seen, and what it costs, against what is promised");
     verb->add_option("--mesh", o.meshes, "Meshes or trees (default: the bunny and the dragon, as ./quickstart gets them; without them a sphere with bumps); "
                                              "of the dragon, unless it is named, only random views, from afar, and speed")
         ->type_name("MESH");
@@ -150,12 +196,15 @@ Command perception_command(CLI::App& bench) {
         ->check(one_of(achromatic_models()));
     verb->add_option("--window", o.window_px, "Its side; promises are about 1024 (default)")->type_name("PIXELS")->check(whole(64, 4096));
     verb->add_flag("--quick", o.quick, "Few views: rough figures");
+    add_targets_option(*verb, a->targets);
     add_json_option(*verb, a->json);
     verb->callback([a] { a->options.only = parse_groups(a->only); });
-    verb->footer("Pictures are drawn with 64 samples a pixel; all of it takes about half an hour without a graphics card.\n\n"
-                 "Examples:\n  unseen bench perception --quick\n"
-                 "  unseen bench perception --mesh bunny.ply horse.ply armadillo.ply gargoyle.ply --pictures judged --json perception.json\n"
-                 "  unseen bench perception --only far,hard");
+    verb->footer(
+        "Pictures are drawn with 64 samples a pixel; all of it takes about half an hour without a graphics card.\n\n"
+        "Examples:\n  unseen-bench perception --quick\n"
+        "  unseen-bench perception --mesh bunny.ply horse.ply armadillo.ply gargoyle.ply --pictures judged --json "
+        "perception.json\n"
+        "  unseen-bench perception --only far,hard");
     return {verb, [a] { return run(*a); }};
 }
 
@@ -165,41 +214,77 @@ struct EffectsArguments {
 };
 
 Result<int> run(EffectsArguments& a) {
-    if (const auto ready = check_outputs(a.options.meshes, {a.json}); !ready) return ready.error();
-    auto report = JsonReport::open(a.json);
-    if (!report) return report.error();
+    auto session = Session::open(a.options.meshes, {}, a.json);
+    if (!session) return session.error();
     const auto result = bench_effects(a.options);
     if (!result) return result.error();
-    if (auto ok = report->prepare({{"effects", result->effects}}); !ok) return ok.error();
-    if (auto ok = report->publish(); !ok) return ok.error();
-    if (report->is_on_stdout()) return exit_done;
-    print_table(result->table);
-    std::printf("\n");
-    for (const std::string& note : result->notes) std::printf("%s\n", note.c_str());
-    return exit_done;
+    return session->close({{"effects", result->effects}}, [&] {
+        print_table(result->table);
+        std::printf("\n");
+        for (const std::string& note : result->notes) std::printf("%s\n", note.c_str());
+    });
 }
 
-Command effects_command(CLI::App& bench) {
+Command effects_command(CLI::App& app) {
     auto a = std::make_shared<EffectsArguments>();
-    CLI::App* verb = bench.add_subcommand("effects", "What each effect of the perceptual test saves in triangles and costs in time");
-    verb->add_option("--mesh", a->options.meshes, "Meshes or trees (default: as for 'unseen bench perception')")->type_name("MESH");
+    CLI::App* verb =
+        app.add_subcommand("effects", "What each effect of the perceptual test saves in triangles and costs in time");
+    verb->add_option("--mesh", a->options.meshes, "Meshes or trees (default: as for 'unseen-bench perception')")
+        ->type_name("MESH");
     verb->add_flag("--quick", a->options.quick, "Few repetitions");
     add_json_option(*verb, a->json);
-    verb->footer("Examples:\n  unseen bench effects --mesh bunny.ply horse.ply dragon.ply");
+    verb->footer("Examples:\n  unseen-bench effects --mesh bunny.ply horse.ply dragon.ply");
     return {verb, [a] { return run(*a); }};
 }
 
-} // namespace
+struct BudgetArguments {
+    BudgetBenchOptions options;
+    std::optional<glm::dvec3> direction;
+    std::string json;
+};
 
-Command bench_command(CLI::App& app) {
-    CLI::App* verb = app.add_subcommand("bench", "Measure how fast, how small and how invisible Unseen is here");
-    verb->require_subcommand(1);
-    verb->footer("Examples:\n  unseen bench engine --quick\n  unseen bench perception --quick\n\n"
-                 "'unseen bench NAME --help' tells more.");
-    const std::vector<Command> commands = {engine_command(*verb), perception_command(*verb), effects_command(*verb)};
-    return {verb, [commands] {
-                return std::find_if(commands.begin(), commands.end(), [](const Command& c) { return c.parser->parsed(); })->run();
-            }};
+Result<int> run(BudgetArguments& a) {
+    if (a.direction) a.options.direction = *a.direction;
+    auto session = Session::open({a.options.mesh}, {a.options.picture}, a.json);
+    if (!session) return session.error();
+    const auto result = bench_budget(a.options);
+    if (!result) return result.error();
+    return session->close({{"tests", result->tests}}, [&] { print_table(result->table); });
 }
 
+Command budget_command(CLI::App& app) {
+    auto a = std::make_shared<BudgetArguments>();
+    CLI::App* verb = app.add_subcommand(
+        "budget", "What two fold tests make of one triangle budget: node extent, and the perceptual test");
+    verb->add_option("MODEL", a->options.mesh, "A mesh or a tree")->required()->type_name("TREE.vdt|MESH");
+    verb->add_option("-o,--output", a->options.picture, "The two wireframes side by side")
+        ->type_name("OUT.png")
+        ->check(ending_in({".png"}));
+    add_triangles_option(*verb, a->options.triangles, "The budget (default: 18000)");
+    add_vector(*verb, "--direction", a->direction, "From the model towards the eye (default: 1 0 0)");
+    add_json_option(*verb, a->json);
+    verb->callback([a] {
+        if (a->direction && *a->direction == glm::dvec3(0)) refuse("--direction must not be 0 0 0.");
+    });
+    verb->footer("Examples:\n  unseen-bench budget horse.vdt --triangles 18000 --direction 1 0 0 -o horse.png");
+    return {verb, [a] { return run(*a); }};
+}
+
+constexpr const char* about =
+    "unseen-bench measures how fast, how small and how invisible Unseen is on this machine, against what is promised.";
+constexpr const char* examples = R"(Examples:
+  unseen-bench engine --quick
+  unseen-bench perception --quick
+
+'unseen-bench VERB --help' tells more. Exit status: 0 done, 1 failed, 2 wrong usage.)";
+
+} // namespace
 } // namespace unseen::app
+
+int main(int argc, char** argv) {
+    using namespace unseen::app;
+    return run_program(argc, argv, {"unseen-bench", about, examples, UNSEEN_VERSION, {}}, [](CLI::App& app) {
+        return std::vector<Command>{engine_command(app), perception_command(app), effects_command(app),
+                                    budget_command(app)};
+    });
+}

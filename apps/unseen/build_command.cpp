@@ -13,7 +13,6 @@
 #endif
 
 #include "build_team.h"
-#include "command.h"
 #include "memory_plan.h"
 #include "model_file.h"
 #include "options.h"
@@ -23,6 +22,7 @@
 #include "progress_bar.h"
 #include "report.h"
 #include "terminal.h"
+#include "verbs.h"
 
 namespace unseen::app {
 namespace {
