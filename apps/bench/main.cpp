@@ -23,9 +23,9 @@ namespace unseen::app {
 namespace {
 
 // A benchmark from its options to its report: what it reads, what it writes, and the load of the machine before.
-class Session {
+class BenchRun {
 public:
-    static Result<Session> open(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs,
+    static Result<BenchRun> open(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs,
                                 const std::string& json) {
         std::vector<std::string> all = outputs;
         all.push_back(json);
@@ -34,7 +34,7 @@ public:
         if (!report) return report.error();
         const MachineLoad load = machine_load();
         if (load.is_high()) print_note(load.advice());
-        return Session(std::move(*report), load);
+        return BenchRun(std::move(*report), load);
     }
 
     // Writes the report; `print` is for people, where stdout is theirs.
@@ -50,7 +50,7 @@ public:
     }
 
 private:
-    Session(JsonReport report, MachineLoad load) : report_(std::move(report)), load_(load) {}
+    BenchRun(JsonReport report, MachineLoad load) : report_(std::move(report)), load_(load) {}
 
     JsonReport report_;
     MachineLoad load_;
@@ -100,11 +100,11 @@ Result<int> run(EngineArguments& a) {
     const auto targets = Targets::read(a.targets);
     if (!targets) return targets.error();
     a.options.targets = *targets;
-    auto session = Session::open({a.options.mesh, a.targets}, {}, a.json);
-    if (!session) return session.error();
+    auto bench = BenchRun::open({a.options.mesh, a.targets}, {}, a.json);
+    if (!bench) return bench.error();
     const auto result = bench_engine(a.options);
     if (!result) return result.error();
-    return session->close({{"mesh", result->mesh}, {"rows", to_json(result->rows)}, {"sizes", result->sizes}},
+    return bench->close({{"mesh", result->mesh}, {"rows", to_json(result->rows)}, {"sizes", result->sizes}},
                           [&] { print(result->mesh, result->rows); });
 }
 
@@ -164,11 +164,11 @@ Result<int> run(PerceptionArguments& a) {
     std::vector<std::string> inputs = a.options.meshes;
     inputs.insert(inputs.end(), a.options.others.begin(), a.options.others.end());
     inputs.push_back(a.targets);
-    auto session = Session::open(inputs, {}, a.json);
-    if (!session) return session.error();
+    auto bench = BenchRun::open(inputs, {}, a.json);
+    if (!bench) return bench.error();
     const auto result = bench_perception(a.options);
     if (!result) return result.error();
-    return session->close({{"title", result->title}, {"rows", to_json(result->rows)}, {"views", result->views}}, [&] {
+    return bench->close({{"title", result->title}, {"rows", to_json(result->rows)}, {"views", result->views}}, [&] {
         print(result->title, result->rows);
         for (const BenchDetails& details : result->details) {
             std::printf("\n%s\n\n", details.title.c_str());
@@ -214,11 +214,11 @@ struct EffectsArguments {
 };
 
 Result<int> run(EffectsArguments& a) {
-    auto session = Session::open(a.options.meshes, {}, a.json);
-    if (!session) return session.error();
+    auto bench = BenchRun::open(a.options.meshes, {}, a.json);
+    if (!bench) return bench.error();
     const auto result = bench_effects(a.options);
     if (!result) return result.error();
-    return session->close({{"effects", result->effects}}, [&] {
+    return bench->close({{"effects", result->effects}}, [&] {
         print_table(result->table);
         std::printf("\n");
         for (const std::string& note : result->notes) std::printf("%s\n", note.c_str());
@@ -245,11 +245,11 @@ struct BudgetArguments {
 
 Result<int> run(BudgetArguments& a) {
     if (a.direction) a.options.direction = *a.direction;
-    auto session = Session::open({a.options.mesh}, {a.options.picture}, a.json);
-    if (!session) return session.error();
+    auto bench = BenchRun::open({a.options.mesh}, {a.options.picture}, a.json);
+    if (!bench) return bench.error();
     const auto result = bench_budget(a.options);
     if (!result) return result.error();
-    return session->close({{"tests", result->tests}}, [&] { print_table(result->table); });
+    return bench->close({{"tests", result->tests}}, [&] { print_table(result->table); });
 }
 
 Command budget_command(CLI::App& app) {
