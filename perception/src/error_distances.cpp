@@ -392,14 +392,8 @@ void cover(Reaches& reaches, Shown& a, const Shown& b) {
     a = std::isfinite(wider.length) && is_wider_less ? wider : richer;
 }
 
-<<<<<<< ours
 // What nodes show, no less than their children: patches, and strips where they are outlines. False where the rows do not suffice.
 bool find_shown(const vdtree::SoundTree& tree, const SceneLuminance& scene, const Levels& levels, const CsfTable& csf, Reaches& reaches,
-=======
-// What nodes show, no less than their children: patches, and strips where they are outlines. False where the rows do
-// not suffice.
-bool find_shown(const vdtree::VertexTree& tree, const SceneLuminance& scene, const Levels& levels, const CsfTable& csf, Reaches& reaches,
->>>>>>> theirs
                 std::vector<Shown>& patches, std::vector<Shown>& strips) {
     const std::span<const vdtree::FoldError> errors = tree.fold_errors();
     const double darkest = levels.in_cdm2(scene.darkest), brightest = levels.in_cdm2(scene.brightest);

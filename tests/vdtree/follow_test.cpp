@@ -33,7 +33,8 @@ using support::gathered;
 using support::state_of;
 using support::triangles_of;
 
-// Frames a mesh class; the customer's figure, 10^4, is reached with the environment variable UNSEEN_FRAMES.
+// Frames a mesh class. A view of a few minutes has ten thousand, in which rare sequences of changes turn up, too: the environment variable
+// UNSEEN_FRAMES asks for so many.
 int frame_count() {
     const char* asked = std::getenv("UNSEEN_FRAMES");
     return asked ? std::atoi(asked) : 400;

@@ -6,14 +6,15 @@
 #include <vector>
 
 #include "report.h"
+#include "targets.h"
 
 namespace unseen::app {
 
-// One line of the table. What is promised holds where the value is at most the bound, or at least.
+// One line of the table. A target is met where the value is at most as large, or at least.
 struct BenchRow {
     std::string name, unit, note;
     std::optional<double> value; // none: not available, see the note
-    std::optional<double> must, aim;
+    Target target;
     bool more_is_better = false;
     int decimals = 0;
 };

@@ -14,6 +14,7 @@ struct EngineBenchOptions {
     std::vector<std::uint64_t> sizes; // triangles, ascending; smaller ones than the mesh are simplified, larger ones subdivided
     std::string keep;                 // a folder for meshes and trees, used again where they are there; empty: none
     bool quick = false;               // few frames
+    Targets targets = Targets::built_in();
 };
 
 struct EngineBenchResult {
@@ -22,8 +23,8 @@ struct EngineBenchResult {
     std::string mesh;
 };
 
-// Cuts are measured on one thread, pinned to one core, by the wall clock; medians. Trees are built by children of this
-// program, whose peak memory that tells.
+// Cuts are measured on one thread, pinned to one core, by the wall clock; medians. Trees are built by the command
+// `unseen`, which lies beside this program or is found by PATH, and tells its peak memory.
 Result<EngineBenchResult> bench_engine(const EngineBenchOptions& options);
 
 } // namespace unseen::app

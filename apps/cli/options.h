@@ -14,9 +14,12 @@
 
 #include <perception/gaze.h>
 
-#include "textures.h"
-
 namespace unseen::app {
+
+struct TextureOptions {
+    std::string file;         // instead of the materials'
+    bool is_left_out = false; // --no-texture
+};
 
 // VIEW. What is not given follows from the model and the display, see scene.h.
 struct ViewOptions {
@@ -123,6 +126,9 @@ CLI::Option* add_choice(CLI::App& verb, const std::string& option, Target& targe
 // An option that takes a number.
 CLI::Option* add_number(CLI::App& verb, const std::string& name, std::optional<double>& value, const CLI::Validator& validator,
                         const std::string& unit, const std::string& text);
+
+// An option that takes three numbers.
+CLI::Option* add_vector(CLI::App& verb, const std::string& name, std::optional<glm::dvec3>& value, const std::string& text);
 
 // Ends the parse: exit status 2.
 [[noreturn]] void refuse(const std::string& message);

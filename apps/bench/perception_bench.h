@@ -20,6 +20,7 @@ struct PerceptionBenchOptions {
     std::string second_judge;               // its model of contrast sensitivity; empty: Barten's of 1999
     int window_px = 1024;
     bool quick = false;                     // few views
+    Targets targets = Targets::built_in();
 };
 
 // Figures of the same things side by side.
@@ -43,6 +44,7 @@ struct SensitivityBenchOptions {
     std::string reference;
     std::string pictures;
     bool quick = false;
+    Targets targets = Targets::built_in();
 };
 Result<std::vector<BenchRow>> bench_csf(const SensitivityBenchOptions& options);
 Result<std::vector<BenchRow>> bench_observers(const SensitivityBenchOptions& options);

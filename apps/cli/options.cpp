@@ -45,16 +45,6 @@ CLI::Validator number_that(const std::string& requirement, Accepts accepts) {
         "");
 }
 
-// An option of three numbers that remembers whether it was given.
-CLI::Option* add_vector(CLI::App& verb, const std::string& name, std::optional<glm::dvec3>& value,
-                        const std::string& text) {
-    return verb
-        .add_option_function<std::array<double, 3>>(
-            name, [&value](const std::array<double, 3>& v) { value = glm::dvec3(v[0], v[1], v[2]); }, text)
-        ->type_name("X Y Z")
-        ->check(finite());
-}
-
 // "1024x768".
 std::string parse_size(const std::string& text, int& width, int& height) {
     const std::size_t x = text.find('x');
@@ -131,6 +121,15 @@ CLI::Option* add_number(CLI::App& verb, const std::string& name, std::optional<d
             name, [&value](const double& v) { value = v; }, text)
         ->type_name(unit)
         ->check(validator);
+}
+
+CLI::Option* add_vector(CLI::App& verb, const std::string& name, std::optional<glm::dvec3>& value,
+                        const std::string& text) {
+    return verb
+        .add_option_function<std::array<double, 3>>(
+            name, [&value](const std::array<double, 3>& v) { value = glm::dvec3(v[0], v[1], v[2]); }, text)
+        ->type_name("X Y Z")
+        ->check(finite());
 }
 
 CLI::Validator one_of(std::vector<std::string> names) {

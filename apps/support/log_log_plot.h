@@ -1,18 +1,19 @@
 // Curves on logarithmic axes, as a picture.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include <perception/image.h>
+#include "drawing.h"
 
 namespace unseen::app {
 
 struct Curve {
-    std::string label;
+    std::string label;               // empty: not in the legend
     glm::vec3 colour = glm::vec3(0); // code values
     bool dashed = false;
     std::vector<glm::dvec2> points; // ascending in x; those outside of the axes are left out
@@ -27,6 +28,9 @@ struct LogLogPlot {
 };
 
 // With a grid at 1, 2, 5 of every decade, labels, and a legend to the right.
-perception::Image draw(const LogLogPlot& plot);
+void draw(const LogLogPlot& plot, Drawing& drawing);
+
+// As .svg or .png, by the file's ending.
+Result<void> write_plot(const std::filesystem::path& file, const LogLogPlot& plot);
 
 } // namespace unseen::app

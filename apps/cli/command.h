@@ -1,4 +1,4 @@
-// The verbs of the command `unseen`.
+// Verbs: what the commands `unseen` and `unseen-bench` are made of.
 #pragma once
 
 #include <functional>
@@ -19,17 +19,5 @@ struct Command {
     CLI::App* parser = nullptr; // of the App given, which keeps it
     std::function<Result<int>()> run;
 };
-
-Command bench_command(CLI::App& app);
-Command build_command(CLI::App& app);
-Command info_command(CLI::App& app);
-Command make_command(CLI::App& app);
-Command simplify_command(CLI::App& app);
-Command render_command(CLI::App& app);
-Command compare_command(CLI::App& app);
-Command calibrate_command(CLI::App& app);
-Command csf_command(CLI::App& app);
-Command sheet_command(CLI::App& app);
-Command view_command(CLI::App& app);
 
 } // namespace unseen::app

@@ -16,7 +16,7 @@
 #include <visibility_map.h>
 
 #include "bench_tools.h"
-#include "canvas.h"
+#include "drawing.h"
 #include "fold_test.h"
 #include "judged_model.h"
 #include "model_file.h"
@@ -97,25 +97,26 @@ public:
 
     Result<void> write(const fs::path& file) const {
         if (rows_.empty()) return {};
-        constexpr int gap = 10, line = 24;
+        constexpr int gap = 10, text_height = 17, line = 24; // pixels
         int width = 0, height = gap;
         for (const Row& row : rows_) {
             width = std::max({width, gap + static_cast<int>(row.pictures.size()) * (row.pictures.front().width + gap),
-                              2 * gap + Canvas::text_width(row.text, 2)});
+                              2 * gap + static_cast<int>(std::ceil(Drawing::text_width(row.text, text_height)))});
             height += line + row.pictures.front().height + gap;
         }
-        Canvas canvas(width, height, glm::vec3(0.12f));
+        auto drawing = Drawing::create(width, height, glm::vec3(0.12f));
+        if (!drawing) return drawing.error();
         int top = gap;
         for (const Row& row : rows_) {
-            canvas.text(gap, top, row.text, glm::vec3(0.95f), 2);
+            drawing->text({gap, top}, row.text, glm::vec3(0.95f), text_height);
             int left = gap;
             for (const Image& picture : row.pictures) {
-                canvas.picture(left, top + line, picture);
+                drawing->picture({left, top + line}, picture);
                 left += picture.width + gap;
             }
             top += line + row.pictures.front().height + gap;
         }
-        return perception::write_image(file, canvas.image());
+        return drawing->write(file);
     }
 
 private:
@@ -211,6 +212,7 @@ private:
     bool is_wanted(const std::string& group) const {
         return options_.only.empty() || std::find(options_.only.begin(), options_.only.end(), group) != options_.only.end();
     }
+    Target target(std::string_view figure) const { return options_.targets.of("perception", figure); }
     bool needs_models() const {
         return is_wanted("savings") || is_wanted("random") || is_wanted("far") || is_wanted("tolerance") || is_wanted("speed");
     }
@@ -314,15 +316,16 @@ private:
             for (std::size_t j = 0; j < judges.size(); ++j) {
                 const Totals t = total(found, test, j);
                 const std::string where = t.worst ? models[t.worst->model]->name() + ", " + t.worst->look.text : "";
-                BenchRow row{"visible pixels, " + what + ", " + name_of(test), "",
-                             std::to_string(t.views_seen) + " of " + std::to_string(t.views) + " views with any; largest V " +
-                                 rounded(t.largest, 3) + ": " + where,
-                             static_cast<double>(t.pixels), {}, {}, false, 0};
-                if (judges[j] == Judge::modern) row.must = 0;
-                else {
+                BenchRow row{"visible pixels, " + what + ", " + name_of(test),
+                             "",
+                             std::to_string(t.views_seen) + " of " + std::to_string(t.views) +
+                                 " views with any; largest V " + rounded(t.largest, 3) + ": " + where,
+                             static_cast<double>(t.pixels),
+                             target(judges[j] == Judge::modern ? "visible pixels" : "visible pixels, second judge"),
+                             false,
+                             0};
+                if (judges[j] != Judge::modern)
                     row.name = "the same by the second judge, " + std::string(perception::name(second_));
-                    row.aim = 0;
-                }
                 result_.rows.push_back(std::move(row));
             }
         }
@@ -396,8 +399,8 @@ private:
                 details.rows.push_back({where, name_of(tests[t]), thousands(kept), rounded(1 / fewer, 3), grouped(first.pixels),
                                         rounded(first.largest, 2), grouped(second.pixels), rounded(second.largest, 2)});
                 if (tests[t] == baseline) continue;
-                BenchRow row{"fewer triangles, " + where + ", " + name_of(tests[t]), "x", note, fewer, {}, {}, true, 2};
-                if (tests[t] == promised) promise_savings(row, settings[s]);
+                BenchRow row{"fewer triangles, " + where + ", " + name_of(tests[t]), "x", note, fewer, {}, true, 2};
+                if (tests[t] == promised) row.target = target("fewer triangles, " + where + ", x");
                 result_.rows.push_back(std::move(row));
             }
         }
@@ -410,18 +413,6 @@ private:
                 if (one.model == 0 && one.look.text == look(directions[0], wanted[0], gaze).text && one.test != FoldTest::luebke_hallen_safe)
                     if (auto added = add_exhibit(sheet, *models_[0], one); !added) return added;
         return write_sheet(sheet, "savings.png");
-    }
-
-    static void promise_savings(BenchRow& row, const Setting& setting) {
-        const struct {
-            double gaze, fill, must, aim;
-        } promises[] = {{gaze_degrees, 0.9, 2.7, 4.8}, {gaze_degrees, 0.5, 3.4, 6.2}, {gaze_degrees, 0.2, 3.3, 6.4},
-                        {0, 0.9, 1.25, 1.8},           {0, 0.5, 1.33, 2.2},           {0, 0.2, 1.55, 3}};
-        for (const auto& p : promises) {
-            if (p.gaze != setting.gaze || p.fill != setting.fill) continue;
-            row.must = p.must;
-            row.aim = p.aim;
-        }
     }
 
     // ---- random views
@@ -481,10 +472,9 @@ private:
             const char* name;
             double fill;
             bool by_share;
-            double must, aim;
-        } distances[] = {{"2 pixels", 2.0 / options_.window_px, false, 200, 20},
-                         {"20 pixels", 20.0 / options_.window_px, true, 5, 1},
-                         {"5% of the height", 0.05, true, 50, 20}};
+        } distances[] = {{"2 pixels", 2.0 / options_.window_px, false},
+                         {"20 pixels", 20.0 / options_.window_px, true},
+                         {"5% of the height", 0.05, true}};
         std::vector<Judged> found;
         std::size_t done = 0;
         const std::size_t all = std::size(distances) * large.size() * direction_count();
@@ -510,14 +500,15 @@ private:
                         worst = models_[one.model]->name();
                     }
                 }
-                BenchRow row{std::string("kept at ") + distance.name + ", " + name_of(test), distance.by_share ? "%" : "triangles",
+                BenchRow row{std::string("kept at ") + distance.name + ", " + name_of(test),
+                             distance.by_share ? "%" : "triangles",
                              "the most, of " + worst + "; mean " + rounded(sum / count, 3) +
                                  (has_large ? "" : "; no mesh has more than " + grouped(large_mesh) + " triangles"),
-                             most, {}, {}, false, distance.by_share ? 1 : 0};
-                if (test == promised) {
-                    row.must = distance.must;
-                    row.aim = distance.aim;
-                }
+                             most,
+                             {},
+                             false,
+                             distance.by_share ? 1 : 0};
+                if (test == promised) row.target = target(std::string("kept at ") + distance.name + ", " + row.unit);
                 result_.rows.push_back(std::move(row));
             }
             found.insert(found.end(), here.begin(), here.end());
@@ -673,10 +664,15 @@ private:
                 const double px = safe[gaze > 0] = found->px[t][gaze > 0 ? 0 : 1]; // as `gazes` has them
                 if (auto added = add_line(test, px, rounded(px, 2) + " px", "safe: " + gaze_name(gaze)); !added) return added;
             }
-            result_.rows.push_back({"safe " + name_of(test) + " at " + gaze_name(gaze_degrees) + " over that at the fovea", "x",
-                                    rounded(safe[1], 3) + " px over " + rounded(safe[0], 3) +
-                                        " px: no one tolerance does for both; the perceptual threshold is 1 everywhere",
-                                    safe[1] / safe[0], {}, {}, true, 1});
+            result_.rows.push_back(
+                {"safe " + name_of(test) + " at " + gaze_name(gaze_degrees) + " over that at the fovea",
+                 "x",
+                 rounded(safe[1], 3) + " px over " + rounded(safe[0], 3) +
+                     " px: no one tolerance does for both; the perceptual threshold is 1 everywhere",
+                 safe[1] / safe[0],
+                 {},
+                 true,
+                 1});
         }
         for (const FoldTest test : tests)
             if (auto added = add_line(test, 0, "threshold 1", "everywhere"); !added) return added;
@@ -686,7 +682,9 @@ private:
 
     // ---- models of sight
 
-    SensitivityBenchOptions sensitivity_options() const { return {options_.reference, options_.pictures, options_.quick}; }
+    SensitivityBenchOptions sensitivity_options() const {
+        return {options_.reference, options_.pictures, options_.quick, options_.targets};
+    }
     Result<void> add(Result<std::vector<BenchRow>> rows) {
         if (!rows) return rows.error();
         std::move(rows->begin(), rows->end(), std::back_inserter(result_.rows));
@@ -721,7 +719,9 @@ private:
         const Pinned pinned;
         const double rate = full_tests_per_second((*scene)->tree, **criterion, viewpoint_of(**scene, what, Purpose::mesh), {},
                                                   options_.quick ? 10 : 60);
-        result_.rows.push_back({"full tests from scratch, " + name_of(test), "M/s", model.name() + ", every node, one thread", rate / 1e6, 60, 200, true, 1});
+        result_.rows.push_back({"full tests from scratch, " + name_of(test), "M/s",
+                                model.name() + ", every node, one thread", rate / 1e6, target("full tests, M/s"), true,
+                                1});
         return {};
     }
 
@@ -770,8 +770,9 @@ private:
             changes.push_back(static_cast<double>(stats.folds + stats.unfolds));
         }
         result_.rows.push_back({std::string("moving light, ") + name + ", 1 degree a frame", "ms",
-                                model.name() + ", " + grouped(aimed.triangles) + " triangles active, " + rounded(median(changes), 3) + " changes a frame",
-                                median(milliseconds), 2, 0.3, false, 2});
+                                model.name() + ", " + grouped(aimed.triangles) + " triangles active, " +
+                                    rounded(median(changes), 3) + " changes a frame",
+                                median(milliseconds), target("moving light, ms"), false, 2});
         return {};
     }
 

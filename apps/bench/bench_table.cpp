@@ -1,6 +1,5 @@
 #include "bench_table.h"
 
-#include <array>
 #include <cstdio>
 
 #include "terminal.h"
@@ -12,31 +11,27 @@ bool holds(const BenchRow& row, double bound) {
     return row.more_is_better ? *row.value >= bound : *row.value <= bound;
 }
 
-std::string fixed(double value, int decimals) {
-    std::array<char, 64> text;
-    std::snprintf(text.data(), text.size(), "%.*f", decimals, value);
-    return text.data();
-}
-
 std::string bound_text(const std::optional<double>& bound) {
     return bound ? rounded(*bound, 4) : "";
 }
 
+// Of the two the better that is met, or else the one that had to be.
 std::string verdict(const BenchRow& row) {
-    if (!row.value || (!row.must && !row.aim)) return "";
-    if (row.aim && holds(row, *row.aim)) return "aim";
-    if (!row.must) return "not yet";
-    return holds(row, *row.must) ? "must" : "NO";
+    const auto& [must, aim] = row.target;
+    if (!row.value || (!must && !aim)) return "";
+    if (aim && holds(row, *aim)) return "aim met";
+    if (!must) return "aim missed";
+    return holds(row, *must) ? "must met" : "must missed";
 }
 
 } // namespace
 
 void print(const std::string& title, const std::vector<BenchRow>& rows) {
     std::printf("%s\n\n", title.c_str());
-    std::vector<std::vector<std::string>> table = {{"measure", "measured", "unit", "must", "aim", "holds"}};
+    std::vector<std::vector<std::string>> table = {{"measure", "measured", "unit", "must", "aim", "verdict"}};
     for (const BenchRow& row : rows)
-        table.push_back({row.name, row.value ? fixed(*row.value, row.decimals) : "not available", row.unit, bound_text(row.must),
-                         bound_text(row.aim), verdict(row)});
+        table.push_back({row.name, row.value ? with_decimals(*row.value, row.decimals) : "not available", row.unit, bound_text(row.target.must),
+                         bound_text(row.target.aim), verdict(row)});
     print_table(table);
     std::printf("\n");
     for (const BenchRow& row : rows)
@@ -53,10 +48,10 @@ Json to_json(const std::vector<BenchRow>& rows) {
         json.push_back({{"name", row.name},
                         {"value", bound(row.value)},
                         {"unit", row.unit},
-                        {"must", bound(row.must)},
-                        {"aim", bound(row.aim)},
-                        {"holds_must", held(row, row.must)},
-                        {"holds_aim", held(row, row.aim)},
+                        {"must", bound(row.target.must)},
+                        {"aim", bound(row.target.aim)},
+                        {"holds_must", held(row, row.target.must)},
+                        {"holds_aim", held(row, row.target.aim)},
                         {"note", row.note}});
     return json;
 }

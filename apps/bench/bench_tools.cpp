@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 
 #include <sample_mesh.h>
@@ -14,6 +15,7 @@ namespace unseen::app {
 namespace {
 
 namespace fs = std::filesystem;
+constexpr double idle_load = 0.5; // of a machine that does nothing else, with what has just been built or copied
 constexpr double active_tolerance = 0.002; // how near a threshold must come to the triangles asked for
 
 } // namespace
@@ -53,6 +55,27 @@ fs::path find_in_checkout(const fs::path& relative) {
         }
     }
     return {};
+}
+
+std::string command_beside(const std::string& name) {
+    const fs::path file = fs::path(own_executable()).parent_path() / name;
+    std::error_code unknown;
+    return fs::exists(file, unknown) ? file.string() : name;
+}
+
+bool MachineLoad::is_high() const { return average > idle_load; }
+
+std::string MachineLoad::advice() const {
+    if (!is_high()) return {};
+    return "the machine was busy when this began (load average " + rounded(average, 3) +
+           "): times and rates come out worse than they are. End other programs, wait a minute and measure again; "
+           "counts, memory and pixels "
+           "are as on an idle machine.";
+}
+
+MachineLoad machine_load() {
+    double average = 0;
+    return {getloadavg(&average, 1) == 1 ? average : std::numeric_limits<double>::quiet_NaN()};
 }
 
 std::vector<std::string> installed_meshes() {

@@ -37,6 +37,18 @@ inline constexpr const char* dragon_file = "build/quickstart/npm/node_modules/st
 // A file or folder of the checkout that the current folder or this program is in; empty: there is none.
 std::filesystem::path find_in_checkout(const std::filesystem::path& relative);
 
+// A command of the same build: its file beside this program, or else its name, to be found by PATH.
+std::string command_beside(const std::string& name);
+
+// How busy the machine is with other things: the load average of the last minute, to be asked for before the work begins.
+struct MachineLoad {
+    double average = 0; // NaN: unknown
+
+    bool is_high() const;
+    std::string advice() const; // what to do about it, in a sentence; empty where it is not high
+};
+MachineLoad machine_load();
+
 // The bunny and the dragon, where ./quickstart or the package glmark2-data has put them; and what stands in where neither is there: a tree
 // of a sphere with bumps.
 std::vector<std::string> installed_meshes();

@@ -19,8 +19,8 @@
 #include <perception/display.h>
 
 #include "bench_tools.h"
+#include "log_log_plot.h"
 #include "perception_bench.h"
-#include "plot.h"
 #include "progress_bar.h"
 #include "terminal.h"
 
@@ -154,7 +154,8 @@ Result<Stimulus> stimulus_of(const Reference& reference, const Reference::Row& r
     return s;
 }
 
-Result<void> compare(const Reference& reference, std::initializer_list<Compared> models, double must, std::vector<BenchRow>& rows) {
+Result<void> compare(const Reference& reference, std::initializer_list<Compared> models, const Target& target,
+                     std::vector<BenchRow>& rows) {
     const auto frequency = reference.column({"frequency", "s_frequency"}), luminance = reference.column({"luminance"}),
                area = reference.column({"area"}), eccentricity = reference.column({"eccentricity"}),
                temporal = reference.column({"temporal", "t_frequency"}), field = reference.column({"field", "vis_field"});
@@ -162,7 +163,8 @@ Result<void> compare(const Reference& reference, std::initializer_list<Compared>
         const auto column = reference.column(compared.columns);
         const std::string name = "deviation of " + std::string(perception::name(compared.model));
         if (!column || !frequency || !luminance || !area || !eccentricity) {
-            rows.push_back({name, "relative", "'" + reference.file.string() + "' has no such column", {}, must, {}, false, 0});
+            rows.push_back(
+                {name, "1e-9", "'" + reference.file.string() + "' has no such column", {}, target, false, 3});
             continue;
         }
         Deviation deviation;
@@ -174,9 +176,10 @@ Result<void> compare(const Reference& reference, std::initializer_list<Compared>
             if (!value) return value.error();
             deviation.add(perception::sensitivity(compared.model, *s), *value, compared.scale);
         }
-        rows.push_back({name, "1e-9", std::to_string(deviation.values) + " values of " + reference.file.filename().string() +
-                                          ", beyond the rounding of their last digit",
-                        deviation.largest * 1e9, must * 1e9, {}, false, 3});
+        rows.push_back({name, "1e-9",
+                        std::to_string(deviation.values) + " values of " + reference.file.filename().string() +
+                            ", beyond the rounding of their last digit",
+                        deviation.largest * 1e9, target, false, 3});
     }
     return {};
 }
@@ -223,7 +226,7 @@ Result<void> plot_models(const fs::path& file) {
         }
         ++colour;
     }
-    return perception::write_image(file, draw(plot));
+    return write_plot(file, plot);
 }
 
 // ---- observers
@@ -285,12 +288,12 @@ Result<void> plot_observer(const fs::path& file, const calibration::Procedure& p
         plot.curves.push_back(std::move(found));
         ++colour;
     }
-    return perception::write_image(file, draw(plot));
+    return write_plot(file, plot);
 }
 
-BenchRow observer_row(const std::string& name, const std::vector<ObserverErrors>& errors, bool of_worst_run, std::optional<double> must,
-                      std::optional<double> aim) {
-    BenchRow row{name, "dB", "", 0, must, aim, false, 2};
+BenchRow observer_row(const std::string& name, const std::vector<ObserverErrors>& errors, bool of_worst_run,
+                      const Target& target) {
+    BenchRow row{name, "dB", "", 0, target, false, 2};
     for (const ObserverErrors& e : errors) {
         row.value = std::max(*row.value, of_worst_run ? e.worst : e.mean);
         row.note += (row.note.empty() ? "" : "; ") + e.observer + " " + rounded(of_worst_run ? e.worst : e.mean, 3);
@@ -302,28 +305,37 @@ BenchRow observer_row(const std::string& name, const std::vector<ObserverErrors>
 
 Result<std::vector<BenchRow>> bench_csf(const SensitivityBenchOptions& options) {
     std::vector<BenchRow> rows;
-    constexpr double castle_must = 1e-6, classical_must = 1e-9, table_must = 0.5; // relative, relative, %
+    const auto target = [&](std::string_view figure) { return options.targets.of("perception", figure); };
+    const Target castle = target("deviation of castle and stela, 1e-9"),
+                 classical = target("deviation of the classical models, 1e-9");
     const char* const none = "no reference figures: run it in the checkout, or name their folder by --reference";
     if (const auto reference = find_reference(options.reference, {"csf_golden.csv", "csf_castle_stela_grid.csv"})) {
-        const auto compared =
-            compare(*reference, {{CsfModel::castle, {"castle", "S_castle_ach"}}, {CsfModel::stela, {"stela", "S_stela"}}}, castle_must, rows);
+        const auto compared = compare(
+            *reference, {{CsfModel::castle, {"castle", "S_castle_ach"}}, {CsfModel::stela, {"stela", "S_stela"}}},
+            castle, rows);
         if (!compared) return compared.error();
-    } else rows.push_back({"deviation of castle and stela", "relative", none, {}, castle_must, {}, false, 0});
+    } else rows.push_back({"deviation of castle and stela", "1e-9", none, {}, castle, false, 3});
     const double scale = 1 / perception::relative_models_peak;
     if (const auto reference = find_reference(options.reference, {"csf_classical_golden.csv", "csf_classical_grid.csv"})) {
-        const auto compared = compare(
-            *reference,
-            {{CsfModel::daly, {"daly", "daly93"}},
-             {CsfModel::barten_1989, {"barten_1989", "barten89_pdiff"}, 1, false},
-             {CsfModel::barten_1999, {"barten_1999", "barten99"}, 1, false},
-             {CsfModel::barten_2004, {"barten_2004", "barten04"}, 1, false},
-             {CsfModel::mannos_sakrison, {"mannos_sakrison"}, scale * mannos_sakrison_peak, false},
-             {CsfModel::rushmeier, {"rushmeier"}, scale * rushmeier_peak, false}},
-            classical_must, rows);
+        const auto compared =
+            compare(*reference,
+                    {{CsfModel::daly, {"daly", "daly93"}},
+                     {CsfModel::barten_1989, {"barten_1989", "barten89_pdiff"}, 1, false},
+                     {CsfModel::barten_1999, {"barten_1999", "barten99"}, 1, false},
+                     {CsfModel::barten_2004, {"barten_2004", "barten04"}, 1, false},
+                     {CsfModel::mannos_sakrison, {"mannos_sakrison"}, scale * mannos_sakrison_peak, false},
+                     {CsfModel::rushmeier, {"rushmeier"}, scale * rushmeier_peak, false}},
+                    classical, rows);
         if (!compared) return compared.error();
-    } else rows.push_back({"deviation of the classical models", "relative", none, {}, classical_must, {}, false, 0});
+    } else rows.push_back({"deviation of the classical models", "1e-9", none, {}, classical, false, 3});
 
-    BenchRow tables{"error of the tables", "%", "the largest of all models in random places where S > 1: ", 0, table_must, {}, false, 2};
+    BenchRow tables{"error of the tables",
+                    "%",
+                    "the largest of all models in random places where S > 1: ",
+                    0,
+                    target("error of the tables, %"),
+                    false,
+                    2};
     ProgressBar bar("tables");
     std::size_t done = 0;
     for (const CsfModel model : perception::csf_models) {
@@ -373,10 +385,12 @@ Result<std::vector<BenchRow>> bench_observers(const SensitivityBenchOptions& opt
         at_many.push_back(std::move(of_many));
     }
     const std::string of_runs = ", mean of " + std::to_string(runs) + (runs > 1 ? " runs" : " run") + ", the worst observer";
-    return std::vector<BenchRow>{observer_row("calibration in 400 trials" + of_runs, at_many, false, 1.5, {}),
-                                 observer_row("calibration in 400 trials, the worst run", at_many, true, 1.5, {}),
-                                 observer_row("calibration in 200 trials" + of_runs, at_few, false, {}, 1),
-                                 observer_row("calibration in 200 trials, the worst run", at_few, true, {}, 1)};
+    const Target after_many = options.targets.of("perception", "calibration in 400 trials, dB"),
+                 after_few = options.targets.of("perception", "calibration in 200 trials, dB");
+    return std::vector<BenchRow>{observer_row("calibration in 400 trials" + of_runs, at_many, false, after_many),
+                                 observer_row("calibration in 400 trials, the worst run", at_many, true, after_many),
+                                 observer_row("calibration in 200 trials" + of_runs, at_few, false, after_few),
+                                 observer_row("calibration in 200 trials, the worst run", at_few, true, after_few)};
 }
 
 } // namespace unseen::app
