@@ -17,7 +17,7 @@
 #include <vdtree/criteria.h>
 #include <vdtree/cut.h>
 #include <vdtree/fold_errors.h>
-#include <vdtree/mesh_io.h>
+#include <meshio/mesh_io.h>
 #include <vdtree/tree_io.h>
 
 #include "bench_tools.h"
@@ -148,11 +148,11 @@ Result<fs::path> mesh_file(const Workshop& shop, const NamedMesh& base, std::uin
     if (fs::exists(file, unknown)) return file;
     Result<void> written;
     if (is_base) {
-        written = vdtree::write_mesh(file, base.mesh.view());
+        written = meshio::write_mesh(file, base.mesh.view());
     } else {
         const auto mesh = mesh_of_size(base.mesh, triangles);
         if (!mesh) return mesh.error();
-        written = vdtree::write_mesh(file, mesh->view());
+        written = meshio::write_mesh(file, mesh->view());
     }
     if (!written) return written.error();
     return file;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include <vdtree/atomic_file.h>
+#include <vdtree/internal/atomic_file.h>
 
 namespace unseen::app {
 

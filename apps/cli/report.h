@@ -7,7 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include <vdtree/atomic_file.h>
+#include <vdtree/internal/atomic_file.h>
 #include <vdtree/result.h>
 #include <vdtree/vertex_tree.h>
 

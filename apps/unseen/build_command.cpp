@@ -32,7 +32,7 @@ namespace {
 struct BuildArguments {
     std::string mesh, out, json;
     vdtree::ClustererKind clusterer = vdtree::ClustererKind::quadric;
-    vdtree::ColourEncoding colours = vdtree::ColourEncoding::srgb;
+    meshio::ColourEncoding colours = meshio::ColourEncoding::srgb;
     int threads = 0;
     double memory_gib = 0; // 0: no limit
     bool fold_errors = false;
@@ -73,8 +73,8 @@ void print(const vdtree::VertexTree& tree, double seconds) {
                  {"built in", rounded(seconds, 3) + " s"}});
 }
 
-vdtree::ReadOptions reading(const BuildArguments& a) {
-    vdtree::ReadOptions options;
+meshio::ReadOptions reading(const BuildArguments& a) {
+    meshio::ReadOptions options;
     options.colours = a.colours;
     return options;
 }
@@ -107,10 +107,10 @@ Result<void> check_names(const BuildArguments& a) {
 }
 
 // Without words.
-Result<vdtree::ReadResult> read_quietly(const std::filesystem::path& file, const vdtree::ReadOptions& options, const TextureOptions& texture) {
-    vdtree::ReadOptions reading = options;
+Result<meshio::ReadResult> read_quietly(const std::filesystem::path& file, const meshio::ReadOptions& options, const TextureOptions& texture) {
+    meshio::ReadOptions reading = options;
     reading.materials = texture.file.empty() && !texture.is_left_out;
-    auto read = vdtree::read_mesh(file, reading);
+    auto read = meshio::read_mesh(file, reading);
     if (!read) return read;
     if (const auto laid = lay_texture(file, *read, texture); !laid) return laid.error();
     return read;
@@ -118,10 +118,10 @@ Result<vdtree::ReadResult> read_quietly(const std::filesystem::path& file, const
 
 // The mesh, if it can be built within the limit of memory. `read_file` reads it, with or without words.
 template <class ReadFile>
-Result<vdtree::ReadResult> read_source(const BuildArguments& a, ProcessTeam* team, ReadFile&& read_file) {
+Result<meshio::ReadResult> read_source(const BuildArguments& a, ProcessTeam* team, ReadFile&& read_file) {
     const auto limit = MemoryLimit::set(a.memory_gib, a.out, a.memory_gib > 0 ? threads(a, team) : 1); // else the team may start meanwhile
     if (!limit) return limit.error();
-    Result<vdtree::ReadResult> read = read_file(a.mesh, reading(a), a.texture);
+    Result<meshio::ReadResult> read = read_file(a.mesh, reading(a), a.texture);
     if (!read) {
         const std::string disk_full = disk_full_complaint(); // to a reader, that is memory as well
         return disk_full.empty() ? read.error() : Error{ErrorCode::io_failure, disk_full};
@@ -134,7 +134,7 @@ Result<vdtree::ReadResult> read_source(const BuildArguments& a, ProcessTeam* tea
 // What there has to be before anything is built.
 struct Source {
     JsonReport report;
-    vdtree::ReadResult read;
+    meshio::ReadResult read;
 };
 
 Result<Source> open_source(const BuildArguments& a, ProcessTeam* team) {
@@ -149,7 +149,7 @@ Result<Source> open_source(const BuildArguments& a, ProcessTeam* team) {
     return Source{std::move(*report), std::move(*read)};
 }
 
-Result<vdtree::VertexTree> build(const BuildArguments& a, vdtree::ReadResult&& read, ProcessTeam* team) {
+Result<vdtree::VertexTree> build(const BuildArguments& a, meshio::ReadResult&& read, ProcessTeam* team) {
     auto tree = build_tree_of(std::move(read), building(a, team));
     if (team && tree) team->leave(); // else the others go when this one ends
     return tree;
@@ -224,8 +224,8 @@ Command build_command(CLI::App& app) {
     add_choice<vdtree::ClustererKind, vdtree::ClustererKind>(
         *verb, "--clusterer", a->clusterer, {{"quadric", vdtree::ClustererKind::quadric}, {"octree", vdtree::ClustererKind::octree}},
         "quadric (best; default) or octree (fast)");
-    add_choice<vdtree::ColourEncoding, vdtree::ColourEncoding>(
-        *verb, "--colours", a->colours, {{"srgb", vdtree::ColourEncoding::srgb}, {"linear", vdtree::ColourEncoding::linear}},
+    add_choice<meshio::ColourEncoding, meshio::ColourEncoding>(
+        *verb, "--colours", a->colours, {{"srgb", meshio::ColourEncoding::srgb}, {"linear", meshio::ColourEncoding::linear}},
         "How the file's colours are encoded: srgb (default) or linear");
     verb->add_option("--threads", a->threads, "Threads of each process; the tree is the same (default: all cores)")
         ->type_name("N")

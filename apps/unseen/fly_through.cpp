@@ -10,7 +10,7 @@
 
 #include <panel_plot.h>
 #include <perception/image.h>
-#include <vdtree/atomic_file.h>
+#include <vdtree/internal/atomic_file.h>
 
 #include "camera_path.h"
 #include "frame_image.h"

@@ -3,7 +3,7 @@
 #include <memory>
 
 #include <subdivide.h>
-#include <vdtree/mesh_io.h>
+#include <meshio/mesh_io.h>
 
 #include "model_file.h"
 #include "options.h"
@@ -32,7 +32,7 @@ Result<vdtree::Mesh> subdivide_with_progress(vdtree::Mesh mesh, const SubdivideA
 
 Result<void> write(const std::string& file, const vdtree::Mesh& mesh) {
     ProgressBar bar("writing " + file);
-    return vdtree::write_mesh(file, mesh.view(), std::ref(bar));
+    return meshio::write_mesh(file, mesh.view(), std::ref(bar));
 }
 
 Result<int> run(const SubdivideArguments& a) {

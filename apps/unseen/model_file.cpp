@@ -7,25 +7,25 @@
 
 namespace unseen::app {
 
-Result<vdtree::ReadResult> read_mesh_file(const std::filesystem::path& file, const vdtree::ReadOptions& options) {
+Result<meshio::ReadResult> read_mesh_file(const std::filesystem::path& file, const meshio::ReadOptions& options) {
     ProgressBar bar("reading " + file.filename().string());
-    vdtree::ReadOptions shown = options;
+    meshio::ReadOptions shown = options;
     shown.progress = std::ref(bar);
-    auto read = vdtree::read_mesh(file, shown);
+    auto read = meshio::read_mesh(file, shown);
     if (!read) return read;
     for (const std::string& warning : read->warnings) print_warning(file.string() + ": " + warning);
     return read;
 }
 
-Result<vdtree::VertexTree> build_tree_of(vdtree::ReadResult&& read, vdtree::BuildOptions options) {
+Result<vdtree::VertexTree> build_tree_of(meshio::ReadResult&& read, vdtree::BuildOptions options) {
     ProgressBar bar("building");
     options.progress = std::ref(bar);
     options.dropped_before = read.dropped_triangles;
     return vdtree::build_tree(read.mesh.view(), options);
 }
 
-Result<vdtree::ReadResult> read_textured_mesh(const std::filesystem::path& file, const vdtree::ReadOptions& options, const TextureOptions& texture) {
-    vdtree::ReadOptions reading = options;
+Result<meshio::ReadResult> read_textured_mesh(const std::filesystem::path& file, const meshio::ReadOptions& options, const TextureOptions& texture) {
+    meshio::ReadOptions reading = options;
     reading.materials = texture.file.empty() && !texture.is_left_out;
     auto read = read_mesh_file(file, reading);
     if (!read) return read;

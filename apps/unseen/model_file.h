@@ -4,7 +4,7 @@
 #include <filesystem>
 
 #include <vdtree/builder.h>
-#include <vdtree/mesh_io.h>
+#include <meshio/mesh_io.h>
 #include <vdtree/tree_io.h>
 
 #include "textures.h"
@@ -12,13 +12,13 @@
 namespace unseen::app {
 
 // A mesh as its reader returns it, with its warnings printed.
-Result<vdtree::ReadResult> read_mesh_file(const std::filesystem::path& file, const vdtree::ReadOptions& options = {});
+Result<meshio::ReadResult> read_mesh_file(const std::filesystem::path& file, const meshio::ReadOptions& options = {});
 
 // The tree of a mesh. Triangles that its reader dropped count as the tree's dropped ones.
-Result<vdtree::VertexTree> build_tree_of(vdtree::ReadResult&& read, vdtree::BuildOptions options);
+Result<vdtree::VertexTree> build_tree_of(meshio::ReadResult&& read, vdtree::BuildOptions options);
 
 // A mesh with its texture.
-Result<vdtree::ReadResult> read_textured_mesh(const std::filesystem::path& file, const vdtree::ReadOptions& options, const TextureOptions& texture);
+Result<meshio::ReadResult> read_textured_mesh(const std::filesystem::path& file, const meshio::ReadOptions& options, const TextureOptions& texture);
 
 // A tree file, or a mesh file with a note that its tree is built now. A tree has its texture, and takes no other.
 Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file, const TextureOptions& texture = {});

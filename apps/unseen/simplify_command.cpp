@@ -3,7 +3,7 @@
 #include <limits>
 #include <memory>
 
-#include <vdtree/mesh_io.h>
+#include <meshio/mesh_io.h>
 
 #include "fold_test.h"
 #include "output_files.h"
@@ -46,7 +46,7 @@ Result<int> run(SimplifyArguments& a) {
     }
 
     if (auto ok = report->prepare(to_json(result, nothing_drawn)); !ok) return ok.error();
-    if (auto ok = vdtree::write_mesh(a.out, mesh.view()); !ok) return ok.error();
+    if (auto ok = meshio::write_mesh(a.out, mesh.view()); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
     if (!report->is_on_stdout()) print(result, nothing_drawn);
     return exit_done;

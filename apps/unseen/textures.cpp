@@ -15,7 +15,7 @@ namespace unseen::app {
 namespace {
 
 using vdtree::Index;
-using vdtree::Material;
+using meshio::Material;
 using vdtree::Mesh;
 using vdtree::MeshRange;
 using vdtree::Texture;
@@ -29,12 +29,12 @@ std::string with_advice(std::string complaint) {
 constexpr std::size_t no_material = std::numeric_limits<std::size_t>::max(), unused = no_material - 1;
 
 // By triangle: the number of its material, or of the first one that looks the same.
-std::vector<std::size_t> materials_of_triangles(const vdtree::ReadResult& read) {
+std::vector<std::size_t> materials_of_triangles(const meshio::ReadResult& read) {
     using Look = std::tuple<std::filesystem::path, const std::string*, vdtree::Wrap, vdtree::Wrap, std::array<float, 4>>;
     std::map<Look, std::size_t> first;
     std::map<std::string, std::size_t> numbers;
     for (std::size_t i = 0; i < read.materials.size(); ++i) {
-        const Material& m = read.materials[i];
+        const meshio::Material& m = read.materials[i];
         const Look look{m.image, m.image_bytes.get(), m.wrap_u, m.wrap_v, {m.colour.r, m.colour.g, m.colour.b, m.colour.a}};
         numbers.emplace(m.name, first.try_emplace(look, i).first->second);
     }
@@ -74,7 +74,7 @@ class Images {
 public:
     Images(std::filesystem::path mesh_file, bool from_top) : mesh_file_(std::move(mesh_file)), from_top_(from_top) {}
 
-    Result<const Texture*> of(const Material& material) {
+    Result<const Texture*> of(const meshio::Material& material) {
         const bool is_embedded = material.image.empty();
         const std::filesystem::path file =
             is_embedded ? std::filesystem::path(mesh_file_.string() + ": the image of material '" + material.name + "'") : mesh_file_.parent_path() / material.image;
@@ -113,7 +113,7 @@ void thin_vertices(Mesh& mesh, const std::vector<Material>& materials, const std
     }
 }
 
-Result<void> check_uvs(const std::filesystem::path& mesh_file, const vdtree::ReadResult& read) {
+Result<void> check_uvs(const std::filesystem::path& mesh_file, const meshio::ReadResult& read) {
     if (read.mesh.uvs.empty())
         return Error{ErrorCode::malformed_data, with_advice(mesh_file.string() + ": it has a texture but no texture coordinates, which say where it lies")};
     if (read.bad_uv)
@@ -122,7 +122,7 @@ Result<void> check_uvs(const std::filesystem::path& mesh_file, const vdtree::Rea
     return {};
 }
 
-Result<void> lay_one(const std::filesystem::path& mesh_file, vdtree::ReadResult& read, const std::string& image) {
+Result<void> lay_one(const std::filesystem::path& mesh_file, meshio::ReadResult& read, const std::string& image) {
     if (const auto ok = check_uvs(mesh_file, read); !ok) return ok;
     auto texture = read_texture(image, read.uvs_from_top);
     if (!texture) return texture.error();
@@ -131,7 +131,7 @@ Result<void> lay_one(const std::filesystem::path& mesh_file, vdtree::ReadResult&
 }
 
 // Materials without an image, and triangles without a material, get a white one.
-Result<void> lay_materials(const std::filesystem::path& mesh_file, vdtree::ReadResult& read) {
+Result<void> lay_materials(const std::filesystem::path& mesh_file, meshio::ReadResult& read) {
     Mesh& mesh = read.mesh;
     const std::vector<std::size_t> of_triangle = materials_of_triangles(read);
     const auto has_image = [&](std::size_t m) { return m != no_material && read.materials[m].has_image(); };
@@ -180,7 +180,7 @@ Result<void> lay_materials(const std::filesystem::path& mesh_file, vdtree::ReadR
 
 } // namespace
 
-Result<void> lay_texture(const std::filesystem::path& mesh_file, vdtree::ReadResult& read, const TextureOptions& options) {
+Result<void> lay_texture(const std::filesystem::path& mesh_file, meshio::ReadResult& read, const TextureOptions& options) {
     if (options.is_left_out) return {};
     return options.file.empty() ? lay_materials(mesh_file, read) : lay_one(mesh_file, read, options.file);
 }

@@ -10,7 +10,7 @@
 #include <fstream>
 #include <set>
 
-#include <vdtree/atomic_file.h>
+#include <vdtree/internal/atomic_file.h>
 
 namespace unseen::calibration {
 namespace {

@@ -30,7 +30,7 @@
 #include <ImfOutputFile.h>
 #include <png.h>
 
-#include <vdtree/atomic_file.h>
+#include <vdtree/internal/atomic_file.h>
 
 namespace unseen::perception {
 namespace {

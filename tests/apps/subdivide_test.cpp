@@ -9,7 +9,7 @@
 
 #include "shapes.h"
 #include "subdivide.h"
-#include "surface.h"
+#include "build/surface.h"
 
 namespace {
 

@@ -7,7 +7,7 @@
 
 #include <perception/display.h>
 #include <vdtree/builder.h>
-#include <vdtree/mesh_io.h>
+#include <meshio/mesh_io.h>
 
 #include "sample_mesh.h"
 #include "subdivide.h"
@@ -28,7 +28,7 @@ T expect(Result<T> result) {
 const vdtree::Mesh& mesh() {
     static const vdtree::Mesh loaded = [] {
         const char* file = std::getenv("UNSEEN_BENCH_MESH");
-        return file ? expect(vdtree::read_mesh(file)).mesh : app::bumpy_sphere(224);
+        return file ? expect(meshio::read_mesh(file)).mesh : app::bumpy_sphere(224);
     }();
     return loaded;
 }

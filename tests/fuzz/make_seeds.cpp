@@ -8,7 +8,7 @@
 #include <string>
 
 #include <vdtree/builder.h>
-#include <vdtree/mesh_io.h>
+#include <meshio/mesh_io.h>
 #include <vdtree/tree_io.h>
 
 #include "built.h"
@@ -40,7 +40,7 @@ void make_meshes(const fs::path& folder) {
     const Mesh mesh = shapes::with_attributes(shapes::icosphere(1));
     for (const auto& [ending, reader] : {std::pair(".ply", '\0'), std::pair(".obj", '\1'), std::pair(".glb", '\5')}) {
         const fs::path plain = folder / ("plain" + std::string(ending));
-        expect(write_mesh(plain, mesh.view()));
+        expect(meshio::write_mesh(plain, mesh.view()));
         write_for_reader(folder / ("mesh" + std::string(ending)), reader, plain);
         fs::remove(plain);
     }

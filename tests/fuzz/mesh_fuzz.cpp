@@ -18,7 +18,7 @@ constexpr const char* names[] = {"fuzz.ply", "fuzz.obj", "fuzz.off", "fuzz.stl",
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     if (size == 0) return 0;
     const std::string_view bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
-    const auto result = unseen::vdtree::read_mesh_bytes(bytes, names[data[0] % std::size(names)]);
+    const auto result = unseen::meshio::read_mesh_bytes(bytes, names[data[0] % std::size(names)]);
     if (!result) {
         if (result.error().message.empty()) std::abort();
         return 0;

@@ -12,7 +12,7 @@
 
 #include <vdtree/builder.h>
 #include <vdtree/cut.h>
-#include <vdtree/mesh_io.h>
+#include <meshio/mesh_io.h>
 #include <vdtree/tree_io.h>
 
 #include "built.h"
@@ -141,7 +141,7 @@ TEST_F(LuebkeHallen, EqualsItsFormula) {
 TEST_F(LuebkeHallen, EqualsItsFormulaOnTheBunny) {
     const char* const file = "/usr/share/glmark2/models/bunny.obj"; // of Debian's package glmark2-data
     if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not there";
-    expect_as_tight_on_screen(*vdtree::build_tree(vdtree::read_mesh(file)->mesh.view()));
+    expect_as_tight_on_screen(*vdtree::build_tree(meshio::read_mesh(file)->mesh.view()));
 }
 
 TEST_F(LuebkeHallen, EqualsItsFormulaOnAFurtherMesh) {
@@ -149,7 +149,7 @@ TEST_F(LuebkeHallen, EqualsItsFormulaOnAFurtherMesh) {
     const auto found = std::find_if(files.begin(), files.end(), [](const auto& file) { return file.filename().string().starts_with("horse."); });
     if (found == files.end()) GTEST_SKIP() << "UNSEEN_EXTRA_MESHES names no folder with a horse";
     const support::TempFolder scratch;
-    const auto read = vdtree::read_mesh(support::uncompressed(*found, scratch.path()));
+    const auto read = meshio::read_mesh(support::uncompressed(*found, scratch.path()));
     ASSERT_TRUE(read) << read.error().message;
     expect_as_tight_on_screen(*vdtree::build_tree(read->mesh.view()));
 }

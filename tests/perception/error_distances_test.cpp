@@ -12,7 +12,7 @@
 
 #include "built.h"
 #include "shapes.h"
-#include "vertex_tree_data.h"
+#include "tree/vertex_tree_data.h"
 
 namespace unseen::perception {
 namespace {

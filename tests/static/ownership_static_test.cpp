@@ -8,7 +8,7 @@
 #include <vdtree/builder.h>
 #include <vdtree/cut.h>
 #include <vdtree/function_ref.h>
-#include <vdtree/mesh_io.h>
+#include <meshio/mesh_io.h>
 
 namespace unseen::vdtree {
 namespace {

@@ -6,8 +6,8 @@
 
 #include <vdtree/builder.h>
 
-#include "surface.h"
-#include "vertex_tree_data.h"
+#include "build/surface.h"
+#include "tree/vertex_tree_data.h"
 
 namespace unseen::support {
 

@@ -9,7 +9,7 @@
 
 #include <vdtree/cut.h>
 
-#include "fold_tester.h"
+#include "cut/kernel/fold_tester.h"
 #include "sound.h"
 
 namespace unseen::support {

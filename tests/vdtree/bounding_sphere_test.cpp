@@ -1,5 +1,5 @@
 // Enclosing spheres against CGAL's exact smallest ones, against exact containment, and how tight those of a tree are.
-#include "bounding_sphere.h"
+#include "build/bounding_sphere.h"
 
 #include <algorithm>
 #include <cmath>

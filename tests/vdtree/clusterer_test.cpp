@@ -20,10 +20,10 @@
 #include <tbb/global_control.h>
 
 #include "clustering_tools.h"
-#include "help_cluster.h"
-#include "quadric_contraction.h"
+#include "build/help_cluster.h"
+#include "build/quadric_contraction.h"
 #include "shapes.h"
-#include "surface.h"
+#include "build/surface.h"
 
 namespace unseen::vdtree {
 namespace {

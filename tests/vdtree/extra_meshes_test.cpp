@@ -13,7 +13,7 @@
 
 #include <vdtree/criteria.h>
 #include <vdtree/cut.h>
-#include <vdtree/mesh_io.h>
+#include <meshio/mesh_io.h>
 #include <vdtree/tree_io.h>
 
 #include "exact.h"
@@ -87,7 +87,7 @@ TEST_P(ExtraMesh, BuildsVerifiesAndUnfolds) {
     const support::TempFolder scratch;
     const auto file = support::uncompressed(GetParam(), scratch.path());
     ASSERT_FALSE(file.empty()) << "the program zstd cannot unpack " << GetParam();
-    const auto read = read_mesh(file);
+    const auto read = meshio::read_mesh(file);
     if (!read) {
         // Only files that are there to be refused may be; which of them, malformed_mesh_test knows.
         ASSERT_EQ(GetParam().parent_path().filename(), "malformed") << read.error().message;

@@ -20,7 +20,7 @@
 #include "shapes.h"
 #include "sound.h"
 #include "temp_folder.h"
-#include "vertex_tree_data.h"
+#include "tree/vertex_tree_data.h"
 
 namespace unseen::vdtree {
 namespace {

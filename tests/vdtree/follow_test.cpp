@@ -17,9 +17,9 @@
 
 #include <vdtree/builder.h>
 
-#include "fold_tester.h"
+#include "cut/kernel/fold_tester.h"
 #include "follow_tools.h"
-#include "index_buffer.h"
+#include "cut/index_buffer.h"
 #include "shapes.h"
 #include "sound.h"
 #include "tree_checks.h"

@@ -13,7 +13,7 @@
 #include <vdtree/builder.h>
 #include <vdtree/cut.h>
 
-#include "lit_kernel.h"
+#include "cut/kernel/lit_kernel.h"
 #include "shapes.h"
 #include "sound.h"
 #include "tree_checks.h"

@@ -1,5 +1,5 @@
 // Files that lie, end early or were damaged: one clear sentence, no crash, no allocation out of proportion.
-#include <vdtree/mesh_io.h>
+#include <meshio/mesh_io.h>
 
 #include "mesh_files.h"
 #include "mesh_readers.h"
@@ -58,7 +58,7 @@ Result<ReadResult> read_exactly(const std::string& bytes, const std::string& nam
     const std::unique_ptr<char[]> copy(new char[bytes.size()]);
     std::copy(bytes.begin(), bytes.end(), copy.get());
     largest_allocation = 0;
-    Result<ReadResult> result = read_mesh_bytes({copy.get(), bytes.size()}, name);
+    Result<ReadResult> result = meshio::read_mesh_bytes({copy.get(), bytes.size()}, name);
     EXPECT_LE(largest_allocation.load(), allowed_bytes + allowed_bytes_per_byte * bytes.size()) << name;
     return result;
 }

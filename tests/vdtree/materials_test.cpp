@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include <vdtree/mesh_io.h>
+#include <meshio/mesh_io.h>
 
 #include "mesh_files.h"
 #include "temp_folder.h"
@@ -14,12 +14,12 @@ namespace {
 class Materials : public testing::Test {
 protected:
     void write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name, std::ios::binary) << text; }
-    Result<ReadResult> read(const std::string& mtl, const std::string& library = "m.mtl", ReadOptions options = {}) const {
+    Result<ReadResult> read(const std::string& mtl, const std::string& library = "m.mtl", meshio::ReadOptions options = {}) const {
         write("m.mtl", mtl);
         write("m.obj", "mtllib " + library + "\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n");
-        return read_mesh(folder_ / "m.obj", options);
+        return meshio::read_mesh(folder_ / "m.obj", options);
     }
-    Material first(const std::string& mtl) const {
+    meshio::Material first(const std::string& mtl) const {
         const auto result = read(mtl);
         if (!result) throw std::runtime_error(result.error().message);
         return result->materials.at(0);
@@ -32,7 +32,7 @@ protected:
 };
 
 TEST_F(Materials, OfObjectsAreRead) {
-    const Material plain = first("# by hand\nKd 0.1 0.1 0.1\nnewmtl a\nKd 1 0 0.5\nillum 2\nd 0.25\n");
+    const meshio::Material plain = first("# by hand\nKd 0.1 0.1 0.1\nnewmtl a\nKd 1 0 0.5\nillum 2\nd 0.25\n");
     EXPECT_EQ(plain.name, "a");
     EXPECT_NEAR(plain.colour.r, 1, 1e-6);
     EXPECT_NEAR(plain.colour.b, 0.2140411, 1e-5); // decoded from sRGB
@@ -43,7 +43,7 @@ TEST_F(Materials, OfObjectsAreRead) {
     EXPECT_EQ(first("newmtl a\nKd spectral f.rfl\n").colour, glm::vec4(1));
 
     EXPECT_EQ(first("newmtl a\nmap_Kd  my image.png \r\n").image, "my image.png");
-    const Material clamped = first("newmtl a\nmap_Kd -blendu on -mm 0 1 -s 2 3 -clamp on textures\\p.jpg\n");
+    const meshio::Material clamped = first("newmtl a\nmap_Kd -blendu on -mm 0 1 -s 2 3 -clamp on textures\\p.jpg\n");
     EXPECT_EQ(clamped.image, "textures/p.jpg");
     EXPECT_EQ(clamped.wrap_u, Wrap::clamp);
     EXPECT_EQ(clamped.wrap_v, Wrap::clamp);
@@ -81,7 +81,7 @@ TEST_F(Materials, ThatCannotBeReadAreNotedAndBadOnesAreNot) {
     ASSERT_TRUE(other);
     ASSERT_EQ(other->warnings.size(), 1u);
     EXPECT_NE(other->warnings[0].find("1 material is in no library that was read, the first 'a'"), std::string::npos) << other->warnings[0];
-    ReadOptions without;
+    meshio::ReadOptions without;
     without.materials = false;
     const auto result = read("newmtl a\nKd nan\n", "m.mtl", without);
     ASSERT_TRUE(result);
@@ -109,14 +109,14 @@ TEST_F(Materials, OfGltfShareTheirImage) {
                                mesh_files::gltf_triangle_data() + "  " + picture);
     };
     write("one.glb", glb(true));
-    const auto one = read_mesh(folder_ / "one.glb");
+    const auto one = meshio::read_mesh(folder_ / "one.glb");
     ASSERT_TRUE(one) << one.error().message;
     ASSERT_EQ(one->materials.size(), std::size_t{count});
     ASSERT_TRUE(one->materials[0].image_bytes);
     EXPECT_EQ(*one->materials[0].image_bytes, picture);
-    for (const Material& material : one->materials) EXPECT_EQ(material.image_bytes, one->materials[0].image_bytes);
+    for (const meshio::Material& material : one->materials) EXPECT_EQ(material.image_bytes, one->materials[0].image_bytes);
     write("many.glb", glb(false));
-    const auto many = read_mesh(folder_ / "many.glb");
+    const auto many = meshio::read_mesh(folder_ / "many.glb");
     EXPECT_TRUE(!many && many.error().message.find("far more than the file holds") != std::string::npos);
     EXPECT_EQ(one->materials[0].name, "same");
     EXPECT_EQ(one->materials[7].name, "same (material 7)");

@@ -1,7 +1,7 @@
 // Every format and feature of the mesh readers on files small enough to check by eye, and what the writers give back.
-#include <vdtree/mesh_io.h>
+#include <meshio/mesh_io.h>
 
-#include <vdtree/atomic_file.h>
+#include <vdtree/internal/atomic_file.h>
 
 #include "mesh_files.h"
 #include "mesh_readers.h"
@@ -26,14 +26,14 @@ using namespace std::string_literals;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-ReadResult read(const std::string& bytes, const std::string& name, const ReadOptions& options = {}) {
-    Result<ReadResult> result = read_mesh_bytes(bytes, name, options);
+meshio::ReadResult read(const std::string& bytes, const std::string& name, const meshio::ReadOptions& options = {}) {
+    Result<ReadResult> result = meshio::read_mesh_bytes(bytes, name, options);
     EXPECT_TRUE(result) << result.error().message;
-    return result ? std::move(*result) : ReadResult{};
+    return result ? std::move(*result) : meshio::ReadResult{};
 }
 
 std::string error_of(const std::string& bytes, const std::string& name) {
-    const Result<ReadResult> result = read_mesh_bytes(bytes, name);
+    const Result<ReadResult> result = meshio::read_mesh_bytes(bytes, name);
     EXPECT_FALSE(result) << name << " was read";
     return result ? std::string() : result.error().message;
 }
@@ -82,7 +82,7 @@ TEST(Ply, ReadsAsciiAndBothByteOrders) {
 }
 
 TEST(Ply, CountsFacesBeforeTriangulation) {
-    const ReadResult result = read(mesh_files::ascii_ply_quad(), "a.ply");
+    const meshio::ReadResult result = read(mesh_files::ascii_ply_quad(), "a.ply");
     EXPECT_EQ(result.source_faces, 1u);
     EXPECT_EQ(result.dropped_triangles, 0u);
     EXPECT_TRUE(result.warnings.empty());
@@ -137,7 +137,7 @@ TEST(Ply, SkipsElementsAndListsItDoesNotKnow) {
                 big(i == 1 ? 1.0f : 0.0f);
     }
     body += "\7"s + big(std::uint32_t{3}) + "\0\1\2"s + "\2"s + big(0.5f) + big(0.5f) + big(std::int32_t{-1});
-    const ReadResult result = read(header + body, "a.ply");
+    const meshio::ReadResult result = read(header + body, "a.ply");
     EXPECT_THAT(result.mesh.positions,
                 ElementsAre(glm::dvec3(0, 0, 0), glm::dvec3(1, 0, 0.25), glm::dvec3(0, 1, 0.5)));
     EXPECT_THAT(result.mesh.triangles, ElementsAre(Triangle{0, 1, 2}));
@@ -153,7 +153,7 @@ TEST(Ply, UnrollsStripsWithTheirOrientation) {
 }
 
 TEST(Ply, DropsTheSwapsOfStripsAndCountsThem) {
-    const ReadResult result =
+    const meshio::ReadResult result =
         read("ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
              "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
              "0 0 0\n0 1 0\n1 0 0\n1 1 0\n6 0 1 2 2 1 3\n", "a.ply");
@@ -180,9 +180,9 @@ TEST(Ply, ReadsNormalsUvsAndColoursUnderTheirNames) {
 }
 
 TEST(Ply, ScalesColoursByTheirTypeAndDecodesThem) {
-    ReadOptions linear;
-    linear.colours = ColourEncoding::linear;
-    const auto colour = [&](const std::string& type, const std::string& values, const ReadOptions& options) {
+    meshio::ReadOptions linear;
+    linear.colours = meshio::ColourEncoding::linear;
+    const auto colour = [&](const std::string& type, const std::string& values, const meshio::ReadOptions& options) {
         const std::string properties = "property " + type + " red\nproperty " + type + " green\nproperty " + type +
                                        " blue\nproperty " + type + " alpha\n";
         return read(ply_with(properties, values), "a.ply", options).mesh.colours[1];
@@ -199,7 +199,7 @@ TEST(Ply, ScalesColoursByTheirTypeAndDecodesThem) {
 }
 
 TEST(Ply, RepairsColoursAndUvsThatWouldSpreadNan) {
-    const ReadResult colours = read(ply_with("property float red\nproperty float green\nproperty float blue\n", "nan 2 -1"),
+    const meshio::ReadResult colours = read(ply_with("property float red\nproperty float green\nproperty float blue\n", "nan 2 -1"),
                                     "a.ply");
     EXPECT_EQ(colours.mesh.colours[0], glm::vec4(0.0f, 1.0f, 0.0f, 1.0f));
     ASSERT_EQ(colours.warnings.size(), 1u);
@@ -218,7 +218,7 @@ TEST(Ply, KeepsDoublePrecisionAtHugeOffsets) {
 }
 
 TEST(Ply, DropsTrianglesThatUseAVertexTwiceAndKeepsCoincidentOnes) {
-    const ReadResult result =
+    const meshio::ReadResult result =
         read("ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
              "element face 3\nproperty list uchar int vertex_indices\nend_header\n"
              "0 0 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 2 3 2\n4 0 2 3 3\n", "a.ply");
@@ -230,7 +230,7 @@ TEST(Ply, DropsTrianglesThatUseAVertexTwiceAndKeepsCoincidentOnes) {
 TEST(Ply, SaysHowManyFacesHadTooFewCorners) {
     std::string file = mesh_files::ascii_ply_quad();
     file.replace(file.find("face 1"), 6, "face 3");
-    const ReadResult result = read(file + "2 0 1\n0\n", "a.ply");
+    const meshio::ReadResult result = read(file + "2 0 1\n0\n", "a.ply");
     EXPECT_EQ(result.source_faces, 3u);
     EXPECT_THAT(result.warnings, ElementsAre("2 faces were left out for having fewer than 3 corners."));
 }
@@ -301,8 +301,8 @@ TEST(Obj, NamesTheRightLineAfterMixedNewlines) {
 }
 
 TEST(Obj, ReadsWeightsAndColoursOfVertices) {
-    ReadOptions linear;
-    linear.colours = ColourEncoding::linear;
+    meshio::ReadOptions linear;
+    linear.colours = meshio::ColourEncoding::linear;
     const Mesh mesh = read("v 2 0 0 0.5\nv 1 0 0 1 0.5 0\nv 0 1 0 0 0 1 0.25\nv 3 3 3\nf 1 2 3\n", "a.obj", linear).mesh;
     EXPECT_EQ(mesh.positions[0], glm::dvec3(2, 0, 0)); // a weight divides nothing
     EXPECT_THAT(mesh.colours, ElementsAre(glm::vec4(1.0f), glm::vec4(1.0f, 0.5f, 0.0f, 1.0f),
@@ -335,7 +335,7 @@ TEST(Obj, ShrinksRangesWithTheTrianglesTheyLose) {
 }
 
 TEST(Obj, SaysWhichKeywordItDidNotKnow) {
-    const ReadResult result = read("v 0 0 0\nv 1 0 0\nv 1 1 0\ns off\nwobble 3\nf 1 2 3\n", "a.obj");
+    const meshio::ReadResult result = read("v 0 0 0\nv 1 0 0\nv 1 1 0\ns off\nwobble 3\nf 1 2 3\n", "a.obj");
     EXPECT_THAT(result.warnings, ElementsAre("1 line was skipped for an unknown keyword, the first 'wobble' in line 5."));
 }
 
@@ -346,7 +346,7 @@ TEST(Obj, ReadsAFaceThatStandsBeforeItsVertices) {
 // ---- polygons ----
 
 double cut_area(const std::vector<glm::dvec3>& polygon) {
-    PolygonTriangulator polygons;
+    meshio::PolygonTriangulator polygons;
     Mesh mesh;
     mesh.positions = polygon;
     polygons.triangulate(polygon, [&](const Triangle& t) { mesh.triangles.push_back(t); });
@@ -379,7 +379,7 @@ TEST(Polygons, KeepTheirOrientationInEveryPlane) {
         std::vector<glm::dvec3> polygon;
         for (const glm::dvec2& p : star) polygon.push_back(p.x * axis[0] + p.y * axis[1]);
         const glm::dvec3 up = glm::cross(axis[0], axis[1]);
-        PolygonTriangulator polygons;
+        meshio::PolygonTriangulator polygons;
         double sum = 0.0;
         polygons.triangulate(polygon, [&](const Triangle& t) {
             const glm::dvec3 normal = glm::cross(polygon[t[1]] - polygon[t[0]], polygon[t[2]] - polygon[t[0]]);
@@ -396,7 +396,7 @@ TEST(Polygons, KeepTheirAreaAtExtremeScales) {
     for (const double scale : {1e-300, 1e-19, 1e30, 1e300}) {
         std::vector<glm::dvec3> scaled = arrow.positions;
         for (glm::dvec3& p : scaled) p *= scale;
-        PolygonTriangulator polygons;
+        meshio::PolygonTriangulator polygons;
         arrow.triangles.clear();
         polygons.triangulate(scaled, [&](const Triangle& t) { arrow.triangles.push_back(t); });
         EXPECT_NEAR(area(arrow), 2.0, 1e-12) << scale; // of the cut at plain size: squares would leave the range
@@ -430,7 +430,7 @@ TEST(Polygons, KeepTheAreaOfLargeRandomStars) {
 TEST(Polygons, GiveNMinusTwoTrianglesWhateverTheirShape) {
     std::mt19937 random(11);
     std::uniform_int_distribution<int> coordinate(0, 3); // many coincidences and collinear corners
-    PolygonTriangulator polygons;
+    meshio::PolygonTriangulator polygons;
     for (int round = 0; round < 5000; ++round) {
         std::vector<glm::dvec3> polygon(static_cast<std::size_t>(3 + round % 12));
         for (glm::dvec3& p : polygon) p = {coordinate(random), coordinate(random), round % 2 ? coordinate(random) : 0};
@@ -450,7 +450,7 @@ TEST(Polygons, AreFannedWhereCuttingThemWouldTakeForEver) {
     comb.push_back({60000, -1, 0});
     comb.push_back({-1, -1, 0});
     std::reverse(comb.begin(), comb.end());
-    PolygonTriangulator polygons;
+    meshio::PolygonTriangulator polygons;
     const auto start = std::chrono::steady_clock::now();
     const std::size_t count = polygons.cut(comb).size() + polygons.cut(comb).size();
     EXPECT_EQ(count, 2 * (comb.size() - 2));
@@ -470,8 +470,8 @@ TEST(Off, ReadsCountsOnEitherLineAndComments) {
 }
 
 TEST(Off, ReadsItsVariants) {
-    ReadOptions linear;
-    linear.colours = ColourEncoding::linear;
+    meshio::ReadOptions linear;
+    linear.colours = meshio::ColourEncoding::linear;
     const auto file = [](const std::string& keyword, const std::string& extra) {
         return keyword + "\n3 1 0\n0 0 0 " + extra + "\n1 0 0 " + extra + "\n0 1 0 " + extra + "\n3 0 1 2\n";
     };
@@ -512,12 +512,12 @@ TEST(Stl, KeepsSolidsAsGroups) {
 
 TEST(Stl, LeavesNormalsOutThatAreZeroOrNan) {
     std::string zero = mesh_files::ascii_stl_facet();
-    const ReadResult without = read(zero.replace(zero.find("0 0 1"), 5, "0 -0 0"), "a.stl");
+    const meshio::ReadResult without = read(zero.replace(zero.find("0 0 1"), 5, "0 -0 0"), "a.stl");
     EXPECT_TRUE(without.mesh.normals.empty());
     EXPECT_TRUE(without.warnings.empty()); // zero is how STL says that there is none
     std::string nan = mesh_files::binary_stl_facet();
     nan.replace(84, 4, mesh_files::floats(std::numeric_limits<float>::quiet_NaN()));
-    const ReadResult strange = read(nan, "a.stl");
+    const meshio::ReadResult strange = read(nan, "a.stl");
     EXPECT_TRUE(strange.mesh.normals.empty());
     EXPECT_THAT(strange.warnings, ElementsAre("1 facet normal was not finite and computed from the corners."));
 }
@@ -525,7 +525,7 @@ TEST(Stl, LeavesNormalsOutThatAreZeroOrNan) {
 TEST(Stl, TellsOfFacetsWithoutANormalAmongOthers) {
     const std::string one = mesh_files::ascii_stl_facet();
     std::string other = one;
-    const ReadResult result = read(one + other.replace(other.find("0 0 1"), 5, "0 0 0"), "a.stl");
+    const meshio::ReadResult result = read(one + other.replace(other.find("0 0 1"), 5, "0 0 0"), "a.stl");
     ASSERT_EQ(result.mesh.normals.size(), 6u);
     EXPECT_EQ(result.mesh.normals[3], glm::vec3(0.0f));
     EXPECT_THAT(result.warnings, ElementsAre("3 normals were zero or missing and computed from the faces, the first that of vertex 3."));
@@ -577,7 +577,7 @@ TEST(Gltf, ReadsGlbAndDataUris) {
     const std::string uri = R"({"byteLength":42,"uri":"data:application/octet-stream;base64,)"
                             "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAABAAIA\"}";
     for (const std::string& file : {mesh_files::glb_triangle(), gltf_triangle_json(R"([{"mesh":0}])", uri)}) {
-        const ReadResult result = read(file, "a.gltf");
+        const meshio::ReadResult result = read(file, "a.gltf");
         EXPECT_THAT(result.mesh.positions, ElementsAre(glm::dvec3(0, 0, 0), glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0)));
         EXPECT_THAT(result.mesh.triangles, ElementsAre(Triangle{0, 1, 2}));
         ASSERT_EQ(result.mesh.ranges.size(), 1u);
@@ -593,17 +593,17 @@ TEST_F(MeshFiles, GltfReadsBuffersBesideTheFileOnly) {
         return gltf_triangle_json(R"([{"mesh":0}])", R"({"byteLength":42,"uri":")" + uri + R"("})");
     };
     save("a.gltf", with_uri("my%20data.bin"));
-    EXPECT_TRUE(read_mesh(folder_ / "a.gltf"));
+    EXPECT_TRUE(meshio::read_mesh(folder_ / "a.gltf"));
     save("inner/a.gltf", with_uri("../my%20data.bin"));
-    EXPECT_FALSE(read_mesh(folder_ / "inner/a.gltf"));
+    EXPECT_FALSE(meshio::read_mesh(folder_ / "inner/a.gltf"));
     for (const std::string uri : {"%2e%2e/x.bin", "/etc/passwd", "file:///etc/passwd", "http://a/b.bin", "missing.bin", "", "."}) {
         save("b.gltf", with_uri(uri));
-        const Result<ReadResult> result = read_mesh(folder_ / "b.gltf");
+        const Result<ReadResult> result = meshio::read_mesh(folder_ / "b.gltf");
         ASSERT_FALSE(result) << uri;
         EXPECT_THAT(result.error().message, HasSubstr("buffer 0"));
     }
     save("my data.bin", gltf_triangle_data().substr(1));
-    EXPECT_FALSE(read_mesh(folder_ / "a.gltf")); // shorter than its byteLength
+    EXPECT_FALSE(meshio::read_mesh(folder_ / "a.gltf")); // shorter than its byteLength
 }
 
 TEST(Gltf, AppliesTheTransformsOfNodes) {
@@ -741,9 +741,9 @@ TEST(MeshIo, StopsWhenTheCallerSaysSo) {
             ++calls;
             return false;
         };
-        ReadOptions options;
+        meshio::ReadOptions options;
         options.progress = stop;
-        const Result<ReadResult> result = read_mesh_bytes(bytes, name, options);
+        const Result<ReadResult> result = meshio::read_mesh_bytes(bytes, name, options);
         if (calls == 0) continue; // a text of a few lines ends before the first call
         ASSERT_FALSE(result) << name;
         EXPECT_EQ(result.error().code, ErrorCode::cancelled) << name;
@@ -751,12 +751,12 @@ TEST(MeshIo, StopsWhenTheCallerSaysSo) {
 }
 
 TEST_F(MeshFiles, SayWhyAFileCannotBeOpened) {
-    const Result<ReadResult> missing = read_mesh(folder_ / "missing.ply");
+    const Result<ReadResult> missing = meshio::read_mesh(folder_ / "missing.ply");
     ASSERT_FALSE(missing);
     EXPECT_EQ(missing.error().code, ErrorCode::io_failure);
     EXPECT_THAT(missing.error().message, HasSubstr("missing.ply"));
-    EXPECT_FALSE(read_mesh(folder_));
-    EXPECT_FALSE(read_mesh("/dev/zero"));
+    EXPECT_FALSE(meshio::read_mesh(folder_));
+    EXPECT_FALSE(meshio::read_mesh("/dev/zero"));
 }
 
 // ---- writing ----
@@ -789,9 +789,9 @@ TEST_F(MeshFiles, ComeBackAsTheyWereWritten) {
     for (const bool has_attributes : {false, true}) {
         for (const std::string name : {"a.ply", "a.obj", "a.glb"}) {
             const Mesh mesh = random_mesh(true, has_attributes);
-            const Result<void> written = write_mesh(folder_ / name, mesh.view());
+            const Result<void> written = meshio::write_mesh(folder_ / name, mesh.view());
             ASSERT_TRUE(written) << written.error().message;
-            const Result<ReadResult> again = read_mesh(folder_ / name);
+            const Result<ReadResult> again = meshio::read_mesh(folder_ / name);
             ASSERT_TRUE(again) << again.error().message;
             EXPECT_EQ(again->mesh.positions, mesh.positions) << name;
             EXPECT_EQ(again->mesh.triangles, mesh.triangles) << name;
@@ -815,8 +815,8 @@ TEST_F(MeshFiles, ComeBackAsTheyWereWritten) {
 TEST_F(MeshFiles, KeepDoublesInPlyAndObj) {
     const Mesh mesh = random_mesh(false, false);
     for (const std::string name : {"a.ply", "a.obj"}) {
-        ASSERT_TRUE(write_mesh(folder_ / name, mesh.view()));
-        const Result<ReadResult> again = read_mesh(folder_ / name);
+        ASSERT_TRUE(meshio::write_mesh(folder_ / name, mesh.view()));
+        const Result<ReadResult> again = meshio::read_mesh(folder_ / name);
         ASSERT_TRUE(again);
         EXPECT_EQ(again->mesh.positions, mesh.positions) << name;
     }
@@ -827,8 +827,8 @@ TEST_F(MeshFiles, KeepOffsetsAndScalesInGlb) {
         Mesh mesh;
         mesh.positions = {{offset, offset, 0.1 * size}, {offset + 0.3 * size, offset, 0}, {offset, offset + 0.7 * size, 0}};
         mesh.triangles = {{0, 1, 2}};
-        ASSERT_TRUE(write_mesh(folder_ / "a.glb", mesh.view()));
-        const Result<ReadResult> again = read_mesh(folder_ / "a.glb");
+        ASSERT_TRUE(meshio::write_mesh(folder_ / "a.glb", mesh.view()));
+        const Result<ReadResult> again = meshio::read_mesh(folder_ / "a.glb");
         ASSERT_TRUE(again) << again.error().message;
         // Half an ulp of a float relative to the size, and of the double at the offset.
         const double tolerance = size * 0x1p-23 + offset * 0x1p-52;
@@ -844,8 +844,8 @@ TEST_F(MeshFiles, KeepMaterialsAndGroups) {
                    {"stone \"grey\"", MeshRange::Kind::material, 10, 90},
                    {"glass", MeshRange::Kind::material, 100, 50},
                    {"stone \"grey\"", MeshRange::Kind::material, 200, 100}};
-    ASSERT_TRUE(write_mesh(folder_ / "a.obj", mesh.view()));
-    const Result<ReadResult> obj = read_mesh(folder_ / "a.obj");
+    ASSERT_TRUE(meshio::write_mesh(folder_ / "a.obj", mesh.view()));
+    const Result<ReadResult> obj = meshio::read_mesh(folder_ / "a.obj");
     ASSERT_TRUE(obj);
     ASSERT_EQ(obj->mesh.ranges.size(), 4u);
     for (std::size_t i = 0; i < 4; ++i) {
@@ -854,8 +854,8 @@ TEST_F(MeshFiles, KeepMaterialsAndGroups) {
         EXPECT_EQ(obj->mesh.ranges[i].first_triangle, mesh.ranges[i].first_triangle);
         EXPECT_EQ(obj->mesh.ranges[i].triangle_count, mesh.ranges[i].triangle_count);
     }
-    ASSERT_TRUE(write_mesh(folder_ / "a.glb", mesh.view()));
-    const Result<ReadResult> glb_file = read_mesh(folder_ / "a.glb");
+    ASSERT_TRUE(meshio::write_mesh(folder_ / "a.glb", mesh.view()));
+    const Result<ReadResult> glb_file = meshio::read_mesh(folder_ / "a.glb");
     ASSERT_TRUE(glb_file) << glb_file.error().message;
     EXPECT_EQ(glb_file->mesh.triangles, mesh.triangles);
     std::vector<std::string> materials;
@@ -868,8 +868,8 @@ TEST_F(MeshFiles, KeepMaterialsAndGroups) {
 TEST_F(MeshFiles, NamesCannotBreakTheLinesOfAnObj) {
     Mesh mesh = random_mesh(true, false);
     mesh.ranges = {{"a\nv 1 2\\", MeshRange::Kind::material, 0, 300}};
-    ASSERT_TRUE(write_mesh(folder_ / "a.obj", mesh.view()));
-    const Result<ReadResult> again = read_mesh(folder_ / "a.obj");
+    ASSERT_TRUE(meshio::write_mesh(folder_ / "a.obj", mesh.view()));
+    const Result<ReadResult> again = meshio::read_mesh(folder_ / "a.obj");
     ASSERT_TRUE(again) << again.error().message;
     EXPECT_EQ(again->mesh.ranges[0].name, "a_v 1 2_");
 }
@@ -878,15 +878,15 @@ TEST_F(MeshFiles, LeaveNothingBehindWhenWritingFails) {
     save("old.ply", "old");
     Mesh bad = random_mesh(true, false);
     bad.positions[7].y = std::nan("");
-    const Result<void> invalid = write_mesh(folder_ / "old.ply", bad.view());
+    const Result<void> invalid = meshio::write_mesh(folder_ / "old.ply", bad.view());
     ASSERT_FALSE(invalid);
     EXPECT_THAT(invalid.error().message, HasSubstr("Vertex 7"));
-    EXPECT_FALSE(write_mesh(folder_ / "a.xyz", random_mesh(true, false).view()));
-    EXPECT_FALSE(write_mesh(folder_ / "missing" / "a.ply", random_mesh(true, false).view()));
-    EXPECT_FALSE(write_mesh(folder_, random_mesh(true, false).view()));
+    EXPECT_FALSE(meshio::write_mesh(folder_ / "a.xyz", random_mesh(true, false).view()));
+    EXPECT_FALSE(meshio::write_mesh(folder_ / "missing" / "a.ply", random_mesh(true, false).view()));
+    EXPECT_FALSE(meshio::write_mesh(folder_, random_mesh(true, false).view()));
     EXPECT_EQ(fs::file_size(folder_ / "old.ply"), 3u);
     EXPECT_EQ(files(), 1u);
-    ASSERT_TRUE(write_mesh(folder_ / "old.ply", random_mesh(true, false).view()));
+    ASSERT_TRUE(meshio::write_mesh(folder_ / "old.ply", random_mesh(true, false).view()));
     EXPECT_GT(fs::file_size(folder_ / "old.ply"), 1000u);
     EXPECT_EQ(files(), 1u);
 }

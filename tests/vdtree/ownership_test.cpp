@@ -10,7 +10,7 @@
 
 #include <vdtree/builder.h>
 #include <vdtree/cut.h>
-#include <vdtree/mesh_io.h>
+#include <meshio/mesh_io.h>
 
 #include "shapes.h"
 
@@ -27,7 +27,7 @@ Options with_progress(std::shared_ptr<int> calls) {
 
 template <class Options>
 class OptionsOwn : public testing::Test {};
-using AllOptions = testing::Types<BuildOptions, ReadOptions>;
+using AllOptions = testing::Types<BuildOptions, meshio::ReadOptions>;
 TYPED_TEST_SUITE(OptionsOwn, AllOptions);
 
 TYPED_TEST(OptionsOwn, TheirProgress) {

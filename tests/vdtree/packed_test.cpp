@@ -9,7 +9,7 @@
 
 #include <vdtree/packed.h>
 
-#include "mask_pool.h"
+#include "tree/mask_pool.h"
 #include "shapes.h"
 
 namespace unseen::vdtree {

@@ -16,7 +16,7 @@
 #include <meshoptimizer.h>
 #endif
 
-#include <vdtree/mesh_io.h>
+#include <meshio/mesh_io.h>
 
 #include "clustering_tools.h"
 #include "extra_meshes.h"
@@ -179,7 +179,7 @@ TEST(PeerQuality, Scans) {
         for (const Scan& scan : scans) {
             const std::string name = file.filename().string();
             if (name != scan.file && name != std::string(scan.file) + ".zst") continue;
-            auto mesh = read_mesh(support::uncompressed(file, scratch.path()));
+            auto mesh = meshio::read_mesh(support::uncompressed(file, scratch.path()));
             ASSERT_TRUE(mesh) << mesh.error().message;
             for (const std::size_t triangles : scan.triangles) compare(scan.file, mesh->mesh, triangles, false);
             ++found;

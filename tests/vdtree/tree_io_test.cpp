@@ -24,7 +24,7 @@
 #include <vdtree/cut.h>
 
 #include "built.h"
-#include "byte_order.h"
+#include "files/byte_order.h"
 #include "shapes.h"
 #include "sound.h"
 #include "temp_folder.h"

@@ -5,8 +5,8 @@
 
 #include <vdtree/chroma.h>
 
-#include "tree_parts.h"
-#include "vertex_tree_data.h"
+#include "tree/tree_parts.h"
+#include "tree/vertex_tree_data.h"
 
 namespace unseen::vdtree {
 

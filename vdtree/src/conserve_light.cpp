@@ -12,10 +12,10 @@
 
 #include "chroma.h"
 #include "fold_sequence.h"
-#include "packed_range.h"
-#include "scaled_geometry.h"
-#include "tree_parts.h"
-#include "vertex_tree_data.h"
+#include "tree/packed_range.h"
+#include "tree/scaled_geometry.h"
+#include "tree/tree_parts.h"
+#include "tree/vertex_tree_data.h"
 
 namespace unseen::vdtree {
 

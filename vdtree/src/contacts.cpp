@@ -10,8 +10,8 @@
 #include <glm/geometric.hpp>
 #include <tbb/parallel_for.h>
 
-#include "leaf_triangles.h"
-#include "scaled_geometry.h"
+#include "tree/leaf_triangles.h"
+#include "tree/scaled_geometry.h"
 
 namespace unseen::vdtree {
 

@@ -13,11 +13,11 @@
 
 #include "chroma.h"
 #include "contacts.h"
-#include "packed_range.h"
-#include "texture_bounds.h"
+#include "tree/packed_range.h"
+#include "tree/texture_bounds.h"
 #include "texture_fit.h"
-#include "tree_parts.h"
-#include "vertex_tree_data.h"
+#include "tree/tree_parts.h"
+#include "tree/vertex_tree_data.h"
 
 namespace unseen::vdtree {
 

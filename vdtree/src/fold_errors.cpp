@@ -14,9 +14,9 @@
 #include "drift.h"
 #include "find_stages.h"
 #include "fold_picture.h"
-#include "leaf_triangles.h"
-#include "scaled_geometry.h"
-#include "vertex_tree_data.h"
+#include "tree/leaf_triangles.h"
+#include "tree/scaled_geometry.h"
+#include "tree/vertex_tree_data.h"
 
 namespace unseen::vdtree {
 

@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 #include <tbb/parallel_for.h>
 
-#include "texture_bounds.h"
+#include "tree/texture_bounds.h"
 
 namespace unseen::vdtree {
 

@@ -8,8 +8,8 @@
 
 #include <glm/vec3.hpp>
 
-#include "tree_parts.h"
-#include "vertex_tree_data.h"
+#include "tree/tree_parts.h"
+#include "tree/vertex_tree_data.h"
 
 namespace unseen::vdtree {
 

@@ -1,0 +1,114 @@
+// The one interface to the closed forms: names, domain, and what gives eccentricity and motion to models that know
+// neither.
+#include <perception/csf.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include <perception/motion.h>
+
+#include "csf/csf_model.h"
+
+namespace unseen::perception {
+namespace {
+
+constexpr std::array<std::pair<CsfModel, std::string_view>, csf_models.size()> names = {{
+    {CsfModel::castle, "castle"},
+    {CsfModel::stela, "stela"},
+    {CsfModel::daly, "daly"},
+    {CsfModel::barten_1989, "barten-1989"},
+    {CsfModel::barten_1999, "barten-1999"},
+    {CsfModel::barten_2004, "barten-2004"},
+    {CsfModel::mannos_sakrison, "mannos-sakrison"},
+    {CsfModel::rushmeier, "rushmeier"},
+    {CsfModel::castle_red_green, "castle-red-green"},
+    {CsfModel::castle_yellow_violet, "castle-yellow-violet"},
+}};
+
+// W. Geisler, J. Perry, "A real-time foveated multiresolution system for low-bandwidth video communication", SPIE 3299,
+// 1998: threshold contrast grows as exp(0.106 rho (e + 2.3) / 2.3), relative to the fovea as exp(0.106 rho e / 2.3).
+constexpr double geisler_perry_alpha = 0.106, geisler_perry_half_degrees = 2.3;
+constexpr double geisler_perry_decay = geisler_perry_alpha / geisler_perry_half_degrees / std::numbers::ln10;
+
+bool in_domain(const Stimulus& s) {
+    const auto positive = [](double v) { return v > 0 && std::isfinite(v); };
+    const auto not_negative = [](double v) { return v >= 0 && std::isfinite(v); };
+    return positive(s.frequency.value()) && positive(s.luminance.value()) && positive(s.area.value()) &&
+           positive(s.distance.value()) && not_negative(s.eccentricity.value()) && not_negative(s.temporal.value()) &&
+           not_negative(s.velocity.value()) && (s.temporal.value() == 0 || s.velocity.value() == 0);
+}
+
+double static_at_fovea(CsfModel model, const Stimulus& s) {
+    return is_castle_family(model) ? castle_family_at_fovea(model, s) : classical_at_fovea(model, s);
+}
+
+} // namespace
+
+std::string_view name(CsfModel model) {
+    return std::ranges::find(names, model, &decltype(names)::value_type::first)->second;
+}
+
+Result<CsfModel> csf_model(std::string_view text) {
+    std::string known;
+    for (const auto& [model, name] : names) {
+        if (text == name) return model;
+        known.append(known.empty() ? "" : model == names.back().first ? " or " : ", ").append(name);
+    }
+    return Error{ErrorCode::invalid_argument,
+                 "there is no contrast sensitivity model \"" + std::string(text) + "\": use " + known};
+}
+
+bool is_achromatic(CsfModel model) {
+    return model != CsfModel::castle_red_green && model != CsfModel::castle_yellow_violet;
+}
+
+double decay_per_degree(CsfModel model, CyclesPerDegree frequency, VisualField field) {
+    if (is_castle_family(model)) return castle_family_decay(model, frequency, field);
+    return geisler_perry_decay * frequency.value();
+}
+
+double motion_factor(CsfModel model, const Stimulus& s) {
+    if (s.velocity.value() > 0) return velocity_factor(s.frequency, s.velocity);
+    if (is_castle_family(model) || s.temporal.value() == 0) return 1;
+    return velocity_factor(s.frequency, DegreesPerSecond(s.temporal.value() / s.frequency.value()));
+}
+
+std::vector<CyclesPerDegree> kinks(CsfModel model, const CsfConditions& conditions) {
+    if (is_castle_family(model)) {
+        if (conditions.field != VisualField::worst) return {};
+        return {equal_decay_frequency(model)};
+    }
+    if (conditions.temporal.value() == 0) return {};
+    return {CyclesPerDegree(conditions.temporal.value() / least_velocity.value())};
+}
+
+double sensitivity(CsfModel model, const Stimulus& s) {
+    if (!in_domain(s)) return std::numeric_limits<double>::quiet_NaN();
+    if (model == CsfModel::daly) return std::min(daly_ceiling(s), daly_eccentric(s)) * motion_factor(model, s);
+    const double loss = decay_per_degree(model, s.frequency, s.field) * s.eccentricity.value();
+    return static_at_fovea(model, s) * motion_factor(model, s) * std::pow(10.0, -loss);
+}
+
+SquareDegrees patch_area(CyclesPerDegree frequency) {
+    const double radius_deg = 1.5 / frequency.value();
+    return SquareDegrees(std::numbers::pi * radius_deg * radius_deg);
+}
+
+Stimulus stimulus_of(const CsfConditions& conditions, CyclesPerDegree frequency, Degrees eccentricity,
+                     Luminance luminance) {
+    return {.frequency = frequency,
+            .luminance = luminance,
+            .eccentricity = eccentricity,
+            .temporal = conditions.temporal,
+            .area = patch_area(frequency),
+            .field = conditions.field,
+            .velocity = conditions.velocity,
+            .distance = conditions.distance};
+}
+
+} // namespace unseen::perception

@@ -1,0 +1,517 @@
+// The fold test by errors in distance form: rows of a reach table for patches and for strips.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <span>
+#include <vector>
+
+#include <perception/criterion.h>
+
+#include "fold/fold_screen.h"
+#include "fold/luminance_classes.h"
+#include "fold/stage_distances.h"
+
+namespace unseen::perception {
+
+namespace {
+
+using vdtree::DistanceCriterion;
+using vdtree::NodeId;
+
+// Of a difference over a mean luminance, in classes up to 2^8: beyond any display's peak over its black.
+constexpr int contrasts_per_octave = 8;
+constexpr ClassSeries contrasts{contrasts_per_octave, -10, 18};
+constexpr int contrast_count = static_cast<int>(contrasts.count()) - 1; // without no_contrast
+constexpr int no_contrast = -1;
+constexpr int luminance_count = static_cast<int>(LuminanceClasses::count);
+
+// Of the frequencies at which patterns are looked for that a strip may hold, from the lowest one up to the display's limit.
+constexpr double frequency_step = 1.0905077326652577; // an eighth of an octave
+
+constexpr int steepest_spike = 8 * contrasts_per_octave; // sharper ones count as this: a sixteenth of the width
+
+// Of a sine, whose mean is 2 / pi of it: of the distances that shift what a ring shows.
+constexpr double amplitude_of_mean = 1.6;
+
+// A picture of 64 samples a pixel tells no finer shifts of an outline than about this, two thirds of the step of one sample. Found by comparing pictures.
+// Where pixels are so coarse that half of what can be seen is less, it would take more samples, not more triangles.
+constexpr double sampled_shift_px = 0.011;
+// The widest mesh there can be, in widths of a node: also where nodes have none.
+constexpr float widest = 1e9f;
+
+class Levels {
+public:
+    explicit Levels(const Display& display) : luminances_(display) {}
+
+    double in_cdm2(double relative) const { return luminances_.in_cdm2(relative); }
+    double difference_in_cdm2(double relative) const { return luminances_.difference_in_cdm2(relative); }
+
+    // Of a contrast, and of a luminance in cd/m2.
+    int contrast_level(double difference, double base) const {
+        return static_cast<int>(contrasts.of(difference / std::max(base, luminances_.lowest()))) - 1;
+    }
+    int luminance_level(double base) const { return static_cast<int>(luminances_.of(base)); }
+    static double contrast(int level) { return contrasts.value(static_cast<std::size_t>(level + 1)); }
+    double luminance(int level) const { return luminances_.value(static_cast<std::size_t>(level)); }
+
+private:
+    LuminanceClasses luminances_;
+};
+
+// What a node's fold shows, as far as that decides from where it can be seen: levels of contrast at widths relative to the node's.
+struct Pattern {
+    int luminance = 0;
+    int typical = no_contrast; // over the whole width
+    int largest = no_contrast; // in a small part of it
+    int drift = no_contrast;   // of what many such nodes shift together
+    int fading = 0, quarters = 0; // of octaves, from the node's width to the mesh's
+    bool is_strip = false;
+
+    auto operator<=>(const Pattern&) const = default;
+    bool is_nothing() const { return largest == no_contrast && drift == no_contrast; }
+};
+
+// At least as visible as both.
+Pattern above(const Pattern& a, const Pattern& b) {
+    if (a.is_nothing()) return b;
+    if (b.is_nothing()) return a;
+    Pattern all{std::max(a.luminance, b.luminance), std::max(a.typical, b.typical), std::max(a.largest, b.largest),
+                std::max(a.drift, b.drift), 0, std::max(a.quarters, b.quarters), a.is_strip};
+    all.fading = a.drift == no_contrast ? b.fading : b.drift == no_contrast ? a.fading : std::min(a.fading, b.fading);
+    return all;
+}
+
+// Few patterns are to stand for many: rounded up, onto one grid, so that what is above two of them is there, too.
+// `coarseness`: of the grid, 1 or a power of two.
+Pattern rounded(Pattern p, int coarseness) {
+    constexpr int coarsest_fading = 32; // on coarser grids drift does not fade at all, which is above any that does
+    const int typical_step = coarseness * contrasts_per_octave / 8, spike_step = coarseness * contrasts_per_octave / 4;
+    const int drift_step = coarseness * contrasts_per_octave / 8;
+    const auto up = [](int value, int step) { return std::min((value + step - 1) / step * step, contrast_count - 1); };
+    if (p.typical != no_contrast) {
+        p.typical = up(p.typical, typical_step);
+        p.largest = p.largest > p.typical ? up(p.largest, spike_step) : p.typical;
+    }
+    if (p.drift != no_contrast) {
+        p.drift = up(p.drift, drift_step);
+        if (coarseness > coarsest_fading) p.fading = 0;
+    } else {
+        p.fading = p.quarters = 0;
+    }
+    return p;
+}
+
+// What can be seen at one luminance and eccentricity. Bands of frequency an octave apart look for a pattern; what they see of it is
+// pooled as the eye pools its channels; wherever the bands' octaves begin.
+class Eye {
+public:
+    Eye(const CsfTable& csf, double eccentricity_deg, double luminance_cdm2, const Screen& screen) : screen_(screen) {
+        const double highest_cpd = screen.highest_cpd;
+        std::vector<Band> bands;
+        for (double low = lowest_table_cpd; low < highest_cpd; low *= frequency_step)
+            bands.push_back({std::min(low * frequency_step, highest_cpd),
+                             csf.monotone_sensitivity(CyclesPerDegree(low), Degrees(eccentricity_deg), Luminance(luminance_cdm2))});
+        for (std::size_t i = 0; i < width_count; ++i) {
+            patches_[i] = 1 / visibility(bands, width(i), share_of_patches);
+            areas_[i] = 1 / visibility(bands, width(i), share_of_area);
+            strips_[i] = 1 / visibility(bands, width(i), share_of_strip);
+        }
+    }
+
+    // The distances, in radii, from which a round patch among others like it is invisible, and an area on its own.
+    double patch_reach(double contrast) const { return reach(patches_, contrast); }
+    double area_reach(double contrast) const { return reach(areas_, contrast); }
+
+    // The distance, in widths, from which a long strip is invisible.
+    double strip_reach(double contrast) const {
+        const double invisible_deg = 0.5 * least_visible_width(strips_, contrast);
+        if (!std::isfinite(invisible_deg)) return 0;
+        const double width_deg = std::max(invisible_deg - sampled_shift_px * screen_.pixel_deg, invisible_deg / 2);
+        return (1 + reach_rounding) * degrees_per_radian * screen_.largest_magnification / width_deg;
+    }
+
+private:
+    struct Band {
+        double highest_cpd, sensitivity;
+    };
+    static constexpr std::size_t bands_per_octave = 8;
+    // Widths from far below any that can be seen up to the lowest frequency's.
+    static constexpr double widest_deg = 1 / lowest_table_cpd, width_step = 0.91700404320467122; // an eighth of an octave
+    static constexpr std::size_t width_count = 160;
+    static double width(std::size_t i) { return widest_deg * std::pow(width_step, static_cast<double>(i)); }
+    using Thresholds = std::array<double, width_count>; // contrasts, by width
+
+    // What a band sees of a pattern, as a share of its contrast, by the pattern's width in the band's waves. Of an area: the share of the
+    // band's own patches that it covers.
+    static double share_of_area(double waves) { return std::min(1.0, waves * waves); }
+    // Of patches side by side whose signs differ at random, also: more of the band's patch, in 1 / n of the contrast for n times the
+    // width. What more of them come to, drift says.
+    static double share_of_patches(double waves) {
+        constexpr double most_side_by_side = 4;
+        double most = 0;
+        for (double side = 1; side <= most_side_by_side; side *= 2) most = std::max(most, share_of_area(side * waves) / side);
+        return most;
+    }
+    // Of a strip whose width is half of this.
+    static double share_of_strip(double waves) { return std::min(1.0, waves); }
+
+    // Of unit contrast, in thresholds.
+    static double visibility(const std::vector<Band>& bands, double width_deg, double (*share)(double)) {
+        double most = 0;
+        for (std::size_t first = 0; first < std::min(bands_per_octave, bands.size()); ++first) {
+            double sum = 0;
+            for (std::size_t i = first; i < bands.size(); i += bands_per_octave) {
+                const double seen = share(width_deg * bands[i].highest_cpd) * bands[i].sensitivity;
+                sum += to_power_of_pooling(seen);
+            }
+            most = std::max(most, sum);
+        }
+        return std::pow(most, 1 / pooling);
+    }
+
+    double reach(const Thresholds& thresholds, double contrast) const {
+        const double width_deg = least_visible_width(thresholds, contrast);
+        if (!std::isfinite(width_deg)) return 0; // from inside only
+        const double half = width_deg / screen_.largest_magnification / degrees_per_radian / 2;
+        return half < std::numbers::pi / 2 ? (1 + reach_rounding) / std::sin(half) : 1;
+    }
+
+    // The widest that is invisible; infinite where all are.
+    static double least_visible_width(const Thresholds& thresholds, double contrast) {
+        // Thresholds rise as widths fall.
+        const auto first = std::lower_bound(thresholds.begin(), thresholds.end(), contrast);
+        if (first == thresholds.begin()) return std::numeric_limits<double>::infinity();
+        if (first == thresholds.end()) return width(width_count - 1);
+        const auto above = static_cast<std::size_t>(first - thresholds.begin());
+        const double t0 = thresholds[above - 1], t1 = thresholds[above]; // visible, invisible
+        const double share = t1 > t0 ? std::log(contrast / t0) / std::log(t1 / t0) : 1;
+        return widest_deg * std::pow(width_step, static_cast<double>(above - 1) + share);
+    }
+
+    const Screen& screen_;
+    Thresholds patches_, areas_, strips_;
+};
+
+// The reach of patterns by eccentricity, computed when they are first asked for. Where patterns are too many for the
+// rows' numbers, begin again with coarser ones.
+class Reaches {
+public:
+    // `added`: rows that add() will ask for.
+    Reaches(const Levels& levels, const Screen& screen, const CsfTable& csf, std::size_t bins, std::size_t added)
+        : levels_(levels), screen_(screen), csf_(csf), bins_(bins), most_patterns_(last_row - added), discs_(luminance_count),
+          eyes_(luminance_count) {
+        begin();
+    }
+
+    std::uint16_t row(const Pattern& pattern) { // simplified; 0 where there is none left
+        if (pattern.is_nothing()) return 0;
+        if (const auto known = rows_.find(pattern); known != rows_.end()) return known->second;
+        if (rows_.size() == most_patterns_) {
+            has_too_few_ = true;
+            return 0;
+        }
+        const auto row = static_cast<std::uint16_t>(rows_.size() + 1);
+        rows_.emplace(pattern, row);
+        pattern.is_strip ? add_strip(pattern) : add_patch(pattern);
+        return row;
+    }
+    bool has_too_few() const { return has_too_few_; } // then nothing found so far is of use
+    // Forgets all rows. In the end they suffice: at a coarseness of 256 each contrast is one of two, so a typical and a
+    // largest one combine in four ways at most; with 16 luminances, 121 quarters and without fading that is 16,000
+    // patches, and there are 3,600 strips.
+    void coarsen() {
+        coarseness_ *= 2;
+        begin();
+    }
+    // On the grid, and without drift that can nowhere be seen from as far as the rest.
+    Pattern simplified(Pattern p) {
+        p = rounded(p, coarseness_);
+        if (p.drift == no_contrast || p.typical == no_contrast) return p;
+        const Discs& tables = discs(p.luminance);
+        const float* const typical = &tables.patches[static_cast<std::size_t>(p.typical) * bins_];
+        bool is_needed = false;
+        for_each_drift(p, [&](int contrast, float width) {
+            const float* const from = &tables.areas[static_cast<std::size_t>(contrast) * bins_];
+            for (std::size_t bin = 0; bin < bins_; ++bin) is_needed |= width * from[bin] > typical[bin];
+        });
+        if (is_needed) return p;
+        p.drift = no_contrast;
+        return rounded(p, coarseness_);
+    }
+    // A row of distances, in lengths of its own.
+    std::uint16_t add(std::span<const float> distances, float length) {
+        for (const float distance : distances) reach_.push_back(std::min(distance / length, DistanceCriterion::always_visible));
+        return static_cast<std::uint16_t>(reach_.size() / bins_ - 1);
+    }
+    std::span<const float> reach(std::uint16_t row) const { return std::span(reach_).subspan(row * bins_, bins_); }
+    std::vector<float> take() { return std::move(reach_); }
+
+private:
+    static constexpr std::size_t last_row = std::numeric_limits<std::uint16_t>::max();
+
+    void begin() {
+        rows_.clear();
+        reach_.assign(bins_, DistanceCriterion::never_visible); // row 0: what changes nothing
+        has_too_few_ = false;
+    }
+
+    const Eye& eye(int luminance, std::size_t bin) {
+        auto& eyes = eyes_[static_cast<std::size_t>(luminance)];
+        if (eyes.empty())
+            for (std::size_t b = 0; b < bins_; ++b)
+                eyes.emplace_back(csf_, static_cast<double>(b) * degrees_per_bin, levels_.luminance(luminance), screen_);
+        return eyes[bin];
+    }
+
+    struct Discs {
+        std::vector<float> patches, areas; // [contrast * bins + bin], in radii
+    };
+    const Discs& discs(int luminance) {
+        Discs& tables = discs_[static_cast<std::size_t>(luminance)];
+        if (tables.patches.empty()) {
+            for (int contrast = 0; contrast < contrast_count; ++contrast) {
+                for (std::size_t bin = 0; bin < bins_; ++bin) {
+                    tables.patches.push_back(static_cast<float>(eye(luminance, bin).patch_reach(Levels::contrast(contrast))));
+                    tables.areas.push_back(static_cast<float>(eye(luminance, bin).area_reach(Levels::contrast(contrast))));
+                }
+            }
+        }
+        return tables;
+    }
+
+    void add_patch(const Pattern& p) {
+        const std::size_t first = reach_.size();
+        reach_.resize(first + bins_, 0);
+        const Discs& tables = discs(p.luminance);
+        const auto include = [&](const std::vector<float>& one, int contrast, float width) {
+            const float* const from = &one[static_cast<std::size_t>(contrast) * bins_];
+            for (std::size_t bin = 0; bin < bins_; ++bin) reach_[first + bin] = std::max(reach_[first + bin], width * from[bin]);
+        };
+        if (p.typical != no_contrast) {
+            // The same light in a part half as wide has four times the contrast; but nowhere more than the largest.
+            constexpr int per_halving = 2 * contrasts_per_octave;
+            float width = 1;
+            for (int contrast = std::min(p.typical, p.largest);; contrast = std::min(contrast + per_halving, p.largest), width /= 2) {
+                include(tables.patches, contrast, width);
+                if (contrast == p.largest) break;
+            }
+        }
+        if (p.drift != no_contrast)
+            for_each_drift(p, [&](int contrast, float width) { include(tables.areas, contrast, width); });
+        make_monotone(first);
+    }
+
+    // Calls f(contrast, width) for the mesh and for areas down to twice the node's width, at whole octaves.
+    template <class F>
+    static void for_each_drift(const Pattern& p, F&& f) {
+        for (int quarters = p.quarters; quarters >= 4; quarters = (quarters - 1) / 4 * 4) {
+            const int contrast = p.drift - (quarters * p.fading * contrasts_per_octave / 2 + 3) / 4;
+            if (contrast >= 0) f(contrast, std::exp2(static_cast<float>(quarters) / 4));
+        }
+    }
+
+    void add_strip(const Pattern& p) {
+        const std::size_t first = reach_.size();
+        for (std::size_t bin = 0; bin < bins_; ++bin)
+            reach_.push_back(static_cast<float>(eye(p.luminance, bin).strip_reach(Levels::contrast(p.largest))));
+        make_monotone(first);
+    }
+
+    // The table's own rounding must not make anything grow with the eccentricity.
+    void make_monotone(std::size_t first) {
+        for (std::size_t i = first + 1; i < reach_.size(); ++i) reach_[i] = std::min(reach_[i], reach_[i - 1]);
+    }
+
+    const Levels& levels_;
+    const Screen& screen_;
+    const CsfTable& csf_;
+    std::size_t bins_, most_patterns_;
+    int coarseness_ = 1;
+    bool has_too_few_ = false;
+    std::vector<Discs> discs_;
+    std::vector<std::vector<Eye>> eyes_; // by luminance; by bin
+    std::map<Pattern, std::uint16_t> rows_;
+    std::vector<float> reach_;
+};
+
+// A pattern of a width, and what it comes to.
+struct Shown {
+    Pattern pattern;
+    float length = 0;
+    std::uint16_t row = 0;
+};
+
+// By how much the one must be wider to be seen from as far as the other everywhere.
+float shortfall(const Reaches& reaches, const Shown& a, const Shown& b) {
+    constexpr float infinity = std::numeric_limits<float>::infinity();
+    if (b.row == 0) return 1;
+    if (a.row == b.row) return a.length > 0 ? std::max(b.length / a.length, 1.0f) : b.length > 0 ? infinity : 1;
+    const std::span<const float> of_a = reaches.reach(a.row), of_b = reaches.reach(b.row);
+    float factor = 0;
+    for (std::size_t bin = 0; bin < of_a.size(); ++bin) {
+        if (!(of_b[bin] > 0)) continue;
+        if (!(of_a[bin] > 0)) return infinity;
+        factor = std::max(factor, b.length > 0 ? b.length * of_b[bin] / (a.length * of_a[bin]) : 0.0f);
+    }
+    constexpr float rounding = 4e-6f; // of the products, when the criterion is checked
+    return std::max(factor * (1 + rounding), 1.0f);
+}
+
+// From how far it is seen, in all.
+float weight(const Reaches& reaches, const Shown& shown) {
+    float sum = 0;
+    const std::span<const float> reach = reaches.reach(shown.row);
+    for (std::size_t bin = 0; bin < reach.size(); bin += 8) sum += std::log2(1 + std::max(reach[bin], 0.0f) * shown.length);
+    return sum;
+}
+
+// Makes `a` be seen from as far as `b`: wider, or of more contrast, whichever adds less.
+void cover(Reaches& reaches, Shown& a, const Shown& b) {
+    if (a.row == 0) {
+        if (b.row != 0) a = {b.pattern, std::max(a.length, b.length), b.row};
+        return;
+    }
+    if (a.row == b.row) a.length = std::max(a.length, b.length);
+    const float factor = shortfall(reaches, a, b);
+    if (factor <= 1) return;
+    Shown wider = a, richer = a;
+    wider.length *= factor;
+    richer.pattern = above(a.pattern, b.pattern);
+    richer.length = std::max(a.length, b.length);
+    richer.row = reaches.row(richer.pattern);
+    // Drifts of different widths are told at different octaves.
+    richer.length *= std::max(shortfall(reaches, richer, a), shortfall(reaches, richer, b));
+    if (!std::isfinite(wider.length) && !std::isfinite(richer.length)) {
+        richer.pattern.fading = 0; // then the larger drift is above both everywhere
+        richer.length = std::max(a.length, b.length);
+        richer.row = reaches.row(richer.pattern);
+    }
+    const bool is_wider_less = !std::isfinite(richer.length) || weight(reaches, wider) <= weight(reaches, richer);
+    a = std::isfinite(wider.length) && is_wider_less ? wider : richer;
+}
+
+// What nodes show, no less than their children: patches, and strips where they are outlines. False where the rows do not suffice.
+bool find_shown(const vdtree::SoundTree& tree, const SceneLuminance& scene, const Levels& levels, const CsfTable& csf, Reaches& reaches,
+                std::vector<Shown>& patches, std::vector<Shown>& strips) {
+    const std::span<const vdtree::FoldError> errors = tree.fold_errors();
+    const double darkest = levels.in_cdm2(scene.darkest), brightest = levels.in_cdm2(scene.brightest);
+    const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
+    const vdtree::LuminanceRange all = tree.ring_luminance()[vdtree::VertexTree::root()];
+    const int whole = levels.luminance_level(levels.in_cdm2(static_cast<double>(all.lo + all.hi) / 2));
+    const double whole_peak = csf.peak_sensitivity(Degrees(0), Luminance(levels.luminance(whole)));
+    patches.assign(tree.interior_count(), {});
+    strips.assign(tree.interior_count(), {});
+    for (NodeId node = tree.interior_count(); node-- > 0;) { // children before parents
+        const vdtree::LuminanceRange range = tree.ring_luminance()[node];
+        const double lo = levels.in_cdm2(range.lo), hi = levels.in_cdm2(range.hi), middle = (lo + hi) / 2;
+        const double r1 = tree.bounds()[node].ring.radius;
+        const auto change = [&](float luminance, double distance) {
+            if (tree.bounds()[node].flags & vdtree::translucent_ring) return brightest - darkest; // anything may show through
+            return levels.difference_in_cdm2(luminance) + (hi - lo) * (r1 > 0 ? std::min(1.0, distance / r1) : 1.0);
+        };
+        Shown patch;
+        patch.pattern.luminance = levels.luminance_level(middle);
+        patch.pattern.largest = levels.contrast_level(change(errors[node].luminance, errors[node].distance), middle);
+        const int typical = levels.contrast_level(change(errors[node].wide_luminance, amplitude_of_mean * errors[node].mean_distance), middle);
+        if (patch.pattern.largest != no_contrast)
+            patch.pattern.typical = std::clamp(typical, std::max(patch.pattern.largest - steepest_spike, 0), patch.pattern.largest);
+        patch.length = std::max(tree.support_spheres()[node].radius, errors[node].extent);
+        const int drift = levels.contrast_level(static_cast<double>(errors[node].drift), 1);
+        if (drift != no_contrast && Levels::contrast(drift) * whole_peak > 1) {
+            patch.pattern.luminance = std::max(patch.pattern.luminance, whole);
+            patch.pattern.drift = drift, patch.pattern.fading = errors[node].fading;
+            patch.pattern.quarters = static_cast<int>(std::ceil(4 * std::log2(std::max(std::min(widest, object_radius / patch.length), 1.0f))));
+        }
+        patch.pattern = reaches.simplified(patch.pattern);
+        patch.row = reaches.row(patch.pattern);
+        cover(reaches, patch, patches[node]); // the children's
+        patches[node] = patch;
+
+        Shown strip;
+        for (const auto& [bright, dark] : {std::pair(brightest, lo), std::pair(hi, darkest)}) {
+            const double mean = (bright + dark) / 2;
+            const Pattern own{.luminance = levels.luminance_level(mean), .largest = levels.contrast_level(bright - dark, mean), .is_strip = true};
+            strip.pattern = above(strip.pattern, own);
+        }
+        strip.length = errors[node].distance;
+        strip.row = reaches.row(strip.pattern);
+        cover(reaches, strip, strips[node]);
+        strips[node] = strip;
+        if (node > 0) {
+            const NodeId parent = tree.parents()[node];
+            cover(reaches, patches[parent], patch);
+            cover(reaches, strips[parent], strip);
+        }
+        if (reaches.has_too_few()) return false;
+    }
+    return true;
+}
+
+// A node folds as well where the whole mesh does, as far as the node's stage: takes the stage where that is nowhere seen from farther, unless a
+// child would then be. Children before parents.
+void fold_in_stages(const vdtree::SoundTree& tree, const Reaches& reaches, std::span<const Shown> stages,
+                    std::span<Shown> shown) {
+    const std::span<const vdtree::FoldError> errors = tree.fold_errors();
+    std::vector<bool> may_take(shown.size(), true);
+    for (std::size_t node = shown.size(); node-- > 0;) {
+        const std::size_t number = errors[node].stage;
+        if (may_take[node] && shortfall(reaches, shown[node], stages[number]) <= 1) {
+            shown[node] = stages[number]; // no more than the parent's own, nor its stage
+            continue;
+        }
+        if (node == 0) return;
+        const NodeId parent = tree.parents()[node];
+        const std::size_t above = errors[parent].stage;
+        if (!(shortfall(reaches, stages[above], shown[node]) <= 1)) may_take[parent] = false;
+    }
+}
+
+} // namespace
+
+Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options) {
+    const std::span<const vdtree::FoldError> errors = tree.fold_errors();
+    if (errors.empty())
+        return Error{ErrorCode::invalid_argument, "The errors of the tree's folds have not been measured (vdtree::with_fold_errors)."};
+    if (const auto valid = check_arguments(view, options); !valid) return valid.error();
+    const auto sound = vdtree::SoundTree::of(tree);
+    if (!sound) return sound.error();
+    const NodeId nodes = tree.interior_count();
+    const Screen screen(view, options);
+    const Levels levels(options.display);
+    const CsfTable& csf = options.csf ? *options.csf : CsfTable::standard();
+
+    DistanceCriterion::Parts parts;
+    parts.spheres = DistanceCriterion::Spheres::ring;
+    parts.eccentricity_bins = options.gaze_px ? bin_count : 1;
+    parts.bin_degrees = degrees_per_bin / screen.least_magnification;
+    parts.facing.resize(nodes);
+    parts.classes.resize(nodes);
+    parts.lengths.resize(nodes);
+    parts.silhouette_lengths.resize(nodes);
+    const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
+    Reaches reaches(levels, screen, csf, parts.eccentricity_bins, tree.fold_stages().size());
+    std::vector<Shown> patches, strips;
+    while (!find_shown(*sound, options.scene, levels, csf, reaches, patches, strips)) reaches.coarsen();
+    const std::vector<float> distances = stage_distances(tree, screen, options, parts.eccentricity_bins);
+    if (!distances.empty() && object_radius > 0) {
+        std::vector<Shown> stages;
+        for (std::size_t first = 0; first < distances.size(); first += parts.eccentricity_bins) {
+            const std::uint16_t row = reaches.add(std::span(distances).subspan(first, parts.eccentricity_bins), object_radius);
+            stages.push_back({.pattern = {}, .length = object_radius, .row = row});
+        }
+        fold_in_stages(*sound, reaches, stages, patches);
+        fold_in_stages(*sound, reaches, stages, strips);
+    }
+    for (NodeId node = 0; node < nodes; ++node) {
+        parts.classes[node] = {patches[node].row, strips[node].row};
+        parts.facing[node] = errors[node].facing;
+        parts.lengths[node] = patches[node].length;
+        parts.silhouette_lengths[node] = strips[node].length;
+    }
+    parts.reach = reaches.take();
+    return DistanceCriterion::create(tree, std::move(parts));
+}
+
+} // namespace unseen::perception

@@ -1,0 +1,367 @@
+// The fold tests after Luebke and Hallen in distance form: a table of reaches by class and eccentricity.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <unordered_map>
+#include <vector>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+#include <perception/criterion.h>
+
+#include "fold/fold_classes.h"
+#include "fold/fold_screen.h"
+
+namespace unseen::perception {
+
+namespace {
+
+using vdtree::ChromaRange;
+using vdtree::DistanceCriterion;
+using vdtree::NodeId;
+
+constexpr float length_rounding = 1e-6f; // covers that of a mean of two floats
+
+// Of eccentricity on the screen; beyond the last one sensitivity is taken as there.
+struct Bins {
+    double degrees;
+    std::size_t count;
+
+    double at(std::size_t bin) const { return static_cast<double>(bin) * degrees; } // the nearest to the gaze
+};
+constexpr Bins coarse_bins{degrees_per_bin, bin_count}, fine_bins{degrees_per_bin / 2, 2 * bin_count};
+
+// The sensitivities that a test uses: to colour only where it looks at colour.
+struct Sensitivities {
+    const CsfTable& luminance;
+    const CsfTable* red_green = nullptr;
+    const CsfTable* yellow_violet = nullptr;
+};
+
+Sensitivities sensitivities_for(const FoldTestOptions& options, bool has_chroma) {
+    Sensitivities all{options.csf ? *options.csf : CsfTable::standard()};
+    if (!has_chroma) return all;
+    static const CsfTable red_green = CsfTable::from_model(CsfModel::castle_red_green);
+    static const CsfTable yellow_violet = CsfTable::from_model(CsfModel::castle_yellow_violet);
+    all.red_green = &red_green;
+    all.yellow_violet = &yellow_violet;
+    return all;
+}
+
+// A row of the table: how visible its contrasts are.
+struct Row {
+    double contrast, shift, luminance_cdm2;
+    glm::dvec2 chroma, chroma_shift;
+    double texture, texture_motion;
+
+    Row(const Level& level, const Classes& classes)
+        : contrast(classes.contrasts().value(level.contrast)), shift(shifts.value(level.shift)), luminance_cdm2(classes.luminance(level.luminance)),
+          chroma(chroma_contrasts.value(level.chroma[0]), chroma_contrasts.value(level.chroma[1])),
+          chroma_shift(chroma_shifts.value(level.chroma_shift[0]), chroma_shifts.value(level.chroma_shift[1])),
+          texture(texture_contrasts.value(level.texture)), texture_motion(std::min(texture_motions.value(level.texture_motion), 1.0)) {}
+
+    bool has_chroma() const { return chroma != glm::dvec2(0); }
+    bool has_texture() const { return texture > 0; }
+
+    // 1 is just visible: of a grating of this frequency in all directions of colour.
+    double visibility(const Sensitivities& see, double frequency_cpd, double eccentricity_deg) const {
+        const CyclesPerDegree frequency(frequency_cpd);
+        const Degrees eccentricity(eccentricity_deg);
+        const Luminance luminance(luminance_cdm2);
+        const double sensitivity = contrast > 0 || has_texture() ? see.luminance.monotone_sensitivity(frequency, eccentricity, luminance) : 0;
+        double grey = contrast * sensitivity;
+        if (has_texture()) grey = std::min(grey + texture * moved_sensitivity(see, frequency_cpd, eccentricity, luminance), sensitivity);
+        if (!has_chroma()) return grey;
+        return std::hypot(grey, chroma.x * see.red_green->monotone_sensitivity(frequency, eccentricity, luminance),
+                          chroma.y * see.yellow_violet->monotone_sensitivity(frequency, eccentricity, luminance));
+    }
+    // To a pattern that moves by a share of half a wave of this frequency, within a patch that holds no lower ones: the bands of higher
+    // frequencies see the share of it that lies in their own half waves.
+    double moved_sensitivity(const Sensitivities& see, double lowest_cpd, Degrees eccentricity, Luminance luminance) const {
+        constexpr double steps_per_octave = 2;
+        double largest = 0;
+        for (double multiple = 1;; ) { // sensitivity falls and shares grow: up to the next step both are no more than this
+            const double next = multiple * std::exp2(1 / steps_per_octave);
+            const double share = std::min(1.0, next * texture_motion);
+            largest = std::max(largest, share * see.luminance.monotone_sensitivity(CyclesPerDegree(lowest_cpd * multiple), eccentricity, luminance));
+            if (share >= 1) return largest;
+            multiple = next;
+        }
+    }
+    // Of the shifts of the mean, at whatever frequency they are seen best.
+    double shift_visibility(const Sensitivities& see, double eccentricity_deg) const {
+        const Degrees eccentricity(eccentricity_deg);
+        const Luminance luminance(luminance_cdm2);
+        const double grey = shift > 0 ? shift * see.luminance.peak_sensitivity(eccentricity, luminance) : 0;
+        if (chroma_shift == glm::dvec2(0)) return grey;
+        return std::hypot(grey, chroma_shift.x * see.red_green->peak_sensitivity(eccentricity, luminance),
+                          chroma_shift.y * see.yellow_violet->peak_sensitivity(eccentricity, luminance));
+    }
+};
+
+// The largest extents, in degrees on the screen, of which a row shows nothing; infinite where it does at no extent. Smaller is what comes first:
+// bins in ascending eccentricity.
+class LargestExtents {
+public:
+    // Extents around the spheres are larger than these, from whose nearest points eccentricity is counted: they reach nearer to the gaze, by
+    // half of their width at most.
+    LargestExtents(const Row& row, const Sensitivities& see, const Screen& screen, bool is_around_spheres)
+        : row_(row), see_(see), is_around_spheres_(is_around_spheres), step_(step_of(screen.pixel_deg / smallest_of_a_pixel)) {}
+
+    double at(double eccentricity_deg) {
+        // Of a fixed series of extents, so that more contrast never makes them larger.
+        if (step_ == last_step || is_unseen(last_step, eccentricity_deg)) {
+            step_ = last_step;
+            return std::numeric_limits<double>::infinity();
+        }
+        int above = step_ + 1;
+        for (int stride = 1; above < last_step && is_unseen(above, eccentricity_deg); stride *= 2) {
+            step_ = above;
+            above = std::min(above + stride, last_step);
+        }
+        while (above - step_ > 1) {
+            const int middle = step_ + (above - step_) / 2;
+            (is_unseen(middle, eccentricity_deg) ? step_ : above) = middle;
+        }
+        return extent(step_);
+    }
+
+private:
+    static constexpr double steps_per_octave = 128;
+    static constexpr int last_step = 9 * 128;           // 512 degrees: all that is seen
+    static constexpr double smallest_of_a_pixel = 1024; // far below what any fold costs 1 at
+
+    static double extent(int step) { return std::exp2(step / steps_per_octave); }
+    static int step_of(double extent_deg) { return static_cast<int>(std::floor(steps_per_octave * std::log2(extent_deg))); }
+    bool is_unseen(int step, double eccentricity_deg) const {
+        const double nearest = is_around_spheres_ ? std::max(0.0, eccentricity_deg - extent(step) / 2) : eccentricity_deg;
+        return row_.visibility(see_, 1 / (2 * extent(step)), nearest) <= 1;
+    }
+
+    const Row& row_;
+    const Sensitivities& see_;
+    bool is_around_spheres_;
+    int step_; // not seen, or smaller than anything that matters
+};
+
+// Of grey rows whose extents are the spheres' own, all at once.
+void find_largest_extents(const Row& row, const CsfTable& csf, const Bins& bins, std::span<double> extents) {
+    std::array<float, fine_bins.count> contrast, eccentricity, luminance, log2_frequency;
+    for (std::size_t bin = 0; bin < extents.size(); ++bin) eccentricity[bin] = static_cast<float>(bins.at(bin));
+    contrast.fill(static_cast<float>(row.contrast));
+    luminance.fill(static_cast<float>(row.luminance_cdm2));
+    csf.highest_visible_log2_frequency(std::span(contrast).first(extents.size()), std::span(eccentricity).first(extents.size()),
+                                       std::span(luminance).first(extents.size()), std::span(log2_frequency).first(extents.size()));
+    // Infinite where not even the peak is seen.
+    for (std::size_t bin = 0; bin < extents.size(); ++bin) extents[bin] = 1 / (2 * std::exp2(static_cast<double>(log2_frequency[bin])));
+}
+
+// The distance, in lengths, from which an extent is no larger than this on the screen.
+float reach_of(double extent_deg, const Screen& screen, bool is_around_spheres) {
+    if (std::isinf(extent_deg)) return 0; // only from inside
+    const double half = extent_deg / screen.largest_magnification / degrees_per_radian / 2;
+    const double in_lengths = half < std::numbers::pi / 2 ? 1 / std::sin(half) : 1; // from the centre
+    return static_cast<float>((is_around_spheres ? in_lengths : in_lengths - 1) * (1 + reach_rounding));
+}
+
+void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes& classes, const Bins& eccentricities, const Screen& screen,
+                const Sensitivities& see) {
+    const std::size_t bins = parts.eccentricity_bins;
+    const bool is_around_spheres = !parts.lengths.empty();
+    parts.reach.assign((rows.levels().size() + 1) * bins, DistanceCriterion::never_visible);
+    parts.least_cost.assign(parts.reach.size(), 0);
+    std::unordered_map<std::uint64_t, std::vector<double>> known; // extents, which do not depend on shifts of the mean
+    for (std::size_t i = 0; i < rows.levels().size(); ++i) {
+        const Row row(rows.levels()[i], classes);
+        Level without_shifts = rows.levels()[i];
+        without_shifts.shift = 0;
+        without_shifts.chroma_shift = {};
+        const auto [found, is_new] = known.try_emplace(without_shifts.number(), bins);
+        std::vector<double>& extents = found->second;
+        if (is_new && (is_around_spheres || row.has_chroma() || row.has_texture())) {
+            LargestExtents largest(row, see, screen, is_around_spheres);
+            for (std::size_t bin = 0; bin < bins; ++bin) extents[bin] = largest.at(eccentricities.at(bin));
+        } else if (is_new) {
+            find_largest_extents(row, see.luminance, eccentricities, extents);
+        }
+        float *const reach = &parts.reach[(i + 1) * bins], *const least_cost = &parts.least_cost[(i + 1) * bins];
+        for (std::size_t bin = 0; bin < bins; ++bin) {
+            // No fold is drawn smaller than a pixel, and a shift of the mean shows from whatever distance.
+            const double eccentricity_deg = eccentricities.at(bin);
+            reach[bin] = reach_of(extents[bin], screen, is_around_spheres);
+            least_cost[bin] = static_cast<float>(std::max(screen.pixel_deg / extents[bin], row.shift_visibility(see, eccentricity_deg)));
+            // The table's own rounding must not make anything grow with the eccentricity.
+            if (bin == 0) continue;
+            reach[bin] = std::min(reach[bin], reach[bin - 1]);
+            least_cost[bin] = std::min(least_cost[bin], least_cost[bin - 1]);
+        }
+    }
+}
+
+// Silhouettes may uncover anything in the scene.
+vdtree::LuminanceRange outline_of(vdtree::LuminanceRange range, const SceneLuminance& scene) {
+    return {std::min(range.lo, scene.darkest), std::max(range.hi, scene.brightest)};
+}
+
+double middle_of(vdtree::LuminanceRange range) { return 0.5 * (static_cast<double>(range.lo) + static_cast<double>(range.hi)); }
+
+glm::dvec2 half_of(const ChromaRange& range) { return (glm::dvec2(range.hi) - glm::dvec2(range.lo)) * 0.5; }
+
+// The object's colours, and the background, which is grey.
+ChromaRange scene_chroma(std::span<const ChromaRange> rings) {
+    const ChromaRange& all = rings[vdtree::VertexTree::root()];
+    return {glm::min(all.lo, glm::vec2(0)), glm::max(all.hi, glm::vec2(0))};
+}
+
+// What a test takes of the tree.
+struct Rings {
+    std::span<const vdtree::PackedRange> luminance;
+    std::span<const ChromaRange> chroma;             // none: not looked at
+    std::span<const float> mean_shift = {};          // likewise
+    std::span<const glm::vec2> mean_chroma_shift = {};
+    std::span<const vdtree::PackedRange> vertices = {}, texture = {}; // where the texture is counted by how far it moves; then, too:
+    std::span<const float> texture_deviation = {}, lengths = {};      // mesh units
+    std::vector<vdtree::NormalSlabs> facing = {};                     // empty: the tree's
+};
+
+// All that grows up the tree stays so: contrasts against a middle would not.
+void saturate(RingLooks& parent, const RingLooks& child) {
+    parent.adaptation = std::max(parent.adaptation, child.adaptation);
+    parent.least_contrast = std::max(parent.least_contrast, child.least_contrast);
+    parent.shift = std::max(parent.shift, child.shift);
+    parent.chroma = glm::max(parent.chroma, child.chroma);
+    parent.chroma_shift = glm::max(parent.chroma_shift, child.chroma_shift);
+}
+
+// Of a surface that faces the eye: its vertices' contrast where the texture is brightest, the texture's where the vertices are, and how far
+// that moves: no less than in the children, whose shares of their extents are rounded up.
+void add_texture(RingLooks& inside, const Rings& rings, NodeId node, const Classes& classes, std::vector<double>& motions) {
+    const vdtree::LuminanceRange vertices = rings.vertices[node], texture = rings.texture[node];
+    inside.range = {vertices.lo * texture.hi, vertices.hi * texture.hi};
+    inside.texture = classes.contrast({vertices.hi * texture.lo, vertices.hi * texture.hi});
+    const double length = static_cast<double>(rings.lengths[node]);
+    double& motion = motions[node];
+    motion = std::max(motion, static_cast<double>(rings.texture_deviation[node]));
+    // Half waves fill twice the length.
+    inside.texture_motion = motion > 0 ? (length > 0 ? std::min(1.0, motion / (2 * length)) : 1.0) : 0.0;
+    motion = std::min(1.0, texture_motions.value(texture_motions.of(inside.texture_motion))) * 2 * length;
+}
+
+// Puts all nodes into classes. False where there are too many of them for rows so fine.
+bool classify(const vdtree::SoundTree& tree, const Rings& rings, const FoldTestOptions& options, const Classes& classes,
+              Rows& rows, std::vector<vdtree::FoldClass>& fold_classes) {
+    const bool has_chroma = !rings.chroma.empty();
+    const glm::dvec2 of_scene = has_chroma ? half_of(scene_chroma(rings.chroma)) : glm::dvec2(0);
+    std::vector<RingLooks> interior(tree.interior_count()), outlines(tree.interior_count());
+    std::vector<double> motions(rings.vertices.size(), 0); // of textures
+    fold_classes.resize(tree.interior_count());
+    for (NodeId node = tree.interior_count(); node-- > 0;) { // children before parents
+        RingLooks &inside = interior[node], &outline = outlines[node];
+        outline.range = outline_of(rings.luminance[node], options.scene);
+        // Anything in the scene may show through.
+        const bool is_translucent = tree.bounds()[node].flags & vdtree::translucent_ring;
+        inside.range = is_translucent ? outline.range : vdtree::LuminanceRange(rings.luminance[node]);
+        inside.adaptation = std::max({inside.adaptation, static_cast<double>(tree.adaptation_luminance()[node]), middle_of(inside.range)});
+        if (!rings.vertices.empty() && !is_translucent) add_texture(inside, rings, node, classes, motions);
+        outline.least_contrast = std::max(outline.least_contrast, classes.sum_of_contrasts(inside));
+        if (!rings.mean_shift.empty())
+            inside.shift = std::max(inside.shift, classes.contrast(static_cast<double>(rings.mean_shift[node]), rings.luminance[node]));
+        if (has_chroma) {
+            inside.chroma = glm::max(inside.chroma, classes.chroma_contrast(is_translucent ? of_scene : half_of(rings.chroma[node]), inside.range));
+            outline.chroma = glm::max(glm::max(outline.chroma, inside.chroma), classes.chroma_contrast(of_scene, outline.range));
+            if (!rings.mean_chroma_shift.empty())
+                inside.chroma_shift = glm::max(inside.chroma_shift, classes.chroma_contrast(rings.mean_chroma_shift[node], rings.luminance[node]));
+        }
+        saturate(outline, {outline.range, std::max(inside.adaptation, middle_of(outline.range)), inside.shift, glm::dvec2(0), inside.chroma_shift});
+        fold_classes[node] = {rows.of(classes.level(inside)), rows.of(classes.level(outline))};
+        if (rows.is_full()) return false;
+        if (node == 0) break;
+        saturate(interior[tree.parents()[node]], inside);
+        if (!motions.empty()) motions[tree.parents()[node]] = std::max(motions[tree.parents()[node]], motions[node]);
+        saturate(outlines[tree.parents()[node]], outline);
+    }
+    return true;
+}
+
+Result<DistanceCriterion> make_criterion(const vdtree::SoundTree& tree, const Rings& rings, std::vector<float> lengths,
+                                         const vdtree::View& view, const FoldTestOptions& options) {
+    if (const auto valid = check_arguments(view, options); !valid) return valid.error();
+    const Screen screen(view, options);
+    const bool has_chroma = !rings.chroma.empty();
+    // Where contrasts and luminances alone make the rows, these are few enough, and quickly found, to be fine.
+    const bool is_fine = !has_chroma && rings.mean_shift.empty() && rings.vertices.empty() && lengths.empty();
+    const Classes classes(options.display, is_fine ? fine_contrasts : coarse_contrasts);
+    const Bins& bins = is_fine ? fine_bins : coarse_bins;
+    if (!tree.texture().empty() && options.chroma)
+        return Error{ErrorCode::invalid_argument, "The colours of textures are not looked at: leave the chroma out, or the texture."};
+    DistanceCriterion::Parts parts;
+    parts.spheres = DistanceCriterion::Spheres::ring;
+    parts.eccentricity_bins = options.gaze_px ? bins.count : 1;
+    parts.bin_degrees = bins.degrees / screen.least_magnification;
+    parts.lengths = std::move(lengths);
+    parts.facing = rings.facing;
+    for (std::size_t coarseness = 1;; coarseness *= 2) {
+        Rows rows(!has_chroma && rings.vertices.empty(), classes.contrasts(), coarseness);
+        if (!classify(tree, rings, options, classes, rows, parts.classes)) continue;
+        fill_table(parts, rows, classes, bins, screen, sensitivities_for(options, has_chroma));
+        return DistanceCriterion::create(tree, std::move(parts));
+    }
+}
+
+} // namespace
+
+Result<DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTree& tree, const vdtree::View& view,
+                                                  const FoldTestOptions& options) {
+    const auto sound = vdtree::SoundTree::of(tree);
+    if (!sound) return sound.error();
+    Rings rings{tree.ring_luminance(), {}};
+    if (options.chroma) rings.chroma = tree.ring_chroma();
+    return make_criterion(*sound, rings, {}, view, options);
+}
+
+Result<DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree& tree, const vdtree::CutRings& cut_rings,
+                                                       const vdtree::View& view, const FoldTestOptions& options) {
+    const auto sound = vdtree::SoundTree::of(tree);
+    if (!sound) return sound.error();
+    Rings rings{cut_rings.luminance, {}, cut_rings.mean_shift};
+    if (options.chroma) {
+        rings.chroma = cut_rings.chroma;
+        rings.mean_chroma_shift = cut_rings.mean_chroma_shift;
+    }
+    std::vector<float> lengths(tree.interior_count(), 0.0f);
+    for (NodeId node = tree.interior_count(); node-- > 0;) {
+        // The change is largest within the support and fades to nothing at the ring's border.
+        const float around = 0.5f * (tree.support_spheres()[node].radius + cut_rings.radius[node]) * (1 + length_rounding);
+        lengths[node] = std::max({lengths[node], tree.bounds()[node].ring.radius, around});
+        if (node > 0) lengths[sound->parents()[node]] = std::max(lengths[sound->parents()[node]], lengths[node]);
+    }
+    if (!cut_rings.meets_another.empty())
+        for (NodeId node = 0; node < tree.interior_count(); ++node) // an outline, whatever it faces
+            rings.facing.push_back(cut_rings.meets_another[node] ? vdtree::NormalSlabs::everything() : tree.bounds()[node].slabs);
+    rings.vertices = cut_rings.vertices;
+    rings.texture = cut_rings.texture;
+    rings.texture_deviation = cut_rings.texture_deviation;
+    const std::vector<float> own_lengths = rings.vertices.empty() ? std::vector<float>() : lengths; // which the criterion takes
+    rings.lengths = own_lengths;
+    return make_criterion(*sound, rings, std::move(lengths), view, options);
+}
+
+vdtree::Viewpoint viewpoint_of(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options,
+                               const vdtree::Similarity& placement, bool window_only) {
+    vdtree::Viewpoint viewpoint;
+    viewpoint.eye = vdtree::eye_in_tree(tree, view, placement);
+    if (options.gaze_px) {
+        const Screen screen(view, options);
+        const vdtree::CameraFrame frame = vdtree::camera_frame(view);
+        const double x = (options.gaze_px->x - view.width * 0.5) * screen.pitch_over_distance / screen.scale;
+        const double y = (view.height * 0.5 - options.gaze_px->y) * screen.pitch_over_distance / screen.scale;
+        viewpoint.gaze = glm::normalize(placement.direction_to_mesh(x * frame.right + y * frame.up - frame.back));
+    }
+    if (window_only) viewpoint.frusta.push_back(vdtree::frustum_of(tree, view, placement));
+    return viewpoint;
+}
+
+} // namespace unseen::perception

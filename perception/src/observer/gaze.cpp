@@ -1,0 +1,301 @@
+// Gazes: traces from files, from statistics, and through a tracker.
+#include <perception/gaze.h>
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <numbers>
+#include <string>
+
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
+
+#include <perception/random.h>
+#include <vdtree/internal/atomic_file.h>
+
+#include "number_text.h"
+
+namespace unseen::perception {
+namespace {
+
+constexpr std::size_t most_samples = 10'000'000;
+
+// Of fixations and saccades, see the header.
+constexpr double median_fixation_s = 0.25, fixation_spread = 0.35; // standard deviation of the logarithm
+constexpr int amplitude_shape = 2;
+constexpr double mean_amplitude_deg = 5.5, least_amplitude_deg = 0.5, largest_amplitude_deg = 20;
+constexpr double seconds_per_degree = 0.0022, least_saccade_s = 0.021;
+
+// Margins that tables are made for; beyond the last, nothing is known.
+constexpr double margins_deg[] = {0, 0.25, 0.5, 0.75, 1, 1.5, 2, 3, 4, 6, 8, 12, 15, 20, 30, 45, 60};
+
+Error invalid(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
+
+// What is wrong with a sample after another, or nothing.
+std::string complaint_about(const GazeSample& sample, const GazeSample* before) {
+    constexpr double farthest_px = 1e6; // from the window's corner: a thousand windows away
+    if (!std::isfinite(sample.time_s)) return "has a time_s that is not finite";
+    for (const auto& [name, px] : {std::pair("x_px", sample.px.x), std::pair("y_px", sample.px.y)}) {
+        if (!std::isfinite(px)) return "has an " + std::string(name) + " that is not finite";
+        if (std::abs(px) > farthest_px) return "has an " + std::string(name) + " of " + number(px) + ": at most a million pixels aside can be";
+    }
+    if (!before) return {};
+    if (!(sample.time_s > before->time_s))
+        return "is out of order: time_s " + number(sample.time_s) + " s comes after " + number(before->time_s) + " s";
+    if (!(sample.time_s - before->time_s <= GazeTrace::longest_gap_s))
+        return "follows a gap of " + number(sample.time_s - before->time_s) + " s: at most 1 s may be missing";
+    return {};
+}
+
+std::string_view trimmed(std::string_view text) {
+    const std::size_t first = text.find_first_not_of(" \t\r"), last = text.find_last_not_of(" \t\r");
+    return first == text.npos ? std::string_view() : text.substr(first, last - first + 1);
+}
+
+// "0.004,512,384.5".
+std::optional<GazeSample> parse_sample(std::string_view line) {
+    std::array<double, 3> values;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        const std::size_t comma = line.find(',');
+        if ((comma == line.npos) != (i + 1 == values.size())) return std::nullopt;
+        const std::string_view cell = trimmed(line.substr(0, comma));
+        const auto [end, code] = std::from_chars(cell.data(), cell.data() + cell.size(), values[i]);
+        if (code != std::errc() || end != cell.data() + cell.size()) return std::nullopt;
+        if (comma != line.npos) line.remove_prefix(comma + 1);
+    }
+    return GazeSample{values[0], {values[1], values[2]}};
+}
+
+// Share of the way at a share of the time: minimum jerk (Hogan 1984).
+double minimum_jerk(double t) { return t * t * t * (10 + t * (-15 + 6 * t)); }
+
+// A fixation at `from`, then a saccade to `to`.
+struct Movement {
+    double fixation_s, saccade_s;
+    glm::dvec2 from, to; // pixels
+};
+
+class EyeModel {
+public:
+    EyeModel(const SimulatedGaze& options, const Display& display)
+        : random_(options.seed), size_(options.width_px, options.height_px), at_(size_ * 0.5),
+          tangent_per_pixel_(display.pixel_pitch / display.distance) {}
+
+    Movement next() {
+        Movement movement;
+        movement.fixation_s = median_fixation_s * std::exp(fixation_spread * random_.normal());
+        movement.from = at_;
+        const double amplitude = choose_target();
+        movement.saccade_s = least_saccade_s + seconds_per_degree * amplitude;
+        movement.to = at_;
+        return movement;
+    }
+
+private:
+    glm::dvec2 to_degrees(glm::dvec2 px) const {
+        const glm::dvec2 t = (px - size_ * 0.5) * tangent_per_pixel_;
+        return {std::atan(t.x) * degrees_per_radian, std::atan(t.y) * degrees_per_radian};
+    }
+    glm::dvec2 to_pixels(glm::dvec2 degrees) const {
+        return size_ * 0.5 + glm::dvec2(std::tan(degrees.x / degrees_per_radian), std::tan(degrees.y / degrees_per_radian)) / tangent_per_pixel_;
+    }
+    bool is_inside(glm::dvec2 px) const { return px.x >= 0 && px.y >= 0 && px.x <= size_.x && px.y <= size_.y; }
+
+    // Draws until a target is in the window; a small window may have none of that amplitude, so it shrinks with every failure.
+    double choose_target() {
+        double amplitude = 0;
+        do amplitude = random_.gamma(amplitude_shape, mean_amplitude_deg / amplitude_shape);
+        while (!(amplitude >= least_amplitude_deg && amplitude <= largest_amplitude_deg));
+        const glm::dvec2 here = to_degrees(at_);
+        for (constexpr double shrink = 0.93; ; amplitude *= shrink) {
+            const double direction = 2 * std::numbers::pi * random_.uniform();
+            const glm::dvec2 target = here + amplitude * glm::dvec2(std::cos(direction), std::sin(direction));
+            constexpr double steepest_deg = 80;
+            const bool is_ahead = std::abs(target.x) < steepest_deg && std::abs(target.y) < steepest_deg;
+            if (is_ahead && is_inside(to_pixels(target))) {
+                at_ = to_pixels(target);
+                return amplitude;
+            }
+            constexpr double hopeless_deg = 1e-6; // a window of a pixel
+            if (amplitude < hopeless_deg) return 0;
+        }
+    }
+
+    Random random_;
+    glm::dvec2 size_, at_;
+    double tangent_per_pixel_;
+};
+
+} // namespace
+
+// ---- traces -------------------------------------------------------------------------------------------------------
+
+Result<GazeTrace> GazeTrace::create(std::vector<GazeSample> samples) {
+    if (samples.empty()) return invalid("A gaze trace needs at least one sample.");
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+        const std::string problem = complaint_about(samples[i], i > 0 ? &samples[i - 1] : nullptr);
+        if (!problem.empty()) return invalid("Gaze sample " + std::to_string(i) + " " + problem + ".");
+    }
+    return GazeTrace(std::move(samples));
+}
+
+glm::dvec2 GazeTrace::at(double time_s) const {
+    const auto after = std::upper_bound(samples_.begin(), samples_.end(), time_s, [](double t, const GazeSample& s) { return t < s.time_s; });
+    if (after == samples_.begin()) return samples_.front().px;
+    if (after == samples_.end()) return samples_.back().px;
+    const GazeSample &a = *(after - 1), &b = *after;
+    return a.px + (b.px - a.px) * ((time_s - a.time_s) / (b.time_s - a.time_s));
+}
+
+Result<GazeTrace> read_gaze_trace(const std::filesystem::path& file) {
+    std::ifstream stream(file, std::ios::binary);
+    if (!stream) return Error{ErrorCode::io_failure, file.string() + ": cannot be opened."};
+    std::vector<GazeSample> samples;
+    bool has_header = false;
+    std::size_t line_number = 0;
+    const auto complain = [&](const std::string& what) {
+        return Error{ErrorCode::malformed_data, file.string() + ": line " + std::to_string(line_number) + ": " + what + "."};
+    };
+    for (std::string line; std::getline(stream, line);) {
+        ++line_number;
+        const std::string_view text = trimmed(line);
+        if (text.empty() || text.starts_with('#')) continue;
+        if (!has_header) {
+            if (text != "time_s,x_px,y_px") return complain("the first line must be \"time_s,x_px,y_px\"");
+            has_header = true;
+            continue;
+        }
+        const auto sample = parse_sample(text);
+        if (!sample) return complain("must be three numbers: time_s,x_px,y_px");
+        const std::string problem = complaint_about(*sample, samples.empty() ? nullptr : &samples.back());
+        if (!problem.empty()) return complain("the sample " + problem);
+        if (samples.size() == most_samples) return complain("there are more than ten million samples");
+        samples.push_back(*sample);
+    }
+    if (stream.bad()) return Error{ErrorCode::io_failure, file.string() + ": cannot be read to its end."};
+    if (samples.empty()) return complain("there is no sample");
+    return GazeTrace::create(std::move(samples));
+}
+
+Result<void> write_gaze_trace(const std::filesystem::path& file, const GazeTrace& trace) {
+    std::string text = "time_s,x_px,y_px\n";
+    for (const GazeSample& s : trace.samples()) text += number(s.time_s) + "," + number(s.px.x) + "," + number(s.px.y) + "\n";
+    auto whole = vdtree::AtomicFile::create(file);
+    if (!whole) return whole.error();
+    if (auto written = whole->write(text); !written) return written;
+    return whole->commit();
+}
+
+Result<GazeTrace> simulate_gaze(const SimulatedGaze& o, const Display& display) {
+    if (!(o.duration_s > 0 && o.samples_per_s > 0 && o.duration_s * o.samples_per_s <= static_cast<double>(most_samples)))
+        return invalid("A simulated gaze needs a duration and a rate above 0, and at most ten million samples.");
+    if (o.width_px < 1 || o.height_px < 1) return invalid("A simulated gaze needs a window of at least 1x1 pixels.");
+    if (o.samples_per_s < 1 / GazeTrace::longest_gap_s) return invalid("A simulated gaze needs a sample a second at least.");
+    if (auto valid = validate(display); !valid) return valid.error();
+    EyeModel eye(o, display);
+    std::vector<GazeSample> samples;
+    Movement movement = eye.next();
+    double begun_s = 0;
+    const auto count = static_cast<std::size_t>(std::floor(o.duration_s * o.samples_per_s)) + 1;
+    samples.reserve(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        const double t = static_cast<double>(i) / o.samples_per_s;
+        while (t >= begun_s + movement.fixation_s + movement.saccade_s) {
+            begun_s += movement.fixation_s + movement.saccade_s;
+            movement = eye.next();
+        }
+        const double share = std::max(0.0, (t - begun_s - movement.fixation_s) / movement.saccade_s);
+        samples.push_back({t, movement.from + (movement.to - movement.from) * minimum_jerk(share)});
+    }
+    return GazeTrace::create(std::move(samples));
+}
+
+// ---- trackers -----------------------------------------------------------------------------------------------------
+
+Result<void> validate(const TrackerOptions& o) {
+    constexpr double widest_deg = 180, slowest_s = 10;
+    if (!(o.error_deg >= 0 && o.error_deg <= widest_deg)) return invalid("The gaze's error must lie in 0 to 180 degrees, not " + number(o.error_deg) + ".");
+    if (!(o.latency_s >= 0 && o.latency_s <= slowest_s)) return invalid("The gaze's latency must lie in 0 to 10 s, not " + number(o.latency_s) + ".");
+    if (!(o.suppressed_s >= 0 && o.suppressed_s <= 1)) return invalid("Suppression must last 0 to 1 s, not " + number(o.suppressed_s) + ".");
+    return {};
+}
+
+GazeTracker::GazeTracker(GazeTrace trace, const TrackerOptions& options, const Display& display, int width_px, int height_px)
+    : trace_(std::move(trace)), options_(options), tangent_per_pixel_(display.pixel_pitch / display.distance),
+      centre_px_(glm::dvec2(width_px, height_px) * 0.5) {
+    const std::vector<GazeSample>& s = trace_.samples();
+    for (std::size_t i = 1; i < s.size(); ++i) {
+        if (!(speed_at((s[i - 1].time_s + s[i].time_s) / 2) >= saccade_speed_deg_s)) continue;
+        if (!saccades_.empty() && saccades_.back().second == s[i - 1].time_s) saccades_.back().second = s[i].time_s;
+        else saccades_.emplace_back(s[i - 1].time_s, s[i].time_s);
+    }
+    for (auto& [from, to] : saccades_) to = std::max(to, from + options_.suppressed_s);
+}
+
+double GazeTracker::speed_at(double time_s) const {
+    const std::vector<GazeSample>& s = trace_.samples();
+    const auto after = std::upper_bound(s.begin(), s.end(), time_s, [](double t, const GazeSample& sample) { return t < sample.time_s; });
+    if (after == s.begin() || after == s.end()) return 0;
+    const auto direction = [&](glm::dvec2 px) { return glm::normalize(glm::dvec3((px - centre_px_) * tangent_per_pixel_, 1)); };
+    const glm::dvec3 a = direction((after - 1)->px), b = direction(after->px);
+    return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)) * degrees_per_radian / (after->time_s - (after - 1)->time_s);
+}
+
+TrackedGaze GazeTracker::at(double time_s) const {
+    double seen_s = time_s - options_.latency_s; // when the eye was where the tracker says
+    TrackedGaze tracked;
+    if (options_.suppression) {
+        const auto next = std::upper_bound(saccades_.begin(), saccades_.end(), seen_s, [](double t, const auto& s) { return t < s.first; });
+        // Saccades may follow each other within the time that the first blinds for.
+        for (auto s = next; s != saccades_.begin();) {
+            --s;
+            if (!(seen_s < s->second)) break;
+            tracked.is_suppressed = true;
+            seen_s = std::nextafter(s->first, s->first - 1);
+        }
+    }
+    tracked.px = trace_.at(seen_s);
+    tracked.speed_deg_s = speed_at(seen_s);
+    tracked.margin_deg = options_.error_deg + tracked.speed_deg_s * options_.latency_s;
+    return tracked;
+}
+
+// ---- tables -------------------------------------------------------------------------------------------------------
+
+CsfTable widened(const CsfTable& table, Degrees margin) {
+    assert(!(margin.value() < 0));
+    if (margin.value() == 0) return table;
+    const CsfSamples& samples = table.samples();
+    const auto plane = static_cast<std::ptrdiff_t>(samples.luminance_cdm2.size() * samples.frequency_cpd.size());
+    const double shift = std::max(margin.value(), CsfTable::smallest_spacing); // NaN stays
+    CsfSamples wide{samples.source, samples.frequency_cpd, {0.0}, samples.luminance_cdm2, {}};
+    wide.sensitivity.assign(samples.sensitivity.begin(), samples.sensitivity.begin() + plane);
+    for (auto column = samples.sensitivity.begin(); const double e : samples.eccentricity_deg) {
+        const double degrees = e + shift;
+        // The sum's rounding can bring columns too near to each other.
+        if (degrees <= CsfTable::highest_eccentricity.value() && degrees - wide.eccentricity_deg.back() >= CsfTable::smallest_spacing) {
+            wide.eccentricity_deg.push_back(degrees);
+            wide.sensitivity.insert(wide.sensitivity.end(), column, column + plane);
+        } else {
+            std::transform(column, column + plane, wide.sensitivity.end() - plane, wide.sensitivity.end() - plane,
+                           [](double left_out, double last) { return std::max(left_out, last); });
+        }
+        column += plane;
+    }
+    auto made = CsfTable::create(std::move(wide));
+    assert(made); // the columns of a table, at eccentricities that a table can have
+    return std::move(*made);
+}
+
+std::shared_ptr<const CsfTable> WidenedTables::at(Degrees margin) {
+    const auto rounded = std::find_if(std::begin(margins_deg), std::end(margins_deg), [&](double m) { return m >= margin.value(); });
+    if (rounded == std::end(margins_deg)) return nullptr;
+    std::shared_ptr<const CsfTable>& kept = widened_[*rounded];
+    if (!kept) kept = std::make_shared<const CsfTable>(widened(table_, Degrees(*rounded)));
+    return kept;
+}
+
+} // namespace unseen::perception

@@ -1,0 +1,67 @@
+// Mesh files as triangle soups of any topology.
+//
+// Read: PLY (ASCII, both endians, face lists and triangle strips), OBJ, OFF, STL (ASCII and binary) and
+// glTF 2.0 (.gltf, .glb), told apart by their content where it is unambiguous, else by the file name's ending.
+// Write: PLY, OBJ, glTF binary, by ending.
+//
+// Nothing in a file is believed: every count is checked against the bytes that are there before memory is
+// allocated for it, so memory stays proportional to the file. Errors name file, and line, byte or index.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <vdtree/function_ref.h>
+#include <vdtree/mesh.h>
+#include <vdtree/result.h>
+
+namespace unseen::meshio {
+
+enum class ColourEncoding { srgb, linear };
+
+struct ReadOptions {
+    // How 8-bit and float colours of PLY, OBJ and OFF are encoded; glTF defines its own (linear).
+    ColourEncoding colours = ColourEncoding::srgb;
+    Progress progress = {};
+    bool materials = true; // read them: of OBJ, the files that it names
+};
+
+// What a file says of the surface of a range of triangles. Images are named, or are there as they were in the file: nothing here decodes
+// them.
+struct Material {
+    std::string name;                 // of the MeshRange; different for all materials of a file
+    glm::vec4 colour = glm::vec4(1);  // linear RGB, 0..1, that vertex colours and texture are multiplied with; alpha
+    std::filesystem::path image = {}; // beside the mesh file, or below; empty: none
+    std::shared_ptr<const std::string> image_bytes = {}; // the image file itself, where the mesh file holds it; shared by all materials that have it; or null
+    vdtree::Wrap wrap_u = vdtree::Wrap::repeat, wrap_v = vdtree::Wrap::repeat;
+
+    bool has_image() const { return !image.empty() || image_bytes; }
+};
+
+struct ReadResult {
+    vdtree::Mesh mesh;
+    std::uint64_t source_faces = 0;       // faces of the file before triangulation
+    std::uint64_t dropped_triangles = 0;  // triangles that used a vertex twice
+    std::vector<std::string> warnings;    // repairs that were made, one sentence each
+    std::vector<Material> materials = {}; // of OBJ and glTF
+    bool uvs_from_top = false;            // v grows downward in images (glTF), not upward (OBJ, PLY)
+    std::optional<std::uint64_t> bad_uv = {}; // the first vertex whose texture coordinates were not finite, and set to 0
+};
+
+// Polygons are triangulated (ear clipping in the plane of the polygon, so concave ones keep their area),
+// triangle strips unrolled with their orientation, glTF node transforms applied. Coincident vertices stay apart.
+// Fails on a mesh without triangles, and on vertex normals in use that are not finite; those of length 0 are told in the warnings.
+Result<ReadResult> read_mesh(const std::filesystem::path& file, const ReadOptions& options = {});
+
+// Writes to a temporary name in the same folder, then renames; an existing file is replaced only by a whole one.
+// PLY: binary little-endian, float positions where they are exact and double otherwise; normals, colours (sRGB
+// 8 bit), UVs where present. OBJ: text with as many digits as needed to read the same values again.
+// GLB: one primitive for each material range.
+// Progress is told, and can cancel, while a PLY is written.
+Result<void> write_mesh(const std::filesystem::path& file, const vdtree::MeshView& mesh, const Progress& progress = {});
+
+} // namespace unseen::meshio

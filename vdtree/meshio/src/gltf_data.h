@@ -1,0 +1,63 @@
+// The bytes that a glTF document describes: its buffers, each read or decoded once, and the typed rows in them.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <glm/vec4.hpp>
+
+#include "gltf_document.h"
+#include "mesh_readers.h"
+
+namespace unseen::meshio::gltf {
+
+class Buffers {
+public:
+    // The source must outlive the buffers. `bin`: the container's own, for the first.
+    Buffers(const MeshSource& source, const json& document, std::optional<std::string_view> bin);
+
+    static std::string decode_data(std::string_view uri, const std::string& where); // "data:...;base64,..."
+    static std::filesystem::path below_folder(const std::string& uri, const std::string& where);
+
+    std::size_t count() const { return buffers_.size(); }
+    std::string_view operator[](std::size_t i) const { return buffers_[i]; }
+    std::uint64_t external_bytes() const { return external_bytes_; }
+
+private:
+    std::string_view resolve(const std::string& uri, const std::string& where);
+    std::string read_beside(const std::string& uri, const std::string& where);
+
+    const MeshSource& source_;
+    std::map<std::string, std::string> loaded_;
+    std::vector<std::string_view> buffers_;
+    std::uint64_t external_bytes_ = 0;
+};
+
+class Accessors {
+public:
+    Accessors(const tinygltf::Model& model, const Buffers& buffers) : model_(model), buffers_(buffers) {}
+
+    std::size_t count_of(int index) const { return accessor(index).count; }
+
+    // The accessor's elements with `components` components (0: 3 or 4), others 1 where there is a fourth.
+    std::vector<glm::dvec4> vectors(int index, int components, const char* use) const;
+    std::vector<Index> indices(int index) const;
+
+private:
+    struct Rows;
+    const tinygltf::Accessor& accessor(int index) const;
+    Rows rows_of(int view_index, std::size_t offset, std::size_t count, std::size_t size, const std::string& where) const;
+    template <class Put>
+    void for_each_sparse(const tinygltf::Accessor& a, std::size_t size, const std::string& where, Put&& put) const;
+
+    const tinygltf::Model& model_;
+    const Buffers& buffers_;
+};
+
+} // namespace unseen::meshio::gltf

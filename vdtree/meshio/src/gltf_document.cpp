@@ -1,0 +1,326 @@
+#include "gltf_document.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <utility>
+
+#include "mesh_readers.h"
+#include "text_scanner.h"
+
+namespace unseen::meshio::gltf {
+namespace {
+
+// Deeper JSON is found in attacks, not in scenes.
+constexpr int max_json_depth = 256;
+// Three bytes of JSON become a few hundred in memory, so their number is bounded, at more than scenes are made of.
+constexpr std::size_t max_json_values = std::size_t{1} << 23;
+constexpr std::size_t max_array_elements = std::size_t{1} << 20; // nodes, meshes, accessors, ...
+
+constexpr std::uint32_t glb_version = 2;
+constexpr std::uint32_t chunk_json = 0x4E4F534A;
+constexpr std::uint32_t chunk_bin = 0x004E4942;
+constexpr std::size_t glb_header_bytes = 12;
+constexpr std::size_t chunk_header_bytes = 8;
+
+// Extensions without which the positions or triangles cannot be read.
+constexpr std::string_view unsupported_extensions[] = {"KHR_draco_mesh_compression", "EXT_meshopt_compression",
+                                                       "KHR_meshopt_compression", "EXT_mesh_gpu_instancing"};
+
+std::uint32_t word_at(std::string_view bytes, std::size_t offset) {
+    std::array<char, 4> raw;
+    std::memcpy(raw.data(), bytes.data() + offset, raw.size());
+    if constexpr (std::endian::native == std::endian::big) std::reverse(raw.begin(), raw.end());
+    return std::bit_cast<std::uint32_t>(raw);
+}
+
+// Recursive code behind the parser must not run out of stack, nor its structures of memory.
+void check_structure(std::string_view text) {
+    int depth = 0;
+    std::size_t values = 0;
+    bool in_string = false;
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        const char c = text[i];
+        if (in_string) {
+            if (c == '\\') ++i;
+            else if (c == '"') in_string = false;
+        } else if (c == '"') {
+            in_string = true;
+        } else if (c == '{' || c == '[') {
+            if (++depth > max_json_depth) fail("byte " + std::to_string(i) + ": the JSON is nested too deeply; simplify it.");
+        } else if (c == '}' || c == ']') {
+            --depth;
+        }
+        if (!in_string && (c == '{' || c == '[' || c == ',') && ++values > max_json_values) {
+            fail("byte " + std::to_string(i) + ": the JSON has too many values; split the scene.");
+        }
+    }
+}
+
+} // namespace
+
+void fail(std::string what) { throw Broken{std::move(what)}; }
+
+std::string numbered(const char* what, std::size_t index) { return std::string(what) + " " + std::to_string(index); }
+
+Container split_glb(std::string_view bytes) {
+    if (bytes.size() < glb_header_bytes + chunk_header_bytes) fail("it is too short for a GLB file; it is cut short.");
+    if (word_at(bytes, 4) != glb_version) {
+        fail("its GLB version is " + std::to_string(word_at(bytes, 4)) + ", and only 2 is read; convert it.");
+    }
+    const std::size_t length = word_at(bytes, 8);
+    if (length > bytes.size()) {
+        fail("its header claims " + std::to_string(length) + " bytes, but there are " + std::to_string(bytes.size()) +
+             "; the file is cut short.");
+    }
+    bytes = bytes.substr(0, length);
+    Container container;
+    for (std::size_t at = glb_header_bytes; at + chunk_header_bytes <= bytes.size();) {
+        const std::size_t size = word_at(bytes, at);
+        const std::uint32_t type = word_at(bytes, at + 4);
+        at += chunk_header_bytes;
+        if (size > bytes.size() - at) fail("byte " + std::to_string(at) + ": a chunk ends behind the file; it is cut short.");
+        const std::string_view chunk = bytes.substr(at, size);
+        if (type == chunk_json && container.json_text.empty()) container.json_text = chunk;
+        else if (type == chunk_bin && !container.bin) container.bin = chunk;
+        at += size;
+    }
+    if (container.json_text.empty()) fail("it has no JSON chunk; the file is damaged.");
+    return container;
+}
+
+json parse_json(std::string_view text) {
+    check_structure(text);
+    try {
+        json document = json::parse(text.begin(), text.end());
+        if (!document.is_object()) fail("its JSON is no object; it is no glTF file.");
+        return document;
+    } catch (const json::parse_error& error) {
+        fail("byte " + std::to_string(error.byte) + ": the JSON cannot be parsed; the file is damaged or cut short.");
+    } catch (const json::exception&) {
+        fail("its JSON has a number that no double can hold; correct it.");
+    }
+}
+
+const json* member(const json& object, const char* key) {
+    const auto found = object.find(key);
+    return found == object.end() ? nullptr : &*found;
+}
+
+// The array under a key; empty where it is missing.
+const json& array_of(const json& object, const char* key) {
+    static const json empty = json::array();
+    const json* array = member(object, key);
+    if (array == nullptr) return empty;
+    if (!array->is_array()) fail(std::string("its ") + key + " are no array; correct the JSON.");
+    return *array;
+}
+
+std::int64_t to_integer_in_range(const json& value, std::int64_t largest, const std::string& where) {
+    const bool is_whole_float = value.is_number_float() && value.get<double>() == std::floor(value.get<double>());
+    double as_double = -1.0;
+    if (value.is_number_integer() || is_whole_float) as_double = value.get<double>();
+    if (!(as_double >= 0.0 && as_double <= static_cast<double>(largest))) {
+        fail(where + " should be a whole number from 0 to " + std::to_string(largest) + "; correct it.");
+    }
+    return static_cast<std::int64_t>(as_double);
+}
+
+namespace {
+
+// Copies what describes triangles, element by element; what is not copied cannot do harm.
+class Reducer {
+public:
+    explicit Reducer(const json& document) : document_(document) {}
+
+    json reduce() {
+        check_version();
+        check_extensions();
+        copy_array("bufferViews", "buffer view", [&](const json& in, json& out) {
+            integer(in, out, "buffer", max_int, true);
+            integer(in, out, "byteOffset", max_size, false);
+            integer(in, out, "byteLength", max_size, true);
+            integer(in, out, "byteStride", max_size, false);
+        });
+        copy_array("accessors", "accessor", [&](const json& in, json& out) { accessor(in, out); });
+        copy_array("materials", "material", [&](const json& in, json& out) { name(in, out); });
+        copy_array("meshes", "mesh", [&](const json& in, json& out) { mesh(in, out); });
+        copy_array("nodes", "node", [&](const json& in, json& out) { node(in, out); });
+        copy_array("scenes", "scene", [&](const json& in, json& out) { integers(in, out, "nodes"); });
+        where_ = "the document";
+        integer(document_, reduced_, "scene", max_int, false);
+        return std::move(reduced_);
+    }
+
+    bool has_skins() const { return has_skins_; }
+    bool has_morph_targets() const { return has_morph_targets_; }
+
+private:
+    void check_version() {
+        const json* asset = member(document_, "asset");
+        const json* version = asset != nullptr && asset->is_object() ? member(*asset, "version") : nullptr;
+        if (version == nullptr || !version->is_string()) fail("it has no asset version; it is no glTF file.");
+        if (!version->get_ref<const std::string&>().starts_with("2.")) {
+            fail("its version is " + in_quotes(version->get_ref<const std::string&>()) + ", and only 2 is read; convert it.");
+        }
+        reduced_["asset"]["version"] = "2.0";
+    }
+
+    void check_extensions() const {
+        for (const json& extension : array_of(document_, "extensionsRequired")) {
+            if (!extension.is_string()) continue;
+            const auto& required = extension.get_ref<const std::string&>();
+            if (std::find(std::begin(unsupported_extensions), std::end(unsupported_extensions), required) !=
+                std::end(unsupported_extensions)) {
+                fail("it needs the extension " + required + ", which is not read; export it without.");
+            }
+        }
+    }
+
+    template <class Copy>
+    void copy_array(const char* key, const char* what, Copy&& copy) {
+        const json& array = array_of(document_, key);
+        if (array.size() > max_array_elements) {
+            fail("it has " + std::to_string(array.size()) + " " + key + ", more than the " +
+                 std::to_string(max_array_elements) + " that are read; split the scene.");
+        }
+        json& out = reduced_[key] = json::array();
+        for (std::size_t i = 0; i < array.size(); ++i) {
+            where_ = numbered(what, i);
+            if (!array[i].is_object()) fail(where_ + " is no object; correct the JSON.");
+            json element = json::object();
+            copy(array[i], element);
+            out.push_back(std::move(element));
+        }
+    }
+
+    void integer(const json& in, json& out, const char* key, std::int64_t largest, bool is_required) const {
+        const json* value = member(in, key);
+        if (value != nullptr) out[key] = to_integer_in_range(*value, largest, where_ + ": " + key);
+        else if (is_required) fail(where_ + " has no " + key + "; correct the JSON.");
+    }
+
+    void integers(const json& in, json& out, const char* key) const {
+        const json& values = array_of(in, key);
+        if (values.empty()) return;
+        json& copied = out[key] = json::array();
+        for (const json& value : values) copied.push_back(to_integer_in_range(value, max_int, where_ + ": " + key));
+    }
+
+    void numbers(const json& in, json& out, const char* key, std::size_t count) const {
+        const json* values = member(in, key);
+        if (values == nullptr) return;
+        const bool is_valid = values->is_array() && values->size() == count &&
+                              std::all_of(values->begin(), values->end(), [](const json& v) { return v.is_number(); });
+        if (!is_valid) fail(where_ + ": " + key + " should be " + std::to_string(count) + " numbers; correct it.");
+        out[key] = *values;
+    }
+
+    void name(const json& in, json& out) const {
+        if (const json* value = member(in, "name"); value != nullptr && value->is_string()) out["name"] = *value;
+    }
+
+    const json& object(const json& in, const char* key) const {
+        const json* value = member(in, key);
+        if (value == nullptr || !value->is_object()) fail(where_ + " has no " + key + "; correct the JSON.");
+        return *value;
+    }
+
+    void accessor(const json& in, json& out) const {
+        integer(in, out, "bufferView", max_int, false);
+        integer(in, out, "byteOffset", max_size, false);
+        integer(in, out, "componentType", max_int, true);
+        integer(in, out, "count", max_size, true);
+        const json* type = member(in, "type");
+        if (type == nullptr || !type->is_string()) fail(where_ + " has no type; correct the JSON.");
+        out["type"] = *type;
+        if (const json* normalized = member(in, "normalized"); normalized != nullptr && normalized->is_boolean()) {
+            out["normalized"] = *normalized;
+        }
+        if (member(in, "sparse") == nullptr) return;
+        const json& sparse = object(in, "sparse");
+        json copied;
+        integer(sparse, copied, "count", max_int, true);
+        for (const char* part : {"indices", "values"}) {
+            const json& part_in = object(sparse, part);
+            json& part_out = copied[part] = json::object();
+            integer(part_in, part_out, "bufferView", max_int, true);
+            integer(part_in, part_out, "byteOffset", max_int, false);
+            if (std::string_view(part) == "indices") integer(part_in, part_out, "componentType", max_int, true);
+        }
+        out["sparse"] = std::move(copied);
+    }
+
+    void mesh(const json& in, json& out) {
+        name(in, out);
+        json& primitives = out["primitives"] = json::array();
+        for (const json& primitive : array_of(in, "primitives")) {
+            if (!primitive.is_object()) fail(where_ + " has a primitive that is no object; correct the JSON.");
+            json copied = json::object();
+            integer(primitive, copied, "indices", max_int, false);
+            integer(primitive, copied, "material", max_int, false);
+            integer(primitive, copied, "mode", max_int, false);
+            json& attributes = copied["attributes"] = json::object();
+            const json& attributes_in = object(primitive, "attributes");
+            for (const char* key : {"POSITION", "NORMAL", "TEXCOORD_0", "COLOR_0"}) {
+                integer(attributes_in, attributes, key, max_int, false);
+            }
+            has_morph_targets_ = has_morph_targets_ || member(primitive, "targets") != nullptr;
+            primitives.push_back(std::move(copied));
+        }
+    }
+
+    void node(const json& in, json& out) {
+        name(in, out);
+        integer(in, out, "mesh", max_int, false);
+        integers(in, out, "children");
+        numbers(in, out, "matrix", 16);
+        numbers(in, out, "translation", 3);
+        numbers(in, out, "rotation", 4);
+        numbers(in, out, "scale", 3);
+        has_skins_ = has_skins_ || member(in, "skin") != nullptr;
+    }
+
+    const json& document_;
+    json reduced_ = json::object();
+    std::string where_;
+    bool has_skins_ = false;
+    bool has_morph_targets_ = false;
+};
+
+bool ignore_image(tinygltf::Image*, const int, std::string*, std::string*, int, int, const unsigned char*, int, void*) {
+    return true;
+}
+
+tinygltf::Model to_model(const json& reduced) {
+    const std::string text = reduced.dump();
+    if (text.size() > std::numeric_limits<unsigned>::max()) fail("its JSON is longer than 4 GiB; split the scene.");
+    tinygltf::Model model;
+    tinygltf::TinyGLTF loader;
+    loader.SetImageLoader(ignore_image, nullptr);
+    std::string error, warning;
+    bool is_loaded = false;
+    try {
+        is_loaded = loader.LoadASCIIFromString(&model, &error, &warning, text.data(), static_cast<unsigned>(text.size()), "");
+    } catch (const std::bad_alloc&) {
+        throw;
+    } catch (const std::exception& exception) {
+        error = exception.what();
+    }
+    while (!error.empty() && is_space(error.back())) error.pop_back();
+    if (!is_loaded) fail("it is no valid glTF: " + error + ".");
+    return model;
+}
+
+} // namespace
+
+Reduced reduce(const json& document) {
+    Reducer reducer(document);
+    tinygltf::Model model = to_model(reducer.reduce());
+    return {std::move(model), reducer.has_skins(), reducer.has_morph_targets()};
+}
+
+} // namespace unseen::meshio::gltf

@@ -1,0 +1,48 @@
+// A glTF document: split from its container, and cut down to what describes triangles, so that nothing that tinygltf would believe or fetch
+// reaches it.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include <nlohmann/json.hpp>
+#include <tiny_gltf.h>
+
+namespace unseen::meshio::gltf {
+
+using nlohmann::json;
+
+// A broken rule of the format, thrown within the glTF reader only: it unwinds from deep inside a document.
+struct Broken {
+    std::string what;
+};
+[[noreturn]] void fail(std::string what);
+
+std::string numbered(const char* what, std::size_t index); // "buffer 3"
+
+struct Container {
+    std::string_view json_text;
+    std::optional<std::string_view> bin;
+};
+Container split_glb(std::string_view bytes);
+
+// Not deeper and not of more values than scenes are.
+json parse_json(std::string_view text);
+
+const json* member(const json& object, const char* key);         // null: it has none
+const json& array_of(const json& object, const char* key);       // empty: it has none
+std::int64_t to_integer_in_range(const json& value, std::int64_t largest, const std::string& where); // from 0 on
+inline constexpr std::int64_t max_size = std::int64_t{1} << 53; // integers above are not exact in JSON
+inline constexpr std::int64_t max_int = std::numeric_limits<int>::max();
+
+// What describes triangles, every integer in range, without buffers and images.
+struct Reduced {
+    tinygltf::Model model;
+    bool has_skins = false, has_morph_targets = false; // which were left out
+};
+Reduced reduce(const json& document);
+
+} // namespace unseen::meshio::gltf

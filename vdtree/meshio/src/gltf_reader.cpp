@@ -1,0 +1,498 @@
+// glTF 2.0, as JSON and as GLB. tinygltf maps the JSON to its structures; everything it would believe or fetch is kept
+// from it: the document is first cut down to what describes triangles (gltf_document.h), and buffers are resolved here
+// (gltf_data.h), so that files cannot make it allocate, decode images or touch the file system.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/mat4x4.hpp>
+
+#include "gltf_data.h"
+#include "gltf_document.h"
+#include "mesh_readers.h"
+
+namespace unseen::meshio {
+namespace gltf {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr std::size_t max_node_depth = 512; // deeper trees are found in attacks, not in scenes
+// Instancing multiplies a file, so what may come out is bounded: bytes for each byte read, and bytes in any case.
+constexpr std::uint64_t max_bytes_out_per_byte_in = 64;
+constexpr std::uint64_t min_bytes_out = std::uint64_t{16} << 20;
+constexpr std::uint64_t bytes_per_vertex = sizeof(glm::dvec3) + sizeof(glm::vec3) + sizeof(glm::vec4) + sizeof(glm::vec2);
+constexpr std::uint64_t bytes_per_visit = 64; // of a primitive: takes time even where it is empty
+constexpr std::uint64_t bytes_per_index = sizeof(Index) * 3; // in a strip an index makes a triangle
+
+// ---- materials ----
+
+// The colours and images of materials, straight from the document.
+class MaterialReader {
+public:
+    // `spend` is told of all bytes of images, and fails where they are too many.
+    MaterialReader(const json& document, const Buffers& buffers, std::vector<std::string>& warnings, Callback<void(std::uint64_t)> spend)
+        : document_(document), buffers_(buffers), warnings_(warnings), spend_(std::move(spend)) {}
+
+    // Alpha counts where it is not said to be ignored.
+    Material read(std::size_t index, std::string name) {
+        Material material{.name = std::move(name)};
+        const json& of_file = array_of(document_, "materials")[index];
+        where_ = numbered("material", index);
+        const json* surface = optional_object(of_file, "pbrMetallicRoughness");
+        if (surface == nullptr) return material;
+        if (const json* factor = member(*surface, "baseColorFactor")) material.colour = colour(*factor);
+        const json* mode = member(of_file, "alphaMode");
+        if (mode == nullptr || *mode == "OPAQUE") material.colour.a = 1;
+        if (const json* texture = optional_object(*surface, "baseColorTexture")) add_texture(*texture, material);
+        return material;
+    }
+
+private:
+    const json* optional_object(const json& in, const char* key) const {
+        const json* value = member(in, key);
+        if (value != nullptr && !value->is_object()) fail(where_ + ": its " + key + " is no object; correct the JSON.");
+        return value;
+    }
+
+    glm::vec4 colour(const json& values) const {
+        glm::vec4 colour(1);
+        bool is_valid = values.is_array() && values.size() == 4;
+        for (std::size_t i = 0; is_valid && i < 4; ++i) {
+            is_valid = values[i].is_number() && values[i].get<double>() >= 0 && values[i].get<double>() <= 1;
+            if (is_valid) colour[static_cast<int>(i)] = values[i].get<float>();
+        }
+        if (!is_valid) fail(where_ + ": its baseColorFactor should be 4 numbers from 0 to 1; correct it.");
+        return colour;
+    }
+
+    const json& element(const char* key, const json& in, const char* of) {
+        const json& array = array_of(document_, key);
+        const json* value = member(in, of);
+        if (value == nullptr) fail(where_ + " has no " + of + "; correct the JSON.");
+        const auto index = static_cast<std::size_t>(to_integer_in_range(*value, max_int, where_ + ": " + of));
+        if (index >= array.size() || !array[index].is_object()) {
+            fail(where_ + ": its " + of + " is " + std::to_string(index) + ", but there are " + std::to_string(array.size()) + " " + key + "; correct the JSON.");
+        }
+        where_ = numbered(key, index);
+        return array[index];
+    }
+
+    void add_texture(const json& info, Material& material) {
+        if (const json* set = member(info, "texCoord"); set != nullptr && *set != 0) {
+            fail(where_ + ": its texture lies by the texture coordinates " + set->dump() + ", and only 0 is read; export it without, or leave the textures out.");
+        }
+        if (member(info, "extensions") != nullptr) warnings_.push_back(where_ + ": the transform of its texture was ignored.");
+        const json& texture = element("textures", info, "index");
+        if (member(texture, "sampler") != nullptr) {
+            const std::string of_texture = where_;
+            const json& sampler = element("samplers", texture, "sampler");
+            material.wrap_u = wrap(sampler, "wrapS");
+            material.wrap_v = wrap(sampler, "wrapT");
+            where_ = of_texture;
+        }
+        add_image(element("images", texture, "source"), material);
+    }
+
+    Wrap wrap(const json& sampler, const char* key) const {
+        constexpr int clamps = 33071, mirrors = 33648;
+        const json* value = member(sampler, key);
+        if (value == nullptr) return Wrap::repeat;
+        if (*value == mirrors) fail(where_ + ": a texture that is repeated in a mirror is not read; export it otherwise, or leave the textures out.");
+        return *value == clamps ? Wrap::clamp : Wrap::repeat;
+    }
+
+    void add_image(const json& image, Material& material) {
+        if (const json* uri = member(image, "uri")) {
+            if (!uri->is_string()) fail(where_ + ": its uri is no text; correct the JSON.");
+            const auto& text = uri->get_ref<const std::string&>();
+            if (text.starts_with("data:")) material.image_bytes = shared(image, [&] { return Buffers::decode_data(text, where_); });
+            else material.image = Buffers::below_folder(text, where_);
+            return;
+        }
+        const std::string of_image = where_;
+        const json& view = element("bufferViews", image, "bufferView");
+        const auto number = [&](const char* key, std::int64_t missing) {
+            const json* value = member(view, key);
+            if (value == nullptr && missing >= 0) return static_cast<std::size_t>(missing);
+            if (value == nullptr) fail(where_ + " has no " + key + "; correct the JSON.");
+            return static_cast<std::size_t>(to_integer_in_range(*value, max_size, where_ + ": " + key));
+        };
+        const std::size_t buffer = number("buffer", -1), offset = number("byteOffset", 0), length = number("byteLength", -1);
+        if (buffer >= buffers_.count() || offset > buffers_[buffer].size() || length > buffers_[buffer].size() - offset) {
+            fail(of_image + " ends behind its buffer; the data are cut short or the JSON is wrong.");
+        }
+        if (length == 0) fail(of_image + " is empty; correct the JSON.");
+        material.image_bytes = shared(image, [&] { return std::string(buffers_[buffer].substr(offset, length)); });
+    }
+
+    // Each image is copied once, however many materials have it.
+    template <class F>
+    std::shared_ptr<const std::string> shared(const json& image, F&& bytes) {
+        auto& known = images_[&image];
+        if (!known) {
+            known = std::make_shared<const std::string>(bytes());
+            spend_(known->size());
+        }
+        return known;
+    }
+
+    const json& document_;
+    const Buffers& buffers_;
+    std::vector<std::string>& warnings_;
+    Callback<void(std::uint64_t)> spend_;
+    std::map<const json*, std::shared_ptr<const std::string>> images_;
+    std::string where_;
+};
+
+// ---- transforms ----
+
+glm::dmat4 rotation_matrix(const std::vector<double>& q, const std::string& where) {
+    const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    if (!(length > 0.0) || !std::isfinite(length)) fail(where + " has a rotation of length 0 or infinity; correct it.");
+    const double x = q[0] / length, y = q[1] / length, z = q[2] / length, w = q[3] / length;
+    glm::dmat4 m(1.0);
+    m[0] = {1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w), 0};
+    m[1] = {2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w), 0};
+    m[2] = {2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y), 0};
+    return m;
+}
+
+glm::dmat4 local_matrix(const tinygltf::Node& node, const std::string& where) {
+    glm::dmat4 m(1.0);
+    if (node.matrix.size() == 16) {
+        for (int i = 0; i < 16; ++i) m[i / 4][i % 4] = node.matrix[static_cast<std::size_t>(i)];
+        return m;
+    }
+    if (node.rotation.size() == 4) m = rotation_matrix(node.rotation, where);
+    if (node.scale.size() == 3) {
+        for (int i = 0; i < 3; ++i) m[i] *= node.scale[static_cast<std::size_t>(i)];
+    }
+    if (node.translation.size() == 3) {
+        m[3] = {node.translation[0], node.translation[1], node.translation[2], 1.0};
+    }
+    return m;
+}
+
+// How positions, normals and orientation go to the world.
+struct Placement {
+    glm::dmat4 matrix{1.0};
+    glm::dmat3 normal_matrix{1.0};
+    bool is_mirrored = false;
+};
+
+Placement placement_of(const glm::dmat4& matrix) {
+    Placement placement;
+    placement.matrix = matrix;
+    glm::dmat3 linear(matrix);
+    double size = 0.0;
+    for (int i = 0; i < 9; ++i) size = std::max(size, std::abs(linear[i / 3][i % 3]));
+    if (size > 0.0 && std::isfinite(size)) linear /= size; // a determinant of tiny scales would underflow
+    // The cofactors are the inverse transpose times the determinant, and exist where the inverse does not.
+    const glm::dmat3 cofactors(glm::cross(linear[1], linear[2]), glm::cross(linear[2], linear[0]),
+                               glm::cross(linear[0], linear[1]));
+    placement.is_mirrored = glm::dot(linear[0], cofactors[0]) < 0.0;
+    placement.normal_matrix = placement.is_mirrored ? -cofactors : cofactors;
+    return placement;
+}
+
+glm::vec3 placed_normal(const Placement& placement, const glm::dvec3& normal) {
+    const glm::dvec3 n = placement.normal_matrix * normal;
+    const double length = glm::length(n);
+    return length > 0.0 && std::isfinite(length) ? glm::vec3(n / length) : missing_normal;
+}
+
+// ---- scene ----
+
+class SceneReader {
+public:
+    SceneReader(const MeshSource& source, const tinygltf::Model& model, const Buffers& buffers)
+        : source_(source), model_(model), accessors_(model, buffers),
+          bytes_left_(std::max(min_bytes_out,
+                               max_bytes_out_per_byte_in * (source.bytes.size() + buffers.external_bytes()))) {
+        for (std::size_t i = 0; i < model.materials.size(); ++i) first_of_name_.try_emplace(model.materials[i].name, i);
+    }
+
+    // Empty where the caller cancelled.
+    std::optional<ReadResult> read() {
+        if (model_.nodes.empty()) {
+            for (std::size_t i = 0; i < model_.meshes.size(); ++i) add_mesh(model_.meshes[i], Placement{});
+        } else {
+            for (const int root : root_nodes()) {
+                if (!add_tree(root)) return std::nullopt;
+            }
+        }
+        if (skipped_primitives_ > 0) {
+            result_.warnings.push_back(counted_were(skipped_primitives_, "primitive") +
+                                       " left out for having no triangles or no positions.");
+        }
+        return std::move(result_);
+    }
+
+    // After read(): of the file, those that triangles have.
+    void read_materials(MaterialReader& reader, ReadResult& result) const {
+        for (const std::size_t index : used_materials_)
+            result.materials.push_back(reader.read(index, material_name(static_cast<int>(index))));
+    }
+
+    void spend(std::uint64_t count, std::uint64_t bytes_each) {
+        if (bytes_each > 0 && count > bytes_left_ / bytes_each) {
+            fail("its instances and shared data multiply to far more than the file holds; split the scene.");
+        }
+        bytes_left_ -= count * bytes_each;
+    }
+
+private:
+    std::vector<int> root_nodes() const {
+        if (!model_.scenes.empty()) {
+            const auto scene = static_cast<std::size_t>(std::max(model_.defaultScene, 0));
+            if (scene >= model_.scenes.size()) {
+                fail("scene " + std::to_string(scene) + " is to be shown, but there are " +
+                     std::to_string(model_.scenes.size()) + "; correct the JSON.");
+            }
+            return model_.scenes[scene].nodes;
+        }
+        std::vector<bool> is_child(model_.nodes.size());
+        for (const tinygltf::Node& node : model_.nodes) {
+            for (const int child : node.children) {
+                if (static_cast<std::size_t>(child) < is_child.size()) is_child[static_cast<std::size_t>(child)] = true;
+            }
+        }
+        std::vector<int> roots;
+        for (std::size_t i = 0; i < is_child.size(); ++i) {
+            if (!is_child[i]) roots.push_back(static_cast<int>(i));
+        }
+        if (roots.empty()) fail("its nodes have no root: each is the child of another; correct the JSON.");
+        return roots;
+    }
+
+    struct Visit {
+        std::size_t node;
+        std::size_t depth;
+        glm::dmat4 parent;
+    };
+
+    bool add_tree(int root) {
+        reached_.resize(model_.nodes.size());
+        std::vector<Visit> stack;
+        push(stack, root, 0, glm::dmat4(1.0));
+        while (!stack.empty()) {
+            const Visit visit = stack.back();
+            stack.pop_back();
+            if (!source_.keep_going(source_.bytes.size() / 2, "reading glTF")) return false;
+            const tinygltf::Node& node = model_.nodes[visit.node];
+            const std::string where = numbered("node", visit.node);
+            const glm::dmat4 world = visit.parent * local_matrix(node, where);
+            if (node.mesh >= 0) {
+                if (static_cast<std::size_t>(node.mesh) >= model_.meshes.size()) {
+                    fail(where + " uses mesh " + std::to_string(node.mesh) + ", but there are " +
+                         std::to_string(model_.meshes.size()) + "; correct the JSON.");
+                }
+                add_mesh(model_.meshes[static_cast<std::size_t>(node.mesh)], placement_of(world));
+            }
+            // Reversed, so that children come off the stack in their order.
+            for (auto child = node.children.rbegin(); child != node.children.rend(); ++child) {
+                push(stack, *child, visit.depth + 1, world);
+            }
+        }
+        return true;
+    }
+
+    void push(std::vector<Visit>& stack, int node, std::size_t depth, const glm::dmat4& parent) {
+        const auto index = static_cast<std::size_t>(node);
+        const std::string where = numbered("node", index);
+        if (index >= model_.nodes.size()) {
+            fail(where + " is used, but there are " + std::to_string(model_.nodes.size()) + "; correct the JSON.");
+        }
+        // A second visit means a cycle or two parents; glTF allows neither.
+        if (reached_[index]) fail(where + " is reached twice, but the nodes must form trees; correct the JSON.");
+        reached_[index] = true;
+        if (depth > max_node_depth) fail(where + " is nested too deeply; flatten the scene.");
+        stack.push_back({index, depth, parent});
+    }
+
+    // Accessors of a primitive's vertices. Primitives of one mesh with the same ones share their vertices.
+    using VertexSource = std::array<int, 4>; // position, normal, UV, colour; -1: none
+
+    void add_mesh(const tinygltf::Mesh& mesh, const Placement& placement) {
+        std::map<VertexSource, Index> first_vertices;
+        for (const tinygltf::Primitive& primitive : mesh.primitives) {
+            spend(1, bytes_per_visit);
+            const bool has_triangles = primitive.mode == TINYGLTF_MODE_TRIANGLES ||
+                                       primitive.mode == TINYGLTF_MODE_TRIANGLE_STRIP ||
+                                       primitive.mode == TINYGLTF_MODE_TRIANGLE_FAN;
+            const VertexSource vertices = vertex_source(primitive);
+            if (!has_triangles || vertices[0] < 0) {
+                ++skipped_primitives_;
+                continue;
+            }
+            const auto [first, is_new] =
+                first_vertices.try_emplace(vertices, static_cast<Index>(result_.mesh.positions.size()));
+            if (is_new) add_vertices(vertices, placement);
+            add_triangles(mesh, primitive, first->second, accessors_.count_of(vertices[0]), placement.is_mirrored);
+        }
+    }
+
+    static VertexSource vertex_source(const tinygltf::Primitive& primitive) {
+        const auto find = [&](const char* name) {
+            const auto found = primitive.attributes.find(name);
+            return found == primitive.attributes.end() ? -1 : found->second;
+        };
+        return {find("POSITION"), find("NORMAL"), find("TEXCOORD_0"), find("COLOR_0")};
+    }
+
+    void add_vertices(const VertexSource& from, const Placement& placement) {
+        Mesh& mesh = result_.mesh;
+        const std::size_t first = mesh.positions.size();
+        const std::size_t count = accessors_.count_of(from[0]);
+        for (const int attribute : from) {
+            if (attribute >= 0 && accessors_.count_of(attribute) != count) {
+                fail(numbered("accessor", static_cast<std::size_t>(attribute)) + " has " +
+                     std::to_string(accessors_.count_of(attribute)) + " elements for " + std::to_string(count) +
+                     " positions; correct the JSON.");
+            }
+        }
+        spend(count, bytes_per_vertex);
+        if (count >= std::numeric_limits<Index>::max() - first) {
+            fail("it has more vertices than 32-bit indices can number; split the scene.");
+        }
+        for (const glm::dvec4& p : accessors_.vectors(from[0], 3, "positions")) {
+            mesh.positions.push_back(glm::dvec3(placement.matrix * glm::dvec4(p.x, p.y, p.z, 1.0)));
+        }
+        if (from[1] >= 0) {
+            mesh.normals.resize(first, missing_normal);
+            for (const glm::dvec4& n : accessors_.vectors(from[1], 3, "normals")) {
+                if (!std::isfinite(n.x) || !std::isfinite(n.y) || !std::isfinite(n.z)) {
+                    fail("normal " + std::to_string(mesh.normals.size() - first) + " of " +
+                         numbered("accessor", static_cast<std::size_t>(from[1])) + " is NaN or infinite; correct it.");
+                }
+                mesh.normals.push_back(placed_normal(placement, glm::dvec3(n)));
+            }
+        }
+        if (from[2] >= 0) {
+            mesh.uvs.resize(first, glm::vec2(0.0f));
+            for (const glm::dvec4& uv : accessors_.vectors(from[2], 2, "texture coordinates")) {
+                mesh.uvs.emplace_back(uv.x, uv.y);
+            }
+        }
+        if (from[3] >= 0) {
+            mesh.colours.resize(first, missing_colour);
+            for (const glm::dvec4& c : accessors_.vectors(from[3], 0, "colours")) mesh.colours.emplace_back(c);
+        }
+        if (!mesh.normals.empty()) mesh.normals.resize(mesh.positions.size(), missing_normal);
+        if (!mesh.uvs.empty()) mesh.uvs.resize(mesh.positions.size(), glm::vec2(0.0f));
+        if (!mesh.colours.empty()) mesh.colours.resize(mesh.positions.size(), missing_colour);
+    }
+
+    void add_triangles(const tinygltf::Mesh& mesh, const tinygltf::Primitive& primitive, Index first, std::size_t count,
+                       bool is_mirrored) {
+        const std::size_t index_count = primitive.indices >= 0 ? accessors_.count_of(primitive.indices) : count;
+        spend(index_count, bytes_per_index);
+        std::vector<Index> indices;
+        if (primitive.indices >= 0) indices = accessors_.indices(primitive.indices);
+        const auto vertex = [&](std::size_t i) {
+            const Index index = indices.empty() ? static_cast<Index>(i) : indices[i];
+            if (index >= count) {
+                fail("mesh " + in_quotes(mesh.name) + ": index " + std::to_string(i) + " names vertex " +
+                     std::to_string(index) + ", but there are " + std::to_string(count) + "; correct it.");
+            }
+            return first + index;
+        };
+        const bool is_list = primitive.mode == TINYGLTF_MODE_TRIANGLES;
+        if (is_list && index_count % 3 != 0) {
+            fail("mesh " + in_quotes(mesh.name) + ": " + std::to_string(index_count) +
+                 " indices make no whole number of triangles; correct it.");
+        }
+        const std::uint64_t first_triangle = result_.mesh.triangles.size();
+        for (std::size_t i = 2; i < index_count; i += is_list ? 3 : 1) {
+            Triangle triangle{vertex(i - 2), vertex(i - 1), vertex(i)};
+            if (primitive.mode == TINYGLTF_MODE_TRIANGLE_FAN) triangle[0] = vertex(0);
+            const bool is_odd_in_strip = primitive.mode == TINYGLTF_MODE_TRIANGLE_STRIP && i % 2 != 0;
+            if (is_odd_in_strip != is_mirrored) std::swap(triangle[0], triangle[1]);
+            result_.mesh.triangles.push_back(triangle);
+        }
+        const std::uint64_t added = result_.mesh.triangles.size() - first_triangle;
+        result_.source_faces += added;
+        if (added == 0) return;
+        if (primitive.material >= 0) {
+            used_materials_.insert(static_cast<std::size_t>(primitive.material));
+            add_range(material_name(primitive.material), MeshRange::Kind::material, first_triangle, added);
+        }
+        add_range(mesh.name, MeshRange::Kind::primitive, first_triangle, added);
+    }
+
+    // Names are repeated with every instance, so they count as well.
+    void add_range(const std::string& name, MeshRange::Kind kind, std::uint64_t first, std::uint64_t count) {
+        spend(1, sizeof(MeshRange) + name.size());
+        result_.mesh.ranges.push_back({name, kind, first, count});
+    }
+
+    std::string material_name(int material) const {
+        const auto index = static_cast<std::size_t>(material);
+        if (index >= model_.materials.size()) {
+            fail("material " + std::to_string(material) + " is used, but there are " +
+                 std::to_string(model_.materials.size()) + "; correct the JSON.");
+        }
+        const std::string& name = model_.materials[index].name;
+        if (!name.empty() && first_of_name_.at(name) != index) return name + " (" + numbered("material", index) + ")";
+        return name.empty() ? numbered("material", index) : name;
+    }
+
+    const MeshSource& source_;
+    const tinygltf::Model& model_;
+    Accessors accessors_;
+    ReadResult result_;
+    std::vector<bool> reached_;
+    std::set<std::size_t> used_materials_;
+    std::unordered_map<std::string, std::size_t> first_of_name_; // of materials
+    std::uint64_t bytes_left_;
+    std::uint64_t skipped_primitives_ = 0;
+};
+
+Result<ReadResult> read_document(const MeshSource& source) {
+    Container container{source.bytes, std::nullopt};
+    if (source.bytes.starts_with("glTF")) container = split_glb(source.bytes);
+    const json document = parse_json(container.json_text);
+    if (!source.keep_going(source.bytes.size() / 4, "reading glTF")) return cancelled(source);
+
+    const Reduced reduced = reduce(document);
+    const Buffers buffers(source, document, container.bin);
+    SceneReader scene(source, reduced.model, buffers);
+    std::optional<ReadResult> result = scene.read();
+    if (!result) return cancelled(source);
+    result->uvs_from_top = true;
+    if (source.options.materials) {
+        const auto spend = [&](std::uint64_t bytes) { scene.spend(1, bytes); };
+        MaterialReader materials(document, buffers, result->warnings, spend);
+        scene.read_materials(materials, *result);
+    }
+    if (reduced.has_skins) result->warnings.push_back("skins were ignored; the mesh is in its bind pose.");
+    if (reduced.has_morph_targets) result->warnings.push_back("morph targets were ignored.");
+    return std::move(*result);
+}
+
+} // namespace
+} // namespace gltf
+
+Result<ReadResult> read_gltf(const MeshSource& source) {
+    try {
+        return gltf::read_document(source);
+    } catch (const gltf::Broken& broken) {
+        return malformed(source, broken.what);
+    } catch (const nlohmann::json::exception& error) {
+        return malformed(source, std::string("its JSON cannot be used: ") + error.what() + ".");
+    }
+}
+
+} // namespace unseen::meshio

@@ -1,0 +1,280 @@
+// Finds out what a file is, has it read, and does what all formats share.
+#include <meshio/mesh_io.h>
+
+#include <vdtree/internal/finite.h>
+#include "mesh_readers.h"
+#include "text_scanner.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <new>
+#include <optional>
+#include <stdexcept>
+
+namespace unseen::meshio {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+enum class Format { ply, obj, off, stl, gltf };
+
+constexpr std::string_view utf8_mark = "\xEF\xBB\xBF";
+// Longer than any word of the formats; the rest of a longer one helps nobody.
+constexpr std::size_t max_quoted = 40;
+
+std::string lower_ending(const fs::path& name) {
+    std::string ending = name.extension().string();
+    for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    return ending;
+}
+
+std::optional<Format> format_by_ending(const fs::path& name) {
+    const std::string ending = lower_ending(name);
+    if (ending == ".ply") return Format::ply;
+    if (ending == ".obj") return Format::obj;
+    if (ending == ".off") return Format::off;
+    if (ending == ".stl") return Format::stl;
+    if (ending == ".gltf" || ending == ".glb") return Format::gltf;
+    return std::nullopt;
+}
+
+std::optional<Format> format_by_signature(std::string_view bytes) {
+    if (bytes.starts_with("glTF")) return Format::gltf;
+    if (bytes.starts_with("ply") && bytes.size() > 3 && is_space(bytes[3])) return Format::ply;
+    if (starts_with_off_keyword(bytes)) return Format::off;
+    return std::nullopt;
+}
+
+// What no signature tells and no ending says.
+std::optional<Format> format_by_guess(std::string_view bytes) {
+    if (is_binary_stl(bytes)) return Format::stl;
+    const std::string_view start = trimmed(bytes.substr(0, std::min<std::size_t>(bytes.size(), 256)));
+    if (start.starts_with("solid") || start.starts_with("SOLID")) return Format::stl;
+    if (start.starts_with("{")) return Format::gltf;
+    if (start.starts_with("v ") || start.starts_with("mtllib ")) return Format::obj;
+    return std::nullopt;
+}
+
+std::optional<Format> find_format(std::string_view bytes, const fs::path& name) {
+    if (const auto format = format_by_signature(bytes)) return format;
+    if (const auto format = format_by_ending(name)) return format;
+    return format_by_guess(bytes);
+}
+
+const char* compression_of(std::string_view bytes) {
+    if (bytes.starts_with("\x28\xB5\x2F\xFD")) return "zstd";
+    if (bytes.starts_with("\x1F\x8B")) return "gzip";
+    if (bytes.starts_with("PK\x03\x04")) return "zip";
+    if (bytes.starts_with("\xFD" "7zXZ")) return "xz";
+    return nullptr;
+}
+
+Result<ReadResult> read_as(Format format, const MeshSource& source) {
+    switch (format) {
+    case Format::ply: return read_ply(source);
+    case Format::obj: return read_obj(source);
+    case Format::off: return read_off(source);
+    case Format::stl: return read_stl(source);
+    case Format::gltf: return read_gltf(source);
+    }
+    return malformed(source, "unknown format.");
+}
+
+// Of the vertices that triangles use. A normal that is not finite is refused, for nobody knows what it was to be; one of length 0, which
+// stands for none as well, is computed from the faces.
+Result<void> check_normals(const MeshSource& source, ReadResult& result) {
+    const Mesh& mesh = result.mesh;
+    if (mesh.normals.empty()) return {};
+    std::vector<bool> used(mesh.positions.size(), false);
+    for (const Triangle& t : mesh.triangles)
+        for (const Index v : t) used[v] = true;
+    std::uint64_t zero = 0;
+    std::size_t first_zero = 0;
+    for (std::size_t v = 0; v < used.size(); ++v) {
+        if (!used[v]) continue;
+        const glm::vec3 n = mesh.normals[v];
+        if (!is_finite(n)) {
+            return malformed(source, "the normal of vertex " + std::to_string(v) +
+                                         " is NaN or infinite; correct it, or leave the normals out.");
+        }
+        if (n != glm::vec3(0.0f)) continue;
+        if (zero++ == 0) first_zero = v;
+    }
+    if (zero > 0) {
+        result.warnings.push_back(counted_were(zero, "normal") + " zero or missing and computed from the faces, the first that of vertex " +
+                                  std::to_string(first_zero) + ".");
+    }
+    return {};
+}
+
+// Colours and UVs take part in costs, where a NaN would spread.
+void repair_attributes(ReadResult& result) {
+    std::uint64_t colours = 0;
+    for (glm::vec4& colour : result.mesh.colours) {
+        bool repaired = false;
+        for (int i = 0; i < 4; ++i) {
+            if (colour[i] >= 0.0f && colour[i] <= 1.0f) continue;
+            colour[i] = colour[i] > 1.0f ? 1.0f : 0.0f; // NaN becomes 0
+            repaired = true;
+        }
+        colours += repaired;
+    }
+    std::uint64_t uvs = 0;
+    for (glm::vec2& uv : result.mesh.uvs) {
+        if (std::isfinite(uv.x) && std::isfinite(uv.y)) continue;
+        if (!result.bad_uv) result.bad_uv = static_cast<std::uint64_t>(&uv - result.mesh.uvs.data());
+        uv = glm::vec2(0.0f);
+        ++uvs;
+    }
+    if (colours > 0) {
+        result.warnings.push_back(counted_were(colours, "vertex colour") + " outside 0..1 and clamped.");
+    }
+    if (uvs > 0) result.warnings.push_back(counted_were(uvs, "texture coordinate") + " not finite and set to 0.");
+}
+
+Result<ReadResult> finish(const MeshSource& source, ReadResult result) {
+    // Before the checks: they would accept a mesh without triangles.
+    if (result.mesh.triangles.empty()) {
+        return malformed(source, "it holds no triangles; give a file with faces.");
+    }
+    if (const Result<void> valid = validate(result.mesh.view()); !valid) {
+        return malformed(source, valid.error().message);
+    }
+    repair_attributes(result);
+    result.dropped_triangles = drop_degenerate_triangles(result.mesh);
+    if (result.mesh.triangles.empty()) {
+        return malformed(source, "all of its " + std::to_string(result.dropped_triangles) +
+                                     " triangles use a vertex twice, so none is left; give a file with proper faces.");
+    }
+    if (const Result<void> valid = check_normals(source, result); !valid) return valid.error();
+    return result;
+}
+
+Error too_large(const std::string& name) {
+    return {ErrorCode::unsupported, name + ": reading it needs more memory than there is; give a smaller file."};
+}
+
+} // namespace
+
+bool MeshSource::keep_going(std::uint64_t bytes_done, const char* stage) const {
+    if (!options.progress) return true;
+    const double total = static_cast<double>(std::max<std::size_t>(bytes.size(), 1));
+    return options.progress(std::min(1.0, static_cast<double>(bytes_done) / total), stage);
+}
+
+Error malformed(const MeshSource& source, const std::string& what) {
+    return {ErrorCode::malformed_data, source.name + ": " + what};
+}
+Error malformed_line(const MeshSource& source, std::uint64_t line, const std::string& what) {
+    return malformed(source, "line " + std::to_string(line) + ": " + what);
+}
+Error malformed_byte(const MeshSource& source, std::uint64_t byte, const std::string& what) {
+    return malformed(source, "byte " + std::to_string(byte) + ": " + what);
+}
+Error cancelled(const MeshSource& source) {
+    return {ErrorCode::cancelled, source.name + ": reading was cancelled."};
+}
+
+std::string in_quotes(std::string_view text) {
+    std::string result = "'";
+    for (const char c : text.substr(0, max_quoted)) {
+        result += std::isprint(static_cast<unsigned char>(c)) ? c : '?';
+    }
+    return result + (text.size() > max_quoted ? "...'" : "'");
+}
+
+std::string counted_were(std::uint64_t count, const std::string& noun) {
+    return std::to_string(count) + " " + noun + (count == 1 ? " was" : "s were");
+}
+
+float srgb_to_linear(float encoded) {
+    // 0.04045 and not 0.03928: the value of IEC 61966-2-1, where the two branches meet.
+    if (!(encoded > 0.04045f)) return encoded / 12.92f;
+    return std::pow((encoded + 0.055f) / 1.055f, 2.4f);
+}
+
+float linear_to_srgb(float linear) {
+    if (!(linear > 0.0031308f)) return linear * 12.92f;
+    return 1.055f * std::pow(linear, 1.0f / 2.4f) - 0.055f;
+}
+
+glm::vec4 decode_colour(glm::vec4 encoded, ColourEncoding encoding) {
+    if (encoding == ColourEncoding::linear) return encoded;
+    return {srgb_to_linear(encoded.r), srgb_to_linear(encoded.g), srgb_to_linear(encoded.b), encoded.a};
+}
+
+std::optional<fs::path> path_beside(std::string_view name) {
+    std::string slashes(name);
+    std::replace(slashes.begin(), slashes.end(), '\\', '/');
+    const fs::path relative = slashes;
+    const bool leaves_folder = std::find(relative.begin(), relative.end(), "..") != relative.end();
+    if (relative.empty() || relative.is_absolute() || leaves_folder || slashes.find(':') != std::string::npos ||
+        slashes.find('\0') != std::string::npos)
+        return std::nullopt;
+    return relative;
+}
+
+Result<std::string> read_whole_file(const fs::path& file) {
+    const auto failure = [&](const std::string& why) {
+        return Error{ErrorCode::io_failure, "Cannot read '" + file.string() + "': " + why};
+    };
+    std::error_code error;
+    const fs::file_status status = fs::status(file, error);
+    if (!fs::exists(status)) return failure("there is no such file; check the name.");
+    // A pipe or a device could make the reader wait for ever.
+    if (!fs::is_regular_file(status)) return failure("it is no regular file; give the name of one.");
+    const std::uintmax_t size = fs::file_size(file, error);
+    if (error) return failure(error.message() + ".");
+
+    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> stream(std::fopen(file.c_str(), "rb"), &std::fclose);
+    if (!stream) return failure(std::string(std::strerror(errno)) + ".");
+    std::string bytes;
+    try {
+        bytes.resize(size);
+    } catch (const std::exception&) {
+        return too_large(file.string());
+    }
+    const std::size_t got = std::fread(bytes.data(), 1, bytes.size(), stream.get());
+    if (got != bytes.size()) return failure("it ended early; it may have been changed meanwhile, so try again.");
+    return bytes;
+}
+
+Result<ReadResult> read_mesh_bytes(std::string_view bytes, const fs::path& name, const ReadOptions& options,
+                                   const fs::path& folder) {
+    const std::string shown_name = name.string();
+    if (bytes.starts_with(utf8_mark)) bytes.remove_prefix(utf8_mark.size());
+    const MeshSource source{bytes, shown_name, folder, options};
+    if (bytes.empty()) return malformed(source, "it is empty; give a file with a mesh in it.");
+    if (const char* compression = compression_of(bytes)) {
+        return malformed(source, std::string("it is compressed with ") + compression + "; decompress it first.");
+    }
+    const std::optional<Format> format = find_format(bytes, name);
+    if (!format) {
+        return malformed(source, "it is neither PLY, OBJ, OFF, STL nor glTF; convert it to one of them.");
+    }
+    try {
+        Result<ReadResult> result = read_as(*format, source);
+        if (!result) return result;
+        return finish(source, std::move(result).value());
+    } catch (const std::bad_alloc&) {
+        return too_large(shown_name);
+    } catch (const std::length_error&) { // what a vector throws instead beyond its largest size
+        return too_large(shown_name);
+    }
+}
+
+Result<ReadResult> read_mesh(const fs::path& file, const ReadOptions& options) {
+    const Result<std::string> bytes = read_whole_file(file);
+    if (!bytes) return bytes.error();
+    const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+    return read_mesh_bytes(*bytes, file, options, folder);
+}
+
+} // namespace unseen::meshio

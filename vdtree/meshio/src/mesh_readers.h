@@ -1,0 +1,81 @@
+// The readers behind read_mesh: one function a format, all from bytes in memory.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
+
+#include <meshio/mesh_io.h>
+
+namespace unseen::meshio {
+
+using namespace vdtree; // the types that are read and written
+
+// What a reader reads. The bytes must outlive the call.
+struct MeshSource {
+    std::string_view bytes;
+    std::string name;                    // for messages
+    std::filesystem::path folder = {};   // where glTF buffers lie; empty where there is no folder
+    const ReadOptions& options;
+
+    // False where the caller wants to stop.
+    bool keep_going(std::uint64_t bytes_done, const char* stage) const;
+};
+
+// Readers check counts, sizes and indices themselves; read_mesh_bytes adds what all formats share.
+Result<ReadResult> read_ply(const MeshSource& source);
+Result<ReadResult> read_obj(const MeshSource& source);
+Result<ReadResult> read_off(const MeshSource& source);
+Result<ReadResult> read_stl(const MeshSource& source);
+Result<ReadResult> read_gltf(const MeshSource& source);
+
+// read_mesh without a file system: finds the format, reads, checks coordinates, drops triangles that use a vertex
+// twice. The name's ending decides where the content does not. glTF files with external buffers need `folder`.
+Result<ReadResult> read_mesh_bytes(std::string_view bytes, const std::filesystem::path& name,
+                                   const ReadOptions& options = {}, const std::filesystem::path& folder = {});
+
+// Whether bytes without a signature are a binary STL: their size is exactly what the triangle count asks for.
+bool is_binary_stl(std::string_view bytes);
+// Whether the bytes start with one of the keywords of OFF (COFF, STOFF, ...), after comments.
+bool starts_with_off_keyword(std::string_view bytes);
+
+// A name in a mesh file as a path below its folder, or nothing: a mesh must not be able to name any file of the machine.
+std::optional<std::filesystem::path> path_beside(std::string_view name);
+
+// Materials of a Wavefront MTL file, added to those there are. `name` is that of the file, for messages.
+Result<void> read_mtl(std::string_view bytes, const std::string& name, std::vector<Material>& materials, std::vector<std::string>& warnings);
+
+// Reads a regular file whole; pipes and devices are refused.
+Result<std::string> read_whole_file(const std::filesystem::path& file);
+
+// Where in the file, and the sentence: "bunny.ply: line 7: ...".
+Error malformed(const MeshSource& source, const std::string& what);
+Error malformed_line(const MeshSource& source, std::uint64_t line, const std::string& what);
+Error malformed_byte(const MeshSource& source, std::uint64_t byte, const std::string& what);
+Error cancelled(const MeshSource& source);
+
+// Text from a file as it may stand in a message: quoted, unprintable bytes replaced, long ones cut.
+std::string in_quotes(std::string_view text);
+
+// "1 face was", "3 faces were".
+std::string counted_were(std::uint64_t count, const std::string& noun);
+
+// One colour channel 0..1 to linear light; IEC 61966-2-1 for sRGB.
+float srgb_to_linear(float encoded);
+float linear_to_srgb(float linear);
+// Decodes the colour channels as the options say; alpha is linear in every format.
+glm::vec4 decode_colour(glm::vec4 encoded, ColourEncoding encoding);
+
+// What a vertex without the attribute gets in a mesh where others have it.
+constexpr glm::vec3 missing_normal{0.0f};
+constexpr glm::vec4 missing_colour{1.0f};
+
+// Rows between two calls of the progress callback: often enough to cancel at once, too rare to cost time.
+constexpr std::uint64_t rows_per_progress = 1 << 16;
+
+} // namespace unseen::meshio

@@ -1,0 +1,519 @@
+// Wavefront OBJ: polygons with positions, UVs, normals, groups and material names. Two passes over the text: vertices
+// first, so that polygons can be cut by their positions, then faces.
+#include <vdtree/internal/finite.h>
+#include "mesh_readers.h"
+#include "polygon_triangulator.h"
+#include "text_scanner.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <numeric>
+#include <random>
+#include <set>
+#include <unordered_map>
+#include <vector>
+
+namespace unseen::meshio {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr Index none = std::numeric_limits<Index>::max(); // a corner without UV or normal
+// Statements of surfaces, curves, display and grouping that change no triangle.
+constexpr std::string_view ignored_keywords[] = {
+    "s",    "l",     "p",    "vp",  "mg",   "lod",  "bevel", "c_interp", "d_interp", "shadow_obj",
+    "trace_obj", "maplib", "usemap", "cstype", "deg", "bmat", "step", "curv", "curv2", "surf", "parm",
+    "trim", "hole",   "scrv",  "sp",   "end", "con",  "ctech", "stech", "call", "csh", "cdc", "cdp", "bzp", "bsp", "res"};
+
+struct Corner {
+    Index position = none;
+    Index uv = none;
+    Index normal = none;
+    bool operator==(const Corner&) const = default;
+};
+
+// Seeded, because a file could be made to have all its corners in one bucket.
+class CornerHash {
+public:
+    explicit CornerHash(std::uint64_t seed) : seed_(seed) {}
+    std::size_t operator()(const Corner& c) const noexcept {
+        std::uint64_t h = mix(seed_ ^ c.position);
+        h = mix(h ^ c.uv);
+        return static_cast<std::size_t>(mix(h ^ c.normal));
+    }
+
+private:
+    // Finaliser of SplitMix64 (S. Vigna, public domain).
+    static std::uint64_t mix(std::uint64_t x) {
+        x += 0x9E3779B97F4A7C15u;
+        x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9u;
+        x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
+        return x ^ (x >> 31);
+    }
+    std::uint64_t seed_;
+};
+
+// For each value the number of the first equal one, so that equal attributes are not told apart by their numbers.
+template <class Vector>
+std::vector<Index> first_equal(const std::vector<Vector>& values) {
+    std::vector<Index> order(values.size());
+    std::iota(order.begin(), order.end(), Index{0});
+    // By bits: NaN has no place in an order of values.
+    const auto compare = [&](Index a, Index b) { return std::memcmp(&values[a], &values[b], sizeof(Vector)); };
+    std::sort(order.begin(), order.end(), [&](Index a, Index b) {
+        const int c = compare(a, b);
+        return c != 0 ? c < 0 : a < b;
+    });
+    std::vector<Index> first(values.size());
+    for (std::size_t i = 0; i < order.size(); ++i) {
+        const bool is_repeated = i > 0 && compare(order[i - 1], order[i]) == 0;
+        first[order[i]] = is_repeated ? first[order[i - 1]] : order[i];
+    }
+    return first;
+}
+
+// Gives every combination of position, UV and normal a vertex: the first one of a position its own number, so that
+// the numbering of the file stays; the others numbers behind the last position.
+class VertexTable {
+public:
+    VertexTable(std::size_t position_count, const std::vector<glm::vec2>& uvs, const std::vector<glm::vec3>& normals)
+        : first_(position_count), first_uv_(first_equal(uvs)), first_normal_(first_equal(normals)),
+          others_(16, CornerHash(std::random_device{}())), next_(position_count) {}
+
+    // The vertex of a corner. False where 32 bits do not suffice.
+    bool find(Corner corner, Index& vertex) {
+        if (corner.uv != none) corner.uv = first_uv_[corner.uv];
+        if (corner.normal != none) corner.normal = first_normal_[corner.normal];
+        Corner& first = first_[corner.position];
+        if (first.position == none) first = corner;
+        vertex = corner.position;
+        if (first == corner) return true;
+
+        const auto [found, is_new] = others_.try_emplace(corner, static_cast<Index>(next_));
+        if (is_new) {
+            if (next_ >= none) return false;
+            added_.push_back(corner);
+            ++next_;
+        }
+        vertex = found->second;
+        return true;
+    }
+
+    const std::vector<Corner>& first() const { return first_; } // position none: in no face
+    const std::vector<Corner>& added() const { return added_; }
+
+private:
+    std::vector<Corner> first_;
+    std::vector<Index> first_uv_;
+    std::vector<Index> first_normal_;
+    std::unordered_map<Corner, Index, CornerHash> others_;
+    std::vector<Corner> added_;
+    std::uint64_t next_;
+};
+
+// Lines with comments removed and those that end in a backslash joined with the next.
+class StatementScanner {
+public:
+    explicit StatementScanner(std::string_view text) : lines_(text) {}
+
+    bool next(std::string_view& keyword, std::string_view& rest) {
+        while (lines_.next(rest)) {
+            line_ = lines_.line();
+            keyword = take_word(rest);
+            if (keyword.empty() || keyword.front() == '#') continue;
+            if (trimmed(rest).ends_with('\\')) rest = join(rest);
+            return true;
+        }
+        return false;
+    }
+
+    std::uint64_t line() const { return line_; } // where the statement starts
+    std::size_t position() const { return lines_.position(); }
+
+private:
+    std::string_view join(std::string_view rest) {
+        joined_.clear();
+        for (;;) {
+            rest = trimmed(rest);
+            const bool goes_on = rest.ends_with('\\');
+            if (goes_on) rest.remove_suffix(1);
+            joined_.append(rest);
+            joined_ += ' ';
+            if (!goes_on || !lines_.next(rest)) return joined_;
+        }
+    }
+
+    LineScanner lines_;
+    std::uint64_t line_ = 0;
+    std::string joined_;
+};
+
+// Parses up to `limit` numbers; -1 where a word is none or there are more. A comment may follow.
+int parse_numbers(std::string_view line, double* numbers, int limit) {
+    const char* at = line.data();
+    const char* const end = at + line.size();
+    int count = 0;
+    for (;;) {
+        while (at != end && is_blank(*at)) ++at;
+        if (at == end || *at == '#') return count;
+        if (count == limit) return -1;
+        at = parse_number(at, end, numbers[count]);
+        if (at == nullptr || (at != end && !is_blank(*at))) return -1;
+        ++count;
+    }
+}
+
+class ObjReader {
+public:
+    explicit ObjReader(const MeshSource& source) : source_(source) {}
+
+    Result<ReadResult> read() {
+        if (const std::size_t nul = source_.bytes.find('\0'); nul != std::string_view::npos) {
+            return malformed_line(source_, line_number(source_.bytes, nul),
+                                  "a NUL byte, which no OBJ text contains; the file is damaged or no OBJ file.");
+        }
+        if (Result<void> done = read_vertices(); !done) return done.error();
+        if (Result<void> done = read_faces(); !done) return done.error();
+        add_attributes();
+        if (has_index_overflow_) return too_many_vertices();
+        add_warnings();
+        return std::move(result_);
+    }
+
+private:
+    // ---- first pass ----
+
+    Result<void> read_vertices() {
+        StatementScanner statements(source_.bytes);
+        std::string_view keyword, rest;
+        while (statements.next(keyword, rest)) {
+            Result<void> done;
+            if (keyword == "v") done = add_position(rest, statements.line());
+            else if (keyword == "vt") done = add_uv(rest, statements.line());
+            else if (keyword == "vn") done = add_normal(rest, statements.line());
+            if (!done) return done;
+            if (++statements_ % rows_per_progress == 0 && !source_.keep_going(statements.position() / 2, "reading OBJ")) {
+                return cancelled(source_);
+            }
+        }
+        if (std::max({positions().size(), uvs_.size(), normals_.size()}) >= none) return too_many_vertices();
+        return {};
+    }
+
+    // v X Y Z [W], v X Y Z R G B or v X Y Z R G B A. W weighs control points of curves and is of no use here.
+    Result<void> add_position(std::string_view rest, std::uint64_t line) {
+        std::array<double, 7> n{};
+        const int count = parse_numbers(rest, n.data(), 7);
+        if (count != 3 && count != 4 && count != 6 && count != 7) {
+            return bad(line, "vertex " + std::to_string(positions().size() + 1) +
+                                 " needs 3 numbers, or 6 with a colour; correct " + in_quotes(trimmed(rest)) + ".");
+        }
+        if (!std::isfinite(n[0]) || !std::isfinite(n[1]) || !std::isfinite(n[2])) {
+            return bad(line, "vertex " + std::to_string(positions().size() + 1) +
+                                 " has a NaN or infinite coordinate; remove it or give it a place.");
+        }
+        positions().emplace_back(n[0], n[1], n[2]);
+        if (count >= 6) {
+            colours_.resize(positions().size() - 1, missing_colour);
+            colours_.push_back(decode_colour(glm::vec4(n[3], n[4], n[5], count == 7 ? n[6] : 1.0),
+                                             source_.options.colours));
+        }
+        return {};
+    }
+
+    Result<void> add_uv(std::string_view rest, std::uint64_t line) {
+        std::array<double, 3> n{};
+        if (parse_numbers(rest, n.data(), 3) < 1) {
+            return bad(line, "a texture coordinate needs 1 to 3 numbers; correct " + in_quotes(trimmed(rest)) + ".");
+        }
+        uvs_.emplace_back(n[0], n[1]);
+        return {};
+    }
+
+    Result<void> add_normal(std::string_view rest, std::uint64_t line) {
+        std::array<double, 3> n{};
+        if (parse_numbers(rest, n.data(), 3) != 3) {
+            return bad(line, "a normal needs 3 numbers; correct " + in_quotes(trimmed(rest)) + ".");
+        }
+        normals_.emplace_back(n[0], n[1], n[2]);
+        return {};
+    }
+
+    // ---- second pass ----
+
+    Result<void> read_faces() {
+        StatementScanner statements(source_.bytes);
+        std::string_view keyword, rest;
+        while (statements.next(keyword, rest)) {
+            if (keyword == "v") {
+                ++positions_seen_;
+            } else if (keyword == "vt") {
+                ++uvs_seen_;
+            } else if (keyword == "vn") {
+                ++normals_seen_;
+            } else if (keyword == "f" || keyword == "fo") { // fo: what f was called before version 3
+                if (Result<void> done = add_face(rest, statements.line()); !done) return done;
+            } else if (keyword == "g" || keyword == "o") {
+                start_range(group_, rest, MeshRange::Kind::group);
+            } else if (keyword == "mtllib") {
+                if (source_.options.materials)
+                    if (Result<void> done = read_materials(rest, statements.line()); !done) return done;
+            } else if (keyword == "usemtl") {
+                start_range(material_, rest, MeshRange::Kind::material);
+            } else {
+                note_unknown(keyword, statements.line());
+            }
+            if (++statements_ % rows_per_progress == 0 &&
+                !source_.keep_going(source_.bytes.size() / 2 + statements.position() / 2, "reading OBJ")) {
+                return cancelled(source_);
+            }
+        }
+        end_range(group_);
+        end_range(material_);
+        std::stable_sort(ranges().begin(), ranges().end(), [](const MeshRange& a, const MeshRange& b) {
+            return a.first_triangle < b.first_triangle;
+        });
+        return {};
+    }
+
+    Result<void> add_face(std::string_view rest, std::uint64_t line) {
+        corners_.clear();
+        const char* at = rest.data();
+        const char* const end = at + rest.size();
+        for (;;) {
+            while (at != end && is_blank(*at)) ++at;
+            if (at == end || *at == '#') break;
+            Corner corner;
+            if (Result<void> done = parse_corner(at, end, line, corner); !done) return done;
+            corners_.push_back(corner);
+        }
+        ++result_.source_faces;
+        if (corners_.size() < 3) {
+            ++small_faces_;
+            return {};
+        }
+        points_.clear();
+        for (const Corner& corner : corners_) points_.push_back(positions()[corner.position]);
+        polygons_.triangulate(points_, [&](const Triangle& t) {
+            triangle_corners_.push_back(corners_[t[0]]);
+            triangle_corners_.push_back(corners_[t[1]]);
+            triangle_corners_.push_back(corners_[t[2]]);
+        });
+        return {};
+    }
+
+    // V, V/T, V//N or V/T/N; the numbers may be left out after a slash.
+    Result<void> parse_corner(const char*& at, const char* end, std::uint64_t line, Corner& corner) {
+        const char* const start = at;
+        const char* const word_end = std::find_if(at, end, is_blank);
+        const auto bad_corner = [&] {
+            return bad(line, "a corner of the face is " + in_quotes({start, word_end}) +
+                                 " and should be like 1, 1/2, 1//3 or 1/2/3; correct it.");
+        };
+        std::int64_t number = 0;
+        at = parse_integer(at, word_end, number);
+        if (at == nullptr) return bad_corner();
+        if (Result<void> done = resolve(number, positions_seen_, positions().size(), "vertex", line, corner.position);
+            !done) {
+            return done;
+        }
+        for (int slash = 0; slash < 2 && at != word_end && *at == '/'; ++slash) {
+            ++at;
+            if (at == word_end || *at == '/') continue;
+            at = parse_integer(at, word_end, number);
+            if (at == nullptr) return bad_corner();
+            Result<void> done =
+                slash == 0 ? resolve(number, uvs_seen_, uvs_.size(), "texture coordinate", line, corner.uv)
+                           : resolve(number, normals_seen_, normals_.size(), "normal", line, corner.normal);
+            if (!done) return done;
+        }
+        if (at != word_end) return bad_corner();
+        if (corner.normal != none && !is_finite(normals_[corner.normal])) {
+            return bad(line, "face " + std::to_string(result_.source_faces + 1) + " uses normal " + std::to_string(corner.normal + 1) +
+                                 ", which is NaN or infinite; correct it.");
+        }
+        has_uvs_ = has_uvs_ || corner.uv != none;
+        has_normals_ = has_normals_ || corner.normal != none;
+        return {};
+    }
+
+    // Positive numbers count from 1 in the file, negative ones back from the last that came before the face.
+    Result<void> resolve(std::int64_t number, std::size_t seen, std::size_t total, const char* what, std::uint64_t line,
+                         Index& index) {
+        const bool is_valid = number > 0 ? static_cast<std::uint64_t>(number) <= total
+                                         : number < 0 && number >= -static_cast<std::int64_t>(seen);
+        if (!is_valid) {
+            return bad(line, "face " + std::to_string(result_.source_faces + 1) + " uses " + what + " " +
+                                 std::to_string(number) + ", but there are " +
+                                 std::to_string(number < 0 ? seen : total) +
+                                 (number == 0 ? ", numbered from 1" : number < 0 ? " before it" : "") +
+                                 "; correct or remove it.");
+        }
+        index = static_cast<Index>(number > 0 ? number - 1 : static_cast<std::int64_t>(seen) + number);
+        return {};
+    }
+
+    // ---- groups and materials ----
+
+    // One name with blanks in it, or several.
+    Result<void> read_materials(std::string_view rest, std::uint64_t line) {
+        rest = trimmed(rest);
+        std::error_code error;
+        const auto whole = path_beside(rest);
+        if (whole && fs::exists(source_.folder / *whole, error)) return read_library(rest, line);
+        while (!(rest = trimmed(rest)).empty())
+            if (Result<void> done = read_library(take_word(rest), line); !done) return done;
+        return {};
+    }
+
+    Result<void> read_library(std::string_view library, std::uint64_t line) {
+        const std::string where = "line " + std::to_string(line) + ": the materials in " + in_quotes(library);
+        const auto path = path_beside(library);
+        if (!path || source_.folder.empty()) {
+            warn(where + " were left out: only files beside the mesh are read" + (path ? ", and a mesh in memory has none." : "."));
+            return {};
+        }
+        if (!libraries_.insert(*path).second) return {}; // it is often named again and again
+        const Result<std::string> bytes = read_whole_file(source_.folder / *path);
+        if (!bytes) {
+            warn(where + " were left out: " + bytes.error().message);
+            return {};
+        }
+        has_library_ = true;
+        return read_mtl(*bytes, (source_.folder / *path).string(), result_.materials, result_.warnings);
+    }
+
+    struct OpenRange {
+        MeshRange range;
+        bool is_open = false;
+    };
+
+    void start_range(OpenRange& open, std::string_view name, MeshRange::Kind kind) {
+        end_range(open);
+        name = trimmed(name);
+        open.is_open = !name.empty();
+        open.range = {std::string(name), kind, triangle_corners_.size() / 3, 0};
+    }
+
+    void end_range(OpenRange& open) {
+        open.range.triangle_count = triangle_corners_.size() / 3 - open.range.first_triangle;
+        if (open.is_open && open.range.triangle_count > 0) ranges().push_back(std::move(open.range));
+        open.is_open = false;
+    }
+
+    void note_unknown(std::string_view keyword, std::uint64_t line) {
+        if (std::find(std::begin(ignored_keywords), std::end(ignored_keywords), keyword) != std::end(ignored_keywords)) {
+            return;
+        }
+        if (unknown_++ == 0) {
+            first_unknown_ = in_quotes(keyword) + " in line " + std::to_string(line);
+        }
+    }
+
+    // ---- vertices with attributes ----
+
+    void add_attributes() {
+        Mesh& mesh = result_.mesh;
+        mesh.triangles.resize(triangle_corners_.size() / 3);
+        if (!has_uvs_ && !has_normals_) {
+            for (std::size_t i = 0; i < triangle_corners_.size(); ++i) {
+                mesh.triangles[i / 3][i % 3] = triangle_corners_[i].position;
+            }
+        } else {
+            split_vertices();
+        }
+        if (!colours_.empty()) colours_.resize(mesh.positions.size(), missing_colour);
+        mesh.colours = std::move(colours_);
+    }
+
+    void split_vertices() {
+        Mesh& mesh = result_.mesh;
+        VertexTable table(mesh.positions.size(), uvs_, normals_);
+        for (std::size_t i = 0; i < triangle_corners_.size(); ++i) {
+            has_index_overflow_ = !table.find(triangle_corners_[i], mesh.triangles[i / 3][i % 3]) || has_index_overflow_;
+        }
+        const std::size_t vertices = mesh.positions.size() + table.added().size();
+        if (has_uvs_) mesh.uvs.reserve(vertices);
+        if (has_normals_) mesh.normals.reserve(vertices);
+        for (const Corner& corner : table.first()) append_attributes(corner);
+        mesh.positions.reserve(vertices);
+        if (!colours_.empty()) {
+            colours_.resize(mesh.positions.size(), missing_colour);
+            colours_.reserve(vertices);
+        }
+        for (const Corner& corner : table.added()) {
+            mesh.positions.push_back(glm::dvec3(mesh.positions[corner.position]));
+            if (!colours_.empty()) colours_.push_back(glm::vec4(colours_[corner.position]));
+            append_attributes(corner);
+        }
+    }
+
+    void append_attributes(const Corner& corner) {
+        Mesh& mesh = result_.mesh;
+        if (has_uvs_) mesh.uvs.push_back(corner.uv == none ? glm::vec2(0.0f) : uvs_[corner.uv]);
+        if (has_normals_) mesh.normals.push_back(corner.normal == none ? missing_normal : normals_[corner.normal]);
+    }
+
+    void add_warnings() {
+        if (small_faces_ > 0) warn(counted_were(small_faces_, "face") + " left out for having fewer than 3 corners.");
+        if (unknown_ > 0) {
+            warn(counted_were(unknown_, "line") + " skipped for an unknown keyword, the first " + first_unknown_ + ".");
+        }
+        if (has_library_) warn_of_unknown_materials();
+        if (const auto fanned = polygons_.fanned_concave(); fanned > 0) {
+            warn(counted_were(fanned, "intricate concave polygon") + " cut into a fan.");
+        }
+    }
+
+    void warn_of_unknown_materials() {
+        std::set<std::string> known, unknown;
+        for (const Material& material : result_.materials) known.insert(material.name);
+        for (const MeshRange& range : ranges())
+            if (range.kind == MeshRange::Kind::material && !known.contains(range.name)) unknown.insert(range.name);
+        if (!unknown.empty())
+            warn(std::to_string(unknown.size()) + (unknown.size() == 1 ? " material is" : " materials are") + " in no library that was read, the first " +
+                 in_quotes(*unknown.begin()) + "; its faces are left as they are.");
+    }
+
+    Error too_many_vertices() const {
+        return {ErrorCode::unsupported,
+                source_.name + ": it has more vertices than 32-bit indices can number; split the mesh."};
+    }
+    void warn(std::string sentence) { result_.warnings.push_back(std::move(sentence)); }
+    Error bad(std::uint64_t line, const std::string& what) const { return malformed_line(source_, line, what); }
+    std::vector<glm::dvec3>& positions() { return result_.mesh.positions; }
+    std::vector<MeshRange>& ranges() { return result_.mesh.ranges; }
+
+    const MeshSource& source_;
+    ReadResult result_;
+    std::vector<glm::vec4> colours_; // up to the last vertex that has one
+    std::vector<glm::vec2> uvs_;
+    std::vector<glm::vec3> normals_;
+    std::size_t positions_seen_ = 0;
+    std::size_t uvs_seen_ = 0;
+    std::size_t normals_seen_ = 0;
+    std::vector<Corner> corners_;          // of the present face
+    std::vector<glm::dvec3> points_;       // their positions
+    std::vector<Corner> triangle_corners_; // three a triangle
+    bool has_uvs_ = false;
+    bool has_normals_ = false;
+    bool has_index_overflow_ = false;
+    OpenRange group_, material_;
+    std::set<fs::path> libraries_; // that were asked for
+    bool has_library_ = false;     // that could be read
+    PolygonTriangulator polygons_;
+    std::uint64_t statements_ = 0;
+    std::uint64_t small_faces_ = 0;
+    std::uint64_t unknown_ = 0;
+    std::string first_unknown_;
+};
+
+} // namespace
+
+Result<ReadResult> read_obj(const MeshSource& source) { return ObjReader(source).read(); }
+
+} // namespace unseen::meshio

@@ -1,0 +1,252 @@
+// OFF: Geomview's object file format, ASCII, with its prefixes ST, C and N.
+#include "mesh_readers.h"
+#include "polygon_triangulator.h"
+#include "text_scanner.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <vector>
+
+namespace unseen::meshio {
+
+namespace {
+
+// More numbers than any vertex line has: 3 + 3 normal + 4 colour + 2 UV.
+constexpr std::size_t max_extras = 9;
+// A row of the shortest kind: "0 0 0\n" for a vertex, "1\n" for a face nobody can draw.
+constexpr std::uint64_t min_vertex_bytes = 6;
+constexpr std::uint64_t min_face_bytes = 2;
+
+struct Keyword {
+    bool is_off = false;
+    bool has_uvs = false;
+    bool has_colours = false;
+    bool has_normals = false;
+    bool is_other_dimension = false; // 4OFF, nOFF: no surface in space
+};
+
+Keyword parse_keyword(std::string_view word) {
+    Keyword keyword;
+    const auto take = [&word](std::string_view prefix) {
+        if (!word.starts_with(prefix)) return false;
+        word.remove_prefix(prefix.size());
+        return true;
+    };
+    keyword.has_uvs = take("ST");
+    keyword.has_colours = take("C");
+    keyword.has_normals = take("N");
+    const bool is_4d = take("4");
+    const bool is_nd = take("n");
+    keyword.is_other_dimension = is_4d || is_nd;
+    keyword.is_off = word == "OFF";
+    return keyword;
+}
+
+class OffReader {
+public:
+    explicit OffReader(const MeshSource& source) : source_(source), words_(source.bytes, true) {}
+
+    Result<ReadResult> read() {
+        if (Result<void> header = read_header(); !header) return header.error();
+        if (Result<void> vertices = read_vertices(); !vertices) return vertices.error();
+        if (Result<void> faces = read_faces(); !faces) return faces.error();
+        if (small_faces_ > 0) {
+            result_.warnings.push_back(counted_were(small_faces_, "face") + " left out for having fewer than 3 corners.");
+        }
+        if (const auto fanned = polygons_.fanned_concave(); fanned > 0) {
+            result_.warnings.push_back(counted_were(fanned, "intricate concave polygon") + " cut into a fan.");
+        }
+        return std::move(result_);
+    }
+
+private:
+    Result<void> read_header() {
+        std::string_view word = words_.next();
+        if (const Keyword keyword = parse_keyword(word); keyword.is_off) {
+            keyword_ = keyword;
+            word = words_.next();
+        }
+        if (word == "BINARY") return unsupported("binary OFF is not read; convert it to ASCII OFF or PLY.");
+        if (keyword_.is_other_dimension) return unsupported("4OFF and nOFF are not read; project it to three dimensions.");
+        if (Result<void> done = to_count(word, "vertices", vertex_count_); !done) return done;
+        if (Result<void> done = to_count(words_.next(), "faces", face_count_); !done) return done;
+        // The number of edges is there in most files, and nobody needs it.
+        words_.next_in_line();
+        return check_counts();
+    }
+
+    Result<void> check_counts() {
+        const std::uint64_t left = words_.remaining() + 1; // the last line may lack its newline
+        if (vertex_count_ > left / min_vertex_bytes || face_count_ > left / min_face_bytes) {
+            return malformed(source_, "it claims " + std::to_string(vertex_count_) + " vertices and " +
+                                          std::to_string(face_count_) + " faces, but only " +
+                                          std::to_string(words_.remaining()) +
+                                          " bytes are left for them; the file is cut short or its counts are wrong.");
+        }
+        if (vertex_count_ > std::numeric_limits<Index>::max()) {
+            return malformed(source_, "it has more vertices than 32-bit indices can number; split the mesh.");
+        }
+        return {};
+    }
+
+    Result<void> read_vertices() {
+        Mesh& mesh = result_.mesh;
+        mesh.positions.reserve(vertex_count_);
+        for (std::uint64_t i = 0; i < vertex_count_; ++i) {
+            if (!pulse(i)) return cancelled(source_);
+            glm::dvec3 p(0.0);
+            for (int axis = 0; axis < 3; ++axis) {
+                if (Result<void> done = to_real(words_.next(), i, p[axis]); !done) return done;
+            }
+            mesh.positions.push_back(p);
+            if (keyword_.has_normals || keyword_.has_colours || keyword_.has_uvs) {
+                if (Result<void> done = read_attributes(i); !done) return done;
+            }
+        }
+        return {};
+    }
+
+    // What follows the coordinates on their line: normal, then colour (3 or 4 numbers), then UV.
+    Result<void> read_attributes(std::uint64_t vertex) {
+        std::array<double, max_extras> extra{};
+        std::size_t count = 0;
+        for (std::string_view word = words_.next_in_line(); !word.empty(); word = words_.next_in_line()) {
+            if (count == max_extras) break;
+            if (Result<void> done = to_real(word, vertex, extra[count++]); !done) return done;
+        }
+        words_.skip_line();
+        const std::size_t normal_size = keyword_.has_normals ? 3 : 0;
+        const std::size_t uv_size = keyword_.has_uvs ? 2 : 0;
+        const std::size_t colour_size = count - std::min(count, normal_size + uv_size);
+        const bool has_right_count =
+            count >= normal_size + uv_size &&
+            (keyword_.has_colours ? colour_size == 3 || colour_size == 4 : colour_size == 0);
+        if (!has_right_count) {
+            return malformed_line(source_, words_.line(), "vertex " + std::to_string(vertex) + " has " +
+                                                              std::to_string(count) +
+                                                              " numbers behind its coordinates, which is not what the "
+                                                              "first line of the file announces; correct one of them.");
+        }
+        Mesh& mesh = result_.mesh;
+        if (keyword_.has_normals) mesh.normals.emplace_back(extra[0], extra[1], extra[2]);
+        if (keyword_.has_colours) {
+            mesh.colours.emplace_back(extra[normal_size], extra[normal_size + 1], extra[normal_size + 2],
+                                      colour_size == 4 ? extra[normal_size + 3] : -1.0);
+        }
+        if (keyword_.has_uvs) mesh.uvs.emplace_back(extra[count - 2], extra[count - 1]);
+        return {};
+    }
+
+    // Colours are 0..1 or 0..255, and only all of them together tell which.
+    void decode_colours() {
+        float largest = 0.0f;
+        for (const glm::vec4& c : result_.mesh.colours) largest = std::max({largest, c.r, c.g, c.b, c.a});
+        const float full = largest > 1.0f ? 255.0f : 1.0f;
+        for (glm::vec4& c : result_.mesh.colours) {
+            const bool has_alpha = c.a >= 0.0f;
+            c = decode_colour(c / full, source_.options.colours);
+            if (!has_alpha) c.a = 1.0f;
+        }
+    }
+
+    Result<void> read_faces() {
+        decode_colours();
+        for (std::uint64_t i = 0; i < face_count_; ++i) {
+            if (!pulse(i)) return cancelled(source_);
+            std::int64_t size = 0;
+            if (Result<void> done = to_index(words_.next(), i, size); !done) return done;
+            if (size < 0 || static_cast<std::uint64_t>(size) > words_.remaining() / 2) {
+                return malformed_line(source_, words_.line(), "face " + std::to_string(i) + " claims " +
+                                                                  std::to_string(size) +
+                                                                  " corners, more than the file can hold; correct it.");
+            }
+            corners_.resize(static_cast<std::size_t>(size));
+            for (Index& corner : corners_) {
+                if (Result<void> done = read_corner(i, corner); !done) return done;
+            }
+            words_.skip_line(); // a colour may follow
+            add_face();
+        }
+        return {};
+    }
+
+    Result<void> read_corner(std::uint64_t face, Index& corner) {
+        std::int64_t index = 0;
+        if (Result<void> done = to_index(words_.next(), face, index); !done) return done;
+        if (index < 0 || static_cast<std::uint64_t>(index) >= vertex_count_) {
+            return malformed_line(source_, words_.line(), "face " + std::to_string(face) + " uses vertex " +
+                                                              std::to_string(index) + ", but there are " +
+                                                              std::to_string(vertex_count_) +
+                                                              ", numbered from 0; correct or remove it.");
+        }
+        corner = static_cast<Index>(index);
+        return {};
+    }
+
+    void add_face() {
+        ++result_.source_faces;
+        if (corners_.size() < 3) {
+            ++small_faces_;
+            return;
+        }
+        points_.clear();
+        for (const Index corner : corners_) points_.push_back(result_.mesh.positions[corner]);
+        polygons_.triangulate(points_, [&](const Triangle& t) {
+            result_.mesh.triangles.push_back({corners_[t[0]], corners_[t[1]], corners_[t[2]]});
+        });
+    }
+
+    Result<void> to_count(std::string_view word, const char* what, std::uint64_t& count) {
+        std::int64_t value = 0;
+        if (!to_integer(word, value) || value < 0) {
+            return malformed_line(source_, words_.line(), std::string("the number of ") + what +
+                                                              " should stand here, not " + in_quotes(word) + ".");
+        }
+        count = static_cast<std::uint64_t>(value);
+        return {};
+    }
+
+    Result<void> to_real(std::string_view word, std::uint64_t vertex, double& value) {
+        if (to_number(word, value)) return {};
+        return not_a_number("vertex " + std::to_string(vertex) + " of " + std::to_string(vertex_count_), word);
+    }
+
+    Result<void> to_index(std::string_view word, std::uint64_t face, std::int64_t& value) {
+        if (to_integer(word, value)) return {};
+        return not_a_number("face " + std::to_string(face) + " of " + std::to_string(face_count_), word);
+    }
+
+    Error not_a_number(const std::string& where, std::string_view word) const {
+        if (word.empty()) return malformed(source_, "it ends within " + where + "; the file is cut short.");
+        return malformed_line(source_, words_.line(), where + " has " + in_quotes(word) +
+                                                          " where a number should be; correct it.");
+    }
+
+    Error unsupported(const std::string& what) const { return {ErrorCode::unsupported, source_.name + ": " + what}; }
+
+    bool pulse(std::uint64_t row) const {
+        return row % rows_per_progress != 0 || source_.keep_going(words_.position(), "reading OFF");
+    }
+
+    const MeshSource& source_;
+    WordScanner words_;
+    Keyword keyword_;
+    std::uint64_t vertex_count_ = 0;
+    std::uint64_t face_count_ = 0;
+    std::uint64_t small_faces_ = 0;
+    ReadResult result_;
+    PolygonTriangulator polygons_;
+    std::vector<Index> corners_;
+    std::vector<glm::dvec3> points_;
+};
+
+} // namespace
+
+bool starts_with_off_keyword(std::string_view bytes) {
+    return parse_keyword(WordScanner(bytes, true).next()).is_off;
+}
+
+Result<ReadResult> read_off(const MeshSource& source) { return OffReader(source).read(); }
+
+} // namespace unseen::meshio

@@ -1,0 +1,214 @@
+// STL, ASCII and binary. Facets keep their own three vertices: nothing is welded.
+#include <vdtree/internal/finite.h>
+#include "mesh_readers.h"
+#include "text_scanner.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cctype>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+namespace unseen::meshio {
+
+namespace {
+
+constexpr std::size_t header_bytes = 80;
+constexpr std::size_t preamble_bytes = header_bytes + 4; // and the facet count
+constexpr std::size_t facet_bytes = 50;                  // normal, 3 corners, 2 bytes that nobody agrees about
+constexpr std::uint64_t max_facets = std::numeric_limits<Index>::max() / 3;
+
+template <class Value>
+Value little_endian(const char* bytes) {
+    std::array<char, sizeof(Value)> raw;
+    std::memcpy(raw.data(), bytes, sizeof(Value));
+    if constexpr (std::endian::native == std::endian::big) std::reverse(raw.begin(), raw.end());
+    return std::bit_cast<Value>(raw);
+}
+
+std::uint64_t claimed_facets(std::string_view bytes) {
+    return little_endian<std::uint32_t>(bytes.data() + header_bytes);
+}
+
+bool equals_ignoring_case(std::string_view word, std::string_view lower) {
+    return std::equal(word.begin(), word.end(), lower.begin(), lower.end(), [](char a, char b) {
+        return std::tolower(static_cast<unsigned char>(a)) == b;
+    });
+}
+
+// "solid" and a name, then a facet or the end: some binary files start with "solid" too.
+bool is_ascii_stl(std::string_view bytes) {
+    WordScanner words(bytes, false);
+    if (!equals_ignoring_case(words.next(), "solid")) return false;
+    words.skip_line();
+    const std::string_view word = words.next();
+    return equals_ignoring_case(word, "facet") || equals_ignoring_case(word, "endsolid");
+}
+
+bool is_direction(const glm::vec3& n) { return is_finite(n) && n != glm::vec3(0.0f); }
+
+void add_facet(ReadResult& result, const glm::vec3& normal, const std::array<glm::dvec3, 3>& corners) {
+    Mesh& mesh = result.mesh;
+    const auto first = static_cast<Index>(mesh.positions.size());
+    mesh.positions.insert(mesh.positions.end(), corners.begin(), corners.end());
+    mesh.normals.insert(mesh.normals.end(), 3, normal);
+    mesh.triangles.push_back({first, first + 1, first + 2});
+    ++result.source_faces;
+}
+
+// A facet's normal of zero means "compute it" in STL, and so does one that is not finite, which flat facets often have: what it was to
+// say follows from the corners.
+void settle_normals(ReadResult& result) {
+    Mesh& mesh = result.mesh;
+    const bool any = std::any_of(mesh.normals.begin(), mesh.normals.end(), is_direction);
+    std::uint64_t not_finite = 0; // a facet's three are the same
+    for (glm::vec3& normal : mesh.normals) {
+        if (is_finite(normal)) continue;
+        normal = missing_normal;
+        ++not_finite;
+    }
+    if (not_finite > 0) {
+        result.warnings.push_back(counted_were(not_finite / 3, "facet normal") + " not finite and computed from the corners.");
+    }
+    if (!any) mesh.normals = {};
+}
+
+Error too_many_facets(const MeshSource& source) {
+    return {ErrorCode::unsupported, source.name + ": it has more facets than 32-bit indices can number; split the mesh."};
+}
+
+glm::vec3 vector_at(const char* bytes) {
+    return {little_endian<float>(bytes), little_endian<float>(bytes + 4), little_endian<float>(bytes + 8)};
+}
+
+Result<ReadResult> read_binary(const MeshSource& source) {
+    const std::string_view bytes = source.bytes;
+    if (bytes.size() < preamble_bytes) {
+        return malformed(source, "it is too short for an STL file; it may be cut short.");
+    }
+    const std::uint64_t count = claimed_facets(bytes);
+    const std::uint64_t room = (bytes.size() - preamble_bytes) / facet_bytes;
+    if (count > room) {
+        return malformed(source, "it claims " + std::to_string(count) + " facets, but its bytes hold only " +
+                                     std::to_string(room) + "; the file is cut short or its count is wrong.");
+    }
+    if (count > max_facets) return too_many_facets(source);
+
+    ReadResult result;
+    result.mesh.positions.reserve(3 * count);
+    result.mesh.normals.reserve(3 * count);
+    result.mesh.triangles.reserve(count);
+    for (std::uint64_t i = 0; i < count; ++i) {
+        const char* facet = bytes.data() + preamble_bytes + i * facet_bytes;
+        if (i % rows_per_progress == 0 && !source.keep_going(preamble_bytes + i * facet_bytes, "reading STL")) {
+            return cancelled(source);
+        }
+        add_facet(result, vector_at(facet),
+                  {glm::dvec3(vector_at(facet + 12)), glm::dvec3(vector_at(facet + 24)),
+                   glm::dvec3(vector_at(facet + 36))});
+    }
+    if (bytes.size() > preamble_bytes + count * facet_bytes) {
+        result.warnings.push_back("data behind the last facet were ignored.");
+    }
+    settle_normals(result);
+    return result;
+}
+
+// "solid NAME" { "facet normal X Y Z outer loop" 3 x "vertex X Y Z" "endloop endfacet" } "endsolid NAME", repeated.
+class AsciiReader {
+public:
+    explicit AsciiReader(const MeshSource& source) : source_(source), words_(source.bytes, false) {}
+
+    Result<ReadResult> read() {
+        for (std::string_view word = words_.next(); !word.empty(); word = words_.next()) {
+            if (!equals_ignoring_case(word, "solid")) return unexpected("solid", word);
+            if (Result<void> solid = read_solid(); !solid) return solid.error();
+        }
+        settle_normals(result_);
+        return std::move(result_);
+    }
+
+private:
+    Result<void> read_solid() {
+        MeshRange range{rest_of_line(), MeshRange::Kind::group, result_.mesh.triangles.size(), 0};
+        for (;;) {
+            const std::string_view word = words_.next();
+            if (equals_ignoring_case(word, "endsolid")) break;
+            if (!equals_ignoring_case(word, "facet")) return unexpected("facet or endsolid", word);
+            if (Result<void> facet = read_facet(); !facet) return facet;
+        }
+        words_.skip_line();
+        range.triangle_count = result_.mesh.triangles.size() - range.first_triangle;
+        if (range.triangle_count > 0) result_.mesh.ranges.push_back(std::move(range));
+        return {};
+    }
+
+    Result<void> read_facet() {
+        const std::uint64_t facet = result_.source_faces;
+        if (facet >= max_facets) return too_many_facets(source_);
+        if (facet % rows_per_progress == 0 && !source_.keep_going(words_.position(), "reading STL")) {
+            return cancelled(source_);
+        }
+        glm::dvec3 normal(0.0);
+        std::array<glm::dvec3, 3> corners{};
+        if (Result<void> done = expect("normal"); !done) return done;
+        if (Result<void> done = read_vector(normal); !done) return done;
+        if (Result<void> done = expect("outer"); !done) return done;
+        if (Result<void> done = expect("loop"); !done) return done;
+        for (glm::dvec3& corner : corners) {
+            if (Result<void> done = expect("vertex"); !done) return done;
+            if (Result<void> done = read_vector(corner); !done) return done;
+        }
+        if (Result<void> done = expect("endloop"); !done) return done;
+        if (Result<void> done = expect("endfacet"); !done) return done;
+        add_facet(result_, glm::vec3(normal), corners);
+        return {};
+    }
+
+    Result<void> read_vector(glm::dvec3& vector) {
+        for (int axis = 0; axis < 3; ++axis) {
+            const std::string_view word = words_.next();
+            if (!to_number(word, vector[axis])) return unexpected("a number", word);
+        }
+        return {};
+    }
+
+    Result<void> expect(std::string_view keyword) {
+        const std::string_view word = words_.next();
+        if (equals_ignoring_case(word, keyword)) return {};
+        return unexpected(std::string(keyword), word);
+    }
+
+    std::string rest_of_line() {
+        const std::size_t first = words_.position();
+        words_.skip_line();
+        return std::string(trimmed(source_.bytes.substr(first, words_.position() - first)));
+    }
+
+    Error unexpected(const std::string& wanted, std::string_view word) const {
+        const std::string where = "facet " + std::to_string(result_.source_faces);
+        if (word.empty()) return malformed(source_, "it ends at " + where + " without " + wanted + "; it is cut short.");
+        return malformed_line(source_, words_.line(),
+                              where + " has " + in_quotes(word) + " where " + wanted + " should be; correct it.");
+    }
+
+    const MeshSource& source_;
+    WordScanner words_;
+    ReadResult result_;
+};
+
+} // namespace
+
+bool is_binary_stl(std::string_view bytes) {
+    return bytes.size() >= preamble_bytes &&
+           bytes.size() - preamble_bytes == claimed_facets(bytes) * facet_bytes;
+}
+
+Result<ReadResult> read_stl(const MeshSource& source) {
+    if (!is_binary_stl(source.bytes) && is_ascii_stl(source.bytes)) return AsciiReader(source).read();
+    return read_binary(source);
+}
+
+} // namespace unseen::meshio

@@ -1,0 +1,248 @@
+#include "build/bound_spheres.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+
+#include <glm/geometric.hpp>
+
+#include "build/bounding_sphere.h"
+#include "cut/kernel/prefetch.h"
+#include "build/spatial_order.h"
+
+namespace unseen::vdtree {
+
+namespace {
+
+// Displacements of nodes with more leaves than this are bounded through their children's: looking for the farthest of very
+// many leaves again in each of their ancestors would cost the square of their number where trees are deep.
+constexpr Index most_measured_leaves = 4096;
+// So many leaves are looked at one by one sooner than their nodes.
+constexpr Index few_leaves = 12;
+
+// Of the radius: spheres that stick out by less do not move the centre any more. Less is not worth the time: what the spheres
+// of children add is more.
+constexpr double node_slack = 1e-3;
+
+// Bounds the nodes of a part, children first, several at a time. Leaves are seen as points, interior children as their spheres.
+class SphereWorker {
+public:
+    // `heights`: by interior node; how many there are below each other, itself the first.
+    SphereWorker(const BoundInput& input, std::span<Index> heights, NodeSpheres& out) : in_(input), heights_(heights), out_(out) {}
+
+    void operator()(std::span<const NodeId> nodes) {
+        sort(nodes);
+        for (std::size_t i = 0; i < sorted_.size();) {
+            lanes_ = 0;
+            do nodes_[lanes_++] = sorted_[i++].index;
+            while (lanes_ < BallLanes::lanes && i < sorted_.size() && heights_[sorted_[i].index] == heights_[nodes_[0]]);
+            bound();
+        }
+    }
+
+private:
+    // Nodes whose children are done before them, and whose bounding takes as long, come together.
+    void sort(std::span<const NodeId> nodes) {
+        sorted_.clear();
+        for (std::size_t i = nodes.size(); i-- > 0;) {
+            Index below = 0;
+            std::uint64_t children = 0, points = 0;
+            in_.shape.for_each_child(
+                nodes[i],
+                [&](NodeId child) {
+                    below = std::max(below, heights_[child]);
+                    ++children;
+                },
+                [&](Index leaf) {
+                    const auto ring = in_.rings.around(leaf);
+                    prefetch(ring.data()); // for bound()
+                    points += 1 + ring.size();
+                });
+            heights_[nodes[i]] = below + 1;
+            constexpr std::uint64_t most_children = 3, most_points = 63; // a byte for both
+            sorted_.push_back({std::uint64_t{below} << 8 | std::min(children, most_children) << 6 | std::min(points, most_points), nodes[i]});
+        }
+        scratch_.resize(sorted_.size());
+        sort_by_code(sorted_, scratch_);
+    }
+
+    void bound() {
+        const auto leaves = in_.positions.subspan(in_.shape.node_of_leaf(0));
+        std::array<Sphere, BallLanes::lanes> spheres;
+        const std::span<Sphere> used = std::span(spheres).first(lanes_);
+        for (std::size_t lane = 0; lane < lanes_; ++lane) {
+            balls_.begin(lane, in_.positions[nodes_[lane]]);
+            in_.shape.for_each_child(
+                nodes_[lane], [&](NodeId child) { balls_.add(lane, out_.support[child]); },
+                [&](Index leaf) { balls_.add(lane, leaves[leaf]); });
+        }
+        balls_.enclose(node_slack, used);
+        for (std::size_t lane = 0; lane < lanes_; ++lane) {
+            out_.support[nodes_[lane]] = spheres[lane];
+            // The ring has all these points, too.
+            balls_.forget_spheres(lane);
+            in_.shape.for_each_child(
+                nodes_[lane], [&](NodeId child) { balls_.add(lane, out_.ring[child]); },
+                [&](Index leaf) { balls_.add(lane, leaves, in_.rings.around(leaf)); });
+        }
+        balls_.enclose(node_slack, used);
+        for (std::size_t lane = 0; lane < lanes_; ++lane) out_.ring[nodes_[lane]] = spheres[lane];
+    }
+
+    const BoundInput& in_;
+    std::span<Index> heights_;
+    NodeSpheres& out_;
+    std::vector<CodedIndex> sorted_, scratch_;
+    BallLanes balls_;
+    std::array<NodeId, BallLanes::lanes> nodes_; // being bounded
+    std::size_t lanes_ = 0;
+};
+
+class DisplacementWorker {
+public:
+    DisplacementWorker(const BoundInput& input, std::span<const Sphere> support, std::span<float> out)
+        : in_(input), support_(support), out_(out) {}
+
+    void operator()(NodeId node) {
+        proxy_ = in_.position(node);
+        farthest_ = 0;
+        const TreeShape& shape = in_.shape;
+        shape.for_each_child(
+            node, [&](NodeId child) { farthest_ = std::max(farthest_, static_cast<double>(out_[child])); },
+            [](Index) {});
+        if (shape.leaf_end[node] - shape.first_leaf[node] <= most_measured_leaves) {
+            measure(node);
+        } else {
+            shape.for_each_child(
+                node, [&](NodeId child) { farthest_ = std::max(farthest_, bound(child)); },
+                [&](Index leaf) { measure_leaf(leaf); });
+        }
+        out_[node] = round_up(farthest_);
+    }
+
+private:
+    void measure_leaf(Index leaf) { farthest_ = std::max(farthest_, glm::distance(proxy_, in_.leaf_position(leaf))); }
+
+    // No leaf under the node is farther from the proxy.
+    double bound(NodeId node) const {
+        return std::min(glm::distance(proxy_, in_.position(node)) + out_[node],
+                        glm::distance(proxy_, glm::dvec3(support_[node].centre)) + support_[node].radius);
+    }
+
+    // Looks where a farther leaf may be, likely places first.
+    void measure(NodeId node) {
+        const TreeShape& shape = in_.shape;
+        if (shape.leaf_end[node] - shape.first_leaf[node] <= few_leaves) {
+            for (Index leaf = shape.first_leaf[node]; leaf < shape.leaf_end[node]; ++leaf) measure_leaf(leaf);
+            return;
+        }
+        NodeId likely = no_node;
+        double most = farthest_;
+        shape.for_each_child(
+            node,
+            [&](NodeId child) {
+                const double reach = bound(child);
+                if (reach > most) {
+                    most = reach;
+                    likely = child;
+                }
+            },
+            [&](Index leaf) { measure_leaf(leaf); });
+        if (likely == no_node) return;
+        measure(likely);
+        shape.for_each_child(
+            node,
+            [&](NodeId child) {
+                if (child != likely && bound(child) > farthest_) measure(child);
+            },
+            [](Index) {});
+    }
+
+    const BoundInput& in_;
+    std::span<const Sphere> support_;
+    std::span<float> out_;
+    glm::dvec3 proxy_;
+    double farthest_;
+};
+
+// Looks for the farthest corner of the triangles, nodes that reach far first. Of several, the first leaf.
+class CornerFinder {
+public:
+    CornerFinder(const BoundInput& input, std::span<const Sphere> support) : in_(input), support_(support) {}
+
+    glm::dvec3 any() const {
+        Index leaf = 0;
+        while (in_.rings.around(leaf).empty()) ++leaf; // there is a triangle
+        return in_.leaf_position(leaf);
+    }
+
+    glm::dvec3 farthest(glm::dvec3 from) {
+        // Spheres contain their leaves but for the rounding of distances.
+        constexpr double slack = 1 + 1e-12;
+        const auto reach = [&](NodeId node) {
+            return (glm::distance(glm::dvec3(support_[node].centre), from) + support_[node].radius) * slack;
+        };
+        Index farthest = 0;
+        double most_squared = -1, most = -1;
+        open_.assign(1, {0, reach(0)});
+        while (!open_.empty()) {
+            const OpenNode node = open_.back();
+            open_.pop_back();
+            if (node.reach < most) continue;
+            const std::size_t siblings = open_.size();
+            in_.shape.for_each_child(
+                node.node,
+                [&](NodeId child) {
+                    if (const double far = reach(child); far >= most) open_.push_back({child, far});
+                },
+                [&](Index leaf) {
+                    const glm::dvec3 away = in_.leaf_position(leaf) - from;
+                    const double squared = glm::dot(away, away);
+                    if (squared < most_squared || (squared == most_squared && leaf > farthest) || in_.rings.around(leaf).empty()) return;
+                    farthest = leaf;
+                    most_squared = squared;
+                    most = std::sqrt(squared);
+                });
+            const auto children = open_.begin() + static_cast<std::ptrdiff_t>(siblings);
+            if (children == open_.end()) continue;
+            std::iter_swap(std::max_element(children, open_.end(), [](const OpenNode& a, const OpenNode& b) { return a.reach < b.reach; }),
+                           std::prev(open_.end()));
+        }
+        return in_.leaf_position(farthest);
+    }
+
+private:
+    struct OpenNode {
+        NodeId node;
+        double reach;
+    };
+
+    const BoundInput& in_;
+    std::span<const Sphere> support_;
+    std::vector<OpenNode> open_; // still to be looked at
+};
+
+} // namespace
+
+NodeSpheres bound_spheres(const BoundInput& input) {
+    NodeSpheres spheres;
+    spheres.support.resize(input.shape.interior());
+    spheres.ring.resize(input.shape.interior());
+    std::vector<Index> heights(input.shape.interior());
+    input.parts.part_by_part([&] { return SphereWorker(input, heights, spheres); });
+    return spheres;
+}
+
+Sphere bound_corners(const BoundInput& input, std::span<const Sphere> support) {
+    CornerFinder corners(input, support);
+    return round_outward(smallest_sphere(corners.any(), [&](glm::dvec3 from) { return corners.farthest(from); }));
+}
+
+std::vector<float> bound_displacements(const BoundInput& input, std::span<const Sphere> support) {
+    std::vector<float> displacement(input.shape.interior());
+    input.parts.bottom_up([&] { return DisplacementWorker(input, support, displacement); });
+    return displacement;
+}
+
+} // namespace unseen::vdtree

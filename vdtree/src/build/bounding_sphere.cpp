@@ -1,0 +1,539 @@
+#include "build/bounding_sphere.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+
+#include <glm/geometric.hpp>
+
+#ifdef __SSE2__
+#include <immintrin.h>
+#endif
+
+// Vectors wider than the target's are only handed to functions that are inlined.
+#pragma GCC diagnostic ignored "-Wpsabi"
+#define UNSEEN_INLINE [[gnu::always_inline]] inline
+
+namespace unseen::vdtree {
+
+namespace {
+
+// A point counts as contained up to this share of the radius, so that rounding does not change the basis for ever.
+constexpr double containment_slack = 1e-12;
+// The growth of a basis is given up after so many rounds, far more than it takes; the radius is then what it has to be.
+constexpr int most_rounds = 64;
+// Of the product of lengths: points flatter than this have no circumsphere worth calling so.
+constexpr double least_flatness = 1e-14;
+
+double squared(glm::dvec3 v) { return glm::dot(v, v); }
+
+// Up to four points, and the smallest sphere around them, which they lie on.
+class Basis {
+public:
+    Basis() = default;
+    // The smallest sphere around two balls.
+    Basis(const DSphere& a, const DSphere& b) {
+        const glm::dvec3 apart = b.centre - a.centre;
+        const double distance = glm::length(apart);
+        if (distance + b.radius <= a.radius) {
+            sphere_ = a;
+            count_ = 0;
+        } else if (distance + a.radius <= b.radius) {
+            sphere_ = b;
+            count_ = 0;
+        } else {
+            points_[0] = a.centre, points_[1] = b.centre;
+            if (a.radius != 0 || b.radius != 0) {
+                const glm::dvec3 direction = apart / distance;
+                points_[0] -= direction * a.radius;
+                points_[1] += direction * b.radius;
+            }
+            sphere_ = {(points_[0] + points_[1]) * 0.5, (distance + a.radius + b.radius) * 0.5};
+            count_ = 2;
+        }
+    }
+
+    // Of what is on the sphere, which is the smallest around it; with no points, a single ball.
+    Basis(std::span<const glm::dvec3> points, const DSphere& sphere) : count_(static_cast<int>(points.size())), sphere_(sphere) {
+        std::copy(points.begin(), points.end(), points_.begin());
+    }
+
+    const DSphere& sphere() const { return sphere_; }
+
+    // Makes the smallest sphere around the basis and what of a ball is farthest outside of its sphere.
+    void add(const DSphere& ball) {
+        if (ball.radius == 0) return add(ball.centre);
+        const glm::dvec3 away = ball.centre - sphere_.centre;
+        const double length = glm::length(away);
+        const glm::dvec3 direction = length > 0 ? away / length : glm::dvec3(1, 0, 0);
+        add(ball.centre + direction * ball.radius);
+    }
+
+private:
+    // Makes the smallest sphere around the basis and a point outside of its sphere.
+    void add(glm::dvec3 p) {
+        if (count_ == 0) {
+            // The sphere is a single ball: the point opposite stands for it.
+            const glm::dvec3 away = p - sphere_.centre;
+            points_[0] = sphere_.centre - away * (sphere_.radius / glm::length(away));
+            count_ = 1;
+        }
+        Best best;
+        for (int i = 0; i < count_ && !best.found; ++i) {
+            const glm::dvec3 half = (at(i) - p) * 0.5;
+            consider(best, {p + half, squared(half)}, {i});
+        }
+        // A pair's sphere that contains the others is the smallest, but one of more points need not be.
+        if (!best.found) {
+            for (int i = 0; i < count_; ++i)
+                for (int j = i + 1; j < count_; ++j) consider(best, around(p, at(i), at(j)), {i, j});
+            for (int i = 0; i < count_; ++i)
+                for (int j = i + 1; j < count_; ++j)
+                    for (int k = j + 1; k < count_; ++k) consider(best, around(p, at(i), at(j), at(k)), {i, j, k});
+        }
+        if (!best.found) {
+            // Rounding has left nothing: keep the sphere in the place of its basis.
+            *this = Basis(sphere_, {p, 0});
+            return;
+        }
+        std::array<glm::dvec3, 4> kept;
+        int count = 0;
+        for (int i = 0; i < 3; ++i)
+            if (best.with[static_cast<std::size_t>(i)] >= 0)
+                kept[static_cast<std::size_t>(count++)] = at(best.with[static_cast<std::size_t>(i)]);
+        kept[static_cast<std::size_t>(count++)] = p;
+        points_ = kept;
+        count_ = count;
+        sphere_ = {best.sphere.centre, std::sqrt(best.sphere.squared_radius)};
+    }
+
+    struct Subset {
+        std::array<int, 3> with{-1, -1, -1};
+        Subset(std::initializer_list<int> which) { std::copy(which.begin(), which.end(), with.begin()); }
+    };
+    // Roots are only taken of the best.
+    struct Candidate {
+        glm::dvec3 centre = glm::dvec3(0);
+        double squared_radius = -1; // negative: none
+    };
+    struct Best {
+        bool found = false;
+        Candidate sphere;
+        std::array<int, 3> with{-1, -1, -1};
+    };
+
+    glm::dvec3 at(int i) const { return points_[static_cast<std::size_t>(i)]; }
+
+    void consider(Best& best, const Candidate& sphere, const Subset& subset) const {
+        if (!(sphere.squared_radius >= 0) || (best.found && sphere.squared_radius >= best.sphere.squared_radius)) return;
+        const double limit = sphere.squared_radius * (1 + 2 * containment_slack);
+        for (int i = 0; i < count_; ++i) {
+            if (i == subset.with[0] || i == subset.with[1] || i == subset.with[2]) continue;
+            if (!(squared(at(i) - sphere.centre) <= limit)) return;
+        }
+        best = {true, sphere, subset.with};
+    }
+
+    // The smallest spheres with three and with four points on them.
+    static Candidate around(glm::dvec3 p, glm::dvec3 q, glm::dvec3 r) {
+        const glm::dvec3 a = q - p, b = r - p, normal = glm::cross(a, b);
+        const double aa = squared(a), bb = squared(b), flat = squared(normal);
+        if (!(flat > least_flatness * aa * bb)) return {};
+        const glm::dvec3 offset = glm::cross(aa * b - bb * a, normal) / (2 * flat);
+        return {p + offset, squared(offset)};
+    }
+    static Candidate around(glm::dvec3 p, glm::dvec3 q, glm::dvec3 r, glm::dvec3 s) {
+        const glm::dvec3 a = q - p, b = r - p, c = s - p, bc = glm::cross(b, c);
+        const double aa = squared(a), bb = squared(b), cc = squared(c), volume = glm::dot(a, bc);
+        if (!(volume * volume > least_flatness * aa * bb * cc)) return {};
+        const glm::dvec3 offset = (aa * bc + bb * glm::cross(c, a) + cc * glm::cross(a, b)) / (2 * volume);
+        return {p + offset, squared(offset)};
+    }
+
+    std::array<glm::dvec3, 4> points_;
+    int count_ = 0;
+    DSphere sphere_;
+};
+
+struct Farthest {
+    DSphere ball;
+    double reach; // from the centre to the ball's far side
+};
+
+// Points and balls as one list of balls, relative to the first.
+class Balls {
+public:
+    Balls(std::span<const glm::dvec3> points, std::span<const DSphere> spheres)
+        : points_(points), spheres_(spheres), origin_(points.empty() ? spheres[0].centre : points[0]) {}
+
+    glm::dvec3 origin() const { return origin_; }
+    DSphere first() const { return {glm::dvec3(0), points_.empty() ? spheres_[0].radius : 0}; }
+
+    Farthest farthest(glm::dvec3 from) const {
+        const glm::dvec3 centre = from + origin_;
+        double largest = -1;
+        const glm::dvec3* point = nullptr;
+        for (const glm::dvec3& p : points_) {
+            const double d = squared(p - centre);
+            if (d > largest) {
+                largest = d;
+                point = &p;
+            }
+        }
+        Farthest out{{point ? *point - origin_ : glm::dvec3(0), 0}, point ? std::sqrt(largest) : -1};
+        for (const DSphere& s : spheres_) {
+            const double reach = glm::distance(s.centre, centre) + s.radius;
+            if (s.radius >= 0 && reach > out.reach) out = {{s.centre - origin_, s.radius}, reach};
+        }
+        return out;
+    }
+
+private:
+    std::span<const glm::dvec3> points_;
+    std::span<const DSphere> spheres_;
+    glm::dvec3 origin_;
+};
+
+// Points that somebody else keeps, relative to one of them; for the time of one call.
+class FarPoints {
+public:
+    FarPoints(glm::dvec3 origin, const FunctionRef<glm::dvec3(glm::dvec3)>& farthest) : origin_(origin), farthest_(farthest) {}
+
+    DSphere first() const { return {glm::dvec3(0), 0}; }
+    Farthest farthest(glm::dvec3 from) const {
+        const glm::dvec3 centre = from + origin_, point = farthest_(centre);
+        return {{point - origin_, 0}, glm::distance(point, centre)};
+    }
+
+private:
+    glm::dvec3 origin_;
+    const FunctionRef<glm::dvec3(glm::dvec3)>& farthest_;
+};
+
+// Grows a basis by what sticks out farthest until nothing does by more than `slack`, a share of the radius. For balls the
+// points of the basis are cutting planes: their smallest sphere is never larger than the one looked for.
+template <class AnyBalls>
+DSphere grow_basis(AnyBalls& balls, double slack) {
+    // A pair far apart is a good beginning.
+    const DSphere one = balls.farthest(balls.first().centre).ball;
+    const DSphere other = balls.farthest(one.centre).ball;
+    Basis basis(one, other);
+    for (int round = 0;; ++round) {
+        const DSphere& sphere = basis.sphere();
+        const auto [ball, reach] = balls.farthest(sphere.centre);
+        if (reach <= sphere.radius * (1 + slack) || round == most_rounds)
+            return {sphere.centre, std::max(sphere.radius, reach)};
+        basis.add(ball);
+    }
+}
+
+DSphere enclose(std::span<const glm::dvec3> points, std::span<const DSphere> spheres, double slack) {
+    while (!spheres.empty() && spheres.front().radius < 0) spheres = spheres.subspan(1);
+    if (points.empty() && spheres.empty()) return {};
+    Balls balls(points, spheres);
+    const DSphere sphere = grow_basis(balls, slack);
+    return {sphere.centre + balls.origin(), sphere.radius};
+}
+
+// A point's distance loses a few units in the last place.
+constexpr double exact_slack = 1e-13;
+// What enclosing_sphere() may exceed the smallest radius by.
+constexpr double sphere_slack = 1e-4;
+
+} // namespace
+
+DSphere smallest_sphere(std::span<const glm::dvec3> points) { return enclose(points, {}, exact_slack); }
+
+DSphere smallest_sphere(glm::dvec3 first, const FunctionRef<glm::dvec3(glm::dvec3)>& farthest) {
+    FarPoints points(first, farthest);
+    const DSphere sphere = grow_basis(points, exact_slack);
+    return {sphere.centre + first, sphere.radius};
+}
+
+DSphere enclosing_sphere(std::span<const glm::dvec3> points, std::span<const DSphere> spheres) {
+    return enclose(points, spheres, sphere_slack);
+}
+
+// ---- several at once
+
+namespace {
+
+constexpr std::size_t lanes = BallLanes::lanes;
+using Lane = BallLanes::Lane;
+using Row = BallLanes::Row;
+using BallRow = BallLanes::BallRow;
+
+// The sets of all lanes. Those that lack a sphere have one that reaches nowhere.
+struct Sets {
+    std::span<const Row> points;
+    std::span<const BallRow> spheres;
+};
+
+// Of each lane, what reaches farthest from somewhere.
+struct FarthestOfLanes {
+    BallRow ball;       // the first point of those that are farthest, or a sphere that reaches farther
+    Lane squared;       // the distance of that point
+    Lane sphere_reach;  // to the farthest far side of a sphere; negative: there is none
+    Lane reach;
+
+    bool sticks_out(std::size_t lane, double radius) const { return squared[lane] > radius * radius || sphere_reach[lane] > radius; }
+};
+
+// A basis of each lane while it has up to three points.
+struct Bases {
+    Row points[3];
+    BallRow sphere;
+    std::array<std::int64_t, lanes> count;  // 0: a single ball
+    std::array<std::int64_t, lanes> growing; // whether something stuck out
+    std::array<std::int64_t, lanes> added;   // and is in the basis now
+
+    Basis basis(std::size_t lane) const {
+        const std::array<glm::dvec3, 3> all = {points[0].at(lane), points[1].at(lane), points[2].at(lane)};
+        return {std::span(all).first(static_cast<std::size_t>(count[lane])), sphere.ball(lane)};
+    }
+};
+
+// `width` lanes at a time: as many as the processor's registers hold (an extension that GCC and Clang share).
+template <std::size_t width>
+struct Kernel {
+    // GCC 12 overlooks such attributes in `using`.
+    typedef double Doubles __attribute__((vector_size(8 * width)));
+    typedef std::int64_t Masks __attribute__((vector_size(8 * width)));
+    static_assert(sizeof(Doubles) == 8 * width && sizeof(Masks) == 8 * width);
+
+    UNSEEN_INLINE static Doubles load(const Lane& from, std::size_t first) {
+        Doubles out;
+        std::memcpy(&out, &from[first], sizeof out);
+        return out;
+    }
+    template <class Vector, class T>
+    UNSEEN_INLINE static void store(Vector v, std::array<T, lanes>& to, std::size_t first) {
+        std::memcpy(&to[first], &v, sizeof v);
+    }
+    UNSEEN_INLINE static Doubles root(Doubles v) {
+#ifdef __SSE2__
+        __m128d pairs[width / 2];
+        std::memcpy(pairs, &v, sizeof v);
+        for (__m128d& pair : pairs) pair = _mm_sqrt_pd(pair);
+        std::memcpy(&v, pairs, sizeof v);
+#else
+        for (std::size_t i = 0; i < width; ++i) v[i] = std::sqrt(v[i]);
+#endif
+        return v;
+    }
+
+    struct Points {
+        Doubles x, y, z;
+
+        UNSEEN_INLINE friend Points operator+(Points a, Points b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+        UNSEEN_INLINE friend Points operator-(Points a, Points b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+        UNSEEN_INLINE friend Points operator*(Points a, Doubles b) { return {a.x * b, a.y * b, a.z * b}; }
+        UNSEEN_INLINE friend Points operator/(Points a, Doubles b) { return {a.x / b, a.y / b, a.z / b}; }
+    };
+    UNSEEN_INLINE static Doubles squared(Points v) { return v.x * v.x + v.y * v.y + v.z * v.z; }
+    UNSEEN_INLINE static Points cross(Points a, Points b) { return {a.y * b.z - b.y * a.z, a.z * b.x - b.z * a.x, a.x * b.y - b.x * a.y}; }
+    UNSEEN_INLINE static Points choose(Masks which, Points a, Points b) { return {which ? a.x : b.x, which ? a.y : b.y, which ? a.z : b.z}; }
+    UNSEEN_INLINE static Points load(const Row& row, std::size_t first) { return {load(row.x, first), load(row.y, first), load(row.z, first)}; }
+    UNSEEN_INLINE static void store(Points v, Row& to, std::size_t first) { store(v.x, to.x, first), store(v.y, to.y, first), store(v.z, to.z, first); }
+
+    // Balls, and how far they reach from somewhere.
+    struct FarBalls {
+        Points centre;
+        Doubles radius, squared, sphere_reach, reach;
+    };
+
+    UNSEEN_INLINE static FarBalls farthest_in(const Sets& sets, Points from, std::size_t first) {
+        FarBalls out{Points{}, Doubles{}, Doubles{} - 1, Doubles{} - 1, Doubles{}};
+        for (const Row& row : sets.points) {
+            const Points p = load(row, first);
+            const Doubles distance = squared(p - from);
+            const Masks farther = distance > out.squared;
+            out.squared = farther ? distance : out.squared;
+            out.centre = choose(farther, p, out.centre);
+        }
+        out.reach = root(out.squared);
+        for (const BallRow& row : sets.spheres) {
+            const Points p = load(row, first);
+            const Doubles radius = load(row.radius, first), reach = root(squared(p - from)) + radius;
+            out.sphere_reach = reach > out.sphere_reach ? reach : out.sphere_reach;
+            const Masks farther = reach > out.reach;
+            out.reach = farther ? reach : out.reach;
+            out.centre = choose(farther, p, out.centre);
+            out.radius = farther ? radius : out.radius;
+        }
+        return out;
+    }
+
+    UNSEEN_INLINE static void store(const FarBalls& far, FarthestOfLanes& out, std::size_t first) {
+        store(far.centre, out.ball, first);
+        store(far.radius, out.ball.radius, first);
+        store(far.squared, out.squared, first);
+        store(far.sphere_reach, out.sphere_reach, first);
+        store(far.reach, out.reach, first);
+    }
+
+    struct PairBases {
+        Points p, q, centre;
+        Doubles radius;
+        Masks is_pair; // else it is a single ball
+    };
+
+    // As Basis(a, b).
+    UNSEEN_INLINE static PairBases pair_up(const FarBalls& a, const FarBalls& b) {
+        const Points apart = b.centre - a.centre;
+        const Doubles distance = root(squared(apart));
+        const Masks is_a = distance + b.radius <= a.radius, is_b = distance + a.radius <= b.radius;
+        const Points direction = apart / (distance > 0 ? distance : Doubles{} + 1);
+        PairBases out;
+        out.p = a.centre - direction * a.radius;
+        out.q = b.centre + direction * b.radius;
+        out.centre = choose(is_a, a.centre, choose(is_b, b.centre, (out.p + out.q) * (Doubles{} + 0.5)));
+        out.radius = is_a ? a.radius : is_b ? b.radius : (distance + a.radius + b.radius) * 0.5;
+        out.is_pair = ~(is_a | is_b);
+        return out;
+    }
+
+    // As Basis::add() of what sticks out by more than a share of the radius.
+    UNSEEN_INLINE static void add_to_pairs(const PairBases& pair, const FarBalls& far, double slack, Bases& bases, std::size_t first) {
+        const Doubles limit = pair.radius * (1 + slack);
+        const Masks grows = (far.squared > limit * limit) | (far.sphere_reach > limit);
+        // The point: of a sphere, the one on the far side.
+        const Points away = far.centre - pair.centre;
+        const Doubles length = root(squared(away));
+        const Points p = far.centre + away / (length > 0 ? length : Doubles{} + 1) * far.radius;
+        // Around it and one of the others, if that has the third in it.
+        const Points a = pair.p - p, b = pair.q - p, half_a = a * (Doubles{} + 0.5), half_b = b * (Doubles{} + 0.5);
+        const Doubles aa = squared(half_a), bb = squared(half_b);
+        const double tight = 1 + 2 * containment_slack;
+        const Masks with_a = squared(pair.q - (p + half_a)) <= aa * tight, with_b = (squared(pair.p - (p + half_b)) <= bb * tight) & ~with_a;
+        // Around all three.
+        const Points normal = cross(a, b);
+        const Doubles length_a = squared(a), length_b = squared(b), flat = squared(normal);
+        const Masks with_both = flat > least_flatness * length_a * length_b;
+        const Points offset = cross(b * length_a - a * length_b, normal) / (2 * (with_both ? flat : Doubles{} + 1));
+
+        const Masks stays_pair = with_a | with_b, added = grows & pair.is_pair & (stays_pair | with_both);
+        const Points centre = p + choose(with_a, half_a, choose(with_b, half_b, offset));
+        const Doubles radius = root(with_a ? aa : with_b ? bb : squared(offset));
+        store(choose(added & with_b, pair.q, pair.p), bases.points[0], first);
+        store(choose(added & stays_pair, p, pair.q), bases.points[1], first);
+        store(p, bases.points[2], first);
+        store(choose(added, centre, pair.centre), bases.sphere, first);
+        store(added ? radius : pair.radius, bases.sphere.radius, first);
+        store((pair.is_pair & 2) | (added & ~stays_pair & 1), bases.count, first);
+        store(grows, bases.growing, first);
+        store(added, bases.added, first);
+    }
+
+    UNSEEN_INLINE static void find_farthest(const Sets& sets, const Row& from, FarthestOfLanes& out) {
+        for (std::size_t first = 0; first < lanes; first += width) store(farthest_in(sets, load(from, first), first), out, first);
+    }
+
+    // What most lanes need, as grow_basis() does it: a pair far apart, and what sticks out farthest from the sphere around it. `far`: from its centre.
+    UNSEEN_INLINE static void begin(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& out) {
+        for (std::size_t first = 0; first < lanes; first += width) {
+            const FarBalls one = farthest_in(sets, Points{}, first);
+            const PairBases pair = pair_up(one, farthest_in(sets, one.centre, first));
+            const FarBalls far = farthest_in(sets, pair.centre, first);
+            add_to_pairs(pair, far, slack, bases, first);
+            store(far, out, first);
+        }
+    }
+};
+
+using FindFarthest = void(const Sets& sets, const Row& from, FarthestOfLanes& out);
+using Begin = void(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far);
+void find_with_any(const Sets& sets, const Row& from, FarthestOfLanes& out) { Kernel<2>::find_farthest(sets, from, out); }
+void begin_with_any(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far) { Kernel<2>::begin(sets, slack, bases, far); }
+
+// Neither has fused operations, so both give the same bits.
+#if defined(__x86_64__) && defined(__GNUC__)
+
+[[gnu::target("avx2")]] void find_with_avx2(const Sets& sets, const Row& from, FarthestOfLanes& out) { Kernel<4>::find_farthest(sets, from, out); }
+[[gnu::target("avx2")]] void begin_with_avx2(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far) { Kernel<4>::begin(sets, slack, bases, far); }
+const bool has_avx2 = __builtin_cpu_supports("avx2");
+FindFarthest* const find = has_avx2 ? find_with_avx2 : find_with_any;
+Begin* const begin_bases = has_avx2 ? begin_with_avx2 : begin_with_any;
+
+#else
+
+FindFarthest* const find = find_with_any;
+Begin* const begin_bases = begin_with_any;
+
+#endif
+
+} // namespace
+
+void BallLanes::fill_up(std::size_t used) {
+    const auto end = static_cast<std::ptrdiff_t>(used);
+    row_count_ = *std::max_element(counts_.begin(), counts_.begin() + end);
+    sphere_count_ = *std::max_element(sphere_counts_.begin(), sphere_counts_.begin() + end);
+    for (std::size_t lane = 0; lane < used; ++lane) {
+        for (std::size_t i = counts_[lane]; i < row_count_; ++i) rows_[i].put(lane, glm::dvec3(0));
+        for (std::size_t i = sphere_counts_[lane]; i < sphere_count_; ++i)
+            spheres_[i].put(lane, glm::dvec3(0), -std::numeric_limits<double>::infinity());
+    }
+}
+
+void BallLanes::enclose(double slack, std::span<Sphere> out) {
+    const std::size_t used = out.size();
+    fill_up(used);
+    const Sets sets{std::span(rows_).first(row_count_), std::span(spheres_).first(sphere_count_)};
+    Bases begun;
+    FarthestOfLanes far;
+    begin_bases(sets, slack, begun, far);
+    Row from = begun.sphere;
+    std::array<Basis, lanes> bases;
+    unsigned growing = 0;
+    for (std::size_t lane = 0; lane < used; ++lane) {
+        if (!begun.growing[lane]) continue;
+        growing |= 1u << lane;
+        bases[lane] = begun.basis(lane);
+        if (begun.added[lane]) continue;
+        bases[lane].add(far.ball.ball(lane));
+        from.put(lane, bases[lane].sphere().centre);
+    }
+    for (int round = 1; growing != 0 && round < most_rounds; ++round) {
+        find(sets, from, far);
+        for (unsigned rest = growing; rest != 0; rest &= rest - 1) {
+            const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
+            Basis& basis = bases[lane];
+            if (far.sticks_out(lane, basis.sphere().radius * (1 + slack))) {
+                basis.add(far.ball.ball(lane));
+                from.put(lane, basis.sphere().centre);
+            } else {
+                growing &= ~(1u << lane);
+            }
+        }
+    }
+
+    for (std::size_t lane = 0; lane < used; ++lane) {
+        out[lane].centre = glm::vec3(from.at(lane) + origins_[lane]);
+        from.put(lane, glm::dvec3(out[lane].centre) - origins_[lane]);
+    }
+    find(sets, from, far);
+    for (std::size_t lane = 0; lane < used; ++lane) out[lane].radius = round_up(far.reach[lane]);
+}
+
+float round_up(double distance) {
+    if (distance == 0) return 0;
+    // Doubles carry distances and sums of the containment test; a few units in their last place cover them.
+    const double needed = distance * (1 + 8 * std::numeric_limits<double>::epsilon());
+    const float out = static_cast<float>(needed);
+    // The next float, if need be; of the largest, infinity.
+    return std::bit_cast<float>(std::bit_cast<std::uint32_t>(out) + (static_cast<double>(out) < needed ? 1u : 0u));
+}
+
+Sphere round_outward(const DSphere& sphere) {
+    if (sphere.radius < 0) return {};
+    Sphere out;
+    out.centre = glm::vec3(sphere.centre);
+    out.radius = round_up(sphere.radius + glm::distance(glm::dvec3(out.centre), sphere.centre));
+    return out;
+}
+
+} // namespace unseen::vdtree

@@ -1,0 +1,504 @@
+// From a mesh and a clustering to a vertex tree: order the nodes, find where triangles vanish, bound every fold.
+#include <vdtree/builder.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <string>
+
+#include <glm/geometric.hpp>
+#include <tbb/blocked_range.h>
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+
+#include "build/bound_facing.h"
+#include "build/bound_spheres.h"
+#include "build/help_cluster.h"
+#include "tree/mask_pool.h"
+#include "build/order_nodes.h"
+#include "build/parallel_array.h"
+#include "build/place_proxies.h"
+#include "build/surface.h"
+#include "tree/texture_bounds.h"
+#include "texture_fit.h"
+#include "tree/vertex_tree_data.h"
+
+namespace unseen::vdtree {
+
+namespace {
+
+// What of the whole build is done when clustering begins and ends.
+constexpr double clustering_begins = 0.1, clustering_ends = 0.7;
+
+// Positions beyond this, relative to the origin, leave no room for spheres around them in floats.
+constexpr double largest_coordinate = std::numeric_limits<float>::max() / 16;
+
+// Tells the caller how far the build is.
+class Reporter {
+public:
+    explicit Reporter(const Progress& progress) : progress_(progress) {}
+    bool cancelled(double share, const char* stage) { return progress_ && !progress_(share, stage); }
+
+private:
+    const Progress& progress_; // of the build's options
+};
+
+// How many threads may work, from its last use until it is destroyed.
+class ThreadLimit {
+public:
+    // 0: no limit.
+    void set(int threads) {
+        control_.reset();
+        if (threads > 0)
+            control_.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+    }
+
+private:
+    std::optional<tbb::global_control> control_;
+};
+
+// Gives memory back that is not needed any more.
+template <class T>
+void release(std::vector<T>& values) {
+    std::vector<T>().swap(values);
+}
+
+Error cancelled_error() { return {ErrorCode::cancelled, "Building the tree was cancelled."}; }
+
+// The input less what cannot be built on: triangles that use a vertex twice, and vertices that no triangle uses
+// (these come back as leaves of a subtree of their own).
+struct CleanMesh {
+    Mesh storage; // used where something had to go, like the next
+    std::vector<Index> source_vertices;  // by clean vertex
+    std::vector<Index> source_triangles; // by clean triangle
+    std::vector<Index> unreferenced;     // source vertices
+    MeshView view;
+    std::uint64_t dropped = 0;
+
+    Index source_vertex(Index v) const { return source_vertices.empty() ? v : source_vertices[v]; }
+    Index source_triangle(Index t) const { return source_triangles.empty() ? t : source_triangles[t]; }
+};
+
+bool uses_a_vertex_twice(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; }
+
+// Whether there is nothing to be cleaned.
+bool is_clean(const MeshView& mesh) {
+    std::vector<std::uint8_t> used(mesh.positions.size(), 0);
+    std::atomic<bool> whole = true;
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 1 << 14), [&](const auto& range) {
+        for (std::size_t t = range.begin(); t < range.end(); ++t) {
+            if (uses_a_vertex_twice(mesh.triangles[t])) whole = false;
+            for (const Index v : mesh.triangles[t]) std::atomic_ref(used[v]).store(1, std::memory_order_relaxed);
+        }
+    });
+    return whole && std::find(used.begin(), used.end(), 0) == used.end();
+}
+
+template <class T>
+std::vector<T> select(std::span<const T> values, std::span<const Index> which) {
+    std::vector<T> out;
+    if (values.empty()) return out;
+    out.reserve(which.size());
+    for (const Index i : which) out.push_back(values[i]);
+    return out;
+}
+
+CleanMesh clean(const MeshView& mesh) {
+    CleanMesh out;
+    if (is_clean(mesh)) {
+        out.view = mesh;
+        return out;
+    }
+    std::vector<std::uint8_t> used(mesh.positions.size(), 0);
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+        if (uses_a_vertex_twice(mesh.triangles[t])) {
+            ++out.dropped;
+            continue;
+        }
+        out.source_triangles.push_back(static_cast<Index>(t));
+        for (const Index v : mesh.triangles[t]) used[v] = 1;
+    }
+    std::vector<Index> clean_number(mesh.positions.size(), 0);
+    for (std::size_t v = 0; v < used.size(); ++v) {
+        clean_number[v] = static_cast<Index>(out.source_vertices.size());
+        (used[v] ? out.source_vertices : out.unreferenced).push_back(static_cast<Index>(v));
+    }
+    Mesh& m = out.storage;
+    m.positions = select(mesh.positions, out.source_vertices);
+    m.normals = select(mesh.normals, out.source_vertices);
+    m.colours = select(mesh.colours, out.source_vertices);
+    m.uvs = select(mesh.uvs, out.source_vertices);
+    for (const Index t : out.source_triangles) {
+        Triangle tri = mesh.triangles[t];
+        for (Index& v : tri) v = clean_number[v];
+        m.triangles.push_back(tri);
+    }
+    out.view = m.view();
+    return out;
+}
+
+// The origin of the tree's float positions. Float coordinates stay exact: where all coordinates of an axis have one sign
+// and the largest is at most twice the smallest, their differences are exact (Sterbenz), else the axis keeps 0.
+// Coordinates of double precision then lose at most half a unit in the last place of a float of the extent's size.
+glm::dvec3 choose_origin(std::span<const glm::dvec3> positions) {
+    glm::dvec3 low = positions[0], high = low, origin(0);
+    for (const glm::dvec3& p : positions) {
+        low = glm::min(low, p);
+        high = glm::max(high, p);
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+        const double a = low[axis], b = high[axis];
+        if (a > 0 && b <= 2 * a) origin[axis] = static_cast<double>(static_cast<float>(a));
+        if (b < 0 && a >= 2 * b) origin[axis] = static_cast<double>(static_cast<float>(b));
+    }
+    return origin;
+}
+
+bool fits_floats(glm::dvec3 p) {
+    return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) <= largest_coordinate &&
+           std::isfinite(p.x + p.y + p.z);
+}
+
+Result<void> check(const Clustering& c, std::size_t vertices) {
+    const auto invalid = [](const std::string& what) { return Error{ErrorCode::invalid_argument, what}; };
+    if (c.parents.size() <= vertices)
+        return invalid("The clustering of " + std::to_string(vertices) + " vertices has only " +
+                       std::to_string(c.parents.size()) + " clusters; it needs the vertices and a root.");
+    if (c.parents.size() >= no_node) return invalid("The clustering has more than 2^32 - 2 clusters.");
+    if (!c.positions.empty() && c.positions.size() != c.parents.size() - vertices)
+        return invalid("The clustering has " + std::to_string(c.positions.size()) + " proxies for " +
+                       std::to_string(c.parents.size() - vertices) + " clusters.");
+    const std::size_t root = c.parents.size() - 1;
+    if (c.parents[root] != root)
+        return invalid("The last cluster, " + std::to_string(root) + ", is the root and has the parent " + std::to_string(c.parents[root]) + "; the root's is its own number.");
+    for (std::size_t i = 0; i < root; ++i) {
+        if (!(c.parents[i] > i && c.parents[i] <= root) || c.parents[i] < vertices)
+            return invalid("Cluster " + std::to_string(i) + " has the parent " + std::to_string(c.parents[i]) +
+                           "; a parent is a cluster with a higher number.");
+    }
+    std::vector<std::uint8_t> has_child(c.parents.size(), 0);
+    for (std::size_t i = 0; i < root; ++i) has_child[c.parents[i]] = 1;
+    for (std::size_t i = vertices; i <= root; ++i)
+        if (!has_child[i]) return invalid("Cluster " + std::to_string(i) + " has no children.");
+    for (std::size_t i = 0; i < c.positions.size(); ++i)
+        if (!fits_floats(c.positions[i]))
+            return invalid("The proxy of cluster " + std::to_string(vertices + i) + " is not finite or too far away.");
+    return {};
+}
+
+Result<void> check(const Light& light) {
+    const float length = glm::length(light.direction);
+    constexpr float unit_slack = 1e-3f; // directions given with three digits
+    if (!(std::abs(length - 1) <= unit_slack) || !(light.ambient >= 0 && light.ambient <= 1))
+        return Error{ErrorCode::invalid_argument,
+                     "The light needs a direction of length 1 and an ambient share from 0 to 1."};
+    return {};
+}
+
+// What validate() lets pass, but the tree's floats do not.
+Result<void> check_attributes(const MeshView& mesh) {
+    const auto invalid = [](const char* what, std::size_t vertex) {
+        return Error{ErrorCode::malformed_data, std::string(what) + " of vertex " + std::to_string(vertex) + "."};
+    };
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v)
+        if (!fits_floats(mesh.positions[v])) return invalid("The position is too far away for floats:", v);
+    for (std::size_t v = 0; v < mesh.colours.size(); ++v) {
+        const glm::vec4 c = mesh.colours[v];
+        if (!std::isfinite(c.r) || !std::isfinite(c.g) || !std::isfinite(c.b) || !std::isfinite(c.a))
+            return invalid("A value is not finite in the colour", v);
+    }
+    for (std::size_t v = 0; v < mesh.uvs.size(); ++v)
+        if (!std::isfinite(mesh.uvs[v].x) || !std::isfinite(mesh.uvs[v].y))
+            return invalid("A value is not finite in the texture coordinates", v);
+    if (mesh.texture.empty()) return {};
+    for (std::size_t v = 0; v < mesh.colours.size(); ++v) // what textures are multiplied with
+        for (int k = 0; k < 3; ++k)
+            if (!(mesh.colours[v][k] >= 0 && mesh.colours[v][k] <= 1)) return invalid("A mesh with a texture needs colours from 0 to 1; correct that", v);
+    return {};
+}
+
+// Moves what was measured to the tree's arrays.
+class TreeBuilder {
+public:
+    TreeBuilder(const MeshView& source, const CleanMesh& mesh, const BuildOptions& options, Reporter& reporter,
+                ThreadLimit& limit)
+        : source_(source), mesh_(mesh.view), clean_(mesh), options_(options), reporter_(reporter), limit_(limit) {}
+
+    Result<VertexTree> build(const Clusterer& clusterer);
+    Result<void> help();
+
+private:
+    Result<void> analyse();
+    std::vector<float> find_luminance() const;
+    Result<Clustering> cluster(const Clusterer& clusterer);
+    void order(const Clustering& clustering);
+    void place_vertices(const Clustering& clustering);
+    void bound();
+    LeafPlaces find_places() const;
+    bool is_textured() const { return !source_.texture.empty(); }
+    void lay_texture();
+    std::vector<std::uint8_t> find_translucent(std::span<const Triangle> triangles) const;
+
+    const MeshView& source_;
+    const MeshView& mesh_;
+    const CleanMesh& clean_;
+    const BuildOptions& options_;
+    Reporter& reporter_;
+    ThreadLimit& limit_;
+
+    bool prelit_ = false;
+    std::vector<Index> coincident_;
+    Surface surface_;
+    NodeOrder nodes_;
+    std::optional<TreeParts> parts_;
+    std::shared_ptr<TreeGeometry> g_ = std::make_shared<TreeGeometry>();
+};
+
+Result<VertexTree> TreeBuilder::build(const Clusterer& clusterer) {
+    if (reporter_.cancelled(0.0, "analysing")) return cancelled_error();
+    if (const auto analysed = analyse(); !analysed) return analysed.error();
+    if (reporter_.cancelled(clustering_begins, "clustering")) return cancelled_error();
+    {
+        const Result<Clustering> clustering = cluster(clusterer);
+        if (!clustering) return clustering.error();
+        if (options_.team) limit_.set(options_.threads_alone);
+        if (reporter_.cancelled(clustering_ends, "ordering")) return cancelled_error();
+        order(*clustering);
+        place_vertices(*clustering);
+        release(surface_.areas); // bounding is what takes most memory
+        release(surface_.normals);
+    }
+    if (reporter_.cancelled(0.8, "bounding")) return cancelled_error();
+    bound();
+    if (is_textured()) lay_texture();
+
+    g_->closedness = surface_.closedness;
+    g_->dropped_triangles = clean_.dropped + options_.dropped_before;
+    g_->ranges.assign(source_.ranges.begin(), source_.ranges.end());
+    auto data = std::make_shared<VertexTree::Data>();
+    data->light = derive_luminance(*g_, *parts_, options_.light, prelit_, is_textured());
+    data->geometry = std::move(g_);
+    if (reporter_.cancelled(1.0, "done")) return cancelled_error();
+    return VertexTree(std::move(data));
+}
+
+Result<void> TreeBuilder::help() {
+    if (const auto analysed = analyse(); !analysed) return analysed.error();
+    const std::vector<float> luminance = find_luminance();
+    return help_cluster_quadric({mesh_, luminance, surface_.normals, surface_.areas, coincident_}, *options_.team);
+}
+
+Result<void> TreeBuilder::analyse() {
+    prelit_ = !mesh_.colours.empty() || is_textured();
+    coincident_ = find_coincident(mesh_.positions);
+    if (!options_.team || options_.clusterer != ClustererKind::quadric) { // only quadrics are helped with
+        surface_ = analyse_surface(mesh_, coincident_);
+        return {};
+    }
+    auto together = analyse_surface(mesh_, coincident_, *options_.team);
+    if (!together) return together.error();
+    surface_ = std::move(*together);
+    return {};
+}
+
+std::vector<float> TreeBuilder::find_luminance() const {
+    std::vector<float> luminance(mesh_.positions.size());
+    tbb::parallel_for(std::size_t{0}, luminance.size(), [&](std::size_t v) {
+        luminance[v] = vertex_luminance(surface_.normals[v], mesh_.colours.empty() ? nullptr : &mesh_.colours[v], options_.light, prelit_,
+                                        is_textured());
+    });
+    return luminance;
+}
+
+Result<Clustering> TreeBuilder::cluster(const Clusterer& clusterer) {
+    const std::vector<float> luminance = find_luminance();
+    Result<Clustering> clustering = clusterer({mesh_, luminance, surface_.normals, surface_.areas, coincident_});
+    if (clustering)
+        if (const auto valid = check(*clustering, mesh_.positions.size()); !valid) return valid.error();
+    return clustering;
+}
+
+void TreeBuilder::order(const Clustering& clustering) {
+    const Index vertices = static_cast<Index>(mesh_.positions.size());
+    nodes_ = order_nodes(clustering, vertices, static_cast<Index>(clean_.unreferenced.size()));
+    std::vector<Index> source_vertices(nodes_.leaf_of_vertex.size());
+    tbb::parallel_for(Index{0}, static_cast<Index>(source_vertices.size()), [&](Index v) {
+        source_vertices[nodes_.leaf_of_vertex[v]] = v < vertices ? clean_.source_vertex(v) : clean_.unreferenced[v - vertices];
+    });
+    g_->source_vertices = std::move(source_vertices);
+    parts_.emplace(nodes_.shape.links());
+}
+
+void TreeBuilder::place_vertices(const Clustering& clustering) {
+    const Index vertices = static_cast<Index>(mesh_.positions.size());
+    g_->origin = choose_origin(source_.positions);
+    // By leaf: weights, and normals of the leaves.
+    ParallelArray<double> weights(nodes_.shape.leaves());
+    ParallelArray<glm::vec3> normals(nodes_.shape.leaves());
+    tbb::parallel_for(Index{0}, vertices, [&](Index v) {
+        weights[nodes_.leaf_of_vertex[v]] = surface_.areas[v];
+        normals[nodes_.leaf_of_vertex[v]] = surface_.normals[v];
+    });
+    const TreeParts& parts = *parts_;
+    ProxyVertices proxies =
+        place_proxies(nodes_.shape, parts, {source_, g_->source_vertices, weights, normals, g_->origin});
+    tbb::parallel_for(std::size_t{0}, clustering.positions.size(), [&](std::size_t i) {
+        const NodeId node = nodes_.node_of_cluster[i];
+        if (node != no_node) proxies.positions[node] = glm::vec3(clustering.positions[i] - g_->origin);
+    });
+    keep_coincident_proxies(nodes_.shape, parts, proxies.positions);
+    if (is_textured()) keep_equal_uvs(nodes_.shape, parts, proxies.uvs);
+    g_->positions = std::move(proxies.positions);
+    g_->normals = std::move(proxies.normals);
+    g_->colours = std::move(proxies.colours);
+    g_->uvs = std::move(proxies.uvs);
+}
+
+void TreeBuilder::lay_texture() {
+    const TextureView& texture = source_.texture;
+    g_->texture = std::vector<TextureFacts>{{texture.width, texture.height, texture.wrap_u, texture.wrap_v}};
+    g_->texels = std::vector<Texel>(texture.texels.begin(), texture.texels.end());
+    std::vector<glm::vec2> uvs = TextureFits(*g_, *parts_).fitted_uvs(bound_footprints(*g_, *parts_));
+    g_->uvs = std::move(uvs);
+    g_->ring_texture = bound_ring_texture(*g_, *parts_);
+}
+
+LeafPlaces TreeBuilder::find_places() const {
+    const std::size_t leaves = nodes_.shape.leaves();
+    LeafPlaces places;
+    places.weld.resize(leaves);
+    std::iota(places.weld.begin(), places.weld.end(), Index{0});
+    places.irregular.assign(leaves, 0);
+    places.alone.assign(leaves, 1);
+    tbb::parallel_for(std::size_t{0}, mesh_.positions.size(), [&](std::size_t v) {
+        const Index leaf = nodes_.leaf_of_vertex[v], place = nodes_.leaf_of_vertex[coincident_[v]];
+        places.weld[leaf] = place;
+        places.irregular[leaf] = surface_.irregular[v];
+        if (leaf == place) return;
+        places.alone[leaf] = 0;
+        std::atomic_ref(places.alone[place]).store(0, std::memory_order_relaxed);
+    });
+    return places;
+}
+
+// By interior node: whether a corner of its ring has an alpha below 1. Empty where none has.
+std::vector<std::uint8_t> TreeBuilder::find_translucent(std::span<const Triangle> triangles) const {
+    const TreeShape& shape = nodes_.shape;
+    const auto shows_through = [&](Index leaf) { return !(g_->colours[shape.node_of_leaf(leaf)].a >= 1); };
+    const Index leaves = g_->colours.empty() ? 0 : shape.leaves();
+    bool any = false;
+    for (Index leaf = 0; leaf < leaves && !any; ++leaf) any = shows_through(leaf);
+    if (!any) return {};
+    std::vector<std::uint8_t> translucent(shape.interior(), 0);
+    for (const Triangle& t : triangles)
+        if (std::any_of(t.begin(), t.end(), shows_through))
+            for (const Index leaf : t) translucent[shape.parents[shape.node_of_leaf(leaf)]] = 1;
+    for (NodeId node = shape.interior(); node-- > 1;) translucent[shape.parents[node]] |= translucent[node];
+    return translucent;
+}
+
+void TreeBuilder::bound() {
+    TreeShape& shape = nodes_.shape;
+    const Ancestors ancestors(shape);
+    TriangleOrder triangles = order_triangles(mesh_.triangles, nodes_, ancestors);
+    if (!source_.ranges.empty()) {
+        for (Index& t : triangles.sources) t = clean_.source_triangle(t);
+        g_->source_triangles = std::move(triangles.sources);
+    }
+    release(triangles.sources);
+    const LeafPlaces places = find_places();
+    release(coincident_);
+    release(surface_.irregular);
+    release(nodes_.leaf_of_vertex);
+    release(nodes_.node_of_cluster);
+    TreeParts& parts = *parts_;
+    parts.assign_triangles(triangles.first_triangle, triangles.triangles);
+    const LeafRings rings = find_rings(triangles.triangles, places, parts);
+    const BoundInput input{shape, parts, rings, g_->positions};
+
+    NodeSpheres spheres = bound_spheres(input);
+    g_->bounding_sphere = bound_corners(input, spheres.support);
+    g_->displacement = bound_displacements(input, spheres.support);
+    const ParallelArray<Directions> facing = bound_facing(input, triangles.triangles, places, spheres.support, ancestors);
+    g_->support_spheres = std::move(spheres.support);
+    const std::vector<std::uint8_t> is_translucent = find_translucent(triangles.triangles);
+    std::vector<NodeBounds> bounds(shape.interior());
+    tbb::parallel_for(NodeId{0}, shape.interior(), [&](NodeId node) {
+        const int irregular = facing[node].marked() ? irregular_ring : 0;
+        const int translucent = is_translucent.empty() || !is_translucent[node] ? 0 : translucent_ring;
+        bounds[node] = {spheres.ring[node], facing[node].slabs(), static_cast<std::uint8_t>(irregular | translucent), 0};
+    });
+    PooledMasks masks = pool_masks(facing, shape.parents);
+    g_->bounds = std::move(bounds);
+    g_->mask_at = std::move(masks.at);
+    g_->mask_records = std::move(masks.records);
+    g_->parents = std::move(shape.parents);
+    g_->first_leaf = std::move(shape.first_leaf);
+    g_->leaf_end = std::move(shape.leaf_end);
+    g_->subtree_end = std::move(shape.subtree_end);
+    g_->first_triangle = std::move(triangles.first_triangle);
+    g_->triangles = std::move(triangles.triangles);
+}
+
+// Hands the mesh without what cannot be built on to `work`.
+template <class Value, class Work>
+Result<Value> with_builder(const MeshView& mesh, const BuildOptions& options, Work&& work) {
+    if (const auto valid = check_buildable(mesh, options); !valid) return valid.error();
+    ThreadLimit limit;
+    limit.set(options.threads);
+    const CleanMesh cleaned = clean(mesh);
+    if (cleaned.view.triangles.empty())
+        return Error{ErrorCode::malformed_data, "The mesh has no triangle with three different vertices."};
+    Reporter reporter(options.progress);
+    TreeBuilder builder(mesh, cleaned, options, reporter, limit);
+    return work(builder);
+}
+
+Result<VertexTree> build_with(const MeshView& mesh, const Clusterer& clusterer, const BuildOptions& options) {
+    return with_builder<VertexTree>(mesh, options, [&](TreeBuilder& builder) { return builder.build(clusterer); });
+}
+
+} // namespace
+
+std::string_view name(ClustererKind kind) { return kind == ClustererKind::quadric ? "quadric" : "octree"; }
+
+Result<void> check_buildable(const MeshView& mesh, const BuildOptions& options) {
+    if (const auto valid = validate(mesh); !valid) return valid.error();
+    if (const auto valid = check_attributes(mesh); !valid) return valid.error();
+    if (const auto valid = check(options.light); !valid) return valid.error();
+    if (options.threads < 0 || options.threads_alone < 0)
+        return Error{ErrorCode::invalid_argument, "The number of threads must be 0 or more."};
+    return {};
+}
+
+Result<VertexTree> build_tree(const MeshView& mesh, const Clusterer& clusterer, const BuildOptions& options) {
+    if (options.team)
+        return Error{ErrorCode::invalid_argument, "A team helps with quadric clustering only: leave it out where the clustering is your own."};
+    return build_with(mesh, clusterer, options);
+}
+
+Result<void> help_build_tree(const MeshView& mesh, const BuildOptions& options) {
+    if (!options.team || options.team->rank() < 1)
+        return Error{ErrorCode::invalid_argument, "Only members of a team other than its first help to build a tree."};
+    if (options.clusterer != ClustererKind::quadric) return check_buildable(mesh, options);
+    return with_builder<void>(mesh, options, [](TreeBuilder& builder) { return builder.help(); });
+}
+
+Result<VertexTree> build_tree(const MeshView& mesh, const BuildOptions& options) {
+    const auto report = [&](double share, const char* stage) {
+        return options.progress(clustering_begins + share * (clustering_ends - clustering_begins), stage);
+    };
+    const Progress progress = options.progress ? Progress(report) : Progress();
+    return build_with(
+        mesh,
+        [&](const ClusterInput& input) {
+            return options.clusterer == ClustererKind::octree ? cluster_octree(input, progress)
+                                                              : cluster_quadric(input, progress, options.team);
+        },
+        options);
+}
+
+} // namespace unseen::vdtree

@@ -1,0 +1,688 @@
+// Pair contraction by quadric error over position, luminance and the mesh's own attributes (Garland and Heckbert 1997, 1998).
+//
+// The welded vertices are parted by a kd-tree, each part is contracted by itself to a small share of its vertices, and the
+// parts are joined up the kd-tree while contraction goes on (see quadric_contraction.h). The parts depend on the mesh alone, so the
+// result does not depend on threads. Within a part, contraction runs in rounds: each cluster chooses its best partner, and
+// pairs that choose each other are contracted. That is nearest-neighbour agglomeration: the hierarchy differs little from
+// strictly greedy order, but the work is linear a round, cache-friendly, and the tree is balanced.
+#include <vdtree/builder.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <numeric>
+#include <span>
+#include <utility>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+
+#include "build/help_cluster.h"
+#include "tree/message.h"
+#include "build/progress_counter.h"
+#include "build/quadric.h"
+#include "build/quadric_contraction.h"
+#include "build/spatial_order.h"
+
+namespace unseen::vdtree {
+
+namespace {
+
+// A part has at most so many welded vertices. Its quadrics then fit a core's cache.
+constexpr Index largest_part = 1 << 15;
+// Parts, and joined parts, are contracted to at most so many clusters: one in 32 of a full part. Few enough that joining costs
+// next to nothing, many enough that those along the border of the part, which had fewer partners to choose from, are a small share.
+constexpr Index part_target = largest_part / 32;
+
+// One unit of relative luminance counts as this share of the model's extent. From 0.01 to 0.2, the triangles that the perceptual
+// fold test leaves of bunny and dragon differ by 0.5%; but with 0.2 the surface strays 1.3 to 1.7 times as far for its triangles,
+// for on a bumpy surface luminance then drowns the shape.
+constexpr double luminance_scale = 0.01;
+// A normal that turns by one radian, and a colour that goes from 0 to 1, count as these shares of the extent. Less than
+// luminance, which is what is seen of both in most lights.
+constexpr double normal_scale = 0.0025;
+constexpr double colour_scale = 0.005;
+// A texture that slides by a length on the surface counts as this share of the length: what one sees of it depends on the
+// texture, and most of a displacement is seen whatever it is.
+constexpr double texture_scale = 0.1;
+// Attributes count as if they were within this many extents, so that stray values stay finite when squared.
+constexpr double largest_value = 1e3;
+
+// ---- numbering of the welded vertices by space
+
+// Where part i of so many begins.
+Index part_begin(std::size_t part, std::size_t parts, std::size_t slots) {
+    return static_cast<Index>(static_cast<std::uint64_t>(part) * slots / parts);
+}
+
+// Welded vertices ("slots") in an order in which every part is a range, and the mesh's vertices in the order of their slots.
+struct SpatialNumbering {
+    std::size_t parts = 1;             // a power of two
+    std::vector<Index> vertex_of_slot; // the first of its vertices
+    std::vector<Index> first_member;   // by slot, one longer: into `members`
+    std::vector<Index> members;        // vertices, by slot
+    std::vector<Index> place;          // by vertex: where it is in `members`
+};
+
+class KdPartition {
+public:
+    KdPartition(std::span<const glm::dvec3> positions, std::span<Index> slots, std::size_t parts)
+        : slots_(slots), items_(slots.size()), other_items_(slots.size()), parts_(parts) {
+        tbb::parallel_for(std::size_t{0}, slots.size(), [&](std::size_t i) { items_[i] = {positions[slots[i]], slots[i]}; });
+    }
+
+    // Puts the slots of parts `first` .. `end` - 1 in order; the others may be anywhere.
+    void run(std::size_t first, std::size_t end) {
+        wanted_first_ = first;
+        wanted_end_ = end;
+        split(0, parts_, items_, other_items_);
+    }
+
+private:
+    // Positions go with the slots, so that nothing is looked up.
+    struct Item {
+        glm::dvec3 at;
+        Index slot;
+    };
+    struct Box {
+        glm::dvec3 low, size;
+        double extent() const { return std::max({size.x, size.y, size.z}); }
+    };
+    static Box box(std::span<const Item> items) {
+        glm::dvec3 low = items[0].at, high = low;
+        for (const Item& item : items) {
+            low = glm::min(low, item.at);
+            high = glm::max(high, item.at);
+        }
+        return {low, high - low};
+    }
+
+    // Halves along the longest side of the bounding box, until there is one part; ties by vertex number. The items are in one of the two
+    // arrays.
+    void split(std::size_t first_part, std::size_t parts, std::vector<Item>& from, std::vector<Item>& to) {
+        if (first_part >= wanted_end_ || first_part + parts <= wanted_first_) return;
+        const auto begin_of = [&](std::size_t part) { return part_begin(part, parts_, slots_.size()); };
+        const Index begin = begin_of(first_part), middle = begin_of(first_part + parts / 2), end = begin_of(first_part + parts);
+        const std::span<Item> items = std::span(from).subspan(begin, end - begin);
+        if (parts == 1) return sort_along_curve(items, slots_.subspan(begin, end - begin));
+        halve(items, std::span(to).subspan(begin, end - begin), middle - begin);
+        tbb::parallel_invoke([&] { split(first_part, parts / 2, to, from); },
+                             [&] { split(first_part + parts / 2, parts / 2, to, from); });
+    }
+
+    // The `left` lowest items first. They are dealt into slices; only one of these has items of both halves, which are compared.
+    static void halve(std::span<const Item> from, std::span<Item> to, std::size_t left) {
+        constexpr std::size_t slices = 2048;
+        const Box bounds = box(from);
+        const glm::dvec3 size = bounds.size;
+        const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+        const double low = bounds.low[axis], slices_per_length = slices / size[axis];
+        const double scale = std::isfinite(slices_per_length) ? slices_per_length : 0;
+        const auto offset = [&](const Item& item) { return item.at[axis] - low; };
+        const auto slice_of = [&](const Item& item) { return std::min(slices - 1, static_cast<std::size_t>(offset(item) * scale)); };
+        std::array<Index, slices> counts{};
+        for (const Item& item : from) ++counts[slice_of(item)];
+        std::size_t below = 0, mixed = 0;
+        while (below + counts[mixed] <= left) below += counts[mixed++];
+        // Where the next item below that slice goes, in it, and above it.
+        std::array<std::size_t, 3> next = {0, below, below + counts[mixed]};
+        for (const Item& item : from) {
+            const std::size_t slice = slice_of(item);
+            to[next[static_cast<std::size_t>(slice >= mixed) + static_cast<std::size_t>(slice > mixed)]++] = item;
+        }
+        const auto of_slice = to.subspan(below, counts[mixed]);
+        std::nth_element(of_slice.begin(), of_slice.begin() + static_cast<std::ptrdiff_t>(left - below), of_slice.end(),
+                         [&](const Item& a, const Item& b) { return offset(a) != offset(b) ? offset(a) < offset(b) : a.slot < b.slot; });
+    }
+
+    // Equal codes by vertex number.
+    static void sort_along_curve(std::span<const Item> items, std::span<Index> slots) {
+        const Box bounds = box(items);
+        const MortonGrid grid(bounds.low, bounds.extent());
+        std::vector<CodedIndex> keys(items.size()), scratch(items.size());
+        for (std::size_t i = 0; i < items.size(); ++i) keys[i] = {grid.code(items[i].at), items[i].slot};
+        sort_by_code(keys, scratch);
+        for (auto run = keys.begin(); run != keys.end();) {
+            const auto end = std::find_if(run, keys.end(), [&](const CodedIndex& key) { return key.code != run->code; });
+            std::sort(run, end, [](const CodedIndex& a, const CodedIndex& b) { return a.index < b.index; });
+            run = end;
+        }
+        for (std::size_t i = 0; i < keys.size(); ++i) slots[i] = keys[i].index;
+    }
+
+    std::span<Index> slots_;
+    std::vector<Item> items_, other_items_;
+    std::size_t parts_, wanted_first_ = 0, wanted_end_ = 0;
+};
+
+// Which member of a team works on which parts: each on a run of them.
+struct Members {
+    Team* team = nullptr; // none: the only member
+    std::size_t parts = 1;
+
+    std::size_t count() const { return team ? std::min<std::size_t>(static_cast<std::size_t>(team->size()), parts) : 1; }
+    std::size_t rank() const { return team ? static_cast<std::size_t>(team->rank()) : 0; }
+    bool has_part() const { return rank() < count(); } // there may be more members than parts
+    std::size_t first_part(std::size_t member) const { return member * parts / count(); }
+    // Of node `i` of the level of so many of the kd-tree: the member that has its first part.
+    std::size_t owner(std::size_t i, std::size_t level) const { return ((i * (parts / level) + 1) * count() - 1) / parts; }
+};
+
+Error strange_message() {
+    return {ErrorCode::malformed_data,
+            "A process of the team sent something else than its part: all must run the same program on the same mesh."};
+}
+
+// Each member has put its own slots in order: all get those of all, by way of member 0.
+Result<void> share_slots(std::vector<Index>& slots, const Members& members) {
+    const auto own_slots = [&](std::size_t member) {
+        const Index begin = part_begin(members.first_part(member), members.parts, slots.size());
+        return std::span(slots).subspan(begin, part_begin(members.first_part(member + 1), members.parts, slots.size()) - begin);
+    };
+    const auto receive = [&](std::size_t member, std::span<Index> to) {
+        const std::vector<std::byte> bytes = members.team->receive(static_cast<int>(member));
+        if (bytes.size() != to.size_bytes()) return false;
+        std::memcpy(to.data(), bytes.data(), bytes.size());
+        return true;
+    };
+    if (members.rank() != 0) {
+        members.team->send(0, std::as_bytes(own_slots(members.rank())));
+        if (!receive(0, slots)) return strange_message();
+        return {};
+    }
+    for (std::size_t member = 1; member < members.count(); ++member)
+        if (!receive(member, own_slots(member))) return strange_message();
+    for (std::size_t member = 1; member < members.count(); ++member)
+        members.team->send(static_cast<int>(member), std::as_bytes(std::span(slots)));
+    return {};
+}
+
+// How many parts: a power of two.
+std::size_t part_count(std::size_t slots) {
+    std::size_t parts = 1;
+    while (parts * largest_part < slots) parts *= 2;
+    return parts;
+}
+
+std::size_t slot_count(std::span<const Index> coincident) {
+    std::size_t slots = 0;
+    for (std::size_t v = 0; v < coincident.size(); ++v) slots += coincident[v] == v;
+    return slots;
+}
+
+Result<SpatialNumbering> number_by_space(std::span<const glm::dvec3> positions, std::span<const Index> coincident,
+                                         const Members& members) {
+    SpatialNumbering n;
+    n.parts = members.parts;
+    const Index vertices = static_cast<Index>(positions.size());
+    for (Index v = 0; v < vertices; ++v)
+        if (coincident[v] == v) n.vertex_of_slot.push_back(v);
+    const std::size_t slots = n.vertex_of_slot.size();
+    KdPartition(positions, n.vertex_of_slot, n.parts).run(members.first_part(members.rank()), members.first_part(members.rank() + 1));
+    if (members.count() > 1)
+        if (const auto shared = share_slots(n.vertex_of_slot, members); !shared) return shared.error();
+
+    n.first_member.assign(slots + 1, 0);
+    n.place.resize(vertices);
+    for (Index s = 0; s < slots; ++s) n.place[n.vertex_of_slot[s]] = s; // for now
+    if (slots == vertices) { // nothing coincides
+        n.members = n.vertex_of_slot;
+        std::iota(n.first_member.begin(), n.first_member.end(), Index{0});
+        return n;
+    }
+    for (Index v = 0; v < vertices; ++v) ++n.first_member[n.place[coincident[v]] + 1];
+    std::partial_sum(n.first_member.begin(), n.first_member.end(), n.first_member.begin());
+    n.members.resize(vertices);
+    std::vector<Index> next(n.first_member.begin(), n.first_member.end() - 1);
+    for (Index v = 0; v < vertices; ++v) n.members[next[n.place[coincident[v]]]++] = v;
+    for (Index i = 0; i < vertices; ++i) n.place[n.members[i]] = i;
+    return n;
+}
+
+// ---- what the parts are made from
+
+class PartMaker {
+public:
+    PartMaker(const ClusterInput& input, const SpatialNumbering& numbering) : input_(input), numbering_(numbering) {
+        measure();
+        list_triangles();
+    }
+
+    PartMesh make(std::size_t part) const;
+    glm::dvec3 from_unit_box(glm::dvec3 p) const { return p / scale_ + centre_; }
+    float length_from_unit_box(float length) const { return static_cast<float>(length / scale_); }
+
+private:
+    void measure();
+    double texture_density() const;
+    void list_triangles();
+    void push_channels(Index vertex, std::vector<float>& to) const;
+
+    std::size_t slots() const { return numbering_.vertex_of_slot.size(); }
+    Index first_place(std::size_t part) const {
+        return numbering_.first_member[part_begin(part, numbering_.parts, slots())];
+    }
+
+    const ClusterInput& input_;
+    const SpatialNumbering& numbering_;
+    glm::dvec3 centre_{0};
+    double scale_ = 1;      // mesh units to the unit box
+    double area_scale_ = 1; // areas in the unit box to shares of the largest
+    double texture_unit_ = 0;
+    bool has_normals_ = false;
+    std::vector<std::size_t> first_triangle_; // by part, one longer
+    std::vector<Index> triangles_;            // those that touch a vertex of the part, by part
+};
+
+void PartMaker::measure() {
+    glm::dvec3 low = input_.mesh.positions[0], high = low;
+    for (const glm::dvec3& p : input_.mesh.positions) {
+        low = glm::min(low, p);
+        high = glm::max(high, p);
+    }
+    const glm::dvec3 size = high - low;
+    const double extent = std::max({size.x, size.y, size.z});
+    centre_ = low + size * 0.5;
+    scale_ = extent > 0 && std::isfinite(1 / extent) ? 1 / extent : 1;
+    double largest = 0;
+    for (const double a : input_.areas) largest = std::max(largest, a);
+    largest *= scale_ * scale_;
+    area_scale_ = largest > 0 && std::isfinite(1 / largest) ? 1 / largest : 1;
+    has_normals_ = !input_.mesh.normals.empty();
+    texture_unit_ = texture_density() * texture_scale;
+}
+
+// The length in the unit box that one unit of texture coordinates covers, on average; 0 without any.
+double PartMaker::texture_density() const {
+    if (input_.mesh.uvs.empty()) return 0;
+    double surface = 0, texture = 0;
+    for (const Triangle& t : input_.mesh.triangles) {
+        const auto p = [&](std::size_t k) { return input_.mesh.positions[t[k]] * scale_; };
+        const auto uv = [&](std::size_t k) { return glm::dvec2(input_.mesh.uvs[t[k]]); };
+        surface += glm::length(glm::cross(p(1) - p(0), p(2) - p(0)));
+        const glm::dvec2 e = uv(1) - uv(0), f = uv(2) - uv(0);
+        texture += std::abs(e.x * f.y - e.y * f.x);
+    }
+    const double density = std::sqrt(surface / texture);
+    return density > 0 && std::isfinite(density) ? density : 0;
+}
+
+void PartMaker::list_triangles() {
+    const std::size_t count = input_.mesh.triangles.size(), parts = numbering_.parts;
+    first_triangle_.assign(parts + 1, 0);
+    if (parts == 1) {
+        first_triangle_[1] = count;
+        triangles_.resize(count);
+        std::iota(triangles_.begin(), triangles_.end(), Index{0});
+        return;
+    }
+    std::vector<Index> part_of(input_.mesh.positions.size());
+    tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t part) {
+        for (Index i = first_place(part); i < first_place(part + 1); ++i) part_of[numbering_.members[i]] = static_cast<Index>(part);
+    });
+    // Chunk by chunk, so that each thread knows where its triangles go and their order is the mesh's.
+    constexpr std::size_t chunk_size = 1 << 16;
+    const std::size_t chunks = (count + chunk_size - 1) / chunk_size;
+    std::vector<std::size_t> next(chunks * parts, 0);
+    const auto for_each_use = [&](std::size_t chunk, auto&& f) {
+        for (std::size_t t = chunk * chunk_size; t < std::min(count, (chunk + 1) * chunk_size); ++t) {
+            const Triangle& tri = input_.mesh.triangles[t];
+            const Index a = part_of[tri[0]], b = part_of[tri[1]], c = part_of[tri[2]];
+            f(t, a);
+            if (b != a) f(t, b);
+            if (c != a && c != b) f(t, c);
+        }
+    };
+    tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
+        for_each_use(chunk, [&](std::size_t, Index part) { ++next[chunk * parts + part]; });
+    });
+    std::size_t sum = 0;
+    for (std::size_t part = 0; part < parts; ++part) {
+        first_triangle_[part] = sum;
+        for (std::size_t chunk = 0; chunk < chunks; ++chunk) {
+            const std::size_t uses = next[chunk * parts + part];
+            next[chunk * parts + part] = sum;
+            sum += uses;
+        }
+    }
+    first_triangle_[parts] = sum;
+    triangles_.resize(sum);
+    tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
+        for_each_use(chunk, [&](std::size_t t, Index part) {
+            triangles_[next[chunk * parts + part]++] = static_cast<Index>(t);
+        });
+    });
+}
+
+void PartMaker::push_channels(Index v, std::vector<float>& to) const {
+    const auto push = [&](double value) {
+        to.push_back(static_cast<float>(std::clamp(value, -largest_value, largest_value)));
+    };
+    push(input_.luminance[v] * luminance_scale);
+    if (has_normals_)
+        for (int k = 0; k < 3; ++k) push(input_.normals[v][k] * normal_scale);
+    if (texture_unit_ > 0)
+        for (int k = 0; k < 2; ++k) push(input_.mesh.uvs[v][k] * texture_unit_);
+    if (!input_.mesh.colours.empty())
+        for (int k = 0; k < 3; ++k) push(input_.mesh.colours[v][k] * colour_scale);
+}
+
+PartMesh PartMaker::make(std::size_t part) const {
+    PartMesh out;
+    const Index first_slot = part_begin(part, numbering_.parts, slots()), end_slot = part_begin(part + 1, numbering_.parts, slots());
+    const Index first = numbering_.first_member[first_slot], end = numbering_.first_member[end_slot];
+    const auto is_own = [&](Index place) { return place >= first && place < end; };
+    const auto triangles = std::span(triangles_).subspan(first_triangle_[part], first_triangle_[part + 1] - first_triangle_[part]);
+
+    std::vector<Index> ghosts; // places of other parts' vertices, by slot
+    for (const Index t : triangles)
+        for (const Index v : input_.mesh.triangles[t])
+            if (!is_own(numbering_.place[v])) ghosts.push_back(numbering_.place[v]);
+    std::sort(ghosts.begin(), ghosts.end());
+    ghosts.erase(std::unique(ghosts.begin(), ghosts.end()), ghosts.end());
+
+    out.first_slot = first_slot;
+    out.own_slots = end_slot - first_slot;
+    out.area_scale = area_scale_;
+    out.channels = 1 + (has_normals_ ? 3 : 0) + (texture_unit_ > 0 ? 2 : 0) + (input_.mesh.colours.empty() ? 0 : 3);
+    const std::size_t vertices = end - first + ghosts.size();
+    out.channel_values.reserve(vertices * out.channels);
+    out.slot_of_vertex.reserve(vertices);
+    out.positions.reserve(out.own_slots + ghosts.size());
+    const auto push_position = [&](Index slot) {
+        out.positions.push_back((input_.mesh.positions[numbering_.vertex_of_slot[slot]] - centre_) * scale_);
+    };
+    for (Index s = first_slot; s < end_slot; ++s) {
+        push_position(s);
+        for (Index i = numbering_.first_member[s]; i < numbering_.first_member[s + 1]; ++i) {
+            out.slot_of_vertex.push_back(s - first_slot);
+            push_channels(numbering_.members[i], out.channel_values);
+        }
+    }
+    for (const Index place : ghosts) {
+        const Index slot = static_cast<Index>(std::upper_bound(numbering_.first_member.begin(), numbering_.first_member.end(), place) -
+                                              numbering_.first_member.begin() - 1);
+        if (out.ghost_slots.empty() || out.ghost_slots.back() != slot) {
+            out.ghost_slots.push_back(slot);
+            push_position(slot);
+        }
+        out.slot_of_vertex.push_back(static_cast<Index>(out.positions.size() - 1));
+        push_channels(numbering_.members[place], out.channel_values);
+    }
+    out.triangles.reserve(triangles.size());
+    for (const Index t : triangles) {
+        Triangle local = input_.mesh.triangles[t];
+        for (Index& v : local) {
+            const Index place = numbering_.place[v];
+            v = is_own(place) ? place - first
+                              : end - first + static_cast<Index>(std::lower_bound(ghosts.begin(), ghosts.end(), place) - ghosts.begin());
+        }
+        out.triangles.push_back(local);
+    }
+    return out;
+}
+
+// ---- the whole
+
+// What a contraction leaves when it has been joined into another.
+struct MergeRecord {
+    std::vector<Merge> merges;
+    std::vector<glm::dvec3> places;
+    std::vector<float> deviations;
+    std::vector<Index> round_ends;
+    std::vector<Contraction::Vanishing> vanishings;
+};
+
+MergeRecord take_record(Contraction& c) {
+    return {std::move(c.merges), std::move(c.places), std::move(c.deviations), std::move(c.round_ends),
+            std::move(c.vanishings)};
+}
+
+// Everything that is in a record, or in a contraction without its record, for a MessageWriter or a MessageReader.
+template <class Record, class Message>
+void exchange_record(Record& r, Message& message) {
+    message(r.merges), message(r.places), message(r.deviations), message(r.round_ends), message(r.vanishings);
+}
+
+template <class Joinable, class Message>
+void exchange_joinable(Joinable& c, Message& message) {
+    message(c.first_slot), message(c.end_slot), message(c.channels);
+    message(c.live.names), message(c.live.places), message(c.live.references), message(c.live.deviations);
+    message(c.live.made_by), message(c.live.vanishing), message(c.live.quadrics);
+    message(c.pairs), message(c.outer_edges), message(c.border_slots);
+}
+
+// The merges of all parts; first those of the parts themselves, then those of joined pairs of parts, and so on.
+using Level = std::vector<MergeRecord>;
+
+// Contracts the parts and joins them up the kd-tree, in one process or with a team. Each member has a run of parts; what is joined
+// belongs to the member that has its first part. Messages go to lower ranks only, those of a level are sent before any are waited for,
+// and so nobody waits in a circle.
+class PartContractor {
+public:
+    PartContractor(const PartMaker& maker, const Members& members, ProgressCounter& counter)
+        : maker_(maker), members_(members), parts_(members.parts), rank_(members.rank()), counter_(counter) {}
+
+    // Member 0 returns all merges; the others' levels hold only their own, which have been sent.
+    Result<std::vector<Level>> run() {
+        std::vector<Contraction> current;
+        for (std::size_t count = parts_; count > 0; count /= 2) {
+            if (const auto ok = gather_neighbours(current, count); !ok) return ok.error();
+            current = work_on_level(std::move(current), count);
+            if (counter_.stopped()) return Error{ErrorCode::cancelled, "Clustering was cancelled."};
+        }
+        if (const auto ok = gather_records(); !ok) return ok.error();
+        if (rank_ == 0) finish(current[0]);
+        return std::move(levels_);
+    }
+
+private:
+    std::size_t owner(std::size_t i, std::size_t count) const { return members_.owner(i, count); }
+    bool is_ours(std::size_t i, std::size_t count) const { return owner(i, count) == rank_; }
+
+    std::vector<Contraction> work_on_level(std::vector<Contraction> current, std::size_t count) {
+        const auto after_round = [&](std::size_t merges) { return counter_.add(merges); };
+        const Index target = count == 1 ? 1 : part_target;
+        Level& level = levels_.emplace_back(count);
+        std::vector<Contraction> next(count);
+        tbb::parallel_for(
+            tbb::blocked_range<std::size_t>(0, count, 1),
+            [&](const tbb::blocked_range<std::size_t>& range) {
+                for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                    if (counter_.stopped()) return;
+                    if (!is_ours(i, count)) continue;
+                    if (count == parts_) {
+                        next[i] = contract_part(maker_.make(i), target, after_round);
+                    } else {
+                        next[i] = join(current[2 * i], current[2 * i + 1], target, after_round);
+                        current[2 * i] = current[2 * i + 1] = {};
+                    }
+                    level[i] = take_record(next[i]);
+                }
+            },
+            tbb::simple_partitioner());
+        return next;
+    }
+
+    // Before a level is worked on: the right halves go to the members that have the left ones.
+    Result<void> gather_neighbours(std::vector<Contraction>& halves, std::size_t count) {
+        if (members_.count() == 1 || count == parts_) return {};
+        for (std::size_t i = 0; i < count; ++i) {
+            if (is_ours(i, count) || !is_ours(2 * i + 1, 2 * count)) continue;
+            MessageWriter message;
+            exchange_joinable(std::as_const(halves[2 * i + 1]), message);
+            members_.team->send(static_cast<int>(owner(i, count)), message.bytes());
+            halves[2 * i + 1] = {};
+        }
+        for (std::size_t i = 0; i < count; ++i) {
+            if (!is_ours(i, count) || is_ours(2 * i + 1, 2 * count)) continue;
+            const std::vector<std::byte> bytes = members_.team->receive(static_cast<int>(owner(2 * i + 1, 2 * count)));
+            MessageReader message(bytes);
+            exchange_joinable(halves[2 * i + 1], message);
+            if (!message.complete() || halves[2 * i + 1].first_slot != halves[2 * i].end_slot) return strange_message();
+        }
+        return {};
+    }
+
+    Result<void> gather_records() {
+        if (members_.count() == 1) return {};
+        for (Level& level : levels_) {
+            for (std::size_t i = 0; i < level.size(); ++i) {
+                const std::size_t from = owner(i, level.size());
+                if (rank_ != 0 && from == rank_) {
+                    MessageWriter message;
+                    exchange_record(std::as_const(level[i]), message);
+                    members_.team->send(0, message.bytes());
+                    level[i] = {};
+                } else if (rank_ == 0 && from != 0) {
+                    const std::vector<std::byte> bytes = members_.team->receive(static_cast<int>(from));
+                    MessageReader message(bytes);
+                    exchange_record(level[i], message);
+                    if (!message.complete()) return strange_message();
+                }
+            }
+        }
+        return {};
+    }
+
+    // Without the last triangles nothing is left of the model: that strays as far as it is large.
+    void finish(const Contraction& whole) {
+        constexpr float whole_extent = 1;
+        const Index last = whole.live.vanishing[0];
+        if (last != no_merge) levels_.back()[0].vanishings.push_back({last, whole_extent});
+    }
+
+    const PartMaker& maker_;
+    const Members members_;
+    std::size_t parts_, rank_;
+    ProgressCounter& counter_;
+    std::vector<Level> levels_;
+};
+
+// Numbers the clusters: vertices, joined coincident vertices, then the merges round by round, all parts side by side.
+class ClusteringWriter {
+public:
+    ClusteringWriter(const ClusterInput& input, const SpatialNumbering& numbering, const PartMaker& maker)
+        : input_(input), numbering_(numbering), maker_(maker) {}
+
+    Clustering write(std::vector<Level>& levels) {
+        join_coincident();
+        const std::size_t clusters = result_.parents.size() + merges_of(levels);
+        result_.parents.resize(clusters);
+        result_.positions.resize(clusters - vertices());
+        result_.deviations.resize(clusters - vertices());
+        for (Level& level : levels) {
+            number_rounds(level);
+            tbb::parallel_for(std::size_t{0}, level.size(), [&](std::size_t i) {
+                write_record(level[i], i);
+                level[i] = {};
+            });
+        }
+        result_.parents.back() = static_cast<Index>(clusters - 1);
+        for (Index c = 0; c < result_.deviations.size(); ++c) raise(result_.parents[vertices() + c], result_.deviations[c]);
+        return std::move(result_);
+    }
+
+private:
+    static std::size_t merges_of(const std::vector<Level>& levels) {
+        std::size_t merges = 0;
+        for (const Level& level : levels)
+            for (const MergeRecord& record : level) merges += record.merges.size();
+        return merges;
+    }
+
+    // Round by round, and in a round record by record.
+    void number_rounds(const Level& level) {
+        first_of_round_.assign(level.size(), {});
+        std::size_t rounds = 0;
+        for (const MergeRecord& record : level) rounds = std::max(rounds, record.round_ends.size());
+        for (std::size_t round = 0; round < rounds; ++round) {
+            for (std::size_t i = 0; i < level.size(); ++i) {
+                if (round >= level[i].round_ends.size()) continue;
+                first_of_round_[i].push_back(end_);
+                end_ += level[i].round_ends[round] - (round == 0 ? 0 : level[i].round_ends[round - 1]);
+            }
+        }
+    }
+
+    // Records of one level have no vertex in common.
+    void write_record(const MergeRecord& record, std::size_t number) {
+        for (std::size_t round = 0; round < record.round_ends.size(); ++round) {
+            Index parent = first_of_round_[number][round];
+            for (Index i = round == 0 ? 0 : record.round_ends[round - 1]; i < record.round_ends[round]; ++i, ++parent) {
+                const Merge& merge = record.merges[i];
+                result_.positions[parent - vertices()] = maker_.from_unit_box(record.places[i]);
+                result_.deviations[parent - vertices()] = maker_.length_from_unit_box(record.deviations[i]);
+                result_.parents[cluster_[merge.kept]] = result_.parents[cluster_[merge.joined]] = parent;
+                cluster_[merge.kept] = made_by_joining_[merge.joined] = parent;
+            }
+        }
+        for (const auto& vanishing : record.vanishings)
+            raise(made_by_joining_[vanishing.joined], maker_.length_from_unit_box(vanishing.deviation));
+    }
+
+    // Coincident vertices are joined first, whatever their attributes: above them, everything moves together, without cracks.
+    void join_coincident() {
+        const auto& first_member = numbering_.first_member;
+        result_.parents.resize(vertices());
+        cluster_ = numbering_.vertex_of_slot;
+        made_by_joining_.resize(cluster_.size());
+        for (Index s = 0; s < cluster_.size(); ++s) {
+            if (first_member[s + 1] - first_member[s] == 1) continue;
+            const Index parent = static_cast<Index>(result_.parents.size());
+            result_.positions.push_back(input_.mesh.positions[cluster_[s]]);
+            result_.parents.push_back(parent);
+            for (Index i = first_member[s]; i < first_member[s + 1]; ++i) result_.parents[numbering_.members[i]] = parent;
+            cluster_[s] = parent;
+        }
+        end_ = static_cast<Index>(result_.parents.size());
+    }
+
+    void raise(Index cluster, float deviation) {
+        float& here = result_.deviations[cluster - vertices()];
+        here = std::max(here, deviation);
+    }
+    Index vertices() const { return static_cast<Index>(input_.mesh.positions.size()); }
+
+    const ClusterInput& input_;
+    const SpatialNumbering& numbering_;
+    const PartMaker& maker_;
+    Clustering result_;
+    std::vector<Index> cluster_;         // by slot: the cluster that is known under its name
+    std::vector<Index> made_by_joining_; // by slot: the cluster that was made when the one of this name was joined to another
+    Index end_ = 0;                      // of the clusters that have a number
+    std::vector<std::vector<Index>> first_of_round_; // by record of a level, by round: the first cluster made
+};
+
+} // namespace
+
+Result<Clustering> cluster_quadric(const ClusterInput& input, const Progress& progress, Team* team) {
+    const std::size_t slots = slot_count(input.coincident);
+    const Members members{team, part_count(slots)};
+    ProgressCounter counter(progress, (slots - 1) / members.count()); // each counts its own merges
+    if (!counter.add(0)) return Error{ErrorCode::cancelled, "Clustering was cancelled."};
+    const auto numbering = number_by_space(input.mesh.positions, input.coincident, members);
+    if (!numbering) return numbering.error();
+    const PartMaker maker(input, *numbering);
+    auto levels = PartContractor(maker, members, counter).run();
+    if (!levels) return levels.error();
+    return ClusteringWriter(input, *numbering, maker).write(*levels);
+}
+
+Result<void> help_cluster_quadric(const ClusterInput& input, Team& team) {
+    const std::size_t slots = slot_count(input.coincident);
+    const Members members{&team, part_count(slots)};
+    if (!members.has_part()) return {};
+    const auto numbering = number_by_space(input.mesh.positions, input.coincident, members);
+    if (!numbering) return numbering.error();
+    const PartMaker maker(input, *numbering);
+    ProgressCounter counter({}, slots - 1);
+    const auto levels = PartContractor(maker, members, counter).run();
+    if (!levels) return levels.error();
+    return {};
+}
+
+} // namespace unseen::vdtree

@@ -1,0 +1,241 @@
+#include "build/order_nodes.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include "build/parallel_array.h"
+#include "cut/kernel/prefetch.h"
+
+namespace unseen::vdtree {
+
+namespace {
+
+// What becomes of a cluster: counted on the way up, turned into places on the way down.
+struct ClusterPlace {
+    Index children = 0;
+    Index leaves = 0;      // under it; then the end of those not yet given to its children
+    NodeId nodes = 0;      // in its subtree; then the end of those not yet given
+    NodeId node = no_node; // its own, or that of the cluster that it is the only child of
+};
+
+constexpr Index never = std::numeric_limits<Index>::max();
+
+// Parents lie anywhere: they are asked for so many clusters before they are needed.
+constexpr Index ahead = 16;
+
+} // namespace
+
+Ancestors::Ancestors(const TreeShape& shape) : shape_(shape), jump_(shape.interior()) {
+    // The jump from a node is as long as two jumps from its parent where these are equally long, else it leads to the parent.
+    std::vector<Index> depth(shape.interior(), 0);
+    for (NodeId node = 0; node < shape.interior(); ++node) {
+        const NodeId up = shape.parents[node];
+        if (up == no_node) {
+            jump_[node] = no_node;
+            continue;
+        }
+        depth[node] = depth[up] + 1;
+        const NodeId once = jump_[up], twice = once == no_node ? no_node : jump_[once];
+        const bool equal = twice != no_node && depth[up] - depth[once] == depth[once] - depth[twice];
+        jump_[node] = equal ? twice : up;
+    }
+}
+
+namespace {
+
+class NodeOrderer {
+public:
+    NodeOrderer(const Clustering& clustering, Index vertices, Index lone)
+        : parents_(clustering.parents), vertices_(vertices), lone_(lone), root_(static_cast<Index>(parents_.size()) - 1), places_(parents_.size() - vertices) {}
+
+    NodeOrder run() {
+        count_up();
+        make_room();
+        number_down();
+        if (lone_ > 0) hang_in_lone_vertices();
+        return std::move(order_);
+    }
+
+private:
+    ClusterPlace& place(Index cluster) { return places_[cluster - vertices_]; }
+    void expect(Index cluster) { prefetch(&place(parents_[cluster])); }
+
+    // Children have lower numbers than their parents.
+    void count_up() {
+        for (Index v = 0; v < vertices_; ++v) {
+            expect(std::min(v + ahead, root_));
+            ClusterPlace& up = place(parents_[v]);
+            ++up.children;
+            ++up.leaves;
+        }
+        for (Index c = vertices_; c <= root_; ++c) {
+            expect(std::min(c + ahead, root_));
+            ClusterPlace& here = place(c);
+            if (here.children > 1) ++here.nodes;
+            if (c == root_) break;
+            ClusterPlace& up = place(parents_[c]);
+            ++up.children;
+            up.leaves += here.leaves;
+            up.nodes += here.nodes;
+        }
+    }
+
+    void make_room() {
+        const NodeId extra = lone_ > 1 ? 2 : lone_; // the root above the clustering's, and the lone vertices' node
+        interior_ = place(root_).nodes + extra;
+        top_ = lone_ > 0 ? 0 : no_node;
+        TreeShape& shape = order_.shape;
+        shape.parents.resize(std::size_t{interior_} + vertices_ + lone_);
+        shape.first_leaf.resize(interior_);
+        shape.leaf_end.resize(interior_);
+        shape.subtree_end.resize(interior_);
+        shape.made.resize(interior_);
+        order_.leaf_of_vertex.resize(std::size_t{vertices_} + lone_);
+        order_.node_of_cluster.assign(places_.size(), no_node);
+    }
+
+    void open(NodeId node, NodeId parent, Index first_leaf, Index leaf_end, NodeId subtree_end, Index made) {
+        TreeShape& shape = order_.shape;
+        shape.parents[node] = parent;
+        shape.first_leaf[node] = first_leaf;
+        shape.leaf_end[node] = leaf_end;
+        shape.subtree_end[node] = subtree_end;
+        shape.made[node] = made;
+    }
+    void put_leaf(Index vertex, Index leaf, NodeId parent) {
+        order_.leaf_of_vertex[vertex] = leaf;
+        order_.shape.parents[order_.shape.node_of_leaf(leaf)] = parent;
+    }
+
+    // The last child takes the last leaves and nodes of its parent.
+    void number_down() {
+        for (Index c = root_; c >= vertices_; --c) {
+            expect(c - std::min(c, ahead));
+            ClusterPlace& here = place(c);
+            const NodeId parent = c == root_ ? top_ : place(parents_[c]).node;
+            Index leaf_end = vertices_;
+            NodeId node_end = interior_ - (lone_ > 1 ? 1 : 0);
+            if (c != root_) {
+                ClusterPlace& up = place(parents_[c]);
+                leaf_end = up.leaves;
+                node_end = up.nodes;
+                up.leaves -= here.leaves;
+                up.nodes -= here.nodes;
+            }
+            here.node = parent;
+            if (here.children > 1) {
+                here.node = order_.node_of_cluster[c - vertices_] = node_end - here.nodes;
+                open(here.node, parent, leaf_end - here.leaves, leaf_end, node_end, c);
+            }
+            here.leaves = leaf_end;
+            here.nodes = node_end;
+        }
+        for (Index v = vertices_; v-- > 0;) {
+            expect(v - std::min(v, ahead));
+            ClusterPlace& up = place(parents_[v]);
+            put_leaf(v, --up.leaves, up.node);
+        }
+    }
+
+    void hang_in_lone_vertices() {
+        const NodeId group = lone_ > 1 ? interior_ - 1 : top_;
+        open(top_, no_node, 0, vertices_ + lone_, interior_, never);
+        if (group != top_) open(group, top_, vertices_, vertices_ + lone_, interior_, never - 1);
+        for (Index i = 0; i < lone_; ++i) put_leaf(vertices_ + i, vertices_ + i, group);
+    }
+
+    std::span<const Index> parents_; // by cluster
+    Index vertices_, lone_, root_;
+    std::vector<ClusterPlace> places_; // by cluster that is no vertex
+    NodeId interior_ = 0, top_ = no_node; // how many nodes; the root where there are lone vertices
+    NodeOrder order_;
+};
+
+} // namespace
+
+NodeOrder order_nodes(const Clustering& clustering, Index vertices, Index lone) { return NodeOrderer(clustering, vertices, lone).run(); }
+
+namespace {
+
+// For some triangles, the nodes that they vanish at.
+//
+// When that is found is as good as random, and the processor is not to guess: all of them go up the tree in turns, a step each.
+template <std::size_t most>
+void find_vanishing(std::span<const Triangle> triangles, const NodeOrder& nodes, const Ancestors& ancestors, NodeId* out) {
+    const TreeShape& shape = nodes.shape;
+    std::array<NodeId, most> at;
+    std::array<Index, most> low, high;
+    const auto found = [&](std::size_t i, NodeId node) { return (shape.first_leaf[node] <= low[i]) + (high[i] < shape.leaf_end[node]) > 0; };
+    std::array<std::uint8_t, most> left;
+    std::size_t count = triangles.size();
+    for (std::size_t i = 0; i < count; ++i) {
+        const Triangle& t = triangles[i];
+        const Index a = nodes.leaf_of_vertex[t[0]], b = nodes.leaf_of_vertex[t[1]], c = nodes.leaf_of_vertex[t[2]];
+        low[i] = std::min({a, b, c});
+        high[i] = std::max({a, b, c});
+        // Of three leaves, the middle one merges first with another.
+        at[i] = shape.parents[shape.node_of_leaf(a ^ b ^ c ^ low[i] ^ high[i])];
+        left[i] = static_cast<std::uint8_t>(i);
+    }
+    constexpr int most_steps = 16; // then jumps are quicker: the tree may be deep
+    for (int step = 0; count > 0 && step < most_steps; ++step) {
+        std::size_t kept = 0;
+        for (std::size_t j = 0; j < count; ++j) {
+            const std::uint8_t i = left[j];
+            const NodeId node = at[i];
+            const bool on = !found(i, node);
+            out[i] = node;
+            at[i] = shape.parents[node];
+            left[kept] = i;
+            kept += on;
+        }
+        count = kept;
+    }
+    for (std::size_t j = 0; j < count; ++j) out[left[j]] = ancestors.lowest(at[left[j]], [&](NodeId node) { return found(left[j], node); });
+}
+
+} // namespace
+
+TriangleOrder order_triangles(std::span<const Triangle> triangles, const NodeOrder& nodes, const Ancestors& ancestors) {
+    const TreeShape& shape = nodes.shape;
+    TriangleOrder order;
+    ParallelArray<NodeId> vanishing(triangles.size(), Unfilled());
+    constexpr std::size_t together = 64;
+    tbb::parallel_for(std::size_t{0}, (triangles.size() + together - 1) / together, [&](std::size_t i) {
+        const std::size_t begin = i * together;
+        find_vanishing<together>(triangles.subspan(begin, std::min(together, triangles.size() - begin)), nodes, ancestors, &vanishing[begin]);
+    });
+    order.first_triangle.assign(shape.interior() + 1, 0);
+    // Each thread looks at all triangles, for a range of the nodes: looking is cheap.
+    constexpr int most_ranges = 8;
+    const auto ranges = static_cast<std::size_t>(std::min(tbb::this_task_arena::max_concurrency(), most_ranges));
+    const auto for_each_of_range = [&](auto&& f) {
+        tbb::parallel_for(std::size_t{0}, ranges, [&](std::size_t r) {
+            const std::size_t begin = shape.interior() * r / ranges, size = shape.interior() * (r + 1) / ranges - begin;
+            for (std::size_t t = triangles.size(); t-- > 0;)
+                if (vanishing[t] - begin < size) f(t, order.first_triangle[vanishing[t] + 1]);
+        });
+    };
+    for_each_of_range([](std::size_t, Index& count) { ++count; });
+    std::partial_sum(order.first_triangle.begin(), order.first_triangle.end(), order.first_triangle.begin());
+    order.triangles.resize(triangles.size());
+    order.sources.resize(triangles.size());
+    // Each node's triangles are counted down from its end, the last triangle first.
+    for_each_of_range([&](std::size_t t, Index& end) {
+        const Index at = --end;
+        for (std::size_t k = 0; k < 3; ++k) order.triangles[at][k] = nodes.leaf_of_vertex[triangles[t][k]];
+        order.sources[at] = static_cast<Index>(t);
+    });
+    // What was the end of a node is its beginning now, one place too high.
+    std::move(order.first_triangle.begin() + 1, order.first_triangle.end(), order.first_triangle.begin());
+    order.first_triangle.back() = static_cast<Index>(triangles.size());
+    return order;
+}
+
+} // namespace unseen::vdtree

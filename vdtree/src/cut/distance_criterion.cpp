@@ -1,0 +1,216 @@
+#include <vdtree/distance_criterion.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <span>
+#include <string>
+
+#include <glm/geometric.hpp>
+
+#include <vdtree/criteria.h>
+
+#include "tree/unchecked_links.h"
+
+namespace unseen::vdtree {
+
+namespace {
+
+std::uint64_t next_id() {
+    static std::atomic<std::uint64_t> last{0};
+    return ++last;
+}
+
+Error invalid(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
+
+// With lights, rows are compared by their contrasts and luminances.
+Result<void> check_growth(const DistanceCriterion::Parts& p) {
+    const std::size_t bins = p.eccentricity_bins;
+    const auto grows = [&](std::size_t from, std::size_t to) {
+        for (std::size_t bin = 0; bin < bins; ++bin) {
+            if (!(p.reach[from * bins + bin] <= p.reach[to * bins + bin])) return false;
+            if (!p.least_cost.empty() && !(p.least_cost[from * bins + bin] <= p.least_cost[to * bins + bin])) return false;
+        }
+        return true;
+    };
+    for (std::size_t l = 0; l < ContrastClasses::luminance_count; ++l)
+        for (std::size_t c = 0; c < ContrastClasses::contrast_count; ++c)
+            if ((c > 0 && !grows(ContrastClasses::row_of(l, c - 1), ContrastClasses::row_of(l, c))) ||
+                (l > 0 && !grows(ContrastClasses::row_of(l - 1, c), ContrastClasses::row_of(l, c))))
+                return invalid("The reaches of a criterion with lights must not fall with the contrast or the luminance.");
+    return {};
+}
+
+Result<void> check(const VertexTree& tree, const DistanceCriterion::Parts& p) {
+    const std::size_t nodes = tree.interior_count();
+    if (!p.classes.empty() && p.classes.size() != nodes)
+        return invalid("A criterion has " + std::to_string(p.classes.size()) + " classes for " + std::to_string(nodes) +
+                       " interior nodes.");
+    if (p.lit && (!p.lit->bounds || p.lit->bounds->cones().size() != nodes || !p.classes.empty()))
+        return invalid("A criterion with lights needs bounds of its tree's normals, and no other classes.");
+    if (!p.facing.empty() && p.facing.size() != nodes)
+        return invalid("A criterion has " + std::to_string(p.facing.size()) + " sets of directions for " + std::to_string(nodes) +
+                       " interior nodes.");
+    for (const auto* lengths : {&p.lengths, &p.silhouette_lengths}) {
+        if (!lengths->empty() && lengths->size() != nodes)
+            return invalid("A criterion has " + std::to_string(lengths->size()) + " lengths for " + std::to_string(nodes) +
+                           " interior nodes.");
+        for (std::size_t i = 0; i < lengths->size(); ++i)
+            if (!((*lengths)[i] >= 0) || !std::isfinite((*lengths)[i]))
+                return invalid("The length of node " + std::to_string(i) + " must be 0 or more and finite.");
+    }
+    if (p.eccentricity_bins == 0 || p.reach.empty() || p.reach.size() % p.eccentricity_bins != 0)
+        return invalid("A criterion's table of " + std::to_string(p.reach.size()) + " reaches has no whole rows of " +
+                       std::to_string(p.eccentricity_bins) + " bins.");
+    if (!p.least_cost.empty() && p.least_cost.size() != p.reach.size())
+        return invalid("A criterion's table of least costs is not of the size of its reaches.");
+    for (std::size_t i = 0; i < p.least_cost.size(); ++i)
+        if (!(p.least_cost[i] >= 0) || (i % p.eccentricity_bins != 0 && p.least_cost[i] > p.least_cost[i - 1]))
+            return invalid("Least cost " + std::to_string(i) + " of a criterion is negative, not a number, or grows with the eccentricity.");
+    if (!(p.bin_degrees > 0) || !std::isfinite(p.bin_degrees))
+        return invalid("The bins of eccentricity need a positive width.");
+    const std::size_t rows = p.reach.size() / p.eccentricity_bins;
+    if (p.lit && (rows < ContrastClasses::row_count || p.lit->silhouette >= rows))
+        return invalid("A criterion with lights needs a row for each class of contrasts.");
+    if (p.lit)
+        if (const auto grows = check_growth(p); !grows) return grows.error();
+    for (std::size_t i = 0; i < p.classes.size(); ++i)
+        if (p.classes[i].interior >= rows || p.classes[i].silhouette >= rows)
+            return invalid("Node " + std::to_string(i) + " has a class beyond the " + std::to_string(rows) + " rows of the table.");
+    for (std::size_t i = 0; i < p.reach.size(); ++i) {
+        if (std::isnan(p.reach[i])) return invalid("Reach " + std::to_string(i) + " of a criterion is not a number.");
+        if (i % p.eccentricity_bins != 0 && p.reach[i] > p.reach[i - 1])
+            return invalid("Reach " + std::to_string(i) + " of a criterion grows with the eccentricity.");
+    }
+    return {};
+}
+
+// By how much longer a node of one row must be than one of another to be seen from as far everywhere: few pairs of rows come again and
+// again.
+class RowRatios {
+public:
+    explicit RowRatios(const DistanceCriterion::Parts& parts) : parts_(parts), known_(1u << known_bits) {}
+
+    // Infinite where no length makes up for the row.
+    float largest(std::uint16_t row, std::uint16_t of) {
+        if (row == of) return 1;
+        const std::uint32_t pair = row * 0x10000u + of;
+        Known& known = known_[(pair * 0x9e3779b1u) >> (32 - known_bits)];
+        if (known.pair != pair) known = {pair, compare(row, of)};
+        return known.ratio;
+    }
+
+private:
+    // A few roundings of the products of lengths and reaches.
+    static constexpr float rounding = 1e-6f;
+    static constexpr float infinity = std::numeric_limits<float>::infinity();
+
+    float compare(std::uint16_t row, std::uint16_t of) const {
+        const std::size_t bins = parts_.eccentricity_bins, a = row * bins, b = of * bins;
+        float ratio = 0;
+        for (std::size_t bin = 0; bin < bins; ++bin) {
+            const float needed = parts_.reach[a + bin], given = parts_.reach[b + bin];
+            if (!parts_.least_cost.empty() && parts_.least_cost[a + bin] > parts_.least_cost[b + bin]) return infinity;
+            if (needed <= DistanceCriterion::never_visible) continue;
+            if (!(given >= 0) || (!(given > 0) && needed > 0)) return infinity;
+            const bool is_everywhere = given >= DistanceCriterion::always_visible;
+            if (needed > 0 && !is_everywhere) ratio = std::max(ratio, needed / given);
+        }
+        // Products of lengths and reaches that are both no larger are exactly so.
+        return ratio <= 1 ? std::min(ratio * (1 + rounding), 1.0f) : ratio * (1 + rounding);
+    }
+
+    static constexpr unsigned known_bits = 14;
+    struct Known {
+        std::uint32_t pair = 0; // of row 0 and itself, which is not asked about
+        float ratio = 1;
+    };
+    const DistanceCriterion::Parts& parts_;
+    std::vector<Known> known_;
+};
+
+// Spheres nest in every tree.
+bool is_monotone_in(const VertexTree& tree, const DistanceCriterion::Parts& p) {
+    const auto parents = unchecked_links(tree).parents;
+    RowRatios ratios(p);
+    const auto is_within = [](std::span<const float> lengths, NodeId node, NodeId parent, float ratio) {
+        if (lengths.empty()) return ratio <= 1; // spheres' radii
+        return lengths[node] * ratio <= lengths[parent]; // false where the ratio is infinite and the length 0
+    };
+    for (NodeId node = 1; node < tree.interior_count(); ++node) {
+        const NodeId parent = parents[node];
+        if (!(parent < node)) return false; // in a damaged file: nobody has looked at all of a mapped tree
+        if (!p.facing.empty() && !p.facing[parent].includes(p.facing[node])) return false;
+        const FoldClass a = p.classes.empty() ? FoldClass{} : p.classes[node], b = p.classes.empty() ? FoldClass{} : p.classes[parent];
+        const auto& outlines = p.silhouette_lengths.empty() ? p.lengths : p.silhouette_lengths;
+        if (!is_within(p.lengths, node, parent, ratios.largest(a.interior, b.interior))) return false;
+        if (!is_within(outlines, node, parent, ratios.largest(a.silhouette, b.silhouette))) return false;
+    }
+    return true;
+}
+
+double radians_of_pixels(const View& view, double pixels) { return pixels / pixels_per_radian(view); }
+
+} // namespace
+
+DistanceCriterion::ObjectId::ObjectId() noexcept : value(next_id()) {}
+
+DistanceCriterion::DistanceCriterion(Parts parts) : parts_(std::move(parts)), id_(next_id()) {
+    uses_silhouettes_ = std::any_of(parts_.classes.begin(), parts_.classes.end(),
+                                    [](FoldClass c) { return c.interior != c.silhouette; }) ||
+                        (!parts_.classes.empty() && !parts_.silhouette_lengths.empty()) || parts_.lit;
+}
+
+Result<DistanceCriterion> DistanceCriterion::create(const VertexTree& tree, Parts parts) {
+    if (const auto valid = check(tree, parts); !valid) return valid.error();
+    for (float& reach : parts.reach) reach = std::clamp(reach, never_visible, always_visible);
+    DistanceCriterion criterion(std::move(parts));
+    criterion.interior_count_ = tree.interior_count();
+    // With lights the ranges nest but for rounding, which may lift a child by a class.
+    criterion.is_monotone_ = !criterion.parts_.lit && is_monotone_in(tree, criterion.parts_);
+    return criterion;
+}
+
+Frustum frustum_of(const VertexTree& tree, const View& view, const Similarity& placement) {
+    const CameraFrame frame = camera_frame(view);
+    const double tan_y = std::tan(view.fov_y_degrees * std::numbers::pi / 360);
+    const double tan_x = tan_y * view.width / view.height;
+    const glm::dvec3 inward[] = {-frame.back, frame.right - tan_x * frame.back, -frame.right - tan_x * frame.back,
+                                 frame.up - tan_y * frame.back, -frame.up - tan_y * frame.back};
+    const glm::dvec3 eye = eye_in_tree(tree, view, placement);
+    Frustum frustum;
+    for (const glm::dvec3& direction : inward) {
+        const glm::dvec3 normal = glm::normalize(placement.direction_to_mesh(direction));
+        frustum.planes.push_back({normal, -glm::dot(normal, eye)});
+    }
+    return frustum;
+}
+
+Result<DistanceCriterion> extent_criterion(const VertexTree& tree, const View& view, double tolerance_pixels) {
+    if (!(tolerance_pixels > 0)) return invalid("The tolerance must be more than 0 pixels.");
+    DistanceCriterion::Parts parts;
+    parts.spheres = DistanceCriterion::Spheres::support;
+    const double half_angle = std::min(radians_of_pixels(view, tolerance_pixels), std::numbers::pi) / 2;
+    parts.reach = {static_cast<float>(1 / std::sin(half_angle) - 1)};
+    return DistanceCriterion::create(tree, std::move(parts));
+}
+
+Result<DistanceCriterion> displacement_criterion(const VertexTree& tree, const View& view, double tolerance_pixels) {
+    if (!(tolerance_pixels > 0)) return invalid("The tolerance must be more than 0 pixels.");
+    DistanceCriterion::Parts parts;
+    parts.spheres = DistanceCriterion::Spheres::support;
+    const auto displacement = tree.displacement();
+    parts.lengths.assign(displacement.begin(), displacement.end());
+    const double half_angle = std::min(radians_of_pixels(view, tolerance_pixels), std::numbers::pi) / 2;
+    const float reach = static_cast<float>(1 / (2 * std::sin(half_angle)));
+    parts.reach = {reach};
+    if (std::find(displacement.begin(), displacement.end(), 0.0f) != displacement.end()) { // a row of their own for what never moves
+        parts.reach = {DistanceCriterion::never_visible, reach};
+        for (const float moved : displacement) parts.classes.push_back(moved == 0 ? FoldClass{0, 0} : FoldClass{1, 1});
+    }
+    return DistanceCriterion::create(tree, std::move(parts));
+}
+
+} // namespace unseen::vdtree

@@ -1,0 +1,611 @@
+// The file format .vdt: a header, a table of sections, the checksums of their pages, and the sections themselves.
+// docs/file-format.md describes it byte by byte.
+#include <vdtree/tree_io.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <string>
+#include <type_traits>
+
+#define XXH_INLINE_ALL
+#include <xxhash.h>
+
+#include <vdtree/internal/atomic_file.h>
+
+#include "files/byte_order.h"
+#include "files/mapped_file.h"
+#include "tree/mask_pool.h"
+#include "tree/node_check.h"
+#include "tree/vertex_tree_data.h"
+
+namespace unseen::vdtree {
+
+namespace {
+
+constexpr std::array<char, 8> magic = {'U', 'N', 'S', 'E', 'E', 'N', 'V', 'T'};
+constexpr std::uint32_t format_version = 3;
+constexpr std::uint64_t page_bytes = 1 << 20;
+constexpr std::uint32_t most_sections = 64;
+constexpr std::size_t most_stages = 256; // that a byte can name
+constexpr std::uint64_t section_alignment = 64; // bytes; a cache line, and what any mapped element needs
+
+// All integers and floats little-endian.
+struct Header {
+    std::array<char, 8> magic;
+    std::uint32_t version;
+    std::uint32_t section_count;
+    std::uint64_t file_bytes;
+    std::uint64_t page_count;      // over all sections
+    std::uint64_t table_checksum;  // of the section table and the page checksums
+    std::uint64_t header_checksum; // of the fields above
+};
+static_assert(sizeof(Header) == 48);
+
+struct Section {
+    std::array<char, 24> name;
+    std::uint32_t element_bytes;
+    std::uint32_t component_bytes; // what a host of the other byte order swaps
+    std::uint64_t count;
+    std::uint64_t offset;
+};
+static_assert(sizeof(Section) == 48);
+
+// What is not an array.
+struct Facts {
+    double origin[3];
+    float bounding_sphere[4];
+    float light[4];
+    float luminance_range[2];
+    std::uint64_t dropped_triangles;
+    std::uint32_t closedness;
+    std::uint32_t prelit;
+};
+static_assert(sizeof(Facts) == 80);
+
+std::uint64_t checksum(const void* data, std::size_t bytes) { return XXH3_64bits(data, bytes); }
+
+std::uint64_t pages_of(const Section& s) {
+    return (s.count * s.element_bytes + page_bytes - 1) / page_bytes;
+}
+
+// A section's elements, of which fold errors and bounds begin with floats and end with single bytes.
+ElementLayout layout_of(const Section& s) {
+    const std::size_t numbers = s.element_bytes == sizeof(FoldError)    ? offsetof(FoldError, facing)
+                                : s.element_bytes == sizeof(NodeBounds) ? sizeof(Sphere)
+                                                                        : s.element_bytes;
+    return {s.element_bytes, numbers, s.component_bytes};
+}
+
+// Walks every stored array of a tree, in file order: f(name, vector).
+template <class Geometry, class Luminance, class F>
+void for_each_array(Geometry& g, Luminance& l, F&& f) {
+    f("parents", g.parents);
+    f("positions", g.positions);
+    f("normals", g.normals);
+    f("colours", g.colours);
+    f("uvs", g.uvs);
+    f("luminance", l.luminance);
+    f("first_leaf", g.first_leaf);
+    f("leaf_end", g.leaf_end);
+    f("subtree_end", g.subtree_end);
+    f("first_triangle", g.first_triangle);
+    f("bounds", g.bounds);
+    f("support_spheres", g.support_spheres);
+    f("mask_at", g.mask_at);
+    f("mask_records", g.mask_records);
+    f("displacement", g.displacement);
+    f("support_range", l.support_range);
+    f("ring_range", l.ring_range);
+    f("adaptation", l.adaptation);
+    f("ring_chroma", l.ring_chroma);
+    f("fold_errors", l.fold_errors);
+    f("fold_stages", l.fold_stages);
+    f("triangles", g.triangles);
+    f("source_triangles", g.source_triangles);
+    f("source_vertices", g.source_vertices);
+    f("texture", g.texture);
+    f("texels", g.texels);
+    f("ring_texture", g.ring_texture);
+}
+
+bool is_of_texture(std::string_view name) { return name == "texture" || name == "texels" || name == "ring_texture"; }
+
+// Sections that are there only where they have elements.
+bool is_optional(std::string_view name) { return name == "ring_chroma" || name == "fold_errors" || name == "fold_stages" || is_of_texture(name); }
+
+enum class OpenMode { read, map };
+
+template <class T>
+constexpr std::uint32_t component_bytes() {
+    if constexpr (std::is_arithmetic_v<T>) return sizeof(T);
+    else if constexpr (std::is_same_v<T, Unorm16> || std::is_same_v<T, PackedRange> || std::is_same_v<T, PackedNormal>)
+        return 2;
+    else if constexpr (std::is_same_v<T, Texel>) return 1;
+    else return 4; // vectors, spheres and triangles of 4-byte components; of NodeBounds, the sphere
+}
+
+// Ranges as text-like records: kind, length of the name, first triangle, count, name.
+std::vector<std::byte> pack_ranges(std::span<const MeshRange> ranges) {
+    std::vector<std::byte> out;
+    const auto put = [&](std::uint64_t value) {
+        for (int i = 0; i < 8; ++i) out.push_back(static_cast<std::byte>(value >> (8 * i)));
+    };
+    for (const MeshRange& r : ranges) {
+        put(static_cast<std::uint64_t>(r.kind));
+        put(r.name.size());
+        put(r.first_triangle);
+        put(r.triangle_count);
+        for (const char c : r.name) out.push_back(static_cast<std::byte>(c));
+    }
+    return out;
+}
+
+bool unpack_ranges(std::span<const std::byte> bytes, std::vector<MeshRange>& ranges) {
+    std::size_t at = 0;
+    const auto get = [&](std::uint64_t& value) {
+        if (bytes.size() - at < 8) return false;
+        value = 0;
+        for (std::size_t i = 0; i < 8; ++i) value |= std::to_integer<std::uint64_t>(bytes[at + i]) << (8 * i);
+        at += 8;
+        return true;
+    };
+    while (at < bytes.size()) {
+        std::uint64_t kind, length, first, count;
+        if (!get(kind) || !get(length) || !get(first) || !get(count)) return false;
+        if (kind > static_cast<std::uint64_t>(MeshRange::Kind::primitive) || length > bytes.size() - at) return false;
+        MeshRange r;
+        r.kind = static_cast<MeshRange::Kind>(kind);
+        r.name.assign(reinterpret_cast<const char*>(bytes.data()) + at, length);
+        r.first_triangle = first;
+        r.triangle_count = count;
+        ranges.push_back(std::move(r));
+        at += length;
+    }
+    return true;
+}
+
+Facts facts_of(const TreeGeometry& g, const TreeLuminance& l) {
+    const Sphere& s = g.bounding_sphere;
+    return {{g.origin.x, g.origin.y, g.origin.z},
+            {s.centre.x, s.centre.y, s.centre.z, s.radius},
+            {l.light.direction.x, l.light.direction.y, l.light.direction.z, l.light.ambient},
+            {l.range.lo, l.range.hi},
+            g.dropped_triangles,
+            static_cast<std::uint32_t>(g.closedness),
+            l.prelit ? 1u : 0u};
+}
+
+// ---- writing
+
+class Writer {
+public:
+    template <class T>
+    void add(std::string_view name, std::span<const T> values, std::uint32_t component) {
+        Section s{};
+        std::copy_n(name.begin(), std::min(name.size(), s.name.size()), s.name.begin());
+        s.element_bytes = sizeof(T);
+        s.component_bytes = component;
+        s.count = values.size();
+        sections_.push_back(s);
+        data_.push_back(std::as_bytes(values));
+    }
+
+    Result<void> write(const std::filesystem::path& file, const Progress& progress) {
+        layout();
+        Result<AtomicFile> out = AtomicFile::create(file);
+        if (!out) return out.error();
+        if (const auto r = write_table(*out); !r) return r;
+        std::uint64_t position = table_bytes();
+        for (std::size_t i = 0; i < sections_.size(); ++i) {
+            if (progress && !progress(static_cast<double>(i) / static_cast<double>(sections_.size()), "writing"))
+                return Error{ErrorCode::cancelled, "Writing " + file.string() + " was cancelled."};
+            const std::vector<std::byte> padding(sections_[i].offset - position);
+            if (const auto r = out->write(padding); !r) return r;
+            if (const auto r = write_pages(*out, i); !r) return r;
+            position = sections_[i].offset + data_[i].size();
+        }
+        return out->commit();
+    }
+
+private:
+    std::uint64_t table_bytes() const {
+        return sizeof(Header) + sections_.size() * sizeof(Section) + checksums_.size() * sizeof(std::uint64_t);
+    }
+
+    void layout() {
+        for (std::size_t i = 0; i < sections_.size(); ++i) {
+            for (std::size_t at = 0; at < data_[i].size(); at += page_bytes) {
+                const auto page = little_endian(i, at);
+                checksums_.push_back(checksum(page.data(), page.size()));
+            }
+        }
+        std::uint64_t offset = table_bytes();
+        for (std::size_t i = 0; i < sections_.size(); ++i) {
+            offset = (offset + section_alignment - 1) / section_alignment * section_alignment;
+            sections_[i].offset = offset;
+            offset += data_[i].size();
+        }
+        file_bytes_ = offset;
+    }
+
+    // A page of a section as it stands in the file.
+    std::span<const std::byte> little_endian(std::size_t section, std::size_t at) {
+        const auto page = data_[section].subspan(at, std::min<std::size_t>(page_bytes, data_[section].size() - at));
+        if constexpr (std::endian::native == std::endian::little) return page;
+        swapped_.assign(page.begin(), page.end());
+        swap_elements(swapped_.data(), swapped_.size(), at, layout_of(sections_[section]));
+        return swapped_;
+    }
+
+    Result<void> write_table(AtomicFile& out) {
+        std::vector<Section> table = sections_;
+        std::vector<std::uint64_t> sums = checksums_;
+        Header h{};
+        h.magic = magic;
+        h.version = format_version;
+        h.section_count = static_cast<std::uint32_t>(table.size());
+        h.file_bytes = file_bytes_;
+        h.page_count = sums.size();
+        if constexpr (std::endian::native == std::endian::big) {
+            for (Section& s : table) {
+                swap_components(reinterpret_cast<std::byte*>(&s.element_bytes), 8, 4);
+                swap_components(reinterpret_cast<std::byte*>(&s.count), 16, 8);
+            }
+            swap_components(reinterpret_cast<std::byte*>(sums.data()), sums.size() * 8, 8);
+            swap_components(reinterpret_cast<std::byte*>(&h.version), 8, 4);
+            swap_components(reinterpret_cast<std::byte*>(&h.file_bytes), 16, 8);
+        }
+        std::vector<std::byte> bytes(table.size() * sizeof(Section) + sums.size() * 8);
+        std::memcpy(bytes.data(), table.data(), table.size() * sizeof(Section));
+        if (!sums.empty()) std::memcpy(bytes.data() + table.size() * sizeof(Section), sums.data(), sums.size() * 8);
+        h.table_checksum = checksum(bytes.data(), bytes.size());
+        if constexpr (std::endian::native == std::endian::big)
+            swap_components(reinterpret_cast<std::byte*>(&h.table_checksum), 8, 8);
+        h.header_checksum = checksum(&h, offsetof(Header, header_checksum));
+        if constexpr (std::endian::native == std::endian::big)
+            swap_components(reinterpret_cast<std::byte*>(&h.header_checksum), 8, 8);
+        if (const auto r = out.write(std::as_bytes(std::span(&h, 1))); !r) return r;
+        return out.write(bytes);
+    }
+
+    Result<void> write_pages(AtomicFile& out, std::size_t section) {
+        if constexpr (std::endian::native == std::endian::little) return out.write(data_[section]);
+        for (std::size_t at = 0; at < data_[section].size(); at += page_bytes)
+            if (const auto r = out.write(little_endian(section, at)); !r) return r;
+        return {};
+    }
+
+    std::vector<Section> sections_;
+    std::vector<std::span<const std::byte>> data_;
+    std::vector<std::uint64_t> checksums_;
+    std::vector<std::byte> swapped_;
+    std::uint64_t file_bytes_ = 0;
+};
+
+// ---- reading
+
+class Reader {
+public:
+    Reader(const std::filesystem::path& file, OpenMode mode, const Progress& progress)
+        : file_(file), mode_(mode), progress_(progress) {}
+
+    Result<VertexTree> read();
+
+private:
+    Error fail(const std::string& what) const {
+        return {ErrorCode::malformed_data, file_.string() + ": " + what + " Build the tree again from its mesh."};
+    }
+    Result<void> read_table();
+    const Section* find(std::string_view name) const;
+    template <class T>
+    Result<void> read_section(std::string_view name, std::vector<T>& out);
+    template <class T>
+    Result<void> map_section(std::string_view name, Array<T>& out);
+    template <class T>
+    Result<void> open_section(std::string_view name, Array<T>& out);
+    Result<void> read_facts(TreeGeometry& g, TreeLuminance& l);
+    Result<void> check_counts(const TreeGeometry& g, const TreeLuminance& l) const;
+    Result<void> check_structure(const TreeGeometry& g) const;
+    Result<void> check_ranges(const TreeGeometry& g) const;
+
+    const std::filesystem::path& file_;
+    const OpenMode mode_;
+    const Progress& progress_;
+    std::shared_ptr<const MappedFile> mapping_;
+    std::ifstream in_;
+    std::uint64_t file_bytes_ = 0;
+    std::vector<Section> sections_;
+    std::vector<std::uint64_t> checksums_;
+};
+
+Result<void> Reader::read_table() {
+    std::error_code error;
+    // Not opened before: a pipe would wait for its writer.
+    if (std::filesystem::is_regular_file(file_, error)) in_.open(file_, std::ios::binary);
+    if (!in_.is_open()) return Error{ErrorCode::io_failure, "Cannot open " + file_.string() + "; does it exist?"};
+    file_bytes_ = std::filesystem::file_size(file_, error);
+    if (error) return Error{ErrorCode::io_failure, "Cannot tell the size of " + file_.string() + "."};
+    Header h;
+    if (!in_.read(reinterpret_cast<char*>(&h), sizeof h)) return fail("The file ends within its header.");
+    if (h.magic != magic) return fail("This is no vertex tree (.vdt).");
+    const std::uint64_t sum = checksum(&h, offsetof(Header, header_checksum));
+    if constexpr (std::endian::native == std::endian::big) {
+        swap_components(reinterpret_cast<std::byte*>(&h.version), 8, 4);
+        swap_components(reinterpret_cast<std::byte*>(&h.file_bytes), 32, 8);
+    }
+    if (h.version != format_version)
+        return Error{ErrorCode::unsupported, file_.string() + ": version " + std::to_string(h.version) +
+                                                 " of the format is not known to this program, which reads version " +
+                                                 std::to_string(format_version) +
+                                                 ". Build the tree again from its mesh."};
+    if (h.header_checksum != sum) return fail("The header is damaged.");
+    if (h.file_bytes != file_bytes_)
+        return fail("The file has " + std::to_string(file_bytes_) + " bytes instead of " +
+                    std::to_string(h.file_bytes) + "; it was cut short or changed.");
+    if (h.section_count > most_sections || h.page_count > file_bytes_ / sizeof(std::uint64_t))
+        return fail("The section table is larger than the file.");
+    std::vector<std::byte> bytes(h.section_count * sizeof(Section) + h.page_count * 8);
+    if (!in_.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size())))
+        return fail("The file ends within its section table.");
+    if (checksum(bytes.data(), bytes.size()) != h.table_checksum) return fail("The section table is damaged.");
+    sections_.resize(h.section_count);
+    checksums_.resize(h.page_count);
+    if (h.section_count > 0) std::memcpy(sections_.data(), bytes.data(), h.section_count * sizeof(Section));
+    if (h.page_count > 0)
+        std::memcpy(checksums_.data(), bytes.data() + h.section_count * sizeof(Section), h.page_count * 8);
+    if constexpr (std::endian::native == std::endian::big) {
+        for (Section& s : sections_) {
+            swap_components(reinterpret_cast<std::byte*>(&s.element_bytes), 8, 4);
+            swap_components(reinterpret_cast<std::byte*>(&s.count), 16, 8);
+        }
+        swap_components(reinterpret_cast<std::byte*>(checksums_.data()), checksums_.size() * 8, 8);
+    }
+    std::uint64_t pages = 0;
+    for (const Section& s : sections_) {
+        const std::string name(s.name.data(), strnlen(s.name.data(), s.name.size()));
+        if (s.element_bytes == 0 || s.offset > file_bytes_ || s.count > (file_bytes_ - s.offset) / s.element_bytes)
+            return fail("Section " + name + " does not fit in the file.");
+        pages += pages_of(s);
+    }
+    if (pages != checksums_.size()) return fail("The number of pages does not match the sections.");
+    return {};
+}
+
+const Section* Reader::find(std::string_view name) const {
+    for (const Section& s : sections_)
+        if (std::string_view(s.name.data(), strnlen(s.name.data(), s.name.size())) == name) return &s;
+    return nullptr;
+}
+
+template <class T>
+Result<void> Reader::read_section(std::string_view name, std::vector<T>& out) {
+    const Section* section = find(name);
+    if (!section) return fail("Section " + std::string(name) + " is missing.");
+    if (section->element_bytes != sizeof(T)) return fail("Section " + std::string(name) + " has elements of another size.");
+    out.resize(section->count);
+    in_.clear();
+    in_.seekg(static_cast<std::streamoff>(section->offset));
+    auto* bytes = reinterpret_cast<std::byte*>(out.data());
+    std::uint64_t page = 0;
+    for (const Section* before = sections_.data(); before != section; ++before) page += pages_of(*before);
+    const std::uint64_t total = section->count * section->element_bytes;
+    for (std::uint64_t at = 0; at < total; at += page_bytes, ++page) {
+        const std::uint64_t size = std::min(page_bytes, total - at);
+        if (!in_.read(reinterpret_cast<char*>(bytes + at), static_cast<std::streamsize>(size)))
+            return fail("The file ends within section " + std::string(name) + "; it was cut short while it was read.");
+        if (checksum(bytes + at, size) != checksums_[page])
+            return fail("Page " + std::to_string(at / page_bytes) + " of section " + std::string(name) + " is damaged.");
+        if constexpr (std::endian::native == std::endian::big) swap_elements(bytes + at, size, at, layout_of(*section));
+    }
+    return {};
+}
+
+template <class T>
+Result<void> Reader::map_section(std::string_view name, Array<T>& out) {
+    const Section* section = find(name);
+    if (!section) return fail("Section " + std::string(name) + " is missing.");
+    if (section->element_bytes != sizeof(T)) return fail("Section " + std::string(name) + " has elements of another size.");
+    if (section->offset % section_alignment != 0)
+        return fail("Section " + std::string(name) + " does not begin at a multiple of 64.");
+    // The mapping was made after the table was read: the file may have been replaced in between.
+    const auto bytes = mapping_->bytes();
+    const std::uint64_t size = section->count * section->element_bytes;
+    if (section->offset > bytes.size() || size > bytes.size() - section->offset)
+        return fail("Section " + std::string(name) + " does not fit in the file.");
+    out = Array<T>(std::span(reinterpret_cast<const T*>(bytes.data() + section->offset), section->count));
+    return {};
+}
+
+template <class T>
+Result<void> Reader::open_section(std::string_view name, Array<T>& out) {
+    if (is_optional(name) && !find(name)) return {};
+    if (mode_ == OpenMode::map) return map_section(name, out);
+    std::vector<T> values;
+    const auto r = read_section(name, values);
+    out = std::move(values);
+    return r;
+}
+
+Result<void> Reader::check_counts(const TreeGeometry& g, const TreeLuminance& l) const {
+    const std::size_t nodes = g.parents.size(), interior = g.first_leaf.size(), triangles = g.triangles.size();
+    if (interior == 0 || nodes <= interior || nodes >= no_node || triangles == 0 || triangles >= no_node)
+        return fail("The tree has no nodes or no triangles.");
+    const auto expect = [&](bool holds, const char* name) {
+        return holds ? Result<void>() : Result<void>(fail("Section " + std::string(name) + " has the wrong length."));
+    };
+    const std::size_t leaves = nodes - interior;
+    const std::pair<bool, const char*> checks[] = {
+        {g.positions.size() == nodes, "positions"},
+        {g.normals.size() == nodes, "normals"},
+        {g.colours.empty() || g.colours.size() == nodes, "colours"},
+        {g.uvs.empty() || g.uvs.size() == nodes, "uvs"},
+        {l.luminance.size() == nodes, "luminance"},
+        {g.leaf_end.size() == interior, "leaf_end"},
+        {g.subtree_end.size() == interior, "subtree_end"},
+        {g.first_triangle.size() == interior + 1, "first_triangle"},
+        {g.support_spheres.size() == interior, "support_spheres"},
+        {g.bounds.size() == interior, "bounds"},
+        {g.mask_at.size() == interior, "mask_at"},
+        {g.mask_records.size() > most_mask_bytes, "mask_records"},
+        {g.displacement.size() == interior, "displacement"},
+        {l.support_range.size() == interior, "support_range"},
+        {l.ring_range.size() == interior, "ring_range"},
+        {l.adaptation.size() == interior, "adaptation"},
+        {l.ring_chroma.empty() || (l.ring_chroma.size() == interior && !g.colours.empty()), "ring_chroma"},
+        {l.fold_errors.empty() || l.fold_errors.size() == interior, "fold_errors"},
+        {l.fold_stages.empty() || (!l.fold_errors.empty() && l.fold_stages.size() <= most_stages), "fold_stages"},
+        {g.source_triangles.size() == (g.ranges.empty() ? 0 : triangles), "source_triangles"},
+        {g.source_vertices.size() == leaves, "source_vertices"},
+        {g.texture.size() <= 1 && (g.texture.empty() || !g.uvs.empty()), "texture"},
+        {g.texels.empty() == g.texture.empty(), "texels"},
+        {g.ring_texture.size() == (g.texture.empty() ? 0 : interior), "ring_texture"}};
+    for (const auto& [holds, name] : checks)
+        if (const auto r = expect(holds, name); !r) return r;
+    if (const auto valid = validate(g.texture_view()); !valid) return fail(valid.error().message);
+    return {};
+}
+
+// That walking the tree stays within it: every interior node's children lie side by side and cover it.
+Result<void> Reader::check_structure(const TreeGeometry& g) const {
+    const NodeId interior = static_cast<NodeId>(g.first_leaf.size());
+    const auto broken = [&](NodeId node, const char* fault) { return fail("Node " + std::to_string(node) + " " + fault); };
+    if (const char* fault = fault_in_root(g)) return broken(0, fault);
+    for (NodeId node = 0; node < interior; ++node)
+        if (const char* fault = fault_in_links(g, node)) return broken(node, fault);
+    return {};
+}
+
+// That the ranges lie in the mesh that the tree was built from.
+Result<void> Reader::check_ranges(const TreeGeometry& g) const {
+    if (g.dropped_triangles > no_node) return fail("Section facts has a value out of range.");
+    const std::uint64_t triangles = g.triangles.size() + g.dropped_triangles;
+    for (const MeshRange& r : g.ranges)
+        if (r.first_triangle > triangles || r.triangle_count > triangles - r.first_triangle)
+            return fail("Range '" + r.name + "' ends after the last triangle.");
+    return {};
+}
+
+Result<void> Reader::read_facts(TreeGeometry& g, TreeLuminance& l) {
+    std::vector<Facts> facts;
+    std::vector<std::byte> ranges;
+    if (const auto r = read_section("facts", facts); !r) return r.error();
+    if (const auto r = read_section("ranges", ranges); !r) return r.error();
+    if (facts.size() != 1) return fail("Section facts has the wrong length.");
+    Facts& f = facts[0];
+    if constexpr (std::endian::native == std::endian::big) {
+        swap_components(reinterpret_cast<std::byte*>(f.origin), sizeof f.origin, 8);
+        swap_components(reinterpret_cast<std::byte*>(f.bounding_sphere), 40, 4);
+        swap_components(reinterpret_cast<std::byte*>(&f.dropped_triangles), 8, 8);
+        swap_components(reinterpret_cast<std::byte*>(&f.closedness), 8, 4);
+    }
+    if (!unpack_ranges(ranges, g.ranges)) return fail("Section ranges is malformed.");
+    if (f.closedness > static_cast<std::uint32_t>(Closedness::closed_inward)) return fail("Section facts is malformed.");
+    g.origin = {f.origin[0], f.origin[1], f.origin[2]};
+    g.bounding_sphere = {{f.bounding_sphere[0], f.bounding_sphere[1], f.bounding_sphere[2]}, f.bounding_sphere[3]};
+    g.dropped_triangles = f.dropped_triangles;
+    g.closedness = static_cast<Closedness>(f.closedness);
+    l.light = {{f.light[0], f.light[1], f.light[2]}, f.light[3]};
+    l.prelit = f.prelit != 0;
+    l.range = {f.luminance_range[0], f.luminance_range[1]};
+    const double sum = g.origin.x + g.origin.y + g.origin.z;
+    const auto is_finite = [](glm::vec3 v, float w) { return std::isfinite(v.x + v.y + v.z + w); };
+    const bool facts_finite = std::isfinite(sum) && is_finite(g.bounding_sphere.centre, g.bounding_sphere.radius) &&
+                              is_finite(l.light.direction, l.light.ambient) && l.range.lo >= 0 &&
+                              l.range.lo <= l.range.hi && l.range.hi <= 1 && g.bounding_sphere.radius >= 0;
+    if (!facts_finite) return fail("Section facts has a value out of range.");
+    return {};
+}
+
+Result<VertexTree> Reader::read() {
+    if (const auto r = read_table(); !r) return r.error();
+    if (mode_ == OpenMode::map) {
+        auto mapping = MappedFile::open(file_);
+        if (!mapping) return mapping.error();
+        mapping_ = std::move(*mapping);
+    }
+    auto geometry = std::make_shared<TreeGeometry>();
+    auto data = std::make_shared<VertexTree::Data>();
+    TreeGeometry& g = *geometry;
+    TreeLuminance& l = data->light;
+    g.mapping = mapping_;
+    Result<void> state;
+    std::size_t done = 0;
+    for_each_array(g, l, [&](std::string_view name, auto& values) {
+        if (!state) return;
+        if (progress_ && !progress_(static_cast<double>(done++) / static_cast<double>(sections_.size()), "reading"))
+            state = Error{ErrorCode::cancelled, "Reading " + file_.string() + " was cancelled."};
+        else state = open_section(name, values);
+    });
+    if (!state) return state.error();
+    if (const auto r = read_facts(g, l); !r) return r.error();
+    if (const auto r = check_counts(g, l); !r) return r.error();
+    if (const auto r = check_ranges(g); !r) return r.error();
+    l.textured = !g.texture.empty();
+    if (mode_ == OpenMode::map) {
+        data->checks = std::make_shared<NodeChecks>(g, l);
+        const char* fault = fault_in_root(g);
+        if (fault) return fail(std::string("Node 0 ") + fault);
+        if (!data->checks->is_sound(0)) return fail("Node 0 is damaged.");
+    } else {
+        if (const auto r = check_structure(g); !r) return r.error();
+        if (const std::string fault = fault_in_sections(g, l); !fault.empty()) return fail(fault);
+    }
+    data->geometry = std::move(geometry);
+    return VertexTree(std::move(data));
+}
+
+} // namespace
+
+Result<void> prepare_tree_file(const std::filesystem::path& file) {
+    const Result<AtomicFile> out = AtomicFile::create(file);
+    if (!out) return out.error();
+    AtomicFile::remove_orphans(file);
+    return {};
+}
+
+Result<void> write_tree(const std::filesystem::path& file, const VertexTree& tree, const Progress& progress) {
+    const TreeGeometry& g = *tree.data().geometry;
+    const TreeLuminance& l = tree.data().light;
+    Writer writer;
+    for_each_array(g, l, [&](std::string_view name, const auto& values) {
+        using T = typename std::remove_cvref_t<decltype(values)>::value_type;
+        if (is_optional(name) && values.empty()) return;
+        if (is_of_texture(name) && !l.textured) return;
+        writer.add(name, std::span<const T>(values), component_bytes<T>());
+    });
+    Facts facts = facts_of(g, l);
+    if constexpr (std::endian::native == std::endian::big) {
+        swap_components(reinterpret_cast<std::byte*>(facts.origin), sizeof facts.origin, 8);
+        swap_components(reinterpret_cast<std::byte*>(facts.bounding_sphere), 40, 4);
+        swap_components(reinterpret_cast<std::byte*>(&facts.dropped_triangles), 8, 8);
+        swap_components(reinterpret_cast<std::byte*>(&facts.closedness), 8, 4);
+    }
+    const std::vector<std::byte> ranges = pack_ranges(g.ranges);
+    writer.add("facts", std::span<const Facts>(&facts, 1), 1);
+    writer.add("ranges", std::span<const std::byte>(ranges), 1);
+    return writer.write(file, progress);
+}
+
+Result<VertexTree> read_tree(const std::filesystem::path& file, const Progress& progress) {
+    return Reader(file, OpenMode::read, progress).read();
+}
+
+Result<VertexTree> map_tree(const std::filesystem::path& file) {
+    // Mapped bytes stand as they are: hosts of the other byte order read the file.
+    constexpr OpenMode mode = std::endian::native == std::endian::little ? OpenMode::map : OpenMode::read;
+    return Reader(file, mode, {}).read();
+}
+
+bool is_tree_file(const std::filesystem::path& file) {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(file, error)) return false; // a pipe would wait for its writer
+    std::ifstream in(file, std::ios::binary);
+    std::array<char, 8> start{};
+    return in.read(start.data(), start.size()) && start == magic;
+}
+
+} // namespace unseen::vdtree

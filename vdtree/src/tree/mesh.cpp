@@ -1,0 +1,94 @@
+// Checks and repairs of triangle soups.
+#include <vdtree/mesh.h>
+
+#include <algorithm>
+
+#include <vdtree/internal/finite.h>
+
+namespace unseen::vdtree {
+
+namespace {
+
+Error invalid(const std::string& what) { return {ErrorCode::malformed_data, what}; }
+
+Result<void> check_length(const char* name, std::size_t length, std::size_t vertices) {
+    if (length == 0 || length == vertices) return {};
+    return invalid("The mesh has " + std::to_string(length) + " " + name + " for " + std::to_string(vertices) +
+                   " vertices; give one for each vertex or none.");
+}
+
+Result<void> check_ranges(const MeshView& mesh) {
+    std::uint64_t previous_first = 0;
+    for (std::size_t i = 0; i < mesh.ranges.size(); ++i) {
+        const MeshRange& range = mesh.ranges[i];
+        const std::uint64_t triangles = mesh.triangles.size();
+        // Not first + count: that sum can wrap around.
+        if (range.first_triangle > triangles || range.triangle_count > triangles - range.first_triangle) {
+            return invalid("Range " + std::to_string(i) + " ('" + range.name + "') of the mesh ends after the last of " +
+                           std::to_string(triangles) + " triangles; shorten it.");
+        }
+        if (range.first_triangle < previous_first) {
+            return invalid("Range " + std::to_string(i) + " ('" + range.name +
+                           "') of the mesh starts before the range in front of it; order them by first triangle.");
+        }
+        previous_first = range.first_triangle;
+    }
+    return {};
+}
+
+} // namespace
+
+Result<void> validate(const MeshView& mesh) {
+    const std::size_t vertices = mesh.positions.size();
+    for (std::size_t i = 0; i < vertices; ++i) {
+        if (!is_finite(mesh.positions[i])) {
+            return invalid("Vertex " + std::to_string(i) +
+                           " of the mesh has a NaN or infinite coordinate; remove it or give it a place.");
+        }
+    }
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+        for (const Index corner : mesh.triangles[i]) {
+            if (corner >= vertices) {
+                return invalid("Triangle " + std::to_string(i) + " of the mesh uses vertex " + std::to_string(corner) +
+                               ", but there are only " + std::to_string(vertices) + "; correct its indices.");
+            }
+        }
+    }
+    if (Result<void> checked = check_length("normals", mesh.normals.size(), vertices); !checked) return checked;
+    if (Result<void> checked = check_length("colours", mesh.colours.size(), vertices); !checked) return checked;
+    if (Result<void> checked = check_length("UVs", mesh.uvs.size(), vertices); !checked) return checked;
+    if (Result<void> checked = validate(mesh.texture); !checked) return checked;
+    if (!mesh.texture.empty() && mesh.uvs.empty()) {
+        return invalid("The mesh has a texture but no UVs, which say where it lies; give one for each vertex or no texture.");
+    }
+    return check_ranges(mesh);
+}
+
+std::uint64_t drop_degenerate_triangles(Mesh& mesh) {
+    const auto is_degenerate = [](const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2] == t[0]; };
+
+    // Numbers of the dropped triangles: few as a rule, so that ranges are moved by a search in them.
+    std::vector<std::uint64_t> dropped;
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+        if (is_degenerate(mesh.triangles[i])) dropped.push_back(i);
+        else mesh.triangles[kept++] = mesh.triangles[i];
+    }
+    if (dropped.empty()) return 0;
+    mesh.triangles.resize(kept);
+
+    const auto dropped_before = [&](std::uint64_t triangle) {
+        const auto found = std::lower_bound(dropped.begin(), dropped.end(), triangle);
+        return static_cast<std::uint64_t>(found - dropped.begin());
+    };
+    for (MeshRange& range : mesh.ranges) {
+        const std::uint64_t end = range.first_triangle + range.triangle_count;
+        const std::uint64_t new_end = end - dropped_before(end);
+        range.first_triangle -= dropped_before(range.first_triangle);
+        range.triangle_count = new_end - range.first_triangle;
+    }
+    std::erase_if(mesh.ranges, [](const MeshRange& range) { return range.triangle_count == 0; });
+    return dropped.size();
+}
+
+} // namespace unseen::vdtree

@@ -1,0 +1,207 @@
+// Checks everything that a vertex tree promises.
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+#include <optional>
+#include <string>
+
+#include <glm/geometric.hpp>
+
+#include "chroma.h"
+#include "tree/texture_bounds.h"
+#include "tree/vertex_tree_data.h"
+
+namespace unseen::vdtree {
+
+namespace {
+
+// Whether `inner` lies in `outer`. The difference of two floats is exact in double, squares and their sum lose a few units
+// in the last place: this much relative slack, far below the rounding outward of the radii, is not counted as a fault.
+constexpr double slack = 1e-14;
+
+bool contains(const Sphere& outer, glm::vec3 point, double radius) {
+    const glm::dvec3 d = glm::dvec3(point) - glm::dvec3(outer.centre);
+    return glm::length(d) + radius <= outer.radius * (1 + slack);
+}
+
+bool contains(PackedRange outer, PackedRange inner) { return outer.lo <= inner.lo && inner.hi <= outer.hi; }
+
+bool contains(const ChromaRange& outer, const ChromaRange& inner) {
+    return outer.lo.x <= inner.lo.x && outer.lo.y <= inner.lo.y && inner.hi.x <= outer.hi.x && inner.hi.y <= outer.hi.y;
+}
+
+class Verifier {
+public:
+    explicit Verifier(const SoundTree& tree) : tree_(tree), g_(*tree.data().geometry), l_(tree.data().light) {}
+
+    Result<void> run() {
+        for (NodeId node = 0; node < tree_.interior_count(); ++node) {
+            check_vertices(node);
+            check_children(node);
+            if (!fault_.empty()) return Error{ErrorCode::malformed_data, "Node " + std::to_string(node) + ": " + fault_};
+        }
+        for (NodeId node = 0; node < tree_.interior_count(); ++node)
+            for (Index t = g_.first_triangle[node]; t < g_.first_triangle[node + 1]; ++t)
+                if (vanishing_node(g_.triangles[t]) != node)
+                    return Error{ErrorCode::malformed_data,
+                                 "Triangle " + std::to_string(t) + " does not vanish at node " + std::to_string(node) + "."};
+        for (std::size_t t = 0; t < g_.triangles.size(); ++t) {
+            check_rings(g_.triangles[t]);
+            if (!fault_.empty())
+                return Error{ErrorCode::malformed_data, "Triangle " + std::to_string(t) + ": " + fault_};
+        }
+        return {};
+    }
+
+private:
+    void expect(bool holds, const char* what) {
+        if (!holds && fault_.empty()) fault_ = what;
+    }
+
+    // What the node promises of its own proxy and of the leaves that are its children.
+    void check_vertices(NodeId node) {
+        const glm::vec3 proxy = g_.positions[node];
+        expect(contains(g_.support_spheres[node], proxy, 0), "the support's sphere does not contain the proxy.");
+        expect(contains(g_.bounds[node].ring, proxy, 0), "the ring's sphere does not contain the proxy.");
+        if (!l_.fold_errors.empty()) {
+            const FoldError& e = l_.fold_errors[node];
+            const float values[] = {e.distance, e.mean_distance, e.luminance, e.wide_luminance, e.extent, e.drift};
+            expect(std::ranges::all_of(values, [](float value) { return value >= 0 && std::isfinite(value); }), "a fold error is no number of 0 or more.");
+        }
+        const Unorm16 y = l_.luminance[node];
+        expect(contains(l_.support_range[node], {y, y}), "the support's luminance does not contain the proxy's.");
+        if (pyramid_) {
+            const PackedRange texture = texture_of({node});
+            expect(contains(g_.ring_texture[node], texture), "the ring's texture does not contain the proxy's.");
+            expect(g_.support_spheres[node].radius == 0 || contains(l_.ring_range[node], product(shade_of({node}), texture)),
+                   "the ring's luminance does not contain what its proxy shows.");
+        }
+        expect(!has_chroma_ || contains(l_.ring_chroma[node], chroma_of(node)), "the ring's chroma does not contain the proxy's.");
+        const Index measured = std::min<Index>(g_.leaf_end[node], g_.first_leaf[node] + most_leaves_measured);
+        for (Index leaf = g_.first_leaf[node]; leaf < measured; ++leaf) {
+            const glm::vec3 p = g_.positions[tree_.interior_count() + leaf];
+            expect(glm::distance(glm::dvec3(p), glm::dvec3(proxy)) <= g_.displacement[node] * (1 + slack),
+                   "a leaf moves farther than the displacement.");
+        }
+    }
+
+    void check_errors(NodeId node, NodeId child) {
+        const FoldError &own = l_.fold_errors[node], &below = l_.fold_errors[child];
+        expect(own.distance >= below.distance && own.extent >= below.extent, "a child's fold error is larger.");
+        expect(own.facing.includes(below.facing), "a child's fold moves outlines seen from elsewhere.");
+        expect(own.stage >= below.stage, "a child folds in a later stage.");
+    }
+
+    void check_children(NodeId node) {
+        tree_.for_each_child(node, [&](NodeId child) {
+            if (tree_.is_leaf(child)) {
+                expect(contains(g_.support_spheres[node], g_.positions[child], 0),
+                       "the support's sphere does not contain a leaf.");
+                expect(contains(l_.support_range[node], {l_.luminance[child], l_.luminance[child]}),
+                       "the support's luminance does not contain a leaf's.");
+                return;
+            }
+            const Sphere &s = g_.support_spheres[child], &r = g_.bounds[child].ring;
+            expect(contains(g_.support_spheres[node], s.centre, s.radius), "a child's support sphere sticks out.");
+            expect(contains(g_.bounds[node].ring, r.centre, r.radius), "a child's ring sphere sticks out.");
+            expect(tree_.mask(node).includes(tree_.mask(child)), "a child's mask has other cells.");
+            expect(g_.bounds[node].slabs.includes(g_.bounds[child].slabs), "a child's slabs stick out.");
+            expect((g_.bounds[child].flags & ~g_.bounds[node].flags) == 0, "a child has other flags.");
+            expect(g_.displacement[node] >= g_.displacement[child], "a child's displacement is larger.");
+            expect(l_.adaptation[node] >= l_.adaptation[child], "a child's adaptation luminance is higher.");
+            if (!l_.fold_errors.empty()) check_errors(node, child);
+            expect(contains(l_.support_range[node], l_.support_range[child]), "a child's support luminance sticks out.");
+            expect(contains(l_.ring_range[node], l_.ring_range[child]), "a child's ring luminance sticks out.");
+            expect(!pyramid_ || contains(g_.ring_texture[node], g_.ring_texture[child]), "a child's texture sticks out.");
+            expect(!has_chroma_ || contains(l_.ring_chroma[node], l_.ring_chroma[child]), "a child's ring chroma sticks out.");
+        });
+    }
+
+    // That the lowest node which moves a corner knows the whole triangle; nesting carries it to the nodes above.
+    void check_rings(const Triangle& t) {
+        const NodeId interior = tree_.interior_count();
+        const glm::dvec3 a = g_.positions[interior + t[0]], b = g_.positions[interior + t[1]],
+                         c = g_.positions[interior + t[2]];
+        const glm::dvec3 normal = glm::cross(b - a, c - a);
+        const int cell = normal_cell(normal);
+        const PackedRange texture = pyramid_ ? texture_of({interior + t[0], interior + t[1], interior + t[2]}) : PackedRange{};
+        const PackedRange shown = pyramid_ ? product(shade_of({interior + t[0], interior + t[1], interior + t[2]}), texture) : PackedRange{};
+        const bool shows_through =
+            !g_.colours.empty() && std::any_of(t.begin(), t.end(), [&](Index leaf) { return !(g_.colours[interior + leaf].a >= 1); });
+        for (const Index leaf : t) {
+            NodeId node = g_.parents[interior + leaf];
+            while (node != no_node && g_.support_spheres[node].radius == 0) node = g_.parents[node];
+            if (node == no_node) continue; // everything is at one point
+            expect(!shows_through || (g_.bounds[node].flags & translucent_ring), "a corner's parent does not know of an alpha below 1.");
+            expect(cell < 0 || tree_.mask(node).contains(cell), "a normal is missing in the mask of a corner's parent.");
+            expect(!pyramid_ || contains(g_.ring_texture[node], texture), "a triangle's texture is outside of that of the ring of a corner's parent.");
+            expect(!pyramid_ || contains(l_.ring_range[node], shown),
+                   "what a triangle shows is outside of the luminance of the ring of a corner's parent.");
+            for (const Index corner : t) {
+                const Unorm16 y = l_.luminance[interior + corner];
+                expect(contains(g_.bounds[node].ring, g_.positions[interior + corner], 0),
+                       "a corner is outside of the ring sphere of another corner's parent.");
+                expect(pyramid_ || contains(l_.ring_range[node], {y, y}),
+                       "a corner's luminance is outside of the ring's of another corner's parent.");
+                expect(!has_chroma_ || contains(l_.ring_chroma[node], chroma_of(interior + corner)),
+                       "a corner's chroma is outside of the ring's of another corner's parent.");
+            }
+        }
+    }
+
+    // Of the texture over the box of these vertices, and of what it is multiplied with there.
+    PackedRange texture_of(std::initializer_list<NodeId> nodes) const {
+        UvBox box;
+        for (const NodeId node : nodes) box.include(g_.uvs[node]);
+        const TexturePyramid::Range range = pyramid_->range(box);
+        return {range.lo, range.hi};
+    }
+    PackedRange shade_of(std::initializer_list<NodeId> nodes) const {
+        PackedRange range{{Unorm16::largest}, {0}};
+        for (const NodeId node : nodes) {
+            const Unorm16 y = l_.luminance[node];
+            const PackedRange shade = g_.colours.empty() ? PackedRange{y, y} : channel_range(g_.colours[node], y);
+            range = {std::min(range.lo, shade.lo), std::max(range.hi, shade.hi)};
+        }
+        return range;
+    }
+
+    ChromaRange chroma_of(NodeId node) const {
+        const glm::vec2 chroma = drawn_chroma(g_.colours[node], l_.luminance[node]);
+        return {chroma, chroma};
+    }
+
+    NodeId vanishing_node(const Triangle& t) const {
+        const auto inside = [&](NodeId node) {
+            int corners = 0;
+            for (const Index leaf : t) corners += g_.first_leaf[node] <= leaf && leaf < g_.leaf_end[node];
+            return corners;
+        };
+        NodeId deepest = no_node;
+        for (const Index leaf : t) {
+            NodeId node = g_.parents[tree_.interior_count() + leaf];
+            while (inside(node) < 2) node = g_.parents[node];
+            if (deepest == no_node || node > deepest) deepest = node;
+        }
+        return deepest;
+    }
+
+    static constexpr Index most_leaves_measured = 4096;
+
+    const SoundTree& tree_;
+    const TreeGeometry& g_;
+    const TreeLuminance& l_;
+    const std::optional<TexturePyramid> pyramid_ = l_.textured ? std::optional<TexturePyramid>(g_.texture_view()) : std::nullopt;
+    const bool has_chroma_ = !l_.ring_chroma.empty() && !g_.colours.empty();
+    std::string fault_;
+};
+
+} // namespace
+
+Result<void> verify(const VertexTree& tree) {
+    const auto sound = SoundTree::of(tree);
+    if (!sound) return sound.error();
+    return Verifier(*sound).run();
+}
+
+} // namespace unseen::vdtree

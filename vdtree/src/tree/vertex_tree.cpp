@@ -1,0 +1,321 @@
+#include "tree/vertex_tree_data.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include <glm/geometric.hpp>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include "chroma.h"
+#include "tree/mask_pool.h"
+#include "tree/node_check.h"
+#include "tree/packed_range.h"
+#include "tree/texture_bounds.h"
+#include "tree/tree_parts.h"
+
+namespace unseen::vdtree {
+
+namespace {
+
+template <class T>
+std::uint64_t bytes_of(const Array<T>& a) {
+    return a.bytes();
+}
+
+constexpr PackedRange empty_range{{Unorm16::largest}, {0}};
+
+PackedRange unite(PackedRange a, Unorm16 y) { return unite(a, PackedRange{y, y}); }
+
+// Rounded up: eyes adapted to more light see no less.
+Unorm16 middle(PackedRange r) { return {static_cast<std::uint16_t>((r.lo.value + r.hi.value + 1) / 2)}; }
+
+// The range of the same length as `spread` that begins where `ring` does, within `ring`.
+PackedRange shortened(PackedRange ring, PackedRange spread) {
+    const int hi = ring.lo.value + (spread.hi.value - spread.lo.value);
+    return {ring.lo, {static_cast<std::uint16_t>(std::min<int>(ring.hi.value, hi))}};
+}
+
+// By leaf: the luminance of the triangles around, its own where there is none, and a third of their area, in double against
+// overflow at extreme scales. And the luminance of all corners.
+struct LeafSurroundings {
+    std::vector<PackedRange> ring;
+    std::vector<double> areas;
+    PackedRange corners = empty_range;
+};
+
+// By node: what the texture is multiplied with, over the three channels of colour; for others, the luminance alone.
+class Shades {
+public:
+    Shades(const TreeGeometry& g, std::span<const Unorm16> luminance, bool textured)
+        : luminance_(luminance), colours_(textured && !g.colours.empty() ? g.colours.data() : nullptr) {}
+
+    PackedRange operator[](NodeId node) const {
+        return colours_ ? channel_range(colours_[node], luminance_[node]) : PackedRange{luminance_[node], luminance_[node]};
+    }
+
+private:
+    std::span<const Unorm16> luminance_;
+    const glm::vec4* colours_; // null where they do not matter
+};
+
+LeafSurroundings survey_leaves(const TreeGeometry& g, const TreeParts& parts, const Shades& shades) {
+    const NodeId interior = static_cast<NodeId>(g.first_leaf.size());
+    LeafSurroundings out;
+    out.ring.assign(g.leaf_end[0], empty_range);
+    out.areas.assign(g.leaf_end[0], 0.0);
+    parts.for_each_triangle([&](const TreePart& part) {
+        return [&](Index triangle) {
+            const Triangle& t = g.triangles[triangle];
+            const glm::dvec3 a = g.positions[interior + t[0]], b = g.positions[interior + t[1]],
+                             c = g.positions[interior + t[2]];
+            const double area = glm::length(glm::cross(b - a, c - a)) / 6;
+            PackedRange range = empty_range;
+            for (const Index leaf : t) range = unite(range, shades[interior + leaf]);
+            for (const Index leaf : t) {
+                if (!parts.owns_leaf(part, leaf)) continue;
+                out.areas[leaf] += area;
+                out.ring[leaf] = unite(out.ring[leaf], range);
+            }
+        };
+    });
+    for (Index leaf = 0; leaf < out.ring.size(); ++leaf) {
+        if (out.ring[leaf] == empty_range) out.ring[leaf] = shades[interior + leaf];
+        else out.corners = unite(out.corners, shades[interior + leaf]);
+    }
+    return out;
+}
+
+// Area-weighted means over ranges of leaves.
+class RunningSums {
+public:
+    RunningSums(std::span<const double> areas, std::span<const Unorm16> luminance)
+        : before_(areas.size() + 1) {
+        double largest = 0;
+        for (const double a : areas) largest = std::max(largest, a);
+        const double scale = largest > 0 ? 1 / largest : 0;
+        for (std::size_t leaf = 0; leaf < areas.size(); ++leaf) {
+            const double area = areas[leaf] * scale, y = luminance[leaf].value;
+            const Sums& sums = before_[leaf];
+            before_[leaf + 1] = {sums.area + area, sums.weighted + area * y, sums.plain + y};
+        }
+    }
+
+    // In units of Unorm16.
+    double mean(Index begin, Index end) const {
+        // Below this share of the largest vertex area, per leaf, the difference of two running sums is rounding noise.
+        constexpr double least_mean_area = 1e-9;
+        const Sums &first = before_[begin], &last = before_[end];
+        const double area = last.area - first.area;
+        if (area > least_mean_area * (end - begin)) return (last.weighted - first.weighted) / area;
+        return (last.plain - first.plain) / (end - begin);
+    }
+
+private:
+    struct Sums {
+        double area = 0, weighted = 0, plain = 0;
+    };
+    std::vector<Sums> before_; // by leaf: over those before it
+};
+
+void light_leaves(const TreeGeometry& g, const Light& light, bool prelit, bool textured, std::span<Unorm16> luminance) {
+    constexpr NodeId grain = 4096; // leaves
+    const NodeId interior = static_cast<NodeId>(g.first_leaf.size()), nodes = static_cast<NodeId>(luminance.size());
+    tbb::parallel_for(tbb::blocked_range<NodeId>(interior, nodes, grain), [&](const auto& range) {
+        for (NodeId node = range.begin(); node < range.end(); ++node)
+            luminance[node] = Unorm16::nearest(
+                vertex_luminance(g.normals[node], g.colours.empty() ? nullptr : &g.colours[node], light, prelit, textured));
+    });
+}
+
+// What a node and all below it are multiplied with, or show.
+PackedRange range_below(const TreeGeometry& g, const Shades& shades, NodeId node) {
+    const NodeId interior = static_cast<NodeId>(g.first_leaf.size());
+    PackedRange range = empty_range;
+    for (NodeId below = node; below < g.subtree_end[node]; ++below) range = unite(range, shades[below]);
+    for (Index leaf = g.first_leaf[node]; leaf < g.leaf_end[node]; ++leaf) range = unite(range, shades[interior + leaf]);
+    return range;
+}
+
+// Whether all leaves of a node lie at one point, its proxy's: then folding it moves nothing.
+bool is_coincident(const TreeGeometry& g, NodeId node) { return g.support_spheres[node].radius == 0; }
+
+} // namespace
+
+float vertex_luminance(glm::vec3 normal, const glm::vec4* colour, const Light& light, bool prelit, bool textured) {
+    const float albedo =
+        colour ? std::clamp(0.2126f * colour->r + 0.7152f * colour->g + 0.0722f * colour->b, 0.0f, 1.0f)
+               : textured ? 1.0f : default_albedo;
+    if (prelit) return albedo;
+    const float lit = light.ambient + (1 - light.ambient) * std::max(0.0f, glm::dot(normal, light.direction));
+    // Unit vectors in floats may be a little long; an impossible light must not lead out of 0..1 either.
+    return std::max(0.0f, std::min(1.0f, albedo * lit));
+}
+
+TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, const Light& light, bool prelit, bool textured) {
+    textured = textured && !g.texels.empty();
+    const TreeLinks tree = links_of(g);
+    const NodeId interior = tree.interior();
+    LuminanceArrays<Vector> out;
+    out.luminance.resize(g.parents.size());
+    out.support_range.resize(interior);
+    out.ring_range.resize(interior);
+    out.adaptation.resize(interior);
+
+    light_leaves(g, light, prelit, textured, out.luminance);
+    const Shades shades(g, out.luminance, textured);
+    const LeafSurroundings leaf = survey_leaves(g, parts, shades);
+    // A proxy's luminance is the area-weighted mean of its leaves: folds keep the mean of their surroundings.
+    const RunningSums sums(leaf.areas, std::span(out.luminance).subspan(interior));
+
+    std::vector<PackedRange> of_vertices(textured ? interior : 0); // the rings, without the texture
+    const std::vector<std::uint8_t> moves_texture = textured ? find_texture_moves(g, parts) : std::vector<std::uint8_t>();
+    parts.bottom_up([&] {
+        return [&](NodeId node) {
+            PackedRange support = empty_range, ring = empty_range;
+            Unorm16 adaptation;
+            tree.for_each_child(
+                node,
+                [&](NodeId child) {
+                    support = unite(support, out.support_range[child]);
+                    ring = unite(ring, textured ? of_vertices[child] : out.ring_range[child]);
+                    if (is_coincident(g, child)) // its ring_range is narrower than its ring
+                        for (Index l = g.first_leaf[child]; l < g.leaf_end[child]; ++l) ring = unite(ring, leaf.ring[l]);
+                    adaptation = std::max(adaptation, out.adaptation[child]);
+                },
+                [&](Index l) {
+                    support = unite(support, out.luminance[interior + l]);
+                    ring = unite(ring, leaf.ring[l]);
+                });
+            // The mean lies within the leaves' range but for rounding.
+            const double mean = sums.mean(g.first_leaf[node], g.leaf_end[node]);
+            const Unorm16 y = std::clamp(Unorm16::nearest(mean / Unorm16::largest), support.lo, support.hi);
+            out.luminance[node] = y;
+            support = unite(support, y);
+            ring = unite(ring, shades[node]);
+            if (is_coincident(g, node) && !(textured && moves_texture[node])) {
+                // Nothing moves; a pixel of the ring changes by the spread of the coincident vertices at most. The
+                // contrast of that is largest on the ring's darkest luminance.
+                ring = shortened(ring, textured ? unite(support, range_below(g, shades, node)) : support);
+            }
+            out.support_range[node] = support;
+            if (textured) {
+                of_vertices[node] = ring;
+                PackedRange texture = g.ring_texture[node];
+                if (is_coincident(g, node) && !moves_texture[node]) texture.lo = texture.hi; // the brightest shows the spread best
+                ring = product(ring, texture);
+            }
+            out.ring_range[node] = ring;
+            out.adaptation[node] = std::max(adaptation, middle(ring));
+        };
+    });
+    std::vector<ChromaRange> chroma = derive_ring_chroma(g, parts, out.luminance);
+    TreeLuminance done{{std::move(out.luminance), std::move(out.support_range), std::move(out.ring_range),
+                        std::move(out.adaptation), std::move(chroma), {}, {}},
+                       light, prelit, textured, textured ? product(leaf.corners, g.ring_texture[VertexTree::root()]) : leaf.corners};
+    return done;
+}
+
+TreeLuminance copy_without_errors(const TreeLuminance& light) {
+    const auto copy_of = [](const auto& values) { return std::vector(values.begin(), values.end()); };
+    return {{copy_of(light.luminance), copy_of(light.support_range), copy_of(light.ring_range), copy_of(light.adaptation),
+             copy_of(light.ring_chroma), {}, {}},
+            light.light, light.prelit, light.textured, light.range};
+}
+
+VertexTree::VertexTree(std::shared_ptr<const Data> data) : data_(std::move(data)), checks_(data_->checks.get()) {
+    const TreeGeometry& g = *data_->geometry;
+    links_ = {g.parents, g.subtree_end, g.first_leaf, g.leaf_end, g.first_triangle, g.triangles};
+}
+VertexTree::VertexTree(VertexTree&&) noexcept = default;
+VertexTree& VertexTree::operator=(VertexTree&&) noexcept = default;
+VertexTree::~VertexTree() = default;
+
+glm::dvec3 VertexTree::origin() const noexcept { return data_->geometry->origin; }
+std::span<const glm::vec3> VertexTree::positions() const noexcept { return data_->geometry->positions; }
+std::span<const Unorm16> VertexTree::luminance() const noexcept { return data_->light.luminance; }
+std::span<const PackedNormal> VertexTree::normals() const noexcept { return data_->geometry->normals; }
+std::span<const glm::vec4> VertexTree::colours() const noexcept { return data_->geometry->colours; }
+std::span<const glm::vec2> VertexTree::uvs() const noexcept { return data_->geometry->uvs; }
+
+TextureView VertexTree::texture() const noexcept { return data_->light.textured ? data_->geometry->texture_view() : TextureView{}; }
+
+std::span<const NodeBounds> VertexTree::bounds() const noexcept { return data_->geometry->bounds; }
+NormalMask VertexTree::mask(NodeId node) const noexcept {
+    return unpack_mask(data_->geometry->mask_records, data_->geometry->mask_at[node]);
+}
+std::span<const Sphere> VertexTree::support_spheres() const noexcept { return data_->geometry->support_spheres; }
+std::span<const PackedRange> VertexTree::support_luminance() const noexcept { return data_->light.support_range; }
+std::span<const PackedRange> VertexTree::ring_luminance() const noexcept { return data_->light.ring_range; }
+std::span<const PackedRange> VertexTree::ring_texture() const noexcept {
+    return data_->light.textured ? std::span<const PackedRange>(data_->geometry->ring_texture) : std::span<const PackedRange>();
+}
+std::span<const ChromaRange> VertexTree::ring_chroma() const noexcept { return data_->light.ring_chroma; }
+std::span<const FoldError> VertexTree::fold_errors() const noexcept { return data_->light.fold_errors; }
+std::span<const FoldStage> VertexTree::fold_stages() const noexcept { return data_->light.fold_stages; }
+std::span<const Unorm16> VertexTree::adaptation_luminance() const noexcept { return data_->light.adaptation; }
+std::span<const float> VertexTree::displacement() const noexcept { return data_->geometry->displacement; }
+
+std::span<const Index> VertexTree::source_vertices() const noexcept { return data_->geometry->source_vertices; }
+std::span<const Index> VertexTree::source_triangles() const noexcept { return data_->geometry->source_triangles; }
+std::span<const MeshRange> VertexTree::ranges() const noexcept { return data_->geometry->ranges; }
+std::uint64_t VertexTree::dropped_triangles() const noexcept { return data_->geometry->dropped_triangles; }
+Closedness VertexTree::closedness() const noexcept { return data_->geometry->closedness; }
+Sphere VertexTree::bounding_sphere() const noexcept { return data_->geometry->bounding_sphere; }
+LuminanceRange VertexTree::luminance_range() const noexcept { return data_->light.range; }
+
+const Light& VertexTree::light() const noexcept { return data_->light.light; }
+bool VertexTree::is_prelit() const noexcept { return data_->light.prelit; }
+
+bool VertexTree::looks_sound(NodeId node) const { return checks_->is_sound(node); }
+
+NodeId VertexTree::first_damaged() const noexcept { return checks_ ? checks_->first_damaged() : no_node; }
+
+Result<void> VertexTree::check() const { return checks_ ? checks_->check_all() : Result<void>(); }
+
+Result<SoundTree> SoundTree::of(const VertexTree& tree) {
+    if (const auto sound = tree.check(); !sound) return sound.error();
+    return SoundTree(tree.share());
+}
+
+namespace {
+
+// The data of a tree whose luminance is found anew. There is nothing left to check.
+Result<std::shared_ptr<const VertexTree::Data>> shaded_anew(const VertexTree& tree, const Light& light, bool prelit, bool textured) {
+    const auto sound = SoundTree::of(tree);
+    if (!sound) return sound.error();
+    auto data = std::make_shared<VertexTree::Data>();
+    data->geometry = tree.data().geometry;
+    TreeParts parts(links_of(*data->geometry));
+    parts.assign_triangles(sound->first_triangle(), sound->triangles());
+    data->light = derive_luminance(*data->geometry, parts, light, prelit, textured);
+    return std::shared_ptr<const VertexTree::Data>(std::move(data));
+}
+
+} // namespace
+
+Result<VertexTree> VertexTree::relit(const Light& light) const {
+    auto data = shaded_anew(*this, light, false, data_->light.textured);
+    if (!data) return data.error();
+    return VertexTree(std::move(*data));
+}
+
+Result<VertexTree> VertexTree::untextured() const {
+    auto data = shaded_anew(*this, light(), is_prelit() && !colours().empty(), false);
+    if (!data) return data.error();
+    return VertexTree(std::move(*data));
+}
+
+std::uint64_t VertexTree::byte_size() const noexcept {
+    const TreeGeometry& g = *data_->geometry;
+    const TreeLuminance& l = data_->light;
+    return bytes_of(g.parents) + bytes_of(g.positions) + bytes_of(g.normals) + bytes_of(g.colours) + bytes_of(g.uvs) +
+           bytes_of(g.first_leaf) + bytes_of(g.leaf_end) + bytes_of(g.subtree_end) + bytes_of(g.first_triangle) +
+           bytes_of(g.bounds) + bytes_of(g.support_spheres) + bytes_of(g.mask_at) + bytes_of(g.mask_records) +
+           bytes_of(g.displacement) + bytes_of(g.triangles) + bytes_of(g.source_triangles) +
+           bytes_of(g.source_vertices) + bytes_of(g.texels) + bytes_of(g.ring_texture) + g.ranges.capacity() * sizeof(MeshRange) + bytes_of(l.luminance) + bytes_of(l.support_range) +
+           bytes_of(l.ring_range) + bytes_of(l.adaptation) + bytes_of(l.fold_errors) + bytes_of(l.fold_stages) + bytes_of(l.ring_chroma);
+}
+
+} // namespace unseen::vdtree
