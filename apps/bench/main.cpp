@@ -7,6 +7,7 @@
 #include <memory>
 
 #include <perception/csf.h>
+#include <vdtree/internal/number_text.h>
 
 #include "bench_tools.h"
 #include "budget_bench.h"
@@ -75,12 +76,10 @@ std::optional<std::uint64_t> parse_size(std::string_view text) {
     if (text.ends_with('k') || text.ends_with('K')) scale = 1e3;
     if (text.ends_with('M')) scale = 1e6;
     if (scale > 1) text.remove_suffix(1);
-    double value = 0;
-    const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (code != std::errc() || end != text.data() + text.size()) return std::nullopt;
+    const auto value = number_from<double>(text);
     constexpr double least = 100, most = 1e9;
-    if (!(value * scale >= least && value * scale <= most)) return std::nullopt;
-    return static_cast<std::uint64_t>(std::llround(value * scale));
+    if (!value || !(*value * scale >= least && *value * scale <= most)) return std::nullopt;
+    return static_cast<std::uint64_t>(std::llround(*value * scale));
 }
 
 std::vector<std::uint64_t> parse_sizes(std::string_view list) {

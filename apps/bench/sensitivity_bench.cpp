@@ -17,6 +17,7 @@
 #include <calibration/simulated_observer.h>
 #include <perception/csf.h>
 #include <perception/display.h>
+#include <vdtree/internal/number_text.h>
 
 #include "bench_tools.h"
 #include "log_log_plot.h"
@@ -43,16 +44,12 @@ struct Printed {
 };
 
 std::optional<Printed> printed(std::string_view text) {
-    Printed number;
-    const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), number.value);
-    if (code != std::errc() || end != text.data() + text.size() || !std::isfinite(number.value)) return std::nullopt;
+    const auto value = finite_from(text);
+    if (!value) return std::nullopt;
+    Printed number{.value = *value};
     const std::size_t point = text.find('.'), exponent = text.find_first_of("eE");
     const double decimals = point == text.npos ? 0 : static_cast<double>(std::min(exponent, text.size()) - point - 1);
-    int scale = 0;
-    if (exponent != text.npos) {
-        const std::size_t sign = text[exponent + 1] == '+' ? 1 : 0; // which from_chars does not take
-        std::from_chars(text.data() + exponent + 1 + sign, text.data() + text.size(), scale);
-    }
+    const int scale = exponent == text.npos ? 0 : number_from<int>(text.substr(exponent + 1)).value_or(0);
     number.half_unit = 0.5 * std::pow(10, scale - decimals);
     return number;
 }

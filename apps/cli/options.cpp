@@ -10,6 +10,7 @@
 #include <memory>
 
 #include <perception/criterion.h>
+#include <vdtree/internal/number_text.h>
 
 #include "terminal.h"
 
@@ -17,14 +18,6 @@ namespace unseen::app {
 namespace {
 
 constexpr int largest_window_px = 32768; // a side, as vdtree::validate has it
-
-std::optional<double> parse_number(std::string_view text) {
-    if (text.starts_with('+')) text.remove_prefix(1);
-    double value = 0;
-    const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (code != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
-    return value;
-}
 
 // "a, b or c".
 std::string listed(const std::vector<std::string>& names) {
@@ -38,7 +31,7 @@ template <class Accepts>
 CLI::Validator number_that(const std::string& requirement, Accepts accepts) {
     return CLI::Validator(
         [requirement, accepts](std::string& text) {
-            const auto value = parse_number(text);
+            const auto value = finite_from(text);
             if (value && accepts(*value)) return std::string();
             return "must be " + requirement + ", not '" + text + "'";
         },
@@ -49,8 +42,9 @@ CLI::Validator number_that(const std::string& requirement, Accepts accepts) {
 std::string parse_size(const std::string& text, int& width, int& height) {
     const std::size_t x = text.find('x');
     const auto side = [](std::string_view digits, int& value) {
-        const auto [end, code] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-        return code == std::errc() && end == digits.data() + digits.size() && value >= 1 && value <= largest_window_px;
+        const auto pixels = number_from<int>(digits);
+        if (pixels) value = *pixels;
+        return pixels && value >= 1 && value <= largest_window_px;
     };
     if (x != std::string::npos && side(std::string_view(text).substr(0, x), width) &&
         side(std::string_view(text).substr(x + 1), height))
@@ -107,7 +101,7 @@ CLI::Validator whole(double low, double high) {
     return CLI::Validator(
         [low, high](std::string& text) {
             const bool has_digits_only = !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
-            const auto value = parse_number(text);
+            const auto value = finite_from(text);
             if (has_digits_only && value && *value >= low && *value <= high) return std::string();
             return "must be a whole number from " + shortest(low) + " to " + shortest(high) + ", not '" + text + "'";
         },
@@ -234,12 +228,11 @@ CLI::Option* add_triangles_option(CLI::App& verb, std::uint32_t& triangles, cons
         .add_option_function<std::string>(
             "--triangles",
             [&triangles](const std::string& digits) {
-                std::uint64_t value = 0;
-                const auto [end, code] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-                if (code != std::errc() || end != digits.data() + digits.size() || value == 0)
+                const auto value = number_from<std::uint64_t>(digits);
+                if (!value || *value == 0)
                     refuse("--triangles: must be a whole number of 1 or more, not '" + digits + "'");
                 triangles = static_cast<std::uint32_t>(
-                    std::min<std::uint64_t>(value, std::numeric_limits<std::uint32_t>::max()));
+                    std::min<std::uint64_t>(*value, std::numeric_limits<std::uint32_t>::max()));
             },
             text)
         ->type_name("N");

@@ -18,6 +18,7 @@
 #include <jerror.h>
 
 #include <perception/image.h>
+#include <vdtree/colour.h>
 
 namespace unseen::app {
 namespace {
@@ -136,7 +137,6 @@ Result<Texture> decode_jpeg(std::string_view bytes, const std::filesystem::path&
 // ---- all others
 
 std::uint8_t code_of(double encoded) { return static_cast<std::uint8_t>(std::clamp(encoded, 0.0, 1.0) * 255 + 0.5); }
-double srgb(double linear) { return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055; }
 
 Result<Texture> to_texture(const perception::ImageFile& file, const std::filesystem::path& name) {
     const perception::Image& image = file.image;
@@ -153,7 +153,7 @@ Result<Texture> to_texture(const perception::ImageFile& file, const std::filesys
                 if (!(value >= 0 && value <= 1))
                     return malformed(name, "the value of pixel (" + std::to_string(x) + ", " + std::to_string(y) + ") is " + std::to_string(value) +
                                                ", and a texture has values from 0 to 1; scale them.");
-                texel[static_cast<std::size_t>(c)] = code_of(file.is_absolute ? srgb(static_cast<double>(value)) : static_cast<double>(value));
+                texel[static_cast<std::size_t>(c)] = code_of(file.is_absolute ? linear_to_srgb(static_cast<double>(value)) : static_cast<double>(value));
             }
             texture.texels.push_back(texel);
         }

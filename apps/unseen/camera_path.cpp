@@ -10,6 +10,7 @@
 
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <vdtree/internal/number_text.h>
 
 #include "terminal.h"
 
@@ -21,19 +22,11 @@ constexpr double least_orbit_degrees = 1e-4; // below, once around would take mi
 
 Error invalid(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
 
-std::string_view trimmed(std::string_view text) {
-    constexpr std::string_view spaces = " \t\r";
-    const std::size_t begin = text.find_first_not_of(spaces);
-    if (begin == std::string_view::npos) return {};
-    return text.substr(begin, text.find_last_not_of(spaces) - begin + 1);
-}
-
 template <class Number>
 bool parse(std::string_view text, Number& value) {
-    text = trimmed(text);
-    if (text.starts_with('+')) text.remove_prefix(1);
-    const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
-    return code == std::errc() && end == text.data() + text.size();
+    const auto parsed = number_from<Number>(trimmed(text));
+    if (parsed) value = *parsed;
+    return parsed.has_value();
 }
 
 // ---- orbits

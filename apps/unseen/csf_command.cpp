@@ -14,6 +14,7 @@
 #include <perception/csf.h>
 #include <perception/image.h>
 #include <perception/motion.h>
+#include <vdtree/internal/number_text.h>
 
 #include "log_log_plot.h"
 #include "options.h"
@@ -141,14 +142,6 @@ std::vector<std::string> split(const std::string& line) {
     return cells;
 }
 
-std::optional<double> number_in(const std::string& cell) {
-    double value = 0;
-    const char* begin = cell.data() + (cell.starts_with('+') ? 1 : 0);
-    const auto [end, code] = std::from_chars(begin, cell.data() + cell.size(), value);
-    if (code != std::errc() || end != cell.data() + cell.size() || !std::isfinite(value)) return std::nullopt;
-    return value;
-}
-
 // Puts a cell into the stimulus; columns of other names are none of ours. Empty cells count as missing.
 Result<void> read_cell(const std::string& column, const std::string& cell, StimulusOptions& stimulus) {
     if (cell.empty()) return {};
@@ -166,7 +159,7 @@ Result<void> read_cell(const std::string& column, const std::string& cell, Stimu
                                    : column == "distance"     ? &stimulus.distance
                                                               : nullptr;
     if (!value) return {};
-    *value = number_in(cell);
+    *value = finite_from(cell);
     if (!*value) return invalid(column + " must be a finite number, not '" + cell + "'.");
     return {};
 }

@@ -1,5 +1,6 @@
 // Fits of a display's transfer function, and photometers' tables.
 #include <calibration/display_fit.h>
+#include <vdtree/internal/number_text.h>
 
 #include <charconv>
 #include <cmath>
@@ -17,24 +18,11 @@ constexpr std::size_t most_rows = 100'000;
 
 Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
 
-std::string_view trimmed(std::string_view text) {
-    const std::size_t first = text.find_first_not_of(" \t\r"), last = text.find_last_not_of(" \t\r");
-    return first == text.npos ? std::string_view() : text.substr(first, last - first + 1);
-}
-
-std::optional<double> number_in(std::string_view text) {
-    text = trimmed(text);
-    double value = 0;
-    const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (code != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
-    return value;
-}
-
 // What is wrong with a further row, or nothing.
 std::string append_row(PhotometerTable& table, std::string_view line) {
     const std::size_t comma = line.find(',');
-    const auto code = number_in(line.substr(0, comma));
-    const auto luminance = comma == line.npos ? std::nullopt : number_in(line.substr(comma + 1));
+    const auto code = finite_from(trimmed(line.substr(0, comma)));
+    const auto luminance = comma == line.npos ? std::nullopt : finite_from(trimmed(line.substr(comma + 1)));
     if (!code || !luminance) return "must be a code and a luminance in cd/m2, such as 128,43.5";
     if (!(*code >= 0 && *code <= 255)) return "the code must lie in 0..255, not " + to_text(*code);
     if (!(*luminance >= 0)) return "the luminance must be 0 cd/m2 or more, not " + to_text(*luminance);

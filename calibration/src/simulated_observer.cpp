@@ -7,6 +7,7 @@
 
 #include <calibration/observer_profile.h>
 #include <perception/random.h>
+#include <vdtree/internal/number_text.h>
 
 #include "json_file.h"
 
@@ -40,13 +41,12 @@ Result<void> apply(SimulatedObserver& observer, std::string_view assignment) {
         return invalid("observer: '" + std::string(assignment) +
                        "' is none of gain=, frequency=, eccentricity=, slope=, lapse=, scatter= and delay=.");
     const std::string_view text = assignment.substr(equals + 1);
-    double value = 0;
-    const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (code != std::errc() || end != text.data() + text.size() || !(value >= key->least && value <= key->most))
+    const auto parsed = number_from<double>(text);
+    if (!parsed || !(*parsed >= key->least && *parsed <= key->most))
         return invalid("observer: " + std::string(name) + " must be a number from " + to_text(key->least) + " to " +
                        to_text(key->most) + ", not '" + std::string(text) + "'.");
-    if (key->value) observer.*key->value = value;
-    else observer.psychometric.*key->of_psychometric = value;
+    if (key->value) observer.*key->value = *parsed;
+    else observer.psychometric.*key->of_psychometric = *parsed;
     return {};
 }
 

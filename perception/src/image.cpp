@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <csetjmp>
 #include <cstdint>
@@ -31,6 +30,8 @@
 #include <png.h>
 
 #include <vdtree/internal/atomic_file.h>
+#include <vdtree/internal/number_text.h>
+#include <vdtree/colour.h>
 
 namespace unseen::perception {
 namespace {
@@ -302,9 +303,9 @@ std::string_view next_word(const Bytes& bytes, std::size_t& position) {
 
 template <class Number>
 bool parse(std::string_view word, Number& number) {
-    if (!word.empty() && word.front() == '+') word.remove_prefix(1);
-    const auto [end, code] = std::from_chars(word.data(), word.data() + word.size(), number);
-    return code == std::errc() && end == word.data() + word.size();
+    const auto parsed = number_from<Number>(word);
+    if (parsed) number = *parsed;
+    return parsed.has_value();
 }
 
 Result<PfmHeader> parse_pfm_header(const std::filesystem::path& file, const Bytes& bytes) {
@@ -736,7 +737,7 @@ Image to_luminance(const ImageFile& file, const Display& display) {
         double y = 0;
         for (std::size_t c = 0; c < channels; ++c) {
             const float value = in.values[p * channels + c];
-            y += (channels == 1 ? 1 : luminance_weights[c]) *
+            y += (channels == 1 ? 1 : rec709_weights[c]) *
                  (file.is_absolute ? static_cast<double>(value) : code_to_light(value));
         }
         out.values.push_back(static_cast<float>(file.is_absolute ? y : to_luminance(display, y).value()));

@@ -1,4 +1,5 @@
 // The display model: geometry, photometry, transfer functions and what it refuses.
+#include <vdtree/colour.h>
 #include <perception/display.h>
 
 #include <cmath>
@@ -216,7 +217,7 @@ TEST(Display, HeadsetsHaveThePixelsOfTheirLens) {
 }
 
 TEST(Display, LuminanceWeightsSumToOne) {
-    EXPECT_NEAR(luminance_weights[0] + luminance_weights[1] + luminance_weights[2], 1, rounding);
+    EXPECT_NEAR(rec709_weights[0] + rec709_weights[1] + rec709_weights[2], 1, rounding);
 }
 
 struct BadDisplay {

@@ -1,5 +1,6 @@
 // Image files: what is written is read again, every variant of the formats that we promise is understood, and nothing
 // that a file can contain crashes a reader or makes it allocate out of proportion.
+#include <vdtree/colour.h>
 #include <perception/image.h>
 
 #include <algorithm>
@@ -453,7 +454,7 @@ TEST(ToLuminance, DecodesCodesAndLeavesAbsoluteValues) {
         EXPECT_FLOAT_EQ(grey.at(2, 0), static_cast<float>(display.peak.value()));
     }
     const Image colour = to_luminance({{1, 1, 3, {1, 128 / 255.0F, 0}}, false, 8}, display);
-    const double linear = luminance_weights[0] + luminance_weights[1] * decode(display, 128 / 255.0);
+    const double linear = rec709_weights[0] + rec709_weights[1] * decode(display, 128 / 255.0);
     EXPECT_FLOAT_EQ(colour.at(0, 0), static_cast<float>(to_luminance(display, linear).value()));
     const Image absolute = to_luminance({{1, 1, 3, {10, 20, 30}}, true, 32}, display);
     EXPECT_FLOAT_EQ(absolute.at(0, 0), static_cast<float>(0.2126 * 10 + 0.7152 * 20 + 0.0722 * 30));

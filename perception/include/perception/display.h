@@ -77,7 +77,7 @@ double to_relative(const Display& display, Luminance luminance);
 double decode(const Display& display, double code);
 double encode(const Display& display, double linear);
 
-// Rec. 709 weights of linear RGB.
-inline constexpr double luminance_weights[3] = {0.2126, 0.7152, 0.0722};
+
+
 
 } // namespace unseen::perception

@@ -10,7 +10,7 @@
 #include <perception/csf.h>
 
 #include "csf/csf_model.h"
-#include "number_text.h"
+#include <vdtree/internal/number_text.h>
 
 namespace unseen::perception {
 
@@ -74,12 +74,12 @@ Result<void> check_axis(std::string_view field, std::span<const double> values, 
     for (std::size_t i = 0; i < values.size(); ++i) {
         const std::string place = indexed(field, {i});
         if (!std::isfinite(values[i]) || !std::isfinite(positions[i])) {
-            return bad(place + " must be a finite number in its range, but is " + number(values[i]));
+            return bad(place + " must be a finite number in its range, but is " + number_text(values[i]));
         }
-        if (values[i] > highest) return bad(place + " must be at most " + number(highest) + ", but is " + number(values[i]));
+        if (values[i] > highest) return bad(place + " must be at most " + number_text(highest) + ", but is " + number_text(values[i]));
         if (i > 0 && !(positions[i] - positions[i - 1] >= CsfTable::smallest_spacing)) {
-            return bad(place + " is " + number(values[i]) + " after " + number(values[i - 1]) +
-                       ": the values must rise from sample to sample, by at least " + number(CsfTable::smallest_spacing) +
+            return bad(place + " is " + number_text(values[i]) + " after " + number_text(values[i - 1]) +
+                       ": the values must rise from sample to sample, by at least " + number_text(CsfTable::smallest_spacing) +
                        (values.data() == positions.data() ? " degrees" : " octaves"));
         }
     }
@@ -149,9 +149,9 @@ std::vector<double> model_luminances(CsfModel model, const CsfConditions& condit
 }
 
 std::string model_source(CsfModel model, const CsfConditions& c) {
-    std::string text = std::string(name(model)) + ", closed form; " + number(c.temporal.value()) + " Hz, " +
-                       number(c.velocity.value()) + " degrees/s, area pi (1.5 / frequency)^2";
-    if (model == CsfModel::daly) return text + ", from " + number(c.distance.value()) + " m";
+    std::string text = std::string(name(model)) + ", closed form; " + number_text(c.temporal.value()) + " Hz, " +
+                       number_text(c.velocity.value()) + " degrees/s, area pi (1.5 / frequency)^2";
+    if (model == CsfModel::daly) return text + ", from " + number_text(c.distance.value()) + " m";
     if (!is_castle_family(model)) return text;
     switch (c.field) {
     case VisualField::nasal: return text + ", nasal field";
@@ -251,7 +251,7 @@ Result<CsfTable> CsfTable::create(CsfSamples samples, Branches branches) {
     if (auto ok = check_axis("eccentricity_deg", s.eccentricity_deg, s.eccentricity_deg, most_degrees); !ok) return ok.error();
     if (auto ok = check_axis("luminance_cdm2", s.luminance_cdm2, log2_luminance, most_cdm2); !ok) return ok.error();
     if (s.eccentricity_deg.front() != 0) {
-        return bad("eccentricity_deg[0] must be 0 (the fovea), but is " + number(s.eccentricity_deg.front()));
+        return bad("eccentricity_deg[0] must be 0 (the fovea), but is " + number_text(s.eccentricity_deg.front()));
     }
 
     const std::size_t columns = s.eccentricity_deg.size() * s.luminance_cdm2.size();
@@ -265,7 +265,7 @@ Result<CsfTable> CsfTable::create(CsfSamples samples, Branches branches) {
         if (!(s.sensitivity[i] > 0 && s.sensitivity[i] <= most_sensitive)) {
             const std::size_t column = i / frequencies, luminances = s.luminance_cdm2.size();
             return bad(indexed("sensitivity", {column / luminances, column % luminances, i % frequencies}) +
-                       " must be above 0 and at most 1e6, but is " + number(s.sensitivity[i]));
+                       " must be above 0 and at most 1e6, but is " + number_text(s.sensitivity[i]));
         }
     }
 
@@ -288,8 +288,8 @@ Result<CsfTable> CsfTable::from_model(CsfModel model, const CsfConditions& condi
     if (std::isnan(perception::sensitivity(model, stimulus(1, 0, 1)))) {
         return bad("temporal frequency and velocity must be finite and 0 or more, one of them 0, and the distance "
                    "above 0 m, but they are " +
-                   number(conditions.temporal.value()) + " Hz, " + number(conditions.velocity.value()) +
-                   " degrees/s and " + number(conditions.distance.value()) + " m");
+                   number_text(conditions.temporal.value()) + " Hz, " + number_text(conditions.velocity.value()) +
+                   " degrees/s and " + number_text(conditions.distance.value()) + " m");
     }
     CsfSamples samples;
     samples.source = model_source(model, conditions);

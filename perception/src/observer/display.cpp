@@ -5,7 +5,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "number_text.h"
+#include <vdtree/internal/number_text.h>
+#include <vdtree/colour.h>
 
 namespace unseen::perception {
 namespace {
@@ -14,14 +15,6 @@ Error bad(std::string message) { return Error{ErrorCode::invalid_argument, "disp
 
 // !(value > 0) is true for NaN as well.
 bool positive(double value) { return value > 0 && std::isfinite(value); }
-
-// IEC 61966-2-1. The threshold of `encode` is the image of that of `decode` to the standard's own rounding.
-double srgb_decode(double code) {
-    return code <= 0.04045 ? code / 12.92 : std::pow((code + 0.055) / 1.055, 2.4);
-}
-double srgb_encode(double linear) {
-    return linear <= 0.0031308 ? linear * 12.92 : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
-}
 
 // SMPTE ST 2084 (2014): 0..1 to cd/m2 and back, 10,000 at most.
 constexpr double pq_m1 = 2610.0 / 16384, pq_m2 = 2523.0 / 4096 * 128;
@@ -59,32 +52,32 @@ std::string in_brackets(const char* name, std::size_t i) { return std::string(na
 
 Result<void> check_transfer(const Display& d) {
     if (d.transfer == TransferFunction::gamma && !(d.gamma >= least_gamma && d.gamma <= largest_gamma))
-        return bad("transfer must be a gamma from 0.1 to 10, but is " + number(d.gamma));
+        return bad("transfer must be a gamma from 0.1 to 10, but is " + number_text(d.gamma));
     if (d.transfer == TransferFunction::pq && !(d.peak.value() <= pq_peak_cdm2))
-        return bad("peak_cdm2 must be at most 10000 cd/m2 with the transfer function pq, but is " + number(d.peak.value()));
+        return bad("peak_cdm2 must be at most 10000 cd/m2 with the transfer function pq, but is " + number_text(d.peak.value()));
     if (d.transfer != TransferFunction::table) return {};
     constexpr std::size_t least_size = 3, largest_size = 65536;
     if (d.table.size() < least_size || d.table.size() > largest_size)
         return bad("transfer_table must have 3 to 65536 values, but has " + std::to_string(d.table.size()));
     if (d.table.front() != 0 || d.table.back() != 1)
-        return bad("transfer_table must go from 0 to 1, but goes from " + number(d.table.front()) + " to " + number(d.table.back()));
+        return bad("transfer_table must go from 0 to 1, but goes from " + number_text(d.table.front()) + " to " + number_text(d.table.back()));
     for (std::size_t i = 1; i < d.table.size(); ++i)
-        if (!(d.table[i] > d.table[i - 1])) return bad(in_brackets("transfer_table", i) + " must be above the value before it, but is " + number(d.table[i]));
+        if (!(d.table[i] > d.table[i - 1])) return bad(in_brackets("transfer_table", i) + " must be above the value before it, but is " + number_text(d.table[i]));
     return {};
 }
 
 Result<void> check_lens(const Display& d) {
-    if (d.field_deg != 0 && !(d.field_deg >= least_field_deg && d.field_deg < 360)) return bad("field_deg must be from 0.1 to 360, but is " + number(d.field_deg));
+    if (d.field_deg != 0 && !(d.field_deg >= least_field_deg && d.field_deg < 360)) return bad("field_deg must be from 0.1 to 360, but is " + number_text(d.field_deg));
     if (d.lens.empty()) return {};
     if (d.lens.size() == 1 || d.lens.size() > 10'000)
         return bad("pixels_per_degree_at must have 2 to 10000 angles, but has " + std::to_string(d.lens.size()));
-    if (d.lens.front().angle_deg != 0) return bad("pixels_per_degree_at[0] must be at 0 degrees, but is at " + number(d.lens.front().angle_deg));
+    if (d.lens.front().angle_deg != 0) return bad("pixels_per_degree_at[0] must be at 0 degrees, but is at " + number_text(d.lens.front().angle_deg));
     for (std::size_t i = 0; i < d.lens.size(); ++i) {
         const PixelsPerDegreeAt& at = d.lens[i];
         if (i > 0 && !(at.angle_deg > d.lens[i - 1].angle_deg && at.angle_deg <= 180))
-            return bad(in_brackets("pixels_per_degree_at", i) + " must be at a larger angle than the one before it, up to 180 degrees, but is at " + number(at.angle_deg));
+            return bad(in_brackets("pixels_per_degree_at", i) + " must be at a larger angle than the one before it, up to 180 degrees, but is at " + number_text(at.angle_deg));
         if (!(positive(at.pixels_per_degree) && at.pixels_per_degree <= most_ppd))
-            return bad(in_brackets("pixels_per_degree_at", i) + " must have pixels per degree above 0 and at most 1e5, but has " + number(at.pixels_per_degree));
+            return bad(in_brackets("pixels_per_degree_at", i) + " must have pixels per degree above 0 and at most 1e5, but has " + number_text(at.pixels_per_degree));
     }
     return {};
 }
@@ -98,28 +91,28 @@ Result<void> validate(const Display& d) {
     if (d.width_px > most_pixels) return bad("width_px must be at most 1000000, but is " + std::to_string(d.width_px));
     if (d.height_px > most_pixels) return bad("height_px must be at most 1000000, but is " + std::to_string(d.height_px));
     if (!(d.pixel_pitch.value() >= smallest_pitch_m && d.pixel_pitch.value() <= largest_pitch_m)) {
-        return bad("pixel_pitch_m (or the diagonal_m that it follows from) must be a length from 1e-9 to 1 metre, but is " + number(d.pixel_pitch.value()));
+        return bad("pixel_pitch_m (or the diagonal_m that it follows from) must be a length from 1e-9 to 1 metre, but is " + number_text(d.pixel_pitch.value()));
     }
     if (!(d.distance.value() >= nearest_m && d.distance.value() <= farthest_m)) {
-        return bad("viewing_distance_m must be a length from 1 mm to 10 km, but is " + number(d.distance.value()));
+        return bad("viewing_distance_m must be a length from 1 mm to 10 km, but is " + number_text(d.distance.value()));
     }
     if (!positive(pixels_per_degree(d).value())) {
-        return bad("pixel_pitch_m " + number(d.pixel_pitch.value()) + " m at viewing_distance_m " + number(d.distance.value()) +
+        return bad("pixel_pitch_m " + number_text(d.pixel_pitch.value()) + " m at viewing_distance_m " + number_text(d.distance.value()) +
                    " m gives no finite number of pixels per degree");
     }
     if (!(positive(d.peak.value()) && d.peak.value() <= brightest_cdm2))
-        return bad("peak_cdm2 must be above 0 and at most 1e6 cd/m2, but is " + number(d.peak.value()));
+        return bad("peak_cdm2 must be above 0 and at most 1e6 cd/m2, but is " + number_text(d.peak.value()));
     if (!(d.black.value() >= darkest_cdm2 && d.black < d.peak)) {
-        return bad("black_cdm2 must be at least 1e-7 and below the peak of " + number(d.peak.value()) + " cd/m2, but is " +
-                   number(d.black.value()));
+        return bad("black_cdm2 must be at least 1e-7 and below the peak of " + number_text(d.peak.value()) + " cd/m2, but is " +
+                   number_text(d.black.value()));
     }
     if (auto ok = check_transfer(d); !ok) return ok;
     if (auto ok = check_lens(d); !ok) return ok;
     if (!(d.ambient.value() >= 0 && d.ambient.value() <= brightest_ambient_lux)) {
-        return bad("ambient_lux must be 0 to 1e6 lux, but is " + number(d.ambient.value()));
+        return bad("ambient_lux must be 0 to 1e6 lux, but is " + number_text(d.ambient.value()));
     }
     if (!(d.reflectivity >= 0 && d.reflectivity <= 1)) {
-        return bad("reflectivity must lie in 0..1, but is " + number(d.reflectivity));
+        return bad("reflectivity must lie in 0..1, but is " + number_text(d.reflectivity));
     }
     return {};
 }
@@ -188,7 +181,7 @@ double to_relative(const Display& display, Luminance luminance) {
 double decode(const Display& display, double code) {
     const double magnitude = std::abs(code);
     switch (display.transfer) {
-    case TransferFunction::srgb: return std::copysign(srgb_decode(magnitude), code);
+    case TransferFunction::srgb: return std::copysign(srgb_to_linear(magnitude), code);
     case TransferFunction::gamma: return std::copysign(std::pow(magnitude, display.gamma), code);
     case TransferFunction::pq:
         return std::copysign(std::min(pq_decode(std::min(magnitude, 1.0)) / display.peak.value(), 1.0), code);
@@ -201,7 +194,7 @@ double decode(const Display& display, double code) {
 double encode(const Display& display, double linear) {
     const double magnitude = std::abs(linear);
     switch (display.transfer) {
-    case TransferFunction::srgb: return std::copysign(srgb_encode(magnitude), linear);
+    case TransferFunction::srgb: return std::copysign(linear_to_srgb(magnitude), linear);
     case TransferFunction::gamma: return std::copysign(std::pow(magnitude, 1 / display.gamma), linear);
     case TransferFunction::pq: return std::copysign(pq_encode(magnitude * display.peak.value()), linear);
     case TransferFunction::table: return std::copysign(table_encode(display.table, magnitude), linear);

@@ -16,7 +16,7 @@
 #include <perception/random.h>
 #include <vdtree/internal/atomic_file.h>
 
-#include "number_text.h"
+#include <vdtree/internal/number_text.h>
 
 namespace unseen::perception {
 namespace {
@@ -40,19 +40,14 @@ std::string complaint_about(const GazeSample& sample, const GazeSample* before) 
     if (!std::isfinite(sample.time_s)) return "has a time_s that is not finite";
     for (const auto& [name, px] : {std::pair("x_px", sample.px.x), std::pair("y_px", sample.px.y)}) {
         if (!std::isfinite(px)) return "has an " + std::string(name) + " that is not finite";
-        if (std::abs(px) > farthest_px) return "has an " + std::string(name) + " of " + number(px) + ": at most a million pixels aside can be";
+        if (std::abs(px) > farthest_px) return "has an " + std::string(name) + " of " + number_text(px) + ": at most a million pixels aside can be";
     }
     if (!before) return {};
     if (!(sample.time_s > before->time_s))
-        return "is out of order: time_s " + number(sample.time_s) + " s comes after " + number(before->time_s) + " s";
+        return "is out of order: time_s " + number_text(sample.time_s) + " s comes after " + number_text(before->time_s) + " s";
     if (!(sample.time_s - before->time_s <= GazeTrace::longest_gap_s))
-        return "follows a gap of " + number(sample.time_s - before->time_s) + " s: at most 1 s may be missing";
+        return "follows a gap of " + number_text(sample.time_s - before->time_s) + " s: at most 1 s may be missing";
     return {};
-}
-
-std::string_view trimmed(std::string_view text) {
-    const std::size_t first = text.find_first_not_of(" \t\r"), last = text.find_last_not_of(" \t\r");
-    return first == text.npos ? std::string_view() : text.substr(first, last - first + 1);
 }
 
 // "0.004,512,384.5".
@@ -62,8 +57,9 @@ std::optional<GazeSample> parse_sample(std::string_view line) {
         const std::size_t comma = line.find(',');
         if ((comma == line.npos) != (i + 1 == values.size())) return std::nullopt;
         const std::string_view cell = trimmed(line.substr(0, comma));
-        const auto [end, code] = std::from_chars(cell.data(), cell.data() + cell.size(), values[i]);
-        if (code != std::errc() || end != cell.data() + cell.size()) return std::nullopt;
+        const auto value = number_from<double>(cell);
+        if (!value) return std::nullopt;
+        values[i] = *value;
         if (comma != line.npos) line.remove_prefix(comma + 1);
     }
     return GazeSample{values[0], {values[1], values[2]}};
@@ -182,7 +178,7 @@ Result<GazeTrace> read_gaze_trace(const std::filesystem::path& file) {
 
 Result<void> write_gaze_trace(const std::filesystem::path& file, const GazeTrace& trace) {
     std::string text = "time_s,x_px,y_px\n";
-    for (const GazeSample& s : trace.samples()) text += number(s.time_s) + "," + number(s.px.x) + "," + number(s.px.y) + "\n";
+    for (const GazeSample& s : trace.samples()) text += number_text(s.time_s) + "," + number_text(s.px.x) + "," + number_text(s.px.y) + "\n";
     auto whole = vdtree::AtomicFile::create(file);
     if (!whole) return whole.error();
     if (auto written = whole->write(text); !written) return written;
@@ -217,9 +213,9 @@ Result<GazeTrace> simulate_gaze(const SimulatedGaze& o, const Display& display) 
 
 Result<void> validate(const TrackerOptions& o) {
     constexpr double widest_deg = 180, slowest_s = 10;
-    if (!(o.error_deg >= 0 && o.error_deg <= widest_deg)) return invalid("The gaze's error must lie in 0 to 180 degrees, not " + number(o.error_deg) + ".");
-    if (!(o.latency_s >= 0 && o.latency_s <= slowest_s)) return invalid("The gaze's latency must lie in 0 to 10 s, not " + number(o.latency_s) + ".");
-    if (!(o.suppressed_s >= 0 && o.suppressed_s <= 1)) return invalid("Suppression must last 0 to 1 s, not " + number(o.suppressed_s) + ".");
+    if (!(o.error_deg >= 0 && o.error_deg <= widest_deg)) return invalid("The gaze's error must lie in 0 to 180 degrees, not " + number_text(o.error_deg) + ".");
+    if (!(o.latency_s >= 0 && o.latency_s <= slowest_s)) return invalid("The gaze's latency must lie in 0 to 10 s, not " + number_text(o.latency_s) + ".");
+    if (!(o.suppressed_s >= 0 && o.suppressed_s <= 1)) return invalid("Suppression must last 0 to 1 s, not " + number_text(o.suppressed_s) + ".");
     return {};
 }
 

@@ -194,17 +194,6 @@ std::string counted_were(std::uint64_t count, const std::string& noun) {
     return std::to_string(count) + " " + noun + (count == 1 ? " was" : "s were");
 }
 
-float srgb_to_linear(float encoded) {
-    // 0.04045 and not 0.03928: the value of IEC 61966-2-1, where the two branches meet.
-    if (!(encoded > 0.04045f)) return encoded / 12.92f;
-    return std::pow((encoded + 0.055f) / 1.055f, 2.4f);
-}
-
-float linear_to_srgb(float linear) {
-    if (!(linear > 0.0031308f)) return linear * 12.92f;
-    return 1.055f * std::pow(linear, 1.0f / 2.4f) - 0.055f;
-}
-
 glm::vec4 decode_colour(glm::vec4 encoded, ColourEncoding encoding) {
     if (encoding == ColourEncoding::linear) return encoded;
     return {srgb_to_linear(encoded.r), srgb_to_linear(encoded.g), srgb_to_linear(encoded.b), encoded.a};

@@ -11,6 +11,7 @@
 #include <glm/vec4.hpp>
 
 #include <meshio/mesh_io.h>
+#include <vdtree/colour.h>
 
 namespace unseen::meshio {
 
@@ -65,9 +66,6 @@ std::string in_quotes(std::string_view text);
 // "1 face was", "3 faces were".
 std::string counted_were(std::uint64_t count, const std::string& noun);
 
-// One colour channel 0..1 to linear light; IEC 61966-2-1 for sRGB.
-float srgb_to_linear(float encoded);
-float linear_to_srgb(float linear);
 // Decodes the colour channels as the options say; alpha is linear in every format.
 glm::vec4 decode_colour(glm::vec4 encoded, ColourEncoding encoding);
 

@@ -8,21 +8,16 @@
 #include <string>
 
 #include <tbb/parallel_for.h>
+#include <vdtree/colour.h>
 
 namespace unseen::vdtree {
 
 namespace {
 
-// IEC 61966-2-1.
-double decoded(int code) {
-    const double c = code / 255.0;
-    return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
-}
-
 const std::array<double, 256>& linear_of_code() {
     static const std::array<double, 256> table = [] {
         std::array<double, 256> t{};
-        for (int code = 0; code < 256; ++code) t[static_cast<std::size_t>(code)] = decoded(code);
+        for (int code = 0; code < 256; ++code) t[static_cast<std::size_t>(code)] = srgb_to_linear(code / 255.0);
         return t;
     }();
     return table;
@@ -74,7 +69,7 @@ glm::vec4 linear_colour(Texel texel) noexcept {
 
 double linear_luminance(Texel texel) noexcept {
     const auto& linear = linear_of_code();
-    return 0.2126 * linear[texel[0]] + 0.7152 * linear[texel[1]] + 0.0722 * linear[texel[2]];
+    return rec709_luminance(glm::dvec3(linear[texel[0]], linear[texel[1]], linear[texel[2]]));
 }
 
 TexturePyramid::TexturePyramid(const TextureView& texture)

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include <tbb/parallel_for.h>
+#include <vdtree/colour.h>
 
 namespace unseen::vdtree {
 
@@ -22,7 +23,7 @@ PackedRange product(PackedRange luminance, PackedRange texture) {
 
 PackedRange channel_range(const glm::vec4& colour, Unorm16 luminance) {
     const glm::dvec3 rgb(colour);
-    const double own = 0.2126 * rgb.r + 0.7152 * rgb.g + 0.0722 * rgb.b;
+    const double own = rec709_luminance(rgb);
     if (!(own > 0)) return {luminance, luminance}; // drawn grey
     const double least = std::min({rgb.r, rgb.g, rgb.b}) / own, most = std::max({rgb.r, rgb.g, rgb.b}) / own;
     return {std::min(down(luminance.value * least), luminance), std::max(up(luminance.value * most), luminance)};

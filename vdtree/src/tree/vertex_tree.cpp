@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <vdtree/colour.h>
 
 #include "chroma.h"
 #include "tree/mask_pool.h"
@@ -145,7 +146,7 @@ bool is_coincident(const TreeGeometry& g, NodeId node) { return g.support_sphere
 
 float vertex_luminance(glm::vec3 normal, const glm::vec4* colour, const Light& light, bool prelit, bool textured) {
     const float albedo =
-        colour ? std::clamp(0.2126f * colour->r + 0.7152f * colour->g + 0.0722f * colour->b, 0.0f, 1.0f)
+        colour ? std::clamp(rec709_luminance(glm::vec3(*colour)), 0.0f, 1.0f)
                : textured ? 1.0f : default_albedo;
     if (prelit) return albedo;
     const float lit = light.ambient + (1 - light.ambient) * std::max(0.0f, glm::dot(normal, light.direction));
