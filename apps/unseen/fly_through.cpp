@@ -258,7 +258,7 @@ private:
         if (drawing) {
             render::DrawOptions draw = options_.draw;
             draw.background = scene_.background;
-            draw.lighting = scene_.lights();
+            draw.lighting = scene_.lighting;
             render::Renderer& renderer = drawing->renderer;
             frame = follower_.geomorph() ? renderer.draw(*follower_.geomorph(), scene_.view, draw, scene_.placement)
                                          : renderer.draw(cut_, scene_.view, draw, scene_.placement);

@@ -30,8 +30,8 @@ struct Verdicts {
 
 class JudgedModel {
 public:
-    // The context must outlive the model.
-    static Result<JudgedModel> create(render::Context& context, std::string name, vdtree::VertexTree tree, int window_px,
+    // Keeps a handle to the context.
+    static Result<JudgedModel> create(const render::Context& context, std::string name, vdtree::VertexTree tree, int window_px,
                                       perception::CsfModel second = usual_second);
 
     const std::string& name() const { return name_; }
@@ -69,7 +69,7 @@ private:
     Result<const perception::Image*> full();
     Result<perception::Judgement> judge(const Picture& picture, const WhatOptions& what, Judge judge);
 
-    render::Context* context_ = nullptr;
+    std::optional<render::Context> context_;
     std::string name_;
     perception::CsfModel second_ = usual_second;
     ViewOptions view_;

@@ -65,7 +65,7 @@ Result<int> run(RenderArguments& a) {
     const Simplification& result = *simplified;
     render::DrawOptions options = a.draw;
     options.background = scene->background;
-    options.lighting = scene->lights();
+    options.lighting = scene->lighting;
     const auto frame = renderer->draw(cut, scene->view, options, scene->placement);
     if (!frame) return frame.error();
 

@@ -37,7 +37,6 @@ struct Scene {
     std::optional<calibration::LightRig> rig = {};
     std::optional<vdtree::Lighting> lighting = {}; // as of the view and the time of light_at()
     std::shared_ptr<const vdtree::LightBounds> light_bounds = {};
-    const vdtree::Lighting* lights() const { return lighting ? &*lighting : nullptr; } // to draw with
 
     const perception::CsfTable& csf_table() const { return csf ? *csf : perception::CsfTable::standard(); }
 

@@ -91,7 +91,7 @@ Result<void> draw_pictures(Column& column, const vdtree::Cut& cut, const Scene& 
     render::DrawOptions options;
     options.samples = a.samples;
     options.background = scene.background;
-    options.lighting = scene.lights();
+    options.lighting = scene.lighting;
     const auto whole = renderer.draw(cut, scene.view, options, scene.placement);
     if (!whole) return whole.error();
     column.draw_ms = whole->draw_ms;

@@ -205,7 +205,7 @@ private:
         follower_.let_pass(std::chrono::duration<double>(start - std::exchange(last_frame_, start)).count());
         if (plays_gaze_) gaze_.apply(what_, scene_, std::chrono::duration<double>(start - first_frame_).count());
         if (auto lit = light_at(scene_, std::chrono::duration<double>(start - first_frame_).count()); !lit) return lit;
-        draw_.lighting = scene_.lights();
+        draw_.lighting = scene_.lighting;
         const auto result = follower_.follow(cut_, scene_, what_);
         if (!result) return result.error();
         const vdtree::Geomorph* const geomorph = follower_.geomorph();

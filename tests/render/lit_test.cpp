@@ -94,7 +94,7 @@ TEST_P(Lit, VerticesAreAsBrightAsTheFormulaSays) {
         if (std::abs(normal.y) > 0.9) view.up = {1, 0, 0};
         render::DrawOptions options;
         options.samples = 1;
-        options.lighting = &lighting;
+        options.lighting = lighting;
         const auto frame = renderer->draw(cut, view, options);
         ASSERT_TRUE(frame) << frame.error().message;
         const double expected = vdtree::lit_luminance(lighting, position, normal, static_cast<double>(vdtree::albedo_of(tree, node)), view.eye - tree.origin());
@@ -125,7 +125,7 @@ TEST_P(Lit, SimplificationsCannotBeToldFromTheWhole) {
             ASSERT_TRUE(cut.follow(*criterion, viewpoint));
             kept += cut.triangle_count();
             all += whole.triangle_count();
-            const auto draw = [&](const Cut& of) { return oracle::draw(*renderer, of, look.view, 36, &lighting); };
+            const auto draw = [&](const Cut& of) { return oracle::draw(*renderer, of, look.view, 36, lighting); };
             const perception::Judgement judged = oracle::judge(draw(whole), draw(cut), look, perception::CsfModel::castle);
             EXPECT_EQ(judged.visible_pixels, 0) << lights().name << ", from " << oracle::words(look) << ", " << cut.triangle_count() << " of "
                                                 << whole.triangle_count();
@@ -142,7 +142,7 @@ TEST_P(Lit, RefusesLightsThatCannotBe) {
     ASSERT_TRUE(renderer) << renderer.error().message;
     const Lighting dark;
     render::DrawOptions options;
-    options.lighting = &dark;
+    options.lighting = dark;
     View view;
     view.eye = {0, 0, 5};
     const auto frame = renderer->draw(Cut(tree), view, options);

@@ -56,7 +56,7 @@ inline std::string words(const Look& look) {
 
 // Luminance in cd/m2 of the usual display.
 inline perception::Image draw(render::Renderer& renderer, const vdtree::Cut& cut, const vdtree::View& view, int samples = 64,
-                              const vdtree::Lighting* lighting = nullptr) {
+                              const std::optional<vdtree::Lighting>& lighting = {}) {
     render::DrawOptions options;
     options.samples = samples;
     options.background = background;

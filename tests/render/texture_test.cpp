@@ -186,7 +186,7 @@ TEST_F(Textured, AreLitByLights) {
         for (const auto shading : {render::Shading::smooth, render::Shading::flat}) {
             render::DrawOptions options{.shading = shading};
             const render::Frame plain = draw(tree, 4, 64, options);
-            options.lighting = &lighting;
+            options.lighting = lighting;
             const render::Frame lit = draw(tree, 4, 64, options);
             for (const auto& [x, y] : {std::pair(16, 16), std::pair(48, 16), std::pair(16, 48), std::pair(30, 33)}) {
                 glm::dvec3 expected = colour(plain, x, y) * (0.1 + intensity) + intensity * specular * 9 / 8;

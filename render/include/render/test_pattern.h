@@ -43,8 +43,8 @@ struct TestPattern {
 // frame, so that its mean is right (spatio-temporal dithering); beyond the codes' range it is clipped.
 class TestPatternDrawer {
 public:
-    // `code_luminances`: cd/m2 of the 256 codes, finite and ascending. The context must outlive the drawer.
-    static Result<TestPatternDrawer> create(Context& context, std::span<const double> code_luminances);
+    // `code_luminances`: cd/m2 of the 256 codes, finite and ascending. Keeps a handle to the context.
+    static Result<TestPatternDrawer> create(const Context& context, std::span<const double> code_luminances);
     TestPatternDrawer(TestPatternDrawer&&) noexcept;
     TestPatternDrawer& operator=(TestPatternDrawer&&) noexcept;
     ~TestPatternDrawer();
