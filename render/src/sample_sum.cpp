@@ -132,6 +132,7 @@ Result<void> SampleSum::begin(float background) {
 }
 
 Result<void> SampleSum::add() {
+    if (impl_->count >= most_samples) return check({.samples = impl_->count + 1});
     return in_context(impl_->context(), "Adding a sample", [&]() -> Result<void> {
         impl_->add(nullptr);
         return {};

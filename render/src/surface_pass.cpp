@@ -143,6 +143,8 @@ Result<SurfacePass> SurfacePass::prepare(std::span<const Item> items, const Came
         return invalid("The view is of " + std::to_string(view.width) + "x" + std::to_string(view.height) +
                        " pixels, and the target has " + std::to_string(target.width) + "x" +
                        std::to_string(target.height) + ".");
+    if (!std::isfinite(camera.point.x) || !std::isfinite(camera.point.y))
+        return invalid("The camera's point of each pixel must be finite.");
     if (camera.near_plane && !(*camera.near_plane > 0 && std::isfinite(*camera.near_plane)))
         return invalid("The near plane's distance must be positive and finite, not " +
                        std::to_string(*camera.near_plane) + ".");

@@ -27,9 +27,9 @@ using unseen::vdtree::View;
 
 constexpr int window = 128;
 constexpr float value_tolerance = 1e-5f; // relative luminance: a rasteriser's interpolation in float
-// Where surfaces meet, depths of two trees, each rounded in its own frame, may tell another one the nearer, and pixels
-// at edges may lie on the other side. That takes a hundredth of the picture's pixels at most, and the rest is equal.
-constexpr double most_flipped = 0.01;
+// The share of pixels that may differ. Where surfaces meet, depths are rounded in each tree's own frame and may tell
+// another one the nearer; pixels at outlines may lie on the other side.
+constexpr double most_flipped = 0.002;
 
 Similarity at(glm::dvec3 place, double scale = 1) {
     Similarity placement;
@@ -111,7 +111,7 @@ TEST_F(SceneTest, TreesThatInterpenetrateLookLikeOneMesh) {
             EXPECT_LT(flipped_share(picture({first, second}, view), expected), most_flipped) << size << ", " << eye.x;
             EXPECT_LT(flipped_share(picture({second, first}, view), expected), most_flipped) << size << ", " << eye.x;
             // Or else it would not be seen whether depth is compared across items.
-            EXPECT_GT(flipped_share(picture({first}, view), expected), 5 * most_flipped);
+            EXPECT_GT(flipped_share(picture({first}, view), expected), 25 * most_flipped);
         }
     }
 }
@@ -282,6 +282,10 @@ TEST_F(SceneTest, AnEmptySceneIsTheBackground) {
     ASSERT_TRUE(sum);
     ASSERT_TRUE(sum->draw({}, frontal_view(4, 4), {.samples = 3, .background = 0.4f}));
     EXPECT_THAT(*sum->mean(), Each(glm::vec4(0.4f)));
+    ASSERT_TRUE(sum->begin(0.4f));
+    for (int i = 0; i < 256; ++i) ASSERT_TRUE(sum->add());
+    EXPECT_FALSE(sum->add()) << "the sum's rounding would show";
+    EXPECT_FALSE(sum->begin(std::numeric_limits<float>::quiet_NaN()));
     GpuCut untouched(on_gpu(Scene(cube())));
     EXPECT_THAT(picture({{.cut = untouched}}, oblique_view()), Each(default_background)) << "it follows no cut yet";
 }
@@ -315,6 +319,7 @@ TEST_F(SceneTest, RefusesWhatCannotBeDrawn) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     const View view = oblique_view();
     EXPECT_THAT(why_not({.cut = cut}, {.view = frontal_view(5, 7)}), HasSubstr("5x7"));
+    EXPECT_THAT(why_not({.cut = cut}, {.view = view, .point = {0.5, nan}}), HasSubstr("point"));
     for (const double near : {nan, 0.0, -1.0})
         EXPECT_THAT(why_not({.cut = cut}, {.view = view, .near_plane = near}), HasSubstr("near plane"));
     for (const double scale : {nan, 0.0})

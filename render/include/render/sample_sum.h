@@ -42,7 +42,7 @@ public:
     // of which clears it to the background, and add().
     Result<void> begin(float background);
     Target& sample() noexcept;
-    Result<void> add();
+    Result<void> add(); // fails after 256 samples
 
     // The mean, the background where nothing was added: linear RGB and relative luminance, row-major from the top left.
     // Waits for the GPU. The pixels are the sum's and stay until the next call.
