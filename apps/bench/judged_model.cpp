@@ -17,10 +17,10 @@ bool needs_errors(FoldTest test) { return test == FoldTest::error; }
 
 } // namespace
 
-Result<JudgedModel> JudgedModel::create(render::Context& context, std::string name, vdtree::VertexTree tree, int window_px,
+Result<JudgedModel> JudgedModel::create(const render::Context& context, std::string name, vdtree::VertexTree tree, int window_px,
                                         perception::CsfModel second) {
     JudgedModel model;
-    model.context_ = context.share();
+    model.context_ = context;
     model.name_ = std::move(name);
     model.second_ = second;
     model.view_.width = model.view_.height = window_px;

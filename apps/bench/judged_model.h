@@ -31,7 +31,7 @@ struct Verdicts {
 class JudgedModel {
 public:
     // Keeps a handle to the context.
-    static Result<JudgedModel> create(render::Context& context, std::string name, vdtree::VertexTree tree, int window_px,
+    static Result<JudgedModel> create(const render::Context& context, std::string name, vdtree::VertexTree tree, int window_px,
                                       perception::CsfModel second = usual_second);
 
     const std::string& name() const { return name_; }

@@ -1,4 +1,4 @@
-// The surface's shade, with the triangles' edges drawn over it (WIREFRAME). WINDOW: for a window's framebuffer, opaque
+// The surface's shade, with the triangles' edges drawn over it (WIREFRAME). DISPLAY: for displays, opaque
 // and, with ENCODE_SRGB, encoded here because the framebuffer does not do it.
 #ifdef FLAT
 layout(location = 0) flat in vec4 surface_shade;
@@ -62,7 +62,7 @@ float line_coverage() {
     vec3 distances = corner_weights * heights;
     float nearest = min(distances.x, min(distances.y, distances.z));
     float width = min(half_line, half_line_of_height * min(heights.x, min(heights.y, heights.z)));
-#ifdef WINDOW
+#ifdef DISPLAY
     return clamp(width - nearest + 0.5, 0.0, 1.0); // one sample a pixel: soft edges, one pixel wide
 #else
     return nearest < width ? 1.0 : 0.0;
@@ -94,7 +94,7 @@ void main() {
 #ifdef ENCODE_SRGB
     result.rgb = srgb_encoded(result.rgb);
 #endif
-#ifdef WINDOW
+#ifdef DISPLAY
     result.a = 1.0;
 #endif
     pixel = result;

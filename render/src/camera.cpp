@@ -46,8 +46,15 @@ UnitFrame unit_frame(const vdtree::Sphere& bounds) {
     return frame;
 }
 
-Camera camera_for(const vdtree::View& view, const vdtree::Similarity& placement, glm::dvec3 origin,
-                  const UnitFrame& frame) {
+// Depth is near plane / distance. Only the row of z knows the near plane.
+void Projection::set_near_plane(double distance) {
+    if (distance == near_plane) return;
+    near_plane = distance;
+    clip_from_unit[3][2] = distance / world_unit;
+}
+
+Projection projection_of(const vdtree::View& view, const vdtree::Similarity& placement, glm::dvec3 origin,
+                         const UnitFrame& frame) {
     const vdtree::CameraFrame axes = vdtree::camera_frame(view);
     const glm::dmat3 view_from_world = glm::transpose(glm::dmat3(axes.right, axes.up, axes.back));
     const glm::dmat3 rotation = view_from_world * glm::mat3_cast(placement.rotation);
@@ -66,16 +73,18 @@ Camera camera_for(const vdtree::View& view, const vdtree::Similarity& placement,
     clip_from_view[2][3] = -1;
     clip_from_view[3][2] = near_plane(centre_in_view, frame.radius, tan_x, tan_y);
 
-    Camera camera;
-    camera.clip_from_unit = clip_from_view * view_from_unit;
-    camera.eye_inside = !(glm::length(centre_in_view) > frame.radius);
-    return camera;
+    Projection projection;
+    projection.clip_from_unit = clip_from_view * view_from_unit;
+    projection.world_unit = world_unit;
+    projection.near_plane = clip_from_view[3][2] * world_unit;
+    projection.eye_inside = !(glm::length(centre_in_view) > frame.radius);
+    return projection;
 }
 
-glm::mat4 jittered(const Camera& camera, const vdtree::View& view, glm::dvec2 sample) {
+glm::mat4 jittered(const Projection& projection, const vdtree::View& view, glm::dvec2 sample) {
     // y points up in clip space and down in the pixel.
     const glm::dvec3 shift(2 * (0.5 - sample.x) / view.width, 2 * (sample.y - 0.5) / view.height, 0);
-    return glm::mat4(glm::translate(glm::dmat4(1), shift) * camera.clip_from_unit);
+    return glm::mat4(glm::translate(glm::dmat4(1), shift) * projection.clip_from_unit);
 }
 
 } // namespace unseen::render

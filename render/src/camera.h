@@ -22,18 +22,23 @@ struct UnitFrame {
 UnitFrame unit_frame(const vdtree::Sphere& bounds);
 
 // Clip space with reversed, infinite depth: 1 at the near plane, 0 at infinity.
-struct Camera {
+struct Projection {
     glm::dmat4 clip_from_unit = glm::dmat4(1);
+    double world_unit = 1;   // world units per unit of the frame
+    double near_plane = 1;   // distance, world units
     bool eye_inside = false; // of the ball
+
+    void set_near_plane(double distance); // world units; an object's own changes no bit
 };
 
-// Precondition: valid view and placement. The eye is the origin in all that is added up, so that the precision is that
-// of the distance from the eye, not of the distance from the world's origin.
-Camera camera_for(const vdtree::View& view, const vdtree::Similarity& placement, glm::dvec3 origin,
-                  const UnitFrame& frame);
+// With the object's own near plane, just before its ball. Precondition: valid view and placement. The eye is the origin
+// in all that is added up, so that the precision is that of the distance from the eye, not of the distance from the
+// world's origin.
+Projection projection_of(const vdtree::View& view, const vdtree::Similarity& placement, glm::dvec3 origin,
+                         const UnitFrame& frame);
 
-// The camera with the picture moved so that the point `sample` of each pixel, in 0..1 from its top left, comes to lie
-// at the pixel's centre.
-glm::mat4 jittered(const Camera& camera, const vdtree::View& view, glm::dvec2 sample);
+// The projection with the picture moved so that the point `sample` of each pixel, in 0..1 from its top left, comes to
+// lie at the pixel's centre.
+glm::mat4 jittered(const Projection& projection, const vdtree::View& view, glm::dvec2 sample);
 
 } // namespace unseen::render

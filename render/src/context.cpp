@@ -23,10 +23,9 @@ Result<void> check_version(const std::string& version) {
 
 } // namespace
 
-Context::Context(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
-Context::Context(Context&&) noexcept = default;
-Context& Context::operator=(Context&&) noexcept = default;
-Context::~Context() = default;
+Context::Impl::~Impl() {
+    if (platform) static_cast<void>(platform->make_current());
+}
 
 Result<Context> Context::headless() {
     auto platform = make_egl_platform();
@@ -53,9 +52,7 @@ Result<Context> Context::adopt(std::unique_ptr<Platform> platform) {
     return Context(std::move(impl));
 }
 
-Context Context::share() const { return Context(impl_); }
-
-Result<void> Context::make_current() {
+Result<void> Context::make_current() const {
     return impl_->platform->make_current();
 }
 
@@ -71,7 +68,7 @@ GLFWwindow* Context::glfw_window() const noexcept {
     return impl_->platform->window();
 }
 
-std::string Context::take_errors() {
+std::string Context::take_errors() const {
     if (auto current = make_current(); !current)
         return current.error().message;
     return impl_->errors.take_all();

@@ -1,4 +1,4 @@
-// What a context holds, shared by its handles and by what draws in it.
+// What a context holds, shared by its handles.
 #pragma once
 
 #include <memory>
@@ -7,6 +7,7 @@
 #include <render/context.h>
 
 #include "error_log.h"
+#include "programs.h"
 
 namespace unseen::render {
 
@@ -30,6 +31,25 @@ struct Context::Impl {
     std::unique_ptr<Platform> platform;
     std::string renderer_name;
     std::string version;
+    Programs programs;
+
+    Impl() = default;
+    Impl(const Impl&) = delete;
+    Impl& operator=(const Impl&) = delete;
+    ~Impl(); // current, for the programs, which go next
 };
+
+// Does GL work that returns a Result<void>. The error is the work's own, or else what GL reported: "`what` failed in
+// OpenGL: ...".
+template <class Work>
+Result<void> in_context(const Context& context, const char* what, Work&& work) {
+    if (auto current = context.make_current(); !current) return current;
+    ErrorLog& log = context.impl().errors;
+    log.begin();
+    Result<void> done = work();
+    const std::string errors = log.take_new();
+    if (!done || errors.empty()) return done;
+    return Error{ErrorCode::unsupported, std::string(what) + " failed in OpenGL: " + errors + "."};
+}
 
 } // namespace unseen::render

@@ -31,34 +31,30 @@ std::uint64_t indices_in_a_window() {
 
 } // namespace
 
-Result<GpuIndices> GpuIndices::create() {
+Result<void> GpuIndices::prepare_patching() {
+    if (patch_) return {};
     const ShaderSource source[] = {{ShaderSource::Stage::compute, shaders::patch_comp}};
-    auto patch = Program::build("patch indices", source);
-    if (!patch)
-        return patch.error();
-    GpuIndices indices(std::move(*patch));
-    if (auto reserved = indices.reserve(1, false); !reserved)
-        return reserved.error();
-    indices.window_indices_ = indices_in_a_window();
-    indices.map_staging();
-    return indices;
-}
-
-void GpuIndices::map_staging() {
+    const auto patch = programs_->named("patch indices", source);
+    if (!patch) return patch.error();
+    patch_ = *patch;
+    window_indices_ = indices_in_a_window();
     constexpr GLbitfield access = GL_MAP_WRITE_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
     constexpr auto bytes = static_cast<GLsizeiptr>(part_count * part_writes * sizeof(Write));
     staging_ = Buffer::create("changes of triangles");
     glNamedBufferStorage(staging_.id(), bytes, nullptr, access);
     mapped_ = static_cast<Write*>(glMapNamedBufferRange(staging_.id(), 0, bytes, access));
+    return {};
 }
 
 Result<void> GpuIndices::update(const IndexState& state) {
     uploaded_bytes_ = 0;
     if (state.version != 0 && state.version == version_)
         return {};
-    const bool patches = can_patch(state);
+    const bool follows = can_follow(state);
     version_ = 0; // until it is done
-    if (patches) {
+    if (follows)
+        if (auto prepared = prepare_patching(); !prepared) return count_ = 0, prepared;
+    if (follows && mapped_ && window_indices_ > 0) {
         if (auto reserved = reserve(state.indices.size(), true); !reserved)
             return reserved;
         patch(*state.writes, state.indices);
@@ -70,8 +66,9 @@ Result<void> GpuIndices::update(const IndexState& state) {
     return {};
 }
 
-bool GpuIndices::can_patch(const IndexState& state) const {
-    return mapped_ && window_indices_ > 0 && version_ != 0 && state.writes && state.writes_from == version_ &&
+// The changes lead here, and are less than the whole.
+bool GpuIndices::can_follow(const IndexState& state) const {
+    return version_ != 0 && state.writes && state.writes_from == version_ &&
            state.writes->size() * sizeof(Write) < state.indices.size_bytes();
 }
 
@@ -135,12 +132,12 @@ void GpuIndices::apply(std::size_t part, std::size_t writes) {
     glBindBufferRange(GL_SHADER_STORAGE_BUFFER, writes_binding, staging_.id(),
                       static_cast<GLintptr>(part * part_writes * sizeof(Write)),
                       static_cast<GLsizeiptr>(writes * sizeof(Write)));
-    patch_.set(write_count_location, static_cast<unsigned>(writes));
-    patch_.use();
+    patch_->set(write_count_location, static_cast<unsigned>(writes));
+    patch_->use();
     for (std::uint64_t first = 0; first < capacity_; first += window_indices_) {
         const std::uint64_t size = std::min(window_indices_, capacity_ - first);
-        patch_.set(window_first_location, static_cast<unsigned>(first));
-        patch_.set(window_size_location, static_cast<unsigned>(size));
+        patch_->set(window_first_location, static_cast<unsigned>(first));
+        patch_->set(window_size_location, static_cast<unsigned>(size));
         glBindBufferRange(GL_SHADER_STORAGE_BUFFER, window_binding, buffer_.id(),
                           static_cast<GLintptr>(first * index_bytes), static_cast<GLsizeiptr>(size * index_bytes));
         glDispatchCompute(static_cast<GLuint>((writes + group_size - 1) / group_size), 1, 1);

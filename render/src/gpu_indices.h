@@ -8,10 +8,10 @@
 #include <span>
 
 #include <render/gl_object.h>
-#include <render/program.h>
 #include <vdtree/cut.h>
 
 #include "gl.h"
+#include "programs.h"
 
 namespace unseen::render {
 
@@ -23,19 +23,20 @@ struct IndexState {
     std::optional<std::span<const vdtree::IndexWrite>> writes = {};
 };
 
-// The buffer lies in the GPU's own memory, which drawing reads fastest. Changes go through a small buffer that stays mapped: the CPU
-// writes pairs of place and value to the next of its parts (and waits only where the GPU has not yet read what was there
-// three parts ago), and a compute pass puts them in their places, in order with the drawing before and after it. The bytes that are
-// uploaded are those of the changes. Where a whole buffer is less, or the GPU maps nothing, the whole is uploaded.
-// Move-only; needs a current context for everything.
+// The buffer lies in the GPU's own memory, which drawing reads fastest. Changes go through a small buffer that stays
+// mapped: the CPU writes pairs of place and value to the next of its parts (and waits only where the GPU has not yet
+// read what was there three parts ago), and a compute pass puts them in their places, in order with the drawing before
+// and after it. The bytes that are uploaded are those of the changes. Where a whole buffer is less, or the GPU maps
+// nothing, the whole is uploaded. The small buffer and the pass are made for the first change. Move-only; needs a
+// current context for everything.
 class GpuIndices {
 public:
-    static Result<GpuIndices> create();
+    explicit GpuIndices(Programs& programs) : programs_(&programs) {} // which outlive it; does no GL
 
-    // Fails where the memory does not suffice; then the buffer is empty.
+    // Fails where the memory does not suffice; then there are no indices.
     Result<void> update(const IndexState& state);
 
-    unsigned buffer() const noexcept { return buffer_.id(); } // another one after it has grown
+    unsigned buffer() const noexcept { return buffer_.id(); } // another one after it has grown; 0 at first
     std::uint64_t count() const noexcept { return count_; }
     std::uint64_t uploaded_bytes() const noexcept { return uploaded_bytes_; } // by the last update
 
@@ -50,20 +51,20 @@ private:
     static constexpr std::size_t part_count = 3; // of the frames that a driver is usually ahead
     static constexpr std::size_t part_writes = std::size_t{1} << 16;
 
-    explicit GpuIndices(Program patch) : patch_(std::move(patch)) {}
-    void map_staging();
+    Result<void> prepare_patching();
     Result<void> upload_all(std::span<const std::uint32_t> indices);
     Result<void> reserve(std::uint64_t count, bool keep);
-    bool can_patch(const IndexState& state) const;
+    bool can_follow(const IndexState& state) const;
     void patch(std::span<const vdtree::IndexWrite> writes, std::span<const std::uint32_t> indices);
     void apply(std::size_t part, std::size_t writes);
 
-    Program patch_;
+    Programs* programs_;
     Buffer buffer_;
     std::uint64_t capacity_ = 0, count_ = 0; // indices
     std::uint64_t version_ = 0;
     std::uint64_t uploaded_bytes_ = 0;
 
+    const Program* patch_ = nullptr; // null: nothing was patched yet
     Buffer staging_;
     Write* mapped_ = nullptr; // null: not to be had
     std::array<Fence, part_count> in_use_;

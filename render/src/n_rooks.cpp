@@ -1,5 +1,5 @@
 // The N-rooks pattern: the permutation of the columns decides everything.
-#include <render/renderer.h>
+#include <render/sample_sum.h>
 
 #include <numeric>
 #include <utility>

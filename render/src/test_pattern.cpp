@@ -4,10 +4,11 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <string>
 
-#include <render/framebuffer.h>
 #include <render/program.h>
+#include <render/target.h>
 
 #include "context_impl.h"
 #include "gl.h"
@@ -41,18 +42,18 @@ Result<void> check(const TestPattern& p) {
 } // namespace
 
 struct TestPatternDrawer::Impl {
-    Impl(std::shared_ptr<Context::Impl> context_, Program program_) : context(std::move(context_)), program(std::move(program_)) {}
+    explicit Impl(const Context& context_) : context(context_) {}
     Impl(const Impl&) = delete;
     Impl& operator=(const Impl&) = delete;
-    ~Impl() { static_cast<void>(context->platform->make_current()); } // for the objects, which go next
+    ~Impl() { static_cast<void>(context.make_current()); } // for the objects, which go next
 
-    std::shared_ptr<Context::Impl> context; // first, and so gone last
-    Program program;
+    Context context; // first, and so gone last
+    const Program* program = nullptr;
     Buffer levels;
     VertexArray no_arrays;
-    Framebuffer target;
+    std::optional<Target> target; // made for the first pattern off screen, and for each of another size
 
-    Result<void> draw(const TestPattern& p, int width, int height, unsigned framebuffer, bool top_first);
+    void draw(const TestPattern& p, int width, int height, unsigned framebuffer, bool top_first);
 };
 
 TestPatternDrawer::TestPatternDrawer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -60,7 +61,7 @@ TestPatternDrawer::TestPatternDrawer(TestPatternDrawer&&) noexcept = default;
 TestPatternDrawer& TestPatternDrawer::operator=(TestPatternDrawer&&) noexcept = default;
 TestPatternDrawer::~TestPatternDrawer() = default;
 
-Result<TestPatternDrawer> TestPatternDrawer::create(Context& context, std::span<const double> code_luminances) {
+Result<TestPatternDrawer> TestPatternDrawer::create(const Context& context, std::span<const double> code_luminances) {
     if (code_luminances.size() != code_count) return invalid("A display has 256 codes, not " + std::to_string(code_luminances.size()) + ".");
     std::array<float, code_count> levels;
     for (std::size_t i = 0; i < code_count; ++i) {
@@ -68,34 +69,35 @@ Result<TestPatternDrawer> TestPatternDrawer::create(Context& context, std::span<
         if (!std::isfinite(levels[i]) || (i > 0 && !(levels[i] >= levels[i - 1])))
             return invalid("The luminances of a display's codes must ascend; that of code " + std::to_string(i) + " does not.");
     }
-    if (auto current = context.make_current(); !current) return current.error();
-    context.impl_->errors.begin();
-    const ShaderSource sources[] = {{ShaderSource::Stage::vertex, shaders::full_screen_vert},
-                                    {ShaderSource::Stage::fragment, shaders::test_pattern_frag}};
-    auto program = Program::build("test pattern", sources);
-    if (!program) return program.error();
-    auto impl = std::make_unique<Impl>(context.impl_, std::move(*program));
-    impl->levels = Buffer::create("code luminances");
-    impl->no_arrays = VertexArray::create("full screen");
-    glNamedBufferStorage(impl->levels.id(), sizeof(levels), levels.data(), 0);
-    if (const std::string errors = context.impl_->errors.take_new(); !errors.empty())
-        return Error{ErrorCode::unsupported, "Test patterns cannot be drawn: " + errors + "."};
+    auto impl = std::make_unique<Impl>(context);
+    auto made = in_context(context, "Making test patterns", [&]() -> Result<void> {
+        const ShaderSource sources[] = {{ShaderSource::Stage::vertex, shaders::full_screen_vert},
+                                        {ShaderSource::Stage::fragment, shaders::test_pattern_frag}};
+        const auto program = context.impl().programs.named("test pattern", sources);
+        if (!program) return program.error();
+        impl->program = *program;
+        impl->levels = Buffer::create("code luminances");
+        impl->no_arrays = VertexArray::create("full screen");
+        glNamedBufferStorage(impl->levels.id(), sizeof(levels), levels.data(), 0);
+        return {};
+    });
+    if (!made) return made.error();
     return TestPatternDrawer(std::move(impl));
 }
 
-Result<void> TestPatternDrawer::Impl::draw(const TestPattern& p, int width, int height, unsigned framebuffer, bool top_first) {
+void TestPatternDrawer::Impl::draw(const TestPattern& p, int width, int height, unsigned framebuffer, bool top_first) {
     const auto vec4 = [](double x, double y, double z, double w) {
         return glm::vec4(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z), static_cast<float>(w));
     };
-    program.set(kind_location, static_cast<unsigned>(p.kind));
-    program.set(screen_location, vec4(width, height, p.tangent_per_pixel, top_first ? 1 : 0));
-    program.set(grating_location, vec4(p.mean, p.contrast, p.frequency_cpd, p.sigma_deg));
-    program.set(place_location, vec4(p.phase_deg * std::numbers::pi / 180, p.centre.x, p.centre.y, p.code));
-    program.set(chart_location, vec4(std::log2(p.highest_frequency_cpd / p.frequency_cpd), p.decades, p.rows, p.white_rows));
-    program.set(overlay_location, vec4(static_cast<double>(p.marks.size()), p.mark_code, 0, 0));
-    program.set(frame_location, p.frame);
+    program->set(kind_location, static_cast<unsigned>(p.kind));
+    program->set(screen_location, vec4(width, height, p.tangent_per_pixel, top_first ? 1 : 0));
+    program->set(grating_location, vec4(p.mean, p.contrast, p.frequency_cpd, p.sigma_deg));
+    program->set(place_location, vec4(p.phase_deg * std::numbers::pi / 180, p.centre.x, p.centre.y, p.code));
+    program->set(chart_location, vec4(std::log2(p.highest_frequency_cpd / p.frequency_cpd), p.decades, p.rows, p.white_rows));
+    program->set(overlay_location, vec4(static_cast<double>(p.marks.size()), p.mark_code, 0, 0));
+    program->set(frame_location, p.frame);
     for (std::size_t i = 0; i < p.marks.size(); ++i)
-        program.set(marks_location + static_cast<int>(i), vec4(p.marks[i].x, p.marks[i].y, p.marks[i].z, p.marks[i].w));
+        program->set(marks_location + static_cast<int>(i), vec4(p.marks[i].x, p.marks[i].y, p.marks[i].z, p.marks[i].w));
 
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, framebuffer);
     glViewport(0, 0, width, height);
@@ -105,38 +107,36 @@ Result<void> TestPatternDrawer::Impl::draw(const TestPattern& p, int width, int 
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);
     glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, levels.id());
     glBindVertexArray(no_arrays.id());
-    program.use();
+    program->use();
     glDrawArrays(GL_TRIANGLES, 0, 3);
-    if (const std::string errors = context->errors.take_new(); !errors.empty())
-        return Error{ErrorCode::unsupported, "Drawing a test pattern failed in OpenGL: " + errors + "."};
-    return {};
 }
 
 Result<void> TestPatternDrawer::draw_to_window(const TestPattern& pattern, int width, int height) {
     if (auto ok = check(pattern); !ok) return ok;
-    if (auto current = impl_->context->platform->make_current(); !current) return current;
-    impl_->context->errors.begin();
-    return impl_->draw(pattern, width, height, 0, false);
+    return in_context(impl_->context, "Drawing a test pattern", [&]() -> Result<void> {
+        impl_->draw(pattern, width, height, 0, false);
+        return {};
+    });
 }
 
 Result<std::vector<float>> TestPatternDrawer::draw(const TestPattern& pattern, int width, int height) {
     if (auto ok = check(pattern); !ok) return ok.error();
-    if (auto current = impl_->context->platform->make_current(); !current) return current.error();
-    impl_->context->errors.begin();
-    if (impl_->target.width() != width || impl_->target.height() != height) {
-        auto target = Framebuffer::create(width, height, {.depth = false, .label = "test pattern"});
-        if (!target) return target.error();
-        impl_->target = std::move(*target);
+    std::optional<Target>& target = impl_->target;
+    if (!target || target->width() != width || target->height() != height) {
+        auto made = Target::create(impl_->context, width, height, {.depth = false, .label = "test pattern"});
+        if (!made) return made.error();
+        target = std::move(*made);
     }
-    if (auto drawn = impl_->draw(pattern, width, height, impl_->target.id(), true); !drawn) return drawn.error();
-    std::vector<float> codes(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-    glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
-    glPixelStorei(GL_PACK_ALIGNMENT, 4);
-    glBindFramebuffer(GL_READ_FRAMEBUFFER, impl_->target.id());
-    glReadBuffer(GL_COLOR_ATTACHMENT0);
-    glReadPixels(0, 0, width, height, GL_RED, GL_FLOAT, codes.data());
-    if (const std::string errors = impl_->context->errors.take_new(); !errors.empty())
-        return Error{ErrorCode::unsupported, "Reading a test pattern failed in OpenGL: " + errors + "."};
+    auto drawn = in_context(impl_->context, "Drawing a test pattern", [&]() -> Result<void> {
+        impl_->draw(pattern, width, height, target->id(), true);
+        return {};
+    });
+    if (!drawn) return drawn.error();
+    const auto pixels = read_pixels(*target);
+    if (!pixels) return pixels.error();
+    std::vector<float> codes;
+    codes.reserve(pixels->size());
+    for (const glm::vec4& pixel : *pixels) codes.push_back(pixel.r);
     return codes;
 }
 

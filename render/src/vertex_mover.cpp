@@ -26,12 +26,12 @@ std::uint64_t vertices_in_a_window() {
 
 } // namespace
 
-Result<VertexMover> VertexMover::create() {
+Result<VertexMover> VertexMover::create(Programs& programs) {
     const ShaderSource source[] = {{ShaderSource::Stage::compute, shaders::move_comp}};
-    auto program = Program::build("move vertices", source);
+    const auto program = programs.named("move vertices", source);
     if (!program)
         return program.error();
-    VertexMover mover(std::move(*program));
+    VertexMover mover(*program);
     mover.moves_ = Buffer::create("moved vertices");
     mover.window_vertices_ = vertices_in_a_window();
     if (mover.window_vertices_ == 0)
@@ -46,12 +46,12 @@ void VertexMover::move(unsigned vertices, std::uint64_t count, std::span<const V
         // A new store each time, so that the driver need not wait for the last frame.
         glNamedBufferData(moves_.id(), static_cast<GLsizeiptr>(part.size_bytes()), part.data(), GL_STREAM_DRAW);
         glBindBufferBase(GL_SHADER_STORAGE_BUFFER, moves_binding, moves_.id());
-        program_.set(move_count_location, static_cast<unsigned>(part.size()));
-        program_.use();
+        program_->set(move_count_location, static_cast<unsigned>(part.size()));
+        program_->use();
         for (std::uint64_t first = 0; first < count; first += window_vertices_) {
             const std::uint64_t size = std::min(window_vertices_, count - first);
-            program_.set(window_first_location, static_cast<unsigned>(first));
-            program_.set(window_size_location, static_cast<unsigned>(size));
+            program_->set(window_first_location, static_cast<unsigned>(first));
+            program_->set(window_size_location, static_cast<unsigned>(size));
             glBindBufferRange(GL_SHADER_STORAGE_BUFFER, window_binding, vertices,
                               static_cast<GLintptr>(first * sizeof(Vertex)),
                               static_cast<GLsizeiptr>(size * sizeof(Vertex)));

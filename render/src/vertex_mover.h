@@ -5,9 +5,9 @@
 #include <span>
 
 #include <render/gl_object.h>
-#include <render/program.h>
 
 #include "gl.h"
+#include "programs.h"
 #include "vertex.h"
 
 namespace unseen::render {
@@ -22,15 +22,15 @@ static_assert(sizeof(VertexMove) == 32, "move.comp counts on it");
 // and after it. Move-only; needs a current context for everything. GL errors are left for the caller to ask for.
 class VertexMover {
 public:
-    static Result<VertexMover> create();
+    static Result<VertexMover> create(Programs& programs); // which outlive it
 
     // No vertex twice. The buffer holds `count` vertices.
     void move(unsigned vertices, std::uint64_t count, std::span<const VertexMove> moves);
 
 private:
-    explicit VertexMover(Program program) : program_(std::move(program)) {}
+    explicit VertexMover(const Program* program) : program_(program) {}
 
-    Program program_;
+    const Program* program_;
     Buffer moves_;
     std::uint64_t window_vertices_ = 0; // as many as a shader may see at a time
 };

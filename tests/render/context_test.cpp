@@ -56,7 +56,7 @@ TEST_F(ContextTest, LivesAsLongAsOneOfItsHandles) {
     auto first = Context::headless();
     ASSERT_TRUE(first) << first.error().message;
     std::optional<Context> gone = std::move(*first);
-    Context second = gone->share();
+    Context second = *gone;
     gone.reset();
     ASSERT_TRUE(second.make_current());
     raise_error();

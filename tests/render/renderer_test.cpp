@@ -12,7 +12,6 @@
 
 #include <gmock/gmock.h>
 
-#include <render/framebuffer.h>
 #include <render/renderer.h>
 
 namespace {
@@ -623,7 +622,7 @@ TEST_F(RendererTest, RefusesWhatCannotBeDrawn) {
 }
 
 TEST_F(RendererTest, RefusesAFrameLargerThanTheDriverDraws) {
-    const int side = largest_framebuffer_side() + 1;
+    const int side = largest_target_side() + 1;
     if (side > 32768)
         GTEST_SKIP() << "this driver draws every window that a view may ask for";
     const Scene scene(rectangle({-1, -1}, {1, 1}, 0, grey(0.5f)));

@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 
 #include <vdtree/result.h>
 
@@ -11,8 +12,6 @@ struct GLFWwindow;
 namespace unseen::render {
 
 class Platform;
-class Renderer;
-class TestPatternDrawer;
 
 struct WindowOptions {
     int width = 1024;
@@ -23,9 +22,10 @@ struct WindowOptions {
     int samples = 8;          // a pixel, wished for; 0: exact pixels
 };
 
-// A move-only handle; current on the thread that made it until another one is made or used there; stays on that thread.
-// What draws in it keeps a handle of its own, so the context, and its window, end with the last of them. GL debug
-// output of severity medium and high is collected as errors, see take_errors(); remarks on performance are not.
+// A handle: copies are the same context. All that lives in it on the GPU keeps one, so the context, and its window, end
+// with the last of them. Current on the thread that made it until another one is made or used there; stays on that
+// thread. GL debug output of severity medium and high is collected as errors, see take_errors(); remarks on performance
+// are not.
 class Context {
 public:
     // EGL without a display: enumerated devices first (so that a GPU is found), then the surfaceless platform
@@ -36,29 +36,22 @@ public:
     // caller polls events and swaps buffers. Fails where there is no display.
     static Result<Context> window(const WindowOptions& options = {});
 
-    Context(Context&&) noexcept;
-    Context& operator=(Context&&) noexcept;
-    ~Context();
-
-    // Another handle to the same context.
-    Context share() const;
-
     // Makes the context current again after another one was. Cheap where it already is. Everything below does it
     // itself.
-    Result<void> make_current();
+    Result<void> make_current() const;
 
     std::string renderer_name() const; // GL_RENDERER
     std::string version() const;       // GL_VERSION
     GLFWwindow* glfw_window() const noexcept; // null when headless
 
     // The GL errors and debug messages since the last call, empty if all went well.
-    std::string take_errors();
+    std::string take_errors() const;
+
+    struct Impl; // the library's own
+    Impl& impl() const noexcept { return *impl_; }
 
 private:
-    friend class Renderer;
-    friend class TestPatternDrawer;
-    struct Impl;
-    explicit Context(std::shared_ptr<Impl> impl);
+    explicit Context(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
     static Result<Context> adopt(std::unique_ptr<Platform> platform);
     std::shared_ptr<Impl> impl_;
 };

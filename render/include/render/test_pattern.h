@@ -44,7 +44,7 @@ struct TestPattern {
 class TestPatternDrawer {
 public:
     // `code_luminances`: cd/m2 of the 256 codes, finite and ascending. Keeps a handle to the context.
-    static Result<TestPatternDrawer> create(Context& context, std::span<const double> code_luminances);
+    static Result<TestPatternDrawer> create(const Context& context, std::span<const double> code_luminances);
     TestPatternDrawer(TestPatternDrawer&&) noexcept;
     TestPatternDrawer& operator=(TestPatternDrawer&&) noexcept;
     ~TestPatternDrawer();

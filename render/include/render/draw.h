@@ -1,0 +1,57 @@
+// Draws items into a target.
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include <glm/vec2.hpp>
+#include <glm/vec4.hpp>
+
+#include <render/gpu_tree.h>
+#include <render/target.h>
+#include <vdtree/lighting.h>
+#include <vdtree/view.h>
+
+namespace unseen::render {
+
+constexpr float default_background = 0.19597990f; // relative luminance; 20 cd/m2 on the default display
+
+enum class Shading {
+    smooth, // luminance by vertex, linearly interpolated (lit or pre-lit, as the tree's luminance is)
+    flat,   // one luminance a triangle: the mean of its corners
+};
+
+// One object of a scene.
+struct Item {
+    GpuCut cut;
+    vdtree::Similarity placement = {};
+    Shading shading = Shading::smooth;
+    bool wireframe = false; // the triangles' edges over the shaded surface, hidden lines removed
+    // In the tree's frame; none: the luminance of vertices is the tree's. Not for cuts with vertices that glide.
+    std::optional<vdtree::Lighting> lighting = {};
+};
+
+struct Camera {
+    vdtree::View view;                  // its window is as large as the target
+    glm::dvec2 point = glm::dvec2(0.5); // of each pixel, from its top left, that is drawn
+    std::optional<double> near_plane =
+        {}; // distance, world units; none: just before the items. One for draws that share depth.
+};
+
+// What a draw begins with.
+struct Clear {
+    std::optional<glm::vec4> colour = glm::vec4(default_background); // linear RGB, luminance; none: kept
+    bool depth = true;
+};
+
+// Draws the items in their order; what is nearer hides what is farther, across items. Items share the target's context.
+// Programs are compiled when they are first needed. `attachment`: the colour that is drawn to, others are kept; without
+// any, only depth is drawn. Fails on an invalid view, placement or light, and on a GL error.
+Result<void> draw(std::span<const Item> items, const Camera& camera, Target& target, const Clear& clear = {},
+                  int attachment = 0);
+
+// The near plane that draw() chooses. It cuts off nothing but what is nearer to the eye than 1e-4 of the size of an
+// item around the eye.
+Result<double> near_plane(std::span<const Item> items, const vdtree::View& view);
+
+} // namespace unseen::render

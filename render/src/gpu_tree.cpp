@@ -1,0 +1,191 @@
+// Brings vertices to the GPU, and keeps the triangles of cuts there current.
+#include "gpu_tree_impl.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+
+#include <vdtree/colour.h>
+#include <vdtree/lighting.h>
+
+#include "gl.h"
+
+namespace unseen::render {
+namespace {
+
+constexpr std::size_t upload_batch = 1u << 16; // vertices; bounds the memory that uploading takes
+
+// The colour scaled to the luminance; grey where it has none.
+glm::vec3 shaded_colour(glm::vec4 colour, float luminance) {
+    const glm::dvec3 rgb(colour);
+    const double own = rec709_luminance(rgb);
+    if (!(own > 0) || !std::isfinite(own)) return glm::vec3(luminance);
+    const glm::dvec3 scaled = rgb * (static_cast<double>(luminance) / own);
+    return glm::vec3(scaled);
+}
+
+// `colour`: null where there are none.
+Vertex vertex_of(const UnitFrame& frame, glm::vec3 position, float luminance, const glm::vec4* colour) {
+    const glm::vec3 rgb = colour ? shaded_colour(*colour, luminance) : glm::vec3(luminance);
+    const glm::dvec3 in_frame = (glm::dvec3(position) - frame.centre) / frame.unit;
+    return {glm::vec3(in_frame), glm::vec4(rgb, luminance)};
+}
+
+void describe_vertices(GLuint arrays, GLuint vertices) {
+    glVertexArrayVertexBuffer(arrays, 0, vertices, 0, sizeof(Vertex));
+    glEnableVertexArrayAttrib(arrays, 0);
+    glVertexArrayAttribFormat(arrays, 0, 3, GL_FLOAT, GL_FALSE, offsetof(Vertex, position));
+    glVertexArrayAttribBinding(arrays, 0, 0);
+    glEnableVertexArrayAttrib(arrays, 1);
+    glVertexArrayAttribFormat(arrays, 1, 4, GL_FLOAT, GL_FALSE, offsetof(Vertex, shade));
+    glVertexArrayAttribBinding(arrays, 1, 0);
+}
+
+void describe_lit_vertices(GLuint arrays, GLuint vertices) {
+    glVertexArrayVertexBuffer(arrays, 1, vertices, 0, sizeof(LitVertex));
+    glEnableVertexArrayAttrib(arrays, 2);
+    glVertexArrayAttribIFormat(arrays, 2, 2, GL_SHORT, offsetof(LitVertex, normal));
+    glVertexArrayAttribBinding(arrays, 2, 1);
+    glEnableVertexArrayAttrib(arrays, 3);
+    glVertexArrayAttribFormat(arrays, 3, 1, GL_FLOAT, GL_FALSE, offsetof(LitVertex, albedo));
+    glVertexArrayAttribBinding(arrays, 3, 1);
+}
+
+Error too_large(const std::string& what) {
+    return {ErrorCode::unsupported, "The graphics memory does not hold " + what};
+}
+
+} // namespace
+
+GpuTree::Impl::Impl(const Context& context_, const vdtree::VertexTree& tree_)
+    : context(context_), tree(tree_.share()), frame(unit_frame(tree.bounds()[tree.root()].ring)) {}
+
+Vertex GpuTree::Impl::vertex(std::size_t i) const {
+    return vertex_of(frame, tree.positions()[i], tree.luminance()[i],
+                     tree.colours().empty() ? nullptr : &tree.colours()[i]);
+}
+
+Result<void> GpuTree::Impl::upload() {
+    const std::size_t count = tree.positions().size();
+    vertices = Buffer::create("vertices");
+    glNamedBufferStorage(vertices.id(), static_cast<GLsizeiptr>(std::max<std::size_t>(count, 1) * sizeof(Vertex)),
+                         nullptr, GL_DYNAMIC_STORAGE_BIT);
+    if (glGetError() == GL_OUT_OF_MEMORY)
+        return too_large("the tree's " + std::to_string(count) + " vertices (" +
+                         std::to_string(count * sizeof(Vertex) >> 20) + " MiB).");
+    std::vector<Vertex> batch;
+    batch.reserve(std::min(count, upload_batch));
+    for (std::size_t first = 0; first < count; first += batch.size()) {
+        batch.clear();
+        for (std::size_t i = first; i < std::min(count, first + upload_batch); ++i) batch.push_back(vertex(i));
+        for (const Vertex& vertex : batch) {
+            box.include(vertex.position);
+            lowest_shade = glm::min(lowest_shade, vertex.shade);
+            highest_shade = glm::max(highest_shade, vertex.shade);
+            if (vertex.shade.a > 0) highest_hue = glm::max(highest_hue, vertex.shade / vertex.shade.a);
+        }
+        glNamedBufferSubData(vertices.id(), static_cast<GLintptr>(first * sizeof(Vertex)),
+                             static_cast<GLsizeiptr>(batch.size() * sizeof(Vertex)), batch.data());
+    }
+    arrays = VertexArray::create("surface");
+    describe_vertices(arrays.id(), vertices.id());
+    if (tree.texture().empty()) return {};
+    auto made = SurfaceTexture::create(tree.texture(), tree.uvs());
+    if (!made) return made.error();
+    texture = std::move(*made);
+    texture->describe(arrays.id());
+    return {};
+}
+
+Result<void> GpuTree::Impl::need_mover() {
+    if (mover) return {};
+    auto made = VertexMover::create(context.impl().programs);
+    if (!made) return made.error();
+    mover = std::move(*made);
+    return {};
+}
+
+Result<void> GpuTree::Impl::need_lit_vertices() {
+    if (lit_vertices) return {};
+    std::vector<LitVertex> made;
+    made.reserve(tree.node_count());
+    for (vdtree::NodeId node = 0; node < tree.node_count(); ++node)
+        made.push_back({tree.normals()[node], vdtree::albedo_of(tree, node)});
+    Buffer buffer = Buffer::create("vertices under lights");
+    glNamedBufferStorage(buffer.id(),
+                         static_cast<GLsizeiptr>(std::max<std::size_t>(made.size(), 1) * sizeof(LitVertex)),
+                         made.data(), 0);
+    if (glGetError() == GL_OUT_OF_MEMORY)
+        return too_large("the normals of the tree's " + std::to_string(made.size()) + " vertices, which lights need.");
+    lit_vertices = std::move(buffer);
+    describe_lit_vertices(arrays.id(), lit_vertices->id());
+    return {};
+}
+
+std::uint64_t GpuTree::Impl::put(const Glides& glides) {
+    if (glides.version == shown_version) return 0;
+    std::vector<VertexMove> moves = glides.moves;
+    std::vector<std::uint32_t> now;
+    now.reserve(moves.size());
+    for (const VertexMove& move : moves) now.push_back(move.vertex);
+    std::sort(now.begin(), now.end());
+    for (auto next = now.begin(); const std::uint32_t back : moved) { // those that are not moved any more
+        next = std::lower_bound(next, now.end(), back);
+        if (next == now.end() || *next != back) moves.push_back({back, vertex(back)});
+    }
+    moved.swap(now);
+    shown_version = glides.version;
+    mover->move(vertices.id(), tree.positions().size(), moves);
+    return moves.size() * sizeof(VertexMove);
+}
+
+Result<GpuTree> GpuTree::create(const Context& context, const vdtree::VertexTree& tree) {
+    auto impl = std::make_shared<Impl>(context, tree);
+    if (auto made = in_context(context, "Bringing the tree to the GPU", [&] { return impl->upload(); }); !made)
+        return made.error();
+    return GpuTree(std::move(impl));
+}
+
+const vdtree::VertexTree& GpuTree::tree() const noexcept { return impl_->tree; }
+const Context& GpuTree::context() const noexcept { return impl_->context; }
+
+Result<void> GpuCut::Impl::follow(const vdtree::Cut& cut, std::span<const vdtree::MovedVertex> moved) {
+    GpuTree::Impl& of = tree.impl();
+    if (std::addressof(cut.tree().data()) != std::addressof(of.tree.data()))
+        return Error{ErrorCode::invalid_argument,
+                     "The cut belongs to another tree than the one on the GPU; bring that tree there."};
+    if (!of.tree.texture().empty() && !moved.empty())
+        return Error{ErrorCode::invalid_argument,
+                     "Textures do not glide: draw the cut instead of the geomorph, or the tree without its texture."};
+    if (!moved.empty())
+        if (auto made = of.need_mover(); !made) return made;
+
+    const auto triangles = cut.indices(); // first: the rest is about what it returned
+    auto updated = indices.update({triangles, cut.index_version(), cut.index_writes_from(), cut.index_writes()});
+    uploaded_bytes = indices.uploaded_bytes();
+    glides.moves.clear();
+    glides.version = moved.empty() ? 0 : ++of.last_version;
+    for (const vdtree::MovedVertex& vertex : moved) {
+        const glm::vec4* const colour = of.tree.colours().empty() ? nullptr : &vertex.colour;
+        glides.moves.push_back({vertex.node, vertex_of(of.frame, vertex.position, vertex.luminance, colour)});
+        box.include(glides.moves.back().to.position);
+    }
+    return updated;
+}
+
+GpuCut::GpuCut(const GpuTree& tree) : impl_(std::make_shared<Impl>(tree)) {}
+
+Result<void> GpuCut::follow(const vdtree::Cut& cut) {
+    return in_context(tree().context(), "Bringing the cut to the GPU", [&] { return impl_->follow(cut, {}); });
+}
+
+Result<void> GpuCut::follow(const vdtree::Geomorph& geomorph) {
+    return in_context(tree().context(), "Bringing the geomorph to the GPU",
+                      [&] { return impl_->follow(geomorph.drawn(), geomorph.moved()); });
+}
+
+const GpuTree& GpuCut::tree() const noexcept { return impl_->tree; }
+std::uint64_t GpuCut::uploaded_bytes() const noexcept { return impl_->uploaded_bytes; }
+
+} // namespace unseen::render

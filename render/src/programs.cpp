@@ -1,0 +1,49 @@
+#include "programs.h"
+
+#include <vector>
+
+#include "shaders.h"
+
+namespace unseen::render {
+namespace {
+
+Result<Program> build_surface(const ProgramKey& key) {
+    std::vector<ShaderSource> sources = {{ShaderSource::Stage::vertex, shaders::surface_vert}};
+    if (key.output == Output::depth) return Program::build("depth", sources);
+    sources.push_back({ShaderSource::Stage::fragment, shaders::surface_frag});
+    if (key.flat || key.wireframe) sources.push_back({ShaderSource::Stage::geometry, shaders::surface_geom});
+
+    std::vector<std::string_view> defines;
+    if (key.flat) defines.push_back("FLAT");
+    if (key.wireframe) defines.push_back("WIREFRAME");
+    if (key.lit) defines.push_back("LIT");
+    if (key.textured) defines.push_back("TEXTURED");
+    if (key.output != Output::linear) defines.push_back("DISPLAY");
+    if (key.output == Output::encoded) defines.push_back("ENCODE_SRGB");
+    return Program::build("surface", sources, defines);
+}
+
+// The key's program, built where the map has none yet.
+template <class Key, class Build>
+Result<const Program*> find_or_build(std::map<Key, Program>& programs, const Key& key, Build&& build) {
+    auto found = programs.find(key);
+    if (found == programs.end()) {
+        auto built = build();
+        if (!built) return built.error();
+        found = programs.emplace(key, std::move(*built)).first;
+    }
+    return &found->second;
+}
+
+} // namespace
+
+Result<const Program*> Programs::surface(ProgramKey key) {
+    if (key.output == Output::depth) key = {.output = Output::depth}; // looks do not change where a surface is
+    return find_or_build(surfaces_, key, [&] { return build_surface(key); });
+}
+
+Result<const Program*> Programs::named(std::string_view label, std::span<const ShaderSource> sources) {
+    return find_or_build(named_, label, [&] { return Program::build(label, sources); });
+}
+
+} // namespace unseen::render

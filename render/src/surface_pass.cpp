@@ -1,0 +1,269 @@
+#include "surface_pass.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include <vdtree/colour.h>
+
+#include "gl.h"
+
+namespace unseen::render {
+namespace {
+
+constexpr std::uint64_t most_indices_a_call = 3ull << 28; // a multiple of 3 that fits GLsizei
+
+constexpr float brightest_light = 1e6f; // times white: far beyond what shows any texel
+
+enum UniformLocation {
+    clip_from_unit_location = 0,
+    lowest_shade_location = 1,
+    highest_shade_location = 2,
+    material_location = 4,
+    eye_location = 5,
+    lights_location = 6,
+    lod_bias_location = 60,
+    uv_bounds_location = 61,
+};
+
+Error invalid(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
+
+bool is_finite(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+
+bool is_finite(glm::dquat q) { return std::isfinite(q.w) && is_finite(glm::dvec3(q.x, q.y, q.z)); }
+
+bool fits_float(const glm::dmat4& matrix) {
+    for (int column = 0; column < 4; ++column)
+        for (int row = 0; row < 4; ++row)
+            if (!std::isfinite(static_cast<float>(matrix[column][row]))) return false;
+    return true;
+}
+
+Result<void> check(const vdtree::Similarity& placement) {
+    if (!(placement.scale > 0) || !std::isfinite(placement.scale))
+        return invalid("The placement's scale must be positive and finite, not " + std::to_string(placement.scale) +
+                       ".");
+    if (!is_finite(placement.rotation) || !is_finite(placement.translation))
+        return invalid("The placement's rotation and translation must be finite.");
+    return {};
+}
+
+Result<void> check(const Item& item, const Context& context) {
+    if (auto valid = check(item.placement); !valid) return valid;
+    if (&item.cut.tree().context().impl() != &context.impl())
+        return invalid("The cut belongs to another OpenGL context than the target.");
+    if (!item.lighting) return {};
+    if (auto valid = vdtree::validate(*item.lighting); !valid) return valid;
+    if (!item.cut.impl().glides.moves.empty())
+        return invalid("Vertices that glide cannot be lit: draw the cut instead of the geomorph, or without lights.");
+    return {};
+}
+
+// In the unit frame.
+LightUniforms uniforms_of(const vdtree::Lighting& lighting, glm::dvec3 eye, const UnitFrame& frame) {
+    using Kind = vdtree::LightSource::Kind;
+    const auto in_frame = [&](glm::dvec3 p) { return (p - frame.centre) / frame.unit; };
+    LightUniforms uniforms;
+    uniforms.material = glm::dvec4(lighting.ambient, lighting.specular * (lighting.shininess + 8) / 8,
+                                   lighting.shininess, static_cast<double>(lighting.lights.size()));
+    uniforms.eye = glm::dvec4(in_frame(eye), 0);
+    for (const vdtree::LightSource& light : lighting.lights) {
+        const double distance = light.kind == Kind::directional ? 1 : light.distance / frame.unit;
+        uniforms.lights.push_back(glm::dvec4(light.direction, light.intensity * distance * distance));
+        uniforms.lights.push_back(glm::dvec4(in_frame(light.position), static_cast<int>(light.kind)));
+        uniforms.lights.push_back(glm::dvec4(light.outer_cosine, light.inner_cosine, 0, 0));
+    }
+    return uniforms;
+}
+
+float srgb_encoded(float linear) { return linear_to_srgb(std::clamp(linear, 0.0f, 1.0f)); }
+
+glm::vec4 shown(glm::vec4 colour, Output output) {
+    if (output == Output::linear) return colour;
+    if (output == Output::encoded) colour = {srgb_encoded(colour.r), srgb_encoded(colour.g), srgb_encoded(colour.b), 1};
+    return {glm::vec3(colour), 1};
+}
+
+void clear_target(const Target::Impl& target, const Clear& clear, int attachment) {
+    const Output output = target.output(attachment);
+    if (clear.colour && output != Output::depth) {
+        const glm::vec4 colour = shown(*clear.colour, output);
+        glClearNamedFramebufferfv(target.id, GL_COLOR, 0, &colour.x);
+    }
+    const GLfloat infinitely_far = 0;
+    if (clear.depth && target.has_depth) glClearNamedFramebufferfv(target.id, GL_DEPTH, 0, &infinitely_far);
+}
+
+} // namespace
+
+void set_fixed_state(const Target::Impl& target) {
+    glViewport(0, 0, target.width, target.height);
+    glDepthRange(0, 1);
+    // Rows from the top, as they are read back, or as a window has them.
+    glClipControl(target.top_row_first ? GL_UPPER_LEFT : GL_LOWER_LEFT, GL_ZERO_TO_ONE);
+    glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
+    glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+    glDepthMask(GL_TRUE);
+    for (GLenum off : {GL_SCISSOR_TEST, GL_STENCIL_TEST, GL_DITHER, GL_RASTERIZER_DISCARD, GL_COLOR_LOGIC_OP,
+                       GL_DEPTH_CLAMP, GL_POLYGON_OFFSET_FILL, GL_SAMPLE_ALPHA_TO_COVERAGE, GL_SAMPLE_MASK,
+                       GL_PRIMITIVE_RESTART, GL_FRAMEBUFFER_SRGB})
+        glDisable(off);
+    glEnable(GL_MULTISAMPLE);
+}
+
+Result<std::vector<Projection>> projections_of(std::span<const Item> items, const vdtree::View& view,
+                                               std::optional<double> near_plane) {
+    std::vector<Projection> projections;
+    for (const Item& item : items) {
+        const GpuTree::Impl& tree = item.cut.tree().impl();
+        projections.push_back(projection_of(view, item.placement, tree.tree.origin(), tree.frame));
+        if (!fits_float(projections.back().clip_from_unit))
+            return invalid("The model cannot be drawn from so far away for its size; move the eye nearer.");
+    }
+    if (projections.empty()) return projections;
+    const auto nearest = std::ranges::min_element(projections, {}, &Projection::near_plane);
+    const double common = near_plane.value_or(nearest->near_plane);
+    for (Projection& projection : projections) projection.set_near_plane(common);
+    return projections;
+}
+
+// The faces of a closed surface that point inward are never seen from outside.
+SurfacePass::Cull SurfacePass::cull_for(vdtree::Closedness closedness, bool eye_inside) {
+    if (eye_inside || closedness == vdtree::Closedness::open) return Cull::nothing;
+    return closedness == vdtree::Closedness::closed_outward ? Cull::back : Cull::front;
+}
+
+Result<SurfacePass> SurfacePass::prepare(std::span<const Item> items, const Camera& camera, const Target::Impl& target,
+                                         int attachment) {
+    const vdtree::View& view = camera.view;
+    if (auto valid = vdtree::validate(view); !valid) return valid.error();
+    if (view.width != target.width || view.height != target.height)
+        return invalid("The view is of " + std::to_string(view.width) + "x" + std::to_string(view.height) +
+                       " pixels, and the target has " + std::to_string(target.width) + "x" +
+                       std::to_string(target.height) + ".");
+    if (!std::isfinite(camera.point.x) || !std::isfinite(camera.point.y))
+        return invalid("The camera's point of each pixel must be finite.");
+    if (camera.near_plane && !(*camera.near_plane > 0 && std::isfinite(*camera.near_plane)))
+        return invalid("The near plane's distance must be positive and finite, not " +
+                       std::to_string(*camera.near_plane) + ".");
+    if (!target.outputs.empty())
+        if (auto valid = target.check_attachment(attachment); !valid) return valid.error();
+    for (const Item& item : items)
+        if (auto valid = check(item, target.context); !valid) return valid.error();
+    auto projections = projections_of(items, view, camera.near_plane);
+    if (!projections) return projections.error();
+
+    const Output output = target.output(attachment);
+    SurfacePass pass(view, attachment, output);
+    for (std::size_t i = 0; i < items.size(); ++i) {
+        const Item& item = items[i];
+        GpuTree::Impl& tree = item.cut.tree().impl();
+        const auto program =
+            target.context.impl().programs.surface({item.lighting.has_value(), tree.texture.has_value(),
+                                                    item.shading == Shading::flat, item.wireframe, output});
+        if (!program) return program.error();
+        const Projection& projection = (*projections)[i];
+        PreparedItem prepared{item.cut, projection, *program, cull_for(tree.tree.closedness(), projection.eye_inside)};
+        if (item.lighting && output != Output::depth) {
+            if (auto made = tree.need_lit_vertices(); !made) return made.error();
+            prepared.is_lit = true;
+            prepared.lights =
+                uniforms_of(*item.lighting, vdtree::eye_in_tree(tree.tree, view, item.placement), tree.frame);
+        }
+        pass.items_.push_back(std::move(prepared));
+    }
+    return pass;
+}
+
+PixelBox SurfacePass::pixels_of(std::span<const glm::dvec2> points) const {
+    constexpr double margin = 2; // pixels, for the rounding of single floats and of the rasteriser
+    const int width = view_.width, height = view_.height;
+    glm::dvec2 low(std::numeric_limits<double>::infinity()), high = -low;
+    for (const PreparedItem& item : items_) {
+        const Box& box = item.cut.impl().box;
+        for (const glm::dvec2 point : points) {
+            const glm::dmat4 clip_from_unit(jittered(item.projection, view_, point));
+            for (int corner = 0; corner < 8; ++corner) {
+                const glm::dvec3 at(corner & 1 ? box.high.x : box.low.x, corner & 2 ? box.high.y : box.low.y,
+                                    corner & 4 ? box.high.z : box.low.z);
+                const glm::dvec4 clip = clip_from_unit * glm::dvec4(at, 1);
+                const glm::dvec2 pixel((clip.x / clip.w + 1) / 2 * width, (1 - clip.y / clip.w) / 2 * height);
+                if (!(clip.w > 0 && std::isfinite(pixel.x) && std::isfinite(pixel.y))) return {0, 0, width, height};
+                low = glm::min(low, pixel);
+                high = glm::max(high, pixel);
+            }
+        }
+    }
+    const auto within = [](double at, int most) {
+        return static_cast<int>(std::clamp(at, 0.0, static_cast<double>(most)));
+    };
+    const int left = within(std::floor(low.x - margin), width), top = within(std::floor(low.y - margin), height);
+    return {left, top, std::max(0, within(std::ceil(high.x + margin), width) - left),
+            std::max(0, within(std::ceil(high.y + margin), height) - top)};
+}
+
+void SurfacePass::draw(const Target::Impl& target, glm::dvec2 point, const Clear& clear, std::size_t sample_count,
+                       const PixelBox* only) const {
+    set_fixed_state(target);
+    if (only) {
+        glScissor(only->left, only->top, only->width, only->height);
+        glEnable(GL_SCISSOR_TEST);
+    }
+    if (output_ == Output::display) glEnable(GL_FRAMEBUFFER_SRGB);
+    target.bind(attachment_);
+    clear_target(target, clear, attachment_);
+    const float lod_bias = -0.5f * std::log2(static_cast<float>(sample_count));
+    for (const PreparedItem& item : items_) draw_item(item, point, lod_bias);
+}
+
+void SurfacePass::draw_item(const PreparedItem& item, glm::dvec2 point, float lod_bias) const {
+    GpuCut::Impl& cut = item.cut.impl();
+    GpuTree::Impl& tree = cut.tree.impl();
+    if (cut.indices.count() == 0) return;
+    cut.uploaded_bytes += tree.put(cut.glides);
+
+    glDisable(GL_BLEND);
+    glEnable(GL_DEPTH_TEST);
+    glDepthFunc(GL_GREATER); // depth is reversed
+    glFrontFace(GL_CCW);
+    if (item.cull == Cull::nothing) {
+        glDisable(GL_CULL_FACE);
+    } else {
+        glEnable(GL_CULL_FACE);
+        glCullFace(item.cull == Cull::back ? GL_BACK : GL_FRONT);
+    }
+
+    item.program->set(clip_from_unit_location, jittered(item.projection, view_, point));
+    if (output_ != Output::depth) set_colours(item, lod_bias);
+    item.program->use();
+    glVertexArrayElementBuffer(tree.arrays.id(), cut.indices.buffer());
+    glBindVertexArray(tree.arrays.id());
+    for (std::uint64_t first = 0; first < cut.indices.count(); first += most_indices_a_call) {
+        const std::uint64_t count = std::min(most_indices_a_call, cut.indices.count() - first);
+        glDrawElements(GL_TRIANGLES, static_cast<GLsizei>(count), GL_UNSIGNED_INT,
+                       reinterpret_cast<const void*>(static_cast<std::uintptr_t>(first * sizeof(std::uint32_t))));
+    }
+    glBindVertexArray(0);
+}
+
+void SurfacePass::set_colours(const PreparedItem& item, float lod_bias) const {
+    const GpuTree::Impl& tree = item.cut.tree().impl();
+    const Program& program = *item.program;
+    program.set(lowest_shade_location, item.is_lit ? glm::vec4(0) : tree.lowest_shade);
+    // A texture that is lit is cut off at white behind it.
+    const glm::vec4 highest_lit = tree.texture ? glm::vec4(brightest_light) : tree.highest_hue;
+    program.set(highest_shade_location, item.is_lit ? highest_lit : tree.highest_shade);
+    if (item.is_lit) {
+        program.set(material_location, item.lights.material);
+        program.set(eye_location, item.lights.eye);
+        if (!item.lights.lights.empty()) program.set(lights_location, item.lights.lights);
+    }
+    if (tree.texture) {
+        program.set(lod_bias_location, lod_bias);
+        program.set(uv_bounds_location, tree.texture->uv_bounds());
+        tree.texture->bind();
+    }
+}
+
+} // namespace unseen::render

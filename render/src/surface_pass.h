@@ -1,0 +1,80 @@
+// Draws a scene's items; what has to be found out about them is found out once for any number of draws.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec4.hpp>
+
+#include <render/draw.h>
+#include <render/program.h>
+
+#include "camera.h"
+#include "gpu_tree_impl.h"
+#include "target_impl.h"
+
+namespace unseen::render {
+
+// Pixels from the top left.
+struct PixelBox {
+    int left = 0, top = 0, width = 0, height = 0;
+};
+
+// Everything that drawing depends on but for depth, blending and faces is set: a window's other users may have changed
+// it.
+void set_fixed_state(const Target::Impl& target);
+
+// Lights as the shader wants them: see surface.vert.
+struct LightUniforms {
+    glm::vec4 material = glm::vec4(0), eye = glm::vec4(0);
+    std::vector<glm::vec4> lights; // three each
+};
+
+// Needs a current context. GL errors are left for the caller to ask for.
+class SurfacePass {
+public:
+    // Checks everything that can be wrong, compiles what is missing and aims at each item. The pass keeps the items'
+    // cuts. Of the camera's point nothing is taken.
+    static Result<SurfacePass> prepare(std::span<const Item> items, const Camera& camera, const Target::Impl& target,
+                                       int attachment);
+
+    // `sample_count`: of draws that will be averaged, each of which stands for so small a part of a pixel. `only`:
+    // nothing else is touched.
+    void draw(const Target::Impl& target, glm::dvec2 point, const Clear& clear, std::size_t sample_count = 1,
+              const PixelBox* only = nullptr) const;
+
+    // Which pixels of draws of these points can show anything: all of them where a part of an item may lie behind the
+    // eye.
+    PixelBox pixels_of(std::span<const glm::dvec2> points) const;
+
+private:
+    enum class Cull { nothing, back, front }; // faces that are left out
+
+    struct PreparedItem {
+        GpuCut cut;
+        Projection projection;
+        const Program* program = nullptr;
+        Cull cull = Cull::nothing;
+        bool is_lit = false;
+        LightUniforms lights = {};
+    };
+
+    SurfacePass(const vdtree::View& view, int attachment, Output output)
+        : view_(view), attachment_(attachment), output_(output) {}
+    static Cull cull_for(vdtree::Closedness closedness, bool eye_inside);
+    void draw_item(const PreparedItem& item, glm::dvec2 point, float lod_bias) const;
+    void set_colours(const PreparedItem& item, float lod_bias) const;
+
+    vdtree::View view_;
+    int attachment_;
+    Output output_;
+    std::vector<PreparedItem> items_;
+};
+
+// Each item's projection, with the near plane that is common to all: the given one, or that of the nearest item.
+Result<std::vector<Projection>> projections_of(std::span<const Item> items, const vdtree::View& view,
+                                               std::optional<double> near_plane);
+
+} // namespace unseen::render

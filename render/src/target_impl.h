@@ -1,0 +1,48 @@
+// What a target holds.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <render/gl_object.h>
+#include <render/target.h>
+
+#include "context_impl.h"
+
+namespace unseen::render {
+
+struct Target::Impl {
+    Impl(const Context& context_, int width_, int height_) : context(context_), width(width_), height(height_) {}
+    Impl(const Impl&) = delete;
+    Impl& operator=(const Impl&) = delete;
+    ~Impl() { static_cast<void>(context.make_current()); } // for the objects, which go next
+
+    Result<void> make(const TargetOptions& options);
+    Result<void> adopt(const ForeignFramebuffer& foreign);
+
+    // Binds it to draw to one of its attachments, and to no other.
+    void bind(int attachment) const;
+    Result<void> check_attachment(int attachment) const;
+    Result<void> check_readable() const;
+    Result<void> read_colour(int attachment, std::span<glm::vec4> pixels) const; // as many as it has
+
+    // How the attachment wants its colours; depth: it has none at all.
+    Output output(int attachment) const {
+        return outputs.empty() ? Output::depth : outputs[static_cast<std::size_t>(attachment)];
+    }
+
+    Context context; // first, and so gone last
+    int width, height;
+    int samples = 0;
+    unsigned id = 0;
+    FramebufferObject framebuffer; // what id names, unless it is foreign
+    bool is_foreign = false;
+    bool top_row_first = true;
+    bool has_depth = true;
+    std::vector<Output> outputs;    // of the attachments
+    std::vector<Texture2d> colours; // without samples
+    Texture2d depth;
+    std::vector<Renderbuffer> buffers; // with samples: colours, depth
+};
+
+} // namespace unseen::render
