@@ -62,7 +62,8 @@ public:
         vdtree::Cut cut(tree_);
         vdtree::FollowOptions following;
         following.triangle_budget = budget;
-        const vdtree::AdjustStats stats = expect(cut.follow(criterion, perception::viewpoint_of(tree_, view_, options_, {}, false), following));
+        const vdtree::AdjustStats stats =
+            expect(cut.follow(criterion, perception::viewpoint_of(tree_, view_, options_, {}, false), following));
         perception::JudgeOptions judge;
         judge.display = display_;
         const perception::Judgement judgement = expect(perception::judge_modern(reference_, luminance(cut), judge));
