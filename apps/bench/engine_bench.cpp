@@ -120,7 +120,8 @@ Result<vdtree::Mesh> simplified(const vdtree::Mesh& mesh, std::uint64_t triangle
     const auto extent = vdtree::extent_criterion(*tree, view, 1);
     if (!extent) return extent.error();
     vdtree::Cut cut(*tree);
-    if (const auto made = cut.follow(*extent, {.eye = vdtree::eye_in_tree(*tree, view, {})}, options); !made) return made.error();
+    if (const auto made = cut.follow(*extent, {.eye = vdtree::eye_in_tree(*tree, view, {})}, options); !made)
+        return made.error();
     return vdtree::extract_mesh(cut);
 }
 

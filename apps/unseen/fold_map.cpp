@@ -80,9 +80,10 @@ public:
         const vdtree::NodeBounds& around = tree_.bounds()[node];
         const glm::dvec3 to_eye = viewpoint_.eye - glm::dvec3(around.ring.centre);
         const double distance = glm::length(to_eye);
-        const bool is_silhouette = (around.flags & (vdtree::irregular_ring | vdtree::translucent_ring)) || !(around.ring.radius < distance) ||
-                                   vdtree::facing(around.slabs, glm::vec3(to_eye / distance),
-                                                  static_cast<float>(distance), around.ring.radius) == vdtree::Facing::mixed;
+        const bool is_silhouette =
+            (around.flags & (vdtree::irregular_ring | vdtree::translucent_ring)) || !(around.ring.radius < distance) ||
+            vdtree::facing(around.slabs, glm::vec3(to_eye / distance), static_cast<float>(distance),
+                           around.ring.radius) == vdtree::Facing::mixed;
         vdtree::LuminanceRange range = tree_.ring_luminance()[node];
         if (is_silhouette) range = {std::min(range.lo, darkest_), std::max(range.hi, brightest_)};
         const double lo = perception::to_luminance(scene_.display, static_cast<double>(range.lo)).value(),

@@ -218,7 +218,8 @@ Result<std::shared_ptr<const vdtree::DistanceCriterion>> distance_criterion(cons
 Result<std::vector<float>> fold_costs(const Scene& scene, const WhatOptions& what, Purpose purpose) {
     const auto criterion = distance_criterion(scene, what);
     if (!criterion) return criterion.error();
-    return vdtree::find_every_cost(scene.tree, **criterion, viewpoint_of(scene, what, purpose), follow_options(scene, purpose));
+    return vdtree::find_every_cost(scene.tree, **criterion, viewpoint_of(scene, what, purpose),
+                                   follow_options(scene, purpose));
 }
 
 } // namespace unseen::app

@@ -103,7 +103,8 @@ TEST_F(RenderCommandTest, APictureAndAFlightMakeTheSameCut) {
     for (const std::vector<std::string>& request : requests) {
         SCOPED_TRACE(::testing::PrintToString(request));
         const double still = render(request, "still.png")["triangles"];
-        std::vector<std::string> flight = {"render", "ball.vdt", "--path", "orbit:0:1", "--no-draw", "--csv", "flight.csv", "--size", "200x160"};
+        std::vector<std::string> flight = {"render", "ball.vdt",   "--path", "orbit:0:1", "--no-draw",
+                                           "--csv",  "flight.csv", "--size", "200x160"};
         flight.insert(flight.end(), request.begin(), request.end());
         const Outcome flown = run(flight);
         ASSERT_EQ(flown.status, 0) << flown.err;

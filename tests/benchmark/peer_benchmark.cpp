@@ -45,7 +45,8 @@ void to_a_tenth_unseen(benchmark::State& state) {
     options.triangle_budget = static_cast<vdtree::Index>(wanted_triangles());
     double degrees = 0;
     for (auto _ : state) {
-        benchmark::DoNotOptimize(cut.follow(extent, {.eye = vdtree::eye_in_tree(tree(), orbit(degrees += 90), {})}, options));
+        benchmark::DoNotOptimize(
+            cut.follow(extent, {.eye = vdtree::eye_in_tree(tree(), orbit(degrees += 90), {})}, options));
         benchmark::DoNotOptimize(cut.indices().data());
     }
     report(state, cut.triangle_count());

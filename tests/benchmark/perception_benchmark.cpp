@@ -16,7 +16,9 @@ perception::FoldTestOptions fold_test(bool gazes) {
     return options;
 }
 
-vdtree::DistanceCriterion luebke_hallen(bool gazes) { return *perception::luebke_hallen_distances(tree(), orbit(0), fold_test(gazes)); }
+vdtree::DistanceCriterion luebke_hallen(bool gazes) {
+    return *perception::luebke_hallen_distances(tree(), orbit(0), fold_test(gazes));
+}
 
 void time_tests(benchmark::State& state, const vdtree::DistanceCriterion& criterion, bool gazes) {
     const vdtree::Viewpoint viewpoint = perception::viewpoint_of(tree(), orbit(0), fold_test(gazes), {}, false);
@@ -25,7 +27,9 @@ void time_tests(benchmark::State& state, const vdtree::DistanceCriterion& criter
 }
 
 void test_extent(benchmark::State& state) { time_tests(state, *vdtree::extent_criterion(tree(), orbit(0), 1), false); }
-void test_displacement(benchmark::State& state) { time_tests(state, *vdtree::displacement_criterion(tree(), orbit(0), 1), false); }
+void test_displacement(benchmark::State& state) {
+    time_tests(state, *vdtree::displacement_criterion(tree(), orbit(0), 1), false);
+}
 void test_luebke_hallen(benchmark::State& state) { time_tests(state, luebke_hallen(state.range(0)), state.range(0)); }
 BENCHMARK(test_extent);
 BENCHMARK(test_displacement);

@@ -47,7 +47,8 @@ public:
         for (std::size_t i = 0; i < nodes.size(); ++i) {
             const Sphere& s = of.support_spheres()[nodes[i]];
             const double distance = glm::length(glm::dvec3(s.centre) - eye_);
-            costs[i] = distance > s.radius ? static_cast<float>(2 * std::asin(s.radius / distance) * scale_) : vdtree::unbounded_cost(0);
+            costs[i] = distance > s.radius ? static_cast<float>(2 * std::asin(s.radius / distance) * scale_)
+                                           : vdtree::unbounded_cost(0);
         }
     }
 

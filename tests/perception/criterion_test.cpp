@@ -62,7 +62,8 @@ View window(const Display& display, glm::dvec3 eye) {
     return view;
 }
 
-std::vector<float> costs_of(const VertexTree& tree, const View& view, const FoldTestOptions& options, const vdtree::Similarity& placement = {}) {
+std::vector<float> costs_of(const VertexTree& tree, const View& view, const FoldTestOptions& options,
+                            const vdtree::Similarity& placement = {}) {
     const auto criterion = luebke_hallen_distances(tree, view, options);
     EXPECT_TRUE(criterion) << criterion.error().message;
     EXPECT_TRUE(criterion->is_monotone());
@@ -104,7 +105,8 @@ TEST_F(LuebkeHallen, NeverCostsLessForAParentThanForItsChild) {
 }
 
 // Never folds what the formula finds visible, and keeps little more than that: `share` of the triangles at most.
-void expect_as_tight_as_the_formula(const VertexTree& tree, const View& view, const FoldTestOptions& options, double share) {
+void expect_as_tight_as_the_formula(const VertexTree& tree, const View& view, const FoldTestOptions& options,
+                                    double share) {
     const vdtree::Viewpoint viewpoint = viewpoint_of(tree, view, options, {}, false);
     const auto criterion = luebke_hallen_distances(tree, view, options);
     ASSERT_TRUE(criterion) << criterion.error().message;
@@ -146,7 +148,8 @@ TEST_F(LuebkeHallen, EqualsItsFormulaOnTheBunny) {
 
 TEST_F(LuebkeHallen, EqualsItsFormulaOnAFurtherMesh) {
     const std::vector<std::filesystem::path> files = support::extra_meshes();
-    const auto found = std::find_if(files.begin(), files.end(), [](const auto& file) { return file.filename().string().starts_with("horse."); });
+    const auto found = std::find_if(files.begin(), files.end(),
+                                    [](const auto& file) { return file.filename().string().starts_with("horse."); });
     if (found == files.end()) GTEST_SKIP() << "UNSEEN_EXTRA_MESHES names no folder with a horse";
     const support::TempFolder scratch;
     const auto read = meshio::read_mesh(support::uncompressed(*found, scratch.path()));
@@ -240,7 +243,8 @@ TEST_F(LuebkeHallen, FoldsMoreWhereNobodyLooks) {
     options.display = display_;
     vdtree::Cut foveal(tree()), gazed(tree());
     const auto follow = [&](vdtree::Cut& cut) {
-        EXPECT_TRUE(cut.follow(*luebke_hallen_distances(tree(), view, options), viewpoint_of(tree(), view, options, {}, false)));
+        EXPECT_TRUE(cut.follow(*luebke_hallen_distances(tree(), view, options),
+                               viewpoint_of(tree(), view, options, {}, false)));
     };
     follow(foveal);
     options.gaze_px = glm::dvec2(1603, 512);

@@ -98,7 +98,8 @@ std::vector<float> ring_costs(const Scene& scene, const View& view) {
     const FoldTestOptions options = fold_test(*scene.tree);
     const auto criterion = luebke_hallen_distances(*scene.tree, view, options);
     EXPECT_TRUE(criterion);
-    const std::vector<float> all = *find_every_cost(*scene.tree, *criterion, viewpoint_of(*scene.tree, view, options, {}, false));
+    const std::vector<float> all =
+        *find_every_cost(*scene.tree, *criterion, viewpoint_of(*scene.tree, view, options, {}, false));
     std::vector<float> costs;
     for (const NodeId node : scene.nodes) costs.push_back(all[node]);
     return costs;

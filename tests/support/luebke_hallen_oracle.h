@@ -32,16 +32,19 @@ inline std::vector<float> luebke_hallen_costs(const vdtree::VertexTree& tree, co
         const bool is_outside = distance > radius;
         const glm::dvec3 direction = to_centre / distance;
         const double half_angle = is_outside ? std::asin(radius / distance) : std::numbers::pi;
-        extent_deg[node] = is_outside ? static_cast<float>(std::max(2 * half_angle * degrees, pixel_deg)) : std::numeric_limits<float>::infinity();
+        extent_deg[node] = is_outside ? static_cast<float>(std::max(2 * half_angle * degrees, pixel_deg))
+                                      : std::numeric_limits<float>::infinity();
         if (viewpoint.gaze && is_outside) {
-            const double angle = std::atan2(glm::length(glm::cross(direction, *viewpoint.gaze)), glm::dot(direction, *viewpoint.gaze));
+            const double angle =
+                std::atan2(glm::length(glm::cross(direction, *viewpoint.gaze)), glm::dot(direction, *viewpoint.gaze));
             eccentricity[node] = static_cast<float>(std::max(0.0, angle - half_angle) * degrees);
         }
         vdtree::LuminanceRange range = tree.ring_luminance()[node];
         float adaptation = tree.adaptation_luminance()[node];
-        const bool is_silhouette = (around.flags & (vdtree::irregular_ring | vdtree::translucent_ring)) ||
-                                   vdtree::facing(around.slabs, tree.mask(node), glm::vec3(-direction), static_cast<float>(distance),
-                                                  around.ring.radius) == vdtree::Facing::mixed;
+        const bool is_silhouette =
+            (around.flags & (vdtree::irregular_ring | vdtree::translucent_ring)) ||
+            vdtree::facing(around.slabs, tree.mask(node), glm::vec3(-direction), static_cast<float>(distance),
+                           around.ring.radius) == vdtree::Facing::mixed;
         if (is_silhouette) {
             range = {std::min(range.lo, options.scene.darkest), std::max(range.hi, options.scene.brightest)};
             adaptation = std::max(adaptation, 0.5f * (range.lo + range.hi));

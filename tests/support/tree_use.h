@@ -44,10 +44,13 @@ inline bool use_everything(const vdtree::VertexTree& tree, bool measures_folds =
     extract();
     const View view{.eye = {1, 2, 3}};
     const auto extent = extent_criterion(tree, view, 20), displacement = displacement_criterion(tree, view, 2);
-    if (extent) (void)cut.follow(*extent, {.eye = eye_in_tree(tree, view, {}), .frusta = {frustum_of(tree, view)}}).has_value();
+    if (extent)
+        (void)cut.follow(*extent, {.eye = eye_in_tree(tree, view, {}), .frusta = {frustum_of(tree, view)}}).has_value();
     extract();
     if (displacement)
-        (void)cut.follow(*displacement, {.eye = eye_in_tree(tree, view, {})}, {.triangle_budget = tree.triangle_count() / 2}).has_value();
+        (void)cut
+            .follow(*displacement, {.eye = eye_in_tree(tree, view, {})}, {.triangle_budget = tree.triangle_count() / 2})
+            .has_value();
     extract();
     const FrustumVisibility frustum(tree, view);
     const auto bright_ones = [](const VertexTree& of, std::span<const NodeId> nodes, std::span<float> costs) {

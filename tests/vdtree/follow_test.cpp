@@ -584,7 +584,8 @@ TEST(FollowBudget, WithHysteresisStaysWithinItsFactorAndDoesNotFlicker) {
     constexpr Index budget = 4000;
     constexpr float hysteresis = 1.1f;
     Cut steady(tree), exact(tree);
-    std::map<NodeId, int> folded_at; // flicker: folds that are undone within ten frames
+    // Flicker: folds that are undone within ten frames. Once an outline that passes over a node may do that.
+    std::map<NodeId, int> folded_at, undone;
     int flickers = 0, folds = 0;
     for (int frame = 0; frame < 240; ++frame) {
         const double angle = frame * 0.01;
@@ -601,12 +602,12 @@ TEST(FollowBudget, WithHysteresisStaysWithinItsFactorAndDoesNotFlicker) {
                 continue;
             }
             const auto folded = folded_at.find(change.node);
-            flickers += folded != folded_at.end() && frame - folded->second <= 10;
+            if (folded != folded_at.end() && frame - folded->second <= 10) flickers += ++undone[change.node] > 1;
         }
         ASSERT_EQ(triangles_of(steady.indices()), gathered(steady)) << "frame " << frame;
     }
     EXPECT_GT(folds, 100);
-    EXPECT_LT(flickers, folds / 20) << flickers << " of " << folds;
+    EXPECT_LT(flickers, folds / 100) << flickers << " of " << folds;
 }
 
 TEST(FollowInTime, FinishesLaterWhatTheTimeDidNotReach) {

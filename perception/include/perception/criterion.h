@@ -50,8 +50,7 @@ struct FoldTestOptions {
 //
 // Contrast and luminance are rounded up, to classes of a 48th of an octave and of a sixteenth of the display's range, eccentricity down to
 // quarters of a degree, and the magnification is the window's largest: so a fold counts for no less than it does above, and a cut keeps
-// about a per cent more triangles at most. Cost: 10 ns a node, and 90 ns for every class in use and eccentricity; bunny: 30 ms with a gaze, 1 ms
-// without.
+// about a per cent more triangles at most. Cost: 100 ns a node, and 90 ns for every class in use and eccentricity; bunny: 7 ms, and 35 ms with a gaze.
 // With the chroma classes are coarser. Fails, too, where the chroma is asked for of a tree with a texture, whose colours are not looked at; so
 // does the next.
 Result<vdtree::DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTree& tree, const vdtree::View& view,

@@ -34,7 +34,9 @@ struct Level {
     std::size_t texture = 0, texture_motion = 0;         // both, or neither
 
     bool is_nothing() const { return contrast == 0 && chroma[0] == 0 && chroma[1] == 0 && texture == 0; }
-    std::size_t grey_number() const { return (shift * LuminanceClasses::count + luminance) * fine_contrasts.count() + contrast; }
+    std::size_t grey_number() const {
+        return (shift * LuminanceClasses::count + luminance) * fine_contrasts.count() + contrast;
+    }
     std::uint64_t number() const {
         std::uint64_t number = texture * texture_motions.count() + texture_motion;
         for (std::size_t i = 0; i < 2; ++i)
@@ -63,10 +65,13 @@ public:
 
     Level level(const RingLooks& looks) const {
         const bool moves_texture = looks.texture > 0 && looks.texture_motion > 0;
-        return {contrasts_.of(std::max(contrast(looks.range), looks.least_contrast)), luminances_.of(luminances_.in_cdm2(looks.adaptation)),
-                shifts.of(looks.shift), {chroma_contrasts.of(looks.chroma.x), chroma_contrasts.of(looks.chroma.y)},
+        return {contrasts_.of(std::max(contrast(looks.range), looks.least_contrast)),
+                luminances_.of(luminances_.in_cdm2(looks.adaptation)),
+                shifts.of(looks.shift),
+                {chroma_contrasts.of(looks.chroma.x), chroma_contrasts.of(looks.chroma.y)},
                 {chroma_shifts.of(looks.chroma_shift.x), chroma_shifts.of(looks.chroma_shift.y)},
-                moves_texture ? texture_contrasts.of(looks.texture) : 0, moves_texture ? texture_motions.of(looks.texture_motion) : 0};
+                moves_texture ? texture_contrasts.of(looks.texture) : 0,
+                moves_texture ? texture_motions.of(looks.texture_motion) : 0};
     }
     // What the contrasts of vertices and texture come to together, rounded up like each of them.
     double sum_of_contrasts(const RingLooks& looks) const {

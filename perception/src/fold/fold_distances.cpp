@@ -58,10 +58,12 @@ struct Row {
     double texture, texture_motion;
 
     Row(const Level& level, const Classes& classes)
-        : contrast(classes.contrasts().value(level.contrast)), shift(shifts.value(level.shift)), luminance_cdm2(classes.luminance(level.luminance)),
+        : contrast(classes.contrasts().value(level.contrast)), shift(shifts.value(level.shift)),
+          luminance_cdm2(classes.luminance(level.luminance)),
           chroma(chroma_contrasts.value(level.chroma[0]), chroma_contrasts.value(level.chroma[1])),
           chroma_shift(chroma_shifts.value(level.chroma_shift[0]), chroma_shifts.value(level.chroma_shift[1])),
-          texture(texture_contrasts.value(level.texture)), texture_motion(std::min(texture_motions.value(level.texture_motion), 1.0)) {}
+          texture(texture_contrasts.value(level.texture)),
+          texture_motion(std::min(texture_motions.value(level.texture_motion), 1.0)) {}
 
     bool has_chroma() const { return chroma != glm::dvec2(0); }
     bool has_texture() const { return texture > 0; }
@@ -167,8 +169,8 @@ float reach_of(double extent_deg, const Screen& screen, bool is_around_spheres) 
     return static_cast<float>((is_around_spheres ? in_lengths : in_lengths - 1) * (1 + reach_rounding));
 }
 
-void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes& classes, const Bins& eccentricities, const Screen& screen,
-                const Sensitivities& see) {
+void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes& classes, const Bins& eccentricities,
+                const Screen& screen, const Sensitivities& see) {
     const std::size_t bins = parts.eccentricity_bins;
     const bool is_around_spheres = !parts.lengths.empty();
     parts.reach.assign((rows.levels().size() + 1) * bins, DistanceCriterion::never_visible);

@@ -46,7 +46,8 @@ std::size_t bucket_of(float cost) { return std::bit_cast<std::uint32_t>(cost) >>
 
 class Budgeter {
 public:
-    Budgeter(std::span<const VertexTree* const> trees, std::span<const CostSource* const> sources, const BudgetLimits& limits)
+    Budgeter(std::span<const VertexTree* const> trees, std::span<const CostSource* const> sources,
+             const BudgetLimits& limits)
         : trees_(trees), sources_(sources), limits_(limits), asked_(trees.size()), above_(trees.size()),
           has_bounds_(!limits.only_unfolding && std::ranges::all_of(sources, &CostSource::has_bounds)) {
         for (const VertexTree* tree : trees) decision_.unfolded.emplace_back((std::size_t{tree->interior_count()} + 63) / 64);
@@ -61,7 +62,8 @@ public:
 
     // From a threshold that leaves some of the budget, and on from there. None where that turns out to be no way.
     std::optional<BudgetDecision> run_from_guess() {
-        if (!has_bounds_ || limits_.is_out_of_time || !std::ranges::all_of(sources_, &CostSource::is_monotone)) return std::nullopt;
+        if (!has_bounds_ || limits_.is_out_of_time || !std::ranges::all_of(sources_, &CostSource::is_monotone))
+            return std::nullopt;
         const float threshold = guess();
         if (!(threshold > 0) || !start_at(threshold)) return std::nullopt;
         BudgetDecision decision = run_buckets();
@@ -123,7 +125,9 @@ private:
         // What would unfold as an outline, but did not, is none.
         const float unfolding = threshold * (1 + decision_rounding);
         for (std::uint32_t tree = 0; tree < trees_.size(); ++tree) {
-            const auto decide = [&](std::span<const NodeId> nodes, std::uint64_t* bits) { sources_[tree]->decide_at(threshold, nodes, bits); };
+            const auto decide = [&](std::span<const NodeId> nodes, std::uint64_t* bits) {
+                sources_[tree]->decide_at(threshold, nodes, bits);
+            };
             decision_.unfolded[tree] = decider.run(*trees_[tree], decide, [&](std::span<const NodeId> folded) {
                 for (const NodeId node : folded) {
                     is_damaged |= !trees_[tree]->is_sound(node);

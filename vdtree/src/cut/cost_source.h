@@ -21,7 +21,8 @@ public:
     virtual bool has_bounds() const noexcept { return false; }
     virtual bool is_monotone() const noexcept { return false; }
     // At least both costs. `folded_at`, if not null, is a threshold (somewhat more than one) at which all of the nodes are folded.
-    virtual void find_cost_bounds(std::span<const NodeId>, [[maybe_unused]] const float* folded_at, float*, float*) const {}
+    virtual void find_cost_bounds(std::span<const NodeId>, [[maybe_unused]] const float* folded_at, float*,
+                                  float*) const {}
     // Whether nodes unfold at a threshold, one bit each. Only without least costs.
     virtual void decide_at([[maybe_unused]] float threshold, std::span<const NodeId>, std::uint64_t*) const {}
 };

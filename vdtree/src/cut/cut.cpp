@@ -105,7 +105,8 @@ Decision decide_by_threshold(const VertexTree& tree, const CostSource& source) {
         costs.resize(nodes.size());
         source.find_costs(nodes, {costs.data(), costs.data(), unfolded});
         for (std::size_t i = 0; i < nodes.size(); ++i)
-            if (costs[i] <= 1 || !tree.is_sound(nodes[i])) decision.max_fold_cost = std::max(decision.max_fold_cost, costs[i]);
+            if (costs[i] <= 1 || !tree.is_sound(nodes[i]))
+                decision.max_fold_cost = std::max(decision.max_fold_cost, costs[i]);
     };
     decision.unfolded = TreeDecider().run(tree, decide, [](std::span<const NodeId>) {});
     return decision;

@@ -206,7 +206,8 @@ Result<DistanceCriterion> displacement_criterion(const VertexTree& tree, const V
     const double half_angle = std::min(radians_of_pixels(view, tolerance_pixels), std::numbers::pi) / 2;
     const float reach = static_cast<float>(1 / (2 * std::sin(half_angle)));
     parts.reach = {reach};
-    if (std::find(displacement.begin(), displacement.end(), 0.0f) != displacement.end()) { // a row of their own for what never moves
+    if (std::find(displacement.begin(), displacement.end(), 0.0f) !=
+        displacement.end()) { // a row of their own for what never moves
         parts.reach = {DistanceCriterion::never_visible, reach};
         for (const float moved : displacement) parts.classes.push_back(moved == 0 ? FoldClass{0, 0} : FoldClass{1, 1});
     }

@@ -46,9 +46,10 @@ constexpr float sqrt3 = 1.7320508075688772f;         // of the diagonals' coordi
 struct Tangent {
     float at_0, slope;
 };
-constexpr Tangent tangent_of(double root) { // at the square of `root`
+constexpr Tangent tangent_of(double root) {             // at the square of `root`
     constexpr double units = 127, just_less = 1 - 1e-6; // covers the rounding of the products
-    return {static_cast<float>(1.5 / (root * units) * just_less), static_cast<float>(0.5 / (root * root * root * units * units * units))};
+    return {static_cast<float>(1.5 / (root * units) * just_less),
+            static_cast<float>(0.5 / (root * root * root * units * units * units))};
 }
 constexpr Tangent near_tangent = tangent_of(1.0954), middle_tangent = tangent_of(1.4142);
 constexpr float least_inverse_reach = 0.25f / slab_units;

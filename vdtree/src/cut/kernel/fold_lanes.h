@@ -304,7 +304,8 @@ struct Lanes {
 
     // Not more than 1 over the root of a squared reach of a parallelepiped, and falling with it: tangents, for the curve is convex.
     static UNSEEN_INLINE Floats inverse_reach(const Floats& squared) {
-        const Floats near = max_of(near_tangent.at_0 - near_tangent.slope * squared, middle_tangent.at_0 - middle_tangent.slope * squared);
+        const Floats near = max_of(near_tangent.at_0 - near_tangent.slope * squared,
+                                   middle_tangent.at_0 - middle_tangent.slope * squared);
         return max_of(near, all(least_inverse_reach));
     }
 

@@ -72,7 +72,8 @@ public:
     void find_costs(std::span<const NodeId> nodes, const NodeCosts& costs) const override;
     // Without a look at what faces the eye: at a third of the price. Not with lights.
     bool has_bounds() const noexcept override { return !has_lights(); }
-    void find_cost_bounds(std::span<const NodeId> nodes, const float* folded_at, float* cost, float* seen_cost) const override;
+    void find_cost_bounds(std::span<const NodeId> nodes, const float* folded_at, float* cost,
+                          float* seen_cost) const override;
     bool has_lights() const noexcept { return lit_.has_value(); }
     bool is_monotone() const noexcept override { return criterion_.is_monotone(); }
     // The same where costs count, not only what is above the threshold: what nodes face is always found out. (In the above, the
