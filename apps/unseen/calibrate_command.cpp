@@ -19,7 +19,7 @@
 #include "output_files.h"
 #include "progress_bar.h"
 #include "report.h"
-#include "scene.h"
+#include "session_options.h"
 #include "terminal.h"
 
 namespace unseen::app {

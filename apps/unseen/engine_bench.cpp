@@ -26,7 +26,6 @@
 #include "model_file.h"
 #include "process_team.h"
 #include "progress_bar.h"
-#include "scene.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -233,7 +232,7 @@ public:
         const auto background = static_cast<float>(perception::to_relative(options_.display, perception::Luminance(20)));
         options_.scene = {std::min(range.lo, background), std::max(range.hi, background)};
         if (!kind.with_gaze) return;
-        options_.gaze_px = gaze_aside(options_.display, window_, usual_degrees_aside);
+        options_.gaze_px = session::gaze_aside(options_.display, window_, session::usual_degrees_aside);
     }
 
     vdtree::View view(double degrees) const {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "command.h"
+#include "option_names.h"
 #include "paged_memory.h"
 #include "terminal.h"
 
@@ -46,7 +47,7 @@ int run(const std::vector<Command>& commands) {
     for (const Command& command : commands) {
         if (!command.parser->parsed()) continue;
         const auto status = command.run();
-        if (!status) print_error(status.error().message);
+        if (!status) print_error(with_option_names(status.error().message));
         if (!status) return exit_failed;
         if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return *status;
         print_error("cannot write to the standard output: is the disk full?");

@@ -3,18 +3,37 @@
 #include <functional>
 
 #include "progress_bar.h"
+#include "session_options.h"
 #include "terminal.h"
 
 namespace unseen::app {
+namespace {
 
-Result<vdtree::ReadResult> read_mesh_file(const std::filesystem::path& file, const vdtree::ReadOptions& options) {
+// `bar` must outlive what is done with the options.
+session::LoadOptions load_options(const TextureOptions& texture, ProgressBar& bar) {
+    session::LoadOptions options;
+    options.texture = texture.file;
+    options.without_textures = texture.is_left_out;
+    options.messages = terminal_messages();
+    options.messages.progress = std::ref(bar);
+    return options;
+}
+
+} // namespace
+
+Result<vdtree::ReadResult> read_mesh_file(const std::filesystem::path& file) {
     ProgressBar bar("reading " + file.filename().string());
-    vdtree::ReadOptions shown = options;
-    shown.progress = std::ref(bar);
-    auto read = vdtree::read_mesh(file, shown);
+    vdtree::ReadOptions options;
+    options.progress = std::ref(bar);
+    auto read = vdtree::read_mesh(file, options);
     if (!read) return read;
     for (const std::string& warning : read->warnings) print_warning(file.string() + ": " + warning);
     return read;
+}
+
+Result<vdtree::ReadResult> read_textured_mesh(const std::filesystem::path& file, const vdtree::ReadOptions& options, const TextureOptions& texture) {
+    ProgressBar bar("reading " + file.filename().string());
+    return session::read_textured_mesh(file, load_options(texture, bar), options);
 }
 
 Result<vdtree::VertexTree> build_tree_of(vdtree::ReadResult&& read, vdtree::BuildOptions options) {
@@ -24,44 +43,16 @@ Result<vdtree::VertexTree> build_tree_of(vdtree::ReadResult&& read, vdtree::Buil
     return vdtree::build_tree(read.mesh.view(), options);
 }
 
-Result<vdtree::ReadResult> read_textured_mesh(const std::filesystem::path& file, const vdtree::ReadOptions& options, const TextureOptions& texture) {
-    vdtree::ReadOptions reading = options;
-    reading.materials = texture.file.empty() && !texture.is_left_out;
-    auto read = read_mesh_file(file, reading);
-    if (!read) return read;
-    if (const auto laid = lay_texture(file, *read, texture); !laid) return laid.error();
-    return read;
+Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file) {
+    ProgressBar bar(file.filename().string());
+    return session::load_tree(file, load_options({}, bar));
 }
 
-namespace {
-
-// As the options have it.
-Result<vdtree::VertexTree> with_texture(Result<vdtree::VertexTree> tree, const std::filesystem::path& file, const TextureOptions& texture) {
-    if (tree && !texture.file.empty())
-        return Error{ErrorCode::invalid_argument, file.string() + " is a tree, whose texture is laid when it is built: give --texture to unseen build."};
-    if (tree && texture.is_left_out && !tree->texture().empty()) return tree->untextured();
-    return tree;
-}
-
-} // namespace
-
-Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file, const TextureOptions& texture) {
-    if (vdtree::is_tree_file(file)) {
-        ProgressBar bar("reading " + file.filename().string());
-        return with_texture(vdtree::read_tree(file, std::ref(bar)), file, texture);
-    }
-    auto read = read_textured_mesh(file, {}, texture);
-    if (!read) return read.error();
-    print_note(file.string() + " is a mesh: its tree is built now; 'unseen build' does it once and for all.");
-    return build_tree_of(std::move(*read), {});
-}
-
-Result<vdtree::VertexTree> open_tree(const std::filesystem::path& file, const TextureOptions& texture) {
-    // Smaller trees are read in less time than a picture takes, and checked to the last bit.
-    constexpr std::uintmax_t mapped_bytes = std::uintmax_t{256} << 20;
-    std::error_code unknown;
-    const bool is_large = std::filesystem::file_size(file, unknown) >= mapped_bytes && !unknown;
-    return is_large && vdtree::is_tree_file(file) ? with_texture(vdtree::map_tree(file), file, texture) : load_tree(file, texture);
+Result<session::Scene> load_scene(const std::filesystem::path& file, const TextureOptions& texture, double unit_metres) {
+    ProgressBar bar(file.filename().string());
+    session::LoadOptions options = load_options(texture, bar);
+    options.unit_metres = unit_metres;
+    return session::Scene::load(file, options);
 }
 
 } // namespace unseen::app

@@ -1,28 +1,28 @@
-// Models as the verbs take them: a tree, or a mesh of which a tree is built on the fly.
+// Models as the verbs take them, with progress bars, notes and warnings on the terminal.
 #pragma once
 
 #include <filesystem>
 
+#include <session/scene.h>
 #include <vdtree/builder.h>
 #include <vdtree/mesh_io.h>
 #include <vdtree/tree_io.h>
 
-#include "textures.h"
+#include "options.h"
 
 namespace unseen::app {
 
-// A mesh as its reader returns it, with its warnings printed.
-Result<vdtree::ReadResult> read_mesh_file(const std::filesystem::path& file, const vdtree::ReadOptions& options = {});
-
-// The tree of a mesh. Triangles that its reader dropped count as the tree's dropped ones.
-Result<vdtree::VertexTree> build_tree_of(vdtree::ReadResult&& read, vdtree::BuildOptions options);
+// A mesh as its reader returns it.
+Result<vdtree::ReadResult> read_mesh_file(const std::filesystem::path& file);
 
 // A mesh with its texture.
 Result<vdtree::ReadResult> read_textured_mesh(const std::filesystem::path& file, const vdtree::ReadOptions& options, const TextureOptions& texture);
 
-// A tree file, or a mesh file with a note that its tree is built now. A tree has its texture, and takes no other.
-Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file, const TextureOptions& texture = {});
-// The same, but tree files of 256 MiB and more are mapped: only what is used is read, and checked.
-Result<vdtree::VertexTree> open_tree(const std::filesystem::path& file, const TextureOptions& texture = {});
+// The tree of a mesh. Triangles that its reader dropped count as the tree's dropped ones.
+Result<vdtree::VertexTree> build_tree_of(vdtree::ReadResult&& read, vdtree::BuildOptions options);
+
+// A tree file, or a mesh file with a note that its tree is built now.
+Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file);
+Result<session::Scene> load_scene(const std::filesystem::path& file, const TextureOptions& texture, double unit_metres);
 
 } // namespace unseen::app

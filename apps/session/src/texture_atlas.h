@@ -7,7 +7,7 @@
 
 #include <vdtree/texture.h>
 
-namespace unseen::app {
+namespace unseen::session {
 
 // One of the textures, and the coordinates at which it is looked up.
 struct AtlasPart {
@@ -30,4 +30,4 @@ struct Atlas {
 // mix neighbours. Fails where that is larger than a texture may be.
 Result<Atlas> make_atlas(std::span<const AtlasPart> parts);
 
-} // namespace unseen::app
+} // namespace unseen::session

@@ -2,19 +2,13 @@
 #pragma once
 
 #include <filesystem>
-#include <string>
 
-#include <vdtree/mesh_io.h>
+#include <session/model_file.h>
 
-namespace unseen::app {
-
-struct TextureOptions {
-    std::string file;          // instead of the materials'
-    bool is_left_out = false;  // --no-texture
-};
+namespace unseen::session {
 
 // Gives the mesh the texture that the options, or else its materials, name, if they do: several become one, and the colours of materials
 // become those of the vertices. Where nothing has an image, nothing changes. Errors name the image's file.
-Result<void> lay_texture(const std::filesystem::path& mesh_file, vdtree::ReadResult& read, const TextureOptions& options);
+Result<void> lay_texture(const std::filesystem::path& mesh_file, vdtree::ReadResult& read, const LoadOptions& options);
 
-} // namespace unseen::app
+} // namespace unseen::session
