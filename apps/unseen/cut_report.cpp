@@ -50,7 +50,8 @@ Json to_json(std::span<const session::Effect> effects) {
 
 void print(std::span<const session::Effect> effects) {
     for (const session::Effect& effect : effects)
-        std::printf("  %-3s  %s: %s\n", effect.on ? "on" : "off", effect.name.c_str(), with_option_names(effect.why).c_str());
+        std::printf("  %-3s  %s: %s\n", effect.on ? "on" : "off", effect.name.c_str(),
+                    with_option_names(effect.why).c_str());
 }
 
 } // namespace unseen::app

@@ -25,7 +25,8 @@ struct Surroundings {
 Result<Surroundings> read_surroundings(const ViewOptions& view, const DisplayOptions& display) {
     auto shown_on = make_display(display);
     if (!shown_on) return shown_on.error();
-    if (const auto background = session::relative_background(*shown_on, background_of(view)); !background) return background.error();
+    if (const auto background = session::relative_background(*shown_on, background_of(view)); !background)
+        return background.error();
     Surroundings around;
     if (!display.csf.empty()) {
         auto table = session::read_csf_table(display.csf, *shown_on);
@@ -74,7 +75,8 @@ Result<perception::Display> make_display(const DisplayOptions& options) {
     return display;
 }
 
-Result<session::Session> open_session(const std::filesystem::path& model, const ViewOptions& view, const DisplayOptions& display) {
+Result<session::Session> open_session(const std::filesystem::path& model, const ViewOptions& view,
+                                      const DisplayOptions& display) {
     auto around = read_surroundings(view, display);
     if (!around) return around.error();
     auto scene = load_scene(model, view.texture, view.unit_metres);
@@ -98,7 +100,8 @@ vdtree::View make_view(const session::Session& session, const ViewOptions& optio
         view.eye = *options.eye;
         view.target = options.target.value_or(session.bounding_sphere().centre);
     } else {
-        view = session.frame(options.direction.value_or(glm::dvec3(0, 0, 1)), options.fill.value_or(default_fill), view);
+        view =
+            session.frame(options.direction.value_or(glm::dvec3(0, 0, 1)), options.fill.value_or(default_fill), view);
     }
     if (options.up) view.up = *options.up;
     return view;

@@ -15,8 +15,10 @@ session::Messages terminal_messages();
 // The display that the options describe; ranges are checked.
 Result<perception::Display> make_display(const DisplayOptions& options);
 
-// Fails on a file that cannot be read, and on options that contradict the model or the display. What is quickly read is read first.
-Result<session::Session> open_session(const std::filesystem::path& model, const ViewOptions& view, const DisplayOptions& display);
+// Fails on a file that cannot be read, and on options that contradict the model or the display. What is quickly read is
+// read first.
+Result<session::Session> open_session(const std::filesystem::path& model, const ViewOptions& view,
+                                      const DisplayOptions& display);
 // The same of a tree that is at hand.
 Result<session::Session> make_session(vdtree::VertexTree tree, const ViewOptions& view, const DisplayOptions& display);
 

@@ -18,19 +18,24 @@ Effect fold_test_effect(const Decision& decision) {
     if (is_full(decision)) return {"fold test", false, "nothing is folded in the full model"};
     const std::string instead = decision.why.empty() ? std::string() : " (" + decision.why + ")";
     if (decision.test == FoldTest::error)
-        return {"fold test", true, "error: what each fold changes in luminance and outline, against the contrast sensitivity"};
+        return {"fold test", true,
+                "error: what each fold changes in luminance and outline, against the contrast sensitivity"};
     if (decision.test == FoldTest::luebke_hallen_safe)
         return {"fold test", true,
-                "luebke-hallen-safe: the worst grating of each fold with any neighbours folded, and the shift of the mean, against the contrast "
-                "sensitivity" + instead};
+                "luebke-hallen-safe: the worst grating of each fold with any neighbours folded, and the shift of the "
+                "mean, against the contrast "
+                "sensitivity" +
+                    instead};
     if (decision.test == FoldTest::luebke_hallen)
-        return {"fold test", true, "luebke-hallen: the worst grating of each fold against the contrast sensitivity" + instead};
+        return {"fold test", true,
+                "luebke-hallen: the worst grating of each fold against the contrast sensitivity" + instead};
     return {"fold test", true, name_of(decision.test) + ": pixels on the screen, whether they can be seen or not"};
 }
 
 Effect gaze_effect(const Sight& sight, const Decision& decision) {
     if (is_full(decision)) return {"gaze", false, "nothing is folded in the full model"};
-    if (!is_perceptual(decision)) return {"gaze", false, "the fold test " + name_of(decision.test) + " does not use it"};
+    if (!is_perceptual(decision))
+        return {"gaze", false, "the fold test " + name_of(decision.test) + " does not use it"};
     const std::optional<Gaze>& gaze = sight.observer.gaze;
     if (!gaze) return {"gaze", false, "no gaze is given, so everything counts as looked at"};
     const std::string around =
@@ -55,13 +60,16 @@ Effect csf_effect(const Sight& sight, const Decision& decision) {
     if (!is_perceptual(decision)) return {"csf table", false, "only the perceptual fold test looks sensitivity up"};
     return {"csf table", sight.observer.csf != nullptr,
             sight.observer.csf ? "by observer.csf: " + sight.observer.csf->samples().source
-                      : "the standard observer is used, castleCSF"};
+                               : "the standard observer is used, castleCSF"};
 }
 
 Effect prelit_effect(const Sight& sight) {
-    if (sight.lighting && !sight.object.tree.colours().empty()) return {"pre-lit colours", false, "scene.lights lights the colours"};
+    if (sight.lighting && !sight.object.tree.colours().empty())
+        return {"pre-lit colours", false, "scene.lights lights the colours"};
     if (sight.object.tree.is_prelit())
-        return {"pre-lit colours", true, sight.object.tree.colours().empty() ? "the texture is taken as lit" : "the mesh's colours are taken as lit"};
+        return {"pre-lit colours", true,
+                sight.object.tree.colours().empty() ? "the texture is taken as lit"
+                                                    : "the mesh's colours are taken as lit"};
     if (!sight.object.tree.texture().empty()) return {"pre-lit colours", false, "Scene::relight() lights the texture"};
     return {"pre-lit colours", false,
             sight.object.tree.colours().empty() ? "the mesh has no colours" : "Scene::relight() lights the colours"};
@@ -69,10 +77,12 @@ Effect prelit_effect(const Sight& sight) {
 
 Effect texture_effect(const Sight& sight, const Decision& decision) {
     if (sight.object.tree.texture().empty())
-        return {"texture", false, sight.object.texture_left_out ? "load.without_textures leaves it out" : "the model has none"};
+        return {"texture", false,
+                sight.object.texture_left_out ? "load.without_textures leaves it out" : "the model has none"};
     if (!is_perceptual(decision)) return {"texture", true, "drawn; folds are not tested against it"};
     if (decision.test == FoldTest::luebke_hallen_safe)
-        return {"texture", true, "folds are tested against its darkest and brightest texels around them, and by how far they move it"};
+        return {"texture", true,
+                "folds are tested against its darkest and brightest texels around them, and by how far they move it"};
     return {"texture", true, "folds are tested against its darkest and brightest texels around them"};
 }
 
@@ -87,8 +97,9 @@ Effect light_effect(const Sight& sight, const Decision& decision) {
     if (sight.lighting)
         return {"light", true,
                 sight.lights->description() +
-                    (is_perceptual(decision) ? ": folds are tested against what these can make of the normals and places in their rings"
-                                         : "; drawn, for the fold test does not look at luminance")};
+                    (is_perceptual(decision)
+                         ? ": folds are tested against what these can make of the normals and places in their rings"
+                         : "; drawn, for the fold test does not look at luminance")};
     if (sight.object.is_relit)
         return {"light", true, "luminance and its bounds were computed again for another light than the tree's"};
     return {"light", false,
@@ -97,7 +108,8 @@ Effect light_effect(const Sight& sight, const Decision& decision) {
 
 Effect frustum_effect(const Decision& decision) {
     if (is_full(decision)) return {"frustum culling", false, "nothing is folded in the full model"};
-    if (decision.request.purpose == Purpose::mesh) return {"frustum culling", false, "the mesh may be looked at from elsewhere"};
+    if (decision.request.purpose == Purpose::mesh)
+        return {"frustum culling", false, "the mesh may be looked at from elsewhere"};
     return {"frustum culling", true, "what lies outside of the window is folded"};
 }
 
@@ -133,7 +145,8 @@ Effect distance_effect(const Decision& decision, const std::optional<CutFacts>& 
         return {name, false, "a fold around the eye or across its plane stays visible from everywhere"};
     if (decision.request.goal.kind == Goal::Kind::imperceptible)
         return {name, true,
-                "the display's distance times " + rounded(decision.request.threshold, 4) + ", above which no fold costs"};
+                "the display's distance times " + rounded(decision.request.threshold, 4) +
+                    ", above which no fold costs"};
     return {name, true, "the display's distance times the largest fold cost"};
 }
 
@@ -150,10 +163,13 @@ Effect hidden_effect(const Sight& sight, const Decision& decision, const std::op
     const std::string name = "hidden folding";
     if (decision.request.purpose == Purpose::mesh) return {name, false, "the mesh may be looked at from elsewhere"};
     if (!folds_hidden(sight, decision))
-        return {name, false, is_perceptual(decision) ? "nothing solid is looked at from outside" : "only the perceptual fold tests know what a fold changes"};
+        return {name, false,
+                is_perceptual(decision) ? "nothing solid is looked at from outside"
+                                        : "only the perceptual fold tests know what a fold changes"};
     if (!facts) return {name, true, "what is behind spheres inside the solid is folded"};
     if (facts->occluders == 0) return {name, false, "no sphere fits into the solid"};
-    return {name, true, "what is behind one of " + std::to_string(facts->occluders) + " spheres inside the solid is folded"};
+    return {name, true,
+            "what is behind one of " + std::to_string(facts->occluders) + " spheres inside the solid is folded"};
 }
 
 Effect translucency_effect(const Sight& sight, const Decision& decision) {
@@ -174,19 +190,12 @@ Effect time_limit_effect(const Decision& decision, const std::optional<CutFacts>
 
 std::vector<Effect> effects_of(const Sight& sight, const Decision& decision, const std::optional<CutFacts>& facts) {
     const Purpose purpose = decision.request.purpose;
-    std::vector<Effect> effects = {fold_test_effect(decision),
-                                   gaze_effect(sight, decision),
-                                   silhouette_effect(sight, decision),
-                                   csf_effect(sight, decision),
-                                   chroma_effect(sight, decision),
-                                   translucency_effect(sight, decision),
-                                   texture_effect(sight, decision),
-                                   prelit_effect(sight),
-                                   light_effect(sight, decision),
-                                   frustum_effect(decision),
-                                   culling_effect(sight, purpose),
-                                   magnification_effect(sight, decision),
-                                   distance_effect(decision, facts)};
+    std::vector<Effect> effects = {
+        fold_test_effect(decision),      gaze_effect(sight, decision),   silhouette_effect(sight, decision),
+        csf_effect(sight, decision),     chroma_effect(sight, decision), translucency_effect(sight, decision),
+        texture_effect(sight, decision), prelit_effect(sight),           light_effect(sight, decision),
+        frustum_effect(decision),        culling_effect(sight, purpose), magnification_effect(sight, decision),
+        distance_effect(decision, facts)};
     if (is_full(decision)) return effects;
     effects.push_back(back_face_effect(sight, purpose));
     effects.push_back(hidden_effect(sight, decision, facts));
@@ -197,8 +206,9 @@ std::vector<Effect> effects_of(const Sight& sight, const Decision& decision, con
 Effect geomorph_effect(const vdtree::Geomorph* geomorph, const vdtree::Cut& cut) {
     if (!geomorph) return {"geomorphs", false, "vertices do not glide unless Follower::set_glide() says for how long"};
     return {"geomorphs", true,
-            "vertices glide for " + rounded(geomorph->seconds(), 3) + " s; " + grouped(geomorph->moved().size()) + " do now, and " +
-                grouped(geomorph->drawn().triangle_count() - cut.triangle_count()) + " triangles wait for them to be folded"};
+            "vertices glide for " + rounded(geomorph->seconds(), 3) + " s; " + grouped(geomorph->moved().size()) +
+                " do now, and " + grouped(geomorph->drawn().triangle_count() - cut.triangle_count()) +
+                " triangles wait for them to be folded"};
 }
 
 } // namespace unseen::session

@@ -35,8 +35,9 @@ Choice suitable_test(const Sight& sight, bool chroma, bool may_measure) {
     if (!tree.texture().empty()) return {FoldTest::luebke_hallen_safe, "the test error does not know textures"};
     if (chroma) return {FoldTest::luebke_hallen, "the test error does not know colours"};
     if (!tree.fold_errors().empty() || (may_measure && tree.interior_count() <= most_measured)) return {};
-    return {FoldTest::luebke_hallen,
-            "the tree does not hold the errors of its folds, and measuring them takes long: vdtree::with_fold_errors()"};
+    return {
+        FoldTest::luebke_hallen,
+        "the tree does not hold the errors of its folds, and measuring them takes long: vdtree::with_fold_errors()"};
 }
 
 // Whether a test knows what it would have to look at.
@@ -44,14 +45,19 @@ Result<void> check_knowledge(const Sight& sight, FoldTest test, bool chroma) {
     if (!is_perceptual(test)) return {};
     if (sight.lighting && test != FoldTest::luebke_hallen)
         return invalid("request.fold_test = " + name_of(test) +
-                       " knows only the light that the tree was built for: with scene.lights, use request.fold_test = luebke-hallen.");
+                       " knows only the light that the tree was built for: with scene.lights, use request.fold_test = "
+                       "luebke-hallen.");
     if (sight.lighting && chroma)
-        return invalid("request.chroma and scene.lights exclude each other: ranges of colour are those of the tree's own light.");
+        return invalid(
+            "request.chroma and scene.lights exclude each other: ranges of colour are those of the tree's own light.");
     if (sight.object.tree.texture().empty()) return {};
-    if (chroma) return invalid("request.chroma does not look at the colours of textures: leave it out, or add load.without_textures.");
+    if (chroma)
+        return invalid(
+            "request.chroma does not look at the colours of textures: leave it out, or add load.without_textures.");
     if (test == FoldTest::error)
-        return invalid("request.fold_test = error does not measure textures: use request.fold_test = luebke-hallen-safe, or add "
-                       "load.without_textures.");
+        return invalid(
+            "request.fold_test = error does not measure textures: use request.fold_test = luebke-hallen-safe, or add "
+            "load.without_textures.");
     return {};
 }
 
@@ -78,8 +84,8 @@ struct Key {
     bool operator==(const Key&) const = default;
 };
 
-// A gaze off the window reaches into larger magnifications: one criterion must do for all gazes up to there, so they are rounded up to whole
-// windows.
+// A gaze off the window reaches into larger magnifications: one criterion must do for all gazes up to there, so they
+// are rounded up to whole windows.
 double farthest_gaze_px(const vdtree::View& view, glm::dvec2 gaze_px) {
     const double side = std::max(view.width, view.height);
     const glm::dvec2 from_centre = gaze_px - glm::dvec2(view.width, view.height) * 0.5;
@@ -124,8 +130,8 @@ Result<vdtree::DistanceCriterion> make_criterion(const Sight& sight, const Decis
 vdtree::Viewpoint viewpoint_of(const Sight& sight, const Decision& decision) {
     // Where all is seen, a turning window must not cost anything.
     const bool window_only = decision.request.purpose == Purpose::picture && !is_wholly_in_window(sight);
-    vdtree::Viewpoint viewpoint = perception::viewpoint_of(sight.object.tree, sight.view, test_options(sight, decision.request),
-                                                           sight.object.placement, window_only);
+    vdtree::Viewpoint viewpoint = perception::viewpoint_of(
+        sight.object.tree, sight.view, test_options(sight, decision.request), sight.object.placement, window_only);
     if (sight.lighting) viewpoint.lighting = *sight.lighting;
     if (folds_hidden(sight, decision)) {
         const auto spheres = inner_spheres(sight.object, sight.cache);
@@ -164,8 +170,9 @@ Result<Decision> decide(const Sight& sight, const Request& request) {
     if (const auto known = check_knowledge(sight, choice.test, request.chroma); !known) return known.error();
     const bool measures = choice.test == FoldTest::error && !has_errors;
     if (measures && !request.may_measure)
-        return invalid("request.fold_test = error goes by errors that the tree does not hold: allow request.may_measure, or call "
-                       "vdtree::with_fold_errors().");
+        return invalid(
+            "request.fold_test = error goes by errors that the tree does not hold: allow request.may_measure, or call "
+            "vdtree::with_fold_errors().");
     return Decision{request, choice.test, std::move(choice.why), measures};
 }
 

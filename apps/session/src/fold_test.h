@@ -18,7 +18,8 @@ Result<CutRecipe> make_recipe(const Sight& sight, const Decision& decision);
 
 // Why recipes are what they are.
 bool is_translucent(const Sight& sight);
-bool culls_back_faces(const Sight& sight); // faces that look away can be folded: they are not drawn, and nothing shows them from outside
+bool culls_back_faces(
+    const Sight& sight); // faces that look away can be folded: they are not drawn, and nothing shows them from outside
 bool folds_hidden(const Sight& sight, const Decision& decision); // what a solid's inside hides
 
 } // namespace unseen::session

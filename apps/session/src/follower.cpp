@@ -33,8 +33,8 @@ vdtree::View widened(const vdtree::View& view) {
     constexpr double wider = 1.3, widest_degrees = 179;
     const double half_tangent = std::tan(view.fov_y_degrees * (std::numbers::pi / 360));
     vdtree::View wide = view;
-    wide.fov_y_degrees =
-        std::max(view.fov_y_degrees, std::min(std::atan(wider * half_tangent) * (360 / std::numbers::pi), widest_degrees));
+    wide.fov_y_degrees = std::max(view.fov_y_degrees,
+                                  std::min(std::atan(wider * half_tangent) * (360 / std::numbers::pi), widest_degrees));
     return wide;
 }
 
@@ -51,7 +51,8 @@ void add(vdtree::AdjustStats& sum, const vdtree::AdjustStats& stats) {
 
 class Follower::State {
 public:
-    explicit State(std::shared_ptr<Session::State> session) : session_(std::move(session)), objects_(session_->scene.objects.size()) {}
+    explicit State(std::shared_ptr<Session::State> session)
+        : session_(std::move(session)), objects_(session_->scene.objects.size()) {}
 
     Result<Report> follow(const vdtree::View& view, const Request& request);
     Result<void> set_glide(double seconds);
@@ -120,7 +121,8 @@ Result<std::vector<CutRecipe>> Follower::State::recipes(const Prepared& prepared
         if (!recipe) return recipe.error();
         // What comes into the window shall not glide there any more.
         if (glide_s_ && !recipe->viewpoint.frusta.empty())
-            recipe->viewpoint.frusta = {vdtree::frustum_of(sight.object.tree, widened(sight.view), sight.object.placement)};
+            recipe->viewpoint.frusta = {
+                vdtree::frustum_of(sight.object.tree, widened(sight.view), sight.object.placement)};
         all.push_back(std::move(*recipe));
     }
     return all;
@@ -138,12 +140,14 @@ Result<std::vector<vdtree::AdjustStats>> Follower::State::unfold_all() {
 
 Result<std::vector<vdtree::AdjustStats>> Follower::State::share_budget(const Request& request) {
     if (request.goal.fill || request.milliseconds)
-        return Error{ErrorCode::unsupported,
-                     "Several objects share a budget without request.goal.fill and request.milliseconds: leave these out."};
+        return Error{
+            ErrorCode::unsupported,
+            "Several objects share a budget without request.goal.fill and request.milliseconds: leave these out."};
     std::vector<vdtree::SceneObject> objects;
     for (Followed& object : objects_) {
         CutRecipe& recipe = *object.recipe;
-        objects.emplace_back(*object.cut, *recipe.criterion, std::move(recipe.viewpoint), recipe.options.cull_back_faces);
+        objects.emplace_back(*object.cut, *recipe.criterion, std::move(recipe.viewpoint),
+                             recipe.options.cull_back_faces);
     }
     return vdtree::follow_scene(objects, request.goal.triangles);
 }
@@ -154,7 +158,8 @@ Result<std::vector<vdtree::AdjustStats>> Follower::State::follow_each(const Requ
     const auto start = Clock::now();
     for (std::size_t i = 0; i < objects_.size(); ++i) {
         CutRecipe& recipe = *objects_[i].recipe;
-        if (request.milliseconds && i > 0) recipe.options.milliseconds = std::max(0.0, *request.milliseconds - milliseconds_since(start));
+        if (request.milliseconds && i > 0)
+            recipe.options.milliseconds = std::max(0.0, *request.milliseconds - milliseconds_since(start));
         auto followed = objects_[i].cut->follow(*recipe.criterion, recipe.viewpoint, recipe.options);
         if (!followed) return followed.error();
         stats.push_back(*followed);
@@ -162,7 +167,8 @@ Result<std::vector<vdtree::AdjustStats>> Follower::State::follow_each(const Requ
     return stats;
 }
 
-void Follower::State::conclude(Report& report, const Prepared& prepared, const std::vector<vdtree::AdjustStats>& stats) const {
+void Follower::State::conclude(Report& report, const Prepared& prepared,
+                               const std::vector<vdtree::AdjustStats>& stats) const {
     for (std::size_t i = 0; i < objects_.size(); ++i) {
         const Sight& sight = prepared.sights[i];
         const Decision& decision = prepared.decisions[i];
@@ -179,7 +185,8 @@ void Follower::State::conclude(Report& report, const Prepared& prepared, const s
             report.effects.push_back(std::move(effect));
         }
         const bool is_unknown = std::isnan(report.imperceptible_from_m) || std::isnan(facts.imperceptible_from_m);
-        report.imperceptible_from_m = is_unknown ? undefined : std::max(report.imperceptible_from_m, facts.imperceptible_from_m);
+        report.imperceptible_from_m =
+            is_unknown ? undefined : std::max(report.imperceptible_from_m, facts.imperceptible_from_m);
     }
 }
 
@@ -233,7 +240,9 @@ Follower::~Follower() = default;
 
 Result<void> Follower::set_glide(double seconds) { return state_->set_glide(seconds); }
 void Follower::let_pass(double seconds) { state_->let_pass(seconds); }
-Result<Report> Follower::follow(const vdtree::View& view, const Request& request) { return state_->follow(view, request); }
+Result<Report> Follower::follow(const vdtree::View& view, const Request& request) {
+    return state_->follow(view, request);
+}
 const vdtree::Cut& Follower::cut(std::size_t object) const { return *state_->objects()[object].cut; }
 
 const vdtree::Geomorph* Follower::geomorph(std::size_t object) const {

@@ -18,8 +18,8 @@ Result<GazePlayer> GazePlayer::create(const GazeOptions& options) {
     return player;
 }
 
-Result<void> GazePlayer::begin(const perception::Display& display, const vdtree::View& view, std::optional<double> duration_s,
-                               const Messages& messages) {
+Result<void> GazePlayer::begin(const perception::Display& display, const vdtree::View& view,
+                               std::optional<double> duration_s, const Messages& messages) {
     if (options_.source == GazeSource::simulated) {
         perception::SimulatedGaze simulated;
         simulated.seed = options_.seed;
@@ -34,11 +34,13 @@ Result<void> GazePlayer::begin(const perception::Display& display, const vdtree:
     }
     if (options_.source == GazeSource::trace) {
         const double first_s = trace_->samples().front().time_s, last_s = trace_->samples().back().time_s;
-        const std::string times = options_.trace.string() + " runs from " + shortest(first_s) + " to " + shortest(last_s) +
-                                  " s, and the frames from 0" + (duration_s ? " to " + shortest(*duration_s) + " s" : " on");
+        const std::string times = options_.trace.string() + " runs from " + shortest(first_s) + " to " +
+                                  shortest(last_s) + " s, and the frames from 0" +
+                                  (duration_s ? " to " + shortest(*duration_s) + " s" : " on");
         if ((duration_s && first_s > *duration_s) || last_s < 0)
             return Error{ErrorCode::invalid_argument, times + ": count its times from the first frame."};
-        if (duration_s && last_s < *duration_s && messages.warning) messages.warning(times + ": after its end the last gaze holds.");
+        if (duration_s && last_s < *duration_s && messages.warning)
+            messages.warning(times + ": after its end the last gaze holds.");
     }
     if (trace_) tracker_.emplace(*std::exchange(trace_, {}), options_.tracker, display, view.width, view.height);
     return {};
@@ -55,7 +57,8 @@ std::optional<Gaze> GazePlayer::at(double time_s, const vdtree::View& view, std:
         return Gaze{gaze.px, gaze.margin_deg};
     }
     if (options_.source != GazeSource::head) return around(own_px);
-    return Gaze{glm::dvec2(view.width, view.height) * 0.5, options_.tracker.error_deg + perception::head_only_margin.value()};
+    return Gaze{glm::dvec2(view.width, view.height) * 0.5,
+                options_.tracker.error_deg + perception::head_only_margin.value()};
 }
 
 } // namespace unseen::session

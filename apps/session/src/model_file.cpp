@@ -10,17 +10,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Result<vdtree::VertexTree> with_texture(Result<vdtree::VertexTree> tree, const fs::path& file, const LoadOptions& options) {
+Result<vdtree::VertexTree> with_texture(Result<vdtree::VertexTree> tree, const fs::path& file,
+                                        const LoadOptions& options) {
     if (tree && !options.texture.empty())
         return Error{ErrorCode::invalid_argument,
-                     file.string() + " is a tree, whose texture is laid when it is built: give load.texture to session::read_textured_mesh()."};
+                     file.string() + " is a tree, whose texture is laid when it is built: give load.texture to "
+                                     "session::read_textured_mesh()."};
     if (tree && options.without_textures && !tree->texture().empty()) return tree->untextured();
     return tree;
 }
 
 } // namespace
 
-Result<vdtree::ReadResult> read_textured_mesh(const fs::path& file, const LoadOptions& options, vdtree::ReadOptions reading) {
+Result<vdtree::ReadResult> read_textured_mesh(const fs::path& file, const LoadOptions& options,
+                                              vdtree::ReadOptions reading) {
     reading.materials = options.texture.empty() && !options.without_textures;
     reading.progress = options.messages.progress;
     auto read = vdtree::read_mesh(file, reading);
@@ -32,11 +35,13 @@ Result<vdtree::ReadResult> read_textured_mesh(const fs::path& file, const LoadOp
 }
 
 Result<vdtree::VertexTree> load_tree(const fs::path& file, const LoadOptions& options) {
-    if (vdtree::is_tree_file(file)) return with_texture(vdtree::read_tree(file, options.messages.progress), file, options);
+    if (vdtree::is_tree_file(file))
+        return with_texture(vdtree::read_tree(file, options.messages.progress), file, options);
     auto read = read_textured_mesh(file, options);
     if (!read) return read.error();
     if (options.messages.note)
-        options.messages.note(file.string() + " is a mesh: its tree is built now; vdtree::write_tree() does it once and for all.");
+        options.messages.note(file.string() +
+                              " is a mesh: its tree is built now; vdtree::write_tree() does it once and for all.");
     vdtree::BuildOptions building;
     building.progress = options.messages.progress;
     building.dropped_before = read->dropped_triangles;
@@ -48,7 +53,8 @@ Result<vdtree::VertexTree> open_tree(const fs::path& file, const LoadOptions& op
     constexpr std::uintmax_t mapped_bytes = std::uintmax_t{256} << 20;
     std::error_code unknown;
     const bool is_large = fs::file_size(file, unknown) >= mapped_bytes && !unknown;
-    return is_large && vdtree::is_tree_file(file) ? with_texture(vdtree::map_tree(file), file, options) : load_tree(file, options);
+    return is_large && vdtree::is_tree_file(file) ? with_texture(vdtree::map_tree(file), file, options)
+                                                  : load_tree(file, options);
 }
 
 } // namespace unseen::session

@@ -16,7 +16,8 @@ std::string rounded(double value, int significant) {
     if (std::isnan(value)) return "none";
     if (std::isinf(value)) return "infinite";
     std::array<char, 64> text;
-    return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, significant).ptr};
+    return {text.data(),
+            std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, significant).ptr};
 }
 
 std::string shortest(double value) {

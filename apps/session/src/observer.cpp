@@ -31,7 +31,8 @@ Result<CsfChoice> choose_csf(const std::string& model_or_file) {
     return CsfChoice{{}, std::move(*table)};
 }
 
-Result<std::shared_ptr<const perception::CsfTable>> read_csf_table(const std::string& model_or_file, const perception::Display& display) {
+Result<std::shared_ptr<const perception::CsfTable>> read_csf_table(const std::string& model_or_file,
+                                                                   const perception::Display& display) {
     auto choice = choose_csf(model_or_file);
     if (!choice) return choice.error();
     auto table = choice->model ? perception::CsfTable::from_model(*choice->model, {.distance = display.distance})
@@ -46,7 +47,8 @@ Result<float> relative_background(const perception::Display& display, std::optio
     // Asking for the black or white that the display reports must work in spite of rounding.
     constexpr double rounding = 1e-9;
     if (asked && !(relative >= -rounding && relative <= 1 + rounding)) {
-        return invalid("scene.background = " + shortest(wanted.value()) + " cd/m2 is not between the display's black (" +
+        return invalid("scene.background = " + shortest(wanted.value()) +
+                       " cd/m2 is not between the display's black (" +
                        shortest(perception::black_level(display).value()) + ") and white (" +
                        shortest(perception::to_luminance(display, 1).value()) + ").");
     }

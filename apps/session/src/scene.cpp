@@ -16,12 +16,15 @@ glm::vec3 unit_vector(glm::dvec3 v) {
     return glm::vec3(glm::normalize(v / largest));
 }
 
-bool is_direction(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z) && v != glm::dvec3(0); }
+bool is_direction(glm::dvec3 v) {
+    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z) && v != glm::dvec3(0);
+}
 
 } // namespace
 
 Result<Scene> Scene::load(const std::filesystem::path& file, const LoadOptions& options) {
-    if (!(options.unit_metres > 0 && std::isfinite(options.unit_metres))) return invalid("load.unit_metres must be above 0 and finite.");
+    if (!(options.unit_metres > 0 && std::isfinite(options.unit_metres)))
+        return invalid("load.unit_metres must be above 0 and finite.");
     auto tree = open_tree(file, options);
     if (!tree) return tree.error();
     Scene scene = of(std::move(*tree), options.unit_metres);
@@ -40,7 +43,8 @@ Scene Scene::of(vdtree::VertexTree tree, double unit_metres) {
 Result<void> Scene::relight(std::optional<glm::dvec3> towards, std::optional<double> ambient) {
     if (!towards && !ambient) return {};
     if (towards && !is_direction(*towards)) return invalid("A light's direction must be finite and not 0 0 0.");
-    if (ambient && !(*ambient >= 0 && *ambient <= 1)) return invalid("The share of light from everywhere must be from 0 to 1.");
+    if (ambient && !(*ambient >= 0 && *ambient <= 1))
+        return invalid("The share of light from everywhere must be from 0 to 1.");
     for (Object& object : objects) {
         vdtree::Light light = object.tree.light();
         if (towards) light.direction = unit_vector(*towards);

@@ -42,7 +42,8 @@ Plan plan_of(const Sight& sight, const Decision& decision, std::size_t object) {
 
 WorldSphere world_sphere(const Object& object) {
     const vdtree::Sphere sphere = object.tree.bounding_sphere();
-    return {object.placement.to_world(object.tree.origin() + glm::dvec3(sphere.centre)), object.placement.scale * sphere.radius};
+    return {object.placement.to_world(object.tree.origin() + glm::dvec3(sphere.centre)),
+            object.placement.scale * sphere.radius};
 }
 
 std::span<const vdtree::Sphere> inner_spheres(const Object& object, ObjectCache& cache) {
@@ -78,7 +79,8 @@ Result<std::optional<vdtree::Lighting>> Session::State::lighting(const vdtree::V
     return std::optional(std::move(lighting));
 }
 
-// Everything that a moved outline may uncover. Behind a single object is the background; behind one of several may be another one.
+// Everything that a moved outline may uncover. Behind a single object is the background; behind one of several may be
+// another one.
 perception::SceneLuminance Session::State::luminance_of(const std::vector<Sight>& sights) const {
     perception::SceneLuminance all{background, background};
     for (const Sight& sight : sights) {
@@ -100,7 +102,8 @@ void Session::State::set_gaze_of(Sight& sight) {
     if (!observer.gaze) return;
     if (observer.gaze->margin_deg != 0) {
         if (!widened_)
-            widened_ = std::make_unique<perception::WidenedTables>(observer.csf ? *observer.csf : perception::CsfTable::standard());
+            widened_ = std::make_unique<perception::WidenedTables>(observer.csf ? *observer.csf
+                                                                                : perception::CsfTable::standard());
         auto around_gaze = widened_->at(perception::Degrees(observer.gaze->margin_deg));
         if (!around_gaze) return; // anything may be looked at
         sight.csf = std::move(around_gaze);
@@ -119,8 +122,8 @@ Result<std::vector<Sight>> Session::State::look(const vdtree::View& view) {
             if (!bounds) return bounds.error();
             caches[i].light_bounds = std::make_shared<const vdtree::LightBounds>(std::move(*bounds));
         }
-        sights.push_back(
-            {scene.objects[i], caches[i], observer, view, scene.lights ? &*scene.lights : nullptr, std::move(*lit), background});
+        sights.push_back({scene.objects[i], caches[i], observer, view, scene.lights ? &*scene.lights : nullptr,
+                          std::move(*lit), background});
         set_gaze_of(sights.back());
     }
     const perception::SceneLuminance luminance = luminance_of(sights);
@@ -173,7 +176,9 @@ Result<Session> Session::create(Scene scene, Observer observer, Messages message
 }
 
 const Scene& Session::scene() const noexcept { return state_->scene; }
-const vdtree::VertexTree& Session::tree(std::size_t object) const noexcept { return state_->scene.objects[object].tree; }
+const vdtree::VertexTree& Session::tree(std::size_t object) const noexcept {
+    return state_->scene.objects[object].tree;
+}
 const Observer& Session::observer() const noexcept { return state_->observer; }
 float Session::background() const noexcept { return state_->background; }
 void Session::set_gaze(std::optional<Gaze> gaze) { state_->observer.gaze = gaze; }
@@ -187,7 +192,8 @@ WorldSphere Session::bounding_sphere() const {
 
 vdtree::View Session::frame(glm::dvec3 direction, double fill, const vdtree::View& window) const {
     const WorldSphere sphere = bounding_sphere();
-    return vdtree::frame_sphere(sphere.centre, sphere.radius > 0 ? sphere.radius : point_radius, direction, fill, window);
+    return vdtree::frame_sphere(sphere.centre, sphere.radius > 0 ? sphere.radius : point_radius, direction, fill,
+                                window);
 }
 
 vdtree::View Session::default_view() const {
@@ -209,12 +215,14 @@ Result<std::vector<Plan>> Session::prepare(const vdtree::View& view, const Reque
     const auto prepared = state_->prepare(view, request);
     if (!prepared) return prepared.error();
     std::vector<Plan> plans;
-    for (std::size_t i = 0; i < prepared->sights.size(); ++i) plans.push_back(plan_of(prepared->sights[i], prepared->decisions[i], i));
+    for (std::size_t i = 0; i < prepared->sights.size(); ++i)
+        plans.push_back(plan_of(prepared->sights[i], prepared->decisions[i], i));
     return plans;
 }
 
 Result<CutRecipe> Session::recipe(const vdtree::View& view, const Request& request, std::size_t object) {
-    if (request.goal.kind == Goal::Kind::full) return invalid("request.goal full folds nothing, so there is nothing to cut by.");
+    if (request.goal.kind == Goal::Kind::full)
+        return invalid("request.goal full folds nothing, so there is nothing to cut by.");
     const auto prepared = state_->prepare(view, request);
     if (!prepared) return prepared.error();
     return make_recipe(prepared->sights[object], prepared->decisions[object]);

@@ -13,7 +13,8 @@
 
 namespace unseen::session {
 
-// All objects as they are seen in a view, and what is to be done about each. Refers to the state, the view and the request.
+// All objects as they are seen in a view, and what is to be done about each. Refers to the state, the view and the
+// request.
 struct Prepared {
     std::vector<Sight> sights;
     std::vector<Decision> decisions; // by object
@@ -31,8 +32,8 @@ public:
     Scene scene;
     Observer observer;
     Messages messages;
-    float background = 0; // relative luminance
-    double seconds = 0;   // of lights that move
+    float background = 0;                  // relative luminance
+    double seconds = 0;                    // of lights that move
     std::vector<ObjectCache> caches;       // by object
     std::vector<std::uint64_t> tree_count; // by object: how many trees it has had
 

@@ -28,10 +28,10 @@ struct Sight {
     ObjectCache& cache;
     const Observer& observer;
     const vdtree::View& view;
-    const calibration::LightRig* lights;        // null: the tree's own light
-    std::optional<vdtree::Lighting> lighting;   // theirs
-    float background;                           // relative luminance
-    perception::SceneLuminance luminance = {};  // of the whole scene
+    const calibration::LightRig* lights;       // null: the tree's own light
+    std::optional<vdtree::Lighting> lighting;  // theirs
+    float background;                          // relative luminance
+    perception::SceneLuminance luminance = {}; // of the whole scene
     // For the gaze's margin; no gaze where the margin is so wide that everything may be looked at.
     std::shared_ptr<const perception::CsfTable> csf = {};
     std::optional<glm::dvec2> gaze_px = {};

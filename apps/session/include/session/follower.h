@@ -9,8 +9,9 @@
 
 namespace unseen::session {
 
-// One cut an object, from frame to frame. For the goals imperceptible and pixels the cost goes with what changes from one call to
-// the next; for a budget, with hysteresis 1 or several objects, each call begins anew; full: only the first does. Not thread-safe. Move-only.
+// One cut an object, from frame to frame. For the goals imperceptible and pixels the cost goes with what changes from
+// one call to the next; for a budget, with hysteresis 1 or several objects, each call begins anew; full: only the first
+// does. Not thread-safe. Move-only.
 class Follower {
 public:
     explicit Follower(const Session& session); // shares what the session keeps, so the session may go or move
@@ -18,8 +19,8 @@ public:
     Follower& operator=(Follower&&) noexcept;
     ~Follower();
 
-    // From now on vertices glide for so long where a cut changes, and geomorph() is what to draw. Fails where that is no time, and on trees
-    // with textures.
+    // From now on vertices glide for so long where a cut changes, and geomorph() is what to draw. Fails where that is
+    // no time, and on trees with textures.
     Result<void> set_glide(double seconds);
     void let_pass(double seconds); // for the glides of the next call; precondition: not negative, finite
 

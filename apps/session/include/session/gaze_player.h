@@ -31,14 +31,14 @@ public:
     // Reads the trace. Errors name its line, or the tracker's field.
     static Result<GazePlayer> create(const GazeOptions& options);
 
-    // To be called before the first frame: simulates a gaze that is to be simulated, in the view's window, for frames up to `duration_s`;
-    // where nobody knows when they end, for an hour, after which the eye keeps still. Fails where a recording has nothing for the frames;
-    // warns where it ends before them, and its last gaze holds.
+    // To be called before the first frame: simulates a gaze that is to be simulated, in the view's window, for frames
+    // up to `duration_s`; where nobody knows when they end, for an hour, after which the eye keeps still. Fails where a
+    // recording has nothing for the frames; warns where it ends before them, and its last gaze holds.
     Result<void> begin(const perception::Display& display, const vdtree::View& view, std::optional<double> duration_s,
                        const Messages& messages = {});
 
-    // What is known at an instant. `own_px`: where the program knows the viewer to look, for sources that are not played; the tracker's error
-    // is around it.
+    // What is known at an instant. `own_px`: where the program knows the viewer to look, for sources that are not
+    // played; the tracker's error is around it.
     std::optional<Gaze> at(double time_s, const vdtree::View& view, std::optional<glm::dvec2> own_px) const;
     std::optional<Gaze> around(std::optional<glm::dvec2> px) const; // with the tracker's error, whatever is played
     bool is_moving() const noexcept { return tracker_.has_value(); }

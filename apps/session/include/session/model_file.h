@@ -17,14 +17,14 @@ struct LoadOptions {
     Messages messages = {};
 };
 
-// A mesh with its texture: those of several materials become one, side by side, and materials' colours become those of the
-// vertices. Images are PNG, JPEG, PFM or EXR. Errors name the file, and what is wrong in it. The reader's warnings are messages.
-// `reading.materials` and `reading.progress` are taken from the options.
+// A mesh with its texture: those of several materials become one, side by side, and materials' colours become those of
+// the vertices. Images are PNG, JPEG, PFM or EXR. Errors name the file, and what is wrong in it. The reader's warnings
+// are messages. `reading.materials` and `reading.progress` are taken from the options.
 Result<vdtree::ReadResult> read_textured_mesh(const std::filesystem::path& file, const LoadOptions& options = {},
                                               vdtree::ReadOptions reading = {});
 
-// A tree file, read and checked to the last byte, or the tree of a mesh file: building takes some ten seconds for a million
-// triangles, and a note says so. A tree has its texture, and takes no other.
+// A tree file, read and checked to the last byte, or the tree of a mesh file: building takes some ten seconds for a
+// million triangles, and a note says so. A tree has its texture, and takes no other.
 Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file, const LoadOptions& options = {});
 
 // The same, but tree files of 256 MiB and more are mapped: only what is used is read, and checked.

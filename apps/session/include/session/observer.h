@@ -21,12 +21,13 @@ struct Gaze {
 // Error messages and reasons call these fields observer.gaze and so on.
 struct Observer {
     perception::Display display = {};
-    std::shared_ptr<const perception::CsfTable> csf = {}; // contrast sensitivity; null: the standard observer, castleCSF
-    std::optional<Gaze> gaze = {};                        // none: everything counts as looked at
+    // Contrast sensitivity; null: the standard observer, castleCSF.
+    std::shared_ptr<const perception::CsfTable> csf = {};
+    std::optional<Gaze> gaze = {}; // none: everything counts as looked at
 };
 
-// Contrast sensitivity by name: that of a model (see perception::csf_model()), or else the file of a table. A model must be of luminance
-// contrast.
+// Contrast sensitivity by name: that of a model (see perception::csf_model()), or else the file of a table. A model
+// must be of luminance contrast.
 struct CsfChoice {
     std::optional<perception::CsfModel> model = {};
     std::optional<perception::CsfTable> table = {}; // of the file; where a model is named, none
@@ -34,10 +35,11 @@ struct CsfChoice {
 Result<CsfChoice> choose_csf(const std::string& model_or_file);
 
 // Its table, of a model for the display's distance.
-Result<std::shared_ptr<const perception::CsfTable>> read_csf_table(const std::string& model_or_file, const perception::Display& display);
+Result<std::shared_ptr<const perception::CsfTable>> read_csf_table(const std::string& model_or_file,
+                                                                   const perception::Display& display);
 
-// The background in relative luminance: what is asked for must be possible on the display, within its black and white. See
-// Scene::background for the default.
+// The background in relative luminance: what is asked for must be possible on the display, within its black and white.
+// See Scene::background for the default.
 Result<float> relative_background(const perception::Display& display, std::optional<perception::Luminance> asked);
 
 // The pixel so far to the right of the window's centre; it may lie outside of the window.

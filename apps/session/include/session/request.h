@@ -9,7 +9,8 @@
 
 namespace unseen::session {
 
-enum class FoldTest { luebke_hallen, luebke_hallen_safe, error, extent, displacement }; // see perception/criterion.h and vdtree/criteria.h
+// See perception/criterion.h for the first three, and vdtree/distance_criterion.h for the others.
+enum class FoldTest { luebke_hallen, luebke_hallen_safe, error, extent, displacement };
 
 // By contrast sensitivity; the others count pixels, seen or not.
 constexpr bool is_perceptual(FoldTest test) { return test != FoldTest::extent && test != FoldTest::displacement; }
@@ -24,12 +25,14 @@ struct Goal {
     bool fill = false;           // of budgets: use all of them, even where no difference can be seen
     double tolerance_px = 0;     // of pixels: above 0 and finite
 
-    static Goal imperceptible() { return {}; }            // fold what nobody can see
-    static Goal full() { return {.kind = Kind::full}; }   // fold nothing
+    static Goal imperceptible() { return {}; }          // fold what nobody can see
+    static Goal full() { return {.kind = Kind::full}; } // fold nothing
+    // As inconspicuous as so many triangles can be.
     static Goal budget(vdtree::Index triangles, bool fill = false) {
         return {.kind = Kind::budget, .triangles = triangles, .fill = fill};
     }
-    static Goal pixels(double tolerance) { return {.kind = Kind::pixels, .tolerance_px = tolerance}; } // fold what is smaller
+    // Fold what is smaller, seen or not.
+    static Goal pixels(double tolerance) { return {.kind = Kind::pixels, .tolerance_px = tolerance}; }
 };
 
 // What the cut is for decides what may be left out of it.
@@ -44,10 +47,11 @@ struct Request {
     std::optional<FoldTest> fold_test = {};  // default: one that suits the scene and the goal, see Plan
     bool chroma = false;                     // changes of colour count, too, not only those of luminance
     std::optional<double> milliseconds = {}; // the best cut that so much time is enough for; 0 or more
-    double threshold = 1;                    // of imperceptible: fold up to this cost; 2: what cannot be seen from twice the distance
-    float hysteresis = 1.1f;                 // of budgets, frame by frame: by what factor the largest cost may exceed the least, 1..2
+    double threshold = 1;    // of imperceptible: fold up to this cost; 2: what cannot be seen from twice the distance
+    float hysteresis = 1.1f; // of budgets, frame by frame: by what factor the largest cost may exceed the least, 1..2
     Purpose purpose = Purpose::mesh;
-    bool may_measure = true; // measure the errors of folds where the test needs them and the tree lacks them: up to a minute
+    // Measure the errors of folds where the test needs them and the tree lacks them: up to a minute.
+    bool may_measure = true;
 };
 
 // Whether the fields are in their ranges and go together, whatever the scene. The error names them.

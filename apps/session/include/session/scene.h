@@ -26,15 +26,16 @@ struct Object {
 struct Scene {
     std::vector<Object> objects = {};
     std::optional<perception::Luminance> background = {}; // default: 20 cd/m2, or the nearest that the display can show
-    std::optional<calibration::LightRig> lights = {};     // in place of the light that the trees were built for; they may move
+    std::optional<calibration::LightRig> lights = {};     // in place of the trees' own light; they may move
 
-    // A scene of one object: a tree file or a mesh file with its textures (see open_tree()), placed at the world's origin.
+    // A scene of one object: a tree file or a mesh file with its textures (see open_tree()), placed at the world's
+    // origin.
     static Result<Scene> load(const std::filesystem::path& file, const LoadOptions& options = {});
     static Scene of(vdtree::VertexTree tree, double unit_metres = 1);
 
-    // Lights all objects anew, by one directional light and light from everywhere; what is not given stays. Vertex colours count as
-    // lit unless this is called. `towards`: the direction of the light, not 0; `ambient`: 0..1. Fails where they are not, and on trees that
-    // cannot be lit anew. Cost: a pass over the trees.
+    // Lights all objects anew, by one directional light and light from everywhere; what is not given stays. Vertex
+    // colours count as lit unless this is called. `towards`: the direction of the light, not 0; `ambient`: 0..1. Fails
+    // where they are not, and on trees that cannot be lit anew. Cost: a pass over the trees.
     Result<void> relight(std::optional<glm::dvec3> towards, std::optional<double> ambient);
 };
 

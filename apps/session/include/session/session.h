@@ -29,24 +29,24 @@ struct WorldSphere {
 
 // What Session makes the cut of one object by, for programs that make cuts themselves.
 struct CutRecipe {
-    std::shared_ptr<const vdtree::DistanceCriterion> criterion; // the same one for views that differ in eye and gaze alone
+    std::shared_ptr<const vdtree::DistanceCriterion> criterion; // one for views that differ in eye and gaze alone
     vdtree::Viewpoint viewpoint;                                // in the object's frame
-    vdtree::FollowOptions options;                              // threshold, budget and time as the request has them
+    vdtree::FollowOptions options;                              // threshold, budget and time of the request
 };
 
-// For one thread at a time. Kept are criteria, sensitivity tables for unsure gazes, and what is derived from a tree alone: spheres that
-// hide, rings of all cuts, bounds under lights.
+// For one thread at a time. Kept are criteria, sensitivity tables for unsure gazes, and what is derived from a tree
+// alone: spheres that hide, rings of all cuts, bounds under lights.
 class Session {
 public:
-    // Fails on a scene without objects, a background that the display does not show, and a display that is none. `messages` are told
-    // what takes long.
+    // Fails on a scene without objects, a background that the display does not show, and a display that is none.
+    // `messages` are told what takes long.
     static Result<Session> create(Scene scene, Observer observer = {}, Messages messages = {});
     Session(Session&&) noexcept;
     Session& operator=(Session&&) noexcept;
     ~Session();
 
     const Scene& scene() const noexcept;
-    const vdtree::VertexTree& tree(std::size_t object = 0) const noexcept; // moves to another tree when its errors are measured
+    const vdtree::VertexTree& tree(std::size_t object = 0) const noexcept; // another one once its errors are measured
     const Observer& observer() const noexcept;
     float background() const noexcept; // relative luminance
 
@@ -56,22 +56,25 @@ public:
 
     // The sphere around all objects.
     WorldSphere bounding_sphere() const;
-    // From `direction` (towards the eye), with the sphere taking the share `fill` of the window's height; size and field of the window.
+    // From `direction` (towards the eye), with the sphere taking the share `fill` of the window's height; size and
+    // field of the window.
     vdtree::View frame(glm::dvec3 direction, double fill, const vdtree::View& window) const;
     // From +Z with 90% filled: 1024 x 1024 pixels, and the field that they fill on the display.
     vdtree::View default_view() const;
 
-    // How a request would be met for an object. All of the following fail where the request is not valid or asks for a fold test that
-    // does not know the scene, on views that are none, and where a light is at a vertex or inside of an object.
+    // How a request would be met for an object. All of the following fail where the request is not valid or asks for a
+    // fold test that does not know the scene, on views that are none, and where a light is at a vertex or inside of an
+    // object.
     Result<Plan> plan(const vdtree::View& view, const Request& request, std::size_t object = 0) const;
 
-    // The same for all objects, and measures the errors of folds where the plan wants them: some 50 us a node, in parallel. Trees change then,
-    // so call this before making anything else of them; simplify() and Follower::follow() do so by themselves.
+    // The same for all objects, and measures the errors of folds where the plan wants them: some 50 us a node, in
+    // parallel. Trees change then, so call this before making anything else of them; simplify() and Follower::follow()
+    // do so by themselves.
     Result<std::vector<Plan>> prepare(const vdtree::View& view, const Request& request);
 
-    // The cuts that meet the request, from scratch. A budget is shared by all objects, so that the largest fold cost is the least; other
-    // goals go object by object, before the luminance of all of them. With several objects, budgets can be neither filled nor limited
-    // in time. Cost: a microsecond for each node test.
+    // The cuts that meet the request, from scratch. A budget is shared by all objects, so that the largest fold cost is
+    // the least; other goals go object by object, before the luminance of all of them. With several objects, budgets
+    // can be neither filled nor limited in time. Cost: a microsecond for each node test.
     Result<Simplification> simplify(const vdtree::View& view, const Request& request = {});
     Result<Simplification> simplify(const Request& request = {}) { return simplify(default_view(), request); }
 
