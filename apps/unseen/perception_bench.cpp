@@ -17,7 +17,6 @@
 
 #include "bench_tools.h"
 #include "canvas.h"
-#include "fold_test.h"
 #include "judged_model.h"
 #include "model_file.h"
 #include "progress_bar.h"
