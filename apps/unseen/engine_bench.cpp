@@ -562,7 +562,7 @@ private:
         const auto subject = Subject::create(tree, {.with_gaze = true});
         if (!subject) return subject.error();
         const OrbitFigures f = measure_orbit(*subject, 1, options_.quick ? 20 : 200);
-        at_main_.push_back({"the same, gaze " + shortest(usual_degrees_aside) + " degrees aside, 1 degree a frame", "us",
+        at_main_.push_back({"the same, gaze " + shortest(session::usual_degrees_aside) + " degrees aside, 1 degree a frame", "us",
                             rounded(f.triangles, 6) + " active triangles, threshold 1", f.median_us, {}, {}, false, 1});
         return {};
     }
