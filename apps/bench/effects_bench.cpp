@@ -9,19 +9,16 @@
 #include <glm/geometric.hpp>
 
 #include <perception/criterion.h>
+#include <session/session.h>
 
 #include "bench_tools.h"
-#include "fold_test.h"
 #include "model_file.h"
-#include "simplification.h"
 #include "terminal.h"
 
 namespace unseen::app {
 namespace {
 
 using vdtree::DistanceCriterion;
-
-constexpr double fill = 0.9;
 
 struct Measured {
     vdtree::Index triangles = 0;
@@ -31,21 +28,21 @@ struct Measured {
 // What one variation of a test asks for.
 struct Variation {
     std::string name, note;
-    std::function<Result<DistanceCriterion>(const Scene&, const perception::FoldTestOptions&)> criterion;
+    std::function<Result<DistanceCriterion>(const session::Session&, const perception::FoldTestOptions&)> criterion;
     bool has_gaze = true, culls = true, needs_errors = false, is_lit = false, hides = true;
 };
 
-Result<DistanceCriterion> plain(const Scene& scene, const perception::FoldTestOptions& options) {
-    return perception::luebke_hallen_distances(scene.tree, scene.view, options);
+Result<DistanceCriterion> plain(const session::Session& session, const perception::FoldTestOptions& options) {
+    return perception::luebke_hallen_distances(session.tree(), session.default_view(), options);
 }
 
 // With other classes of contrast: `change` is given those of a node.
-Result<DistanceCriterion> with_classes(const Scene& scene, const perception::FoldTestOptions& options, void (*change)(vdtree::FoldClass&)) {
-    const auto made = plain(scene, options);
+Result<DistanceCriterion> with_classes(const session::Session& session, const perception::FoldTestOptions& options, void (*change)(vdtree::FoldClass&)) {
+    const auto made = plain(session, options);
     if (!made) return made.error();
     DistanceCriterion::Parts parts = made->parts();
     for (vdtree::FoldClass& classes : parts.classes) change(classes);
-    return DistanceCriterion::create(scene.tree, std::move(parts));
+    return DistanceCriterion::create(session.tree(), std::move(parts));
 }
 
 std::vector<Variation> variations() {
@@ -55,35 +52,34 @@ std::vector<Variation> variations() {
     all.push_back({"no back-face folding", "what faces away is kept like what faces the eye", plain, true, false});
     all.push_back({"no hidden folding", "what is behind spheres inside the solid is kept", plain, true, true, false, false, false});
     all.push_back({"no contrast", "every fold counts as one against anything in the scene: what knowing luminance saves",
-                   [](const Scene& scene, const perception::FoldTestOptions& options) {
-                       return with_classes(scene, options, [](vdtree::FoldClass& c) { c.interior = c.silhouette; });
+                   [](const session::Session& session, const perception::FoldTestOptions& options) {
+                       return with_classes(session, options, [](vdtree::FoldClass& c) { c.interior = c.silhouette; });
                    }});
     all.push_back({"no silhouettes", "outlines count like what lies inside: not safe; what keeping them costs",
-                   [](const Scene& scene, const perception::FoldTestOptions& options) {
-                       return with_classes(scene, options, [](vdtree::FoldClass& c) { c.silhouette = c.interior; });
+                   [](const session::Session& session, const perception::FoldTestOptions& options) {
+                       return with_classes(session, options, [](vdtree::FoldClass& c) { c.silhouette = c.interior; });
                    }});
     all.push_back({"chroma", "with contrast of colour; no difference where all is grey",
-                   [](const Scene& scene, perception::FoldTestOptions options) {
+                   [](const session::Session& session, perception::FoldTestOptions options) {
                        options.chroma = true;
-                       return plain(scene, options);
+                       return plain(session, options);
                    }});
     all.push_back({"dynamic light", "bounds over the normals in a ring in place of baked luminances: ambient 0.2, directional 0.8",
                    nullptr, true, true, false, true});
-    all.push_back(
-        {"luebke-hallen-safe", "rings of all cuts, and shifts of the mean",
-         [](const Scene& scene, const perception::FoldTestOptions& options) -> Result<vdtree::DistanceCriterion> {
-             const auto rings = scene.cut_rings();
-             if (!rings) return rings.error();
-             return perception::luebke_hallen_safe_distances(scene.tree, **rings, scene.view, options);
-         }});
+    all.push_back({"luebke-hallen-safe", "rings of all cuts, and shifts of the mean",
+                   [](const session::Session& session, const perception::FoldTestOptions& options) -> Result<vdtree::DistanceCriterion> {
+                       const auto rings = session.cut_rings();
+                       if (!rings) return rings.error();
+                       return perception::luebke_hallen_safe_distances(session.tree(), **rings, session.default_view(), options);
+                   }});
     all.push_back({"error", "what folds change in fact, in place of what they could",
-                   [](const Scene& scene, const perception::FoldTestOptions& options) {
-                       return perception::error_distances(scene.tree, scene.view, options);
+                   [](const session::Session& session, const perception::FoldTestOptions& options) {
+                       return perception::error_distances(session.tree(), session.default_view(), options);
                    },
                    true, true, true});
     all.push_back({"error, no gaze", "the same, looked at",
-                   [](const Scene& scene, const perception::FoldTestOptions& options) {
-                       return perception::error_distances(scene.tree, scene.view, options);
+                   [](const session::Session& session, const perception::FoldTestOptions& options) {
+                       return perception::error_distances(session.tree(), session.default_view(), options);
                    },
                    false, true, true});
     return all;
@@ -105,37 +101,41 @@ vdtree::Lighting one_light() {
     return lighting;
 }
 
-perception::FoldTestOptions test_options(const Scene& scene, bool has_gaze) {
+Result<perception::FoldTestOptions> test_options(const session::Session& session, bool has_gaze) {
+    const vdtree::View view = session.default_view();
+    const auto luminance = session.luminance(view);
+    if (!luminance) return luminance.error();
     perception::FoldTestOptions options;
-    options.display = scene.display;
-    options.scene = scene_luminance(scene);
-    if (!has_gaze) return options;
-    options.gaze_px = gaze_aside(scene.display, scene.view, usual_degrees_aside);
+    options.display = session.observer().display;
+    options.scene = *luminance;
+    if (has_gaze) options.gaze_px = session::gaze_aside(options.display, view, session::usual_degrees_aside);
     return options;
 }
 
 // Sets the lights of the viewpoint, too.
-Result<DistanceCriterion> criterion_of(const Variation& variation, const Scene& scene, perception::FoldTestOptions options, vdtree::Viewpoint& viewpoint) {
-    if (!variation.is_lit) return variation.criterion(scene, options);
-    const auto bounds = vdtree::LightBounds::measure(scene.tree);
+Result<DistanceCriterion> criterion_of(const Variation& variation, const session::Session& session, perception::FoldTestOptions options, vdtree::Viewpoint& viewpoint) {
+    if (!variation.is_lit) return variation.criterion(session, options);
+    const auto bounds = vdtree::LightBounds::measure(session.tree());
     if (!bounds) return bounds.error();
     viewpoint.lighting = one_light();
-    options.scene = perception::lit_scene(scene.tree, *bounds, viewpoint.lighting, viewpoint.eye, scene.background);
-    return perception::lit_distances(scene.tree, std::make_shared<const vdtree::LightBounds>(*bounds), scene.view, options);
+    options.scene = perception::lit_scene(session.tree(), *bounds, viewpoint.lighting, viewpoint.eye, session.background());
+    return perception::lit_distances(session.tree(), std::make_shared<const vdtree::LightBounds>(*bounds), session.default_view(), options);
 }
 
-Result<Measured> measure(const Scene& scene, const Variation& variation, int repeats) {
-    const perception::FoldTestOptions options = test_options(scene, variation.has_gaze);
-    vdtree::Viewpoint viewpoint = perception::viewpoint_of(scene.tree, scene.view, options, scene.placement);
-    if (variation.hides) viewpoint.occluders.assign(scene.inner_spheres().begin(), scene.inner_spheres().end()); // of open surfaces, none
-    const auto criterion = criterion_of(variation, scene, options, viewpoint);
+Result<Measured> measure(const session::Session& session, const Variation& variation, int repeats) {
+    const auto asked = test_options(session, variation.has_gaze);
+    if (!asked) return asked.error();
+    const perception::FoldTestOptions& options = *asked;
+    vdtree::Viewpoint viewpoint = perception::viewpoint_of(session.tree(), session.default_view(), options);
+    if (variation.hides) viewpoint.occluders.assign(session.inner_spheres().begin(), session.inner_spheres().end()); // of open surfaces, none
+    const auto criterion = criterion_of(variation, session, options, viewpoint);
     if (!criterion) return criterion.error();
     vdtree::FollowOptions following;
-    following.cull_back_faces = variation.culls && scene.tree.closedness() != vdtree::Closedness::open;
+    following.cull_back_faces = variation.culls && session.tree().closedness() != vdtree::Closedness::open;
     Measured measured;
     std::vector<double> milliseconds;
     for (int i = 0; i < repeats; ++i) {
-        vdtree::Cut cut(scene.tree);
+        vdtree::Cut cut(session.tree());
         const double start = thread_seconds();
         const auto stats = cut.follow(*criterion, viewpoint, following);
         static_cast<void>(cut.indices());
@@ -180,15 +180,14 @@ Result<EffectsBenchResult> bench_effects(const EffectsBenchOptions& options) {
     for (auto& [name, tree] : *trees) {
         auto measured_tree = measured(tree, 1);
         if (!measured_tree) return measured_tree.error();
-        ViewOptions view;
-        view.fill = fill;
-        const auto scene = make_scene(std::move(tree), view, {}), with_errors = make_scene(std::move(*measured_tree), view, {});
-        if (!scene) return scene.error();
+        const auto session = session::Session::create(session::Scene::of(std::move(tree)));
+        const auto with_errors = session::Session::create(session::Scene::of(std::move(*measured_tree)));
+        if (!session) return session.error();
         if (!with_errors) return with_errors.error();
         result.table[0].push_back(name);
-        result.table[1].push_back(grouped(scene->tree.triangle_count()));
+        result.table[1].push_back(grouped(session->tree().triangle_count()));
         for (std::size_t i = 0; i < all.size(); ++i) {
-            const auto found = measure(all[i].needs_errors ? *with_errors : *scene, all[i], options.quick ? 3 : 11);
+            const auto found = measure(all[i].needs_errors ? *with_errors : *session, all[i], options.quick ? 3 : 11);
             if (!found) return found.error();
             result.table[i + 2].push_back(grouped(found->triangles) + "; " + rounded(found->milliseconds, 3));
             result.effects.push_back({{"mesh", name}, {"variation", all[i].name}, {"triangles", found->triangles}, {"milliseconds", found->milliseconds}});

@@ -24,7 +24,6 @@
 #include "child_process.h"
 #include "model_file.h"
 #include "progress_bar.h"
-#include "scene.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -232,7 +231,7 @@ public:
         const auto background = static_cast<float>(perception::to_relative(options_.display, perception::Luminance(20)));
         options_.scene = {std::min(range.lo, background), std::max(range.hi, background)};
         if (!kind.with_gaze) return;
-        options_.gaze_px = gaze_aside(options_.display, window_, usual_degrees_aside);
+        options_.gaze_px = session::gaze_aside(options_.display, window_, session::usual_degrees_aside);
     }
 
     vdtree::View view(double degrees) const {
@@ -580,7 +579,7 @@ private:
         const auto subject = Subject::create(tree, {.with_gaze = true});
         if (!subject) return subject.error();
         const OrbitFigures f = measure_orbit(*subject, 1, options_.quick ? 20 : 200);
-        at_main_.push_back({"the same, gaze " + shortest(usual_degrees_aside) + " degrees aside, 1 degree a frame",
+        at_main_.push_back({"the same, gaze " + shortest(session::usual_degrees_aside) + " degrees aside, 1 degree a frame",
                             "us",
                             rounded(f.triangles, 6) + " active triangles, threshold 1",
                             f.median_us,

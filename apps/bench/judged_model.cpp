@@ -13,6 +13,7 @@ bool is_same(const vdtree::View& a, const vdtree::View& b) {
     return a.eye == b.eye && a.target == b.target && a.up == b.up && a.fov_y_degrees == b.fov_y_degrees && a.width == b.width && a.height == b.height;
 }
 
+FoldTest test_of(const WhatOptions& what) { return what.request.fold_test.value_or(FoldTest::error); }
 bool needs_errors(FoldTest test) { return test == FoldTest::error; }
 
 } // namespace
@@ -23,71 +24,73 @@ Result<JudgedModel> JudgedModel::create(const render::Context& context, std::str
     model.context_ = context;
     model.name_ = std::move(name);
     model.second_ = second;
-    model.view_.width = model.view_.height = window_px;
-    auto scene = make_scene(std::move(tree), model.view_, {});
-    if (!scene) return scene.error();
-    auto stand = model.make_stand(std::move(*scene));
+    auto stand = model.make_stand(std::move(tree));
     if (!stand) return stand.error();
     model.plain_ = std::move(*stand);
+    ViewOptions first;
+    first.width = first.height = window_px;
+    model.view_ = make_view(*model.plain_.session, first);
     return model;
 }
 
-Result<JudgedModel::Stand> JudgedModel::make_stand(Scene scene) {
-    Stand stand{std::make_unique<Scene>(std::move(scene)), nullptr};
-    auto renderer = render::Renderer::create(*context_, stand.scene->tree);
+Result<JudgedModel::Stand> JudgedModel::make_stand(vdtree::VertexTree tree) {
+    auto session = session::Session::create(session::Scene::of(std::move(tree)));
+    if (!session) return session.error();
+    auto renderer = render::Renderer::create(*context_, session->tree());
     if (!renderer) return renderer.error();
-    stand.renderer = std::make_unique<render::Renderer>(std::move(*renderer));
-    return stand;
+    return Stand{std::make_unique<session::Session>(std::move(*session)), std::make_unique<render::Renderer>(std::move(*renderer))};
 }
 
 Result<JudgedModel::Stand*> JudgedModel::stand(FoldTest test) {
     if (!needs_errors(test)) return &plain_;
-    if (!measured_.scene) {
-        auto tree = measured(plain_.scene->tree);
+    if (!measured_.session) {
+        auto tree = session::measured(plain_.session->tree());
         if (!tree) return tree.error();
-        auto scene = make_scene(std::move(*tree), view_, {});
-        if (!scene) return scene.error();
-        scene->view = plain_.scene->view;
-        auto made = make_stand(std::move(*scene));
+        auto made = make_stand(std::move(*tree));
         if (!made) return made.error();
         measured_ = std::move(*made);
     }
     return &measured_;
 }
 
-Result<const Scene*> JudgedModel::scene(FoldTest test) {
+Result<session::Session*> JudgedModel::session(FoldTest test) {
     const auto stood = stand(test);
     if (!stood) return stood.error();
-    return (*stood)->scene.get();
+    return (*stood)->session.get();
 }
 
-Result<void> JudgedModel::look(ViewOptions view) {
-    view.width = view_.width;
-    view.height = view_.height;
-    view_ = view;
-    const vdtree::View before = plain_.scene->view;
-    for (Stand* stand : {&plain_, &measured_})
-        if (stand->scene)
-            if (auto looked = app::look(*stand->scene, view_); !looked) return looked;
-    if (!is_same(plain_.scene->view, before)) full_.reset();
-    return {};
+Result<void> JudgedModel::look(ViewOptions options) {
+    options.width = view_.width;
+    options.height = view_.height;
+    const vdtree::View before = view_;
+    view_ = make_view(*plain_.session, options);
+    if (!is_same(view_, before)) full_.reset();
+    return vdtree::validate(view_);
+}
+
+Result<session::Simplification> JudgedModel::simplify(Stand& stand, const WhatOptions& what) {
+    session::Request request = what.request;
+    request.purpose = session::Purpose::picture;
+    stand.session->set_gaze(fixed_gaze(what));
+    return stand.session->simplify(view_, request);
 }
 
 Result<JudgedModel::Picture> JudgedModel::draw(Stand& stand, const WhatOptions& what, bool wireframe) {
-    vdtree::Cut cut(stand.scene->tree);
-    const auto simplified = simplify(cut, *stand.scene, what, Purpose::picture);
+    const auto simplified = simplify(stand, what);
     if (!simplified) return simplified.error();
+    const vdtree::Cut& cut = simplified->cuts.front();
     render::DrawOptions options;
     options.samples = samples_to_judge;
-    options.background = stand.scene->background;
+    options.background = stand.session->background();
     options.wireframe = wireframe;
-    const auto frame = stand.renderer->draw(cut, stand.scene->view, options, stand.scene->placement);
+    const auto frame = stand.renderer->draw(cut, view_, options);
     if (!frame) return frame.error();
-    return Picture{cut.triangle_count(), luminance_image(*frame, stand.scene->display), code_image(*frame, stand.scene->display)};
+    const perception::Display& display = stand.session->observer().display;
+    return Picture{cut.triangle_count(), luminance_image(*frame, display), code_image(*frame, display)};
 }
 
 Result<JudgedModel::Picture> JudgedModel::draw(const WhatOptions& what, bool wireframe) {
-    const auto stood = stand(what.mode == Mode::full ? FoldTest::luebke_hallen : what.test());
+    const auto stood = stand(what.request.goal.kind == Goal::Kind::full ? FoldTest::luebke_hallen : test_of(what));
     if (!stood) return stood.error();
     return draw(**stood, what, wireframe);
 }
@@ -95,7 +98,7 @@ Result<JudgedModel::Picture> JudgedModel::draw(const WhatOptions& what, bool wir
 Result<const perception::Image*> JudgedModel::full() {
     if (!full_) {
         WhatOptions what;
-        what.mode = Mode::full;
+        what.request.goal = Goal::full();
         auto drawn = draw(plain_, what, false);
         if (!drawn) return drawn.error();
         full_ = std::move(drawn->luminance);
@@ -107,7 +110,7 @@ Result<perception::Judgement> JudgedModel::judge(const Picture& picture, const W
     const auto reference = full();
     if (!reference) return reference.error();
     perception::JudgeOptions options;
-    options.display = plain_.scene->display;
+    options.display = plain_.session->observer().display;
     options.gaze_px = what.gaze_px;
     if (judge == Judge::second) {
         options.csf = second_;
@@ -137,12 +140,11 @@ Result<Verdicts> JudgedModel::judge(const WhatOptions& what) {
 }
 
 Result<vdtree::Index> JudgedModel::count(const WhatOptions& what) {
-    const auto stood = stand(what.test());
+    const auto stood = stand(test_of(what));
     if (!stood) return stood.error();
-    vdtree::Cut cut((*stood)->scene->tree);
-    const auto simplified = simplify(cut, *(*stood)->scene, what, Purpose::picture);
+    const auto simplified = simplify(**stood, what);
     if (!simplified) return simplified.error();
-    return cut.triangle_count();
+    return simplified->stats.triangles;
 }
 
 } // namespace unseen::app

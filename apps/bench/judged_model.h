@@ -11,8 +11,7 @@
 #include <render/renderer.h>
 #include <vdtree/cut.h>
 
-#include "scene.h"
-#include "simplification.h"
+#include "session_options.h"
 
 namespace unseen::app {
 
@@ -35,11 +34,12 @@ public:
                                       perception::CsfModel second = usual_second);
 
     const std::string& name() const { return name_; }
-    const vdtree::VertexTree& tree() const { return plain_.scene->tree; }
+    const vdtree::VertexTree& tree() const { return plain_.session->tree(); }
     vdtree::Index triangles() const { return tree().triangle_count(); }
 
     // What a fold test looks at: the tree as it was built or, where the test asks for it, with the errors of its folds.
-    Result<const Scene*> scene(FoldTest test);
+    Result<session::Session*> session(FoldTest test);
+    const vdtree::View& view() const { return view_; }
 
     // From now on everything is seen so. Of the options, the window's size is the model's own.
     Result<void> look(ViewOptions view);
@@ -58,13 +58,14 @@ public:
     Result<vdtree::Index> count(const WhatOptions& what);
 
 private:
-    struct Stand { // a scene with what draws it
-        std::unique_ptr<Scene> scene;
+    struct Stand { // a session with what draws it
+        std::unique_ptr<session::Session> session;
         std::unique_ptr<render::Renderer> renderer;
     };
     JudgedModel() = default;
     Result<Stand*> stand(FoldTest test);
-    Result<Stand> make_stand(Scene scene);
+    Result<Stand> make_stand(vdtree::VertexTree tree);
+    Result<session::Simplification> simplify(Stand& stand, const WhatOptions& what);
     Result<Picture> draw(Stand& stand, const WhatOptions& what, bool wireframe);
     Result<const perception::Image*> full();
     Result<perception::Judgement> judge(const Picture& picture, const WhatOptions& what, Judge judge);
@@ -72,7 +73,7 @@ private:
     std::optional<render::Context> context_;
     std::string name_;
     perception::CsfModel second_ = usual_second;
-    ViewOptions view_;
+    vdtree::View view_;
     Stand plain_, measured_; // the second with the errors of folds; made when it is first asked for
     std::optional<perception::Image> full_;
 };

@@ -17,7 +17,6 @@
 
 #include "bench_tools.h"
 #include "drawing.h"
-#include "fold_test.h"
 #include "judged_model.h"
 #include "model_file.h"
 #include "progress_bar.h"
@@ -129,7 +128,7 @@ private:
 
 WhatOptions what_of(FoldTest test, const Look& look) {
     WhatOptions what;
-    what.chosen = ChosenTest{test};
+    what.request.fold_test = test;
     what.gaze_px = look.gaze_px;
     return what;
 }
@@ -144,7 +143,7 @@ std::string words(const Judged& judged, const JudgedModel& model) {
 Result<void> add_exhibit(Sheet& sheet, JudgedModel& model, const Judged& judged) {
     if (auto looked = model.look(judged.look.view); !looked) return looked;
     WhatOptions full, what = what_of(judged.test, judged.look);
-    full.mode = Mode::full;
+    full.request.goal = Goal::full();
     std::vector<Image> pictures;
     for (const auto& [wish, wireframe] : {std::pair{&full, false}, std::pair{&what, false}, std::pair{&what, true}}) {
         auto drawn = model.draw(*wish, wireframe);
@@ -268,7 +267,7 @@ private:
         look.view.width = look.view.height = options_.window_px;
         look.view.direction = direction;
         look.view.fill = fill;
-        if (aside_degrees > 0) look.gaze_px = gaze_aside({}, window(), aside_degrees);
+        if (aside_degrees > 0) look.gaze_px = session::gaze_aside({}, window(), aside_degrees);
         look.text = "from " + rounded(direction.x, 2) + " " + rounded(direction.y, 2) + " " + rounded(direction.z, 2) + ", " + percent(fill) +
                     " of the height, " + gaze_name(aside_degrees);
         return look;
@@ -449,7 +448,7 @@ private:
             if (i % 2) {
                 const double aside = uniform(0, 40), where = uniform(0, 2 * std::numbers::pi);
                 const glm::dvec2 centre(options_.window_px * 0.5);
-                const double px = gaze_aside({}, window(), aside).x - centre.x;
+                const double px = session::gaze_aside({}, window(), aside).x - centre.x;
                 how.gaze_px = centre + px * glm::dvec2(std::cos(where), std::sin(where));
                 how.text.replace(how.text.rfind("fovea"), 5, "gaze " + rounded(aside, 3) + " degrees aside");
             }
@@ -594,8 +593,7 @@ private:
         if (auto looked = models_[model]->look(how.view); !looked) return looked;
         const auto is_safe = [&](double px) -> Result<bool> {
             WhatOptions what = what_of(test, how);
-            what.mode = Mode::pixels;
-            what.pixels = px;
+            what.request.goal = Goal::pixels(px);
             const auto verdict = models_[model]->judge(what, Judge::modern);
             if (!verdict) return verdict.error();
             return verdict->visible_pixels == 0;
@@ -620,10 +618,7 @@ private:
         for (const auto& [model, how] : looks) {
             if (auto looked = models_[model]->look(how.view); !looked) return looked.error();
             WhatOptions what = what_of(test, how);
-            if (pixels > 0) {
-                what.mode = Mode::pixels;
-                what.pixels = pixels;
-            }
+            if (pixels > 0) what.request.goal = Goal::pixels(pixels);
             const auto count = models_[model]->count(what);
             if (!count) return count.error();
             sum += *count;
@@ -711,13 +706,13 @@ private:
     }
 
     Result<void> full_tests(JudgedModel& model, FoldTest test) {
-        const auto scene = model.scene(test);
-        if (!scene) return scene.error();
-        const WhatOptions what = what_of(test, {});
-        const auto criterion = distance_criterion(**scene, what);
-        if (!criterion) return criterion.error();
+        const auto session = model.session(test);
+        if (!session) return session.error();
+        (*session)->set_gaze(std::nullopt);
+        const auto recipe = (*session)->recipe(model.view(), what_of(test, {}).request);
+        if (!recipe) return recipe.error();
         const Pinned pinned;
-        const double rate = full_tests_per_second((*scene)->tree, **criterion, viewpoint_of(**scene, what, Purpose::mesh), {},
+        const double rate = full_tests_per_second((*session)->tree(), *recipe->criterion, recipe->viewpoint, {},
                                                   options_.quick ? 10 : 60);
         result_.rows.push_back({"full tests from scratch, " + name_of(test), "M/s",
                                 model.name() + ", every node, one thread", rate / 1e6, target("full tests, M/s"), true,
@@ -738,13 +733,13 @@ private:
     }
 
     Result<void> moving_light(JudgedModel& model, const std::shared_ptr<const vdtree::LightBounds>& bounds, Index wanted, TurningLight kind, const char* name) {
-        const auto scene = model.scene(baseline);
-        if (!scene) return scene.error();
-        const vdtree::VertexTree& tree = (*scene)->tree;
+        const auto session = model.session(baseline);
+        if (!session) return session.error();
+        const vdtree::VertexTree& tree = (*session)->tree();
         perception::FoldTestOptions options;
-        vdtree::Viewpoint viewpoint = perception::viewpoint_of(tree, (*scene)->view, options, {}, false);
-        options.scene = perception::lit_scene(tree, *bounds, lighting_at(tree, kind, 0), viewpoint.eye, (*scene)->background);
-        const auto made = perception::lit_distances(tree, bounds, (*scene)->view, options);
+        vdtree::Viewpoint viewpoint = perception::viewpoint_of(tree, model.view(), options, {}, false);
+        options.scene = perception::lit_scene(tree, *bounds, lighting_at(tree, kind, 0), viewpoint.eye, (*session)->background());
+        const auto made = perception::lit_distances(tree, bounds, model.view(), options);
         if (!made) return made.error();
         vdtree::Cut cut(tree);
         vdtree::FollowOptions following;

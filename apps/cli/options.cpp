@@ -12,6 +12,7 @@
 #include <perception/criterion.h>
 #include <vdtree/internal/number_text.h>
 
+#include "option_names.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -64,24 +65,9 @@ void check(const ViewOptions& view) {
     if (view.eye && view.target && *view.eye == *view.target) refuse("--eye and --target are the same point.");
 }
 
-void check(const WhatOptions& what) {
-    const bool is_perceptual = app::is_perceptual(what.test());
-    if (what.mode == Mode::pixels && is_perceptual)
-        refuse("--pixels needs --fold-test extent or displacement: " + name_of(what.test()) + " knows no pixels.");
-    if (what.mode == Mode::imperceptible && !is_perceptual)
-        refuse("--fold-test " + name_of(what.test()) +
-               " cannot tell what is imperceptible: add --triangles N or --pixels E.");
-    // Where none was asked for, one that knows colours is taken.
-    const bool knows_chroma = !what.chosen || what.test() == FoldTest::luebke_hallen || what.test() == FoldTest::luebke_hallen_safe;
-    if (what.chroma && (!knows_chroma || what.mode == Mode::full))
-        refuse("--chroma needs --fold-test luebke-hallen or luebke-hallen-safe, and not --full.");
-}
-
 } // namespace
 
 void refuse(const std::string& message) { throw CLI::ValidationError(message, CLI::ExitCodes::ValidationError); }
-
-std::string name_of(FoldTest test) { return std::string(perception::fold_test_names[static_cast<std::size_t>(test)]); }
 
 CLI::Validator finite() {
     return number_that("a finite number", [](double) { return true; });
@@ -212,9 +198,9 @@ void check_geomorph(const std::optional<double>& seconds, const ViewOptions& vie
     if (seconds && !view.lights.empty()) refuse("--geomorph and --lights exclude each other: vertices that glide are not lit.");
 }
 
-void add_fold_test_option(CLI::App& verb, std::optional<ChosenTest>& chosen, std::span<const FoldTest> tests, const std::string& text) {
-    std::vector<std::pair<std::string, ChosenTest>> choices;
-    for (const FoldTest test : tests) choices.push_back({name_of(test), ChosenTest{test}});
+void add_fold_test_option(CLI::App& verb, std::optional<FoldTest>& chosen, std::span<const FoldTest> tests, const std::string& text) {
+    std::vector<std::pair<std::string, FoldTest>> choices;
+    for (const FoldTest test : tests) choices.emplace_back(name_of(test), test);
     add_choice(verb, "--fold-test", chosen, std::move(choices), text);
 }
 
@@ -285,35 +271,36 @@ void add_display_options(CLI::App& verb, DisplayOptions& o) {
 
 void add_what_options(CLI::App& verb, WhatOptions& o) {
     CLI::App& group = *verb.add_option_group("WHAT", "Which simplification (default: --imperceptible)");
+    Goal& goal = o.request.goal;
     const auto counted = [](std::int64_t) {}; // the options themselves know whether they were given
     CLI::Option* full = group.add_flag_function("--full", counted, "The input, whole");
     CLI::Option* imperceptible =
         group.add_flag_function("--imperceptible", counted, "Fold what nobody can see on this display");
     CLI::Option* triangles =
-        add_triangles_option(group, o.triangles, "At most N triangles, as inconspicuous as can be");
-    CLI::Option* fill = group.add_flag("--fill-budget", o.fill_budget, "With --triangles: use all of them, even where it cannot be seen");
-    add_number(group, "--milliseconds", o.milliseconds, not_negative(), "T", "The best cut that T milliseconds are enough for");
-    CLI::Option* pixels = group.add_option("--pixels", o.pixels, "Fold what is smaller than E pixels, seen or not")
+        add_triangles_option(group, goal.triangles, "At most N triangles, as inconspicuous as can be");
+    CLI::Option* fill = group.add_flag("--fill-budget", goal.fill, "With --triangles: use all of them, even where it cannot be seen");
+    add_number(group, "--milliseconds", o.request.milliseconds, not_negative(), "T", "The best cut that T milliseconds are enough for");
+    CLI::Option* pixels = group.add_option("--pixels", goal.tolerance_px, "Fold what is smaller than E pixels, seen or not")
                               ->type_name("E")
                               ->check(positive());
-    add_fold_test_option(group, o.chosen,
+    add_fold_test_option(group, o.request.fold_test,
                          std::array{FoldTest::error, FoldTest::luebke_hallen, FoldTest::luebke_hallen_safe, FoldTest::extent, FoldTest::displacement},
                          "error (perceptual: what folds change in fact; default), luebke-hallen (perceptual: what they could change at most), "
                          "luebke-hallen-safe (the same with its known holes closed, more triangles), extent or displacement (in pixels; of --pixels: "
                          "extent)");
-    group.add_flag("--chroma", o.chroma, "Keep changes of colour that can be seen, too, not only those of luminance");
+    group.add_flag("--chroma", o.request.chroma, "Keep changes of colour that can be seen, too, not only those of luminance");
     add_gaze_option(group, o.gaze_px);
     group.callback([=, &o] {
+        Goal::Kind& kind = o.request.goal.kind;
         const std::size_t given = full->count() + imperceptible->count() + triangles->count() + pixels->count();
         if (given > 1)
             refuse("--full, --imperceptible, --triangles and --pixels exclude each other: give one of them.");
         if (*fill && !*triangles) refuse("--fill-budget needs --triangles N.");
-        if (o.milliseconds && *full) refuse("--milliseconds and --full exclude each other.");
-        if (*full) o.mode = Mode::full;
-        if (*triangles) o.mode = Mode::budget;
-        if (*pixels) o.mode = Mode::pixels;
-        if (*pixels && !o.chosen) o.chosen = ChosenTest{FoldTest::extent};
-        check(o);
+        if (o.request.milliseconds && *full) refuse("--milliseconds and --full exclude each other.");
+        if (*full) kind = Goal::Kind::full;
+        if (*triangles) kind = Goal::Kind::budget;
+        if (*pixels) kind = Goal::Kind::pixels;
+        if (const auto valid = session::validate(o.request); !valid) refuse(with_option_names(valid.error().message));
     });
 }
 

@@ -12,16 +12,21 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include <perception/gaze.h>
+#include <session/gaze_player.h>
+#include <session/request.h>
 
 namespace unseen::app {
+
+using session::FoldTest;
+using session::Goal;
+using session::name_of;
 
 struct TextureOptions {
     std::string file;         // instead of the materials'
     bool is_left_out = false; // --no-texture
 };
 
-// VIEW. What is not given follows from the model and the display, see scene.h.
+// VIEW. What is not given follows from the model and the display, see session/session.h.
 struct ViewOptions {
     std::optional<glm::dvec3> eye, target, up; // world units
     std::optional<glm::dvec3> direction;       // from the model towards the eye
@@ -43,41 +48,15 @@ struct DisplayOptions {
     std::string csf; // a model's name or a file's
 };
 
-enum class Mode { full, imperceptible, budget, pixels };
-enum class FoldTest { luebke_hallen, luebke_hallen_safe, error, extent, displacement }; // like perception::fold_test_names
-
-constexpr bool is_perceptual(FoldTest test) { return test != FoldTest::extent && test != FoldTest::displacement; }
-std::string name_of(FoldTest test); // as --fold-test has it
-
-// A fold test, and why it is taken in place of the default; asked for, it needs no reason.
-struct ChosenTest {
-    FoldTest test = FoldTest::error;
-    std::string why = {};
-};
-
 // WHAT.
 struct WhatOptions {
-    Mode mode = Mode::imperceptible;
-    std::optional<ChosenTest> chosen = {};   // none: by the scene, see settle_fold_test() in fold_test.h
-    std::uint32_t triangles = 0;             // of Mode::budget
-    double pixels = 0;                       // of Mode::pixels
-    bool chroma = false;                     // look at colour, too
-    bool fill_budget = false;                // of Mode::budget: go on where nothing more can be seen
-    std::optional<double> milliseconds;      // at most so long for the cut
+    session::Request request;
     std::optional<glm::dvec2> gaze_px;
-    double gaze_margin_deg = 0;              // the true gaze may be so far from it
-
-    FoldTest test() const { return chosen ? chosen->test : FoldTest::error; }
 };
 
-// Where gazes come from.
-enum class GazeSource { none, mouse, head, trace, simulated }; // a fixed one is WhatOptions::gaze_px
-struct GazeOptions {
-    GazeSource source = GazeSource::none;
-    std::string trace; // a file
-    std::uint64_t seed = 1;
-    perception::TrackerOptions tracker;
-};
+// Where gazes come from; a fixed one is WhatOptions::gaze_px.
+using session::GazeOptions;
+using session::GazeSource;
 
 // Each adds a group of options to a verb. The structs must outlive the parser. Impossible values and combinations end
 // the parse with an error that names the option.
@@ -93,7 +72,7 @@ void add_texture_options(CLI::App& verb, TextureOptions& options);
 void add_geomorph_option(CLI::App& verb, std::optional<double>& seconds);
 void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px);
 // Of `tests`.
-void add_fold_test_option(CLI::App& verb, std::optional<ChosenTest>& chosen, std::span<const FoldTest> tests, const std::string& text);
+void add_fold_test_option(CLI::App& verb, std::optional<FoldTest>& chosen, std::span<const FoldTest> tests, const std::string& text);
 void add_json_option(CLI::App& verb, std::string& file);
 CLI::Option* add_triangles_option(CLI::App& verb, std::uint32_t& triangles, const std::string& text);
 

@@ -6,6 +6,7 @@
 #include <new>
 #include <typeinfo>
 
+#include "option_names.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -41,7 +42,7 @@ int run(const std::vector<Command>& commands) {
     for (const Command& command : commands) {
         if (!command.parser->parsed()) continue;
         const auto status = command.run();
-        if (!status) print_error(status.error().message);
+        if (!status) print_error(with_option_names(status.error().message));
         if (!status) return exit_failed;
         if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return *status;
         print_error("cannot write to the standard output: is the disk full?");

@@ -107,13 +107,9 @@ Result<void> check_names(const BuildArguments& a) {
 }
 
 // Without words.
-Result<meshio::ReadResult> read_quietly(const std::filesystem::path& file, const meshio::ReadOptions& options, const TextureOptions& texture) {
-    meshio::ReadOptions reading = options;
-    reading.materials = texture.file.empty() && !texture.is_left_out;
-    auto read = meshio::read_mesh(file, reading);
-    if (!read) return read;
-    if (const auto laid = lay_texture(file, *read, texture); !laid) return laid.error();
-    return read;
+Result<meshio::ReadResult> read_quietly(const std::filesystem::path& file, const meshio::ReadOptions& options,
+                                        const TextureOptions& texture) {
+    return session::read_textured_mesh(file, {.texture = texture.file, .without_textures = texture.is_left_out}, options);
 }
 
 // The mesh, if it can be built within the limit of memory. `read_file` reads it, with or without words.

@@ -18,7 +18,7 @@
 #include "output_files.h"
 #include "progress_bar.h"
 #include "report.h"
-#include "scene.h"
+#include "session_options.h"
 #include "terminal.h"
 #include "verbs.h"
 
@@ -224,7 +224,9 @@ void simulate(Procedure& procedure, const SimulatedObserver& observer) {
 
 Result<perception::CsfTable> expected_table(const CalibrateArguments& a, const perception::Display& display) {
     if (a.display.csf.empty()) return perception::CsfTable::standard();
-    return csf_table(a.display.csf, display);
+    const auto table = session::read_csf_table(a.display.csf, display);
+    if (!table) return table.error();
+    return **table;
 }
 
 Result<Procedure> begin_or_resume(const CalibrateArguments& a, const perception::Display& display) {

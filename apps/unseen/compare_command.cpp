@@ -10,7 +10,7 @@
 
 #include "output_files.h"
 #include "report.h"
-#include "scene.h"
+#include "session_options.h"
 #include "terminal.h"
 #include "verbs.h"
 #include "visibility_map.h"
@@ -69,7 +69,7 @@ Result<Verdict> judge_modern(const CompareArguments& a, const Pair& pair, const 
     options.display = display;
     options.gaze_px = a.gaze_px;
     if (!a.display.csf.empty()) {
-        auto chosen = choose_csf(a.display.csf);
+        auto chosen = session::choose_csf(a.display.csf);
         if (!chosen) return chosen.error();
         if (chosen->model) options.csf = *chosen->model;
         if (chosen->table) options.csf_table = std::make_shared<const perception::CsfTable>(*std::move(chosen->table));

@@ -12,6 +12,7 @@
 
 #include <calibration/observer_profile.h>
 #include <perception/csf.h>
+#include <session/observer.h>
 #include <perception/image.h>
 #include <perception/motion.h>
 #include <vdtree/internal/number_text.h>
@@ -19,7 +20,6 @@
 #include "log_log_plot.h"
 #include "options.h"
 #include "output_files.h"
-#include "scene.h"
 #include "terminal.h"
 #include "verbs.h"
 
@@ -78,7 +78,7 @@ public:
         observer.model_ = *model;
         bool by_table = a.by_table;
         if (!a.csf.empty()) {
-            auto choice = choose_csf(a.csf);
+            auto choice = session::choose_csf(a.csf);
             if (!choice) return choice.error();
             by_table = choice->model.has_value();
             if (choice->model) observer.model_ = *choice->model;

@@ -10,14 +10,16 @@
 
 #include <panel_plot.h>
 #include <perception/image.h>
+#include <session/follower.h>
 #include <vdtree/internal/atomic_file.h>
 
 #include "camera_path.h"
+#include "cut_report.h"
 #include "frame_image.h"
-#include "gaze_player.h"
 #include "output_files.h"
 #include "progress_bar.h"
 #include "report.h"
+#include "session_options.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -67,9 +69,9 @@ struct Drawing {
     render::Renderer renderer;
 };
 
-Result<std::optional<Drawing>> make_drawing(const Scene& scene, std::optional<render::Context> context) {
+Result<std::optional<Drawing>> make_drawing(const session::Session& session, std::optional<render::Context> context) {
     if (!context) return std::optional<Drawing>();
-    auto renderer = render::Renderer::create(*context, scene.tree);
+    auto renderer = render::Renderer::create(*context, session.tree());
     if (!renderer) return renderer.error();
     return std::optional<Drawing>(Drawing{std::move(*context), std::move(*renderer)});
 }
@@ -175,8 +177,8 @@ std::vector<Measure> measures_of(const std::vector<FrameRecord>& frames) {
             {"gliding", "gliding vertices", column(later, [](auto& f) { return f.gliding; })}};
 }
 
-Json to_json(const Scene& scene, const std::vector<FrameRecord>& frames, const Simplification& last) {
-    Json json = {{"source_triangles", scene.tree.triangle_count()},
+Json to_json(const session::Session& session, const std::vector<FrameRecord>& frames, const session::Report& last) {
+    Json json = {{"source_triangles", session.tree().triangle_count()},
                  {"frames", frames.size()},
                  {"first_cut_ms", number_or_null(frames.front().cut_ms + frames.front().index_ms)}};
     for (const Measure& m : measures_of(frames))
@@ -186,9 +188,9 @@ Json to_json(const Scene& scene, const std::vector<FrameRecord>& frames, const S
     return json;
 }
 
-void print(const Scene& scene, const std::vector<FrameRecord>& frames, const Simplification& last) {
+void print(const session::Session& session, const std::vector<FrameRecord>& frames, const session::Report& last) {
     print_table({{"frames", grouped(frames.size())},
-                 {"triangles of the model", grouped(scene.tree.triangle_count())},
+                 {"triangles of the model", grouped(session.tree().triangle_count())},
                  {"first cut", rounded(frames.front().cut_ms + frames.front().index_ms, 3) + " ms"}});
     std::vector<std::vector<std::string>> rows = {{"", "median", "largest"}};
     for (const Measure& m : measures_of(frames))
@@ -198,53 +200,52 @@ void print(const Scene& scene, const std::vector<FrameRecord>& frames, const Sim
     const std::string metres = std::isfinite(last.imperceptible_from_m) ? " m" : "";
     print_table({{"imperceptible from", rounded(last.imperceptible_from_m, 3) + metres}});
     std::printf("effects of the last frame\n");
-    print(last.effects);
+    app::print(last.effects);
 }
 
 class FlyThrough {
 public:
-    FlyThrough(Scene& scene, const WhatOptions& what, const FlyThroughOptions& options)
-        : scene_(scene), options_(options), what_(what), cut_(scene.tree) {
-        follower_.set_threshold(options.threshold);
-    }
+    FlyThrough(session::Session& session, const vdtree::View& view, const session::Request& request, const FlyThroughOptions& options)
+        : session_(session), options_(options), view_(view), request_(request), gaze_px_(options.what.gaze_px), follower_(session) {}
 
-    Result<void> run(const std::vector<CameraPose>& poses, GazePlayer gaze, std::optional<render::Context> context, Pictures& pictures) {
-        auto drawing = make_drawing(scene_, std::move(context));
+    Result<void> run(const std::vector<CameraPose>& poses, session::GazePlayer gaze, std::optional<render::Context> context, Pictures& pictures) {
+        auto drawing = make_drawing(session_, std::move(context));
         if (!drawing) return drawing.error();
         if (options_.geomorph_seconds)
-            if (auto set = follower_.set_geomorph(scene_, *options_.geomorph_seconds); !set) return set;
+            if (auto set = follower_.set_glide(*options_.geomorph_seconds); !set) return set;
         const double frame_s = 1 / options_.frames_a_second;
-        if (auto begun = gaze.begin(scene_, static_cast<double>(poses.size()) * frame_s); !begun) return begun;
+        if (auto begun = gaze.begin(display(), view_, static_cast<double>(poses.size()) * frame_s, terminal_messages()); !begun) return begun;
         ProgressBar bar("flying");
         for (std::size_t i = 0; i < poses.size(); ++i) {
             bar(static_cast<double>(i) / static_cast<double>(poses.size()), "frames");
             take(poses[i]);
-            if (auto lit = light_at(scene_, static_cast<double>(i) * frame_s); !lit)
-                return Error{lit.error().code, "Frame " + std::to_string(i) + ": " + lit.error().message};
-            gaze.apply(what_, scene_, static_cast<double>(i) * frame_s);
+            session_.set_time(static_cast<double>(i) * frame_s);
+            session_.set_gaze(gaze.at(static_cast<double>(i) * frame_s, view_, gaze_px_));
             auto frame = next(*drawing);
             if (!frame) return Error{frame.error().code, "Frame " + std::to_string(i) + ": " + frame.error().message};
             if (!pictures.are_wanted()) continue;
-            if (auto written = pictures.write_next(code_image(*frame, scene_.display)); !written) return written;
+            if (auto written = pictures.write_next(code_image(*frame, display())); !written) return written;
         }
         return {};
     }
 
     const std::vector<FrameRecord>& records() const { return records_; }
-    const Simplification& last() const { return last_; }
+    const session::Report& last() const { return last_; }
 
 private:
+    const perception::Display& display() const { return session_.observer().display; }
+
     void take(const CameraPose& pose) {
-        scene_.view.eye = pose.eye;
-        scene_.view.target = pose.target;
-        scene_.view.up = pose.up;
-        if (pose.gaze_px) what_.gaze_px = pose.gaze_px;
+        view_.eye = pose.eye;
+        view_.target = pose.target;
+        view_.up = pose.up;
+        if (pose.gaze_px) gaze_px_ = pose.gaze_px;
     }
 
     Result<render::Frame> next(std::optional<Drawing>& drawing) {
         if (options_.geomorph_seconds) follower_.let_pass(1 / options_.frames_a_second);
         const auto start = Clock::now();
-        auto simplified = follower_.follow(cut_, scene_, what_);
+        auto simplified = follower_.follow(view_, request_);
         if (!simplified) return simplified.error();
         last_ = std::move(*simplified);
         FrameRecord record;
@@ -258,11 +259,14 @@ private:
         Result<render::Frame> frame = render::Frame{};
         if (drawing) {
             render::DrawOptions draw = options_.draw;
-            draw.background = scene_.background;
-            draw.lighting = scene_.lighting;
+            draw.background = session_.background();
+            auto lighting = session_.lighting(view_);
+            if (!lighting) return lighting.error();
+            draw.lighting = std::move(*lighting);
+            const vdtree::Similarity& placement = session_.scene().objects.front().placement;
             render::Renderer& renderer = drawing->renderer;
-            frame = follower_.geomorph() ? renderer.draw(*follower_.geomorph(), scene_.view, draw, scene_.placement)
-                                         : renderer.draw(cut_, scene_.view, draw, scene_.placement);
+            frame = follower_.geomorph() ? renderer.draw(*follower_.geomorph(), view_, draw, placement)
+                                         : renderer.draw(follower_.cut(), view_, draw, placement);
             if (!frame) return frame;
             record.draw_ms = frame->draw_ms;
             record.uploaded_bytes = static_cast<double>(renderer.uploaded_bytes());
@@ -272,13 +276,14 @@ private:
         return frame;
     }
 
-    Scene& scene_;
+    session::Session& session_;
     const FlyThroughOptions& options_;
-    WhatOptions what_;
-    vdtree::Cut cut_;
-    Follower follower_;
+    vdtree::View view_;
+    session::Request request_;
+    std::optional<glm::dvec2> gaze_px_; // of the options, or of the path
+    session::Follower follower_;
     std::vector<FrameRecord> records_;
-    Simplification last_;
+    session::Report last_;
 };
 
 // The folder that the pictures go to is made where it is missing.
@@ -308,7 +313,7 @@ Result<void> fly_through(const std::string& model, const ViewOptions& view, cons
     if (path->has_gaze() && (options.what.gaze_px || options.gaze.source != GazeSource::none))
         return Error{ErrorCode::invalid_argument,
                      "'" + options.path + "' says where the viewer looks: leave --gaze, --gaze-mode and --gaze-trace away, or its columns gaze_x and gaze_y."};
-    auto gaze = GazePlayer::create(options.gaze);
+    auto gaze = session::GazePlayer::create(options.gaze);
     if (!gaze) return gaze.error();
     auto report = JsonReport::open(options.json);
     if (!report) return report.error();
@@ -325,28 +330,31 @@ Result<void> fly_through(const std::string& model, const ViewOptions& view, cons
         if (!made) return made.error();
         context = std::move(*made);
     }
-    auto scene = load_scene(model, view, display);
-    if (!scene) return scene.error();
+    auto session = open_session(model, view, display);
+    if (!session) return session.error();
+    const vdtree::View first_view = make_view(*session, view);
     if (!options.pictures.empty())
         if (auto made = make_folder_of(options.pictures); !made) return made;
-    WhatOptions what = options.what;
-    if (const auto ready = settle_fold_test(*scene, what); !ready) return ready;
+    session::Request request = options.what.request;
+    request.purpose = session::Purpose::picture;
+    request.threshold = options.threshold;
+    if (const auto ready = session->prepare(first_view, request); !ready) return ready.error();
 
-    FlyThrough flight(*scene, what, options);
+    FlyThrough flight(*session, first_view, request, options);
     Pictures pictures(options.pictures);
-    if (auto flown = flight.run(path->poses_from(scene->view), std::move(*gaze), std::move(context), pictures); !flown) return flown;
+    if (auto flown = flight.run(path->poses_from(first_view), std::move(*gaze), std::move(context), pictures); !flown) return flown;
     if (csv)
         if (auto ok = csv->write(to_csv(flight.records())); !ok) return ok;
-    if (auto ok = report->prepare(to_json(*scene, flight.records(), flight.last())); !ok) return ok;
+    if (auto ok = report->prepare(to_json(*session, flight.records(), flight.last())); !ok) return ok;
     if (!options.plot.empty()) {
-        const std::string title = grouped(scene->tree.triangle_count()) + " triangles, " + options.path;
+        const std::string title = grouped(session->tree().triangle_count()) + " triangles, " + options.path;
         if (auto ok = write_plot(options.plot, plot_of(flight.records(), title)); !ok) return ok;
     }
     if (csv)
         if (auto ok = csv->commit(); !ok) return ok;
     if (auto ok = report->publish(); !ok) return ok;
     pictures.keep();
-    if (!report->is_on_stdout()) print(*scene, flight.records(), flight.last());
+    if (!report->is_on_stdout()) print(*session, flight.records(), flight.last());
     return {};
 }
 

@@ -6,8 +6,7 @@
 
 #include <render/renderer.h>
 
-#include "scene.h"
-#include "simplification.h"
+#include "options.h"
 
 namespace unseen::app {
 

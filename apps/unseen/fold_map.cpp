@@ -13,7 +13,6 @@
 #include <vdtree/normal_mask.h>
 
 #include "colour_bar.h"
-#include "fold_test.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -38,11 +37,11 @@ struct Scale {
     }
 };
 
-Scale scale_of(FoldMap map, const Scene& scene, double largest) {
+Scale scale_of(FoldMap map, const perception::Display& display, double largest) {
     switch (map) {
     case FoldMap::cost: return {1.0 / 64, 1, true, {1.0 / 64, 1.0 / 16, 1.0 / 4, 1}, "fold cost; 1: just imperceptible, red: more"};
     case FoldMap::frequency: {
-        Scale scale{0.1, perception::nyquist(perception::finest_pixels_per_degree(scene.display)).value(), true, {0.1, 0.3, 1, 3, 10, 30}, "cycles per degree"};
+        Scale scale{0.1, perception::nyquist(perception::finest_pixels_per_degree(display)).value(), true, {0.1, 0.3, 1, 3, 10, 30}, "cycles per degree"};
         std::erase_if(scale.ticks, [&](double tick) { return tick > scale.high; });
         return scale;
     }
@@ -56,16 +55,22 @@ Scale scale_of(FoldMap map, const Scene& scene, double largest) {
 // The scene as it is seen, in the tree's frame.
 class Sight {
 public:
-    Sight(const Scene& scene, const WhatOptions& what, const vdtree::Viewpoint& viewpoint) : scene_(scene), tree_(scene.tree), viewpoint_(viewpoint) {
+    Sight(const session::Session& session, const vdtree::View& view)
+        : tree_(session.tree()), display_(session.observer().display) {
+        const vdtree::Similarity& placement = session.scene().objects.front().placement;
+        perception::FoldTestOptions options;
+        options.display = display_;
+        if (session.observer().gaze) options.gaze_px = session.observer().gaze->px;
+        viewpoint_ = perception::viewpoint_of(tree_, view, options, placement);
         const vdtree::LuminanceRange range = tree_.luminance_range();
-        darkest_ = std::min(range.lo, scene.background);
-        brightest_ = std::max(range.hi, scene.background);
-        pixel_deg_ = 1 / perception::coarsest_pixels_per_degree(scene.display).value();
-        has_gaze_ = what.gaze_px.has_value() && viewpoint.gaze.has_value();
-        ahead_ = scene.placement.direction_to_mesh(-vdtree::camera_frame(scene.view).back);
-        const double half_screen_deg = perception::physical_field(scene.display, scene.view.height).value() / 2;
-        magnification_ = std::tan(half_screen_deg / perception::degrees_per_radian) / std::tan(scene.view.fov_y_degrees / 2 / perception::degrees_per_radian);
-        if (has_gaze_) gaze_on_screen_ = on_screen(*viewpoint.gaze);
+        darkest_ = std::min(range.lo, session.background());
+        brightest_ = std::max(range.hi, session.background());
+        pixel_deg_ = 1 / perception::coarsest_pixels_per_degree(display_).value();
+        has_gaze_ = viewpoint_.gaze.has_value();
+        ahead_ = placement.direction_to_mesh(-vdtree::camera_frame(view).back);
+        const double half_screen_deg = perception::physical_field(display_, view.height).value() / 2;
+        magnification_ = std::tan(half_screen_deg / perception::degrees_per_radian) / std::tan(view.fov_y_degrees / 2 / perception::degrees_per_radian);
+        if (has_gaze_) gaze_on_screen_ = on_screen(*viewpoint_.gaze);
     }
 
     double frequency(NodeId node) const {
@@ -86,8 +91,8 @@ public:
                            around.ring.radius) == vdtree::Facing::mixed;
         vdtree::LuminanceRange range = tree_.ring_luminance()[node];
         if (is_silhouette) range = {std::min(range.lo, darkest_), std::max(range.hi, brightest_)};
-        const double lo = perception::to_luminance(scene_.display, static_cast<double>(range.lo)).value(),
-                     hi = perception::to_luminance(scene_.display, static_cast<double>(range.hi)).value();
+        const double lo = perception::to_luminance(display_, static_cast<double>(range.lo)).value(),
+                     hi = perception::to_luminance(display_, static_cast<double>(range.hi)).value();
         return (hi - lo) / (hi + lo);
     }
 
@@ -116,9 +121,9 @@ private:
         return m * std::max(across_squared, std::sqrt(across_squared));
     }
 
-    const Scene& scene_;
     const vdtree::VertexTree& tree_;
-    const vdtree::Viewpoint& viewpoint_;
+    const perception::Display& display_;
+    vdtree::Viewpoint viewpoint_;
     float darkest_ = 0, brightest_ = 1;
     double pixel_deg_ = 0;
     bool has_gaze_ = false;
@@ -163,12 +168,12 @@ std::vector<Corner> clipped(const std::array<Corner, 3>& triangle, double neares
 
 class Raster {
 public:
-    Raster(const vdtree::VertexTree& tree, const Scene& scene, const vdtree::View& view)
-        : tree_(tree), width_(view.width), height_(view.height), frame_(vdtree::camera_frame(view)), eye_(view.eye), placement_(scene.placement),
+    Raster(const session::Session& session, const vdtree::View& view)
+        : tree_(session.tree()), width_(view.width), height_(view.height), frame_(vdtree::camera_frame(view)), eye_(view.eye),
+          placement_(session.scene().objects.front().placement),
           focal_px_(view.height / 2.0 / std::tan(view.fov_y_degrees * std::numbers::pi / 360)),
           nearness_(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), 0), nodes_(nearness_.size(), vdtree::no_node) {
-        const PlacedSphere sphere = placed_sphere(tree, placement_);
-        nearest_ = 1e-6 * std::max(sphere.radius, std::numeric_limits<double>::min());
+        nearest_ = 1e-6 * std::max(session.bounding_sphere().radius, std::numeric_limits<double>::min());
     }
 
     void draw(const vdtree::Cut& cut) {
@@ -239,12 +244,16 @@ ColourBar bar_of(const Scale& scale) {
 
 } // namespace
 
-Result<Image> draw_fold_map(const vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, FoldMap map, const vdtree::View& view) {
-    const vdtree::Viewpoint viewpoint = viewpoint_of(scene, what, Purpose::picture);
-    const Sight sight(scene, what, viewpoint);
+Result<Image> draw_fold_map(const vdtree::Cut& cut, session::Session& session, const vdtree::View& seen,
+                            const session::Request& request, FoldMap map, const vdtree::View& view) {
+    const vdtree::VertexTree& tree = session.tree();
+    const Sight sight(session, seen);
     std::vector<float> costs;
     if (map == FoldMap::cost) {
-        auto found = fold_costs(scene, what, Purpose::picture);
+        const auto recipe = session.recipe(seen, request);
+        if (!recipe) return recipe.error();
+        auto found = vdtree::find_every_cost(tree, *recipe->criterion, recipe->viewpoint,
+                                             {.cull_back_faces = recipe->options.cull_back_faces});
         if (!found) return found.error();
         costs = std::move(*found);
     }
@@ -258,20 +267,20 @@ Result<Image> draw_fold_map(const vdtree::Cut& cut, const Scene& scene, const Wh
         return sight.eccentricity(node);
     };
 
-    Raster raster(scene.tree, scene, view);
+    Raster raster(session, view);
     raster.draw(cut);
     double largest = 0;
     if (map == FoldMap::eccentricity)
         for (int y = 0; y < view.height; ++y)
             for (int x = 0; x < view.width; ++x)
-                if (const NodeId node = raster.node_at(x, y); node < scene.tree.interior_count()) largest = std::max(largest, value(node));
-    const Scale scale = scale_of(map, scene, largest);
+                if (const NodeId node = raster.node_at(x, y); node < tree.interior_count()) largest = std::max(largest, value(node));
+    const Scale scale = scale_of(map, session.observer().display, largest);
     Image image{view.width, view.height, 3, {}};
     image.values.reserve(image.index(0, view.height, 0));
     for (int y = 0; y < view.height; ++y) {
         for (int x = 0; x < view.width; ++x) {
             const NodeId node = raster.node_at(x, y);
-            const bool is_covered = node != vdtree::no_node, is_folded = is_covered && node < scene.tree.interior_count();
+            const bool is_covered = node != vdtree::no_node, is_folded = is_covered && node < tree.interior_count();
             const double v = is_folded ? value(node) : 0;
             const bool is_more = is_folded && map == FoldMap::cost && !(v <= 1);
             const glm::vec3 colour = !is_covered ? background : !is_folded ? unfolded : is_more ? too_much : colour_at(scale.place(v));

@@ -5,10 +5,8 @@
 #include <vector>
 
 #include <perception/image.h>
+#include <session/session.h>
 #include <vdtree/cut.h>
-
-#include "options.h"
-#include "scene.h"
 
 namespace unseen::app {
 
@@ -20,10 +18,12 @@ enum class FoldMap {
 };
 inline constexpr std::string_view fold_map_names[] = {"cost", "frequency", "contrast", "eccentricity"};
 
-// Draws the cut, which must be of the scene's tree and cut by `what`, as `view` sees it: a view of the scene's camera, whatever its size.
-// Values are those of the scene's view. Around each vertex of the cut (up to the middle of the edges) is the value of the node that is
-// folded there; vertices of the whole mesh are grey, the background is black. Below comes a scale. Code values. Preconditions: a
-// gaze for the eccentricity, and for the cost not the mode full, in which nothing is folded. Cost: a test of every node, and a second for a million triangles.
-Result<perception::Image> draw_fold_map(const vdtree::Cut& cut, const Scene& scene, const WhatOptions& what, FoldMap map, const vdtree::View& view);
+// Draws the cut of the session's only object, made by `request` for `seen`, as `view` sees it: the same camera,
+// whatever its size. Values are those of `seen`. Around each vertex of the cut (up to the middle of the edges) is the
+// value of the node that is folded there; vertices of the whole mesh are grey, the background is black. Below comes a
+// scale. Code values. Preconditions: a gaze for the eccentricity, and for the cost not the full model, in which nothing
+// is folded. Cost: a test of every node, and a second for a million triangles.
+Result<perception::Image> draw_fold_map(const vdtree::Cut& cut, session::Session& session, const vdtree::View& seen,
+                                        const session::Request& request, FoldMap map, const vdtree::View& view);
 
 } // namespace unseen::app

@@ -5,14 +5,13 @@
 #include <perception/image.h>
 #include <render/renderer.h>
 
+#include "cut_report.h"
 #include "fly_through.h"
 #include "fold_map.h"
-#include "fold_test.h"
 #include "frame_image.h"
-#include "gaze_player.h"
 #include "output_files.h"
 #include "report.h"
-#include "simplification.h"
+#include "session_options.h"
 #include "terminal.h"
 #include "verbs.h"
 
@@ -46,41 +45,43 @@ Result<int> run_flight(RenderArguments& a) {
 Result<int> run(RenderArguments& a) {
     if (!a.flight.path.empty()) return run_flight(a);
     if (const auto ready = check_outputs(inputs_of(a.model, a.view, a.display), {a.out, a.json}); !ready) return ready.error();
-    const auto gaze = GazePlayer::create(a.flight.gaze);
+    const auto gaze = session::GazePlayer::create(a.flight.gaze);
     if (!gaze) return gaze.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     auto context = render::Context::headless();
     if (!context) return context.error();
-    auto scene = load_scene(a.model, a.view, a.display);
-    if (!scene) return scene.error();
-    if (const auto ready = settle_fold_test(*scene, a.what); !ready) return ready.error();
-    auto renderer = render::Renderer::create(*context, scene->tree);
-    if (!renderer) return renderer.error();
+    auto session = open_session(a.model, a.view, a.display);
+    if (!session) return session.error();
+    const vdtree::View view = make_view(*session, a.view);
+    session->set_gaze(gaze->at(0, view, a.what.gaze_px));
+    a.what.request.purpose = session::Purpose::picture;
+    const auto result = session->simplify(view, a.what.request);
+    if (!result) return result.error();
+    const vdtree::Cut& cut = result->cuts.front();
 
-    vdtree::Cut cut(scene->tree);
-    gaze->apply(a.what, *scene, 0);
-    const auto simplified = simplify(cut, *scene, a.what, Purpose::picture);
-    if (!simplified) return simplified.error();
-    const Simplification& result = *simplified;
+    auto renderer = render::Renderer::create(*context, session->tree());
+    if (!renderer) return renderer.error();
+    auto lighting = session->lighting(view);
+    if (!lighting) return lighting.error();
     render::DrawOptions options = a.draw;
-    options.background = scene->background;
-    options.lighting = scene->lighting;
-    const auto frame = renderer->draw(cut, scene->view, options, scene->placement);
+    options.background = session->background();
+    options.lighting = std::move(*lighting);
+    const auto frame = renderer->draw(cut, view, options, session->scene().objects.front().placement);
     if (!frame) return frame.error();
 
-    perception::Image image =
-        is_for_people(a.out) ? code_image(*frame, scene->display) : luminance_image(*frame, scene->display);
+    const perception::Display& display = session->observer().display;
+    perception::Image image = is_for_people(a.out) ? code_image(*frame, display) : luminance_image(*frame, display);
     if (a.map) {
-        auto drawn = draw_fold_map(cut, *scene, a.what, *a.map, scene->view);
+        auto drawn = draw_fold_map(cut, *session, view, a.what.request, *a.map, view);
         if (!drawn) return drawn.error();
         image = std::move(*drawn);
     }
-    if (auto ok = report->prepare(to_json(result, frame->draw_ms)); !ok) return ok.error();
+    if (auto ok = report->prepare(to_json(*result, frame->draw_ms)); !ok) return ok.error();
     if (auto ok = perception::write_image(a.out, image); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
     if (!report->is_on_stdout()) {
-        print(result, frame->draw_ms);
+        print(*result, frame->draw_ms);
         print_table({{"drawn by", context->renderer_name()}});
     }
     return exit_done;
@@ -119,12 +120,12 @@ void check(const RenderArguments& a) {
     check_geomorph(o.geomorph_seconds, a.view);
     const bool may_have_gaze = a.what.gaze_px || o.gaze.source != GazeSource::none || !o.path.empty();
     if (o.gaze.tracker.error_deg > 0 && !may_have_gaze) refuse("--gaze-error needs a gaze: --gaze or --gaze-mode.");
-    if (o.threshold != 1 && a.what.mode != Mode::imperceptible)
+    if (o.threshold != 1 && a.what.request.goal.kind != Goal::Kind::imperceptible)
         refuse("--threshold is of --imperceptible: --full, --triangles and --pixels say themselves how much is folded.");
     if (o.path.empty()) {
         if (a.out.empty()) refuse("-o is required (or --path).");
         if (a.map && !is_for_people(a.out)) refuse("--show draws pictures for people: -o must end in .png.");
-        if (a.map == FoldMap::cost && a.what.mode == Mode::full) refuse("--show cost and --full exclude each other: nothing is folded.");
+        if (a.map == FoldMap::cost && a.what.request.goal.kind == Goal::Kind::full) refuse("--show cost and --full exclude each other: nothing is folded.");
         if (a.map == FoldMap::contrast && !a.view.lights.empty()) refuse("--show contrast is of the mesh's own light, and excludes --lights.");
         if (a.map == FoldMap::eccentricity && !a.what.gaze_px && o.gaze.source == GazeSource::none)
             refuse("--show eccentricity needs --gaze: without one all counts as looked at.");

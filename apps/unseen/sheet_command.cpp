@@ -11,13 +11,13 @@
 #include <perception/judge.h>
 #include <render/renderer.h>
 
+#include "cut_report.h"
 #include "drawing.h"
 #include "fold_map.h"
-#include "fold_test.h"
 #include "frame_image.h"
 #include "output_files.h"
 #include "report.h"
-#include "simplification.h"
+#include "session_options.h"
 #include "terminal.h"
 #include "verbs.h"
 
@@ -33,7 +33,7 @@ struct SheetArguments {
     int samples = 64;
     int cell_px = 480;
     bool maps = false;
-    std::optional<ChosenTest> test;    // default: as in 'unseen render'
+    std::optional<FoldTest> test;      // default: as in 'unseen render'
 };
 
 constexpr std::uint32_t default_budget_share = 4;
@@ -41,27 +41,31 @@ constexpr std::uint32_t default_budget_share = 4;
 // One column of the sheet.
 struct Column {
     std::string name;
-    WhatOptions what;
-    Simplification simplification;
+    session::Request request;
+    std::optional<session::Gaze> gaze;
+    session::Report report;
     double draw_ms = 0;
     perception::Image luminance;                    // cd/m2, of the whole window
     std::vector<perception::Image> pictures;        // one below the other; code values, of a cell's size
     std::optional<perception::Judgement> judgement; // against the full model; none for that itself
 };
 
-// As `what`, in four ways.
-std::vector<Column> wishes(const Scene& scene, const SheetArguments& a, const WhatOptions& what) {
+// By one fold test, in four ways.
+std::vector<Column> wishes(const session::Session& session, const vdtree::View& view, const SheetArguments& a) {
     std::vector<Column> columns(4);
-    for (Column& column : columns) column.what = what;
+    for (Column& column : columns) {
+        column.request.fold_test = a.test;
+        column.request.purpose = session::Purpose::picture;
+    }
     columns[0].name = "full";
-    columns[0].what.mode = Mode::full;
+    columns[0].request.goal = Goal::full();
     columns[1].name = "imperceptible";
     columns[2].name = "budget";
-    columns[2].what.mode = Mode::budget;
-    columns[2].what.triangles =
-        a.triangles ? a.triangles : std::max(1U, scene.tree.triangle_count() / default_budget_share);
+    columns[2].request.goal =
+        Goal::budget(a.triangles ? a.triangles : std::max(1U, session.tree().triangle_count() / default_budget_share));
     columns[3].name = "gaze-directed";
-    columns[3].what.gaze_px = a.gaze_px.value_or(gaze_aside(scene.display, scene.view, usual_degrees_aside));
+    columns[3].gaze = session::Gaze{
+        a.gaze_px.value_or(session::gaze_aside(session.observer().display, view, session::usual_degrees_aside))};
     if (a.maps) columns.erase(columns.begin() + 2); // a budget is another matter
     return columns;
 }
@@ -76,61 +80,66 @@ vdtree::View small_view(const vdtree::View& view, int cell_px) {
 }
 
 // Where there is none, as that of the cost in the full model, nothing: such columns are shorter.
-Result<void> draw_maps(Column& column, const vdtree::Cut& cut, const Scene& scene, const vdtree::View& small) {
+Result<void> draw_maps(Column& column, const vdtree::Cut& cut, session::Session& session, const vdtree::View& view, const vdtree::View& small) {
     for (const FoldMap map : {FoldMap::cost, FoldMap::frequency, FoldMap::contrast, FoldMap::eccentricity}) {
-        if (column.what.mode == Mode::full || (map == FoldMap::eccentricity && !column.what.gaze_px)) continue;
-        auto drawn = draw_fold_map(cut, scene, column.what, map, small);
+        if (column.request.goal.kind == Goal::Kind::full || (map == FoldMap::eccentricity && !column.gaze)) continue;
+        auto drawn = draw_fold_map(cut, session, view, column.request, map, small);
         if (!drawn) return drawn.error();
         column.pictures.push_back(std::move(*drawn));
     }
     return {};
 }
 
-Result<void> draw_pictures(Column& column, const vdtree::Cut& cut, const Scene& scene, const SheetArguments& a,
-                           render::Renderer& renderer) {
+Result<void> draw_pictures(Column& column, const vdtree::Cut& cut, session::Session& session, const vdtree::View& view,
+                           const SheetArguments& a, render::Renderer& renderer) {
+    auto lighting = session.lighting(view);
+    if (!lighting) return lighting.error();
+    const vdtree::Similarity& placement = session.scene().objects.front().placement;
+    const perception::Display& display = session.observer().display;
     render::DrawOptions options;
     options.samples = a.samples;
-    options.background = scene.background;
-    options.lighting = scene.lighting;
-    const auto whole = renderer.draw(cut, scene.view, options, scene.placement);
+    options.background = session.background();
+    options.lighting = std::move(*lighting);
+    const auto whole = renderer.draw(cut, view, options, placement);
     if (!whole) return whole.error();
     column.draw_ms = whole->draw_ms;
-    column.luminance = luminance_image(*whole, scene.display);
+    column.luminance = luminance_image(*whole, display);
 
-    const vdtree::View small = small_view(scene.view, a.cell_px);
-    const auto shaded = renderer.draw(cut, small, options, scene.placement);
+    const vdtree::View small = small_view(view, a.cell_px);
+    const auto shaded = renderer.draw(cut, small, options, placement);
     if (!shaded) return shaded.error();
-    column.pictures.push_back(code_image(*shaded, scene.display));
+    column.pictures.push_back(code_image(*shaded, display));
     options.wireframe = true;
-    const auto wired = renderer.draw(cut, small, options, scene.placement);
+    const auto wired = renderer.draw(cut, small, options, placement);
     if (!wired) return wired.error();
-    column.pictures.push_back(code_image(*wired, scene.display));
-    return a.maps ? draw_maps(column, cut, scene, small) : Result<void>();
+    column.pictures.push_back(code_image(*wired, display));
+    return a.maps ? draw_maps(column, cut, session, view, small) : Result<void>();
 }
 
-Result<void> judge(Column& column, const Column& full, const Scene& scene) {
+Result<void> judge(Column& column, const Column& full, const session::Observer& observer) {
     perception::JudgeOptions options;
-    options.display = scene.display;
-    options.gaze_px = column.what.gaze_px;
-    options.csf_table = scene.csf;
+    options.display = observer.display;
+    if (column.gaze) options.gaze_px = column.gaze->px;
+    options.csf_table = observer.csf;
     auto judgement = perception::judge_modern(full.luminance, column.luminance, options);
     if (!judgement) return judgement.error();
     column.judgement = std::move(*judgement);
     return {};
 }
 
-Result<std::vector<Column>> make_columns(const Scene& scene, const SheetArguments& a, const WhatOptions& what, render::Context& context) {
-    auto renderer = render::Renderer::create(context, scene.tree);
+Result<std::vector<Column>> make_columns(session::Session& session, const vdtree::View& view, const SheetArguments& a, render::Context& context) {
+    std::vector<Column> columns = wishes(session, view, a);
+    if (const auto ready = session.prepare(view, columns[1].request); !ready) return ready.error();
+    auto renderer = render::Renderer::create(context, session.tree());
     if (!renderer) return renderer.error();
-    std::vector<Column> columns = wishes(scene, a, what);
     for (Column& column : columns) {
-        vdtree::Cut cut(scene.tree);
-        auto simplified = simplify(cut, scene, column.what, Purpose::picture);
+        session.set_gaze(column.gaze);
+        auto simplified = session.simplify(view, column.request);
         if (!simplified) return simplified.error();
-        column.simplification = std::move(*simplified);
-        if (auto ok = draw_pictures(column, cut, scene, a, *renderer); !ok) return ok.error();
+        if (auto ok = draw_pictures(column, simplified->cuts.front(), session, view, a, *renderer); !ok) return ok.error();
+        column.report = std::move(*simplified);
         if (&column == &columns.front()) continue;
-        if (auto ok = judge(column, columns.front(), scene); !ok) return ok.error();
+        if (auto ok = judge(column, columns.front(), session.observer()); !ok) return ok.error();
     }
     return columns;
 }
@@ -140,9 +149,9 @@ double visible_pixels(const Column& column) {
                             : std::numeric_limits<double>::quiet_NaN();
 }
 
-std::string effects_that_ran(const Simplification& simplification) {
+std::string effects_that_ran(const session::Report& report) {
     std::string list;
-    for (const Effect& effect : simplification.effects)
+    for (const session::Effect& effect : report.effects)
         if (effect.on) list += (list.empty() ? "" : ", ") + effect.name;
     return list;
 }
@@ -155,13 +164,15 @@ std::string metres(double value) { return rounded(value, 3) + (std::isfinite(val
 struct Caption {
     std::string name, verdict;
 
-    explicit Caption(const Column& column) : name(column.name + ": " + grouped(column.simplification.stats.triangles) + " triangles") {
+    explicit Caption(const Column& column) : name(column.name + ": " + grouped(column.report.stats.triangles) + " triangles") {
         if (column.judgement)
-            verdict = grouped(column.judgement->visible_pixels) + " pixels visible; from " + metres(column.simplification.imperceptible_from_m) + " none";
+            verdict = grouped(column.judgement->visible_pixels) + " pixels visible; from " +
+                      metres(column.report.imperceptible_from_m) + " none";
     }
 };
 
-Result<perception::Image> compose(const std::vector<Column>& columns, const Scene& scene, const std::string& model) {
+Result<perception::Image> compose(const std::vector<Column>& columns, const perception::Display& display, const vdtree::View& view,
+                                  const std::string& model) {
     constexpr int gap = 12, text_height = 17, line_height = 22; // pixels
     constexpr glm::vec3 paper{0.12f}, ink{0.95f}, weak{0.7f};
     int height = 0, cell_width = 0; // of the tallest column, and of the widest picture or line of text
@@ -182,9 +193,9 @@ Result<perception::Image> compose(const std::vector<Column>& columns, const Scen
     auto drawing = Drawing::create(gap + count * (cell_width + gap), header + above + height, paper);
     if (!drawing) return drawing.error();
 
-    const std::string title = std::filesystem::path(model).filename().string() + "   " + std::to_string(scene.view.width) + "x" +
-                              std::to_string(scene.view.height) + " pixels, " + rounded(perception::pixels_per_degree(scene.display).value(), 4) +
-                              " per degree, seen from " + rounded(scene.display.distance.value(), 3) + " m";
+    const std::string title = std::filesystem::path(model).filename().string() + "   " + std::to_string(view.width) + "x" +
+                              std::to_string(view.height) + " pixels, " + rounded(perception::pixels_per_degree(display).value(), 4) +
+                              " per degree, seen from " + rounded(display.distance.value(), 3) + " m";
     drawing->text({gap, gap}, title, ink, Drawing::fitting_height(title, text_height, drawing->width() - 2 * gap));
     for (int i = 0; i < count; ++i) {
         const int left = gap + i * (cell_width + gap);
@@ -206,7 +217,7 @@ Json to_json(const std::vector<Column>& columns) {
     Json cuts = Json::array();
     for (const Column& column : columns) {
         Json cut = {{"name", column.name}};
-        cut.update(to_json(column.simplification, column.draw_ms));
+        cut.update(app::to_json(column.report, column.draw_ms));
         cut["visible_pixels"] = number_or_null(visible_pixels(column));
         cut["pixels"] = column.luminance.values.size();
         cut["max_ratio"] = column.judgement ? number_or_null(column.judgement->max_ratio) : Json(nullptr);
@@ -219,7 +230,7 @@ void print(const std::vector<Column>& columns) {
     std::vector<std::vector<std::string>> rows = {
         {"cut", "triangles", "nodes tested", "adapt ms", "draw ms", "visible px", "imperceptible from"}};
     for (const Column& column : columns) {
-        const Simplification& s = column.simplification;
+        const session::Report& s = column.report;
         rows.push_back({column.name, grouped(s.stats.triangles), grouped(s.stats.node_tests), rounded(s.adapt_ms, 3),
                         rounded(column.draw_ms, 3),
                         column.judgement ? grouped(column.judgement->visible_pixels) : "reference",
@@ -228,7 +239,7 @@ void print(const std::vector<Column>& columns) {
     print_table(rows);
     std::printf("effects that ran\n");
     for (const Column& column : columns)
-        std::printf("  %s: %s\n", column.name.c_str(), effects_that_ran(column.simplification).c_str());
+        std::printf("  %s: %s\n", column.name.c_str(), effects_that_ran(column.report).c_str());
 }
 
 Result<int> run(const SheetArguments& a) {
@@ -237,15 +248,13 @@ Result<int> run(const SheetArguments& a) {
     if (!report) return report.error();
     auto context = render::Context::headless();
     if (!context) return context.error();
-    auto scene = load_scene(a.model, a.view, a.display);
-    if (!scene) return scene.error();
-    WhatOptions what;
-    what.chosen = a.test;
-    if (const auto ready = settle_fold_test(*scene, what); !ready) return ready.error();
-    const auto columns = make_columns(*scene, a, what, *context);
+    auto session = open_session(a.model, a.view, a.display);
+    if (!session) return session.error();
+    const vdtree::View view = make_view(*session, a.view);
+    const auto columns = make_columns(*session, view, a, *context);
     if (!columns) return columns.error();
 
-    const auto sheet = compose(*columns, *scene, a.model);
+    const auto sheet = compose(*columns, session->observer().display, view, a.model);
     if (!sheet) return sheet.error();
     if (auto ok = report->prepare(to_json(*columns)); !ok) return ok.error();
     if (auto ok = perception::write_image(a.out, *sheet); !ok) return ok.error();

@@ -5,10 +5,10 @@
 
 #include <meshio/mesh_io.h>
 
-#include "fold_test.h"
+#include "cut_report.h"
 #include "output_files.h"
 #include "report.h"
-#include "simplification.h"
+#include "session_options.h"
 #include "terminal.h"
 #include "verbs.h"
 
@@ -24,31 +24,28 @@ struct SimplifyArguments {
 
 constexpr double nothing_drawn = std::numeric_limits<double>::quiet_NaN();
 
-Result<int> run(SimplifyArguments& a) {
+Result<int> run(const SimplifyArguments& a) {
     if (const auto ready = check_outputs(inputs_of(a.model, a.view, a.display), {a.out, a.json}); !ready) return ready.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
-    auto scene = load_scene(a.model, a.view, a.display);
-    if (!scene) return scene.error();
-    if (const auto ready = settle_fold_test(*scene, a.what); !ready) return ready.error();
-
-    vdtree::Cut cut(scene->tree);
-    auto simplified = simplify(cut, *scene, a.what, Purpose::mesh);
-    if (!simplified) return simplified.error();
-    Simplification& result = *simplified;
+    auto session = open_session(a.model, a.view, a.display);
+    if (!session) return session.error();
+    session->set_gaze(fixed_gaze(a.what));
+    auto result = session->simplify(make_view(*session, a.view), a.what.request);
+    if (!result) return result.error();
     const auto start = std::chrono::steady_clock::now();
-    const vdtree::Mesh mesh = vdtree::extract_mesh(cut);
-    result.extract_ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    const vdtree::Mesh mesh = result->mesh();
+    result->extract_ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     if (mesh.triangles.empty()) {
         return Error{ErrorCode::invalid_argument,
                      "No triangle is left, for the model is too small in this view or the budget too low: "
                      "move nearer or allow more triangles."};
     }
 
-    if (auto ok = report->prepare(to_json(result, nothing_drawn)); !ok) return ok.error();
+    if (auto ok = report->prepare(to_json(*result, nothing_drawn)); !ok) return ok.error();
     if (auto ok = meshio::write_mesh(a.out, mesh.view()); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
-    if (!report->is_on_stdout()) print(result, nothing_drawn);
+    if (!report->is_on_stdout()) print(*result, nothing_drawn);
     return exit_done;
 }
 

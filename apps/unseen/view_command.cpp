@@ -1,9 +1,9 @@
 // unseen view: a window in which the cut follows the eye.
 #include <memory>
 
-#include "fold_test.h"
 #include "options.h"
 #include "output_files.h"
+#include "session_options.h"
 #include "verbs.h"
 #include "viewer.h"
 
@@ -22,17 +22,17 @@ Result<int> run(ViewArguments& a) {
     std::vector<std::string> inputs = inputs_of(a.model, a.view, a.display);
     inputs.push_back(a.gaze.trace);
     if (const auto ready = check_outputs(inputs, {a.viewer.screenshot}); !ready) return ready.error();
-    auto gaze = GazePlayer::create(a.gaze);
+    auto gaze = session::GazePlayer::create(a.gaze);
     if (!gaze) return gaze.error();
     // Not to be seen before there is something to see.
     auto window = render::Context::window({.width = a.view.width, .height = a.view.height, .title = "Unseen", .visible = false});
     if (!window) return window.error();
-    auto scene = load_scene(a.model, a.view, a.display);
-    if (!scene) return scene.error();
-    if (const auto ready = settle_fold_test(*scene, a.viewer.what); !ready) return ready.error();
+    auto session = open_session(a.model, a.view, a.display);
+    if (!session) return session.error();
+    a.viewer.first_view = make_view(*session, a.view);
     a.viewer.has_fixed_field = a.view.fov_degrees.has_value();
     a.viewer.gaze_follows_pointer = a.gaze.source == GazeSource::mouse;
-    if (auto ended = run_viewer(*window, *scene, std::move(*gaze), a.viewer); !ended) return ended.error();
+    if (auto ended = run_viewer(*window, *session, std::move(*gaze), a.viewer); !ended) return ended.error();
     return exit_done;
 }
 

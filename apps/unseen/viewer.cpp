@@ -13,12 +13,9 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 
-#include <perception/criterion.h>
 #include <perception/image.h>
 
 #include "frame_image.h"
-#include "fold_test.h"
-#include "simplification.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -48,11 +45,16 @@ double milliseconds_since(Clock::time_point start) {
 
 class Viewer {
 public:
-    Viewer(Scene& scene, GazePlayer gaze, const ViewerOptions& options, render::Context& context, render::Renderer renderer)
-        : scene_(scene), options_(options), window_(context.glfw_window()), renderer_(std::move(renderer)),
-          cut_(scene.tree), first_view_(scene.view), what_(options.what), draw_(options.draw), gaze_follows_pointer_(options.gaze_follows_pointer), gaze_(std::move(gaze)) {
-        draw_.background = scene.background;
-        budget_ = what_.mode == Mode::budget ? what_.triangles : std::max(1U, scene.tree.triangle_count() / 4);
+    Viewer(session::Session& session, session::GazePlayer gaze, const ViewerOptions& options, render::Context& context,
+           render::Renderer renderer)
+        : session_(session), options_(options), window_(context.glfw_window()), renderer_(std::move(renderer)), follower_(session),
+          view_(options.first_view), request_(options.what.request), gaze_px_(options.what.gaze_px), draw_(options.draw),
+          gaze_follows_pointer_(options.gaze_follows_pointer), gaze_(std::move(gaze)) {
+        request_.purpose = session::Purpose::picture;
+        request_.may_measure = false; // nobody waits for that here
+        draw_.background = session.background();
+        const Goal& goal = request_.goal;
+        budget_ = goal.kind == Goal::Kind::budget ? goal.triangles : std::max(1U, session.tree().triangle_count() / 4);
         glfwSetWindowUserPointer(window_, this);
         glfwSetCharCallback(window_, [](GLFWwindow* w, unsigned c) { of(w).on_character(c); });
         glfwSetKeyCallback(window_, [](GLFWwindow* w, int key, int, int action, int) {
@@ -70,12 +72,12 @@ public:
     Viewer& operator=(const Viewer&) = delete;
 
     Result<void> run() {
-        if (auto begun = gaze_.begin(scene_, {}); !begun) return begun;
+        if (auto begun = gaze_.begin(display(), view_, {}); !begun) return begun;
         if (options_.geomorph_seconds)
-            if (auto set = follower_.set_geomorph(scene_, *options_.geomorph_seconds); !set) return set;
+            if (auto set = follower_.set_glide(*options_.geomorph_seconds); !set) return set;
         for (int frame = 0; !glfwWindowShouldClose(window_);) {
             follow_window_size();
-            if (needs_frame_ && scene_.view.width > 0 && scene_.view.height > 0) {
+            if (needs_frame_ && view_.width > 0 && view_.height > 0) {
                 if (auto drawn = draw_frame(); !drawn) return drawn;
                 ++frame;
             }
@@ -101,12 +103,12 @@ private:
     void on_character(unsigned character) {
         needs_frame_ = true;
         switch (character) {
-        case '1': choose(Mode::full); break;
-        case '2': choose(Mode::imperceptible); break;
-        case '3': choose(Mode::budget); break;
+        case '1': choose(Goal::full()); break;
+        case '2': choose(Goal::imperceptible()); break;
+        case '3': choose(Goal::budget(budget_)); break;
         case '4':
-            choose(Mode::imperceptible);
-            what_.gaze_px = pointer_px_;
+            choose(Goal::imperceptible());
+            gaze_px_ = pointer_px_;
             gaze_follows_pointer_ = true;
             break;
         case '+': scale_budget(budget_step); break;
@@ -116,7 +118,7 @@ private:
             draw_.shading = draw_.shading == render::Shading::flat ? render::Shading::smooth : render::Shading::flat;
             break;
         case 'r':
-            scene_.view = first_view_;
+            view_ = options_.first_view;
             follow_window_size();
             break;
         case 's': take_screenshot(); break;
@@ -129,21 +131,20 @@ private:
         }
     }
 
-    void choose(Mode mode) {
-        what_.mode = mode;
-        what_.triangles = budget_;
-        // Nobody waits for errors to be measured here.
-        if (mode == Mode::imperceptible && !is_perceptual(what_.test())) what_.chosen = suitable_test(scene_, what_.chroma, false);
-        what_.gaze_px.reset();
-        what_.gaze_margin_deg = gaze_.tracker_error_deg();
+    void choose(Goal goal) {
+        request_.goal = goal;
+        request_.goal.fill = goal.kind == Goal::Kind::budget && options_.what.request.goal.fill;
+        // What was asked for may not do for this goal, or would have to be measured.
+        if (!session_.plan(view_, request_)) request_.fold_test.reset();
+        gaze_px_.reset();
         gaze_follows_pointer_ = plays_gaze_ = false;
     }
 
     void scale_budget(double factor) {
         const double wanted = std::round(budget_ * factor);
         budget_ =
-            static_cast<std::uint32_t>(std::clamp(wanted, 1.0, static_cast<double>(scene_.tree.triangle_count())));
-        choose(Mode::budget);
+            static_cast<std::uint32_t>(std::clamp(wanted, 1.0, static_cast<double>(session_.tree().triangle_count())));
+        choose(Goal::budget(budget_));
     }
 
     void on_button(bool is_down) { is_dragging_ = is_down; }
@@ -152,20 +153,20 @@ private:
         // GLFW's pointer is in screen coordinates, of which a pixel may have several or a share.
         int width = 0, height = 0;
         glfwGetWindowSize(window_, &width, &height);
-        const glm::dvec2 scale(scene_.view.width / std::max(1.0, double(width)),
-                               scene_.view.height / std::max(1.0, double(height)));
+        const glm::dvec2 scale(view_.width / std::max(1.0, double(width)),
+                               view_.height / std::max(1.0, double(height)));
         const glm::dvec2 moved = at * scale - pointer_px_;
         pointer_px_ = at * scale;
-        if (is_dragging_) turn(moved * (turn_per_window / std::max(1, scene_.view.height)));
+        if (is_dragging_) turn(moved * (turn_per_window / std::max(1, view_.height)));
         if (gaze_follows_pointer_) {
-            what_.gaze_px = pointer_px_;
+            gaze_px_ = pointer_px_;
             needs_frame_ = true;
         }
     }
 
     // Around the target: across about the up vector, up and down about the camera's right.
     void turn(glm::dvec2 radians) {
-        vdtree::View& view = scene_.view;
+        vdtree::View& view = view_;
         const vdtree::CameraFrame frame = vdtree::camera_frame(view);
         const glm::dvec3 up = glm::normalize(view.up);
         const glm::dquat across = glm::angleAxis(-radians.x, up), over = glm::angleAxis(-radians.y, frame.right);
@@ -177,23 +178,23 @@ private:
     }
 
     void on_wheel(double notches) {
-        const double radius = std::max(placed_sphere(scene_.tree, scene_.placement).radius, 1e-30);
-        const glm::dvec3 from_target = scene_.view.eye - scene_.view.target;
+        const double radius = std::max(session_.bounding_sphere().radius, 1e-30);
+        const glm::dvec3 from_target = view_.eye - view_.target;
         const double distance = glm::length(from_target);
         const double wanted =
             std::clamp(distance * std::pow(zoom_per_notch, notches), nearest_radii * radius, farthest_radii * radius);
-        scene_.view.eye = scene_.view.target + from_target * (wanted / distance);
+        view_.eye = view_.target + from_target * (wanted / distance);
         needs_frame_ = true;
     }
 
     void follow_window_size() {
         int width = 0, height = 0;
         glfwGetFramebufferSize(window_, &width, &height);
-        if (width == scene_.view.width && height == scene_.view.height) return;
-        scene_.view.width = width; // both 0 while the window is minimised
-        scene_.view.height = height;
+        if (width == view_.width && height == view_.height) return;
+        view_.width = width; // both 0 while the window is minimised
+        view_.height = height;
         if (!options_.has_fixed_field && height > 0)
-            scene_.view.fov_y_degrees = perception::physical_field(scene_.display, height).value();
+            view_.fov_y_degrees = perception::physical_field(display(), height).value();
         needs_frame_ = true;
     }
 
@@ -203,52 +204,60 @@ private:
         needs_frame_ = false;
         const auto start = Clock::now();
         follower_.let_pass(std::chrono::duration<double>(start - std::exchange(last_frame_, start)).count());
-        if (plays_gaze_) gaze_.apply(what_, scene_, std::chrono::duration<double>(start - first_frame_).count());
-        if (auto lit = light_at(scene_, std::chrono::duration<double>(start - first_frame_).count()); !lit) return lit;
-        draw_.lighting = scene_.lighting;
-        const auto result = follower_.follow(cut_, scene_, what_);
+        const double now_s = std::chrono::duration<double>(start - first_frame_).count();
+        take_gaze(now_s);
+        session_.set_time(now_s);
+        auto lighting = session_.lighting(view_);
+        if (!lighting) return lighting.error();
+        draw_.lighting = std::move(*lighting);
+        const auto result = follower_.follow(view_, request_);
         if (!result) return result.error();
         const vdtree::Geomorph* const geomorph = follower_.geomorph();
-        const auto drawn = geomorph ? renderer_.draw_to_window(*geomorph, scene_.view, draw_, scene_.placement)
-                                    : renderer_.draw_to_window(cut_, scene_.view, draw_, scene_.placement);
+        const auto drawn = geomorph ? renderer_.draw_to_window(*geomorph, view_, draw_, placement())
+                                    : renderer_.draw_to_window(follower_.cut(), view_, draw_, placement());
         if (!drawn) return drawn;
         glfwSwapBuffers(window_);
         // What the time limit has left to do, and what glides, goes on in the next frame.
         needs_frame_ = !result->stats.is_complete || result->gliding > 0 || (plays_gaze_ && gaze_.is_moving()) ||
-                       (scene_.rig && scene_.rig->moves());
+                       (session_.scene().lights && session_.scene().lights->moves());
         show_title(*result, milliseconds_since(start));
         return {};
     }
 
     std::string mode_name() const {
-        switch (what_.mode) {
-        case Mode::full: return "full";
-        case Mode::budget: return "budget of " + grouped(budget_);
-        case Mode::pixels: return rounded(what_.pixels, 3) + " pixels";
-        case Mode::imperceptible: break;
+        switch (request_.goal.kind) {
+        case Goal::Kind::full: return "full";
+        case Goal::Kind::budget: return "budget of " + grouped(budget_);
+        case Goal::Kind::pixels: return rounded(request_.goal.tolerance_px, 3) + " pixels";
+        case Goal::Kind::imperceptible: break;
         }
-        return what_.gaze_px ? "gaze-directed" : "imperceptible";
+        return session_.observer().gaze ? "gaze-directed" : "imperceptible";
     }
 
-    void show_title(const Simplification& s, double frame_ms) {
+    void show_title(const session::Report& s, double frame_ms) {
         std::string title = "Unseen - " + mode_name() + ": " + grouped(s.stats.triangles) + " of " +
                             grouped(s.source_triangles) + " triangles, " + rounded(s.adapt_ms, 2) + " ms to adapt, " +
                             rounded(frame_ms, 2) + " ms a frame";
-        if (what_.mode != Mode::full)
-            title += ", " + name_of(what_.test()) + ", unseen from " + rounded(s.imperceptible_from_m, 2) + (std::isfinite(s.imperceptible_from_m) ? " m" : "");
+        if (request_.goal.kind != Goal::Kind::full)
+            title += ", " + name_of(s.fold_tests.front()) + ", unseen from " + rounded(s.imperceptible_from_m, 2) + (std::isfinite(s.imperceptible_from_m) ? " m" : "");
         if (!s.stats.is_complete) title += ", time is up: to be continued";
         if (s.gliding > 0) title += ", " + grouped(s.gliding) + " vertices glide";
         glfwSetWindowTitle(window_, title.c_str());
     }
 
+    void take_gaze(double now_s) {
+        session_.set_gaze(plays_gaze_ ? gaze_.at(now_s, view_, gaze_px_) : gaze_.around(gaze_px_));
+    }
+
     Result<void> save_picture(const std::string& file) {
         // Keys that came since the last frame count.
-        if (const auto result = follower_.follow(cut_, scene_, what_); !result) return result.error();
+        take_gaze(std::chrono::duration<double>(last_frame_ - first_frame_).count());
+        if (const auto result = follower_.follow(view_, request_); !result) return result.error();
         const vdtree::Geomorph* const geomorph = follower_.geomorph();
-        const auto frame = geomorph ? renderer_.draw(*geomorph, scene_.view, draw_, scene_.placement)
-                                    : renderer_.draw(cut_, scene_.view, draw_, scene_.placement);
+        const auto frame = geomorph ? renderer_.draw(*geomorph, view_, draw_, placement())
+                                    : renderer_.draw(follower_.cut(), view_, draw_, placement());
         if (!frame) return frame.error();
-        return perception::write_image(file, code_image(*frame, scene_.display));
+        return perception::write_image(file, code_image(*frame, display()));
     }
 
     void take_screenshot() {
@@ -262,20 +271,23 @@ private:
         else print_note("wrote '" + file + "'.");
     }
 
-    Scene& scene_;
+    const perception::Display& display() const { return session_.observer().display; }
+    const vdtree::Similarity& placement() const { return session_.scene().objects.front().placement; }
+
+    session::Session& session_;
     const ViewerOptions& options_;
     GLFWwindow* window_;
     render::Renderer renderer_;
-    vdtree::Cut cut_;
-    Follower follower_;
-    vdtree::View first_view_;
-    WhatOptions what_;
+    session::Follower follower_;
+    vdtree::View view_;
+    session::Request request_;
+    std::optional<glm::dvec2> gaze_px_; // the pointer's, or one that was asked for
     render::DrawOptions draw_;
     std::uint32_t budget_ = 1;
     glm::dvec2 pointer_px_ = glm::dvec2(0);
     bool is_dragging_ = false;
     bool gaze_follows_pointer_;
-    GazePlayer gaze_;
+    session::GazePlayer gaze_;
     bool plays_gaze_ = true; // until a mode is chosen
     Clock::time_point first_frame_ = Clock::now();
     bool needs_frame_ = true;
@@ -286,11 +298,14 @@ private:
 
 } // namespace
 
-Result<void> run_viewer(render::Context& window, Scene& scene, GazePlayer gaze, const ViewerOptions& options) {
-    auto renderer = render::Renderer::create(window, scene.tree);
+Result<void> run_viewer(render::Context& window, session::Session& session, session::GazePlayer gaze, const ViewerOptions& options) {
+    session::Request request = options.what.request;
+    request.purpose = session::Purpose::picture;
+    if (const auto ready = session.prepare(options.first_view, request); !ready) return ready.error();
+    auto renderer = render::Renderer::create(window, session.tree());
     if (!renderer) return renderer.error();
     glfwShowWindow(window.glfw_window());
-    return Viewer(scene, std::move(gaze), options, window, std::move(*renderer)).run();
+    return Viewer(session, std::move(gaze), options, window, std::move(*renderer)).run();
 }
 
 } // namespace unseen::app

@@ -6,13 +6,15 @@
 
 #include <render/context.h>
 #include <render/renderer.h>
+#include <session/follower.h>
+#include <session/gaze_player.h>
 
-#include "gaze_player.h"
-#include "scene.h"
+#include "options.h"
 
 namespace unseen::app {
 
 struct ViewerOptions {
+    vdtree::View first_view;
     WhatOptions what;             // to begin with
     bool gaze_follows_pointer = false;
     bool has_fixed_field = false; // the camera's field was asked for; else it follows the window's height
@@ -26,6 +28,6 @@ struct ViewerOptions {
 extern const char* const viewer_help;
 
 // Shows the window and runs until it is closed. On the main thread only.
-Result<void> run_viewer(render::Context& window, Scene& scene, GazePlayer gaze, const ViewerOptions& options);
+Result<void> run_viewer(render::Context& window, session::Session& session, session::GazePlayer gaze, const ViewerOptions& options);
 
 } // namespace unseen::app

@@ -8,6 +8,9 @@
 #ifdef WITH_RENDER
 #include <render/renderer.h>
 #endif
+#ifdef WITH_SESSION
+#include <session/session.h>
+#endif
 
 int main() {
     using namespace unseen;
@@ -29,6 +32,12 @@ int main() {
     if (!stats) return std::printf("%s\n", stats.error().message.c_str()), 1;
     std::printf("%u of %u triangles, largest fold cost %g\n", stats->triangles, tree->triangle_count(),
                 static_cast<double>(stats->max_fold_cost));
+#ifdef WITH_SESSION
+    auto session = session::Session::create(session::Scene::of(*vdtree::build_tree({positions, triangles})));
+    if (!session) return std::printf("%s\n", session.error().message.c_str()), 1;
+    const auto whole = session->simplify({.goal = session::Goal::full()});
+    if (!whole || whole->mesh().triangles.size() != 4) return std::printf("the session lost a face\n"), 1;
+#endif
 #ifdef WITH_RENDER
     return render::n_rooks(16, 1).size() == 16 ? 0 : 1;
 #endif

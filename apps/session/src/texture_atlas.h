@@ -7,7 +7,7 @@
 
 #include <vdtree/texture.h>
 
-namespace unseen::app {
+namespace unseen::session {
 
 // One of the textures, and the coordinates at which it is looked up.
 struct AtlasPart {
@@ -26,8 +26,8 @@ struct Atlas {
     std::vector<AtlasPlace> places; // by part
 };
 
-// Puts parts side by side, each as often as its coordinates repeat it, with borders that go on as the part does, so that filters do not
-// mix neighbours. Fails where that is larger than a texture may be.
+// Puts parts side by side, each as often as its coordinates repeat it, with borders that go on as the part does, so
+// that filters do not mix neighbours. Fails where that is larger than a texture may be.
 Result<Atlas> make_atlas(std::span<const AtlasPart> parts);
 
-} // namespace unseen::app
+} // namespace unseen::session

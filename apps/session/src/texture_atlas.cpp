@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <numeric>
 
-namespace unseen::app {
+namespace unseen::session {
 namespace {
 
 using vdtree::Texel;
@@ -111,4 +111,4 @@ Result<Atlas> make_atlas(std::span<const AtlasPart> parts) {
     return atlas;
 }
 
-} // namespace unseen::app
+} // namespace unseen::session

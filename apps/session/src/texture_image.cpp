@@ -20,7 +20,7 @@
 #include <perception/image.h>
 #include <vdtree/colour.h>
 
-namespace unseen::app {
+namespace unseen::session {
 namespace {
 
 using vdtree::Texel;
@@ -200,4 +200,4 @@ Result<Texture> read_texture(const std::filesystem::path& file, bool from_top) {
     return decode_texture(bytes, file, from_top);
 }
 
-} // namespace unseen::app
+} // namespace unseen::session

@@ -11,7 +11,7 @@
 #include "texture_atlas.h"
 #include "texture_image.h"
 
-namespace unseen::app {
+namespace unseen::session {
 namespace {
 
 using vdtree::Index;
@@ -23,7 +23,7 @@ using vdtree::Texture;
 // What one can do about a bad image, in the same sentence.
 std::string with_advice(std::string complaint) {
     if (complaint.ends_with('.')) complaint.pop_back();
-    return complaint + " (--texture FILE names another image, --no-texture leaves textures out).";
+    return complaint + " (load.texture names another image, load.without_textures leaves images out).";
 }
 
 constexpr std::size_t no_material = std::numeric_limits<std::size_t>::max(), unused = no_material - 1;
@@ -122,7 +122,7 @@ Result<void> check_uvs(const std::filesystem::path& mesh_file, const meshio::Rea
     return {};
 }
 
-Result<void> lay_one(const std::filesystem::path& mesh_file, meshio::ReadResult& read, const std::string& image) {
+Result<void> lay_one(const std::filesystem::path& mesh_file, meshio::ReadResult& read, const std::filesystem::path& image) {
     if (const auto ok = check_uvs(mesh_file, read); !ok) return ok;
     auto texture = read_texture(image, read.uvs_from_top);
     if (!texture) return texture.error();
@@ -180,9 +180,9 @@ Result<void> lay_materials(const std::filesystem::path& mesh_file, meshio::ReadR
 
 } // namespace
 
-Result<void> lay_texture(const std::filesystem::path& mesh_file, meshio::ReadResult& read, const TextureOptions& options) {
-    if (options.is_left_out) return {};
-    return options.file.empty() ? lay_materials(mesh_file, read) : lay_one(mesh_file, read, options.file);
+Result<void> lay_texture(const std::filesystem::path& mesh_file, meshio::ReadResult& read, const LoadOptions& options) {
+    if (options.without_textures) return {};
+    return options.texture.empty() ? lay_materials(mesh_file, read) : lay_one(mesh_file, read, options.texture);
 }
 
-} // namespace unseen::app
+} // namespace unseen::session

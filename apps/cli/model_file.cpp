@@ -1,0 +1,58 @@
+#include "model_file.h"
+
+#include <functional>
+
+#include "progress_bar.h"
+#include "session_options.h"
+#include "terminal.h"
+
+namespace unseen::app {
+namespace {
+
+// `bar` must outlive what is done with the options.
+session::LoadOptions load_options(const TextureOptions& texture, ProgressBar& bar) {
+    session::LoadOptions options;
+    options.texture = texture.file;
+    options.without_textures = texture.is_left_out;
+    options.messages = terminal_messages();
+    options.messages.progress = std::ref(bar);
+    return options;
+}
+
+} // namespace
+
+Result<meshio::ReadResult> read_mesh_file(const std::filesystem::path& file) {
+    ProgressBar bar("reading " + file.filename().string());
+    meshio::ReadOptions options;
+    options.progress = std::ref(bar);
+    auto read = meshio::read_mesh(file, options);
+    if (!read) return read;
+    for (const std::string& warning : read->warnings) print_warning(file.string() + ": " + warning);
+    return read;
+}
+
+Result<meshio::ReadResult> read_textured_mesh(const std::filesystem::path& file, const meshio::ReadOptions& options, const TextureOptions& texture) {
+    ProgressBar bar("reading " + file.filename().string());
+    return session::read_textured_mesh(file, load_options(texture, bar), options);
+}
+
+Result<vdtree::VertexTree> build_tree_of(meshio::ReadResult&& read, vdtree::BuildOptions options) {
+    ProgressBar bar("building");
+    options.progress = std::ref(bar);
+    options.dropped_before = read.dropped_triangles;
+    return vdtree::build_tree(read.mesh.view(), options);
+}
+
+Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file) {
+    ProgressBar bar(file.filename().string());
+    return session::load_tree(file, load_options({}, bar));
+}
+
+Result<session::Scene> load_scene(const std::filesystem::path& file, const TextureOptions& texture, double unit_metres) {
+    ProgressBar bar(file.filename().string());
+    session::LoadOptions options = load_options(texture, bar);
+    options.unit_metres = unit_metres;
+    return session::Scene::load(file, options);
+}
+
+} // namespace unseen::app

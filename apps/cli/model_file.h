@@ -1,0 +1,28 @@
+// Models as the verbs take them, with progress bars, notes and warnings on the terminal.
+#pragma once
+
+#include <filesystem>
+
+#include <session/scene.h>
+#include <vdtree/builder.h>
+#include <meshio/mesh_io.h>
+#include <vdtree/tree_io.h>
+
+#include "options.h"
+
+namespace unseen::app {
+
+// A mesh as its reader returns it.
+Result<meshio::ReadResult> read_mesh_file(const std::filesystem::path& file);
+
+// A mesh with its texture.
+Result<meshio::ReadResult> read_textured_mesh(const std::filesystem::path& file, const meshio::ReadOptions& options, const TextureOptions& texture);
+
+// The tree of a mesh. Triangles that its reader dropped count as the tree's dropped ones.
+Result<vdtree::VertexTree> build_tree_of(meshio::ReadResult&& read, vdtree::BuildOptions options);
+
+// A tree file, or a mesh file with a note that its tree is built now.
+Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file);
+Result<session::Scene> load_scene(const std::filesystem::path& file, const TextureOptions& texture, double unit_metres);
+
+} // namespace unseen::app

@@ -1,0 +1,46 @@
+#include "option_names.h"
+
+#include <string_view>
+
+namespace unseen::app {
+namespace {
+
+struct OptionName {
+    std::string_view field, option;
+};
+
+// Fields with values come first: "request.fold_test = error" becomes "--fold-test error".
+constexpr OptionName option_names[] = {
+    {"request.fold_test = ", "--fold-test "},
+    {"scene.background = ", "--background "},
+    {"observer.csf = ", "--csf "},
+    {"request.fold_test", "--fold-test"},
+    {"request.chroma", "--chroma"},
+    {"request.goal.triangles", "--triangles"},
+    {"request.goal.pixels", "--pixels"},
+    {"request.goal.fill", "--fill-budget"},
+    {"request.goal full", "--full"},
+    {"request.milliseconds", "--milliseconds"},
+    {"request.threshold", "--threshold"},
+    {"observer.csf", "--csf"},
+    {"scene.lights", "--lights"},
+    {"Scene::relight()", "--light or --ambient"},
+    {"load.texture", "--texture"},
+    {"load.without_textures", "--no-texture"},
+    {"load.unit_metres", "--unit"},
+    {"Follower::set_glide()", "--geomorph"},
+    {"session::read_textured_mesh()", "unseen build"},
+    {"vdtree::write_tree()", "'unseen build'"},
+    {"vdtree::with_fold_errors()", "unseen build --fold-errors"},
+};
+
+} // namespace
+
+std::string with_option_names(std::string text) {
+    for (const auto& [field, option] : option_names)
+        for (std::size_t at = 0; (at = text.find(field, at)) != std::string::npos; at += option.size())
+            text.replace(at, field.size(), option);
+    return text;
+}
+
+} // namespace unseen::app

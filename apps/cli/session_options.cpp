@@ -1,0 +1,115 @@
+#include "session_options.h"
+
+#include <calibration/display_profile.h>
+
+#include "model_file.h"
+#include "option_names.h"
+#include "terminal.h"
+
+namespace unseen::app {
+namespace {
+
+constexpr double default_fill = 0.9;
+
+std::optional<perception::Luminance> background_of(const ViewOptions& view) {
+    if (!view.background_cdm2) return std::nullopt;
+    return perception::Luminance(*view.background_cdm2);
+}
+
+// What the options say that does not depend on the model.
+struct Surroundings {
+    session::Observer observer;
+    std::optional<calibration::LightRig> lights;
+};
+
+Result<Surroundings> read_surroundings(const ViewOptions& view, const DisplayOptions& display) {
+    auto shown_on = make_display(display);
+    if (!shown_on) return shown_on.error();
+    if (const auto background = session::relative_background(*shown_on, background_of(view)); !background)
+        return background.error();
+    Surroundings around;
+    if (!display.csf.empty()) {
+        auto table = session::read_csf_table(display.csf, *shown_on);
+        if (!table) return table.error();
+        around.observer.csf = std::move(*table);
+    }
+    around.observer.display = std::move(*shown_on);
+    if (!view.lights.empty()) {
+        auto read = calibration::LightRig::read(view.lights);
+        if (!read) return read.error();
+        around.lights = std::move(*read);
+    }
+    return around;
+}
+
+Result<session::Session> assemble(session::Scene scene, Surroundings around, const ViewOptions& view) {
+    if (const auto lit = scene.relight(view.light, view.ambient); !lit) return lit.error();
+    scene.background = background_of(view);
+    scene.lights = std::move(around.lights);
+    return session::Session::create(std::move(scene), std::move(around.observer), terminal_messages());
+}
+
+} // namespace
+
+session::Messages terminal_messages() {
+    session::Messages messages;
+    messages.note = [](const std::string& text) { print_note(with_option_names(text)); };
+    messages.warning = [](const std::string& text) { print_warning(with_option_names(text)); };
+    return messages;
+}
+
+Result<perception::Display> make_display(const DisplayOptions& options) {
+    perception::Display display;
+    if (!options.file.empty()) {
+        auto read = calibration::read_display(options.file);
+        if (!read) return read.error();
+        display = *read;
+    }
+    // The distance first: pixels per degree hold at a distance.
+    if (options.distance_m) display.distance = perception::Metres(*options.distance_m);
+    if (options.pixels_per_degree)
+        perception::set_pixels_per_degree(display, perception::PixelsPerDegree(*options.pixels_per_degree));
+    if (options.peak_cdm2) display.peak = perception::Luminance(*options.peak_cdm2);
+    if (options.black_cdm2) display.black = perception::Luminance(*options.black_cdm2);
+    if (auto valid = perception::validate(display); !valid) return valid.error();
+    return display;
+}
+
+Result<session::Session> open_session(const std::filesystem::path& model, const ViewOptions& view,
+                                      const DisplayOptions& display) {
+    auto around = read_surroundings(view, display);
+    if (!around) return around.error();
+    auto scene = load_scene(model, view.texture, view.unit_metres);
+    if (!scene) return scene.error();
+    return assemble(std::move(*scene), std::move(*around), view);
+}
+
+Result<session::Session> make_session(vdtree::VertexTree tree, const ViewOptions& view, const DisplayOptions& display) {
+    auto around = read_surroundings(view, display);
+    if (!around) return around.error();
+    return assemble(session::Scene::of(std::move(tree), view.unit_metres), std::move(*around), view);
+}
+
+vdtree::View make_view(const session::Session& session, const ViewOptions& options) {
+    vdtree::View view;
+    view.width = options.width;
+    view.height = options.height;
+    view.fov_y_degrees =
+        options.fov_degrees.value_or(perception::physical_field(session.observer().display, options.height).value());
+    if (options.eye) {
+        view.eye = *options.eye;
+        view.target = options.target.value_or(session.bounding_sphere().centre);
+    } else {
+        view =
+            session.frame(options.direction.value_or(glm::dvec3(0, 0, 1)), options.fill.value_or(default_fill), view);
+    }
+    if (options.up) view.up = *options.up;
+    return view;
+}
+
+std::optional<session::Gaze> fixed_gaze(const WhatOptions& what) {
+    if (!what.gaze_px) return std::nullopt;
+    return session::Gaze{*what.gaze_px};
+}
+
+} // namespace unseen::app

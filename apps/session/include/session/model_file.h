@@ -1,0 +1,33 @@
+// Models from files: a tree, or a mesh with its textures, of which a tree is built on the fly.
+#pragma once
+
+#include <filesystem>
+
+#include <session/messages.h>
+#include <meshio/mesh_io.h>
+#include <vdtree/vertex_tree.h>
+
+namespace unseen::session {
+
+// Error messages and reasons call these fields load.texture and so on.
+struct LoadOptions {
+    std::filesystem::path texture = {}; // an image that lies over a mesh instead of its materials' images; empty: none
+    bool without_textures = false;      // leave all images out
+    double unit_metres = 1;             // world units (metres) a mesh unit; above 0. Of Scene::load()
+    Messages messages = {};
+};
+
+// A mesh with its texture: those of several materials become one, side by side, and materials' colours become those of
+// the vertices. Images are PNG, JPEG, PFM or EXR. Errors name the file, and what is wrong in it. The reader's warnings
+// are messages. `reading.materials` and `reading.progress` are taken from the options.
+Result<meshio::ReadResult> read_textured_mesh(const std::filesystem::path& file, const LoadOptions& options = {},
+                                              meshio::ReadOptions reading = {});
+
+// A tree file, read and checked to the last byte, or the tree of a mesh file: building takes some ten seconds for a
+// million triangles, and a note says so. A tree has its texture, and takes no other.
+Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file, const LoadOptions& options = {});
+
+// The same, but tree files of 256 MiB and more are mapped: only what is used is read, and checked.
+Result<vdtree::VertexTree> open_tree(const std::filesystem::path& file, const LoadOptions& options = {});
+
+} // namespace unseen::session

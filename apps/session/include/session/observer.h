@@ -1,0 +1,49 @@
+// Who looks: on which display, how well, and where.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <glm/vec2.hpp>
+
+#include <perception/csf.h>
+#include <perception/display.h>
+#include <vdtree/view.h>
+
+namespace unseen::session {
+
+struct Gaze {
+    glm::dvec2 px = glm::dvec2(0); // in the window, from the top left; may lie outside
+    double margin_deg = 0;         // the true gaze may be so far from it; 0 or more
+};
+
+// Error messages and reasons call these fields observer.gaze and so on.
+struct Observer {
+    perception::Display display = {};
+    // Contrast sensitivity; null: the standard observer, castleCSF.
+    std::shared_ptr<const perception::CsfTable> csf = {};
+    std::optional<Gaze> gaze = {}; // none: everything counts as looked at
+};
+
+// Contrast sensitivity by name: that of a model (see perception::csf_model()), or else the file of a table. A model
+// must be of luminance contrast.
+struct CsfChoice {
+    std::optional<perception::CsfModel> model = {};
+    std::optional<perception::CsfTable> table = {}; // of the file; where a model is named, none
+};
+Result<CsfChoice> choose_csf(const std::string& model_or_file);
+
+// Its table, of a model for the display's distance.
+Result<std::shared_ptr<const perception::CsfTable>> read_csf_table(const std::string& model_or_file,
+                                                                   const perception::Display& display);
+
+// The background in relative luminance: what is asked for must be possible on the display, within its black and white.
+// See Scene::background for the default.
+Result<float> relative_background(const perception::Display& display, std::optional<perception::Luminance> asked);
+
+// The pixel so far to the right of the window's centre; it may lie outside of the window.
+glm::dvec2 gaze_aside(const perception::Display& display, const vdtree::View& view, double degrees);
+inline constexpr double usual_degrees_aside = 29; // well in the periphery
+
+} // namespace unseen::session

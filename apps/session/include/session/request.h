@@ -1,0 +1,60 @@
+// What is wanted of a simplification.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <vdtree/mesh.h>
+#include <vdtree/result.h>
+
+namespace unseen::session {
+
+// See perception/criterion.h for the first three, and vdtree/distance_criterion.h for the others.
+enum class FoldTest { luebke_hallen, luebke_hallen_safe, error, extent, displacement };
+
+// By contrast sensitivity; the others count pixels, seen or not.
+constexpr bool is_perceptual(FoldTest test) { return test != FoldTest::extent && test != FoldTest::displacement; }
+std::string name_of(FoldTest test); // "luebke-hallen", ...
+
+// How far to fold.
+struct Goal {
+    enum class Kind { imperceptible, full, budget, pixels };
+
+    Kind kind = Kind::imperceptible;
+    vdtree::Index triangles = 0; // of budgets: at most so many, of all objects together; 1 or more
+    bool fill = false;           // of budgets: use all of them, even where no difference can be seen
+    double tolerance_px = 0;     // of pixels: above 0 and finite
+
+    static Goal imperceptible() { return {}; }          // fold what nobody can see
+    static Goal full() { return {.kind = Kind::full}; } // fold nothing
+    // As inconspicuous as so many triangles can be.
+    static Goal budget(vdtree::Index triangles, bool fill = false) {
+        return {.kind = Kind::budget, .triangles = triangles, .fill = fill};
+    }
+    // Fold what is smaller, seen or not.
+    static Goal pixels(double tolerance) { return {.kind = Kind::pixels, .tolerance_px = tolerance}; }
+};
+
+// What the cut is for decides what may be left out of it.
+enum class Purpose {
+    mesh,    // may be looked at from elsewhere
+    picture, // seen from this view only: what is out of the window, faces away or is hidden in a solid is folded
+};
+
+// Error messages and reasons call these fields request.goal, request.fold_test and so on.
+struct Request {
+    Goal goal = {};
+    std::optional<FoldTest> fold_test = {};  // default: one that suits the scene and the goal, see Plan
+    bool chroma = false;                     // changes of colour count, too, not only those of luminance
+    std::optional<double> milliseconds = {}; // the best cut that so much time is enough for; 0 or more
+    double threshold = 1;    // of imperceptible: fold up to this cost; 2: what cannot be seen from twice the distance
+    float hysteresis = 1.1f; // of budgets, frame by frame: by what factor the largest cost may exceed the least, 1..2
+    Purpose purpose = Purpose::mesh;
+    // Measure the errors of folds where the test needs them and the tree lacks them: up to a minute.
+    bool may_measure = true;
+};
+
+// Whether the fields are in their ranges and go together, whatever the scene. The error names them.
+Result<void> validate(const Request& request);
+
+} // namespace unseen::session

@@ -1,0 +1,36 @@
+// What a simplification came to.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <session/plan.h>
+#include <vdtree/cut.h>
+
+namespace unseen::session {
+
+// Of all objects together.
+struct Report {
+    vdtree::Index source_triangles = 0;
+    std::uint64_t dropped = 0;       // triangles that the meshes had and the trees have not: those with a vertex twice
+    vdtree::AdjustStats stats;       // sums; the largest cost of all; complete where all are
+    double adapt_ms = 0;             // making the cuts, in wall-clock time
+    double extract_ms = 0;           // their index buffers
+    double imperceptible_from_m = 0; // infinite: from nowhere; NaN: the fold test does not know
+    std::vector<FoldTest> fold_tests = {}; // by object
+    std::vector<Effect> effects = {};
+    // With geomorphs.
+    std::optional<vdtree::Index> drawn_triangles = {}; // those that wait to be folded included
+    std::size_t gliding = 0;                           // vertices that are on their way
+};
+
+struct Simplification : Report {
+    std::vector<vdtree::Cut> cuts; // by object
+
+    // The cut of an object as a mesh of its own, in that object's own frame, as its file had it. Cost: the cut's
+    // triangles. Precondition: there is such an object.
+    vdtree::Mesh mesh(std::size_t object = 0) const { return vdtree::extract_mesh(cuts[object]); }
+};
+
+} // namespace unseen::session

@@ -1,0 +1,214 @@
+#include "effects.h"
+
+#include <cmath>
+
+#include <glm/geometric.hpp>
+
+#include "number_text.h"
+
+namespace unseen::session {
+namespace {
+
+// The default field is the physical one, computed by way of degrees: rounding is no magnification.
+constexpr double same_field_degrees = 1e-7;
+
+bool is_full(const Decision& decision) { return decision.request.goal.kind == Goal::Kind::full; }
+
+Effect fold_test_effect(const Decision& decision) {
+    if (is_full(decision)) return {"fold test", false, "nothing is folded in the full model"};
+    const std::string instead = decision.why.empty() ? std::string() : " (" + decision.why + ")";
+    if (decision.test == FoldTest::error)
+        return {"fold test", true,
+                "error: what each fold changes in luminance and outline, against the contrast sensitivity"};
+    if (decision.test == FoldTest::luebke_hallen_safe)
+        return {"fold test", true,
+                "luebke-hallen-safe: the worst grating of each fold with any neighbours folded, and the shift of the "
+                "mean, against the contrast "
+                "sensitivity" +
+                    instead};
+    if (decision.test == FoldTest::luebke_hallen)
+        return {"fold test", true,
+                "luebke-hallen: the worst grating of each fold against the contrast sensitivity" + instead};
+    return {"fold test", true, name_of(decision.test) + ": pixels on the screen, whether they can be seen or not"};
+}
+
+Effect gaze_effect(const Sight& sight, const Decision& decision) {
+    if (is_full(decision)) return {"gaze", false, "nothing is folded in the full model"};
+    if (!is_perceptual(decision))
+        return {"gaze", false, "the fold test " + name_of(decision.test) + " does not use it"};
+    const std::optional<Gaze>& gaze = sight.observer.gaze;
+    if (!gaze) return {"gaze", false, "no gaze is given, so everything counts as looked at"};
+    const std::string around =
+        gaze->margin_deg > 0 ? ", give or take " + rounded(gaze->margin_deg, 3) + " degrees," : std::string(",");
+    return {"gaze", true,
+            "the viewer looks at pixel " + rounded(gaze->px.x, 6) + ", " + rounded(gaze->px.y, 6) + around +
+                " and sees less sharply elsewhere"};
+}
+
+Effect silhouette_effect(const Sight& sight, const Decision& decision) {
+    if (!is_perceptual(decision)) return {"silhouettes", false, "only the perceptual fold test knows them"};
+    const perception::SceneLuminance& range = sight.luminance;
+    const auto cdm2 = [&](float relative) {
+        return rounded(perception::to_luminance(sight.observer.display, static_cast<double>(relative)).value(), 3);
+    };
+    return {"silhouettes", true,
+            "folds on outlines are tested against " + cdm2(range.darkest) + " to " + cdm2(range.brightest) +
+                " cd/m2, the whole scene with its background"};
+}
+
+Effect csf_effect(const Sight& sight, const Decision& decision) {
+    if (!is_perceptual(decision)) return {"csf table", false, "only the perceptual fold test looks sensitivity up"};
+    return {"csf table", sight.observer.csf != nullptr,
+            sight.observer.csf ? "by observer.csf: " + sight.observer.csf->samples().source
+                               : "the standard observer is used, castleCSF"};
+}
+
+Effect prelit_effect(const Sight& sight) {
+    if (sight.lighting && !sight.object.tree.colours().empty())
+        return {"pre-lit colours", false, "scene.lights lights the colours"};
+    if (sight.object.tree.is_prelit())
+        return {"pre-lit colours", true,
+                sight.object.tree.colours().empty() ? "the texture is taken as lit"
+                                                    : "the mesh's colours are taken as lit"};
+    if (!sight.object.tree.texture().empty()) return {"pre-lit colours", false, "Scene::relight() lights the texture"};
+    return {"pre-lit colours", false,
+            sight.object.tree.colours().empty() ? "the mesh has no colours" : "Scene::relight() lights the colours"};
+}
+
+Effect texture_effect(const Sight& sight, const Decision& decision) {
+    if (sight.object.tree.texture().empty())
+        return {"texture", false,
+                sight.object.texture_left_out ? "load.without_textures leaves it out" : "the model has none"};
+    if (!is_perceptual(decision)) return {"texture", true, "drawn; folds are not tested against it"};
+    if (decision.test == FoldTest::luebke_hallen_safe)
+        return {"texture", true,
+                "folds are tested against its darkest and brightest texels around them, and by how far they move it"};
+    return {"texture", true, "folds are tested against its darkest and brightest texels around them"};
+}
+
+Effect chroma_effect(const Sight& sight, const Decision& decision) {
+    if (!is_perceptual(decision)) return {"chroma", false, "only the perceptual fold test knows it"};
+    if (!decision.request.chroma) return {"chroma", false, "without request.chroma only luminance counts"};
+    if (sight.object.tree.ring_chroma().empty()) return {"chroma", false, "nothing has any colour"};
+    return {"chroma", true, "red-green and yellow-violet contrast count beside that of luminance, by castleCSF"};
+}
+
+Effect light_effect(const Sight& sight, const Decision& decision) {
+    if (sight.lighting)
+        return {"light", true,
+                sight.lights->description() +
+                    (is_perceptual(decision)
+                         ? ": folds are tested against what these can make of the normals and places in their rings"
+                         : "; drawn, for the fold test does not look at luminance")};
+    if (sight.object.is_relit)
+        return {"light", true, "luminance and its bounds were computed again for another light than the tree's"};
+    return {"light", false,
+            sight.object.tree.is_prelit() ? "the colours are pre-lit" : "the light that the tree was built for"};
+}
+
+Effect frustum_effect(const Decision& decision) {
+    if (is_full(decision)) return {"frustum culling", false, "nothing is folded in the full model"};
+    if (decision.request.purpose == Purpose::mesh)
+        return {"frustum culling", false, "the mesh may be looked at from elsewhere"};
+    return {"frustum culling", true, "what lies outside of the window is folded"};
+}
+
+Effect culling_effect(const Sight& sight, Purpose purpose) {
+    const WorldSphere sphere = world_sphere(sight.object);
+    const bool is_open = sight.object.tree.closedness() == vdtree::Closedness::open;
+    const bool is_outside = glm::length(sight.view.eye - sphere.centre) > sphere.radius;
+    if (purpose == Purpose::mesh) return {"back-face culling", false, "nothing is drawn"};
+    if (is_open) return {"back-face culling", false, "the surface is open, so both sides are drawn"};
+    if (!is_outside) return {"back-face culling", false, "the eye is in the model, so both sides are drawn"};
+    return {"back-face culling", true,
+            sight.object.tree.closedness() == vdtree::Closedness::closed_outward
+                ? "the surface is closed, so its inner side cannot be seen"
+                : "the surface is closed but inside out, so it is turned"};
+}
+
+Effect magnification_effect(const Sight& sight, const Decision& decision) {
+    const double physical = perception::physical_field(sight.observer.display, sight.view.height).value();
+    const std::string fields =
+        rounded(sight.view.fov_y_degrees, 4) + " degrees, the window fills " + rounded(physical, 4);
+    if (std::abs(sight.view.fov_y_degrees - physical) <= same_field_degrees)
+        return {"magnification", false, "the camera's field is the one that the window fills on the display"};
+    if (!is_perceptual(decision)) return {"magnification", false, "pixels do not depend on it (camera " + fields + ")"};
+    return {"magnification", true, "the camera's field is " + fields + ": angles are those on the screen"};
+}
+
+Effect distance_effect(const Decision& decision, const std::optional<CutFacts>& facts) {
+    const std::string name = "imperceptible distance";
+    if (is_full(decision)) return {name, true, "nothing is folded, so it holds from any distance"};
+    if (!is_perceptual(decision))
+        return {name, false, "costs of the fold test " + name_of(decision.test) + " are no distances"};
+    if (facts && std::isinf(facts->imperceptible_from_m))
+        return {name, false, "a fold around the eye or across its plane stays visible from everywhere"};
+    if (decision.request.goal.kind == Goal::Kind::imperceptible)
+        return {name, true,
+                "the display's distance times " + rounded(decision.request.threshold, 4) +
+                    ", above which no fold costs"};
+    return {name, true, "the display's distance times the largest fold cost"};
+}
+
+Effect back_face_effect(const Sight& sight, Purpose purpose) {
+    if (purpose == Purpose::mesh) return {"back-face folding", false, "the mesh may be looked at from elsewhere"};
+    if (culls_back_faces(sight)) return {"back-face folding", true, "what faces away is not drawn, so it is folded"};
+    if (sight.object.tree.closedness() == vdtree::Closedness::open)
+        return {"back-face folding", false, "the surface is open"};
+    if (is_translucent(sight)) return {"back-face folding", false, "what faces away may show through"};
+    return {"back-face folding", false, "the eye is in the model"};
+}
+
+Effect hidden_effect(const Sight& sight, const Decision& decision, const std::optional<CutFacts>& facts) {
+    const std::string name = "hidden folding";
+    if (decision.request.purpose == Purpose::mesh) return {name, false, "the mesh may be looked at from elsewhere"};
+    if (!folds_hidden(sight, decision))
+        return {name, false,
+                is_perceptual(decision) ? "nothing solid is looked at from outside"
+                                        : "only the perceptual fold tests know what a fold changes"};
+    if (!facts) return {name, true, "what is behind spheres inside the solid is folded"};
+    if (facts->occluders == 0) return {name, false, "no sphere fits into the solid"};
+    return {name, true,
+            "what is behind one of " + std::to_string(facts->occluders) + " spheres inside the solid is folded"};
+}
+
+Effect translucency_effect(const Sight& sight, const Decision& decision) {
+    if (!is_perceptual(decision)) return {"translucency", false, "only the perceptual fold test knows it"};
+    if (!is_translucent(sight)) return {"translucency", false, "no vertex has an alpha below 1"};
+    return {"translucency", true, "where a vertex has an alpha below 1, anything in the scene may show through"};
+}
+
+Effect time_limit_effect(const Decision& decision, const std::optional<CutFacts>& facts) {
+    if (!decision.request.milliseconds) return {"time limit", false, "none is given"};
+    return {"time limit", true,
+            !facts               ? "it ends the cut; the worst folds are undone first"
+            : facts->is_complete ? "the cut was made within it"
+                                 : "it ended the cut; the worst folds were undone first"};
+}
+
+} // namespace
+
+std::vector<Effect> effects_of(const Sight& sight, const Decision& decision, const std::optional<CutFacts>& facts) {
+    const Purpose purpose = decision.request.purpose;
+    std::vector<Effect> effects = {
+        fold_test_effect(decision),      gaze_effect(sight, decision),   silhouette_effect(sight, decision),
+        csf_effect(sight, decision),     chroma_effect(sight, decision), translucency_effect(sight, decision),
+        texture_effect(sight, decision), prelit_effect(sight),           light_effect(sight, decision),
+        frustum_effect(decision),        culling_effect(sight, purpose), magnification_effect(sight, decision),
+        distance_effect(decision, facts)};
+    if (is_full(decision)) return effects;
+    effects.push_back(back_face_effect(sight, purpose));
+    effects.push_back(hidden_effect(sight, decision, facts));
+    effects.push_back(time_limit_effect(decision, facts));
+    return effects;
+}
+
+Effect geomorph_effect(const vdtree::Geomorph* geomorph, const vdtree::Cut& cut) {
+    if (!geomorph) return {"geomorphs", false, "vertices do not glide unless Follower::set_glide() says for how long"};
+    return {"geomorphs", true,
+            "vertices glide for " + rounded(geomorph->seconds(), 3) + " s; " + grouped(geomorph->moved().size()) +
+                " do now, and " + grouped(geomorph->drawn().triangle_count() - cut.triangle_count()) +
+                " triangles wait for them to be folded"};
+}
+
+} // namespace unseen::session

@@ -1,0 +1,209 @@
+#include "fold_test.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/geometric.hpp>
+
+namespace unseen::session {
+namespace {
+
+Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
+
+perception::FoldTestOptions test_options(const Sight& sight, const Request& request) {
+    perception::FoldTestOptions options;
+    options.display = sight.observer.display;
+    options.scene = sight.luminance;
+    options.csf = sight.csf;
+    options.chroma = request.chroma;
+    options.gaze_px = sight.gaze_px;
+    return options;
+}
+
+// ---- which test
+
+struct Choice {
+    FoldTest test = FoldTest::error;
+    std::string why = {};
+};
+
+// Of the tests by luminance one that knows the scene, and colours where they count.
+Choice suitable_test(const Sight& sight, bool chroma, bool may_measure) {
+    constexpr vdtree::NodeId most_measured = 2'000'000; // nodes; about a minute on one core
+    const vdtree::VertexTree& tree = sight.object.tree;
+    if (sight.lighting) return {FoldTest::luebke_hallen, "the test error does not know lights that move"};
+    if (!tree.texture().empty()) return {FoldTest::luebke_hallen_safe, "the test error does not know textures"};
+    if (chroma) return {FoldTest::luebke_hallen, "the test error does not know colours"};
+    if (!tree.fold_errors().empty() || (may_measure && tree.interior_count() <= most_measured)) return {};
+    return {
+        FoldTest::luebke_hallen,
+        "the tree does not hold the errors of its folds, and measuring them takes long: vdtree::with_fold_errors()"};
+}
+
+// Whether a test knows what it would have to look at.
+Result<void> check_knowledge(const Sight& sight, FoldTest test, bool chroma) {
+    if (!is_perceptual(test)) return {};
+    if (sight.lighting && test != FoldTest::luebke_hallen)
+        return invalid("request.fold_test = " + name_of(test) +
+                       " knows only the light that the tree was built for: with scene.lights, use request.fold_test = "
+                       "luebke-hallen.");
+    if (sight.lighting && chroma)
+        return invalid(
+            "request.chroma and scene.lights exclude each other: ranges of colour are those of the tree's own light.");
+    if (sight.object.tree.texture().empty()) return {};
+    if (chroma)
+        return invalid(
+            "request.chroma does not look at the colours of textures: leave it out, or add load.without_textures.");
+    if (test == FoldTest::error)
+        return invalid(
+            "request.fold_test = error does not measure textures: use request.fold_test = luebke-hallen-safe, or add "
+            "load.without_textures.");
+    return {};
+}
+
+// ---- what it looks at
+
+bool is_wholly_in_window(const Sight& sight) {
+    const vdtree::Sphere sphere = sight.object.tree.bounding_sphere();
+    const vdtree::Frustum frustum = vdtree::frustum_of(sight.object.tree, sight.view, sight.object.placement);
+    return std::all_of(frustum.planes.begin(), frustum.planes.end(), [&](const vdtree::Plane& plane) {
+        return glm::dot(plane.normal, glm::dvec3(sphere.centre)) + plane.offset > static_cast<double>(sphere.radius);
+    });
+}
+
+// What a criterion depends on, besides what a scene never changes.
+struct Key {
+    FoldTest test = FoldTest::error;
+    double pixels = 0; // of the others than perceptual tests; and of these alone:
+    std::optional<double> farthest_gaze_px = {};
+    perception::SceneLuminance scene = {0, 0};
+    bool is_lit = false, chroma = false;
+    std::shared_ptr<const perception::CsfTable> csf = {}; // kept, so that no other table comes to its address
+    int width = 0, height = 0;
+    double fov_y_degrees = 0;
+    bool operator==(const Key&) const = default;
+};
+
+// A gaze off the window reaches into larger magnifications: one criterion must do for all gazes up to there, so they
+// are rounded up to whole windows.
+double farthest_gaze_px(const vdtree::View& view, glm::dvec2 gaze_px) {
+    const double side = std::max(view.width, view.height);
+    const glm::dvec2 from_centre = gaze_px - glm::dvec2(view.width, view.height) * 0.5;
+    return std::ceil(std::max(glm::length(from_centre) / side, 1.0)) * side;
+}
+
+// A budget goes by the order of the costs alone, for which any tolerance will do.
+double tolerance_px(const Goal& goal) { return goal.kind == Goal::Kind::pixels ? goal.tolerance_px : 1; }
+
+Key key_of(const Sight& sight, const Decision& decision) {
+    Key key;
+    key.test = decision.test;
+    key.width = sight.view.width;
+    key.height = sight.view.height;
+    key.fov_y_degrees = sight.view.fov_y_degrees;
+    if (!is_perceptual(decision.test)) {
+        key.pixels = tolerance_px(decision.request.goal);
+        return key;
+    }
+    key.scene = sight.luminance;
+    key.is_lit = sight.lighting.has_value();
+    key.chroma = decision.request.chroma;
+    key.csf = sight.csf;
+    if (sight.gaze_px) key.farthest_gaze_px = farthest_gaze_px(sight.view, *sight.gaze_px);
+    return key;
+}
+
+Result<vdtree::DistanceCriterion> make_criterion(const Sight& sight, const Decision& decision, const Key& key) {
+    const vdtree::VertexTree& tree = sight.object.tree;
+    const vdtree::View& view = sight.view;
+    if (decision.test == FoldTest::extent) return vdtree::extent_criterion(tree, view, key.pixels);
+    if (decision.test == FoldTest::displacement) return vdtree::displacement_criterion(tree, view, key.pixels);
+    perception::FoldTestOptions options = test_options(sight, decision.request);
+    if (key.farthest_gaze_px) options.gaze_px = glm::dvec2(view.width * 0.5 + *key.farthest_gaze_px, view.height * 0.5);
+    if (sight.lighting) return perception::lit_distances(tree, sight.cache.light_bounds, view, options);
+    if (decision.test == FoldTest::luebke_hallen) return perception::luebke_hallen_distances(tree, view, options);
+    if (decision.test == FoldTest::luebke_hallen_safe)
+        return perception::luebke_hallen_safe_distances(tree, cut_rings(sight.object, sight.cache), view, options);
+    return perception::error_distances(tree, view, options);
+}
+
+vdtree::Viewpoint viewpoint_of(const Sight& sight, const Decision& decision) {
+    // Where all is seen, a turning window must not cost anything.
+    const bool window_only = decision.request.purpose == Purpose::picture && !is_wholly_in_window(sight);
+    vdtree::Viewpoint viewpoint = perception::viewpoint_of(
+        sight.object.tree, sight.view, test_options(sight, decision.request), sight.object.placement, window_only);
+    if (sight.lighting) viewpoint.lighting = *sight.lighting;
+    if (folds_hidden(sight, decision)) {
+        const auto spheres = inner_spheres(sight.object, sight.cache);
+        viewpoint.occluders.assign(spheres.begin(), spheres.end());
+    }
+    return viewpoint;
+}
+
+vdtree::FollowOptions follow_options(const Sight& sight, const Request& request) {
+    vdtree::FollowOptions options;
+    options.threshold = static_cast<float>(request.threshold);
+    options.milliseconds = request.milliseconds;
+    options.cull_back_faces = request.purpose == Purpose::picture && culls_back_faces(sight);
+    if (request.goal.kind == Goal::Kind::budget) {
+        options.triangle_budget = request.goal.triangles;
+        options.fill_budget = request.goal.fill;
+        options.hysteresis = request.hysteresis;
+    }
+    return options;
+}
+
+} // namespace
+
+struct KeptCriterion {
+    Key key;
+    vdtree::DistanceCriterion criterion;
+};
+
+Result<Decision> decide(const Sight& sight, const Request& request) {
+    const bool folds = request.goal.kind != Goal::Kind::full;
+    const bool has_errors = !sight.object.tree.fold_errors().empty();
+    Choice choice = suitable_test(sight, request.chroma, folds && request.may_measure);
+    if (!folds) return Decision{request, choice.test, std::move(choice.why)};
+    if (request.goal.kind == Goal::Kind::pixels) choice = {FoldTest::extent};
+    if (request.fold_test) choice = {*request.fold_test};
+    if (const auto known = check_knowledge(sight, choice.test, request.chroma); !known) return known.error();
+    const bool measures = choice.test == FoldTest::error && !has_errors;
+    if (measures && !request.may_measure)
+        return invalid(
+            "request.fold_test = error goes by errors that the tree does not hold: allow request.may_measure, or call "
+            "vdtree::with_fold_errors().");
+    return Decision{request, choice.test, std::move(choice.why), measures};
+}
+
+bool is_perceptual(const Decision& decision) {
+    return decision.request.goal.kind != Goal::Kind::full && is_perceptual(decision.test);
+}
+
+bool is_translucent(const Sight& sight) {
+    return sight.object.tree.bounds()[vdtree::VertexTree::root()].flags & vdtree::translucent_ring;
+}
+
+bool culls_back_faces(const Sight& sight) {
+    const WorldSphere sphere = world_sphere(sight.object);
+    return !is_translucent(sight) && sight.object.tree.closedness() != vdtree::Closedness::open &&
+           glm::length(sight.view.eye - sphere.centre) > sphere.radius;
+}
+
+// Extent and displacement look at supports, which do not contain all that a fold changes.
+bool folds_hidden(const Sight& sight, const Decision& decision) {
+    return decision.request.purpose == Purpose::picture && is_perceptual(decision) && culls_back_faces(sight);
+}
+
+Result<CutRecipe> make_recipe(const Sight& sight, const Decision& decision) {
+    const Key key = key_of(sight, decision);
+    std::shared_ptr<const KeptCriterion>& last = sight.cache.criterion;
+    if (!last || !(last->key == key)) {
+        auto made = make_criterion(sight, decision, key);
+        if (!made) return made.error();
+        last = std::make_shared<const KeptCriterion>(KeptCriterion{key, std::move(*made)});
+    }
+    return CutRecipe{{last, &last->criterion}, viewpoint_of(sight, decision), follow_options(sight, decision.request)};
+}
+
+} // namespace unseen::session

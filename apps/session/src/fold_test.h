@@ -1,0 +1,25 @@
+// Which fold test a cut of an object goes by, and what it looks at.
+#pragma once
+
+#include <memory>
+
+#include "sight.h"
+
+namespace unseen::session {
+
+// Fails where the request asks for a test that does not know what there is to see.
+Result<Decision> decide(const Sight& sight, const Request& request);
+
+// By contrast sensitivity, and for a goal that folds.
+bool is_perceptual(const Decision& decision);
+
+// The rest is of decisions whose errors are measured, and for goals that fold. The cache keeps the last criterion.
+Result<CutRecipe> make_recipe(const Sight& sight, const Decision& decision);
+
+// Why recipes are what they are.
+bool is_translucent(const Sight& sight);
+bool culls_back_faces(
+    const Sight& sight); // faces that look away can be folded: they are not drawn, and nothing shows them from outside
+bool folds_hidden(const Sight& sight, const Decision& decision); // what a solid's inside hides
+
+} // namespace unseen::session

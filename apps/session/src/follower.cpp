@@ -1,0 +1,264 @@
+#include <session/follower.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "session_state.h"
+
+namespace unseen::session {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double undefined = std::numeric_limits<double>::quiet_NaN();
+
+double milliseconds_since(Clock::time_point start) {
+    return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+// Cost is v*/v for the perceptual tests alone; the others count pixels.
+double imperceptible_from(const Sight& sight, const Decision& decision, float largest_cost) {
+    if (decision.request.goal.kind == Goal::Kind::full) return 0;
+    if (!is_perceptual(decision)) return undefined;
+    if (vdtree::is_unbounded(largest_cost)) return infinity;
+    return sight.observer.display.distance.value() * static_cast<double>(largest_cost);
+}
+
+// The view through a window whose sides are so much farther from its centre.
+vdtree::View widened(const vdtree::View& view) {
+    constexpr double wider = 1.3, widest_degrees = 179;
+    const double half_tangent = std::tan(view.fov_y_degrees * (std::numbers::pi / 360));
+    vdtree::View wide = view;
+    wide.fov_y_degrees = std::max(view.fov_y_degrees,
+                                  std::min(std::atan(wider * half_tangent) * (360 / std::numbers::pi), widest_degrees));
+    return wide;
+}
+
+void add(vdtree::AdjustStats& sum, const vdtree::AdjustStats& stats) {
+    sum.node_tests += stats.node_tests;
+    sum.folds += stats.folds;
+    sum.unfolds += stats.unfolds;
+    sum.triangles += stats.triangles;
+    sum.max_fold_cost = std::max(sum.max_fold_cost, stats.max_fold_cost);
+    sum.is_complete = sum.is_complete && stats.is_complete;
+}
+
+} // namespace
+
+class Follower::State {
+public:
+    explicit State(std::shared_ptr<Session::State> session)
+        : session_(std::move(session)), objects_(session_->scene.objects.size()) {}
+
+    Result<Report> follow(const vdtree::View& view, const Request& request);
+    Result<void> set_glide(double seconds);
+
+    // One object's cut.
+    struct Followed {
+        std::uint64_t tree_count = 0; // of the tree that the cut is of
+        std::optional<vdtree::Cut> cut;
+        std::optional<vdtree::Geomorph> geomorph;
+        std::optional<CutRecipe> recipe; // of the last cut, which refers to its criterion
+    };
+    std::vector<Followed>& objects() { return objects_; }
+    void let_pass(double seconds) { passed_s_ += seconds; }
+
+private:
+    Result<void> take_up_trees();
+    Result<std::vector<CutRecipe>> recipes(const Prepared& prepared) const;
+    Result<std::vector<vdtree::AdjustStats>> unfold_all();
+    Result<std::vector<vdtree::AdjustStats>> share_budget(const Request& request);
+    Result<std::vector<vdtree::AdjustStats>> follow_each(const Request& request);
+    void conclude(Report& report, const Prepared& prepared, const std::vector<vdtree::AdjustStats>& stats) const;
+    Result<void> glide(Report& report);
+
+    std::shared_ptr<Session::State> session_;
+    std::vector<Followed> objects_;
+    std::optional<double> glide_s_;
+    double passed_s_ = 0; // since the last step of glides
+};
+
+Result<void> Follower::State::set_glide(double seconds) {
+    for (std::size_t i = 0; i < objects_.size(); ++i) {
+        const vdtree::VertexTree& tree = session_->scene.objects[i].tree;
+        if (!tree.texture().empty())
+            return Error{ErrorCode::invalid_argument,
+                         "Follower::set_glide() does not move textures: leave it out, or add load.without_textures."};
+        auto made = vdtree::Geomorph::create(tree, {.seconds = seconds});
+        if (!made) return made.error();
+        objects_[i].geomorph = std::move(*made);
+    }
+    glide_s_ = seconds;
+    passed_s_ = 0;
+    return {};
+}
+
+// A cut is of one tree: where another has come in its place, it begins anew.
+Result<void> Follower::State::take_up_trees() {
+    for (std::size_t i = 0; i < objects_.size(); ++i) {
+        Followed& object = objects_[i];
+        const vdtree::VertexTree& tree = session_->scene.objects[i].tree;
+        if (object.cut && object.tree_count == session_->tree_count[i]) continue;
+        object.cut.emplace(tree);
+        object.tree_count = session_->tree_count[i];
+        if (!glide_s_) continue;
+        auto made = vdtree::Geomorph::create(tree, {.seconds = *glide_s_});
+        if (!made) return made.error();
+        object.geomorph = std::move(*made);
+    }
+    return {};
+}
+
+Result<std::vector<CutRecipe>> Follower::State::recipes(const Prepared& prepared) const {
+    std::vector<CutRecipe> all;
+    for (std::size_t i = 0; i < objects_.size(); ++i) {
+        const Sight& sight = prepared.sights[i];
+        auto recipe = make_recipe(sight, prepared.decisions[i]);
+        if (!recipe) return recipe.error();
+        // What comes into the window shall not glide there any more.
+        if (glide_s_ && !recipe->viewpoint.frusta.empty())
+            recipe->viewpoint.frusta = {
+                vdtree::frustum_of(sight.object.tree, widened(sight.view), sight.object.placement)};
+        all.push_back(std::move(*recipe));
+    }
+    return all;
+}
+
+Result<std::vector<vdtree::AdjustStats>> Follower::State::unfold_all() {
+    std::vector<vdtree::AdjustStats> stats(objects_.size());
+    for (std::size_t i = 0; i < objects_.size(); ++i) {
+        vdtree::Cut& cut = *objects_[i].cut;
+        if (cut.triangle_count() != cut.tree().triangle_count()) cut.unfold_all();
+        stats[i].triangles = cut.triangle_count();
+    }
+    return stats;
+}
+
+Result<std::vector<vdtree::AdjustStats>> Follower::State::share_budget(const Request& request) {
+    if (request.goal.fill || request.milliseconds)
+        return Error{
+            ErrorCode::unsupported,
+            "Several objects share a budget without request.goal.fill and request.milliseconds: leave these out."};
+    std::vector<vdtree::SceneObject> objects;
+    for (Followed& object : objects_) {
+        CutRecipe& recipe = *object.recipe;
+        objects.emplace_back(*object.cut, *recipe.criterion, std::move(recipe.viewpoint),
+                             recipe.options.cull_back_faces);
+    }
+    return vdtree::follow_scene(objects, request.goal.triangles);
+}
+
+// Each has the time that the ones before have left.
+Result<std::vector<vdtree::AdjustStats>> Follower::State::follow_each(const Request& request) {
+    std::vector<vdtree::AdjustStats> stats;
+    const auto start = Clock::now();
+    for (std::size_t i = 0; i < objects_.size(); ++i) {
+        CutRecipe& recipe = *objects_[i].recipe;
+        if (request.milliseconds && i > 0)
+            recipe.options.milliseconds = std::max(0.0, *request.milliseconds - milliseconds_since(start));
+        auto followed = objects_[i].cut->follow(*recipe.criterion, recipe.viewpoint, recipe.options);
+        if (!followed) return followed.error();
+        stats.push_back(*followed);
+    }
+    return stats;
+}
+
+void Follower::State::conclude(Report& report, const Prepared& prepared,
+                               const std::vector<vdtree::AdjustStats>& stats) const {
+    for (std::size_t i = 0; i < objects_.size(); ++i) {
+        const Sight& sight = prepared.sights[i];
+        const Decision& decision = prepared.decisions[i];
+        report.source_triangles += sight.object.tree.triangle_count();
+        report.dropped += sight.object.tree.dropped_triangles();
+        add(report.stats, stats[i]);
+        report.fold_tests.push_back(decision.test);
+        CutFacts facts;
+        facts.imperceptible_from_m = imperceptible_from(sight, decision, stats[i].max_fold_cost);
+        facts.is_complete = stats[i].is_complete;
+        if (folds_hidden(sight, decision)) facts.occluders = inner_spheres(sight.object, sight.cache).size();
+        for (Effect& effect : effects_of(sight, decision, facts)) {
+            effect.object = i;
+            report.effects.push_back(std::move(effect));
+        }
+        const bool is_unknown = std::isnan(report.imperceptible_from_m) || std::isnan(facts.imperceptible_from_m);
+        report.imperceptible_from_m =
+            is_unknown ? undefined : std::max(report.imperceptible_from_m, facts.imperceptible_from_m);
+    }
+}
+
+Result<void> Follower::State::glide(Report& report) {
+    vdtree::Index drawn = 0;
+    for (Followed& object : objects_) {
+        if (auto stepped = object.geomorph->step(*object.cut, passed_s_); !stepped) return stepped;
+        drawn += object.geomorph->drawn().triangle_count();
+        report.gliding += object.geomorph->moved().size();
+    }
+    passed_s_ = 0;
+    report.drawn_triangles = drawn;
+    return {};
+}
+
+Result<Report> Follower::State::follow(const vdtree::View& view, const Request& request) {
+    const auto prepared = session_->prepare(view, request);
+    if (!prepared) return prepared.error();
+    if (const auto taken = take_up_trees(); !taken) return taken.error();
+    const bool folds = request.goal.kind != Goal::Kind::full;
+    if (folds) {
+        auto made = recipes(*prepared);
+        if (!made) return made.error();
+        for (std::size_t i = 0; i < objects_.size(); ++i) objects_[i].recipe = std::move((*made)[i]);
+    }
+    Report report;
+    const auto start = Clock::now();
+    const bool is_shared = request.goal.kind == Goal::Kind::budget && objects_.size() > 1;
+    const auto stats = !folds ? unfold_all() : is_shared ? share_budget(request) : follow_each(request);
+    report.adapt_ms = milliseconds_since(start);
+    if (!stats) return stats.error();
+    conclude(report, *prepared, *stats);
+
+    const auto adapted = Clock::now();
+    if (glide_s_)
+        if (const auto glided = glide(report); !glided) return glided.error();
+    for (std::size_t i = 0; i < objects_.size(); ++i) {
+        const Followed& object = objects_[i];
+        static_cast<void>(object.geomorph ? object.geomorph->drawn().indices() : object.cut->indices());
+        report.effects.push_back(geomorph_effect(object.geomorph ? &*object.geomorph : nullptr, *object.cut));
+        report.effects.back().object = i;
+    }
+    report.extract_ms = milliseconds_since(adapted);
+    return report;
+}
+
+Follower::Follower(const Session& session) : state_(std::make_unique<State>(session.state_)) {}
+Follower::Follower(Follower&&) noexcept = default;
+Follower& Follower::operator=(Follower&&) noexcept = default;
+Follower::~Follower() = default;
+
+Result<void> Follower::set_glide(double seconds) { return state_->set_glide(seconds); }
+void Follower::let_pass(double seconds) { state_->let_pass(seconds); }
+Result<Report> Follower::follow(const vdtree::View& view, const Request& request) {
+    return state_->follow(view, request);
+}
+const vdtree::Cut& Follower::cut(std::size_t object) const { return *state_->objects()[object].cut; }
+
+const vdtree::Geomorph* Follower::geomorph(std::size_t object) const {
+    const auto& geomorph = state_->objects()[object].geomorph;
+    return geomorph ? &*geomorph : nullptr;
+}
+
+Result<Simplification> Session::simplify(const vdtree::View& view, const Request& request) {
+    Request once = request;
+    once.hysteresis = 1; // with no cut before, nothing is to keep still
+    Follower follower(*this);
+    auto report = follower.follow(view, once);
+    if (!report) return report.error();
+    Simplification result{std::move(*report), {}};
+    for (Follower::State::Followed& object : follower.state_->objects()) result.cuts.push_back(std::move(*object.cut));
+    return result;
+}
+
+} // namespace unseen::session

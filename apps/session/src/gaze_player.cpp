@@ -1,0 +1,64 @@
+#include <session/gaze_player.h>
+
+#include <string>
+#include <utility>
+
+#include "number_text.h"
+
+namespace unseen::session {
+
+Result<GazePlayer> GazePlayer::create(const GazeOptions& options) {
+    if (auto valid = perception::validate(options.tracker); !valid) return valid.error();
+    GazePlayer player(options);
+    if (options.source == GazeSource::trace) {
+        auto trace = perception::read_gaze_trace(options.trace);
+        if (!trace) return trace.error();
+        player.trace_ = std::move(*trace);
+    }
+    return player;
+}
+
+Result<void> GazePlayer::begin(const perception::Display& display, const vdtree::View& view,
+                               std::optional<double> duration_s, const Messages& messages) {
+    if (options_.source == GazeSource::simulated) {
+        perception::SimulatedGaze simulated;
+        simulated.seed = options_.seed;
+        constexpr double spare_s = 1; // beyond the last frame
+        constexpr double longest_s = 3600;
+        simulated.duration_s = duration_s.value_or(longest_s) + spare_s;
+        simulated.width_px = view.width;
+        simulated.height_px = view.height;
+        auto trace = perception::simulate_gaze(simulated, display);
+        if (!trace) return trace.error();
+        trace_ = std::move(*trace);
+    }
+    if (options_.source == GazeSource::trace) {
+        const double first_s = trace_->samples().front().time_s, last_s = trace_->samples().back().time_s;
+        const std::string times = options_.trace.string() + " runs from " + shortest(first_s) + " to " +
+                                  shortest(last_s) + " s, and the frames from 0" +
+                                  (duration_s ? " to " + shortest(*duration_s) + " s" : " on");
+        if ((duration_s && first_s > *duration_s) || last_s < 0)
+            return Error{ErrorCode::invalid_argument, times + ": count its times from the first frame."};
+        if (duration_s && last_s < *duration_s && messages.warning)
+            messages.warning(times + ": after its end the last gaze holds.");
+    }
+    if (trace_) tracker_.emplace(*std::exchange(trace_, {}), options_.tracker, display, view.width, view.height);
+    return {};
+}
+
+std::optional<Gaze> GazePlayer::around(std::optional<glm::dvec2> px) const {
+    if (!px) return std::nullopt;
+    return Gaze{*px, options_.tracker.error_deg};
+}
+
+std::optional<Gaze> GazePlayer::at(double time_s, const vdtree::View& view, std::optional<glm::dvec2> own_px) const {
+    if (tracker_) {
+        const perception::TrackedGaze gaze = tracker_->at(time_s);
+        return Gaze{gaze.px, gaze.margin_deg};
+    }
+    if (options_.source != GazeSource::head) return around(own_px);
+    return Gaze{glm::dvec2(view.width, view.height) * 0.5,
+                options_.tracker.error_deg + perception::head_only_margin.value()};
+}
+
+} // namespace unseen::session

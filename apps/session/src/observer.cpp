@@ -1,0 +1,63 @@
+#include <session/observer.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include <calibration/observer_profile.h>
+
+#include "number_text.h"
+
+namespace unseen::session {
+namespace {
+
+constexpr double default_background_cdm2 = 20;
+
+Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
+
+} // namespace
+
+Result<CsfChoice> choose_csf(const std::string& model_or_file) {
+    const auto model = perception::csf_model(model_or_file);
+    if (model) {
+        if (perception::is_achromatic(*model)) return CsfChoice{*model, {}};
+        return invalid("observer.csf = " + model_or_file + " is sensitivity to colour, not to luminance contrast.");
+    }
+    std::error_code unknown;
+    if (!std::filesystem::exists(model_or_file, unknown))
+        return invalid("observer.csf: there is no such file, and " + model.error().message + ".");
+    auto table = calibration::read_csf(model_or_file);
+    if (!table) return table.error();
+    return CsfChoice{{}, std::move(*table)};
+}
+
+Result<std::shared_ptr<const perception::CsfTable>> read_csf_table(const std::string& model_or_file,
+                                                                   const perception::Display& display) {
+    auto choice = choose_csf(model_or_file);
+    if (!choice) return choice.error();
+    auto table = choice->model ? perception::CsfTable::from_model(*choice->model, {.distance = display.distance})
+                               : Result<perception::CsfTable>(*std::move(choice->table));
+    if (!table) return table.error();
+    return std::make_shared<const perception::CsfTable>(std::move(*table));
+}
+
+Result<float> relative_background(const perception::Display& display, std::optional<perception::Luminance> asked) {
+    const perception::Luminance wanted = asked.value_or(perception::Luminance(default_background_cdm2));
+    const double relative = perception::to_relative(display, wanted);
+    // Asking for the black or white that the display reports must work in spite of rounding.
+    constexpr double rounding = 1e-9;
+    if (asked && !(relative >= -rounding && relative <= 1 + rounding)) {
+        return invalid("scene.background = " + shortest(wanted.value()) +
+                       " cd/m2 is not between the display's black (" +
+                       shortest(perception::black_level(display).value()) + ") and white (" +
+                       shortest(perception::to_luminance(display, 1).value()) + ").");
+    }
+    return static_cast<float>(std::clamp(relative, 0.0, 1.0));
+}
+
+glm::dvec2 gaze_aside(const perception::Display& display, const vdtree::View& view, double degrees) {
+    const double tangent = std::tan(perception::to_radians(perception::Degrees(degrees)).value());
+    return {view.width * 0.5 + tangent * (display.distance / display.pixel_pitch), view.height * 0.5};
+}
+
+} // namespace unseen::session

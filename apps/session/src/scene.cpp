@@ -1,0 +1,61 @@
+#include <session/scene.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/geometric.hpp>
+
+namespace unseen::session {
+namespace {
+
+Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
+
+// Scaled first, so that neither tiny nor huge directions under- or overflow when squared.
+glm::vec3 unit_vector(glm::dvec3 v) {
+    const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+    return glm::vec3(glm::normalize(v / largest));
+}
+
+bool is_direction(glm::dvec3 v) {
+    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z) && v != glm::dvec3(0);
+}
+
+} // namespace
+
+Result<Scene> Scene::load(const std::filesystem::path& file, const LoadOptions& options) {
+    if (!(options.unit_metres > 0 && std::isfinite(options.unit_metres)))
+        return invalid("load.unit_metres must be above 0 and finite.");
+    auto tree = open_tree(file, options);
+    if (!tree) return tree.error();
+    Scene scene = of(std::move(*tree), options.unit_metres);
+    scene.objects[0].name = file.filename().string();
+    scene.objects[0].texture_left_out = options.without_textures;
+    return scene;
+}
+
+Scene Scene::of(vdtree::VertexTree tree, double unit_metres) {
+    Scene scene;
+    scene.objects.push_back({std::move(tree)});
+    scene.objects[0].placement.scale = unit_metres;
+    return scene;
+}
+
+Result<void> Scene::relight(std::optional<glm::dvec3> towards, std::optional<double> ambient) {
+    if (!towards && !ambient) return {};
+    if (towards && !is_direction(*towards)) return invalid("A light's direction must be finite and not 0 0 0.");
+    if (ambient && !(*ambient >= 0 && *ambient <= 1))
+        return invalid("The share of light from everywhere must be from 0 to 1.");
+    for (Object& object : objects) {
+        vdtree::Light light = object.tree.light();
+        if (towards) light.direction = unit_vector(*towards);
+        if (ambient) light.ambient = static_cast<float>(*ambient);
+        if (light == object.tree.light() && !object.tree.is_prelit()) continue;
+        auto relit = object.tree.relit(light);
+        if (!relit) return relit.error();
+        object.tree = std::move(*relit);
+        object.is_relit = true;
+    }
+    return {};
+}
+
+} // namespace unseen::session

@@ -1,0 +1,249 @@
+#include <session/session.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/geometric.hpp>
+
+#include <perception/gaze.h>
+#include <session/follower.h>
+#include <vdtree/fold_errors.h>
+#include <vdtree/occluders.h>
+
+#include "session_state.h"
+
+namespace unseen::session {
+namespace {
+
+constexpr double default_fill = 0.9;
+constexpr double point_radius = 1e-3; // world units: what is framed where all vertices coincide
+
+Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
+
+// The smallest sphere around two.
+WorldSphere united(const WorldSphere& a, const WorldSphere& b) {
+    const glm::dvec3 way = b.centre - a.centre;
+    const double distance = glm::length(way);
+    if (distance + b.radius <= a.radius) return a;
+    if (distance + a.radius <= b.radius) return b;
+    const double radius = (distance + a.radius + b.radius) / 2;
+    return {a.centre + way * ((radius - a.radius) / distance), radius};
+}
+
+Plan plan_of(const Sight& sight, const Decision& decision, std::size_t object) {
+    Plan plan{decision.test, decision.why, decision.measures, effects_of(sight, decision, std::nullopt)};
+    for (Effect& effect : plan.effects) effect.object = object;
+    return plan;
+}
+
+} // namespace
+
+// ---- what is derived from an object alone
+
+WorldSphere world_sphere(const Object& object) {
+    const vdtree::Sphere sphere = object.tree.bounding_sphere();
+    return {object.placement.to_world(object.tree.origin() + glm::dvec3(sphere.centre)),
+            object.placement.scale * sphere.radius};
+}
+
+std::span<const vdtree::Sphere> inner_spheres(const Object& object, ObjectCache& cache) {
+    if (!cache.inner_spheres) cache.inner_spheres = vdtree::inner_spheres(object.tree);
+    return *cache.inner_spheres;
+}
+
+const vdtree::CutRings& cut_rings(const Object& object, ObjectCache& cache) {
+    if (!cache.cut_rings) cache.cut_rings = vdtree::bound_cut_rings(object.tree);
+    return *cache.cut_rings;
+}
+
+// ---- how objects are seen
+
+Session::State::State(Scene scene_, Observer observer_, Messages messages_, float background_)
+    : scene(std::move(scene_)), observer(std::move(observer_)), messages(std::move(messages_)), background(background_),
+      caches(scene.objects.size()), tree_count(scene.objects.size(), 1) {}
+
+Result<std::shared_ptr<Session::State>> Session::State::create(Scene scene, Observer observer, Messages messages) {
+    if (scene.objects.empty()) return invalid("A scene needs an object: load one, or add it to scene.objects.");
+    if (const auto valid = perception::validate(observer.display); !valid) return valid.error();
+    const auto background = relative_background(observer.display, scene.background);
+    if (!background) return background.error();
+    return std::shared_ptr<State>(new State(std::move(scene), std::move(observer), std::move(messages), *background));
+}
+
+Result<std::optional<vdtree::Lighting>> Session::State::lighting(const vdtree::View& view, std::size_t object) {
+    if (!scene.lights) return std::optional<vdtree::Lighting>();
+    const Object& lit = scene.objects[object];
+    vdtree::Lighting lighting = scene.lights->at(seconds, lit.tree, view, lit.placement);
+    if (const auto ok = vdtree::check_lights(lit.tree, lighting); !ok)
+        return Error{ok.error().code, scene.lights->file().string() + ": " + ok.error().message};
+    return std::optional(std::move(lighting));
+}
+
+// Everything that a moved outline may uncover. Behind a single object is the background; behind one of several may be
+// another one.
+perception::SceneLuminance Session::State::luminance_of(const std::vector<Sight>& sights) const {
+    perception::SceneLuminance all{background, background};
+    for (const Sight& sight : sights) {
+        const vdtree::VertexTree& tree = sight.object.tree;
+        perception::SceneLuminance own{tree.luminance_range().lo, tree.luminance_range().hi,
+                                       vdtree::LuminanceRange{background, background}};
+        if (sight.lighting)
+            own = perception::lit_scene(tree, *sight.cache.light_bounds, *sight.lighting,
+                                        vdtree::eye_in_tree(tree, sight.view, sight.object.placement), background);
+        all.darkest = std::min(all.darkest, own.darkest);
+        all.brightest = std::max(all.brightest, own.brightest);
+        if (sights.size() == 1) all.behind = own.behind;
+    }
+    return all;
+}
+
+void Session::State::set_gaze_of(Sight& sight) {
+    sight.csf = observer.csf;
+    if (!observer.gaze) return;
+    if (observer.gaze->margin_deg != 0) {
+        if (!widened_)
+            widened_ = std::make_unique<perception::WidenedTables>(observer.csf ? *observer.csf
+                                                                                : perception::CsfTable::standard());
+        auto around_gaze = widened_->at(perception::Degrees(observer.gaze->margin_deg));
+        if (!around_gaze) return; // anything may be looked at
+        sight.csf = std::move(around_gaze);
+    }
+    sight.gaze_px = observer.gaze->px;
+}
+
+Result<std::vector<Sight>> Session::State::look(const vdtree::View& view) {
+    if (const auto valid = vdtree::validate(view); !valid) return valid.error();
+    std::vector<Sight> sights;
+    for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+        auto lit = lighting(view, i);
+        if (!lit) return lit.error();
+        if (*lit && !caches[i].light_bounds) {
+            auto bounds = vdtree::LightBounds::measure(scene.objects[i].tree);
+            if (!bounds) return bounds.error();
+            caches[i].light_bounds = std::make_shared<const vdtree::LightBounds>(std::move(*bounds));
+        }
+        sights.push_back({scene.objects[i], caches[i], observer, view, scene.lights ? &*scene.lights : nullptr,
+                          std::move(*lit), background});
+        set_gaze_of(sights.back());
+    }
+    const perception::SceneLuminance luminance = luminance_of(sights);
+    for (Sight& sight : sights) sight.luminance = luminance;
+    return sights;
+}
+
+Result<void> Session::State::measure(std::size_t object) {
+    constexpr vdtree::NodeId told_from = 20'000; // nodes; about half a second on one core
+    vdtree::VertexTree& tree = scene.objects[object].tree;
+    if (messages.note && tree.interior_count() >= told_from)
+        messages.note("measuring what folds change (vdtree::with_fold_errors() keeps that in the tree) ...");
+    auto measured = vdtree::with_fold_errors(tree);
+    if (!measured) return measured.error();
+    tree = std::move(*measured);
+    caches[object] = {};
+    ++tree_count[object];
+    return {};
+}
+
+Result<Prepared> Session::State::prepare(const vdtree::View& view, const Request& request) {
+    if (const auto valid = validate(request); !valid) return valid.error();
+    auto sights = look(view);
+    if (!sights) return sights.error();
+    std::vector<Decision> decisions;
+    for (const Sight& sight : *sights) {
+        auto decision = decide(sight, request);
+        if (!decision) return decision.error();
+        decisions.push_back(std::move(*decision));
+    }
+    if (std::none_of(decisions.begin(), decisions.end(), [](const Decision& d) { return d.measures; }))
+        return Prepared{std::move(*sights), std::move(decisions)};
+    for (std::size_t i = 0; i < decisions.size(); ++i)
+        if (decisions[i].measures)
+            if (const auto measured = measure(i); !measured) return measured.error();
+    return prepare(view, request); // of the other trees
+}
+
+// ---- the session
+
+Session::Session(std::shared_ptr<State> state) : state_(std::move(state)) {}
+Session::Session(Session&&) noexcept = default;
+Session& Session::operator=(Session&&) noexcept = default;
+Session::~Session() = default;
+
+Result<Session> Session::create(Scene scene, Observer observer, Messages messages) {
+    auto state = State::create(std::move(scene), std::move(observer), std::move(messages));
+    if (!state) return state.error();
+    return Session(std::move(*state));
+}
+
+const Scene& Session::scene() const noexcept { return state_->scene; }
+const vdtree::VertexTree& Session::tree(std::size_t object) const noexcept {
+    return state_->scene.objects[object].tree;
+}
+const Observer& Session::observer() const noexcept { return state_->observer; }
+float Session::background() const noexcept { return state_->background; }
+void Session::set_gaze(std::optional<Gaze> gaze) { state_->observer.gaze = gaze; }
+void Session::set_time(double seconds) { state_->seconds = seconds; }
+
+WorldSphere Session::bounding_sphere() const {
+    WorldSphere all = world_sphere(state_->scene.objects.front());
+    for (const Object& object : state_->scene.objects) all = united(all, world_sphere(object));
+    return all;
+}
+
+vdtree::View Session::frame(glm::dvec3 direction, double fill, const vdtree::View& window) const {
+    const WorldSphere sphere = bounding_sphere();
+    return vdtree::frame_sphere(sphere.centre, sphere.radius > 0 ? sphere.radius : point_radius, direction, fill,
+                                window);
+}
+
+vdtree::View Session::default_view() const {
+    vdtree::View window;
+    window.fov_y_degrees = perception::physical_field(state_->observer.display, window.height).value();
+    return frame({0, 0, 1}, default_fill, window);
+}
+
+Result<Plan> Session::plan(const vdtree::View& view, const Request& request, std::size_t object) const {
+    if (const auto valid = validate(request); !valid) return valid.error();
+    const auto sights = state_->look(view);
+    if (!sights) return sights.error();
+    const auto decision = decide((*sights)[object], request);
+    if (!decision) return decision.error();
+    return plan_of((*sights)[object], *decision, object);
+}
+
+Result<std::vector<Plan>> Session::prepare(const vdtree::View& view, const Request& request) {
+    const auto prepared = state_->prepare(view, request);
+    if (!prepared) return prepared.error();
+    std::vector<Plan> plans;
+    for (std::size_t i = 0; i < prepared->sights.size(); ++i)
+        plans.push_back(plan_of(prepared->sights[i], prepared->decisions[i], i));
+    return plans;
+}
+
+Result<CutRecipe> Session::recipe(const vdtree::View& view, const Request& request, std::size_t object) {
+    if (request.goal.kind == Goal::Kind::full)
+        return invalid("request.goal full folds nothing, so there is nothing to cut by.");
+    const auto prepared = state_->prepare(view, request);
+    if (!prepared) return prepared.error();
+    return make_recipe(prepared->sights[object], prepared->decisions[object]);
+}
+
+Result<std::optional<vdtree::Lighting>> Session::lighting(const vdtree::View& view, std::size_t object) const {
+    return state_->lighting(view, object);
+}
+
+Result<perception::SceneLuminance> Session::luminance(const vdtree::View& view) const {
+    const auto sights = state_->look(view);
+    if (!sights) return sights.error();
+    return sights->front().luminance;
+}
+
+std::span<const vdtree::Sphere> Session::inner_spheres(std::size_t object) const {
+    return session::inner_spheres(state_->scene.objects[object], state_->caches[object]);
+}
+
+const vdtree::CutRings& Session::cut_rings(std::size_t object) const {
+    return session::cut_rings(state_->scene.objects[object], state_->caches[object]);
+}
+
+} // namespace unseen::session

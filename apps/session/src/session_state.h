@@ -1,0 +1,49 @@
+// What a session and its followers share.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <perception/gaze.h>
+
+#include "effects.h"
+#include "fold_test.h"
+#include "sight.h"
+
+namespace unseen::session {
+
+// All objects as they are seen in a view, and what is to be done about each. Refers to the state, the view and the
+// request.
+struct Prepared {
+    std::vector<Sight> sights;
+    std::vector<Decision> decisions; // by object
+};
+
+class Session::State {
+public:
+    static Result<std::shared_ptr<State>> create(Scene scene, Observer observer, Messages messages);
+
+    Result<std::vector<Sight>> look(const vdtree::View& view);
+    // Measures the errors of folds where a decision wants them.
+    Result<Prepared> prepare(const vdtree::View& view, const Request& request);
+    Result<std::optional<vdtree::Lighting>> lighting(const vdtree::View& view, std::size_t object);
+
+    Scene scene;
+    Observer observer;
+    Messages messages;
+    float background = 0;                  // relative luminance
+    double seconds = 0;                    // of lights that move
+    std::vector<ObjectCache> caches;       // by object
+    std::vector<std::uint64_t> tree_count; // by object: how many trees it has had
+
+private:
+    State(Scene scene_, Observer observer_, Messages messages_, float background_);
+    perception::SceneLuminance luminance_of(const std::vector<Sight>& sights) const;
+    Result<void> measure(std::size_t object);
+    void set_gaze_of(Sight& sight);
+
+    std::unique_ptr<perception::WidenedTables> widened_; // for gazes that are not known for sure
+};
+
+} // namespace unseen::session

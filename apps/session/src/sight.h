@@ -1,0 +1,52 @@
+// One object of a scene as it is seen: what fold tests look at.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <perception/criterion.h>
+#include <session/observer.h>
+#include <session/scene.h>
+#include <session/session.h>
+#include <vdtree/cut_rings.h>
+
+namespace unseen::session {
+
+struct KeptCriterion; // see fold_test.cpp
+
+// What is derived from an object's tree, made when it is first asked for. Dropped when the tree is replaced.
+struct ObjectCache {
+    std::optional<std::vector<vdtree::Sphere>> inner_spheres = {};
+    std::optional<vdtree::CutRings> cut_rings = {};
+    std::shared_ptr<const vdtree::LightBounds> light_bounds = {};
+    std::shared_ptr<const KeptCriterion> criterion = {}; // the last that was asked for
+};
+
+struct Sight {
+    const Object& object;
+    ObjectCache& cache;
+    const Observer& observer;
+    const vdtree::View& view;
+    const calibration::LightRig* lights;       // null: the tree's own light
+    std::optional<vdtree::Lighting> lighting;  // theirs
+    float background;                          // relative luminance
+    perception::SceneLuminance luminance = {}; // of the whole scene
+    // For the gaze's margin; no gaze where the margin is so wide that everything may be looked at.
+    std::shared_ptr<const perception::CsfTable> csf = {};
+    std::optional<glm::dvec2> gaze_px = {};
+};
+
+// What will be done for a valid request.
+struct Decision {
+    const Request& request;
+    FoldTest test;
+    std::string why;       // not the default
+    bool measures = false; // the tree lacks the errors of its folds
+};
+
+WorldSphere world_sphere(const Object& object);
+std::span<const vdtree::Sphere> inner_spheres(const Object& object, ObjectCache& cache);
+const vdtree::CutRings& cut_rings(const Object& object, ObjectCache& cache);
+
+} // namespace unseen::session

@@ -1,0 +1,180 @@
+// The session library: requests that contradict themselves, plans, several objects.
+#include <cmath>
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <session/follower.h>
+#include <session/session.h>
+#include <vdtree/builder.h>
+
+#include "shapes.h"
+
+namespace {
+
+using namespace unseen;
+using session::FoldTest;
+using session::Goal;
+using session::Request;
+using session::Session;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+vdtree::VertexTree tree_of(const vdtree::Mesh& mesh) { return *vdtree::build_tree(mesh.view()); }
+
+// Two balls beside each other, the second one half as large.
+Session two_balls() {
+    session::Scene scene = session::Scene::of(tree_of(shapes::bumpy_sphere(4, 0.03)));
+    scene.objects.push_back({tree_of(shapes::bumpy_sphere(4, 0.03)), {.scale = 0.5, .translation = {4, 0, 0}}, "half"});
+    return *Session::create(std::move(scene));
+}
+
+std::string complaint_about(const Request& request) {
+    const auto valid = session::validate(request);
+    return valid ? "" : valid.error().message;
+}
+
+TEST(Request, NamesTheFieldThatIsWrong) {
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_EQ(complaint_about({}), "");
+    EXPECT_EQ(complaint_about({.goal = Goal::budget(100, true), .milliseconds = 0.0}), "");
+    EXPECT_THAT(complaint_about({.goal = Goal::budget(0)}), HasSubstr("request.goal.triangles"));
+    EXPECT_THAT(complaint_about({.goal = Goal::pixels(nan)}), HasSubstr("request.goal.pixels"));
+    EXPECT_THAT(complaint_about({.goal = Goal::pixels(1), .fold_test = FoldTest::error}),
+                HasSubstr("request.fold_test"));
+    EXPECT_THAT(complaint_about({.fold_test = FoldTest::extent}), HasSubstr("request.fold_test = extent"));
+    EXPECT_THAT(complaint_about({.fold_test = FoldTest::error, .chroma = true}), HasSubstr("request.chroma"));
+    EXPECT_THAT(complaint_about({.milliseconds = nan}), HasSubstr("request.milliseconds"));
+    EXPECT_THAT(complaint_about({.threshold = nan}), HasSubstr("request.threshold"));
+    EXPECT_THAT(complaint_about({.goal = Goal::budget(5), .threshold = 2}), HasSubstr("request.threshold"));
+    EXPECT_THAT(complaint_about({.hysteresis = 3}), HasSubstr("request.hysteresis"));
+}
+
+TEST(Session, RefusesWhatCannotBeSeen) {
+    EXPECT_FALSE(Session::create({}));
+    session::Scene scene = session::Scene::of(tree_of(shapes::cube(4)));
+    scene.background = perception::Luminance(1e6);
+    const auto refused = Session::create(std::move(scene));
+    ASSERT_FALSE(refused);
+    EXPECT_THAT(refused.error().message, HasSubstr("scene.background"));
+    auto session = Session::create(session::Scene::of(tree_of(shapes::cube(4))));
+    vdtree::View blind = session->default_view();
+    blind.target = blind.eye;
+    EXPECT_FALSE(session->simplify(blind));
+    EXPECT_FALSE(session->plan(blind, {}));
+}
+
+TEST(Session, PlansBeforeItMeasures) {
+    auto session = Session::create(session::Scene::of(tree_of(shapes::bumpy_sphere(3, 0.03))));
+    const vdtree::View view = session->default_view();
+    const auto first = session->plan(view, {});
+    ASSERT_TRUE(first);
+    EXPECT_EQ(first->fold_test, FoldTest::error);
+    EXPECT_TRUE(first->measures);
+    EXPECT_TRUE(session->tree().fold_errors().empty()) << "a plan changes nothing";
+    const auto hurried = session->plan(view, {.may_measure = false});
+    ASSERT_TRUE(hurried);
+    EXPECT_EQ(hurried->fold_test, FoldTest::luebke_hallen);
+    EXPECT_THAT(hurried->why, HasSubstr("takes long"));
+    EXPECT_FALSE(session->plan(view, {.fold_test = FoldTest::error, .may_measure = false}));
+
+    const auto ready = session->prepare(view, {});
+    ASSERT_TRUE(ready);
+    EXPECT_FALSE(ready->front().measures);
+    EXPECT_FALSE(session->tree().fold_errors().empty());
+    EXPECT_EQ(session->plan(view, {.may_measure = false})->fold_test, FoldTest::error);
+}
+
+TEST(Session, SaysOfEachEffectWhyItIsOnOrOff) {
+    auto session = Session::create(session::Scene::of(tree_of(shapes::bumpy_sphere(3, 0.03))));
+    const auto simplified = session->simplify({.fold_test = FoldTest::luebke_hallen});
+    ASSERT_TRUE(simplified);
+    const auto plan = session->plan(session->default_view(), {.fold_test = FoldTest::luebke_hallen});
+    ASSERT_TRUE(plan);
+    ASSERT_EQ(plan->effects.size() + 1, simplified->effects.size()) << "the cut adds geomorphs";
+    for (std::size_t i = 0; i < plan->effects.size(); ++i) {
+        EXPECT_EQ(plan->effects[i].name, simplified->effects[i].name);
+        EXPECT_FALSE(plan->effects[i].why.empty()) << plan->effects[i].name;
+    }
+}
+
+TEST(Session, SharesABudgetAmongItsObjects) {
+    Session session = two_balls();
+    const auto shared = session.simplify({.goal = Goal::budget(1500), .fold_test = FoldTest::luebke_hallen});
+    ASSERT_TRUE(shared) << shared.error().message;
+    ASSERT_EQ(shared->cuts.size(), 2u);
+    const vdtree::Index whole = shared->cuts[0].triangle_count(), half = shared->cuts[1].triangle_count();
+    EXPECT_EQ(shared->stats.triangles, whole + half);
+    EXPECT_LE(whole + half, 1500u);
+    EXPECT_GT(whole + half, 1400u);
+    EXPECT_GT(whole, half) << "what is smaller needs fewer";
+    EXPECT_EQ(shared->mesh(1).triangles.size(), half);
+    EXPECT_EQ(shared->source_triangles, session.tree(0).triangle_count() + session.tree(1).triangle_count());
+    const auto filled = session.simplify({.goal = Goal::budget(1500, true)});
+    ASSERT_FALSE(filled);
+    EXPECT_THAT(filled.error().message, HasSubstr("request.goal.fill"));
+}
+
+TEST(Session, FoldsObjectsBeforeTheLuminanceOfAll) {
+    // A white object behind may be uncovered by the outline of a grey one, so this keeps more than it would alone.
+    vdtree::Mesh grey = shapes::bumpy_sphere(4, 0.03), white = shapes::cube(2);
+    grey.colours.assign(grey.positions.size(), glm::vec4(0.2f, 0.2f, 0.2f, 1));
+    white.colours.assign(white.positions.size(), glm::vec4(1));
+    const auto triangles_of_grey = [](Session& session) {
+        vdtree::View view = session.default_view();
+        view.eye = {0, 0, 20};
+        view.target = {0, 0, 0};
+        auto simplified = session.simplify(view, {.fold_test = FoldTest::luebke_hallen});
+        return simplified->cuts[0].triangle_count();
+    };
+    session::Scene both = session::Scene::of(tree_of(grey));
+    both.objects.push_back({tree_of(white), {.translation = {0, 0, -5}}});
+    auto alone = Session::create(session::Scene::of(tree_of(grey)));
+    auto together = Session::create(std::move(both));
+    EXPECT_GT(triangles_of_grey(*together), triangles_of_grey(*alone));
+}
+
+TEST(Session, FramesAllObjectsWhereTheyArePlaced) {
+    const Session session = two_balls();
+    const session::WorldSphere sphere = session.bounding_sphere();
+    EXPECT_NEAR(sphere.radius, 2.75, 0.3);
+    EXPECT_NEAR(sphere.centre.x, 1.75, 0.3);
+    EXPECT_EQ(session.default_view().target, sphere.centre);
+}
+
+TEST(Follower, ComesWhereACutFromScratchIs) {
+    Session session = two_balls();
+    session::Follower follower(session);
+    const Request request = {.fold_test = FoldTest::luebke_hallen, .purpose = session::Purpose::picture};
+    vdtree::View view = session.default_view();
+    for (int frame = 0; frame < 5; ++frame) {
+        view.eye.x += 0.2;
+        const auto followed = follower.follow(view, request);
+        ASSERT_TRUE(followed);
+        const auto anew = session.simplify(view, request);
+        ASSERT_TRUE(anew);
+        for (std::size_t object = 0; object < 2; ++object)
+            EXPECT_EQ(follower.cut(object).triangle_count(), anew->cuts[object].triangle_count()) << "frame " << frame;
+    }
+}
+
+TEST(Follower, OutlivesItsSessionAndTakesUpMeasuredTrees) {
+    std::optional<session::Follower> follower;
+    vdtree::View view;
+    {
+        auto session = Session::create(session::Scene::of(tree_of(shapes::bumpy_sphere(3, 0.03))));
+        view = session->default_view();
+        follower.emplace(*session);
+    }
+    const auto whole = follower->follow(view, {.goal = Goal::full()});
+    ASSERT_TRUE(whole);
+    EXPECT_EQ(whole->stats.triangles, whole->source_triangles);
+    const auto folded = follower->follow(view, {}); // by errors that are measured now: of another tree
+    ASSERT_TRUE(folded);
+    EXPECT_EQ(folded->fold_tests.front(), FoldTest::error);
+    EXPECT_FALSE(follower->cut().tree().fold_errors().empty());
+    EXPECT_LT(folded->stats.triangles, whole->stats.triangles);
+}
+
+} // namespace
