@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "fold_kernel.h"
+#include "deadline_kernel.h"
 #include "prefetch.h"
 
 namespace unseen::vdtree {

@@ -219,7 +219,7 @@ void WatchList::set_deadlines(std::span<const Slot> slots, const TestBatch& test
     DueBatch dues;
     dues.facing_clock = facing_clock_float_.early;
     dues.longest = cutting.longest;
-    dues.hair = cutting.hair;
+    dues.margin = cutting.hair;
     for (std::size_t i = 0; i < kernel_lanes; ++i) {
         const std::size_t block = slots[i < slots.size() ? i : 0] / block_slots;
         dues.passed[i] = spheres_.error[block] + position_clock_float_;

@@ -9,7 +9,7 @@
 
 #include <glm/vec3.hpp>
 
-#include "fold_kernel.h"
+#include "deadline_kernel.h"
 #include "fold_tester.h"
 #include "side_deadlines.h"
 
