@@ -62,7 +62,7 @@ void CutFollower::make_tester(const DistanceCriterion& criterion) {
     watches_ancestors_ = !criterion.is_monotone();
 }
 
-AdjustStats CutFollower::follow(Cut& cut, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
+AdjustStats CutFollower::follow(CutState& cut, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
                                 const FollowOptions& options) {
     stats_ = {};
     time_limit_.reset();
@@ -134,7 +134,7 @@ void CutFollower::look_from(const Viewpoint& viewpoint) {
     hair_ = static_cast<float>(2 * farthest) * test_rounding;
 }
 
-void CutFollower::follow_threshold(Cut& cut, const Viewpoint& viewpoint, const Motion& motion) {
+void CutFollower::follow_threshold(CutState& cut, const Viewpoint& viewpoint, const Motion& motion) {
     if (!(motion.position < longest_step * length_per_radian_)) {
         start_at(viewpoint);
         if (time_limit_) start_in_time(cut);
@@ -148,7 +148,7 @@ void CutFollower::follow_threshold(Cut& cut, const Viewpoint& viewpoint, const M
 
 // ---- budgets
 
-void CutFollower::follow_budget(Cut& cut, const Viewpoint& viewpoint, const Motion& motion) {
+void CutFollower::follow_budget(CutState& cut, const Viewpoint& viewpoint, const Motion& motion) {
     const bool is_exact = options_.hysteresis <= 1 || options_.fill_budget;
     if (is_exact || !(motion.position < longest_step * length_per_radian_)) {
         start_at(viewpoint);
@@ -164,7 +164,7 @@ void CutFollower::follow_budget(Cut& cut, const Viewpoint& viewpoint, const Moti
     cut.end_changes(stats_);
 }
 
-void CutFollower::start_with_budget(Cut& cut) { cut.change_to(decide_with_budget(), stats_); }
+void CutFollower::start_with_budget(CutState& cut) { cut.change_to(decide_with_budget(), stats_); }
 
 // The best cut within the budget. What to watch for hysteresis is left to the next call.
 std::vector<std::uint64_t> CutFollower::decide_with_budget() {
@@ -194,7 +194,7 @@ float CutFollower::keeping_factor() const {
 // Steps at the threshold there is, and moves it where the triangles have become too many, or so few that a better one
 // can be expected. Every change of the threshold by `factor` moves all distances by that factor: at most
 // (factor - 1) times twice the farthest point's distance for nodes whose slack was cut to that, as an advance of the clock.
-void CutFollower::keep_within_budget(Cut& cut) {
+void CutFollower::keep_within_budget(CutState& cut) {
     const double budget = *options_.triangle_budget;
     // The number of triangles goes about with the inverse square of the threshold.
     const double enough = budget / std::sqrt(static_cast<double>(options_.hysteresis));
@@ -220,7 +220,7 @@ void CutFollower::keep_within_budget(Cut& cut) {
     cut.change_further(decide_with_budget());
 }
 
-void CutFollower::change_threshold(Cut& cut, float factor) {
+void CutFollower::change_threshold(CutState& cut, float factor) {
     threshold_ = std::max(threshold_ * factor, least_threshold);
     tester_->set_threshold(threshold_);
     const double share = factor > 1 ? factor - 1 : 1 / factor - 1;
@@ -231,7 +231,7 @@ void CutFollower::change_threshold(Cut& cut, float factor) {
 // ---- from scratch
 
 // Deadlines are left to the first frame that needs some: after a jump there may be another one.
-void CutFollower::start_over(Cut& cut) {
+void CutFollower::start_over(CutState& cut) {
     is_tracking_ = true;
     max_fold_cost_ = threshold_;
     watch_nothing();
@@ -248,7 +248,7 @@ std::vector<std::uint64_t> CutFollower::decide_all() {
 }
 
 // The worst folds first, as far as the time goes; the next call finds what to watch.
-void CutFollower::start_in_time(Cut& cut) {
+void CutFollower::start_in_time(CutState& cut) {
     const VertexTree* const tree = &tree_;
     const CostSource* const source = &*tester_;
     const auto is_out = [this] { return is_out_of_deciding_time(); };
@@ -272,7 +272,7 @@ void CutFollower::watch_nothing() {
 }
 
 // What can change next, from a cut of which nothing is watched: all due, or tested, with what folds and unfolds for it.
-void CutFollower::watch_all(const Cut& cut, Deadlines deadlines) {
+void CutFollower::watch_all(const CutState& cut, Deadlines deadlines) {
     watch_nothing();
     find_border(cut);
     watched_.reserve(next_wave_.size());
@@ -293,10 +293,10 @@ void CutFollower::watch_all(const Cut& cut, Deadlines deadlines) {
 }
 
 // The nodes to watch, in about their order, as the next wave.
-void CutFollower::find_border(const Cut& cut) {
+void CutFollower::find_border(const CutState& cut) {
     unfolding_.clear();
-    for (std::size_t word = 0; word < cut.unfolded_.size(); ++word)
-        for (std::uint64_t bits = cut.unfolded_[word]; bits; bits &= bits - 1)
+    for (std::size_t word = 0; word < cut.unfolded().size(); ++word)
+        for (std::uint64_t bits = cut.unfolded()[word]; bits; bits &= bits - 1)
             unfolding_.push_back(static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))));
     next_wave_.clear();
     if (unfolding_.empty()) next_wave_.push_back(VertexTree::root());
@@ -322,7 +322,7 @@ bool CutFollower::is_out_of_deciding_time() const {
 
 // ---- from frame to frame
 
-void CutFollower::step(Cut& cut, const Motion& motion) {
+void CutFollower::step(CutState& cut, const Motion& motion) {
     if (watched_.empty() && !time_limit_) {
         if (!(motion.position < step_worth_deadlines * length_per_radian_)) return start_over(cut);
         cut.begin_changes();
@@ -346,13 +346,13 @@ void CutFollower::step(Cut& cut, const Motion& motion) {
     cut.end_changes(stats_);
 }
 
-void CutFollower::settle_due(Cut& cut) {
+void CutFollower::settle_due(CutState& cut) {
     if (time_limit_) settle_in_time(cut);
     else settle(cut, watched_.collect_due());
 }
 
 // Tests what is due, folds what has to go, and unfolds what has to come, with all that follows above and under it.
-void CutFollower::settle(Cut& cut, std::span<const Slot> due) {
+void CutFollower::settle(CutState& cut, std::span<const Slot> due) {
     begin_settling();
     constexpr std::size_t piece = 2048; // what their tests read and write stays in the cache
     for (std::size_t first = 0; first < due.size(); first += piece) test_due(due.subspan(first, std::min(piece, due.size() - first)));
@@ -361,7 +361,7 @@ void CutFollower::settle(Cut& cut, std::span<const Slot> due) {
 
 // The same in small steps, as many as the time is enough for: at least one of tests and folds, and one of unfolds. Both get the same time,
 // for what is not tested keeps what is unfolded from being right, and unfolds alone make the cut better. What is left to do is kept.
-void CutFollower::settle_in_time(Cut& cut) {
+void CutFollower::settle_in_time(CutState& cut) {
     using Clock = std::chrono::steady_clock;
     begin_settling();
     if (waiting_.size() > watched_.size()) drop_idle();
@@ -402,14 +402,14 @@ void CutFollower::begin_settling() {
     wave_.clear();
 }
 
-void CutFollower::finish_folding(Cut& cut) {
+void CutFollower::finish_folding(CutState& cut) {
     while (!folding_.empty() || !parents_.empty()) {
         fold_wave(cut);
         test_parents(cut);
     }
 }
 
-void CutFollower::end_settling(Cut& cut) {
+void CutFollower::end_settling(CutState& cut) {
     finish_folding(cut);
     for (const Waiting& waiting : waiting_) { // of calls with a time limit
         if (!waits(waiting.node)) continue;
@@ -458,7 +458,7 @@ void CutFollower::test_slots(std::span<const Slot> slots) {
 }
 
 // What the follower itself will read and write, too.
-void CutFollower::prefetch_changes(Cut& cut, std::span<const NodeId> nodes, bool folds) {
+void CutFollower::prefetch_changes(CutState& cut, std::span<const NodeId> nodes, bool folds) {
     for (const NodeId node : nodes) {
         watched_.prefetch_slot(node);
         prefetch(&tree_.parents()[node]);
@@ -468,13 +468,13 @@ void CutFollower::prefetch_changes(Cut& cut, std::span<const NodeId> nodes, bool
         watched_.prefetch_deadlines(node);
         if (const NodeId parent = tree_.parents()[node]; parent != no_node) watched_.prefetch_slot(parent);
     }
-    for (const NodeId child : cut.soon_) {
+    for (const NodeId child : cut.fetched_children()) {
         if (tree_.is_leaf(child)) continue;
         watched_.prefetch_slot(child);
         if (!folds) tester_->prefetch(child);
     }
     if (folds) {
-        for (const NodeId child : cut.soon_)
+        for (const NodeId child : cut.fetched_children())
             if (!tree_.is_leaf(child)) watched_.prefetch_deadlines(child);
     } else {
         for (const NodeId node : nodes)
@@ -483,7 +483,7 @@ void CutFollower::prefetch_changes(Cut& cut, std::span<const NodeId> nodes, bool
 }
 
 // Folds with all that is under it what the last tests want folded, the lowest nodes first; what is above may want to fold now.
-void CutFollower::fold_wave(Cut& cut) {
+void CutFollower::fold_wave(CutState& cut) {
     std::sort(folding_.begin(), folding_.end(), std::greater<>());
     const auto subtree_end = tree_.subtree_end();
     for (std::size_t i = 0; i < folding_.size(); ++i) {
@@ -512,7 +512,7 @@ void CutFollower::ask_parent(NodeId node) {
 }
 
 // Nodes that are watched are left to their deadlines.
-void CutFollower::test_parents(const Cut& cut) {
+void CutFollower::test_parents(const CutState& cut) {
     std::sort(parents_.begin(), parents_.end());
     parents_.erase(std::unique(parents_.begin(), parents_.end()), parents_.end());
     std::erase_if(parents_, [&](NodeId node) { return !cut.is_unfolded_interior(node) || watched_.slot_of(node) != no_slot; });
@@ -533,7 +533,7 @@ void CutFollower::test_parents(const Cut& cut) {
     stats_.node_tests += parent_candidates_.size();
     for (std::size_t i = 0; i < parent_candidates_.size(); ++i) {
         const NodeId node = parent_candidates_[i].node;
-        if (!verdicts_[i].unfolded || !has_unfolded_child(node, cut.unfolded_))
+        if (!verdicts_[i].unfolded || !has_unfolded_child(node, cut.unfolded()))
             set_deadlines(watched_.insert(parent_candidates_[i], near_children_of(node)), verdicts_[i]);
         if (!verdicts_[i].unfolded) folding_.push_back(node);
         else if (stands_by_a_hair(verdicts_[i])) ask_parent(node);
@@ -548,7 +548,7 @@ void CutFollower::use_threshold_of(bool unfolded) {
 }
 
 // Watches the children of what has unfolded, too: they are the next wave.
-void CutFollower::apply_unfold(Cut& cut, NodeId node, std::span<const NodeId> children) {
+void CutFollower::apply_unfold(CutState& cut, NodeId node, std::span<const NodeId> children) {
     cut.apply_unfold(node, children);
     watched_.set_unfolded(watched_.slot_of(node), true);
     if (node != VertexTree::root() && !watches_ancestors_) watched_.remove(tree_.parents()[node]);
@@ -568,7 +568,7 @@ void CutFollower::test_next_wave() {
 }
 
 // What unfolds, and then what unfolds under it.
-void CutFollower::unfold_wave(Cut& cut) {
+void CutFollower::unfold_wave(CutState& cut) {
     std::sort(wave_.begin(), wave_.end());
     next_wave_.clear();
     while (!wave_.empty()) {
@@ -615,7 +615,7 @@ NodeId CutFollower::pop_waiting() {
 }
 
 // Brings what waits to the top; false where there is none, or no room for it in a budget.
-bool CutFollower::find_worst(const Cut& cut, Index more) {
+bool CutFollower::find_worst(const CutState& cut, Index more) {
     while (!waiting_.empty() && !waits(waiting_.front().node)) pop_waiting();
     if (waiting_.empty()) return false;
     const auto first = tree_.first_triangle();
@@ -623,7 +623,7 @@ bool CutFollower::find_worst(const Cut& cut, Index more) {
     return !options_.triangle_budget || std::uint64_t{cut.triangle_count()} + more + (first[node + 1] - first[node]) <= *options_.triangle_budget;
 }
 
-void CutFollower::unfold_worst(Cut& cut) {
+void CutFollower::unfold_worst(CutState& cut) {
     Index triangles = 0;
     while (wave_.size() < unfolds_in_time && find_worst(cut, triangles)) {
         const NodeId node = pop_waiting();

@@ -11,6 +11,7 @@
 
 #include <vdtree/cut.h>
 
+#include "cut_state.h"
 #include "decide_tree.h"
 #include "fold_tester.h"
 #include "watch_list.h"
@@ -28,7 +29,7 @@ public:
     explicit CutFollower(const VertexTree& tree) : tree_(tree), watched_(tree.interior_count()) {}
 
     // Brings the cut to what the criterion and the options ask for.
-    AdjustStats follow(Cut& cut, const DistanceCriterion& criterion, const Viewpoint& viewpoint, const FollowOptions& options);
+    AdjustStats follow(CutState& cut, const DistanceCriterion& criterion, const Viewpoint& viewpoint, const FollowOptions& options);
     // The cut was changed by others.
     void forget() noexcept { is_tracking_ = false; }
     std::uint64_t byte_size() const noexcept;
@@ -44,32 +45,32 @@ private:
     void start_at(const Viewpoint& viewpoint);
     void move_to(const Viewpoint& viewpoint, const Motion& motion);
     void look_from(const Viewpoint& viewpoint);
-    void follow_threshold(Cut& cut, const Viewpoint& viewpoint, const Motion& motion);
-    void follow_budget(Cut& cut, const Viewpoint& viewpoint, const Motion& motion);
-    void keep_within_budget(Cut& cut);
-    void change_threshold(Cut& cut, float factor);
-    void start_with_budget(Cut& cut);
+    void follow_threshold(CutState& cut, const Viewpoint& viewpoint, const Motion& motion);
+    void follow_budget(CutState& cut, const Viewpoint& viewpoint, const Motion& motion);
+    void keep_within_budget(CutState& cut);
+    void change_threshold(CutState& cut, float factor);
+    void start_with_budget(CutState& cut);
     std::vector<std::uint64_t> decide_with_budget();
-    void start_over(Cut& cut);
+    void start_over(CutState& cut);
     bool is_out_of_deciding_time() const;
-    void start_in_time(Cut& cut);
+    void start_in_time(CutState& cut);
     enum class Deadlines { now, found };
-    void watch_all(const Cut& cut, Deadlines deadlines);
-    void find_border(const Cut& cut);
+    void watch_all(const CutState& cut, Deadlines deadlines);
+    void find_border(const CutState& cut);
     std::vector<std::uint64_t> decide_all();
-    void step(Cut& cut, const Motion& motion);
+    void step(CutState& cut, const Motion& motion);
     bool is_out_of_time() const;
-    void settle_due(Cut& cut);
-    void settle(Cut& cut, std::span<const Slot> due);
-    void settle_in_time(Cut& cut);
+    void settle_due(CutState& cut);
+    void settle(CutState& cut, std::span<const Slot> due);
+    void settle_in_time(CutState& cut);
     void begin_settling();
-    void finish_folding(Cut& cut);
-    void end_settling(Cut& cut);
+    void finish_folding(CutState& cut);
+    void end_settling(CutState& cut);
     void test_due(std::span<const Slot> slots);
     void test_slots(std::span<const Slot> slots);
-    void prefetch_changes(Cut& cut, std::span<const NodeId> nodes, bool folds);
-    void fold_wave(Cut& cut);
-    void test_parents(const Cut& cut);
+    void prefetch_changes(CutState& cut, std::span<const NodeId> nodes, bool folds);
+    void fold_wave(CutState& cut);
+    void test_parents(const CutState& cut);
     void use_threshold_of(bool unfolded);
     bool stands_by_a_hair(const Verdict& verdict) const {
         return !(std::min({verdict.position_slack, verdict.facing_slack, verdict.plane_slack, verdict.light_slack}) >
@@ -82,17 +83,17 @@ private:
     }
     void ask_parent(NodeId node);
     float keeping_factor() const;
-    void unfold_wave(Cut& cut);
+    void unfold_wave(CutState& cut);
     void test_next_wave();
-    void unfold_worst(Cut& cut);
+    void unfold_worst(CutState& cut);
     void let_wave_wait();
     bool waits(NodeId node) const;
     NodeId pop_waiting();
-    bool find_worst(const Cut& cut, Index more = 0);
+    bool find_worst(const CutState& cut, Index more = 0);
     void drop_idle();
     float largest_cost_left() const;
     void watch_nothing();
-    void apply_unfold(Cut& cut, NodeId node, std::span<const NodeId> children);
+    void apply_unfold(CutState& cut, NodeId node, std::span<const NodeId> children);
     bool has_unfolded_child(NodeId node, std::span<const std::uint64_t> unfolded) const;
     Slot near_children_of(NodeId node) const;
     void set_deadlines(Slot slot, const Verdict& verdict);

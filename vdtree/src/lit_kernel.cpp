@@ -5,11 +5,11 @@
 
 #include <glm/geometric.hpp>
 
+#include "simd.h"
+
 namespace unseen::vdtree {
 
 namespace {
-
-#define UNSEEN_INLINE __attribute__((always_inline)) inline
 
 // Covers the rounding of some dozens of operations on floats, as a share and as relative luminance.
 constexpr float range_rounding = 1e-5f;
@@ -96,86 +96,128 @@ UNSEEN_INLINE float step_of(float cosine, float outer, float inner) {
     return t * t * (3 - 2 * t);
 }
 
-// One light on one lane.
-template <LightSource::Kind kind, bool shines>
-UNSEEN_INLINE void add(const KernelLights& all, const KernelLights::Light& light, LitBatch& b, std::size_t i) {
-    const float centre[3] = {b.centre[0][i], b.centre[1][i], b.centre[2][i]};
-    const float at_centre = std::abs(centre[0]) + std::abs(centre[1]) + std::abs(centre[2]);
-    const float radius = b.radius[i] + position_rounding * (at_centre + b.radius[i]);
-    const float ah = b.largest_albedo[i], al = b.least_albedo[i];
+// What a light sends to a vertex with the normal n and the albedo r is
+//
+//     L = I (n.l)+ (r + k (n.h)+^e),      h = (l + v) / |l + v|,
+//
+// where I is its intensity there, l and v are the directions to the light and to the eye, ()+ is no less than 0, and k and e are the
+// highlight's. Of a node's vertices it is known that their normals are in a cone (and in a box), their albedos in an interval, and their places in a
+// sphere. With the largest and least values of each factor over these,
+//
+//     L <= I_most (n.l)_most (r_most + k (n.h)_most^e),      L >= I_least (n.l)_least (r_least + k (n.h)_least^e).
+//
+// Each factor also has a rate: by how much it changes at most while the lights move by 1 (see light_motion()), for moves up to the cap.
 
-    // Where it is, how bright it is there, and how fast that changes.
-    Direction l;
-    float most, least, most_rate, least_rate, spread_rate, cap, growth, fade_rate = 0;
+// A light as a node's sphere sees it.
+struct Beam {
+    Direction to;                // the directions to it
+    float most, least;           // intensity
+    float most_rate, least_rate; // shares of these
+    float spread_rate;           // of most * largest albedo - least * least albedo
+    float fade_rate;             // of the intensity, by a spot's edge
+    float growth;                // of other rates, until the cap
+    float cap;                   // moves, as light_motion() counts them
+};
+
+// The edge of a spot: which share of the intensity comes through, and how fast that changes.
+UNSEEN_INLINE void fade(const KernelLights::Light& light, float largest_albedo, Beam& beam) {
+    const Direction& l = beam.to;
+    const float c = -(l.x * light.direction[0] + l.y * light.direction[1] + l.z * light.direction[2]);
+    const float s = angle_sine(l.x, l.y, l.z, light.direction[0], light.direction[1], light.direction[2]);
+    const Window off_axis = window(c, s, l.anywhere ? -1.0f : l.cosine, l.anywhere ? -1.0f : l.sine);
+    const float moves = l.turn + l.widen + 1, reach = moves * beam.cap;
+    const bool fades = !(off_axis.largest + reach <= light.outer_cosine || off_axis.least - reach >= light.inner_cosine);
+    beam.fade_rate = fades ? light.fade * moves * beam.most : 0.0f;
+    // Rounding of the cosines, where the step is steep.
+    const float inexact = 1e-6f * light.fade;
+    beam.most *= std::min(step_of(off_axis.largest, light.outer_cosine, light.inner_cosine) + inexact, 1.0f);
+    beam.least *= std::max(step_of(off_axis.least, light.outer_cosine, light.inner_cosine) - inexact, 0.0f);
+    beam.spread_rate = beam.most_rate * beam.most * largest_albedo; // the step may keep one and lower the other
+    if (beam.most <= 2 * inexact && !fades) beam.most_rate = beam.spread_rate = 0;
+}
+
+template <LightSource::Kind kind>
+UNSEEN_INLINE Beam beam_of(const KernelLights& all, const KernelLights::Light& light, const float (&centre)[3], float radius, float largest_albedo,
+                           float least_albedo) {
+    Beam beam;
+    beam.fade_rate = 0;
     if constexpr (kind == LightSource::Kind::directional) {
-        l = {light.direction[0], light.direction[1], light.direction[2], 0, 1, 1, 0, false};
-        most = least = light.intensity;
-        most_rate = least_rate = intensity_rate;
-        spread_rate = intensity_rate * light.intensity * (ah - al);
-        cap = longest_turn;
-        growth = turn_growth;
-    } else {
-        float near, far;
-        l = towards(centre, radius + light.inexact, light.position, all.radius, near, far);
-        // So near that a float would not hold it, a light is as bright as any.
-        most = std::min(brightest, light.intensity * squared(std::min(light.distance / near, largest_ratio)));
-        least = l.anywhere ? 0.0f : std::min(brightest, light.intensity * squared(std::min(light.distance / far, largest_ratio)));
-        most_rate = square_rate * all.radius / near + intensity_rate;
-        least_rate = square_rate * all.radius / far + intensity_rate;
-        // Both fall with the distance: their difference changes by the difference of the changes.
-        spread_rate = 2 * all.radius * (cube_growth * most * ah / near - least * al / far) + intensity_rate * (most * ah - least * al);
-        cap = l.sine > steepest_sine ? 0.0f : longest_step * near / all.radius;
-        growth = step_growth;
-        if constexpr (kind == LightSource::Kind::spot) {
-            const float c = -(l.x * light.direction[0] + l.y * light.direction[1] + l.z * light.direction[2]);
-            const float s = angle_sine(l.x, l.y, l.z, light.direction[0], light.direction[1], light.direction[2]);
-            const Window w = window(c, s, l.anywhere ? -1.0f : l.cosine, l.anywhere ? -1.0f : l.sine);
-            const float moves = l.turn + l.widen + 1, reach = moves * cap;
-            const bool fades = !(w.largest + reach <= light.outer_cosine || w.least - reach >= light.inner_cosine);
-            fade_rate = fades ? light.fade * moves * most : 0.0f;
-            // Rounding of the cosines, where the step is steep.
-            const float inexact = 1e-6f * light.fade;
-            most *= std::min(step_of(w.largest, light.outer_cosine, light.inner_cosine) + inexact, 1.0f);
-            least *= std::max(step_of(w.least, light.outer_cosine, light.inner_cosine) - inexact, 0.0f);
-            spread_rate = most_rate * most * ah; // the step may keep one and lower the other
-            if (most <= 2 * inexact && !fades) most_rate = spread_rate = 0;
-        }
+        beam.to = {light.direction[0], light.direction[1], light.direction[2], 0, 1, 1, 0, false};
+        beam.most = beam.least = light.intensity;
+        beam.most_rate = beam.least_rate = intensity_rate;
+        beam.spread_rate = intensity_rate * light.intensity * (largest_albedo - least_albedo);
+        beam.cap = longest_turn;
+        beam.growth = turn_growth;
+        return beam;
     }
+    float near, far;
+    beam.to = towards(centre, radius + light.inexact, light.position, all.radius, near, far);
+    // So near that a float would not hold it, a light is as bright as any.
+    beam.most = std::min(brightest, light.intensity * squared(std::min(light.distance / near, largest_ratio)));
+    beam.least = beam.to.anywhere ? 0.0f : std::min(brightest, light.intensity * squared(std::min(light.distance / far, largest_ratio)));
+    beam.most_rate = square_rate * all.radius / near + intensity_rate;
+    beam.least_rate = square_rate * all.radius / far + intensity_rate;
+    // Both fall with the distance: their difference changes by the difference of the changes.
+    beam.spread_rate = 2 * all.radius * (cube_growth * beam.most * largest_albedo / near - beam.least * least_albedo / far) +
+                       intensity_rate * (beam.most * largest_albedo - beam.least * least_albedo);
+    beam.cap = beam.to.sine > steepest_sine ? 0.0f : longest_step * near / all.radius;
+    beam.growth = step_growth;
+    if constexpr (kind == LightSource::Kind::spot) fade(light, largest_albedo, beam);
+    return beam;
+}
 
-    // The matt surface.
+// How the lane's normals face a light: the extremes of (n.l)+, and what their rates are made of.
+struct LitFacing {
+    float most, least;
+    float beyond;  // of Window; 0: some of it is lit
+    float nearest; // of the least n.l to 0, from either side
+    bool faces;    // all of it
+    float sine;    // of the half-angle of normals and directions together
+    float moves;   // most change of n.l while the lights move by 1
+};
+UNSEEN_INLINE LitFacing facing_of(const LitBatch& b, std::size_t i, const Direction& l) {
     const float ax = b.axis[0][i], ay = b.axis[1][i], az = b.axis[2][i];
     const float c = ax * l.x + ay * l.y + az * l.z, s = angle_sine(ax, ay, az, l.x, l.y, l.z);
-    const float cg = l.anywhere ? -1.0f : b.cosine[i] * l.cosine - b.sine[i] * l.sine;
-    const float sg = l.anywhere ? -1.0f : b.sine[i] * l.cosine + b.cosine[i] * l.sine;
-    Window facing = window(c, s, cg, sg);
+    const float cosine = l.anywhere ? -1.0f : b.cosine[i] * l.cosine - b.sine[i] * l.sine;
+    const float sine = l.anywhere ? -1.0f : b.sine[i] * l.cosine + b.cosine[i] * l.sine;
+    const Window cone = window(c, s, cosine, sine);
     const BoxBounds box = box_bounds(b, i, l.x, l.y, l.z, l.anywhere ? 4.0f : chord_of(l.sine, l.cosine));
-    facing.largest = std::min(facing.largest, box.largest);
-    facing.least = std::max(facing.least, box.least);
-    facing.beyond = std::max(-facing.largest, 0.0f);
-    const float u = std::max(facing.largest, 0.0f), w = std::max(facing.least, 0.0f);
-    const float moves = (l.turn + l.widen) * std::max(b.steepness[i], 1.0f);
-    b.hi[i] += most * u * ah;
-    b.lo[i] += least * w * al;
-    const float rise = growth * most * ah * moves + most_rate * most * ah + fade_rate * ah;
-    const float full = rise + growth * least * al * moves + least_rate * least * al + fade_rate * ah;
-    // Where all of it faces the light, u - w changes by less than 2 sin gamma a radian, or the spread of the box; where some of it faces away, by u alone, and where
-    // all of it does, not at all.
-    const float turning_rate = growth * (least * al * (std::max(2 * std::max(sg, 0.0f), b.spread[i]) * l.turn + 2 * l.widen) + (most * ah - least * al) * moves) +
-                               spread_rate + 2 * fade_rate * ah;
-    const float facing_rate = turning_rate + least_rate * least * al * (u - w);
-    const bool is_dark = facing.beyond > 0, faces = facing.least > 0;
-    b.fine_rate[i] += is_dark ? 0.0f : faces ? facing_rate : rise;
-    // Whichever of these it comes to be; with u at 1 and beyond, lo alone counts.
-    b.rough_rate[i] += std::max(std::max(rise, full - rise), turning_rate + least_rate * least * al);
-    b.fine_sum_rate[i] += is_dark ? 0.0f : faces ? full : rise;
-    const float fine_cap = (is_dark ? facing.beyond : std::abs(facing.least)) / moves;
+    const float largest = std::min(cone.largest, box.largest), least = std::max(cone.least, box.least);
+    return {std::max(largest, 0.0f), std::max(least, 0.0f), std::max(-largest, 0.0f), std::abs(least), least > 0, sine,
+            (l.turn + l.widen) * std::max(b.steepness[i], 1.0f)};
+}
+
+// The matt surface: I (n.l)+ r.
+UNSEEN_INLINE void add_matt(const Beam& beam, const LitFacing& facing, LitBatch& b, std::size_t i) {
+    const float largest_albedo = b.largest_albedo[i], least_albedo = b.least_albedo[i], moves = facing.moves;
+    b.hi[i] += beam.most * facing.most * largest_albedo;
+    b.lo[i] += beam.least * facing.least * least_albedo;
+    const float rise = beam.growth * beam.most * largest_albedo * moves + beam.most_rate * beam.most * largest_albedo + beam.fade_rate * largest_albedo;
+    const float full = rise + beam.growth * beam.least * least_albedo * moves + beam.least_rate * beam.least * least_albedo + beam.fade_rate * largest_albedo;
+    // Where all of it faces the light, the difference of the extremes of n.l changes by less than 2 sine a radian, or the spread of the box;
+    // where some of it faces away, by the largest alone, and where all of it does, not at all.
+    const float turning_rate =
+        beam.growth * (beam.least * least_albedo * (std::max(2 * std::max(facing.sine, 0.0f), b.spread[i]) * beam.to.turn + 2 * beam.to.widen) +
+                       (beam.most * largest_albedo - beam.least * least_albedo) * moves) +
+        beam.spread_rate + 2 * beam.fade_rate * largest_albedo;
+    const float facing_rate = turning_rate + beam.least_rate * beam.least * least_albedo * (facing.most - facing.least);
+    const bool is_dark = facing.beyond > 0;
+    b.fine_rate[i] += is_dark ? 0.0f : facing.faces ? facing_rate : rise;
+    // Whichever of these it comes to be; with the largest n.l at 1 and beyond, lo alone counts.
+    b.rough_rate[i] += std::max(std::max(rise, full - rise), turning_rate + beam.least_rate * beam.least * least_albedo);
+    b.fine_sum_rate[i] += is_dark ? 0.0f : facing.faces ? full : rise;
+    const float fine_cap = (is_dark ? facing.beyond : facing.nearest) / moves;
     b.full_rate[i] += full;
     b.rise_rate[i] += rise;
     b.fine_cap[i] = std::min(b.fine_cap[i], fine_cap);
-    b.cap[i] = std::min(b.cap[i], l.anywhere ? 0.0f : cap);
+    b.cap[i] = std::min(b.cap[i], beam.to.anywhere ? 0.0f : beam.cap);
+}
 
-    // The highlight.
-    if constexpr (!shines) return;
+// The highlight: I (n.l)+ k (n.h)+^e. Its steps have no rates: as far as the cap allows them, they are part of the jump.
+UNSEEN_INLINE void add_highlight(const KernelLights& all, const Beam& beam, const LitFacing& facing, const float (&centre)[3], float radius, LitBatch& b,
+                                 std::size_t i) {
+    const Direction& l = beam.to;
+    const float ax = b.axis[0][i], ay = b.axis[1][i], az = b.axis[2][i];
     float near_eye, far_eye;
     const Direction v = towards(centre, radius + all.eye_inexact, all.eye, all.radius, near_eye, far_eye);
     const float x = l.x + v.x, y = l.y + v.y, z = l.z + v.z;
@@ -183,8 +225,8 @@ UNSEEN_INLINE void add(const KernelLights& all, const KernelLights::Light& light
     // How far from their sum's direction the sum of two directions can be that differ by these chords from the centre's.
     const auto chord = [](const Direction& d) { return d.anywhere ? 2.0f : chord_of(d.sine, d.cosine); };
     const float chords = chord(l) + chord(v) + 1e-6f;
-    const float hc = (ax * x + ay * y + az * z) * inverse, hs = angle_sine(ax, ay, az, x, y, z) * inverse;
-    const auto highlight = [&](float total, bool largest) {
+    const float hc = (ax * x + ay * y + az * z) * inverse, hs = angle_sine(ax, ay, az, x, y, z) * inverse; // of the axis and h
+    const auto highlight = [&](float total, bool largest) { // (n.h)+^e
         const float sine = total * inverse;
         if (!(sine < 1)) return largest ? 1.0f : 0.0f;
         const float cosine = std::sqrt(1 - sine * sine);
@@ -194,13 +236,25 @@ UNSEEN_INLINE void add(const KernelLights& all, const KernelLights::Light& light
         const float base = largest ? std::min(std::min(h.largest, within.largest) + 2e-7f, 1.0f) : std::max(h.least, within.least) - 2e-7f;
         return base > 0 ? std::pow(base, all.shininess) : 0.0f;
     };
-    b.hi[i] += all.specular * most * u * highlight(chords, true);
-    b.lo[i] += all.specular * least * w * highlight(chords, false);
-    const float window_cap = v.sine > steepest_sine ? 0.0f
-                                                    : std::min({b.cap[i], longest_step * near_eye / all.radius,
-                                                                longest_highlight_turn / (moves + v.turn + v.widen)});
+    b.hi[i] += all.specular * beam.most * facing.most * highlight(chords, true);
+    b.lo[i] += all.specular * beam.least * facing.least * highlight(chords, false);
+    const float all_moves = facing.moves + v.turn + v.widen;
+    const float window_cap =
+        v.sine > steepest_sine ? 0.0f : std::min({b.cap[i], longest_step * near_eye / all.radius, longest_highlight_turn / all_moves});
     b.cap[i] = window_cap;
-    b.jump[i] += all.specular * most * step_growth * highlight(chords + (moves + v.turn + v.widen) * window_cap, true);
+    b.jump[i] += all.specular * beam.most * step_growth * highlight(chords + all_moves * window_cap, true);
+}
+
+// One light on one lane.
+template <LightSource::Kind kind, bool shines>
+UNSEEN_INLINE void add(const KernelLights& all, const KernelLights::Light& light, LitBatch& b, std::size_t i) {
+    const float centre[3] = {b.centre[0][i], b.centre[1][i], b.centre[2][i]};
+    const float at_centre = std::abs(centre[0]) + std::abs(centre[1]) + std::abs(centre[2]);
+    const float radius = b.radius[i] + position_rounding * (at_centre + b.radius[i]);
+    const Beam beam = beam_of<kind>(all, light, centre, radius, b.largest_albedo[i], b.least_albedo[i]);
+    const LitFacing facing = facing_of(b, i, beam.to);
+    add_matt(beam, facing, b, i);
+    if constexpr (shines) add_highlight(all, beam, facing, centre, radius, b, i);
 }
 
 template <bool shines>
@@ -256,13 +310,7 @@ UNSEEN_INLINE void run(const KernelLights& all, LitBatch& b) {
     }
 }
 
-#if defined(__x86_64__) && defined(__GNUC__)
-[[gnu::target("avx2")]] void run_avx2(const KernelLights& all, LitBatch& b) { run(all, b); }
-const bool has_avx2 = __builtin_cpu_supports("avx2");
-#else
-constexpr bool has_avx2 = false;
-void run_avx2(const KernelLights&, LitBatch&) {}
-#endif
+UNSEEN_AVX2 void run_avx2(const KernelLights& all, LitBatch& b) { run(all, b); }
 
 } // namespace
 
@@ -312,7 +360,7 @@ void LitBatch::set(std::size_t lane, const VertexCone& cone, const Sphere& spher
 
 // Neither has fused operations, so both give the same bits.
 void find_ranges(const KernelLights& lights, LitBatch& batch) noexcept {
-    if (has_avx2) run_avx2(lights, batch);
+    if (has_avx2()) run_avx2(lights, batch);
     else run(lights, batch);
 }
 

@@ -2,6 +2,8 @@
 
 #include <cstring>
 
+#include "simd.h"
+
 namespace unseen::vdtree {
 
 void SideDeadlines::clear() {
@@ -56,8 +58,8 @@ void SideDeadlines::find_due_blocks(std::vector<std::uint32_t>& blocks) const {
 }
 
 bool SideDeadlines::hand_over(std::size_t block, std::uint32_t unfolded, BlockDues& dues) {
-    using Floats = float __attribute__((vector_size(16))); // an extension that GCC and Clang share
-    using Ints = std::int32_t __attribute__((vector_size(16)));
+    using Floats = FourWide::Floats;
+    using Ints = FourWide::Ints;
     const Floats none = Floats{} + never;
     Floats earliest_unfolded = none, earliest_folded = none;
     bool any = false;
@@ -76,9 +78,8 @@ bool SideDeadlines::hand_over(std::size_t block, std::uint32_t unfolded, BlockDu
         std::memcpy(&dues_[block].slots[i], &due, sizeof due);
         std::memcpy(&dues.facing[i], &facing, sizeof facing);
     }
-    const auto least = [](const Floats& of) { return std::min(std::min(of[0], of[1]), std::min(of[2], of[3])); };
-    earliest_unfolded_[block] = least(earliest_unfolded);
-    earliest_folded_[block] = least(earliest_folded);
+    earliest_unfolded_[block] = FourWide::least_of(earliest_unfolded);
+    earliest_folded_[block] = FourWide::least_of(earliest_folded);
     return any;
 }
 

@@ -19,8 +19,8 @@
 #include <cstdint>
 #include <cstring>
 
-// GCC tells of an old change in how wide vectors are passed; none is passed but to functions that are inlined.
-#if defined(__GNUC__) && !defined(__clang__)
+// Compilers tell of a change in how wide vectors are passed; none is passed but to functions that are inlined.
+#if defined(__GNUC__)
 #pragma GCC diagnostic ignored "-Wpsabi"
 #endif
 
