@@ -1,20 +1,22 @@
 #include "panel_plot.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
+#include <limits>
+#include <utility>
 
-#include "canvas.h"
+#include "number_format.h"
+#include "plot_style.h"
 
 namespace unseen::app {
 namespace {
 
-constexpr glm::vec3 paper{1.0f}, ink{0.1f}, grid{0.85f};
-constexpr int margin_left = 110, margin_right = 30, margin_top = 46, margin_bottom = 60; // pixels
-constexpr int gap = 34;                                                                 // between panels, for their labels
-constexpr int text_scale = 2;
-constexpr double curve_width = 1.5, dash_px = 8; // pixels
+constexpr glm::vec3 grid{0.85f};
+constexpr double text_height = plot_text_height, text_gap = 6;                             // pixels
+constexpr double margin_left = 96, margin_right = 30, margin_top = 46, margin_bottom = 62; // pixels
+constexpr double gap = 36;          // pixels between panels, for their labels
+constexpr double curve_width = 1.5; // pixels
+constexpr double head_room = 1.05;
 
 // 1, 2 or 5 times a power of ten, so that about `count` of them fill the range.
 double tick_step(double range, int count) {
@@ -26,16 +28,9 @@ double tick_step(double range, int count) {
 }
 
 std::string number(double value) { // 1500000 -> 1.5M
-    const char* suffix = "";
-    for (const auto& [scale, name] : {std::pair{1e9, "G"}, std::pair{1e6, "M"}, std::pair{1e3, "k"}}) {
-        if (value < scale) continue;
-        value /= scale;
-        suffix = name;
-        break;
-    }
-    std::array<char, 32> text;
-    const auto end = std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, 4).ptr;
-    return std::string(text.data(), end) + suffix;
+    for (const auto& [scale, name] : {std::pair{1e9, "G"}, std::pair{1e6, "M"}, std::pair{1e3, "k"}})
+        if (value >= scale) return rounded(value / scale, 4) + name;
+    return rounded(value, 4);
 }
 
 struct Box {
@@ -45,79 +40,108 @@ struct Box {
     }
 };
 
-void draw_grid(Canvas& canvas, const Box& box) {
+void draw_grid(Drawing& drawing, const Box& box) {
     const double y_step = tick_step(box.y_end, 4);
     for (int i = 0; i * y_step <= box.y_end * (1 + 1e-9); ++i) {
-        const glm::dvec2 at = box.place(0, i * y_step);
-        canvas.line(at, {box.right, at.y}, grid);
-        const std::string text = number(i * y_step);
-        canvas.text(static_cast<int>(box.left) - 8 - Canvas::text_width(text, text_scale),
-                    static_cast<int>(at.y) - Canvas::text_height(text_scale) / 2, text, ink, text_scale);
+        const double y = box.place(0, i * y_step).y;
+        drawing.line({box.left, crisp(y)}, {box.right, crisp(y)}, grid);
+        drawing.text({box.left - text_gap, y - text_height / 2}, number(i * y_step), plot_ink, text_height,
+                     Align::right);
     }
     const double x_step = tick_step(box.x_end, 10);
     for (int i = 0; i * x_step <= box.x_end * (1 + 1e-9); ++i) {
-        const glm::dvec2 at = box.place(i * x_step, 0);
-        canvas.line({at.x, box.top}, at, grid);
+        const double x = crisp(box.place(i * x_step, 0).x);
+        drawing.line({x, box.top}, {x, box.bottom}, grid);
     }
-    canvas.line({box.left, box.bottom}, {box.right, box.bottom}, ink);
-    canvas.line({box.left, box.top}, {box.left, box.bottom}, ink);
+    drawing.line({box.left, crisp(box.bottom)}, {box.right, crisp(box.bottom)}, plot_ink);
+    drawing.line({crisp(box.left), box.top}, {crisp(box.left), box.bottom}, plot_ink);
 }
 
-void draw_curve(Canvas& canvas, const Box& box, const Panel& panel) {
+// A value alone between gaps is a dot.
+void draw_curve(Drawing& drawing, const Box& box, const Panel& panel) {
+    constexpr double label_room = 2; // above the box, so that a curve along its top is whole
+    drawing.clip({0, box.top - label_room}, {drawing.width(), box.bottom - box.top + 2 * label_room});
+    std::vector<glm::dvec2> run;
+    const auto end_run = [&] {
+        if (run.size() == 1) run.push_back(run.front());
+        if (!run.empty()) drawing.line(run, panel.colour, curve_width);
+        run.clear();
+    };
     for (std::size_t i = 0; i < panel.values.size(); ++i) {
-        if (!std::isfinite(panel.values[i])) continue;
-        const std::size_t next = std::min(i + 1, panel.values.size() - 1);
-        const double end = std::isfinite(panel.values[next]) ? panel.values[next] : panel.values[i];
-        canvas.line(box.place(static_cast<double>(i), panel.values[i]), box.place(static_cast<double>(next), end),
-                    panel.colour, curve_width);
+        if (std::isfinite(panel.values[i])) run.push_back(box.place(static_cast<double>(i), panel.values[i]));
+        else end_run();
     }
+    end_run();
+    drawing.end_clip();
 }
 
-void draw_panel(Canvas& canvas, const Box& box, const Panel& panel, std::vector<double> finite) {
-    draw_grid(canvas, box);
-    draw_curve(canvas, box, panel);
-    std::string label = panel.label;
-    if (!finite.empty()) {
-        const auto middle = finite.begin() + static_cast<std::ptrdiff_t>(finite.size() / 2);
-        std::nth_element(finite.begin(), middle, finite.end());
-        const double y = box.place(0, *middle).y;
-        for (double x = box.left; x < box.right; x += 2 * dash_px)
-            canvas.line({x, y}, {std::min(x + dash_px, box.right), y}, panel.colour);
-        label += "   median " + number(*middle) + ", largest " + number(*std::max_element(finite.begin(), finite.end()));
+// What a panel's values come to.
+struct Summary {
+    std::vector<double> settled;
+    double first_largest = -std::numeric_limits<double>::infinity(); // of those before
+
+    Summary(const Panel& panel, std::size_t settled_from) {
+        const std::size_t begin = settled_from < panel.values.size() ? settled_from : 0; // of very short ones, all
+        for (std::size_t i = 0; i < panel.values.size(); ++i) {
+            if (!std::isfinite(panel.values[i])) continue;
+            if (i < begin) first_largest = std::max(first_largest, panel.values[i]);
+            else settled.push_back(panel.values[i]);
+        }
     }
-    canvas.text(static_cast<int>(box.left), static_cast<int>(box.top) - Canvas::text_height(text_scale) - 6, label,
-                panel.colour, text_scale);
+    double largest() const { return settled.empty() ? 0 : *std::max_element(settled.begin(), settled.end()); }
+    double median() {
+        const auto middle = settled.begin() + static_cast<std::ptrdiff_t>(settled.size() / 2);
+        std::nth_element(settled.begin(), middle, settled.end());
+        return *middle;
+    }
+};
+
+void draw_panel(Drawing& drawing, const Box& box, const Panel& panel, Summary summary) {
+    draw_grid(drawing, box);
+    draw_curve(drawing, box, panel);
+    std::string label = panel.label;
+    if (!summary.settled.empty()) {
+        const double median = summary.median(), y = box.place(0, median).y;
+        drawing.line({box.left, y}, {box.right, y}, panel.colour, 1, true);
+        label += "   median " + number(median) + ", largest " + number(summary.largest());
+        if (summary.first_largest > box.y_end) label += ", at first " + number(summary.first_largest);
+    }
+    const double height = Drawing::fitting_height(label, text_height, box.right - box.left);
+    drawing.text({box.left, box.top - text_height - text_gap}, label, panel.colour, height);
 }
 
 } // namespace
 
-perception::Image draw(const PanelPlot& plot) {
-    const int count = static_cast<int>(plot.panels.size());
-    const int height = margin_top + count * (plot.panel_height + gap) + margin_bottom;
-    Canvas canvas(plot.width, height, paper);
-    canvas.text((plot.width - Canvas::text_width(plot.title, text_scale)) / 2, 14, plot.title, ink, text_scale);
-    Box box{margin_left, margin_top, static_cast<double>(plot.width - margin_right), margin_top, 1, 1};
+int height_of(const PanelPlot& plot) {
+    return static_cast<int>(margin_top + static_cast<double>(plot.panels.size()) * (plot.panel_height + gap) +
+                            margin_bottom);
+}
+
+void draw(const PanelPlot& plot, Drawing& drawing) {
+    const double room = plot.width - 2 * margin_right, middle = plot.width / 2.0;
+    drawing.text({middle, 12}, plot.title, plot_ink, Drawing::fitting_height(plot.title, text_height, room),
+                 Align::centre);
+    Box box{margin_left, margin_top, plot.width - margin_right, margin_top, 1, 1};
     for (const Panel& panel : plot.panels) {
-        std::vector<double> finite;
-        for (const double value : panel.values)
-            if (std::isfinite(value)) finite.push_back(value);
-        constexpr double head_room = 1.05;
+        const Summary summary(panel, plot.settled_from);
         box.x_end = std::max(1.0, static_cast<double>(panel.values.size()) - 1);
-        box.y_end = finite.empty() ? 1 : *std::max_element(finite.begin(), finite.end()) * head_room;
-        if (!(box.y_end > 0)) box.y_end = 1;
+        box.y_end = summary.largest() > 0 ? summary.largest() * head_room : 1;
         box.top = box.bottom + gap;
         box.bottom = box.top + plot.panel_height;
-        draw_panel(canvas, box, panel, std::move(finite));
+        draw_panel(drawing, box, panel, summary);
     }
     const double x_step = tick_step(box.x_end, 10);
-    for (int i = 0; i * x_step <= box.x_end * (1 + 1e-9); ++i) {
-        const std::string text = number(i * x_step);
-        canvas.text(static_cast<int>(box.place(i * x_step, 0).x) - Canvas::text_width(text, text_scale) / 2,
-                    static_cast<int>(box.bottom) + 8, text, ink, text_scale);
-    }
-    canvas.text((plot.width - Canvas::text_width(plot.x_label, text_scale)) / 2, height - 26, plot.x_label, ink,
-                text_scale);
-    return canvas.image();
+    for (int i = 0; i * x_step <= box.x_end * (1 + 1e-9); ++i)
+        drawing.text({box.place(i * x_step, 0).x, box.bottom + text_gap}, number(i * x_step), plot_ink, text_height,
+                     Align::centre);
+    drawing.text({middle, height_of(plot) - text_height - 12}, plot.x_label, plot_ink, text_height, Align::centre);
+}
+
+Result<void> write_plot(const std::filesystem::path& file, const PanelPlot& plot) {
+    auto drawing = Drawing::for_file(file, plot.width, height_of(plot), plot_paper);
+    if (!drawing) return drawing.error();
+    draw(plot, *drawing);
+    return drawing->write(file);
 }
 
 } // namespace unseen::app

@@ -14,7 +14,6 @@
 #endif
 
 #include "build_team.h"
-#include "command.h"
 #include "fold_test.h"
 #include "memory_plan.h"
 #include "model_file.h"
@@ -25,6 +24,7 @@
 #include "progress_bar.h"
 #include "report.h"
 #include "terminal.h"
+#include "verbs.h"
 
 namespace unseen::app {
 namespace {

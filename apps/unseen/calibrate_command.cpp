@@ -14,13 +14,13 @@
 #include <calibration/simulated_observer.h>
 
 #include "calibration_window.h"
-#include "command.h"
 #include "options.h"
 #include "output_files.h"
 #include "progress_bar.h"
 #include "report.h"
 #include "scene.h"
 #include "terminal.h"
+#include "verbs.h"
 
 namespace unseen::app {
 namespace {

@@ -8,11 +8,11 @@
 #include <perception/image.h>
 #include <perception/judge.h>
 
-#include "command.h"
 #include "output_files.h"
 #include "report.h"
 #include "scene.h"
 #include "terminal.h"
+#include "verbs.h"
 #include "visibility_map.h"
 
 namespace unseen::app {
@@ -117,7 +117,9 @@ double ssim_of(const Pair& pair) {
 
 Result<void> write_maps(const CompareArguments& a, const Verdict& verdict) {
     if (!a.map.empty()) {
-        if (auto ok = perception::write_image(a.map, visibility_map(verdict.judgement.visibility)); !ok) return ok;
+        const auto map = with_colour_bar(visibility_map(verdict.judgement.visibility), visibility_bar());
+        if (!map) return map.error();
+        if (auto ok = perception::write_image(a.map, *map); !ok) return ok;
     }
     if (!verdict.threshold_map) return {};
     auto ok = perception::write_image(a.threshold_map, *verdict.threshold_map);
@@ -193,7 +195,7 @@ Command compare_command(CLI::App& app) {
         ->type_name("DEGREES")
         ->check(within(1e-3, 179.9));
     add_gaze_option(*verb, a->gaze_px);
-    verb->add_option("--map", a->map, "The differences: blue where invisible, yellow to red where visible")
+    verb->add_option("--map", a->map, "The differences, with a scale below: blue where invisible, yellow to red where visible")
         ->type_name("OUT.png")
         ->check(ending_in({".png"}));
     verb->add_option("--threshold-map", a->threshold_map, "The least visible luminance step, in cd/m2")

@@ -15,12 +15,12 @@
 #include <perception/image.h>
 #include <perception/motion.h>
 
-#include "command.h"
+#include "log_log_plot.h"
 #include "options.h"
 #include "output_files.h"
-#include "plot.h"
 #include "scene.h"
 #include "terminal.h"
+#include "verbs.h"
 
 namespace unseen::app {
 namespace {
@@ -272,7 +272,7 @@ Result<int> run_plot(const CsfArguments& a, const Observer& observer) {
     }
     // Coarse gratings that move are seen far better than any that stand.
     plot.y_range.y = std::max(1000.0, std::pow(10.0, std::ceil(std::log10(peak))));
-    if (auto ok = perception::write_image(a.plot, draw(plot)); !ok) return ok.error();
+    if (auto ok = write_plot(a.plot, plot); !ok) return ok.error();
     return exit_done;
 }
 
@@ -359,7 +359,7 @@ Command csf_command(CLI::App& app) {
         ->check(one_of({"nasal", "temporal", "worst"}));
     verb->add_option("--csv", a->csv, "Rows of stimuli, columns named like these options; adds 'sensitivity' to stdout")
         ->type_name("FILE|-");
-    verb->add_option("--plot", a->plot, "Curves over frequency")->type_name("OUT.png")->check(ending_in({".png"}));
+    verb->add_option("--plot", a->plot, "Curves over frequency")->type_name("OUT.png|.svg")->check(ending_in({".png", ".svg"}));
     verb->add_flag("--table", a->by_table, "Through the interpolated table that fold tests use, not the closed form");
     verb->add_option("--csf", a->csf, "Through a model's table, or a viewer's")->type_name("MODEL|FILE");
     verb->add_option("--save-table", a->save, "With --table or --csf: write the table")

@@ -34,7 +34,7 @@ Effect gaze_effect(const WhatOptions& what) {
     const std::string around =
         what.gaze_margin_deg > 0 ? ", give or take " + rounded(what.gaze_margin_deg, 3) + " degrees," : std::string(",");
     return {"gaze", true,
-            "the viewer looks at pixel " + rounded(what.gaze_px->x, 6) + ", " + rounded(what.gaze_px->y, 6) + around +
+            "the viewer looks at pixel " + rounded(what.gaze_px->x, 6) + " from the left and " + rounded(what.gaze_px->y, 6) + " from the top" + around +
                 " and sees less sharply elsewhere"};
 }
 

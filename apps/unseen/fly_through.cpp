@@ -122,10 +122,11 @@ std::vector<double> column(const std::vector<FrameRecord>& frames, Value value) 
     return values;
 }
 
-perception::Image plot_of(const std::vector<FrameRecord>& frames, const std::string& title) {
+PanelPlot plot_of(const std::vector<FrameRecord>& frames, const std::string& title) {
     PanelPlot plot;
     plot.title = title;
     plot.x_label = "frame";
+    plot.settled_from = 1; // the first frame makes the cut, which the others only change
     plot.panels = {
         {"cut and index buffer, ms", {0.75f, 0.2f, 0.1f}, column(frames, [](auto& f) { return f.cut_ms + f.index_ms; })},
         {"triangles", {0.1f, 0.35f, 0.75f}, column(frames, [](auto& f) { return f.stats.triangles; })},
@@ -136,7 +137,7 @@ perception::Image plot_of(const std::vector<FrameRecord>& frames, const std::str
         plot.panels.push_back(
             {"uploaded bytes", {0.7f, 0.45f, 0.0f}, column(frames, [](auto& f) { return f.uploaded_bytes; })});
     }
-    return draw(plot);
+    return plot;
 }
 
 double median(std::vector<double> values) {
@@ -339,7 +340,7 @@ Result<void> fly_through(const std::string& model, const ViewOptions& view, cons
     if (auto ok = report->prepare(to_json(*scene, flight.records(), flight.last())); !ok) return ok;
     if (!options.plot.empty()) {
         const std::string title = grouped(scene->tree.triangle_count()) + " triangles, " + options.path;
-        if (auto ok = perception::write_image(options.plot, plot_of(flight.records(), title)); !ok) return ok;
+        if (auto ok = write_plot(options.plot, plot_of(flight.records(), title)); !ok) return ok;
     }
     if (csv)
         if (auto ok = csv->commit(); !ok) return ok;

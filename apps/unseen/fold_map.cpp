@@ -12,7 +12,7 @@
 #include <perception/criterion.h>
 #include <vdtree/normal_mask.h>
 
-#include "canvas.h"
+#include "colour_bar.h"
 #include "fold_test.h"
 #include "terminal.h"
 
@@ -228,21 +228,12 @@ private:
 
 // ---- the scale below
 
-constexpr int legend_height = 46, margin = 8, bar_height = 10;
-
-void draw_legend(Canvas& canvas, int top, const Scale& scale) {
-    const int left = margin, right = canvas.width() - margin;
-    for (int x = left; x < right; ++x)
-        canvas.fill(x, top + margin, 1, bar_height, colour_at(static_cast<double>(x - left) / std::max(1, right - left - 1)));
-    constexpr glm::vec3 ink{0.95f};
-    for (const double tick : scale.ticks) {
-        const std::string text = rounded(tick, 2);
-        const int x = left + static_cast<int>(std::lround(scale.place(tick) * (right - left - 1)));
-        canvas.fill(x, top + margin, 1, bar_height + 3, ink);
-        canvas.text(std::clamp(x - Canvas::text_width(text) / 2, 0, std::max(0, canvas.width() - Canvas::text_width(text))),
-                    top + margin + bar_height + 5, text, ink);
-    }
-    canvas.text(left, top + legend_height - Canvas::text_height(), scale.unit, glm::vec3(0.7f));
+ColourBar bar_of(const Scale& scale) {
+    ColourBar bar;
+    bar.colour_at = colour_at;
+    for (const double tick : scale.ticks) bar.ticks.push_back({scale.place(tick), rounded(tick, 2)});
+    bar.unit = scale.unit;
+    return bar;
 }
 
 } // namespace
@@ -274,19 +265,19 @@ Result<Image> draw_fold_map(const vdtree::Cut& cut, const Scene& scene, const Wh
             for (int x = 0; x < view.width; ++x)
                 if (const NodeId node = raster.node_at(x, y); node < scene.tree.interior_count()) largest = std::max(largest, value(node));
     const Scale scale = scale_of(map, scene, largest);
-    Canvas canvas(view.width, view.height + legend_height, background);
+    Image image{view.width, view.height, 3, {}};
+    image.values.reserve(image.index(0, view.height, 0));
     for (int y = 0; y < view.height; ++y) {
         for (int x = 0; x < view.width; ++x) {
             const NodeId node = raster.node_at(x, y);
-            if (node == vdtree::no_node) continue;
-            const bool is_folded = node < scene.tree.interior_count();
+            const bool is_covered = node != vdtree::no_node, is_folded = is_covered && node < scene.tree.interior_count();
             const double v = is_folded ? value(node) : 0;
             const bool is_more = is_folded && map == FoldMap::cost && !(v <= 1);
-            canvas.fill(x, y, 1, 1, !is_folded ? unfolded : is_more ? too_much : colour_at(scale.place(v)));
+            const glm::vec3 colour = !is_covered ? background : !is_folded ? unfolded : is_more ? too_much : colour_at(scale.place(v));
+            image.values.insert(image.values.end(), {colour.r, colour.g, colour.b});
         }
     }
-    draw_legend(canvas, view.height, scale);
-    return canvas.image();
+    return with_colour_bar(image, bar_of(scale));
 }
 
 } // namespace unseen::app

@@ -114,8 +114,11 @@ Result<vdtree::DistanceCriterion> make_criterion(const Scene& scene, const WhatO
         options.gaze_px = glm::dvec2(scene.view.width * 0.5 + *key.farthest_gaze_px, scene.view.height * 0.5);
     if (scene.lighting) return perception::lit_distances(scene.tree, scene.light_bounds, scene.view, options);
     if (what.test() == FoldTest::luebke_hallen) return perception::luebke_hallen_distances(scene.tree, scene.view, options);
-    if (what.test() == FoldTest::luebke_hallen_safe)
-        return perception::luebke_hallen_safe_distances(scene.tree, scene.cut_rings(), scene.view, options);
+    if (what.test() == FoldTest::luebke_hallen_safe) {
+        const auto rings = scene.cut_rings();
+        if (!rings) return rings.error();
+        return perception::luebke_hallen_safe_distances(scene.tree, **rings, scene.view, options);
+    }
     return perception::error_distances(scene.tree, scene.view, options);
 }
 

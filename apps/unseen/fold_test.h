@@ -23,7 +23,8 @@ enum class Purpose {
 // `may_measure` allows for measuring them, which it does not of a very large tree.
 ChosenTest suitable_test(const Scene& scene, bool chroma, bool may_measure);
 
-// The tree with its light conserved and the errors of its folds measured, as the test error goes by them. `threads`: 0: all cores.
+// The tree with its light conserved and the errors of its folds measured, as the test error goes by them. `threads`: 0:
+// all cores.
 Result<vdtree::VertexTree> measured(const vdtree::VertexTree& tree, int threads = 0);
 
 // To be called before anything is cut. Where no test was asked for, takes one that is suitable; fails where one was asked for that does not know

@@ -3,12 +3,12 @@
 #include <filesystem>
 #include <memory>
 
-#include "command.h"
 #include "model_file.h"
 #include "options.h"
 #include "progress_bar.h"
 #include "report.h"
 #include "terminal.h"
+#include "verbs.h"
 
 namespace unseen::app {
 namespace {

@@ -5,13 +5,13 @@
 #include <subdivide.h>
 #include <vdtree/mesh_io.h>
 
-#include "command.h"
 #include "model_file.h"
 #include "options.h"
 #include "output_files.h"
 #include "progress_bar.h"
 #include "report.h"
 #include "terminal.h"
+#include "verbs.h"
 
 namespace unseen::app {
 namespace {

@@ -1,7 +1,6 @@
 // The verbs that draw, in a build without OpenGL: they say so.
 #include "calibration_window.h"
-#include "command.h"
-#include "perception_bench.h"
+#include "verbs.h"
 
 namespace unseen::app {
 namespace {
@@ -28,11 +27,6 @@ Result<void> run_calibration_window(calibration::Procedure&, const CalibrationWi
 }
 Result<std::vector<GammaMatch>> match_gamma(const CalibrationWindowOptions&) { return no_window(); }
 Result<void> show_chart(const CalibrationWindowOptions&, const std::string&) { return no_window(); }
-
-Result<PerceptionBenchResult> bench_perception(const PerceptionBenchOptions&) {
-    return Error{ErrorCode::unsupported, "This build cannot judge pictures, for it was made without OpenGL; configure it with "
-                                         "-DUNSEEN_BUILD_RENDER=ON."};
-}
 
 Command render_command(CLI::App& app) { return absent(app, "render"); }
 Command sheet_command(CLI::App& app) { return absent(app, "sheet"); }

@@ -5,7 +5,6 @@
 #include <perception/image.h>
 #include <render/renderer.h>
 
-#include "command.h"
 #include "fly_through.h"
 #include "fold_map.h"
 #include "fold_test.h"
@@ -15,6 +14,7 @@
 #include "report.h"
 #include "simplification.h"
 #include "terminal.h"
+#include "verbs.h"
 
 namespace unseen::app {
 namespace {
@@ -97,8 +97,8 @@ void add_path_options(CLI::App& verb, FlyThroughOptions& o) {
     group.add_option("--csv", o.csv, "One line a frame: triangles, changes, node tests, times, uploaded bytes")
         ->type_name("FILE.csv");
     group.add_option("--plot", o.plot, "Times, triangles, changes and uploaded bytes over the frames")
-        ->type_name("FILE.png")
-        ->check(ending_in({".png"}));
+        ->type_name("FILE.png|.svg")
+        ->check(ending_in({".png", ".svg"}));
     group.add_option("--threshold", o.threshold,
                      "Fold up to this cost: 1 (default) what cannot be seen, 2 what cannot be seen from twice the distance")
         ->type_name("X")

@@ -145,9 +145,13 @@ std::span<const vdtree::Sphere> Scene::inner_spheres() const {
     return *kept.inner_spheres;
 }
 
-const vdtree::CutRings& Scene::cut_rings() const {
-    if (!kept.cut_rings) kept.cut_rings = vdtree::bound_cut_rings(tree);
-    return *kept.cut_rings;
+Result<const vdtree::CutRings*> Scene::cut_rings() const {
+    if (!kept.cut_rings) {
+        auto rings = vdtree::bound_cut_rings(tree);
+        if (!rings) return rings.error();
+        kept.cut_rings = std::move(*rings);
+    }
+    return &*kept.cut_rings;
 }
 
 void Scene::replace_tree(vdtree::VertexTree other) {

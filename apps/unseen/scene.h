@@ -44,7 +44,7 @@ struct Scene {
     // For gazes that are known to a margin only, above 0; null where the margin is so wide that everything may be looked at.
     std::shared_ptr<const perception::CsfTable> csf_table(perception::Degrees margin) const;
     std::span<const vdtree::Sphere> inner_spheres() const; // of vdtree::inner_spheres()
-    const vdtree::CutRings& cut_rings() const;
+    Result<const vdtree::CutRings*> cut_rings() const; // of vdtree::bound_cut_rings(); the scene's
 
     // Drops what was kept of the tree before.
     void replace_tree(vdtree::VertexTree other);

@@ -11,8 +11,7 @@
 #include <perception/judge.h>
 #include <render/renderer.h>
 
-#include "canvas.h"
-#include "command.h"
+#include "drawing.h"
 #include "fold_map.h"
 #include "fold_test.h"
 #include "frame_image.h"
@@ -20,6 +19,7 @@
 #include "report.h"
 #include "simplification.h"
 #include "terminal.h"
+#include "verbs.h"
 
 namespace unseen::app {
 namespace {
@@ -151,45 +151,53 @@ std::string metres(double value) { return rounded(value, 3) + (std::isfinite(val
 
 // ---- the picture --------------------------------------------------------------------------------------------------
 
-perception::Image compose(const std::vector<Column>& columns, const Scene& scene, const std::string& model) {
-    constexpr int gap = 12, text_scale = 2, line_height = 20; // pixels
+// The lines above a column of pictures.
+struct Caption {
+    std::string name, verdict;
+
+    explicit Caption(const Column& column) : name(column.name + ": " + grouped(column.simplification.stats.triangles) + " triangles") {
+        if (column.judgement)
+            verdict = grouped(column.judgement->visible_pixels) + " pixels visible; from " + metres(column.simplification.imperceptible_from_m) + " none";
+    }
+};
+
+Result<perception::Image> compose(const std::vector<Column>& columns, const Scene& scene, const std::string& model) {
+    constexpr int gap = 12, text_height = 17, line_height = 22; // pixels
     constexpr glm::vec3 paper{0.12f}, ink{0.95f}, weak{0.7f};
-    const int width = columns.front().pictures.front().width;
-    int height = 0; // of the tallest column
+    int height = 0, cell_width = 0; // of the tallest column, and of the widest picture or line of text
+    std::vector<Caption> captions;
     for (const Column& column : columns) {
+        const Caption& caption = captions.emplace_back(column);
+        for (const std::string& line : {caption.name, caption.verdict})
+            cell_width = std::max(cell_width, static_cast<int>(std::ceil(Drawing::text_width(line, text_height))));
         int below = 0;
-        for (const perception::Image& picture : column.pictures) below += picture.height + gap;
+        for (const perception::Image& picture : column.pictures) {
+            cell_width = std::max(cell_width, picture.width);
+            below += picture.height + gap;
+        }
         height = std::max(height, below);
     }
-    // Two lines of text above each pair of pictures must fit.
-    const int cell_width = std::max(width, Canvas::text_width(std::string(30, 'x'), text_scale));
     const int count = static_cast<int>(columns.size());
-    const int header = 2 * gap + line_height, captions = 2 * line_height + gap;
-    Canvas canvas(gap + count * (cell_width + gap), header + captions + height, paper);
+    const int header = 2 * gap + line_height, above = 2 * line_height + gap;
+    auto drawing = Drawing::create(gap + count * (cell_width + gap), header + above + height, paper);
+    if (!drawing) return drawing.error();
 
-    const std::string title = std::filesystem::path(model).filename().string() + "   " +
-                              std::to_string(scene.view.width) + "x" + std::to_string(scene.view.height) + " pixels, " +
-                              rounded(perception::pixels_per_degree(scene.display).value(), 4) +
+    const std::string title = std::filesystem::path(model).filename().string() + "   " + std::to_string(scene.view.width) + "x" +
+                              std::to_string(scene.view.height) + " pixels, " + rounded(perception::pixels_per_degree(scene.display).value(), 4) +
                               " per degree, seen from " + rounded(scene.display.distance.value(), 3) + " m";
-    canvas.text(gap, gap, title, ink, text_scale);
+    drawing->text({gap, gap}, title, ink, Drawing::fitting_height(title, text_height, drawing->width() - 2 * gap));
     for (int i = 0; i < count; ++i) {
-        const Column& column = columns[static_cast<std::size_t>(i)];
         const int left = gap + i * (cell_width + gap);
-        const Simplification& s = column.simplification;
-        canvas.text(left, header, column.name + ": " + grouped(s.stats.triangles) + " tri.", ink, text_scale);
-        if (column.judgement) {
-            canvas.text(left, header + line_height,
-                        grouped(column.judgement->visible_pixels) + " px visible; from " +
-                            metres(s.imperceptible_from_m) + " none",
-                        weak, text_scale);
-        }
-        int top = header + captions;
-        for (const perception::Image& picture : column.pictures) {
-            canvas.picture(left, top, picture);
+        const Caption& caption = captions[static_cast<std::size_t>(i)];
+        drawing->text({left, header}, caption.name, ink, text_height);
+        drawing->text({left, header + line_height}, caption.verdict, weak, text_height);
+        int top = header + above;
+        for (const perception::Image& picture : columns[static_cast<std::size_t>(i)].pictures) {
+            drawing->picture({left, top}, picture);
             top += picture.height + gap;
         }
     }
-    return canvas.image();
+    return drawing->image();
 }
 
 // ---- the report ---------------------------------------------------------------------------------------------------
@@ -237,8 +245,10 @@ Result<int> run(const SheetArguments& a) {
     const auto columns = make_columns(*scene, a, what, *context);
     if (!columns) return columns.error();
 
+    const auto sheet = compose(*columns, *scene, a.model);
+    if (!sheet) return sheet.error();
     if (auto ok = report->prepare(to_json(*columns)); !ok) return ok.error();
-    if (auto ok = perception::write_image(a.out, compose(*columns, *scene, a.model)); !ok) return ok.error();
+    if (auto ok = perception::write_image(a.out, *sheet); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
     if (!report->is_on_stdout()) print(*columns);
     return exit_done;

@@ -5,12 +5,12 @@
 
 #include <vdtree/mesh_io.h>
 
-#include "command.h"
 #include "fold_test.h"
 #include "output_files.h"
 #include "report.h"
 #include "simplification.h"
 #include "terminal.h"
+#include "verbs.h"
 
 namespace unseen::app {
 namespace {

@@ -6,12 +6,9 @@
 
 #include <vdtree/mesh_io.h>
 
-namespace unseen::app {
+#include "options.h"
 
-struct TextureOptions {
-    std::string file;          // instead of the materials'
-    bool is_left_out = false;  // --no-texture
-};
+namespace unseen::app {
 
 // Gives the mesh the texture that the options, or else its materials, name, if they do: several become one, and the colours of materials
 // become those of the vertices. Where nothing has an image, nothing changes. Errors name the image's file.

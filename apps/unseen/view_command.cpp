@@ -1,10 +1,10 @@
 // unseen view: a window in which the cut follows the eye.
 #include <memory>
 
-#include "command.h"
 #include "fold_test.h"
 #include "options.h"
 #include "output_files.h"
+#include "verbs.h"
 #include "viewer.h"
 
 namespace unseen::app {

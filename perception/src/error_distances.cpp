@@ -83,8 +83,8 @@ Pattern above(const Pattern& a, const Pattern& b) {
     return all;
 }
 
-// Few patterns are to stand for many: rounded up, onto one grid, so that what is above two of them is there, too. `coarseness`: of the grid,
-// 1 or a power of two.
+// Few patterns are to stand for many: rounded up, onto one grid, so that what is above two of them is there, too.
+// `coarseness`: of the grid, 1 or a power of two.
 Pattern rounded(Pattern p, int coarseness) {
     constexpr int coarsest_fading = 32; // on coarser grids drift does not fade at all, which is above any that does
     const int typical_step = coarseness * contrasts_per_octave / 8, spike_step = coarseness * contrasts_per_octave / 4;
@@ -194,8 +194,8 @@ private:
     Thresholds patches_, areas_, strips_;
 };
 
-// The reach of patterns by eccentricity, computed when they are first asked for. Where patterns are too many for the rows' numbers, begin again with
-// coarser ones.
+// The reach of patterns by eccentricity, computed when they are first asked for. Where patterns are too many for the
+// rows' numbers, begin again with coarser ones.
 class Reaches {
 public:
     // `added`: rows that add() will ask for.
@@ -217,9 +217,10 @@ public:
         pattern.is_strip ? add_strip(pattern) : add_patch(pattern);
         return row;
     }
-    bool has_too_few() const { return has_too_few_; } // of what there is, nothing is to be used then
-    // Forgets all rows. Ends well: at a coarseness of 256 each contrast is one of two, and there are no more than 16 luminances, 121 quarters and four
-    // ways to combine a typical and a largest contrast: 16,000 patches.
+    bool has_too_few() const { return has_too_few_; } // then nothing found so far is of use
+    // Forgets all rows. In the end they suffice: at a coarseness of 256 each contrast is one of two, so a typical and a
+    // largest one combine in four ways at most; with 16 luminances, 121 quarters and without fading that is 16,000
+    // patches, and there are 3,600 strips.
     void coarsen() {
         coarseness_ *= 2;
         begin();
@@ -392,7 +393,7 @@ void cover(Reaches& reaches, Shown& a, const Shown& b) {
 }
 
 // What nodes show, no less than their children: patches, and strips where they are outlines. False where the rows do not suffice.
-bool find_shown(const vdtree::VertexTree& tree, const SceneLuminance& scene, const Levels& levels, const CsfTable& csf, Reaches& reaches,
+bool find_shown(const vdtree::SoundTree& tree, const SceneLuminance& scene, const Levels& levels, const CsfTable& csf, Reaches& reaches,
                 std::vector<Shown>& patches, std::vector<Shown>& strips) {
     const std::span<const vdtree::FoldError> errors = tree.fold_errors();
     const double darkest = levels.in_cdm2(scene.darkest), brightest = levels.in_cdm2(scene.brightest);
@@ -450,12 +451,12 @@ bool find_shown(const vdtree::VertexTree& tree, const SceneLuminance& scene, con
 
 // A node folds as well where the whole mesh does, as far as the node's stage: takes the stage where that is nowhere seen from farther, unless a
 // child would then be. Children before parents.
-void fold_in_stages(const vdtree::VertexTree& tree, const Reaches& reaches, std::span<const Shown> stages, std::span<Shown> shown) {
+void fold_in_stages(const vdtree::SoundTree& tree, const Reaches& reaches, std::span<const Shown> stages,
+                    std::span<Shown> shown) {
     const std::span<const vdtree::FoldError> errors = tree.fold_errors();
     std::vector<bool> may_take(shown.size(), true);
     for (std::size_t node = shown.size(); node-- > 0;) {
         const std::size_t number = errors[node].stage;
-        if (number >= stages.size()) return; // a damaged file
         if (may_take[node] && shortfall(reaches, shown[node], stages[number]) <= 1) {
             shown[node] = stages[number]; // no more than the parent's own, nor its stage
             continue;
@@ -463,7 +464,7 @@ void fold_in_stages(const vdtree::VertexTree& tree, const Reaches& reaches, std:
         if (node == 0) return;
         const NodeId parent = tree.parents()[node];
         const std::size_t above = errors[parent].stage;
-        if (above >= stages.size() || !(shortfall(reaches, stages[above], shown[node]) <= 1)) may_take[parent] = false;
+        if (!(shortfall(reaches, stages[above], shown[node]) <= 1)) may_take[parent] = false;
     }
 }
 
@@ -473,7 +474,9 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
     const std::span<const vdtree::FoldError> errors = tree.fold_errors();
     if (errors.empty())
         return Error{ErrorCode::invalid_argument, "The errors of the tree's folds have not been measured (vdtree::with_fold_errors)."};
-    if (const auto sound = check_arguments(tree, view, options); !sound) return sound.error();
+    if (const auto valid = check_arguments(view, options); !valid) return valid.error();
+    const auto sound = vdtree::SoundTree::of(tree);
+    if (!sound) return sound.error();
     const NodeId nodes = tree.interior_count();
     const Screen screen(view, options);
     const Levels levels(options.display);
@@ -490,7 +493,7 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
     const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
     Reaches reaches(levels, screen, csf, parts.eccentricity_bins, tree.fold_stages().size());
     std::vector<Shown> patches, strips;
-    while (!find_shown(tree, options.scene, levels, csf, reaches, patches, strips)) reaches.coarsen();
+    while (!find_shown(*sound, options.scene, levels, csf, reaches, patches, strips)) reaches.coarsen();
     const std::vector<float> distances = stage_distances(tree, screen, options, parts.eccentricity_bins);
     if (!distances.empty() && object_radius > 0) {
         std::vector<Shown> stages;
@@ -498,8 +501,8 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
             const std::uint16_t row = reaches.add(std::span(distances).subspan(first, parts.eccentricity_bins), object_radius);
             stages.push_back({.pattern = {}, .length = object_radius, .row = row});
         }
-        fold_in_stages(tree, reaches, stages, patches);
-        fold_in_stages(tree, reaches, stages, strips);
+        fold_in_stages(*sound, reaches, stages, patches);
+        fold_in_stages(*sound, reaches, stages, strips);
     }
     for (NodeId node = 0; node < nodes; ++node) {
         parts.classes[node] = {patches[node].row, strips[node].row};

@@ -251,8 +251,8 @@ void add_texture(RingLooks& inside, const Rings& rings, NodeId node, const Class
 }
 
 // Puts all nodes into classes. False where there are too many of them for rows so fine.
-bool classify(const vdtree::VertexTree& tree, const Rings& rings, const FoldTestOptions& options, const Classes& classes, Rows& rows,
-              std::vector<vdtree::FoldClass>& fold_classes) {
+bool classify(const vdtree::SoundTree& tree, const Rings& rings, const FoldTestOptions& options, const Classes& classes,
+              Rows& rows, std::vector<vdtree::FoldClass>& fold_classes) {
     const bool has_chroma = !rings.chroma.empty();
     const glm::dvec2 of_scene = has_chroma ? half_of(scene_chroma(rings.chroma)) : glm::dvec2(0);
     std::vector<RingLooks> interior(tree.interior_count()), outlines(tree.interior_count());
@@ -286,9 +286,9 @@ bool classify(const vdtree::VertexTree& tree, const Rings& rings, const FoldTest
     return true;
 }
 
-Result<DistanceCriterion> make_criterion(const vdtree::VertexTree& tree, const Rings& rings, std::vector<float> lengths, const vdtree::View& view,
-                                         const FoldTestOptions& options) {
-    if (const auto sound = check_arguments(tree, view, options); !sound) return sound.error();
+Result<DistanceCriterion> make_criterion(const vdtree::SoundTree& tree, const Rings& rings, std::vector<float> lengths,
+                                         const vdtree::View& view, const FoldTestOptions& options) {
+    if (const auto valid = check_arguments(view, options); !valid) return valid.error();
     const Screen screen(view, options);
     const bool has_chroma = !rings.chroma.empty();
     // Where contrasts and luminances alone make the rows, these are few enough, and quickly found, to be fine.
@@ -315,14 +315,17 @@ Result<DistanceCriterion> make_criterion(const vdtree::VertexTree& tree, const R
 
 Result<DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTree& tree, const vdtree::View& view,
                                                   const FoldTestOptions& options) {
+    const auto sound = vdtree::SoundTree::of(tree);
+    if (!sound) return sound.error();
     Rings rings{tree.ring_luminance(), {}};
     if (options.chroma) rings.chroma = tree.ring_chroma();
-    return make_criterion(tree, rings, {}, view, options);
+    return make_criterion(*sound, rings, {}, view, options);
 }
 
 Result<DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree& tree, const vdtree::CutRings& cut_rings,
                                                        const vdtree::View& view, const FoldTestOptions& options) {
-    if (const auto sound = check_arguments(tree, view, options); !sound) return sound.error();
+    const auto sound = vdtree::SoundTree::of(tree);
+    if (!sound) return sound.error();
     Rings rings{cut_rings.luminance, {}, cut_rings.mean_shift};
     if (options.chroma) {
         rings.chroma = cut_rings.chroma;
@@ -333,7 +336,7 @@ Result<DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree&
         // The change is largest within the support and fades to nothing at the ring's border.
         const float around = 0.5f * (tree.support_spheres()[node].radius + cut_rings.radius[node]) * (1 + length_rounding);
         lengths[node] = std::max({lengths[node], tree.bounds()[node].ring.radius, around});
-        if (node > 0) lengths[tree.parents()[node]] = std::max(lengths[tree.parents()[node]], lengths[node]);
+        if (node > 0) lengths[sound->parents()[node]] = std::max(lengths[sound->parents()[node]], lengths[node]);
     }
     if (!cut_rings.meets_another.empty())
         for (NodeId node = 0; node < tree.interior_count(); ++node) // an outline, whatever it faces
@@ -343,7 +346,7 @@ Result<DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree&
     rings.texture_deviation = cut_rings.texture_deviation;
     const std::vector<float> own_lengths = rings.vertices.empty() ? std::vector<float>() : lengths; // which the criterion takes
     rings.lengths = own_lengths;
-    return make_criterion(tree, rings, std::move(lengths), view, options);
+    return make_criterion(*sound, rings, std::move(lengths), view, options);
 }
 
 vdtree::Viewpoint viewpoint_of(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options,

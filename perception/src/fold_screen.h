@@ -8,8 +8,6 @@
 
 #include <perception/criterion.h>
 
-#include "sound_parents.h"
-
 namespace unseen::perception {
 
 inline constexpr double degrees_per_bin = 0.5;  // of eccentricity on the screen
@@ -25,7 +23,7 @@ inline double to_power_of_pooling(double seen) { return seen * seen * seen * std
 // Covers the rounding of a reach to float.
 inline constexpr double reach_rounding = 1e-6;
 
-// What has to hold before a fold test computes with its arguments; and before it walks up a tree, too.
+// What has to hold before a fold test computes with its arguments.
 inline Result<void> check_arguments(const vdtree::View& view, const FoldTestOptions& options) {
     if (auto ok = validate(options.display); !ok) return ok;
     if (auto ok = vdtree::validate(view); !ok) return ok;
@@ -35,10 +33,6 @@ inline Result<void> check_arguments(const vdtree::View& view, const FoldTestOpti
     for (const float relative : {options.scene.darkest, options.scene.brightest, behind.lo, behind.hi})
         if (!std::isfinite(relative)) return Error{ErrorCode::invalid_argument, "fold test: the scene's luminances must be finite"};
     return {};
-}
-inline Result<void> check_arguments(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options) {
-    if (auto ok = check_arguments(view, options); !ok) return ok;
-    return check_parents(tree);
 }
 
 // The camera's and the display's geometry, as far as the test needs it.

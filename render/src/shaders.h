@@ -1,4 +1,4 @@
-// The GLSL files under shaders/, embedded by EmbedShaders.cmake. They have no #version line: program.cpp puts it first.
+// The GLSL files under shaders/, embedded by EmbedFiles.cmake. They have no #version line: program.cpp puts it first.
 #pragma once
 
 #include <string_view>

@@ -1,17 +1,18 @@
-// unseen bench engine, on a mesh so small that the figures mean nothing: every row is there, and measured.
-#include "run_command.h"
+// unseen-bench engine, on a mesh so small that the figures mean nothing: every row is there, and measured.
+#include "run_bench.h"
 
 namespace {
 
 using namespace unseen::app::testing;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
-class BenchCommandTest : public CommandTest {};
+class BenchCommandTest : public BenchTest {};
 
 TEST_F(BenchCommandTest, MeasuresEveryRow) {
     write_ball("ball.obj"); // 1472 triangles
-    const Outcome outcome = run({"bench", "engine", "--quick", "--mesh", "ball.obj", "--sizes", "400,1472,5k", "--keep", "kept",
-                                 "--json", "-"});
+    const Outcome outcome =
+        bench({"engine", "--quick", "--mesh", "ball.obj", "--sizes", "400,1472,5k", "--keep", "kept", "--json", "-"});
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     const Json report = outcome.json();
     ASSERT_EQ(report["sizes"].size(), 3u);
@@ -38,18 +39,20 @@ TEST_F(BenchCommandTest, MeasuresEveryRow) {
     }
     EXPECT_GE(with_bounds, 20);
     EXPECT_TRUE(fs::exists(path("kept/ball-5000.vdt")));
-    const Outcome again = run({"bench", "engine", "--quick", "--mesh", "ball.obj", "--sizes", "1472", "--keep", "kept"});
+    const Outcome again = bench({"engine", "--quick", "--mesh", "ball.obj", "--sizes", "1472", "--keep", "kept"});
     EXPECT_EQ(again.status, 0) << again.err;
     EXPECT_THAT(again.out, HasSubstr("still view"));
-    EXPECT_THAT(again.err, ::testing::Not(HasSubstr("building ball-1472.vdt"))) << "it is kept";
+    EXPECT_THAT(again.out, ::testing::ContainsRegex("must met|must missed|aim met")) << "in words";
+    EXPECT_THAT(again.out, Not(::testing::ContainsRegex("[0-9]e[+-][0-9]"))) << "numbers as people write them";
+    EXPECT_THAT(again.err, Not(HasSubstr("building ball-1472.vdt"))) << "it is kept";
 }
 
 TEST_F(BenchCommandTest, DoesNotWriteOverItsMesh) {
     write_ball("ball.obj");
     const std::string before = read_text(path("ball.obj"));
-    for (const char* bench : {"engine", "perception", "effects"}) {
-        const Outcome outcome = run({"bench", bench, "--quick", "--mesh", "ball.obj", "--json", "ball.obj"});
-        EXPECT_EQ(outcome.status, 1) << bench;
+    for (const char* verb : {"engine", "perception", "effects"}) {
+        const Outcome outcome = bench({verb, "--quick", "--mesh", "ball.obj", "--json", "ball.obj"});
+        EXPECT_EQ(outcome.status, 1) << verb;
         EXPECT_THAT(outcome.err, HasSubstr("ball.obj' is read"));
     }
     EXPECT_EQ(read_text(path("ball.obj")), before);
@@ -57,9 +60,57 @@ TEST_F(BenchCommandTest, DoesNotWriteOverItsMesh) {
 
 TEST_F(BenchCommandTest, RefusesWrongSizes) {
     for (const std::string sizes : {"", "0", "70k,70k", "70k,1k", "nan", "1e99", "50", "70q"})
-        EXPECT_EQ(run({"bench", "engine", "--sizes", sizes}).status, 2) << sizes;
-    EXPECT_EQ(run({"bench"}).status, 2);
-    EXPECT_EQ(run({"bench", "engine", "--mesh", "missing.ply"}).status, 1);
+        EXPECT_EQ(bench({"engine", "--sizes", sizes}).status, 2) << sizes;
+    EXPECT_EQ(bench({}).status, 2);
+    EXPECT_EQ(bench({"engine", "--mesh", "missing.ply"}).status, 1);
+}
+
+// With targets of one's own every figure is measured against these, and the others against none.
+TEST_F(BenchCommandTest, TakesTargetsFromAFile) {
+    write_ball("ball.obj");
+    write_text(path("t.json"),
+               R"({"engine": {"still view, us": {"must": 1e9, "aim": 1e-9}, "full tests, M/s": {"must": 1e9}}})");
+    const Outcome outcome = bench({"engine", "--quick", "--mesh", "ball.obj", "--sizes", "1472", "--targets", "t.json",
+                                   "--json", "r.json"});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const Json report = Json::parse(read_text(path("r.json")));
+    EXPECT_EQ(row_named(report, "still view")["holds_must"], true);
+    EXPECT_EQ(row_named(report, "still view")["holds_aim"], false);
+    EXPECT_EQ(row_named(report, "full perceptual tests")["holds_must"], false);
+    EXPECT_TRUE(row_named(report, "teleport, 1.47 k")["must"].is_null());
+    EXPECT_TRUE(report["load_average"].is_number());
+    EXPECT_THAT(outcome.out, ::testing::ContainsRegex("still view [^\n]*must met"));
+    EXPECT_THAT(outcome.out, ::testing::ContainsRegex("full perceptual tests [^\n]*must missed"));
+    const bool is_busy = report["load_average"] > 0.5;
+    EXPECT_EQ(outcome.out.find("the machine was busy") != std::string::npos, is_busy);
+}
+
+TEST_F(BenchCommandTest, RefusesWrongTargets) {
+    for (const auto& [text, complaint] : {
+             std::pair("[1]", "no JSON object"),
+             {R"({"engine": 1})", "no object of figures"},
+             {R"({"engine": {"still view, us": 1}})", "not like"},
+             {R"({"engine": {"still view, us": {"must": "1"}}})", "not like"},
+             {R"({"engine": {"still view, us": {"most": 1}}})", "not like"},
+             {R"({"engine": {"beauty": {"must": 1}}})", "nothing measures 'engine/beauty'"},
+         }) {
+        write_text(path("t.json"), text);
+        const Outcome outcome = bench({"engine", "--quick", "--targets", "t.json"});
+        EXPECT_EQ(outcome.status, 1) << text;
+        EXPECT_THAT(outcome.err, HasSubstr(complaint));
+        EXPECT_THAT(outcome.err, ::testing::StartsWith("unseen-bench: "));
+    }
+    EXPECT_EQ(bench({"engine", "--targets", "missing.json"}).status, 1);
+}
+
+// Who looks for it there is told where it is.
+TEST_F(BenchCommandTest, IsAProgramOfItsOwn) {
+    const Outcome outcome = run({"bench", "engine", "--quick"});
+    EXPECT_EQ(outcome.status, 2);
+    EXPECT_THAT(outcome.err, HasSubstr("unseen-bench"));
+    const Outcome help = bench({"--help"});
+    EXPECT_EQ(help.status, 0);
+    for (const char* verb : {"engine", "perception", "effects", "budget"}) EXPECT_THAT(help.out, HasSubstr(verb));
 }
 
 } // namespace

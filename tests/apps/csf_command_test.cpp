@@ -218,6 +218,9 @@ TEST_F(CsfCommandTest, PlotsCurves) {
     for (std::size_t i = 0; i + 2 < plot->image.values.size(); i += 3)
         coloured += std::abs(plot->image.values[i] - plot->image.values[i + 2]) > 0.2f;
     EXPECT_GT(coloured, 2000u);
+    ASSERT_EQ(run({"csf", "--plot", "csf.svg"}).status, 0);
+    EXPECT_THAT(read_text(path("csf.svg")), HasSubstr("<svg"));
+    EXPECT_EQ(run({"csf", "--plot", "csf.gif"}).status, 2);
 }
 
 } // namespace

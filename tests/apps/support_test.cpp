@@ -1,74 +1,169 @@
-// Canvas, font and plot: ink where it belongs, and none outside.
+// Numbers, drawings, plots and scales: ink where it belongs, and none outside.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
 #include <set>
 #include <string>
 
-#include "bitmap_font.h"
-#include "canvas.h"
+#include "colour_bar.h"
+#include "drawing.h"
+#include "log_log_plot.h"
+#include "number_format.h"
 #include "panel_plot.h"
-#include "plot.h"
+#include "temp_folder.h"
+#include "visibility_map.h"
 
 namespace {
 
 using namespace unseen::app;
+using ::testing::HasSubstr;
+using unseen::perception::Image;
 
 constexpr glm::vec3 black{0.0f}, white{1.0f};
 
-double ink(const Canvas& canvas) {
+Drawing drawing(int width, int height, glm::vec3 background = black) {
+    return std::move(*Drawing::create(width, height, background));
+}
+
+Image image_of(const Drawing& drawing) { return std::move(*drawing.image()); }
+
+double ink(const Drawing& drawing) {
     double sum = 0;
-    for (const float value : canvas.image().values) sum += static_cast<double>(value);
+    for (const float value : image_of(drawing).values) sum += static_cast<double>(value);
     return sum / 3;
 }
 
-TEST(BitmapFont, GlyphsAreWholeAndDiffer) {
-    std::set<std::string_view> shapes;
-    for (char c = ' '; c <= '~'; ++c) {
-        EXPECT_EQ(glyph(c).size(), static_cast<std::size_t>(glyph_width * glyph_height)) << c;
-        shapes.insert(glyph(c));
-    }
-    EXPECT_EQ(shapes.size(), 95u);
-    EXPECT_EQ(glyph('\n'), glyph('?'));
-    EXPECT_EQ(glyph(static_cast<char>(200)), glyph('?'));
+// The columns and rows where anything differs from the colour of the corner.
+struct Extent {
+    int left = std::numeric_limits<int>::max(), top = left, right = -1, bottom = -1;
+};
+Extent inked(const Image& image) {
+    Extent extent;
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x)
+            if (image.at(x, y, 0) != image.at(0, 0, 0) || image.at(x, y, 1) != image.at(0, 0, 1) ||
+                image.at(x, y, 2) != image.at(0, 0, 2))
+                extent = {std::min(extent.left, x), std::min(extent.top, y), std::max(extent.right, x),
+                          std::max(extent.bottom, y)};
+    return extent;
 }
 
-TEST(Canvas, LinesCoverTheirArea) {
-    Canvas canvas(100, 100, black);
+TEST(Numbers, AreWrittenOut) {
+    EXPECT_EQ(rounded(8612.3, 3), "8,610");
+    EXPECT_EQ(rounded(61.84, 3), "61.8");
+    EXPECT_EQ(rounded(6184, 6), "6,184");
+    EXPECT_EQ(rounded(0.00061849, 3), "0.000618");
+    EXPECT_EQ(rounded(999.96, 4), "1,000") << "rounding adds a digit";
+    EXPECT_EQ(rounded(0.5, 4), "0.5") << "no zeros at the end";
+    EXPECT_EQ(rounded(1200, 2), "1,200") << "those before the point stay";
+    EXPECT_EQ(rounded(-1234567, 3), "-1,230,000");
+    EXPECT_EQ(rounded(0, 3), "0");
+    EXPECT_EQ(rounded(1.5e-9, 3), "1.5e-09");
+    EXPECT_EQ(rounded(NAN, 3), "none");
+    EXPECT_EQ(rounded(INFINITY, 3), "infinite");
+    EXPECT_EQ(with_decimals(61800.04, 1), "61,800.0");
+    EXPECT_EQ(with_decimals(0.6, 0), "1");
+    EXPECT_EQ(shortest(1e6), "1000000");
+    EXPECT_EQ(shortest(0.1), "0.1");
+    EXPECT_EQ(std::stod(shortest(1.0 / 3)), 1.0 / 3);
+    EXPECT_EQ(std::stod(shortest(1e300)), 1e300);
+    EXPECT_EQ(grouped(69666), "69,666");
+    EXPECT_EQ(grouped(999), "999");
+}
+
+TEST(Drawing, LinesCoverTheirArea) {
+    Drawing canvas = drawing(100, 100);
     canvas.line({20, 50}, {80, 50}, white, 4);
     EXPECT_NEAR(ink(canvas), 60 * 4 + 3.1416 * 4, 3); // with the round ends
-    EXPECT_EQ(canvas.image().at(50, 40), 0.0f);
-    EXPECT_EQ(canvas.image().at(50, 50), 1.0f);
+    EXPECT_EQ(image_of(canvas).at(50, 40), 0.0f);
+    EXPECT_EQ(image_of(canvas).at(50, 50), 1.0f);
+    Drawing after_text = drawing(100, 100);
+    after_text.text({0, 80}, " ", white, 12);
+    after_text.line({20, 50}, {80, 50}, white, 4);
+    EXPECT_EQ(ink(after_text), ink(canvas)) << "it begins where it is told to";
+    Drawing dashed = drawing(100, 100);
+    dashed.line({20, 50}, {80, 50}, white, 4, true);
+    EXPECT_LT(ink(dashed), 0.95 * ink(canvas));
 }
 
-TEST(Canvas, ClipsEverything) {
-    Canvas canvas(10, 10, black);
-    canvas.fill(-5, -5, 5, 5, white);
+TEST(Drawing, ClipsEverything) {
+    Drawing canvas = drawing(10, 10);
+    canvas.fill({-5, -5}, {5, 5}, white);
     canvas.line({-50, -1000}, {-40, 2000}, white, 3);
-    canvas.text(11, 0, "outside", white, 3);
-    canvas.text(0, -30, "outside", white, 3);
-    canvas.text_upward(-30, 5, "outside", white, 3);
-    canvas.picture(20, 20, canvas.image());
+    canvas.text({11, 0}, "outside", white, 30);
+    canvas.text({0, -40}, "outside", white, 30);
+    canvas.text_upward({-40, 5}, "outside", white, 30);
+    canvas.picture({20, 20}, image_of(canvas));
     EXPECT_EQ(ink(canvas), 0);
-    canvas.fill(-5, -5, 1000, 1000, white);
+    canvas.clip({0, 0}, {4, 4});
+    canvas.fill({-5, -5}, {1000, 1000}, white);
+    EXPECT_EQ(ink(canvas), 16);
+    canvas.end_clip();
+    canvas.fill({-5, -5}, {1000, 1000}, white);
     EXPECT_EQ(ink(canvas), 100);
 }
 
-TEST(Canvas, TextTurnsWithoutLosingInk) {
-    Canvas level(200, 200, black), upward(200, 200, black);
-    level.text(10, 10, "Unseen 1.5", white, 2);
-    upward.text_upward(10, 190, "Unseen 1.5", white, 2);
-    EXPECT_GT(ink(level), 0);
-    EXPECT_EQ(ink(level), ink(upward));
+// What layouts count on: text is as wide and as high as it says.
+TEST(Drawing, TextKeepsWithinItsExtents) {
+    for (const std::string text : {"Unseen 1.5", "gjpqy|Ag", "W", "castle, 10 cd/m2"}) {
+        const double width = Drawing::text_width(text, 20);
+        Drawing level = drawing(400, 60), upward = drawing(60, 400), right = drawing(400, 60);
+        level.text({10, 10}, text, white, 20);
+        upward.text_upward({10, 390}, text, white, 20);
+        right.text({390, 10}, text, white, 20, Align::right);
+        const Extent extent = inked(image_of(level));
+        ASSERT_GE(extent.right, 0) << text;
+        EXPECT_GE(extent.left, 9) << text;
+        EXPECT_LE(extent.right, 10 + width + 1) << text;
+        EXPECT_GT(extent.right, 10 + 0.6 * width) << text;
+        EXPECT_GE(extent.top, 10) << text;
+        EXPECT_LE(extent.bottom, 30) << text;
+        EXPECT_NEAR(inked(image_of(right)).right, 390 - (10 + width - extent.right), 1.5) << text;
+        EXPECT_NEAR(ink(level), ink(upward), 0.03 * ink(level)) << text;
+        EXPECT_GE(inked(image_of(upward)).left, 10) << text;
+        EXPECT_LE(inked(image_of(upward)).bottom, 390) << text;
+    }
+    const std::string title = "a title that is far too long for so small a picture";
+    EXPECT_LE(Drawing::text_width(title, Drawing::fitting_height(title, 20, 100)), 100.01);
+    EXPECT_EQ(Drawing::fitting_height("short", 20, 100), 20);
 }
 
-TEST(Canvas, CopiesPictures) {
-    Canvas canvas(4, 4, black);
-    canvas.picture(1, 2, {2, 1, 1, {0.25f, 2.0f}});
-    EXPECT_EQ(canvas.image().at(1, 2, 1), 0.25f);
-    EXPECT_EQ(canvas.image().at(2, 2, 0), 1.0f);
-    EXPECT_NEAR(ink(canvas), 1.25, 1e-6);
+// Cairo draws nothing any more once it is given something else than UTF-8: file names may hold anything.
+TEST(Drawing, TakesAnyBytesAsText) {
+    for (const std::string text :
+         {"a\xFF\xFE", "\xC3", "\xE2\x82", "\xED\xA0\x80", "\xF4\x90\x80\x80", "\xC0\x80", "tab\t", "new\nline"}) {
+        Drawing canvas = drawing(200, 60);
+        canvas.text({5, 5}, text, white, 20);
+        canvas.fill({190, 50}, {5, 5}, white);
+        ASSERT_TRUE(canvas.image()) << canvas.image().error().message;
+        EXPECT_GT(ink(canvas), 30) << text;
+        EXPECT_GT(Drawing::text_width(text, 20), 0);
+    }
+    EXPECT_GT(Drawing::text_width("\xC3\xA4", 20), 0) << "an umlaut";
+    EXPECT_EQ(Drawing::text_width("\xFF", 20), Drawing::text_width("?", 20));
+}
+
+TEST(Drawing, CopiesPictures) {
+    Drawing canvas = drawing(4, 4);
+    canvas.picture({1, 2}, {2, 1, 1, {0.2f, 2.0f}});
+    const Image image = image_of(canvas);
+    EXPECT_FLOAT_EQ(image.at(1, 2, 1), 0.2f);
+    EXPECT_EQ(image.at(2, 2, 0), 1.0f);
+    EXPECT_NEAR(ink(canvas), 1.2, 1e-6);
+    Drawing coloured = drawing(1, 1);
+    coloured.picture({0, 0}, {1, 1, 3, {0.2f, 0.4f, 0.6f}});
+    EXPECT_THAT(image_of(coloured).values, ::testing::Pointwise(::testing::FloatEq(), {0.2f, 0.4f, 0.6f}));
+}
+
+TEST(Drawing, RefusesImpossibleSizes) {
+    EXPECT_FALSE(Drawing::create(0, 10, black));
+    EXPECT_FALSE(Drawing::create(10, 40'000, black));
+    EXPECT_FALSE(Drawing::create(-1, 10, black, Drawing::Kind::svg));
 }
 
 TEST(Plot, DrawsACurveWhereItsPointsAre) {
@@ -76,7 +171,9 @@ TEST(Plot, DrawsACurveWhereItsPointsAre) {
     plot.curves = {{"flat", {1, 0, 0}, false, {{0.1, 31.622777}, {100, 31.622777}}}};
     plot.x_range = {0.1, 100};
     plot.y_range = {1, 1000};
-    const auto image = draw(plot);
+    Drawing canvas = drawing(plot.width, plot.height, white);
+    draw(plot, canvas);
+    const Image image = image_of(canvas);
     int top = image.height, bottom = 0, left = image.width, red = 0;
     for (int y = 0; y < image.height; ++y) {
         for (int x = 0; x < image.width; ++x) {
@@ -94,24 +191,108 @@ TEST(Plot, DrawsACurveWhereItsPointsAre) {
     EXPECT_NEAR((top + bottom) / 2.0, image.height / 2.0, image.height * 0.05);
 }
 
+// Titles, labels and the legend stay clear of the picture's edge, however long they are and however many.
+TEST(Plot, CutsNothingOff) {
+    LogLogPlot plot;
+    plot.title = plot.x_label = plot.y_label = "a text that is a good deal longer than there is room for it, and goes "
+                                               "on and on, and then on again, to no end at all in sight";
+    plot.y_range = {1, 100'000};
+    for (int i = 0; i < 40; ++i)
+        plot.curves.push_back({"an observer of a long name, 100 cd/m2, 20 degrees", {1, 0, 0}, i % 2 == 0, {}});
+    Drawing canvas = drawing(plot.width, plot.height, white);
+    draw(plot, canvas);
+    const Extent extent = inked(image_of(canvas));
+    EXPECT_GE(extent.left, 4);
+    EXPECT_GE(extent.top, 4);
+    EXPECT_LE(extent.right, plot.width - 5);
+    EXPECT_LE(extent.bottom, plot.height - 5);
+}
+
+TEST(Plot, IsWrittenAsItsNameEnds) {
+    const unseen::support::TempFolder folder;
+    LogLogPlot plot;
+    plot.title = "sensitivity";
+    plot.curves = {{"flat", {1, 0, 0}, false, {{0.1, 30}, {100, 30}}}};
+    ASSERT_TRUE(write_plot(folder / "plot.png", plot));
+    const auto png = unseen::perception::read_image(folder / "plot.png");
+    ASSERT_TRUE(png) << png.error().message;
+    EXPECT_EQ(png->image.width, plot.width);
+    ASSERT_TRUE(write_plot(folder / "plot.SVG", plot));
+    std::ifstream stream(folder / "plot.SVG");
+    const std::string svg((std::istreambuf_iterator<char>(stream)), {});
+    EXPECT_THAT(svg.substr(0, 400), HasSubstr("<svg"));
+    EXPECT_THAT(svg, HasSubstr("width=\"1200px\""));
+    EXPECT_THAT(svg, HasSubstr("<path")) << "lines, not pixels";
+    EXPECT_THAT(svg, ::testing::Not(HasSubstr("<image")));
+    EXPECT_FALSE(write_plot(folder / "missing" / "plot.svg", plot));
+    EXPECT_FALSE(write_plot(folder / "plot.gif", plot));
+}
+
+std::set<int> rows_with(const Image& image, bool (*is_colour)(float, float, float)) {
+    std::set<int> rows;
+    for (int y = 0; y < image.height; ++y)
+        for (int x = 0; x < image.width; ++x)
+            if (is_colour(image.at(x, y, 0), image.at(x, y, 1), image.at(x, y, 2))) rows.insert(y);
+    return rows;
+}
+bool is_red(float r, float g, float b) { return r > 0.9f && g < 0.1f && b < 0.1f; }
+bool is_blue(float r, float g, float b) { return b > 0.9f && g < 0.1f && r < 0.1f; }
+
 TEST(PanelPlot, PutsCurvesInTheirPanels) {
     PanelPlot plot;
     plot.panels = {{"steady", {1, 0, 0}, {5, 5, 5, 5}}, {"gone", {0, 0, 1}, {0, std::nan(""), 3}}, {"empty", {0, 1, 0}, {}}};
-    const auto image = draw(plot);
-    EXPECT_EQ(image.width, plot.width);
-    const auto rows_with = [&](auto is_colour) {
-        std::set<int> rows;
-        for (int y = 0; y < image.height; ++y)
-            for (int x = 0; x < image.width; ++x)
-                if (is_colour(image.at(x, y, 0), image.at(x, y, 1), image.at(x, y, 2))) rows.insert(y);
-        return rows;
-    };
-    const auto red = rows_with([](float r, float g, float b) { return r > 0.9f && g < 0.1f && b < 0.1f; });
-    const auto blue = rows_with([](float r, float g, float b) { return b > 0.9f && g < 0.1f && r < 0.1f; });
+    Drawing canvas = drawing(plot.width, height_of(plot), white);
+    draw(plot, canvas);
+    const Image image = image_of(canvas);
+    const auto red = rows_with(image, is_red), blue = rows_with(image, is_blue);
     ASSERT_FALSE(red.empty());
     ASSERT_FALSE(blue.empty());
     EXPECT_LT(*red.rbegin(), *blue.begin()) << "one below the other";
     EXPECT_GT(image.height, 3 * plot.panel_height);
+}
+
+// A first value a thousand times as large as the others does not press them to the bottom of their panel, nor leave it.
+TEST(PanelPlot, ScalesBySettledValues) {
+    PanelPlot plot;
+    plot.settled_from = 1;
+    plot.panels = {{"", {1, 1, 1}, {1, 1, 1}}, {"times", {1, 0, 0}, {5000, 4, 5, 4, 5, 4, 5}}};
+    Drawing canvas = drawing(plot.width, height_of(plot), white);
+    draw(plot, canvas);
+    const Image image = image_of(canvas);
+    std::set<int> rows; // of the curve's right half
+    for (int y = 0; y < image.height; ++y)
+        for (int x = image.width / 2; x < image.width; ++x)
+            if (is_red(image.at(x, y, 0), image.at(x, y, 1), image.at(x, y, 2))) rows.insert(y);
+    ASSERT_FALSE(rows.empty());
+    EXPECT_GT(*rows.rbegin() - *rows.begin(), 0.15 * plot.panel_height) << "from 4 to 5 of about 5";
+    EXPECT_LT(*rows.rbegin() - *rows.begin(), 0.5 * plot.panel_height);
+    const auto all = rows_with(image, is_red);
+    EXPECT_GT(*all.begin(), 46 + plot.panel_height) << "it does not reach into the panel above";
+}
+
+TEST(ColourBar, LiesBelowTheMapWithAllOfItsText) {
+    const ColourBar bar = visibility_bar();
+    for (const int width : {4, 128, 1024}) {
+        Image map{width, 8, 3, {}};
+        map.values.assign(map.index(0, map.height, 0), 0.5f);
+        const auto whole = with_colour_bar(map, bar);
+        ASSERT_TRUE(whole) << whole.error().message;
+        EXPECT_GE(whole->width, std::max(width, 100));
+        for (int y = 0; y < map.height; ++y)
+            for (int x = 0; x < map.width; ++x) ASSERT_EQ(whole->at(x, y, 2), 0.5f) << "pixels keep their places";
+        // Below the bar itself: numbers and the unit, clear of the edges.
+        Image text{whole->width, whole->height - map.height - 24, 3, {}};
+        text.values.assign(whole->values.begin() + static_cast<std::ptrdiff_t>(whole->index(0, map.height + 24, 0)),
+                           whole->values.end());
+        const Extent extent = inked(text);
+        EXPECT_GE(extent.left, 1) << width;
+        EXPECT_LE(extent.right, whole->width - 2) << width;
+        EXPECT_LE(extent.bottom, text.height - 2) << width;
+        EXPECT_GT(extent.bottom, 20);
+    }
+    const glm::vec3 invisible = bar.colour_at(0.1), visible = bar.colour_at(0.5);
+    EXPECT_GT(invisible.b, invisible.r);
+    EXPECT_GT(visible.r, visible.b);
 }
 
 } // namespace

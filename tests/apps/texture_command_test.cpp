@@ -2,15 +2,19 @@
 #include "run_command.h"
 
 #include <cstdio> // what jpeglib.h counts on
+#include <functional>
 
 #include <jpeglib.h>
 
 #include <perception/image.h>
 
+#include "tree_file.h"
+
 namespace {
 
 using namespace unseen::app::testing;
 using ::testing::AllOf;
+using ::testing::AnyOf;
 using ::testing::HasSubstr;
 using unseen::perception::Image;
 using unseen::perception::read_image;
@@ -303,6 +307,53 @@ TEST_F(TextureCommandTest, WhatCannotFollowThemSaysSo) {
     const Outcome cut = run({"simplify", "t.vdt", "-o", "x.obj", "--fold-test", "luebke-hallen-safe", "--json", "-"});
     EXPECT_EQ(cut.status, 0) << cut.err;
     EXPECT_THAT(effect_named(cut.json(), "texture")["why"].get<std::string>(), HasSubstr("how far they move it"));
+}
+
+// As large as files are mapped, by a hole at the end: nobody looks at all of them first.
+TEST_F(TextureCommandTest, OfDamagedTreesThatAreMappedLeadNobodyAstray) {
+    using unseen::support::TreeFile;
+    write_png("p.png", halves());
+    write_square("p.png");
+    const auto write_large = [&](const std::function<void(TreeFile&)>& damage) {
+        TreeFile file = TreeFile::parse(read_text(path("t.vdt")));
+        damage(file);
+        std::string bytes = file.bytes();
+        constexpr std::uint64_t mapped_bytes = 256 << 20;
+        unseen::support::store(bytes, TreeFile::file_bytes_at, mapped_bytes);
+        TreeFile::seal(bytes);
+        write_text(path("large.vdt"), bytes);
+        fs::resize_file(path("large.vdt"), mapped_bytes);
+    };
+    for (const std::vector<std::string>& texture : {std::vector<std::string>{}, {"--no-texture"}}) {
+        build("square.obj", texture);
+        write_large([](TreeFile&) {});
+        EXPECT_EQ(run({"simplify", "large.vdt", "-o", "x.obj"}).status, 0);
+        EXPECT_EQ(run({"simplify", "large.vdt", "-o", "x.obj", "--fold-test", "luebke-hallen-safe"}).status, 0);
+        for (const std::uint32_t parent : {0x40000000u, 0xffffffffu, 0u}) {
+            write_large([&](TreeFile& file) {
+                const std::size_t interior = file["first_leaf"].count();
+                // Far from the root, which is looked at first.
+                for (std::size_t node = interior - 3; node < interior + 8; ++node) file["parents"].set(node, parent);
+            });
+            EXPECT_THAT(complaint({"simplify", "large.vdt", "-o", "x.obj", "--fold-test", "luebke-hallen-safe"}),
+                        HasSubstr("of the mapped tree is damaged"));
+            EXPECT_THAT(complaint({"simplify", "large.vdt", "-o", "x.obj"}), HasSubstr("damaged"));
+            EXPECT_THAT(complaint({"simplify", "large.vdt", "-o", "x.obj", "--light", "1", "0", "0"}),
+                        HasSubstr("damaged"));
+            EXPECT_THAT(complaint({"info", "large.vdt"}), HasSubstr("Node"));
+            EXPECT_THAT(complaint({"render", "large.vdt", "-o", "x.png"}),
+                        AnyOf(HasSubstr("damaged"), HasSubstr("No OpenGL")));
+            // What asks node by node goes as far as nodes are sound.
+            for (const std::vector<std::string>& test : {std::vector<std::string>{"luebke-hallen"},
+                                                         {"extent", "--pixels", "1"},
+                                                         {"displacement", "--pixels", "1"}}) {
+                std::vector<std::string> words = {"simplify", "large.vdt", "-o", "x.obj", "--fold-test"};
+                words.insert(words.end(), test.begin(), test.end());
+                const Outcome cut = run(words);
+                EXPECT_EQ(cut.status, 0) << cut.err;
+            }
+        }
+    }
 }
 
 } // namespace

@@ -62,7 +62,7 @@ void make_trees(const fs::path& folder) {
         const auto tree = build_tree(mesh.view());
         if (!tree) throw std::runtime_error(tree.error().message);
         expect(write_tree(folder / (std::string(name) + ".vdt"), *tree));
-        expect(write_tree(folder / (std::string(name) + "_measured.vdt"), support::measured(*tree)));
+        expect(write_tree(folder / (std::string(name) + "_measured.vdt"), unseen::support::measured(*tree)));
     }
 }
 

@@ -1,4 +1,5 @@
-// Fuzz target for the reader of tree files: any bytes must give an error, or a tree with which everything can be done.
+// Fuzz target for the reader of tree files: any bytes must give an error, or a tree with which
+// everything can be done or which says that it is damaged.
 // tests/README.md tells how to build and run it.
 #include <cstddef>
 #include <cstdint>

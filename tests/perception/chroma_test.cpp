@@ -76,7 +76,7 @@ Result<DistanceCriterion> criterion_of(const VertexTree& tree, const View& view,
     options.scene = {0.2f, 0.4f};
     options.chroma = test.chroma;
     if (gazes) options.gaze_px = glm::dvec2(128, 128);
-    return test.safe ? luebke_hallen_safe_distances(tree, vdtree::bound_cut_rings(tree), view, options)
+    return test.safe ? luebke_hallen_safe_distances(tree, *vdtree::bound_cut_rings(tree), view, options)
                      : luebke_hallen_distances(tree, view, options);
 }
 

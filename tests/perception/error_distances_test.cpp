@@ -75,7 +75,8 @@ std::vector<int> heights_of(const VertexTree& tree) {
     return heights;
 }
 
-// Here about 80,000 patterns are rounded to fewer. The exact distances are those of nodes with no errors below them, few enough for a row each.
+// Patterns are rounded to fewer until there are rows for all. The exact distances are those of nodes with no errors
+// below them, so few that each pattern has its row.
 TEST(ErrorDistances, OfMorePatternsThanRowsAreNoLess) {
     constexpr std::size_t most_rows = 0x10000;
     std::mt19937_64 random(5);

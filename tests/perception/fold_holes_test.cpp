@@ -16,6 +16,8 @@
 #include <vdtree/builder.h>
 #include <vdtree/cut.h>
 
+#include "sound.h"
+
 namespace unseen::perception {
 namespace {
 
@@ -70,7 +72,8 @@ struct Scene {
         tree = std::move(*built);
         std::vector<NodeId> parent_of_vertex(mesh.positions.size());
         for (Index leaf = 0; leaf < tree->leaf_count(); ++leaf)
-            parent_of_vertex[tree->source_vertices()[leaf]] = tree->parents()[tree->interior_count() + leaf];
+            parent_of_vertex[tree->source_vertices()[leaf]] =
+                support::sound(*tree).parents()[tree->interior_count() + leaf];
         for (const Group& group : groups) nodes.push_back(parent_of_vertex[group.vertices.front()]);
     }
 };
@@ -105,7 +108,7 @@ std::vector<float> ring_costs(const Scene& scene, const View& view) {
 
 double literal_cost(const VertexTree& tree, NodeId node, const View& view, const FoldTestOptions& options) {
     const NodeId interior = tree.interior_count();
-    const Index first = tree.first_leaf()[node], end = tree.leaf_end()[node];
+    const Index first = support::sound(tree).first_leaf()[node], end = support::sound(tree).leaf_end()[node];
     const glm::dvec3 eye = view.eye - tree.origin();
     glm::dvec3 low(std::numeric_limits<double>::max()), high(-low);
     float darkest = 1, brightest = 0;
@@ -116,7 +119,7 @@ double literal_cost(const VertexTree& tree, NodeId node, const View& view, const
         brightest = std::max<float>(brightest, tree.luminance()[interior + leaf]);
     }
     bool has_front = false, has_back = false;
-    for (const auto& t : tree.triangles()) {
+    for (const auto& t : support::sound(tree).triangles()) {
         const bool is_own = std::any_of(t.begin(), t.end(), [&](Index leaf) { return first <= leaf && leaf < end; });
         if (!is_own) continue;
         const glm::dvec3 a = tree.positions()[interior + t[0]], b = tree.positions()[interior + t[1]], c = tree.positions()[interior + t[2]];
@@ -199,7 +202,8 @@ std::uint64_t visible_pixels(const Cut& cut, const View& view) {
 
 // What the safe test makes of the scene.
 Cut safe_cut(const Scene& scene, const View& view) {
-    const auto criterion = luebke_hallen_safe_distances(*scene.tree, vdtree::bound_cut_rings(*scene.tree), view, fold_test(*scene.tree));
+    const auto criterion =
+        luebke_hallen_safe_distances(*scene.tree, *vdtree::bound_cut_rings(*scene.tree), view, fold_test(*scene.tree));
     if (!criterion) throw std::runtime_error(criterion.error().message);
     EXPECT_TRUE(criterion->is_monotone());
     Cut cut(*scene.tree);
@@ -402,7 +406,7 @@ TEST(LuebkeHallenSafe, FoldsNothingThatLuebkeHallenKeeps) {
     mesh = flat_grid(even_lines(lines, 1), [](int row, int column) { return 0.5f + 0.1f * static_cast<float>(std::sin(0.7 * row) * std::cos(1.3 * column)); });
     for (glm::dvec3& p : mesh.positions) p.z = 3 * std::sin(0.2 * p.x) * std::cos(0.3 * p.y);
     const VertexTree tree = std::move(*vdtree::build_tree(mesh.view()));
-    const vdtree::CutRings rings = vdtree::bound_cut_rings(tree);
+    const vdtree::CutRings rings = *vdtree::bound_cut_rings(tree);
     View view = view_of_screen();
     std::size_t kept = 0, more = 0;
     for (int trial = 0; trial < 8; ++trial) {

@@ -19,6 +19,7 @@
 #include <vdtree/normal_mask.h>
 
 #include "shapes.h"
+#include "sound.h"
 
 namespace unseen::vdtree {
 namespace {
@@ -175,7 +176,7 @@ NodeId random_node(const VertexTree& tree, std::mt19937_64& random) { return sta
 void unfold_around(Cut& cut, NodeId node, std::mt19937_64& random, const std::function<bool(NodeId)>& may_fold) {
     const VertexTree& tree = cut.tree();
     cut.unfold_all();
-    const NodeId end = tree.subtree_end()[node];
+    const NodeId end = support::sound(tree).subtree_end()[node];
     // Children before parents: a node may fold where all of its own children are folded.
     const bool is_rough = random() % 2;
     for (NodeId other = tree.interior_count(); other-- > 0;) {
@@ -221,7 +222,8 @@ const Case cases[] = {
 
 class SingleFolds : public testing::TestWithParam<Case> {
 protected:
-    SingleFolds() : tree_(std::move(*build_tree(GetParam().make().view()))), rings_(bound_cut_rings(tree_)), cut_(tree_) {}
+    SingleFolds()
+        : tree_(std::move(*build_tree(GetParam().make().view()))), rings_(*bound_cut_rings(tree_)), cut_(tree_) {}
 
     // Folds as many nodes as this mesh's share. `prepare` makes the cut before, `bound` says what is claimed of it.
     template <class MayFold, class BoundOf>
@@ -268,9 +270,9 @@ protected:
 
     bool is_in_subtree(NodeId corner, NodeId node) const {
         if (corner == no_node) return false;
-        if (!tree_.is_leaf(corner)) return corner >= node && corner < tree_.subtree_end()[node];
+        if (!tree_.is_leaf(corner)) return corner >= node && corner < support::sound(tree_).subtree_end()[node];
         const Index leaf = corner - tree_.interior_count();
-        return leaf >= tree_.first_leaf()[node] && leaf < tree_.leaf_end()[node];
+        return leaf >= support::sound(tree_).first_leaf()[node] && leaf < support::sound(tree_).leaf_end()[node];
     }
     // Whether the triangles around a node do not all face the eye, or all face away, in one of the surfaces or the other.
     bool turns_over(std::initializer_list<std::span<const NodeId>> surfaces, NodeId node, glm::dvec3 eye) const {

@@ -14,6 +14,7 @@
 
 #include "built.h"
 #include "shapes.h"
+#include "sound.h"
 #include "textures.h"
 
 namespace unseen {
@@ -218,7 +219,8 @@ TEST_F(Textured, AreBoundedUnderLights) {
     dull.specular = 0;
     for (vdtree::NodeId node = 0; node < tree.interior_count(); ++node) {
         const vdtree::LuminanceRange range = vdtree::lit_range(lighting, bounds->cones()[node], tree.bounds()[node].ring, eye);
-        for (vdtree::Index leaf = tree.first_leaf()[node]; leaf < tree.leaf_end()[node]; ++leaf) {
+        for (vdtree::Index leaf = support::sound(tree).first_leaf()[node]; leaf < support::sound(tree).leaf_end()[node];
+             ++leaf) {
             const vdtree::NodeId vertex = tree.interior_count() + leaf;
             const glm::dvec3 p(tree.positions()[vertex]), n(glm::vec3(tree.normals()[vertex])), rgb(tree.colours()[vertex]);
             const double light = vdtree::lit_luminance(dull, p, n, 1, eye), both = vdtree::lit_luminance(lighting, p, n, 1, eye);

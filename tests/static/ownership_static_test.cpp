@@ -33,7 +33,9 @@ struct KeepsAView {
 static_assert(!std::is_default_constructible_v<KeepsAView> && !std::is_move_constructible_v<KeepsAView> &&
               !std::is_assignable_v<KeepsAView&, KeepsAView>);
 template <class Options, class F>
-concept can_set_view = requires(Options options, F f) { options.view = f; };
+concept can_set_view = requires(Options options, F f) {
+    options.view = f;
+};
 static_assert(!can_set_view<KeepsAView, Lambda>);
 
 // Options own what they are given.
@@ -41,9 +43,11 @@ template <class Options>
 concept owns_progress = requires(Options options) {
     options.progress = [](double, const char*) { return true; };
     requires std::is_same_v<decltype(options.progress), Callback<bool(double, const char*)>>;
-} && std::is_copy_assignable_v<Options>;
+    requires std::is_copy_assignable_v<Options>;
+};
 static_assert(owns_progress<BuildOptions> && owns_progress<ReadOptions>);
-static_assert(std::is_same_v<decltype(AdjustOptions::visibility), VisibilityTest> && std::is_copy_assignable_v<AdjustOptions>);
+static_assert(std::is_same_v<decltype(AdjustOptions::visibility), VisibilityTest> &&
+              std::is_copy_assignable_v<AdjustOptions>);
 
 // What cannot be copied is kept only where that is said, and is no temporary.
 struct Unique {
@@ -53,7 +57,9 @@ struct Unique {
 };
 static_assert(!std::is_convertible_v<Unique, std::reference_wrapper<Unique>>);
 template <class T>
-concept can_refer_to = requires(T&& value) { std::ref(std::forward<T>(value)); };
+concept can_refer_to = requires(T&& value) {
+    std::ref(std::forward<T>(value));
+};
 static_assert(can_refer_to<Unique&> && !can_refer_to<Unique>);
 static_assert(std::is_assignable_v<Progress&, std::reference_wrapper<Unique>>);
 

@@ -19,6 +19,7 @@
 
 #include "follow_tools.h"
 #include "shapes.h"
+#include "sound.h"
 #include "tree_checks.h"
 
 namespace unseen::support {
@@ -118,7 +119,7 @@ private:
             own.interior = std::max(own.interior, static_cast<std::uint16_t>(in_.below(static_cast<unsigned>(rows))));
             own.silhouette = std::max({own.silhouette, own.interior, static_cast<std::uint16_t>(in_.below(static_cast<unsigned>(rows)))});
             if (node == 0 || is_wild) continue;
-            FoldClass& parent = classes[tree_->parents()[node]];
+            FoldClass& parent = classes[support::sound(*tree_).parents()[node]];
             parent.interior = std::max(parent.interior, own.interior);
             parent.silhouette = std::max(parent.silhouette, own.silhouette);
         }
@@ -130,7 +131,7 @@ private:
         for (NodeId node = tree_->interior_count(); node-- > 0;) {
             lengths[node] = std::max(lengths[node], static_cast<float>(in_.share() * tree_->bounds()[node].ring.radius));
             if (node == 0 || is_wild) continue;
-            float& parent = lengths[tree_->parents()[node]];
+            float& parent = lengths[support::sound(*tree_).parents()[node]];
             parent = std::max(parent, lengths[node]);
         }
         return lengths;

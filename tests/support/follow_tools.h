@@ -10,6 +10,7 @@
 #include <vdtree/cut.h>
 
 #include "fold_tester.h"
+#include "sound.h"
 
 namespace unseen::support {
 
@@ -26,7 +27,7 @@ inline std::vector<bool> from_scratch(const VertexTree& tree, const DistanceCrit
         Verdict verdict;
         tester.test({&candidate, 1}, {&verdict, 1});
         unfolded[node] = verdict.unfolded;
-        node = verdict.unfolded ? node + 1 : tree.subtree_end()[node];
+        node = verdict.unfolded ? node + 1 : support::sound(tree).subtree_end()[node];
     }
     return unfolded;
 }
@@ -54,8 +55,9 @@ inline Triangles gathered(const Cut& cut) {
     std::vector<NodeId> indices;
     for (NodeId node = 0; node < tree.interior_count(); ++node)
         if (cut.is_unfolded(node))
-            for (Index t = tree.first_triangle()[node]; t < tree.first_triangle()[node + 1]; ++t)
-                for (const Index leaf : tree.triangles()[t]) indices.push_back(cut.proxy_of_leaf(leaf));
+            for (Index t = support::sound(tree).first_triangle()[node];
+                 t < support::sound(tree).first_triangle()[node + 1]; ++t)
+                for (const Index leaf : support::sound(tree).triangles()[t]) indices.push_back(cut.proxy_of_leaf(leaf));
     return triangles_of(indices);
 }
 

@@ -15,6 +15,7 @@
 #include <vdtree/vertex_tree.h>
 
 #include "shapes.h"
+#include "sound.h"
 
 namespace unseen::support {
 
@@ -33,12 +34,12 @@ bool same_bytes(std::span<const T> a, std::span<const T> b) {
 
 // The first array in which two trees differ, bit for bit.
 inline std::string difference(const VertexTree& a, const VertexTree& b) {
-    if (!same_bytes(a.parents(), b.parents())) return "parents";
-    if (!same_bytes(a.first_leaf(), b.first_leaf())) return "first_leaf";
-    if (!same_bytes(a.leaf_end(), b.leaf_end())) return "leaf_end";
-    if (!same_bytes(a.subtree_end(), b.subtree_end())) return "subtree_end";
-    if (!same_bytes(a.first_triangle(), b.first_triangle())) return "first_triangle";
-    if (!same_bytes(a.triangles(), b.triangles())) return "triangles";
+    if (!same_bytes(support::sound(a).parents(), support::sound(b).parents())) return "parents";
+    if (!same_bytes(support::sound(a).first_leaf(), support::sound(b).first_leaf())) return "first_leaf";
+    if (!same_bytes(support::sound(a).leaf_end(), support::sound(b).leaf_end())) return "leaf_end";
+    if (!same_bytes(support::sound(a).subtree_end(), support::sound(b).subtree_end())) return "subtree_end";
+    if (!same_bytes(support::sound(a).first_triangle(), support::sound(b).first_triangle())) return "first_triangle";
+    if (!same_bytes(support::sound(a).triangles(), support::sound(b).triangles())) return "triangles";
     if (a.origin() != b.origin()) return "origin";
     if (!same_bytes(a.positions(), b.positions())) return "positions";
     if (!same_bytes(a.luminance(), b.luminance())) return "luminance";
@@ -77,44 +78,48 @@ inline std::string difference(const VertexTree& a, const VertexTree& b) {
 inline std::string fault_in_structure(const VertexTree& tree) {
     const NodeId interior = tree.interior_count();
     if (tree.node_count() != interior + tree.leaf_count()) return "node_count";
-    if (tree.parents().size() != tree.node_count()) return "parents has another length";
-    if (tree.parents()[0] != no_node) return "the root has a parent";
-    if (tree.first_leaf()[0] != 0 || tree.leaf_end()[0] != tree.leaf_count()) return "the root lacks leaves";
-    if (tree.subtree_end()[0] != interior) return "the root lacks nodes";
+    if (support::sound(tree).parents().size() != tree.node_count()) return "parents has another length";
+    if (support::sound(tree).parents()[0] != no_node) return "the root has a parent";
+    if (support::sound(tree).first_leaf()[0] != 0 || support::sound(tree).leaf_end()[0] != tree.leaf_count())
+        return "the root lacks leaves";
+    if (support::sound(tree).subtree_end()[0] != interior) return "the root lacks nodes";
     std::vector<int> children(interior, 0);
     for (NodeId node = 1; node < tree.node_count(); ++node) {
-        const NodeId parent = tree.parents()[node];
+        const NodeId parent = support::sound(tree).parents()[node];
         if (parent >= interior) return "node " + std::to_string(node) + " has no interior parent";
         ++children[parent];
         if (tree.is_leaf(node)) {
             const Index leaf = node - interior;
-            if (leaf < tree.first_leaf()[parent] || leaf >= tree.leaf_end()[parent])
+            if (leaf < support::sound(tree).first_leaf()[parent] || leaf >= support::sound(tree).leaf_end()[parent])
                 return "leaf " + std::to_string(leaf) + " is outside of its parent's leaves";
             continue;
         }
         if (parent >= node) return "node " + std::to_string(node) + " comes before its parent";
-        if (node >= tree.subtree_end()[parent] || tree.subtree_end()[node] > tree.subtree_end()[parent])
+        if (node >= support::sound(tree).subtree_end()[parent] ||
+            support::sound(tree).subtree_end()[node] > support::sound(tree).subtree_end()[parent])
             return "node " + std::to_string(node) + " is outside of its parent's subtree";
-        if (tree.first_leaf()[node] < tree.first_leaf()[parent] || tree.leaf_end()[node] > tree.leaf_end()[parent])
+        if (support::sound(tree).first_leaf()[node] < support::sound(tree).first_leaf()[parent] ||
+            support::sound(tree).leaf_end()[node] > support::sound(tree).leaf_end()[parent])
             return "node " + std::to_string(node) + " has leaves outside of its parent's";
     }
     for (NodeId node = 0; node < interior; ++node) {
         if (children[node] < 2) return "node " + std::to_string(node) + " has fewer than two children";
         int visited = 0;
-        Index next_leaf = tree.first_leaf()[node];
+        Index next_leaf = support::sound(tree).first_leaf()[node];
         bool ordered = true;
         tree.for_each_child(node, [&](NodeId child) {
             ++visited;
             const bool leaf = tree.is_leaf(child);
-            ordered &= tree.parents()[child] == node;
-            ordered &= (leaf ? child - interior : tree.first_leaf()[child]) == next_leaf;
-            next_leaf = leaf ? next_leaf + 1 : tree.leaf_end()[child];
+            ordered &= support::sound(tree).parents()[child] == node;
+            ordered &= (leaf ? child - interior : support::sound(tree).first_leaf()[child]) == next_leaf;
+            next_leaf = leaf ? next_leaf + 1 : support::sound(tree).leaf_end()[child];
         });
-        if (!ordered || visited != children[node] || next_leaf != tree.leaf_end()[node])
+        if (!ordered || visited != children[node] || next_leaf != support::sound(tree).leaf_end()[node])
             return "the children of node " + std::to_string(node) + " do not tile its leaves";
     }
-    if (tree.first_triangle().size() != interior + std::size_t{1} || tree.first_triangle()[0] != 0 ||
-        tree.first_triangle()[interior] != tree.triangle_count())
+    if (support::sound(tree).first_triangle().size() != interior + std::size_t{1} ||
+        support::sound(tree).first_triangle()[0] != 0 ||
+        support::sound(tree).first_triangle()[interior] != tree.triangle_count())
         return "first_triangle";
     return {};
 }
@@ -198,7 +203,7 @@ inline std::string fault_in_cut(const Cut& cut) {
     const NodeId interior = tree.interior_count();
     std::vector<NodeId> active_above(tree.node_count(), no_node); // the active node at or above
     for (NodeId node = 0; node < tree.node_count(); ++node) {
-        const NodeId parent = tree.parents()[node];
+        const NodeId parent = support::sound(tree).parents()[node];
         const bool unfolded = cut.is_unfolded(node);
         if (tree.is_leaf(node) && unfolded) return "a leaf is unfolded";
         if (unfolded && parent != no_node && !cut.is_unfolded(parent))
@@ -214,7 +219,7 @@ inline std::string fault_in_cut(const Cut& cut) {
             return "leaf " + std::to_string(leaf) + " has another proxy";
     }
     std::vector<Triangle> expected;
-    for (const Triangle& t : tree.triangles()) {
+    for (const Triangle& t : support::sound(tree).triangles()) {
         const Triangle now = {active_above[interior + t[0]], active_above[interior + t[1]],
                               active_above[interior + t[2]]};
         if (now[0] != now[1] && now[1] != now[2] && now[2] != now[0]) expected.push_back(now);

@@ -9,18 +9,28 @@
 #include <vdtree/cut.h>
 #include <vdtree/cut_rings.h>
 #include <vdtree/fold_errors.h>
+#include <vdtree/geomorph.h>
 #include <vdtree/lighting.h>
 #include <vdtree/occluders.h>
 #include <vdtree/vertex_tree.h>
 
 namespace unseen::support {
 
-// Returns whether every mesh that came out was valid. Measuring folds takes a second, however small the tree is, and with sanitizers ten.
+// Returns whether every mesh that came out was valid, and all that looks at the whole tree agreed on whether it is
+// damaged. Measuring folds takes a second, however small the tree is, and with sanitizers ten.
 inline bool use_everything(const vdtree::VertexTree& tree, bool measures_folds = true) {
     using namespace vdtree;
-    (void)verify(tree).has_value();
-    if (tree.check()) (void)bound_cut_rings(tree);
-    bool valid = true;
+    // First, for nobody has looked at a mapped tree yet.
+    const bool is_sound = bound_cut_rings(tree).has_value();
+    bool valid = is_sound == tree.check().has_value();
+    valid &= is_sound || !verify(tree);
+    valid &= is_sound == LightBounds::measure(tree).has_value();
+    valid &= is_sound == tree.untextured().has_value();
+    if (measures_folds || !is_sound) valid &= !with_fold_errors(tree, 1) || is_sound;
+    for (const double distance : {0.5, 1.5})
+        (void)check_lights(tree,
+                           {.lights = {{.kind = LightSource::Kind::point, .position = glm::dvec3(distance, 0.1, 0.2)}}})
+            .has_value();
     Cut cut(tree);
     const auto extract = [&] { valid &= validate(extract_mesh(cut).view()).has_value(); };
     cut.unfold_all();
@@ -59,8 +69,15 @@ inline bool use_everything(const vdtree::VertexTree& tree, bool measures_folds =
         (void)cut.follow(*everything, {.eye = eye, .occluders = occluders}).has_value(); // not from within one
         extract();
     }
-    const auto relit = tree.relit({.direction = {0, 0, 1}});
-    return valid && (relit ? relit->node_count() == tree.node_count() : !tree.check());
+    for (const auto& criterion : {extent_criterion(tree, view, 20), displacement_criterion(tree, view, 2)})
+        if (criterion) (void)cut.follow(*criterion, {.eye = view.eye}).has_value();
+    extract();
+    if (auto geomorph = Geomorph::create(tree, {.seconds = 1})) {
+        (void)geomorph->step(cut, 0).has_value();
+        cut.fold_all();
+        (void)geomorph->step(cut, 0.5).has_value();
+    }
+    return valid && is_sound == tree.relit({.direction = {0, 0, 1}}).has_value();
 }
 
 } // namespace unseen::support

@@ -23,6 +23,7 @@
 
 #include "exact.h"
 #include "shapes.h"
+#include "sound.h"
 
 namespace unseen::vdtree {
 namespace {
@@ -313,7 +314,7 @@ Tightness measure(const VertexTree& tree) {
     const NodeId interior = tree.interior_count();
     std::vector<std::vector<Index>> around(tree.leaf_count());
     for (Index t = 0; t < tree.triangle_count(); ++t)
-        for (const Index leaf : tree.triangles()[t]) around[leaf].push_back(t);
+        for (const Index leaf : support::sound(tree).triangles()[t]) around[leaf].push_back(t);
     Tightness result;
     int supports = 0, rings = 0;
     Points region;
@@ -327,12 +328,13 @@ Tightness measure(const VertexTree& tree) {
     const auto add = [&](NodeId node) { region.emplace_back(tree.positions()[node]); };
     for (NodeId node = 0; node < interior; ++node) {
         region.clear();
-        for (NodeId below = node; below < tree.subtree_end()[node]; ++below) add(below);
-        for (Index leaf = tree.first_leaf()[node]; leaf < tree.leaf_end()[node]; ++leaf) add(interior + leaf);
+        for (NodeId below = node; below < support::sound(tree).subtree_end()[node]; ++below) add(below);
+        for (Index leaf = support::sound(tree).first_leaf()[node]; leaf < support::sound(tree).leaf_end()[node]; ++leaf)
+            add(interior + leaf);
         ratio(tree.support_spheres()[node], result.support, supports);
-        for (Index leaf = tree.first_leaf()[node]; leaf < tree.leaf_end()[node]; ++leaf)
+        for (Index leaf = support::sound(tree).first_leaf()[node]; leaf < support::sound(tree).leaf_end()[node]; ++leaf)
             for (const Index t : around[leaf])
-                for (const Index corner : tree.triangles()[t]) add(interior + corner);
+                for (const Index corner : support::sound(tree).triangles()[t]) add(interior + corner);
         ratio(tree.bounds()[node].ring, result.ring, rings);
     }
     result.support /= supports;

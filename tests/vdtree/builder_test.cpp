@@ -23,6 +23,7 @@
 
 #include "exact.h"
 #include "shapes.h"
+#include "sound.h"
 #include "tree_checks.h"
 
 namespace unseen::vdtree {
@@ -65,7 +66,7 @@ public:
     Regions(const VertexTree& tree, const Mesh& mesh)
         : tree_(tree), around_(tree.leaf_count()), weld_(tree.leaf_count()) {
         for (Index t = 0; t < tree.triangle_count(); ++t)
-            for (const Index leaf : tree.triangles()[t]) around_[leaf].push_back(t);
+            for (const Index leaf : support::sound(tree).triangles()[t]) around_[leaf].push_back(t);
         std::map<std::tuple<double, double, double>, Index> first;
         for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf) {
             const glm::dvec3 p = mesh.positions[tree.source_vertices()[leaf]];
@@ -81,14 +82,15 @@ public:
     NodeId node_of(Index leaf) const { return tree_.interior_count() + leaf; }
     std::set<Index> triangles_around(NodeId node) const {
         std::set<Index> found;
-        for (Index leaf = tree_.first_leaf()[node]; leaf < tree_.leaf_end()[node]; ++leaf)
+        for (Index leaf = support::sound(tree_).first_leaf()[node]; leaf < support::sound(tree_).leaf_end()[node];
+             ++leaf)
             found.insert(around_[leaf].begin(), around_[leaf].end());
         return found;
     }
     std::set<Index> ring_leaves(NodeId node) const {
         std::set<Index> found;
         for (const Index t : triangles_around(node))
-            found.insert(tree_.triangles()[t].begin(), tree_.triangles()[t].end());
+            found.insert(support::sound(tree_).triangles()[t].begin(), support::sound(tree_).triangles()[t].end());
         return found;
     }
     // Triangles that touch a place in the ring: the ring dilated by one more.
@@ -111,7 +113,7 @@ public:
 private:
     void find_irregular_places() {
         std::map<std::pair<Index, Index>, std::vector<bool>> uses; // by edge: whether it is run from low to high
-        for (const Triangle& t : tree_.triangles()) {
+        for (const Triangle& t : support::sound(tree_).triangles()) {
             const Triangle w = {weld_[t[0]], weld_[t[1]], weld_[t[2]]};
             if (w[0] == w[1] || w[1] == w[2] || w[2] == w[0]) continue;
             for (std::size_t k = 0; k < 3; ++k)
@@ -191,11 +193,13 @@ TEST_P(BuiltTree, LosesEachTriangleWhereTwoCornersFirstMerge) {
     const auto tree = build();
     ASSERT_TRUE(tree);
     for (NodeId node = 0; node < tree->interior_count(); ++node) {
-        for (Index t = tree->first_triangle()[node]; t < tree->first_triangle()[node + 1]; ++t) {
+        for (Index t = support::sound(*tree).first_triangle()[node];
+             t < support::sound(*tree).first_triangle()[node + 1]; ++t) {
             const auto supported = [&](NodeId n) {
                 int corners = 0;
-                for (const Index leaf : tree->triangles()[t])
-                    corners += tree->first_leaf()[n] <= leaf && leaf < tree->leaf_end()[n];
+                for (const Index leaf : support::sound(*tree).triangles()[t])
+                    corners +=
+                        support::sound(*tree).first_leaf()[n] <= leaf && leaf < support::sound(*tree).leaf_end()[n];
                 return corners;
             };
             ASSERT_GE(supported(node), 2) << "triangle " << t;
@@ -214,19 +218,20 @@ TEST_P(BuiltTree, HasSpheresThatContainTheirRegionsExactly) {
     const Regions regions(*tree, mesh());
     for (NodeId node = 0; node < tree->interior_count(); ++node) {
         const Sphere support = tree->support_spheres()[node], ring = tree->bounds()[node].ring;
-        for (NodeId below = node; below < tree->subtree_end()[node]; ++below) {
+        for (NodeId below = node; below < support::sound(*tree).subtree_end()[node]; ++below) {
             ASSERT_TRUE(support::contains(support, tree->positions()[below])) << "node " << node << ", proxy " << below;
             ASSERT_TRUE(support::contains(ring, tree->positions()[below])) << "node " << node << ", proxy " << below;
             const Sphere s = tree->support_spheres()[below], r = tree->bounds()[below].ring;
             ASSERT_TRUE(support::contains(support, s.centre, s.radius)) << "node " << node << ", node " << below;
             ASSERT_TRUE(support::contains(ring, r.centre, r.radius)) << "node " << node << ", node " << below;
         }
-        for (Index leaf = tree->first_leaf()[node]; leaf < tree->leaf_end()[node]; ++leaf)
+        for (Index leaf = support::sound(*tree).first_leaf()[node]; leaf < support::sound(*tree).leaf_end()[node];
+             ++leaf)
             ASSERT_TRUE(support::contains(support, tree->positions()[regions.node_of(leaf)])) << "node " << node;
         for (const Index leaf : regions.ring_leaves(node))
             ASSERT_TRUE(support::contains(ring, tree->positions()[regions.node_of(leaf)])) << "node " << node;
     }
-    for (const Triangle& t : tree->triangles())
+    for (const Triangle& t : support::sound(*tree).triangles())
         for (const Index leaf : t)
             ASSERT_TRUE(support::contains(tree->bounding_sphere(), tree->positions()[regions.node_of(leaf)]));
 }
@@ -241,7 +246,7 @@ TEST_P(BuiltTree, KnowsTheNormalsOfTheDilatedRing) {
             continue;
         }
         for (const Index t : regions.dilated_triangles(node)) {
-            const Triangle& corners = tree->triangles()[t];
+            const Triangle& corners = support::sound(*tree).triangles()[t];
             const glm::dvec3 n =
                 normal_of(regions.position(regions.node_of(corners[0])), regions.position(regions.node_of(corners[1])),
                           regions.position(regions.node_of(corners[2])));
@@ -271,7 +276,7 @@ TEST_P(BuiltTree, KnowsTheNormalsAfterEachFold) {
     // Nodes are known by their leaves.
     std::map<std::pair<Index, Index>, NodeId> node_by_leaves;
     for (NodeId node = 0; node < tree->interior_count(); ++node)
-        node_by_leaves[{tree->first_leaf()[node], tree->leaf_end()[node]}] = node;
+        node_by_leaves[{support::sound(*tree).first_leaf()[node], support::sound(*tree).leaf_end()[node]}] = node;
     std::vector<std::set<Index>> leaves(clusters);
     for (Index v = 0; v < vertices; ++v) leaves[v] = {leaf_of_vertex[v]};
     for (std::size_t c = 0; c + 1 < clusters; ++c)
@@ -322,8 +327,10 @@ TEST_P(BuiltTree, BoundsLuminance) {
             low = std::min<float>(low, y[n]);
             high = std::max<float>(high, y[n]);
         };
-        for (NodeId below = node; below < tree->subtree_end()[node]; ++below) take(below);
-        for (Index leaf = tree->first_leaf()[node]; leaf < tree->leaf_end()[node]; ++leaf) take(regions.node_of(leaf));
+        for (NodeId below = node; below < support::sound(*tree).subtree_end()[node]; ++below) take(below);
+        for (Index leaf = support::sound(*tree).first_leaf()[node]; leaf < support::sound(*tree).leaf_end()[node];
+             ++leaf)
+            take(regions.node_of(leaf));
         const LuminanceRange support = tree->support_luminance()[node], ring = tree->ring_luminance()[node];
         ASSERT_EQ(support.lo, low) << "node " << node;
         ASSERT_EQ(support.hi, high) << "node " << node;
@@ -349,7 +356,7 @@ TEST_P(BuiltTree, BoundsLuminance) {
         ASSERT_LE(rounding, luminance_rounding / 2 + floats) << "node " << node;
     }
     float low = 1, high = 0;
-    for (const Triangle& t : tree->triangles()) {
+    for (const Triangle& t : support::sound(*tree).triangles()) {
         for (const Index leaf : t) {
             low = std::min<float>(low, tree->luminance()[regions.node_of(leaf)]);
             high = std::max<float>(high, tree->luminance()[regions.node_of(leaf)]);
@@ -365,7 +372,8 @@ TEST_P(BuiltTree, MeasuresDisplacement) {
     for (NodeId node = tree->interior_count(); node-- > 0;) {
         double largest = 0;
         const glm::dvec3 proxy(tree->positions()[node]);
-        for (Index leaf = tree->first_leaf()[node]; leaf < tree->leaf_end()[node]; ++leaf)
+        for (Index leaf = support::sound(*tree).first_leaf()[node]; leaf < support::sound(*tree).leaf_end()[node];
+             ++leaf)
             largest =
                 std::max(largest, glm::distance(proxy, glm::dvec3(tree->positions()[tree->interior_count() + leaf])));
         double with_children = largest;
@@ -390,11 +398,11 @@ TEST_P(BuiltTree, MergesCoincidentVerticesAtNoCost) {
     for (const auto& [place, leaves] : places) {
         if (leaves.size() < 2 || GetParam().shape == "all_coincident") continue;
         // Some node supports these leaves and no others.
-        NodeId node = tree->parents()[tree->interior_count() + leaves.front()];
-        while (tree->leaf_end()[node] <= leaves.back()) node = tree->parents()[node];
-        ASSERT_EQ(tree->first_leaf()[node], leaves.front());
-        ASSERT_EQ(tree->leaf_end()[node], leaves.back() + 1);
-        ASSERT_EQ(tree->leaf_end()[node] - tree->first_leaf()[node], leaves.size());
+        NodeId node = support::sound(*tree).parents()[tree->interior_count() + leaves.front()];
+        while (support::sound(*tree).leaf_end()[node] <= leaves.back()) node = support::sound(*tree).parents()[node];
+        ASSERT_EQ(support::sound(*tree).first_leaf()[node], leaves.front());
+        ASSERT_EQ(support::sound(*tree).leaf_end()[node], leaves.back() + 1);
+        ASSERT_EQ(support::sound(*tree).leaf_end()[node] - support::sound(*tree).first_leaf()[node], leaves.size());
         EXPECT_EQ(tree->support_spheres()[node].radius, 0);
         EXPECT_EQ(tree->displacement()[node], 0);
     }
@@ -446,7 +454,7 @@ std::vector<T> copy(std::span<const T> values) {
 
 // The tree's triangles in its order, by input vertices.
 std::vector<Triangle> corners_of(const VertexTree& tree) {
-    std::vector<Triangle> out = copy(tree.triangles());
+    std::vector<Triangle> out = copy(support::sound(tree).triangles());
     for (Triangle& t : out)
         for (Index& leaf : t) leaf = tree.source_vertices()[leaf];
     return out;
@@ -468,13 +476,13 @@ TEST(LiteralTree, QuadOfTwoTriangles) {
     //    / \   / \.
     //   3   4 5   6
     EXPECT_EQ(tree->interior_count(), 3u);
-    EXPECT_THAT(copy(tree->parents()), ElementsAre(no_node, 0, 0, 1, 1, 2, 2));
-    EXPECT_THAT(copy(tree->first_leaf()), ElementsAre(0, 0, 2));
-    EXPECT_THAT(copy(tree->leaf_end()), ElementsAre(4, 2, 4));
-    EXPECT_THAT(copy(tree->subtree_end()), ElementsAre(3, 2, 3));
+    EXPECT_THAT(copy(support::sound(*tree).parents()), ElementsAre(no_node, 0, 0, 1, 1, 2, 2));
+    EXPECT_THAT(copy(support::sound(*tree).first_leaf()), ElementsAre(0, 0, 2));
+    EXPECT_THAT(copy(support::sound(*tree).leaf_end()), ElementsAre(4, 2, 4));
+    EXPECT_THAT(copy(support::sound(*tree).subtree_end()), ElementsAre(3, 2, 3));
     EXPECT_THAT(copy(tree->source_vertices()), ElementsAre(0, 1, 2, 3));
     // Triangle 0 has 0 and 1 in common with node 1; triangle 1 has 2 and 3 in common with node 2.
-    EXPECT_THAT(copy(tree->first_triangle()), ElementsAre(0, 0, 1, 2));
+    EXPECT_THAT(copy(support::sound(*tree).first_triangle()), ElementsAre(0, 0, 1, 2));
     EXPECT_THAT(corners_of(*tree), ElementsAre(quad.triangles[0], quad.triangles[1]));
     EXPECT_EQ(tree->positions()[0], glm::vec3(0.5, 0.5, 0));
     EXPECT_EQ(tree->positions()[1], glm::vec3(0.5, 0, 0));
@@ -512,10 +520,10 @@ TEST(LiteralTree, Fan) {
     // Leaves in depth-first order: 0 1 (5 (4 (2 3))).
     EXPECT_EQ(tree->interior_count(), 4u);
     EXPECT_THAT(copy(tree->source_vertices()), ElementsAre(0, 1, 5, 4, 2, 3));
-    EXPECT_THAT(copy(tree->first_leaf()), ElementsAre(0, 2, 3, 4));
-    EXPECT_THAT(copy(tree->leaf_end()), ElementsAre(6, 6, 6, 6));
-    EXPECT_THAT(copy(tree->parents()), ElementsAre(no_node, 0, 1, 2, 0, 0, 1, 2, 3, 3));
-    EXPECT_THAT(copy(tree->first_triangle()), ElementsAre(0, 1, 2, 3, 4));
+    EXPECT_THAT(copy(support::sound(*tree).first_leaf()), ElementsAre(0, 2, 3, 4));
+    EXPECT_THAT(copy(support::sound(*tree).leaf_end()), ElementsAre(6, 6, 6, 6));
+    EXPECT_THAT(copy(support::sound(*tree).parents()), ElementsAre(no_node, 0, 1, 2, 0, 0, 1, 2, 3, 3));
+    EXPECT_THAT(copy(support::sound(*tree).first_triangle()), ElementsAre(0, 1, 2, 3, 4));
     EXPECT_THAT(corners_of(*tree),
                 ElementsAre(fan.triangles[0], fan.triangles[3], fan.triangles[2], fan.triangles[1]));
 

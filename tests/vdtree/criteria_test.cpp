@@ -16,6 +16,7 @@
 #include <vdtree/cut.h>
 
 #include "shapes.h"
+#include "sound.h"
 
 namespace unseen::vdtree {
 namespace {
@@ -206,7 +207,8 @@ TEST(Displacement, IsNotExceededByAnyVertex) {
             for (NodeId node = 0; node < tree.interior_count(); ++node) {
                 const glm::dvec3 to = glm::normalize(glm::dvec3(tree.positions()[node]) - eye);
                 double widest = 0;
-                for (Index leaf = tree.first_leaf()[node]; leaf < tree.leaf_end()[node]; ++leaf) {
+                for (Index leaf = support::sound(tree).first_leaf()[node]; leaf < support::sound(tree).leaf_end()[node];
+                     ++leaf) {
                     const glm::dvec3 from =
                         glm::normalize(glm::dvec3(tree.positions()[tree.interior_count() + leaf]) - eye);
                     widest = std::max(widest, 2 * std::asin(std::min(1.0, glm::distance(from, to) / 2)));
@@ -437,7 +439,7 @@ TEST(Frustum, NestsUpTheTree) {
         for (int round = 0; round < 100; ++round) {
             const auto seen = seen_of(tree, FrustumVisibility(tree, random_view(random, tree)));
             for (NodeId node = 1; node < tree.interior_count(); ++node) {
-                const Visibility above = seen[tree.parents()[node]];
+                const Visibility above = seen[support::sound(tree).parents()[node]];
                 if (above != Visibility::partly) {
                     ASSERT_EQ(seen[node], above) << named.name << ", node " << node;
                 }

@@ -17,6 +17,7 @@
 #include <vdtree/builder.h>
 
 #include "shapes.h"
+#include "sound.h"
 #include "tree_checks.h"
 
 namespace unseen::vdtree {
@@ -90,7 +91,9 @@ std::vector<float> random_costs(const VertexTree& tree, std::mt19937_64& random)
         if (kind == 2) own = 0.5f;
         if (kind == 3 && random() % 8 == 0) own = unbounded_cost(static_cast<float>(random_unit(random)));
         costs[node] = std::max(costs[node], own);
-        if (node > 0) costs[tree.parents()[node]] = std::max(costs[tree.parents()[node]], costs[node]);
+        if (node > 0)
+            costs[support::sound(tree).parents()[node]] =
+                std::max(costs[support::sound(tree).parents()[node]], costs[node]);
     }
     return costs;
 }
@@ -161,7 +164,7 @@ TEST(Cut, OperationsTellWhetherTheyChangedAnything) {
     EXPECT_FALSE(cut.unfold_ancestors(root));
     EXPECT_TRUE(cut.unfold(root));
     EXPECT_FALSE(cut.unfold(root));
-    EXPECT_TRUE(cut.unfold_ancestors(last_leaf) || tree.parents()[last_leaf] == root);
+    EXPECT_TRUE(cut.unfold_ancestors(last_leaf) || support::sound(tree).parents()[last_leaf] == root);
     EXPECT_TRUE(cut.is_active(last_leaf));
     EXPECT_FALSE(cut.unfold_ancestors(last_leaf));
     EXPECT_TRUE(cut.fold_subtree(root));
@@ -177,7 +180,8 @@ TEST(Cut, UnfoldAncestorsUnfoldsNothingElse) {
         cut.unfold_ancestors(node);
         EXPECT_TRUE(cut.is_active(node));
         std::vector<bool> above(tree.interior_count(), false);
-        for (NodeId up = tree.parents()[node]; up != no_node; up = tree.parents()[up]) above[up] = true;
+        for (NodeId up = support::sound(tree).parents()[node]; up != no_node; up = support::sound(tree).parents()[up])
+            above[up] = true;
         for (NodeId n = 0; n < tree.interior_count(); ++n) ASSERT_EQ(cut.is_unfolded(n), above[n]);
     }
 }
@@ -197,7 +201,7 @@ TEST(Adjust, FoldsWhereTheCostIsAtMostOne) {
             ASSERT_EQ(fault_in_cut(cut), "");
             float largest = 0;
             for (NodeId node = 0; node < tree.interior_count(); ++node) {
-                const NodeId parent = tree.parents()[node];
+                const NodeId parent = support::sound(tree).parents()[node];
                 const bool reached = parent == no_node || cut.is_unfolded(parent);
                 ASSERT_EQ(cut.is_unfolded(node), reached && costs[node] > 1);
                 if (reached && costs[node] <= 1) largest = std::max(largest, costs[node]);
@@ -303,7 +307,9 @@ TEST(Budget, NeverExceedsAndNeverWastes) {
             for (NodeId node = 0; node < tree.interior_count() && first == no_node; ++node)
                 if (cut.is_active(node) && costs[node] == largest) first = node;
             if (first != no_node)
-                fits = cut.triangle_count() + tree.first_triangle()[first + 1] - tree.first_triangle()[first] <= budget;
+                fits = cut.triangle_count() + support::sound(tree).first_triangle()[first + 1] -
+                           support::sound(tree).first_triangle()[first] <=
+                       budget;
             ASSERT_TRUE(largest == 0 || !fits);
         }
     }
@@ -319,10 +325,12 @@ float least_largest_cost(const VertexTree& tree, const std::vector<float>& costs
         Index triangles = 0;
         float largest = 0;
         for (NodeId node = 0; node < n; ++node) {
-            const NodeId parent = tree.parents()[node];
+            const NodeId parent = support::sound(tree).parents()[node];
             const bool reached = parent == no_node || is_unfolded(parent);
             closed &= reached || !is_unfolded(node);
-            if (is_unfolded(node)) triangles += tree.first_triangle()[node + 1] - tree.first_triangle()[node];
+            if (is_unfolded(node))
+                triangles +=
+                    support::sound(tree).first_triangle()[node + 1] - support::sound(tree).first_triangle()[node];
             else if (reached) largest = std::max(largest, costs[node]);
         }
         if (closed && triangles <= budget) least = std::min(least, largest);
@@ -360,7 +368,7 @@ TEST(Budget, BreaksTiesByNodeNumber) {
     bool ended = false;
     Index triangles = 0;
     for (NodeId node = 0; node < tree.interior_count(); ++node) {
-        triangles += tree.first_triangle()[node + 1] - tree.first_triangle()[node];
+        triangles += support::sound(tree).first_triangle()[node + 1] - support::sound(tree).first_triangle()[node];
         ended |= triangles > tree.triangle_count() / 2;
         ASSERT_EQ(cut.is_unfolded(node), !ended) << "node " << node;
     }
@@ -395,7 +403,8 @@ TEST(Budget, OrdersUnboundedCostsAmongThemselves) {
     // All unbounded, ordered by the number of leaves.
     std::vector<float> costs(tree.interior_count());
     for (NodeId node = 0; node < tree.interior_count(); ++node)
-        costs[node] = unbounded_cost(static_cast<float>(tree.leaf_end()[node] - tree.first_leaf()[node]));
+        costs[node] = unbounded_cost(
+            static_cast<float>(support::sound(tree).leaf_end()[node] - support::sound(tree).first_leaf()[node]));
     const auto criterion = look_up(costs);
     Cut cut(tree);
     const AdjustStats stats = cut.adjust(criterion, {.triangle_budget = tree.triangle_count() / 2});
@@ -438,7 +447,7 @@ TEST(Visibility, FoldsWhatIsOutAtNoCost) {
     Index checked = 0;
     for (NodeId node = 0; node < tree.interior_count(); ++node) {
         const Sphere s = tree.bounds()[node].ring;
-        const NodeId parent = tree.parents()[node];
+        const NodeId parent = support::sound(tree).parents()[node];
         const bool out = s.centre.x - s.radius > 0.1f;
         if (parent == no_node || cut.is_unfolded(parent)) {
             ASSERT_EQ(cut.is_unfolded(node), !out);
@@ -535,8 +544,8 @@ TEST(ExtractMesh, KeepsEveryTriangleInItsRange) {
         for (const MeshRange& range : tree.ranges()) {
             std::uint64_t expected = 0;
             for (NodeId node = 0; node < tree.interior_count(); ++node)
-                for (Index t = tree.first_triangle()[node];
-                     cut.is_unfolded(node) && t < tree.first_triangle()[node + 1]; ++t)
+                for (Index t = support::sound(tree).first_triangle()[node];
+                     cut.is_unfolded(node) && t < support::sound(tree).first_triangle()[node + 1]; ++t)
                     expected += tree.source_triangles()[t] >= range.first_triangle &&
                                 tree.source_triangles()[t] < range.first_triangle + range.triangle_count;
             std::uint64_t found = 0;

@@ -14,12 +14,15 @@
 #include "built.h"
 #include "pyramid.h"
 #include "shapes.h"
+#include "sound.h"
 #include "temp_folder.h"
 
 namespace unseen::vdtree {
 namespace {
 
-VertexTree built(const Mesh& mesh, int threads = 1) { return support::measured(support::built(mesh, {.threads = 1}), threads); }
+VertexTree built(const Mesh& mesh, int threads = 1) {
+    return support::measured(support::built(mesh, {.threads = 1}), threads);
+}
 
 Mesh grey(Mesh mesh, float luminance) {
     mesh.colours.assign(mesh.positions.size(), {luminance, luminance, luminance, 1});
@@ -93,7 +96,8 @@ TEST(FoldStages, GoFromFineToTheRoot) {
     const VertexTree tree = built(shapes::torus(48, 24));
     const auto errors = tree.fold_errors();
     ASSERT_FALSE(tree.fold_stages().empty());
-    for (NodeId node = 1; node < tree.interior_count(); ++node) EXPECT_LE(errors[node].stage, errors[tree.parents()[node]].stage);
+    for (NodeId node = 1; node < tree.interior_count(); ++node)
+        EXPECT_LE(errors[node].stage, errors[support::sound(tree).parents()[node]].stage);
     EXPECT_EQ(errors[VertexTree::root()].stage + 1u, tree.fold_stages().size());
     EXPECT_EQ(errors[tree.interior_count() - 1].stage < tree.fold_stages().size(), true);
     // Coarse stages show more.

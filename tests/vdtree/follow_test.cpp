@@ -21,6 +21,7 @@
 #include "follow_tools.h"
 #include "index_buffer.h"
 #include "shapes.h"
+#include "sound.h"
 #include "tree_checks.h"
 
 namespace unseen::vdtree {
@@ -32,7 +33,8 @@ using support::gathered;
 using support::state_of;
 using support::triangles_of;
 
-// Frames a mesh class; the customer's figure, 10^4, is reached with the environment variable UNSEEN_FRAMES.
+// Frames a mesh class. A view of a few minutes has ten thousand, in which rare sequences of changes turn up, too: the environment variable
+// UNSEEN_FRAMES asks for so many.
 int frame_count() {
     const char* asked = std::getenv("UNSEEN_FRAMES");
     return asked ? std::atoi(asked) : 400;
@@ -85,7 +87,9 @@ DistanceCriterion rich_criterion(const VertexTree& tree, std::uint64_t seed, boo
         for (NodeId node = tree.interior_count(); node-- > 0;) {
             float& own = parts.silhouette_lengths[node];
             own = std::max(own, tree.bounds()[node].ring.radius * static_cast<float>(0.2 + random_unit(random)));
-            if (node > 0) parts.silhouette_lengths[tree.parents()[node]] = std::max(parts.silhouette_lengths[tree.parents()[node]], own);
+            if (node > 0)
+                parts.silhouette_lengths[support::sound(tree).parents()[node]] =
+                    std::max(parts.silhouette_lengths[support::sound(tree).parents()[node]], own);
         }
     }
     parts.classes.resize(tree.interior_count());
@@ -94,7 +98,7 @@ DistanceCriterion rich_criterion(const VertexTree& tree, std::uint64_t seed, boo
         own.interior = std::max(own.interior, static_cast<std::uint16_t>(random() % 8));
         own.silhouette = std::max<std::uint16_t>({own.silhouette, own.interior, static_cast<std::uint16_t>(8 + random() % 15)});
         if (node == 0) break;
-        FoldClass& parent = parts.classes[tree.parents()[node]];
+        FoldClass& parent = parts.classes[support::sound(tree).parents()[node]];
         parent.interior = std::max(parent.interior, own.interior);
         parent.silhouette = std::max(parent.silhouette, own.silhouette);
     }
@@ -497,7 +501,7 @@ TEST(FollowAfterOthers, StartsOverFromWhateverTheCutIs) {
     cut.unfold_all();
     ASSERT_TRUE(cut.follow(criterion, viewpoint));
     EXPECT_EQ(state_of(cut), state_of(other));
-    cut.fold_subtree(tree.subtree_end()[1]);
+    cut.fold_subtree(support::sound(tree).subtree_end()[1]);
     ASSERT_TRUE(cut.follow(criterion, viewpoint));
     EXPECT_EQ(state_of(cut), state_of(other));
 }
@@ -530,7 +534,7 @@ std::vector<std::uint32_t> all_cuts(const VertexTree& tree) {
     for (std::uint32_t bits = 0; bits < 1u << tree.interior_count(); ++bits) {
         bool closed = true;
         for (NodeId node = 1; node < tree.interior_count() && closed; ++node)
-            closed = !((bits >> node) & 1) || ((bits >> tree.parents()[node]) & 1);
+            closed = !((bits >> node) & 1) || ((bits >> support::sound(tree).parents()[node]) & 1);
         if (closed) cuts.push_back(bits);
     }
     return cuts;
@@ -550,12 +554,14 @@ TEST(FollowBudget, HasTheLeastLargestCostOfAllCuts) {
         std::vector<std::uint64_t> unfolded((nodes.size() + 63) / 64);
         tester.find_costs(nodes, {own_cost.data(), seen_cost.data(), unfolded.data()});
         for (NodeId node = 0; node < nodes.size(); ++node)
-            cost[node] = node == 0 ? own_cost[0] : std::min(own_cost[node], cost[tree.parents()[node]]);
+            cost[node] = node == 0 ? own_cost[0] : std::min(own_cost[node], cost[support::sound(tree).parents()[node]]);
         const auto triangles_and_cost = [&](auto is_unfolded) {
             Index triangles = 0;
             float largest = 0;
             for (NodeId node = 0; node < tree.interior_count(); ++node) {
-                if (is_unfolded(node)) triangles += tree.first_triangle()[node + 1] - tree.first_triangle()[node];
+                if (is_unfolded(node))
+                    triangles +=
+                        support::sound(tree).first_triangle()[node + 1] - support::sound(tree).first_triangle()[node];
                 else largest = std::max(largest, cost[node]);
             }
             return std::pair(triangles, largest);
@@ -663,7 +669,8 @@ float largest_cost_of(const Cut& cut, const DistanceCriterion& criterion, const 
     const auto costs = find_every_cost(cut.tree(), criterion, viewpoint);
     if (!costs) throw std::runtime_error(costs.error().message);
     float largest = 0;
-    for (NodeId node = 0; node < cut.tree().interior_count(); node = cut.is_unfolded(node) ? node + 1 : cut.tree().subtree_end()[node])
+    for (NodeId node = 0; node < cut.tree().interior_count();
+         node = cut.is_unfolded(node) ? node + 1 : support::sound(cut.tree()).subtree_end()[node])
         if (!cut.is_unfolded(node)) largest = std::max(largest, (*costs)[node]);
     return largest;
 }
@@ -817,9 +824,9 @@ TEST(FollowBackFaces, OfInsideOutSurfacesAreThoseOfTheSurfaceTurnedRight) {
         // What folds for facing away shows no triangle of the surface, whose hidden half is folded for the most part.
         Index hidden = 0;
         for (Index t = 0; t < wrong.triangle_count(); ++t) {
-            const Triangle& corners = wrong.triangles()[t];
+            const Triangle& corners = support::sound(wrong).triangles()[t];
             const bool is_hidden = std::any_of(corners.begin(), corners.end(), [&](Index leaf) {
-                const NodeId parent = wrong.parents()[wrong.interior_count() + leaf];
+                const NodeId parent = support::sound(wrong).parents()[wrong.interior_count() + leaf];
                 return with_back.is_unfolded(parent) && !of_wrong.is_unfolded(parent);
             });
             hidden += is_hidden;
@@ -913,7 +920,7 @@ TEST(FollowIndices, PatchingThatIsGivenUpLeavesNoListsBehind) {
         ASSERT_TRUE(buffer.can_patch());
         buffer.begin_patch();
         for (NodeId node = tree.interior_count(); node-- > 0;) {
-            if (tree.subtree_end()[node] != node + 1) continue; // all children are leaves
+            if (support::sound(tree).subtree_end()[node] != node + 1) continue; // all children are leaves
             std::vector<NodeId> children;
             tree.for_each_child(node, [&](NodeId child) { children.push_back(child); });
             buffer.fold(node, children);

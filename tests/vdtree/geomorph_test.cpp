@@ -16,6 +16,7 @@
 #include <vdtree/builder.h>
 
 #include "shapes.h"
+#include "sound.h"
 #include "tree_checks.h"
 
 namespace unseen::vdtree {
@@ -102,7 +103,8 @@ std::vector<Longest> longest_glides(const VertexTree& tree) {
     std::vector<Longest> out;
     for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf) {
         std::vector<NodeId> chain;
-        for (NodeId node = tree.interior_count() + leaf; node != no_node; node = tree.parents()[node]) chain.push_back(node);
+        for (NodeId node = tree.interior_count() + leaf; node != no_node; node = support::sound(tree).parents()[node])
+            chain.push_back(node);
         Longest longest;
         for (const NodeId a : chain)
             for (const NodeId b : chain) {
@@ -127,7 +129,8 @@ public:
     // Above a leaf.
     int count(const VertexTree& tree, Index leaf, double now) const {
         int nodes = 0;
-        for (NodeId node = tree.parents()[tree.interior_count() + leaf]; node != no_node; node = tree.parents()[node])
+        for (NodeId node = support::sound(tree).parents()[tree.interior_count() + leaf]; node != no_node;
+             node = support::sound(tree).parents()[node])
             nodes += now - when_[node] <= glide_seconds + 1e-6;
         return nodes;
     }
@@ -218,7 +221,9 @@ TEST_P(Geomorphs, DrawsNoMoreThanTheLatestFoldsTookAway) {
         waves.adjust(cut, frame);
         double triangles = 0;
         for (const FoldChange& change : cut.changes())
-            if (change.folded) triangles += tree.first_triangle()[change.node + 1] - tree.first_triangle()[change.node];
+            if (change.folded)
+                triangles += support::sound(tree).first_triangle()[change.node + 1] -
+                             support::sound(tree).first_triangle()[change.node];
         folded.push_back(triangles);
         ASSERT_TRUE(geomorph.step(cut, frame_seconds));
         double most = cut.triangle_count();
@@ -280,7 +285,7 @@ class OneNode : public testing::Test {
 protected:
     OneNode() { // a node whose children are all leaves, apart from its own place
         cut_.unfold_all();
-        while (tree_.subtree_end()[node_] > node_ + 1) ++node_;
+        while (support::sound(tree_).subtree_end()[node_] > node_ + 1) ++node_;
         EXPECT_TRUE(geomorph_.step(cut_, 0));
     }
     MovedVertex drawn(NodeId vertex) const {
@@ -357,7 +362,7 @@ TEST_F(OneNode, AnUnfoldThatIsTakenBackTurnsAround) {
 }
 
 TEST_F(OneNode, WhatUnfoldsUnderAGlidingVertexBeginsWhereThatIs) {
-    const NodeId parent = tree_.parents()[node_];
+    const NodeId parent = support::sound(tree_).parents()[node_];
     cut_.fold_subtree(parent);
     pass(0);
     pass(1);

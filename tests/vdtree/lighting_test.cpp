@@ -15,6 +15,7 @@
 
 #include "lit_kernel.h"
 #include "shapes.h"
+#include "sound.h"
 #include "tree_checks.h"
 
 namespace unseen::vdtree {
@@ -213,7 +214,7 @@ const std::vector<Subject>& subjects() {
             VertexTree tree = std::move(*build_tree(mesh.view(), {.clusterer = kind, .threads = 1}));
             LightBounds bounds = std::move(*LightBounds::measure(tree));
             std::vector<std::vector<NodeId>> neighbours(tree.leaf_count());
-            for (const Triangle& t : tree.triangles())
+            for (const Triangle& t : support::sound(tree).triangles())
                 for (const Index a : t)
                     for (const Index b : t) neighbours[a].push_back(tree.interior_count() + b);
             made.push_back({name, std::move(tree), std::move(bounds), std::move(neighbours)});
@@ -231,8 +232,9 @@ const std::vector<Subject>& subjects() {
 // All vertices that a fold of the node may show.
 std::vector<NodeId> vertices_of(const Subject& s, NodeId node) {
     std::vector<NodeId> vertices;
-    for (NodeId below = node; below < s.tree.subtree_end()[node]; ++below) vertices.push_back(below);
-    for (Index leaf = s.tree.first_leaf()[node]; leaf < s.tree.leaf_end()[node]; ++leaf) {
+    for (NodeId below = node; below < support::sound(s.tree).subtree_end()[node]; ++below) vertices.push_back(below);
+    for (Index leaf = support::sound(s.tree).first_leaf()[node]; leaf < support::sound(s.tree).leaf_end()[node];
+         ++leaf) {
         vertices.push_back(s.tree.interior_count() + leaf);
         vertices.insert(vertices.end(), s.neighbours[leaf].begin(), s.neighbours[leaf].end());
     }

@@ -15,6 +15,7 @@
 
 #include "built.h"
 #include "shapes.h"
+#include "sound.h"
 #include "triangle_distance.h"
 
 namespace unseen::vdtree {
@@ -25,7 +26,7 @@ using support::built;
 // The sum of the solid angles of all triangles, in turns: 1 inside, 0 outside, and -1 inside of what is inside out.
 double winding_number(const VertexTree& tree, glm::dvec3 at) {
     double sum = 0;
-    for (const Triangle& t : tree.triangles()) {
+    for (const Triangle& t : support::sound(tree).triangles()) {
         glm::dvec3 p[3];
         for (std::size_t k = 0; k < 3; ++k) p[k] = glm::dvec3(tree.positions()[tree.interior_count() + t[k]]) - at;
         const double a = glm::length(p[0]), b = glm::length(p[1]), c = glm::length(p[2]);
@@ -38,7 +39,8 @@ double winding_number(const VertexTree& tree, glm::dvec3 at) {
 double distance_from_surface(const VertexTree& tree, glm::dvec3 at) {
     double least = std::numeric_limits<double>::infinity();
     const auto corner = [&](const Triangle& t, std::size_t k) { return glm::dvec3(tree.positions()[tree.interior_count() + t[k]]); };
-    for (const Triangle& t : tree.triangles()) least = std::min(least, support::distance_to_triangle(at, corner(t, 0), corner(t, 1), corner(t, 2)));
+    for (const Triangle& t : support::sound(tree).triangles())
+        least = std::min(least, support::distance_to_triangle(at, corner(t, 0), corner(t, 1), corner(t, 2)));
     return least;
 }
 

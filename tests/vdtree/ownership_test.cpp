@@ -62,7 +62,9 @@ TEST(OptionsOwn, TheirVisibilityTest) {
     EXPECT_EQ(calls.use_count(), 2);
     Cut cut(*tree);
     cut.unfold_all();
-    cut.adjust([](const VertexTree&, std::span<const NodeId>, std::span<float> costs) { std::fill(costs.begin(), costs.end(), 9.0f); }, options);
+    cut.adjust([](const VertexTree&, std::span<const NodeId>,
+                  std::span<float> costs) { std::fill(costs.begin(), costs.end(), 9.0f); },
+               options);
     EXPECT_EQ(cut.triangle_count(), 0u);
     EXPECT_GT(*calls, 0);
 }

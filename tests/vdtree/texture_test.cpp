@@ -17,6 +17,7 @@
 
 #include "built.h"
 #include "shapes.h"
+#include "sound.h"
 #include "temp_folder.h"
 #include "textures.h"
 #include "tree_file.h"
@@ -185,7 +186,7 @@ TEST(Textures, BoundTheRingsOfAllCuts) {
     for (int which = 0; which < 5; ++which) {
         const Mesh mesh = textured_cases(which);
         const VertexTree tree = built(mesh);
-        const CutRings rings = bound_cut_rings(tree);
+        const CutRings rings = *bound_cut_rings(tree);
         const auto is_larger = [&](NodeId a, NodeId b) {
             const float ra = tree.support_spheres()[a].radius, rb = tree.support_spheres()[b].radius;
             return ra != rb ? ra > rb : a < b;
@@ -194,7 +195,10 @@ TEST(Textures, BoundTheRingsOfAllCuts) {
             const double keep = shapes::random_unit(random);
             std::vector<float> costs(tree.interior_count());
             for (NodeId node = 0; node < costs.size(); ++node)
-                costs[node] = (node == 0 || costs[tree.parents()[node]] > 1) && shapes::random_unit(random) < 1 - keep / 20 ? 2.0f : 0.0f;
+                costs[node] = (node == 0 || costs[support::sound(tree).parents()[node]] > 1) &&
+                                      shapes::random_unit(random) < 1 - keep / 20
+                                  ? 2.0f
+                                  : 0.0f;
             Cut cut(tree);
             cut.adjust([&](const VertexTree&, std::span<const NodeId> nodes, std::span<float> out) {
                 for (std::size_t i = 0; i < nodes.size(); ++i) out[i] = costs[nodes[i]];
@@ -234,7 +238,7 @@ TEST(Textures, BoundTheRingsOfAllCuts) {
             }
         }
         for (NodeId node = 1; node < tree.interior_count(); ++node) {
-            const NodeId parent = tree.parents()[node];
+            const NodeId parent = support::sound(tree).parents()[node];
             EXPECT_LE(rings.texture_deviation[node], rings.texture_deviation[parent]);
             EXPECT_LE(rings.texture[parent].lo, rings.texture[node].lo);
             EXPECT_GE(rings.texture[parent].hi, rings.texture[node].hi);
@@ -250,12 +254,12 @@ TEST(Textures, BoundTheRingsOfAllCuts) {
 // Two points of triangles around a node that show the same place of the texture, in the mesh and after all below it has folded.
 TEST(Textures, MoveByNoMoreThanTheirDeviation) {
     const VertexTree flat = built(textures::textured_grid(24, textures::noise(32, 32, 1)));
-    const CutRings of_flat = bound_cut_rings(flat);
+    const CutRings of_flat = *bound_cut_rings(flat);
     const float size = flat.support_spheres()[0].radius;
     for (NodeId node = 0; node < flat.interior_count(); ++node) EXPECT_LE(of_flat.texture_deviation[node], 1e-5f * size);
 
     const VertexTree sphere = built(textures::textured_sphere(4, textures::noise(32, 32, 1)));
-    const CutRings of_sphere = bound_cut_rings(sphere);
+    const CutRings of_sphere = *bound_cut_rings(sphere);
     int smaller = 0, looked = 0;
     for (NodeId node = 0; node < sphere.interior_count(); ++node) {
         EXPECT_LE(of_sphere.texture_deviation[node], 2 * of_sphere.radius[node]);
@@ -266,8 +270,11 @@ TEST(Textures, MoveByNoMoreThanTheirDeviation) {
         const glm::dvec2 uv(sphere.uvs()[node]);
         const glm::dvec3 proxy(sphere.positions()[node]);
         for (Index t = 0; t < sphere.triangle_count(); ++t) {
-            const Triangle& corners = sphere.triangles()[t];
-            const bool is_around = std::any_of(corners.begin(), corners.end(), [&](Index leaf) { return sphere.first_leaf()[node] <= leaf && leaf < sphere.leaf_end()[node]; });
+            const Triangle& corners = support::sound(sphere).triangles()[t];
+            const bool is_around = std::any_of(corners.begin(), corners.end(), [&](Index leaf) {
+                return support::sound(sphere).first_leaf()[node] <= leaf &&
+                       leaf < support::sound(sphere).leaf_end()[node];
+            });
             if (!is_around) continue;
             const auto u = [&](int k) { return glm::dvec2(sphere.uvs()[sphere.interior_count() + corners[static_cast<std::size_t>(k)]]); };
             const auto p = [&](int k) { return glm::dvec3(sphere.positions()[sphere.interior_count() + corners[static_cast<std::size_t>(k)]]); };

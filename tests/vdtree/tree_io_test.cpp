@@ -26,6 +26,7 @@
 #include "built.h"
 #include "byte_order.h"
 #include "shapes.h"
+#include "sound.h"
 #include "temp_folder.h"
 #include "textures.h"
 #include "tree_checks.h"
@@ -475,7 +476,9 @@ TEST_F(TreeIo, UsesNoMoreMemoryThanTheFileIsWorth) {
 NodeId node_with_triangles(const VertexTree& tree) {
     NodeId best = 1;
     for (NodeId node = 1; node < tree.interior_count(); ++node) {
-        const auto count = [&](NodeId n) { return tree.first_triangle()[n + 1] - tree.first_triangle()[n]; };
+        const auto count = [&](NodeId n) {
+            return support::sound(tree).first_triangle()[n + 1] - support::sound(tree).first_triangle()[n];
+        };
         if (count(node) > count(best)) best = node;
     }
     return best;
@@ -484,8 +487,9 @@ NodeId node_with_triangles(const VertexTree& tree) {
 TEST_F(TreeIo, LeavesDamagedNodesOfAMappedTreeFolded) {
     const VertexTree tree = built(shapes::bumpy_sphere(3));
     const NodeId damaged = node_with_triangles(tree);
-    const Index triangle = tree.first_triangle()[damaged], below = tree.first_triangle()[tree.subtree_end()[damaged]];
-    ASSERT_LT(triangle, tree.first_triangle()[damaged + 1]);
+    const Index triangle = support::sound(tree).first_triangle()[damaged],
+                below = support::sound(tree).first_triangle()[support::sound(tree).subtree_end()[damaged]];
+    ASSERT_LT(triangle, support::sound(tree).first_triangle()[damaged + 1]);
     TreeFile file = TreeFile::parse(bytes_of(tree));
     file["triangles"].set(3 * triangle, 0x7fffffffu);
     support::write_bytes(file_, file.bytes());

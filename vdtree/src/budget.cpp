@@ -11,6 +11,7 @@
 
 #include "decide_tree.h"
 #include "prefetch.h"
+#include "unchecked_links.h"
 #include "walk_children.h"
 
 namespace unseen::vdtree {
@@ -75,7 +76,7 @@ private:
         return !decision_.is_complete;
     }
     std::uint64_t triangles_of(std::uint32_t tree, NodeId node) const {
-        const auto first = trees_[tree]->first_triangle();
+        const auto first = unchecked_links(*trees_[tree]).first_triangle;
         return first[node + 1] - first[node];
     }
     std::uint64_t triangles_of(const Entry& e) const { return triangles_of(e.tree, e.node); }
@@ -131,7 +132,7 @@ private:
                 find_bounds(tree, &unfolding, [&](const Entry& entry) { wait(entry); });
             });
             const auto& unfolded = decision_.unfolded[tree];
-            const auto first = trees_[tree]->first_triangle();
+            const auto first = unchecked_links(*trees_[tree]).first_triangle;
             for (std::size_t word = 0; word < unfolded.size(); ++word)
                 for (std::uint64_t bits = unfolded[word]; bits; bits &= bits - 1) {
                     const std::size_t node = word * 64 + static_cast<std::size_t>(std::countr_zero(bits));
@@ -277,7 +278,8 @@ private:
         while (!fresh.empty()) {
             constexpr std::size_t ahead = 16; // entries between a prefetch and its use
             for (std::size_t i = 0; i < fresh.size(); ++i) {
-                if (i + ahead < fresh.size()) prefetch(&trees_[fresh[i + ahead].tree]->first_triangle()[fresh[i + ahead].node]);
+                if (i + ahead < fresh.size())
+                    prefetch(&unchecked_links(*trees_[fresh[i + ahead].tree]).first_triangle[fresh[i + ahead].node]);
                 sum += triangles_of(fresh[i]);
             }
             all.insert(all.end(), fresh.begin(), fresh.end());
@@ -312,7 +314,7 @@ private:
         }
         // What is left is folded, as far as its parent is not.
         const auto is_folded_under_unfolded = [&](const Entry& e) {
-            const NodeId parent = trees_[e.tree]->parents()[e.node];
+            const NodeId parent = unchecked_links(*trees_[e.tree]).parents[e.node];
             const auto& bits = decision_.unfolded[e.tree];
             return parent == no_node || ((bits[parent >> 6] >> (parent & 63)) & 1);
         };

@@ -26,7 +26,7 @@ constexpr float least_facing = 0.2f;
 
 class Conservation {
 public:
-    explicit Conservation(const VertexTree& tree)
+    explicit Conservation(const SoundTree& tree)
         : tree_(tree), interior_(tree.interior_count()), luminance_(tree.luminance().begin(), tree.luminance().end()),
           mesh_(tree), missing_(interior_) {}
 
@@ -81,21 +81,21 @@ private:
 
     float luminance_of(const Triangle& t) const { return (luminance_[t[0]] + luminance_[t[1]] + luminance_[t[2]]) / 3; }
 
-    const VertexTree& tree_;
+    const SoundTree& tree_;
     NodeId interior_;
     std::vector<float> luminance_;
     FoldSequence mesh_;
     std::vector<glm::vec3> missing_; // light that the luminances of the ring could not make good
 };
 
-void include_proxies(const VertexTree& tree, std::span<const Unorm16> luminance, std::span<PackedRange> support) {
+void include_proxies(const SoundTree& tree, std::span<const Unorm16> luminance, std::span<PackedRange> support) {
     for (NodeId node = tree.interior_count(); node-- > 0;) { // children before parents
         support[node] = unite(support[node], PackedRange{luminance[node], luminance[node]});
         if (node > 0) support[tree.parents()[node]] = unite(support[tree.parents()[node]], support[node]);
     }
 }
 
-std::vector<ChromaRange> ring_chroma_of(const VertexTree& tree, std::span<const Unorm16> luminance) {
+std::vector<ChromaRange> ring_chroma_of(const SoundTree& tree, std::span<const Unorm16> luminance) {
     if (tree.colours().empty()) return {};
     const TreeGeometry& geometry = *tree.data().geometry;
     TreeParts parts(links_of(geometry));
@@ -106,7 +106,8 @@ std::vector<ChromaRange> ring_chroma_of(const VertexTree& tree, std::span<const 
 } // namespace
 
 Result<VertexTree> conserve_light(const VertexTree& tree) {
-    if (const auto sound = tree.check(); !sound) return sound.error();
+    const auto sound = SoundTree::of(tree);
+    if (!sound) return sound.error();
     if (!tree.texture().empty())
         return Error{ErrorCode::unsupported,
                      "What light a texture radiates is not conserved: take the tree without its texture."};
@@ -116,14 +117,15 @@ Result<VertexTree> conserve_light(const VertexTree& tree) {
     // In units in which no product of areas overflows or vanishes.
     const float scale = unit_scale(tree.bounding_sphere().radius);
     data->geometry = scale == 1 ? given.geometry : scaled_geometry(given.geometry, scale);
-    std::vector<Unorm16> luminance = Conservation(VertexTree(data)).run();
+    const auto scaled = SoundTree::of(VertexTree(data)); // nobody else has it
+    if (!scaled) return scaled.error();
+    std::vector<Unorm16> luminance = Conservation(*scaled).run();
     data->geometry = given.geometry;
-    data->checks = given.checks;
 
     std::vector<PackedRange> support(given.light.support_range.begin(), given.light.support_range.end());
-    include_proxies(tree, luminance, support);
+    include_proxies(*sound, luminance, support);
     data->light.support_range = std::move(support);
-    data->light.ring_chroma = ring_chroma_of(tree, luminance);
+    data->light.ring_chroma = ring_chroma_of(*sound, luminance);
     data->light.luminance = std::move(luminance);
     return VertexTree(data);
 }

@@ -112,9 +112,9 @@ struct Box {
 // Looks for near triangles down the tree, by boxes around those that vanish at a node or below.
 class ContactFinder {
 public:
-    explicit ContactFinder(const VertexTree& tree)
-        : tree_(tree), interior_(tree.interior_count()), triangles_(tree.triangles()), scale_(unit_scale(tree.bounding_sphere().radius)),
-          luminance_(tree.luminance().subspan(interior_)),
+    explicit ContactFinder(const SoundTree& tree)
+        : tree_(tree), interior_(tree.interior_count()), triangles_(tree.triangles()),
+          scale_(unit_scale(tree.bounding_sphere().radius)), luminance_(tree.luminance().subspan(interior_)),
           first_triangle_(tree.first_triangle()), boxes_(interior_), of_leaf_(tree),
           boxes_a_triangle_(std::max(most_triangles, most_boxes / std::max<std::size_t>(triangles_.size(), 1))) {
         const auto leaves = tree.positions().subspan(interior_);
@@ -208,7 +208,7 @@ private:
         return contact;
     }
 
-    const VertexTree& tree_;
+    const SoundTree& tree_;
     NodeId interior_;
     std::span<const Triangle> triangles_;
     float scale_;                          // in which they are measured
@@ -222,6 +222,6 @@ private:
 
 } // namespace
 
-std::vector<Contact> find_contacts(const VertexTree& tree) { return ContactFinder(tree).run(); }
+std::vector<Contact> find_contacts(const SoundTree& tree) { return ContactFinder(tree).run(); }
 
 } // namespace unseen::vdtree

@@ -21,6 +21,6 @@ struct Contact {
 };
 
 // By interior node: of all triangles that touch its support, or the supports below. In parallel; some microseconds a triangle.
-std::vector<Contact> find_contacts(const VertexTree& tree);
+std::vector<Contact> find_contacts(const SoundTree& tree);
 
 } // namespace unseen::vdtree

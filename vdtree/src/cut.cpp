@@ -10,6 +10,7 @@
 #include "cut_state.h"
 #include "decide_tree.h"
 #include "finite.h"
+#include "unchecked_links.h"
 
 namespace unseen::vdtree {
 
@@ -100,7 +101,8 @@ Decision decide_by_budget(const VertexTree& tree, const CostSource& source, Inde
 // index buffer's order follows from the history of the cut.)
 std::vector<NodeId> corners_by_range(const Cut& cut, std::vector<MeshRange>& ranges) {
     const VertexTree& tree = cut.tree();
-    const auto first = tree.first_triangle();
+    const auto& links = unchecked_links(tree); // of unfolded nodes, which are sound
+    const auto first = links.first_triangle;
     std::vector<std::pair<Index, Index>> order; // input triangle, triangle of the tree
     order.reserve(cut.triangle_count());
     for (NodeId node = 0; node < tree.interior_count(); ++node) {
@@ -111,7 +113,7 @@ std::vector<NodeId> corners_by_range(const Cut& cut, std::vector<MeshRange>& ran
     std::vector<NodeId> corners;
     corners.reserve(3 * order.size());
     for (const auto& [source, triangle] : order)
-        for (const Index leaf : tree.triangles()[triangle]) corners.push_back(cut.proxy_of_leaf(leaf));
+        for (const Index leaf : links.triangles[triangle]) corners.push_back(cut.proxy_of_leaf(leaf));
     for (const MeshRange& range : tree.ranges()) {
         const auto place = [&](std::uint64_t source) {
             const auto found = std::partition_point(order.begin(), order.end(),

@@ -11,6 +11,7 @@
 
 #include "budget.h"
 #include "prefetch.h"
+#include "unchecked_links.h"
 #include "walk_children.h"
 
 namespace unseen::vdtree {
@@ -461,12 +462,13 @@ void CutFollower::test_slots(std::span<const Slot> slots) {
 void CutFollower::prefetch_changes(CutState& cut, std::span<const NodeId> nodes, bool folds) {
     for (const NodeId node : nodes) {
         watched_.prefetch_slot(node);
-        prefetch(&tree_.parents()[node]);
+        prefetch(&unchecked_links(tree_).parents[node]);
     }
     cut.prefetch_changes(nodes, folds);
     for (const NodeId node : nodes) {
         watched_.prefetch_deadlines(node);
-        if (const NodeId parent = tree_.parents()[node]; parent != no_node) watched_.prefetch_slot(parent);
+        if (const NodeId parent = unchecked_links(tree_).parents[node]; parent != no_node)
+            watched_.prefetch_slot(parent);
     }
     for (const NodeId child : cut.fetched_children()) {
         if (tree_.is_leaf(child)) continue;
@@ -478,14 +480,15 @@ void CutFollower::prefetch_changes(CutState& cut, std::span<const NodeId> nodes,
             if (!tree_.is_leaf(child)) watched_.prefetch_deadlines(child);
     } else {
         for (const NodeId node : nodes)
-            if (const NodeId parent = tree_.parents()[node]; parent != no_node) watched_.prefetch_deadlines(parent);
+            if (const NodeId parent = unchecked_links(tree_).parents[node]; parent != no_node)
+                watched_.prefetch_deadlines(parent);
     }
 }
 
 // Folds with all that is under it what the last tests want folded, the lowest nodes first; what is above may want to fold now.
 void CutFollower::fold_wave(CutState& cut) {
     std::sort(folding_.begin(), folding_.end(), std::greater<>());
-    const auto subtree_end = tree_.subtree_end();
+    const auto subtree_end = unchecked_links(tree_).subtree_end;
     for (std::size_t i = 0; i < folding_.size(); ++i) {
         if (i % changes_at_once == 0) prefetch_changes(cut, std::span(folding_).subspan(i, std::min(changes_at_once, folding_.size() - i)), true);
         const NodeId node = folding_[i];
@@ -508,7 +511,7 @@ void CutFollower::fold_wave(CutState& cut) {
 }
 
 void CutFollower::ask_parent(NodeId node) {
-    if (node != VertexTree::root() && !watches_ancestors_) parents_.push_back(tree_.parents()[node]);
+    if (node != VertexTree::root() && !watches_ancestors_) parents_.push_back(unchecked_links(tree_).parents[node]);
 }
 
 // Nodes that are watched are left to their deadlines.
@@ -519,7 +522,7 @@ void CutFollower::test_parents(const CutState& cut) {
     parent_candidates_.clear();
     for (const NodeId node : parents_) {
         tester_->prefetch(node);
-        prefetch(&tree_.subtree_end()[node]);
+        prefetch(&unchecked_links(tree_).subtree_end[node]);
     }
     for (const NodeId node : parents_) {
         parent_candidates_.push_back(tester_->candidate(node));
@@ -551,7 +554,7 @@ void CutFollower::use_threshold_of(bool unfolded) {
 void CutFollower::apply_unfold(CutState& cut, NodeId node, std::span<const NodeId> children) {
     cut.apply_unfold(node, children);
     watched_.set_unfolded(watched_.slot_of(node), true);
-    if (node != VertexTree::root() && !watches_ancestors_) watched_.remove(tree_.parents()[node]);
+    if (node != VertexTree::root() && !watches_ancestors_) watched_.remove(unchecked_links(tree_).parents[node]);
     for (const NodeId child : children) {
         if (tree_.is_leaf(child)) continue;
         watched_.insert(tester_->candidate(child), watched_.slot_of(node));
@@ -618,7 +621,7 @@ NodeId CutFollower::pop_waiting() {
 bool CutFollower::find_worst(const CutState& cut, Index more) {
     while (!waiting_.empty() && !waits(waiting_.front().node)) pop_waiting();
     if (waiting_.empty()) return false;
-    const auto first = tree_.first_triangle();
+    const auto first = unchecked_links(tree_).first_triangle;
     const NodeId node = waiting_.front().node;
     return !options_.triangle_budget || std::uint64_t{cut.triangle_count()} + more + (first[node + 1] - first[node]) <= *options_.triangle_budget;
 }
@@ -628,7 +631,7 @@ void CutFollower::unfold_worst(CutState& cut) {
     while (wave_.size() < unfolds_in_time && find_worst(cut, triangles)) {
         const NodeId node = pop_waiting();
         watched_.set_waiting(watched_.slot_of(node), false);
-        triangles += tree_.first_triangle()[node + 1] - tree_.first_triangle()[node];
+        triangles += unchecked_links(tree_).first_triangle[node + 1] - unchecked_links(tree_).first_triangle[node];
         wave_.push_back(node);
     }
     prefetch_changes(cut, wave_, false);
@@ -654,7 +657,7 @@ float CutFollower::largest_cost_left() const {
 // ---- slots
 
 bool CutFollower::has_unfolded_child(NodeId node, std::span<const std::uint64_t> unfolded) const {
-    const auto subtree_end = tree_.subtree_end();
+    const auto subtree_end = unchecked_links(tree_).subtree_end;
     for (NodeId child = node + 1; child < subtree_end[node]; child = subtree_end[child])
         if ((unfolded[child >> 6] >> (child & 63)) & 1) return true;
     return false;
@@ -662,7 +665,7 @@ bool CutFollower::has_unfolded_child(NodeId node, std::span<const std::uint64_t>
 
 // A node's children are its neighbours.
 CutFollower::Slot CutFollower::near_children_of(NodeId node) const {
-    const auto subtree_end = tree_.subtree_end();
+    const auto subtree_end = unchecked_links(tree_).subtree_end;
     for (NodeId child = node + 1; child < subtree_end[node]; child = subtree_end[child])
         if (const Slot slot = watched_.slot_of(child); slot != no_slot) return slot;
     return no_slot;

@@ -114,9 +114,9 @@ class RingBounder {
     static constexpr bool is_textured = std::is_same_v<Light, glm::dvec2>;
 
 public:
-    explicit RingBounder(const VertexTree& tree)
-        : tree_(tree), g_(*tree.data().geometry), l_(tree.data().light), interior_(tree.interior_count()), vertices_(tree),
-          parts_(links_of(g_)), around_(interior_), left_(interior_) {
+    explicit RingBounder(const SoundTree& tree)
+        : tree_(tree), g_(*tree.data().geometry), l_(tree.data().light), interior_(tree.interior_count()),
+          vertices_(tree), parts_(links_of(g_)), around_(interior_), left_(interior_) {
         parts_.assign_triangles(g_.first_triangle, g_.triangles);
     }
 
@@ -374,7 +374,7 @@ private:
         }
     }
 
-    const VertexTree& tree_;
+    const SoundTree& tree_;
     const TreeGeometry& g_;
     const TreeLuminance& l_;
     NodeId interior_;
@@ -393,12 +393,14 @@ private:
 
 } // namespace
 
-CutRings bound_cut_rings(const VertexTree& tree) {
-    CutRings rings = !tree.texture().empty()       ? RingBounder<TexturedVertices>(tree).run()
-                     : tree.ring_chroma().empty() ? RingBounder<GreyVertices>(tree).run()
-                                                  : RingBounder<ColouredVertices>(tree).run();
+Result<CutRings> bound_cut_rings(const VertexTree& tree) {
+    const auto sound = SoundTree::of(tree);
+    if (!sound) return sound.error();
+    CutRings rings = !tree.texture().empty()      ? RingBounder<TexturedVertices>(*sound).run()
+                     : tree.ring_chroma().empty() ? RingBounder<GreyVertices>(*sound).run()
+                                                  : RingBounder<ColouredVertices>(*sound).run();
     // What comes as near as a quarter of a triangle is in the way of any fold.
-    const std::vector<Contact> contacts = find_contacts(tree);
+    const std::vector<Contact> contacts = find_contacts(*sound);
     if (std::any_of(contacts.begin(), contacts.end(), std::mem_fn(&Contact::is_any))) {
         rings.meets_another.resize(contacts.size());
         std::transform(contacts.begin(), contacts.end(), rings.meets_another.begin(), std::mem_fn(&Contact::is_any));

@@ -9,6 +9,7 @@
 #include "cut_follower.h"
 #include "index_buffer.h"
 #include "prefetch.h"
+#include "unchecked_links.h"
 
 namespace unseen::vdtree {
 
@@ -65,12 +66,14 @@ void CutState::forget_followed() noexcept {
 
 void CutState::set_unfolded(NodeId node) {
     set_bit(unfolded_, node);
-    triangle_count_ += tree_.first_triangle()[node + 1] - tree_.first_triangle()[node];
+    const auto first = unchecked_links(tree_).first_triangle;
+    triangle_count_ += first[node + 1] - first[node];
 }
 
 void CutState::set_folded(NodeId node) {
     clear_bit(unfolded_, node);
-    triangle_count_ -= tree_.first_triangle()[node + 1] - tree_.first_triangle()[node];
+    const auto first = unchecked_links(tree_).first_triangle;
+    triangle_count_ -= first[node + 1] - first[node];
 }
 
 // Makes the leaves of a node stand for the node itself.
@@ -79,7 +82,8 @@ void CutState::assign(NodeId node) {
         proxy_[node - tree_.interior_count()] = node;
         return;
     }
-    std::fill(proxy_.begin() + tree_.first_leaf()[node], proxy_.begin() + tree_.leaf_end()[node], node);
+    const auto& links = unchecked_links(tree_);
+    std::fill(proxy_.begin() + links.first_leaf[node], proxy_.begin() + links.leaf_end[node], node);
 }
 
 std::span<const NodeId> CutState::children_of(NodeId node) {
@@ -120,7 +124,7 @@ bool CutState::fold(NodeId node) {
 }
 
 bool CutState::unfold_ancestors(NodeId node) {
-    const Index leaf = tree_.is_leaf(node) ? node - tree_.interior_count() : tree_.first_leaf()[node];
+    const Index leaf = tree_.is_leaf(node) ? node - tree_.interior_count() : unchecked_links(tree_).first_leaf[node];
     bool changed = false;
     // What stands for the node's first leaf is an ancestor as long as its number is lower.
     while (leaf < tree_.leaf_count() && proxy_[leaf] < node && unfold(proxy_[leaf])) changed = true;
@@ -130,7 +134,7 @@ bool CutState::unfold_ancestors(NodeId node) {
 bool CutState::fold_subtree(NodeId node) {
     if (tree_.is_leaf(node) || !test_bit(unfolded_, node)) return false;
     make_stale();
-    for (NodeId below = node; below < tree_.subtree_end()[node]; ++below)
+    for (NodeId below = node; below < unchecked_links(tree_).subtree_end[node]; ++below)
         if (test_bit(unfolded_, below)) set_folded(below);
     assign(node);
     return true;
@@ -171,8 +175,10 @@ bool CutState::is_patching() {
 // Reads follow from reads: links, lists, and what is drawn. Those of many changes are made to overlap. Leaves the children in soon_, where
 // those of each node end.
 void CutState::prefetch_changes(std::span<const NodeId> nodes, bool folds) {
-    const auto first_leaf = tree_.first_leaf(), leaf_end = tree_.leaf_end(), first_triangle = tree_.first_triangle();
-    const auto subtree_end = tree_.subtree_end();
+    const auto& links = unchecked_links(tree_);
+    const auto first_leaf = links.first_leaf, leaf_end = links.leaf_end, first_triangle = links.first_triangle;
+    const auto subtree_end = links.subtree_end;
+    const auto triangles = links.triangles;
     const auto prefetch_leaves = [&](NodeId node) {
         prefetch(&first_leaf[node]);
         prefetch(&leaf_end[node]);
@@ -199,14 +205,14 @@ void CutState::prefetch_changes(std::span<const NodeId> nodes, bool folds) {
     if (!folds) {
         buffer.prefetch_places(nodes);
         for (const NodeId node : nodes)
-            if (first_triangle[node] < tree_.triangle_count()) prefetch(&tree_.triangles()[first_triangle[node]]);
+            if (first_triangle[node] < tree_.triangle_count()) prefetch(&triangles[first_triangle[node]]);
     }
     buffer.prefetch_lists(active);
     // The third corners of the triangles that come.
     const auto for_each_third = [&](auto&& f) {
         for (const NodeId node : nodes)
             for (Index t = first_triangle[node]; t < first_triangle[node + 1]; ++t)
-                for (const Index leaf : tree_.triangles()[t])
+                for (const Index leaf : triangles[t])
                     if (leaf < first_leaf[node] || leaf >= leaf_end[node]) f(leaf);
     };
     if (!folds) for_each_third([&](Index leaf) { prefetch(&proxy_[leaf]); });
@@ -233,7 +239,7 @@ void CutState::apply_fold(NodeId node, std::span<const NodeId> children) {
 }
 
 void CutState::fold_below(NodeId node, const FunctionRef<void(NodeId)>& on_fold) {
-    const NodeId end = tree_.subtree_end()[node];
+    const NodeId end = unchecked_links(tree_).subtree_end[node];
     for (std::size_t word = (std::size_t{end} + 63) / 64; word-- > node / 64;) {
         std::uint64_t bits = unfolded_[word];
         if (word == node / 64) bits &= ~std::uint64_t{0} << (node & 63);
@@ -302,8 +308,8 @@ void CutState::replay(std::span<const std::uint64_t> unfolded) {
 
 // The proxies of all leaves, in order: what is folded under unfolded nodes stands for its leaves, and other leaves for themselves.
 void CutState::assign_all(std::span<const std::uint64_t> unfolded) {
-    const auto first_leaf = tree_.first_leaf(), leaf_end = tree_.leaf_end();
-    const auto subtree_end = tree_.subtree_end();
+    const auto& links = unchecked_links(tree_);
+    const auto first_leaf = links.first_leaf, leaf_end = links.leaf_end, subtree_end = links.subtree_end;
     const NodeId end = tree_.interior_count();
     const auto next_folded = [&](NodeId node) {
         std::size_t word = node / 64;
@@ -366,7 +372,7 @@ void CutState::become(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
 
 // The triangles of changes_.
 void CutState::count_triangles() {
-    const auto first = tree_.first_triangle();
+    const auto first = unchecked_links(tree_).first_triangle;
     constexpr std::size_t ahead = 32; // changes between a prefetch and its use
     for (std::size_t i = 0; i < changes_.size(); ++i) {
         if (i + ahead < changes_.size()) prefetch(&first[changes_[i + ahead].node]);
@@ -378,9 +384,9 @@ void CutState::count_triangles() {
 
 // The triangles of changes_, and the proxies under them.
 void CutState::assign_changed(const std::vector<std::uint64_t>& unfolded) {
-    const auto first = tree_.first_triangle(), first_leaf = tree_.first_leaf(), leaf_end = tree_.leaf_end();
-    const auto subtree_end = tree_.subtree_end();
-    const auto parents = tree_.parents();
+    const auto& links = unchecked_links(tree_);
+    const auto first = links.first_triangle, first_leaf = links.first_leaf, leaf_end = links.leaf_end;
+    const auto subtree_end = links.subtree_end, parents = links.parents;
     const auto prefetch_links = [&](NodeId node) {
         prefetch(&first_leaf[node]);
         prefetch(&leaf_end[node]);

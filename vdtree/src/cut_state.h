@@ -11,6 +11,8 @@
 #include <vdtree/function_ref.h>
 #include <vdtree/vertex_tree.h>
 
+#include "unchecked_links.h"
+
 namespace unseen::vdtree {
 
 class CutFollower;
@@ -37,7 +39,7 @@ public:
     bool is_unfolded(NodeId node) const noexcept { return !tree_.is_leaf(node) && is_unfolded_interior(node); }
     bool is_active(NodeId node) const noexcept {
         // Not by its parent, which a damaged file may lie about.
-        const Index leaf = tree_.is_leaf(node) ? node - tree_.interior_count() : tree_.first_leaf()[node];
+        const Index leaf = tree_.is_leaf(node) ? node - tree_.interior_count() : unchecked_links(tree_).first_leaf[node];
         return leaf < tree_.leaf_count() && proxy_[leaf] == node;
     }
 

@@ -10,6 +10,7 @@
 #include <vdtree/vertex_tree.h>
 
 #include "prefetch.h"
+#include "unchecked_links.h"
 
 namespace unseen::vdtree {
 
@@ -40,7 +41,7 @@ public:
             });
             for (const NodeId node : unfolding_) unfolded[node >> 6] |= std::uint64_t{1} << (node & 63);
             if (!folded_.empty()) on_folded(std::span<const NodeId>(folded_));
-            add_children(tree.subtree_end());
+            add_children(unchecked_links(tree).subtree_end);
         }
         return unfolded;
     }

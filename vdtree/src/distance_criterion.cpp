@@ -12,6 +12,8 @@
 
 #include <vdtree/criteria.h>
 
+#include "unchecked_links.h"
+
 namespace unseen::vdtree {
 
 namespace {
@@ -131,7 +133,7 @@ private:
 
 // Spheres nest in every tree.
 bool is_monotone_in(const VertexTree& tree, const DistanceCriterion::Parts& p) {
-    const auto parents = tree.parents();
+    const auto parents = unchecked_links(tree).parents;
     RowRatios ratios(p);
     const auto is_within = [](std::span<const float> lengths, NodeId node, NodeId parent, float ratio) {
         if (lengths.empty()) return ratio <= 1; // spheres' radii
@@ -139,7 +141,7 @@ bool is_monotone_in(const VertexTree& tree, const DistanceCriterion::Parts& p) {
     };
     for (NodeId node = 1; node < tree.interior_count(); ++node) {
         const NodeId parent = parents[node];
-        if (!(parent < node)) return false; // in a damaged file
+        if (!(parent < node)) return false; // in a damaged file: nobody has looked at all of a mapped tree
         if (!p.facing.empty() && !p.facing[parent].includes(p.facing[node])) return false;
         const FoldClass a = p.classes.empty() ? FoldClass{} : p.classes[node], b = p.classes.empty() ? FoldClass{} : p.classes[parent];
         const auto& outlines = p.silhouette_lengths.empty() ? p.lengths : p.silhouette_lengths;

@@ -28,7 +28,7 @@ constexpr int most_ancestors = 4096; // of a node, from the nearest on, that are
 
 class DriftFinder {
 public:
-    DriftFinder(const VertexTree& tree, std::span<FoldError> errors)
+    DriftFinder(const SoundTree& tree, std::span<FoldError> errors)
         : tree_(tree), errors_(errors), interior_(tree.interior_count()), luminance_(tree.luminance()),
           parents_(tree.parents()), mesh_(tree), surfaces_(interior_), light_(interior_), found_(interior_) {}
 
@@ -201,7 +201,7 @@ private:
         }
     };
 
-    const VertexTree& tree_;
+    const SoundTree& tree_;
     std::span<FoldError> errors_;
     NodeId interior_;
     std::span<const Unorm16> luminance_;
@@ -216,6 +216,6 @@ private:
 
 } // namespace
 
-void find_drift(const VertexTree& tree, std::span<FoldError> errors) { DriftFinder(tree, errors).run(); }
+void find_drift(const SoundTree& tree, std::span<FoldError> errors) { DriftFinder(tree, errors).run(); }
 
 } // namespace unseen::vdtree

@@ -10,7 +10,7 @@
 namespace unseen::vdtree {
 
 // Reads the luminance errors and extents, and adds the drift. Cost: as of folding the mesh once, one node after the other.
-void find_drift(const VertexTree& tree, std::span<FoldError> errors);
+void find_drift(const SoundTree& tree, std::span<FoldError> errors);
 
 // The radius of what a fold of the node changes, in mesh units.
 inline float changed_radius(const VertexTree& tree, std::span<const FoldError> errors, NodeId node) {

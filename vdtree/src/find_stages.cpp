@@ -262,7 +262,7 @@ FoldStage contrasts(const Bands& mesh, const Bands& difference) {
 
 class StageFinder {
 public:
-    StageFinder(const VertexTree& tree, std::span<FoldError> errors)
+    StageFinder(const SoundTree& tree, std::span<FoldError> errors)
         : tree_(tree), errors_(errors), interior_(tree.interior_count()), parents_(tree.parents()),
           triangles_(tree.triangles().begin(), tree.triangles().end()) {
         for (Triangle& t : triangles_)
@@ -337,7 +337,7 @@ private:
                     stage.contrast[k][b][row] = std::max(stage.contrast[k][b][row], other.contrast[k][b][row]);
     }
 
-    const VertexTree& tree_;
+    const SoundTree& tree_;
     std::span<FoldError> errors_;
     NodeId interior_;
     std::span<const NodeId> parents_;
@@ -351,7 +351,7 @@ private:
 
 double FoldStage::frequency(std::size_t band) { return nominal_frequency(band) * side / static_cast<double>(margin); }
 
-std::vector<FoldStage> find_stages(const VertexTree& tree, std::span<FoldError> errors) {
+std::vector<FoldStage> find_stages(const SoundTree& tree, std::span<FoldError> errors) {
     const float radius = tree.bounding_sphere().radius;
     const bool is_translucent = tree.bounds()[VertexTree::root()].flags & translucent_ring;
     if (is_translucent || !(radius > 0) || !std::isfinite(side / (2 * radius))) return {};

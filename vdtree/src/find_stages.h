@@ -12,6 +12,6 @@ namespace unseen::vdtree {
 
 // Reads the errors, and notes in which stage every node folds. No stages for trees with translucent vertices, and of no extent. Cost: some
 // hundred pictures of up to half of the triangles; in parallel.
-std::vector<FoldStage> find_stages(const VertexTree& tree, std::span<FoldError> errors);
+std::vector<FoldStage> find_stages(const SoundTree& tree, std::span<FoldError> errors);
 
 } // namespace unseen::vdtree

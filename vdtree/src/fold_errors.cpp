@@ -169,11 +169,12 @@ private:
 
 class Measurer {
 public:
-    Measurer(const VertexTree& tree, std::vector<FoldError>& errors)
-        : tree_(tree), errors_(errors), positions_(tree.positions()), luminance_(tree.luminance()), support_luminance_(tree.support_luminance()),
-          first_leaf_(tree.first_leaf()), leaf_end_(tree.leaf_end()), parents_(tree.parents()),
-          first_triangle_(tree.first_triangle()), triangles_(tree.triangles()), support_(tree.support_spheres()),
-          interior_(tree.interior_count()), of_leaf_(tree), crossing_(interior_), contacts_(find_contacts(tree)), witnesses_(interior_) {}
+    Measurer(const SoundTree& tree, std::vector<FoldError>& errors)
+        : tree_(tree), errors_(errors), positions_(tree.positions()), luminance_(tree.luminance()),
+          support_luminance_(tree.support_luminance()), first_leaf_(tree.first_leaf()), leaf_end_(tree.leaf_end()),
+          parents_(tree.parents()), first_triangle_(tree.first_triangle()), triangles_(tree.triangles()),
+          support_(tree.support_spheres()), interior_(tree.interior_count()), of_leaf_(tree), crossing_(interior_),
+          contacts_(find_contacts(tree)), witnesses_(interior_) {}
 
     void run() {
         std::vector<NodeId> parts, above;
@@ -532,7 +533,7 @@ private:
         take(witness_count / 2, [](const Sample& s) { return s.error.luminance; });
     }
 
-    const VertexTree& tree_;
+    const SoundTree& tree_;
     std::vector<FoldError>& errors_;
     std::span<const glm::vec3> positions_;
     std::span<const Unorm16> luminance_;
@@ -557,7 +558,8 @@ bool are_finite(const FoldError& e) {
 } // namespace
 
 Result<VertexTree> with_fold_errors(const VertexTree& tree, int threads) {
-    if (const auto sound = tree.check(); !sound) return sound.error();
+    const auto sound = SoundTree::of(tree);
+    if (!sound) return sound.error();
     if (!tree.texture().empty())
         return Error{ErrorCode::unsupported, "What folds change of a texture is not measured: take another fold test, or the tree without its texture."};
     const VertexTree::Data& given = tree.data();
@@ -568,13 +570,14 @@ Result<VertexTree> with_fold_errors(const VertexTree& tree, int threads) {
     TreeLuminance& light = data->light;
     light = copy_without_errors(given.light);
 
-    const VertexTree measured(data); // nobody else has it
+    const auto measured = SoundTree::of(VertexTree(data)); // nobody else has it
+    if (!measured) return measured.error();
     std::vector<FoldError> errors(tree.interior_count());
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
     arena.execute([&] {
-        Measurer(measured, errors).run();
-        find_drift(measured, errors);
-        light.fold_stages = find_stages(measured, errors);
+        Measurer(*measured, errors).run();
+        find_drift(*measured, errors);
+        light.fold_stages = find_stages(*measured, errors);
     });
     for (NodeId node = 0; node < errors.size(); ++node) {
         FoldError& e = errors[node];
@@ -584,7 +587,6 @@ Result<VertexTree> with_fold_errors(const VertexTree& tree, int threads) {
     }
     light.fold_errors = std::move(errors);
     data->geometry = given.geometry;
-    data->checks = given.checks;
     return VertexTree(data);
 }
 

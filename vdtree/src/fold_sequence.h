@@ -13,8 +13,9 @@ namespace unseen::vdtree {
 
 class FoldSequence {
 public:
-    explicit FoldSequence(const VertexTree& tree)
-        : tree_(tree), positions_(tree.positions()), corners_(tree.triangles().begin(), tree.triangles().end()), around_(tree.node_count()) {
+    explicit FoldSequence(const SoundTree& tree)
+        : tree_(tree), positions_(tree.positions()), corners_(tree.triangles().begin(), tree.triangles().end()),
+          around_(tree.node_count()) {
         for (Index t = 0; t < corners_.size(); ++t)
             for (NodeId& corner : corners_[t]) around_[corner += tree.interior_count()].push_back(t);
     }
@@ -51,7 +52,7 @@ public:
 private:
     static bool are_distinct(const Triangle& t) { return t[0] != t[1] && t[1] != t[2] && t[2] != t[0]; }
 
-    const VertexTree& tree_;
+    const SoundTree& tree_;
     std::span<const glm::vec3> positions_;
     std::vector<Triangle> corners_;          // nodes that are shown
     std::vector<std::vector<Index>> around_; // by node that is shown

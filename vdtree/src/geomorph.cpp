@@ -11,6 +11,7 @@
 #include <glm/common.hpp>
 
 #include "cut_state.h"
+#include "unchecked_links.h"
 
 namespace unseen::vdtree {
 
@@ -143,7 +144,7 @@ std::span<const FoldChange> Geomorph::State::changes_of(const CutState& cut) {
 
 bool Geomorph::State::is_jump(const CutState& cut, std::span<const FoldChange> changes) const {
     if (changes.size() <= fewest_of_a_jump) return false;
-    const auto first = cut.tree().first_triangle();
+    const auto first = unchecked_links(cut.tree()).first_triangle;
     std::uint64_t triangles = 0;
     for (const FoldChange& change : changes) triangles += first[change.node + 1] - first[change.node];
     const double shown = std::max(cut.triangle_count(), drawn.triangle_count());
@@ -233,7 +234,7 @@ void Geomorph::State::begin(NodeId node, double weight) {
     const VertexTree& tree = drawn.tree();
     if (slot_of_node.empty()) slot_of_node.assign(tree.interior_count(), no_slot);
     slot_of_node[node] = static_cast<Slot>(glides.size());
-    glides.push_back({weight, weight == 0, tree.parents()[node], at_rest(tree, node), {}, 0, {}});
+    glides.push_back({weight, weight == 0, unchecked_links(tree).parents[node], at_rest(tree, node), {}, 0, {}});
     tree.for_each_child(node, [&](NodeId child) { glides.back().children.push_back(at_rest(tree, child)); });
 }
 

@@ -5,6 +5,7 @@
 #include <cassert>
 
 #include "prefetch.h"
+#include "unchecked_links.h"
 
 namespace unseen::vdtree {
 
@@ -23,8 +24,9 @@ unsigned log2_size_for(std::uint32_t corners) {
 
 // Brings leaves_ to what unfolded nodes show: what showed there before is copied, word by word of them.
 void IndexBuffer::find_leaves(std::span<const std::uint64_t> unfolded, Index triangles) {
-    const auto first = tree_->first_triangle();
-    const auto corners = tree_->triangles();
+    const auto& links = unchecked_links(*tree_);
+    const auto first = links.first_triangle;
+    const auto corners = links.triangles;
     shown_by_.resize(unfolded.size()); // by none before the first time
     places_.resize(unfolded.size() + 1);
     // First which triangles come: most nodes have two or less, and nobody could foretell how many, so nothing branches on that.
@@ -287,19 +289,20 @@ void IndexBuffer::fold(NodeId node, std::span<const NodeId> children) {
 
 void IndexBuffer::unfold(NodeId node, std::span<const NodeId> children, std::span<const NodeId> proxies) {
     remove_all();
-    const auto first_leaf = tree_->first_leaf(), leaf_end = tree_->leaf_end();
+    const auto& links = unchecked_links(*tree_);
+    const auto first_leaf = links.first_leaf, leaf_end = links.leaf_end;
     // The corners under the node, those of the triangles that come last.
     const Block block = block_of_node_[node];
     const auto shown = list(block);
     scratch_.assign(shown.begin(), shown.end());
     discard(block);
     block_of_node_[node] = no_block;
-    const Index first_triangle = tree_->first_triangle()[node], triangle_end = tree_->first_triangle()[node + 1];
+    const Index first_triangle = links.first_triangle[node], triangle_end = links.first_triangle[node + 1];
     IndexWrite* written = room_for(scratch_.size() + std::size_t{3} * (triangle_end - first_triangle));
     for (Index t = first_triangle; t < triangle_end; ++t) {
         const Index c0 = new_triangle() * 3;
         for (Index k = 0; k < 3; ++k) {
-            const Entry entry{c0 + k, tree_->triangles()[t][k]};
+            const Entry entry{c0 + k, links.triangles[t][k]};
             if (entry.leaf - first_leaf[node] < leaf_end[node] - first_leaf[node]) {
                 scratch_.push_back(entry);
             } else {

@@ -10,7 +10,8 @@ namespace unseen::vdtree {
 
 class LeafTriangles {
 public:
-    explicit LeafTriangles(const VertexTree& tree) : first_(std::size_t{tree.leaf_count()} + 1, 0), triangles_(tree.triangles().size() * 3) {
+    explicit LeafTriangles(const SoundTree& tree)
+        : first_(std::size_t{tree.leaf_count()} + 1, 0), triangles_(tree.triangles().size() * 3) {
         const std::span<const Triangle> triangles = tree.triangles();
         for (const Triangle& t : triangles)
             for (const Index leaf : t) ++first_[leaf + 1];

@@ -25,9 +25,10 @@ constexpr float cone_rounding = 1e-5f;
 
 class Measurer {
 public:
-    explicit Measurer(const VertexTree& tree)
-        : tree_(tree), interior_(tree.interior_count()), cones_(interior_), angles_(interior_), normals_(tree.node_count()),
-          albedo_(tree.node_count()), start_(tree.leaf_count() + 1, 0), sums_(tree.leaf_count() + 1, glm::dvec3(0)) {}
+    explicit Measurer(const SoundTree& tree)
+        : tree_(tree), interior_(tree.interior_count()), cones_(interior_), angles_(interior_),
+          normals_(tree.node_count()), albedo_(tree.node_count()), start_(tree.leaf_count() + 1, 0),
+          sums_(tree.leaf_count() + 1, glm::dvec3(0)) {}
 
     std::vector<VertexCone> run() {
         tbb::parallel_for(NodeId{0}, tree_.node_count(), [&](NodeId node) {
@@ -151,7 +152,7 @@ private:
         end(node, seen);
     }
 
-    const VertexTree& tree_;
+    const SoundTree& tree_;
     NodeId interior_;
     std::vector<VertexCone> cones_;
     std::vector<float> angles_;      // by interior node
@@ -164,9 +165,10 @@ private:
 } // namespace
 
 Result<LightBounds> LightBounds::measure(const VertexTree& tree) {
-    if (const auto sound = tree.check(); !sound) return sound.error();
+    const auto sound = SoundTree::of(tree);
+    if (!sound) return sound.error();
     LightBounds bounds;
-    bounds.cones_ = Measurer(tree).run();
+    bounds.cones_ = Measurer(*sound).run();
     return bounds;
 }
 

@@ -6,6 +6,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "unchecked_links.h"
 #include "unit_vector.h"
 #include "vertex_tree_data.h"
 
@@ -76,15 +77,16 @@ bool ray_meets(const Sphere& sphere, glm::dvec3 origin, glm::dvec3 direction) {
 
 // Whether a ray from outside to `origin` would cross the surface an odd number of times.
 bool crosses_oddly(const VertexTree& tree, glm::dvec3 origin, glm::dvec3 direction) {
+    const auto& links = unchecked_links(tree);
     bool odd = false;
     std::vector<NodeId> waiting = {VertexTree::root()};
     const auto at = [&](Index leaf) { return glm::dvec3(tree.positions()[tree.interior_count() + leaf]) - origin; };
     while (!waiting.empty()) {
         const NodeId node = waiting.back();
         waiting.pop_back();
-        if (!ray_meets(tree.bounds()[node].ring, origin, direction)) continue;
-        for (Index t = tree.first_triangle()[node]; t < tree.first_triangle()[node + 1]; ++t) {
-            const Triangle& corners = tree.triangles()[t];
+        if (!tree.is_sound(node) || !ray_meets(tree.bounds()[node].ring, origin, direction)) continue;
+        for (Index t = links.first_triangle[node]; t < links.first_triangle[node + 1]; ++t) {
+            const Triangle& corners = links.triangles[t];
             const glm::dvec3 a = at(corners[0]), b = at(corners[1]), c = at(corners[2]);
             const double u = glm::dot(direction, glm::cross(b, c)), v = glm::dot(direction, glm::cross(c, a)),
                          w = glm::dot(direction, glm::cross(a, b));

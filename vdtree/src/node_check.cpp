@@ -3,7 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <utility>
 #include <vector>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_reduce.h>
+
+#include "mask_pool.h"
 
 namespace unseen::vdtree {
 
@@ -65,6 +71,16 @@ bool vanishes(Triangle t, Index begin, Index end, std::span<const Index> child_s
     return pairs > 0;
 }
 
+template <class T>
+bool all_finite(const Array<T>& values) {
+    static_assert(sizeof(T) % sizeof(float) == 0);
+    const float* p = reinterpret_cast<const float*>(values.data());
+    const std::size_t n = values.size() * sizeof(T) / sizeof(float);
+    for (std::size_t i = 0; i < n; ++i)
+        if (!std::isfinite(p[i])) return false;
+    return true;
+}
+
 } // namespace
 
 const char* fault_in_root(const TreeGeometry& g) noexcept {
@@ -114,21 +130,101 @@ const char* fault_in_values(const TreeGeometry& g, NodeId node) noexcept {
     return nullptr;
 }
 
-NodeChecks::NodeChecks(const TreeGeometry& g)
-    : g_(g), sound_(std::make_unique<std::atomic<std::uint64_t>[]>((g.first_leaf.size() + 63) / 64)) {}
+std::string fault_in_sections(const TreeGeometry& g, const TreeLuminance& l) {
+    const std::pair<bool, const char*> finite[] = {{all_finite(g.positions), "positions"},
+                                                   {all_finite(g.colours), "colours"},
+                                                   {all_finite(g.uvs), "uvs"},
+                                                   {all_finite(g.support_spheres), "support_spheres"},
+                                                   {all_finite(g.displacement), "displacement"},
+                                                   {all_finite(l.ring_chroma), "ring_chroma"}};
+    for (const auto& [holds, name] : finite)
+        if (!holds) return "Section " + std::string(name) + " has a value that is not finite.";
+    for (const NodeBounds& b : g.bounds) {
+        const glm::dvec3 centre = b.ring.centre;
+        if (!std::isfinite(centre.x + centre.y + centre.z + b.ring.radius))
+            return "Section bounds has a value that is not finite.";
+        if (!(b.ring.radius >= 0)) return "A bounding sphere has a negative radius.";
+    }
+    for (const Sphere& s : g.support_spheres)
+        if (!(s.radius >= 0)) return "A bounding sphere has a negative radius.";
+    for (const std::uint32_t at : g.mask_at)
+        if (at >= g.mask_records.size() - most_mask_bytes) return "A mask begins behind the last record.";
+    for (const auto* ranges : {&l.support_range, &l.ring_range})
+        for (const PackedRange& r : *ranges)
+            if (!(r.lo <= r.hi)) return "A luminance range ends before it begins.";
+    for (const PackedRange& r : g.ring_texture)
+        if (!(r.lo <= r.hi)) return "A range of the texture's luminance ends before it begins.";
+    for (const ChromaRange& r : l.ring_chroma)
+        if (!(r.lo.x <= r.hi.x && r.lo.y <= r.hi.y)) return "A range of chroma ends before it begins.";
+    for (const FoldError& e : l.fold_errors)
+        for (const float value : {e.distance, e.mean_distance, e.luminance, e.wide_luminance, e.extent, e.drift})
+            if (!(value >= 0) || !std::isfinite(value)) return "An error of a fold is negative or not finite.";
+    for (const FoldError& e : l.fold_errors)
+        if (!l.fold_stages.empty() && e.stage >= l.fold_stages.size())
+            return "A node folds in a stage that is not there.";
+    for (const FoldStage& stage : l.fold_stages)
+        for (const auto& by_band : stage.contrast)
+            for (const auto& by_mask : by_band)
+                for (const float contrast : by_mask)
+                    if (!(contrast >= 0) || !std::isfinite(contrast))
+                        return "A contrast of a stage is negative or not finite.";
+    for (const float moved : g.displacement)
+        if (!(moved >= 0)) return "A displacement is negative.";
+    // Users index their own arrays with these.
+    for (const Index v : g.source_vertices)
+        if (v >= g.source_vertices.size()) return "A source vertex is out of range.";
+    for (const Index t : g.source_triangles)
+        if (t >= g.triangles.size() + g.dropped_triangles) return "A source triangle is out of range.";
+    return {};
+}
+
+NodeChecks::NodeChecks(const TreeGeometry& g, const TreeLuminance& l)
+    : g_(g), l_(l), sound_(std::make_unique<std::atomic<std::uint64_t>[]>((g.first_leaf.size() + 63) / 64)) {}
 
 // The file does not change, so that several threads may look at one node.
-bool NodeChecks::look(NodeId node) {
-    const char* fault = fault_in_links(g_, node);
-    if (!fault && node == VertexTree::root()) fault = fault_in_values(g_, node);
-    if (!fault) fault = walk_children(g_, node, [&](NodeId child) { return fault_in_values(g_, child); });
-    if (fault) {
-        NodeId none = no_node;
-        damaged_.compare_exchange_strong(none, node, std::memory_order_relaxed);
-        return false;
-    }
-    sound_[node >> 6].fetch_or(std::uint64_t{1} << (node & 63), std::memory_order_relaxed);
+bool NodeChecks::is_in_order(NodeId node) {
+    std::atomic<std::uint64_t>& word = sound_[node >> 6];
+    const std::uint64_t bit = std::uint64_t{1} << (node & 63);
+    if (word.load(std::memory_order_relaxed) & bit) return true;
+    if (fault_in_links(g_, node)) return false;
+    if (node == VertexTree::root() && fault_in_values(g_, node)) return false;
+    if (walk_children(g_, node, [&](NodeId child) { return fault_in_values(g_, child); })) return false;
+    word.fetch_or(bit, std::memory_order_relaxed);
     return true;
+}
+
+bool NodeChecks::look(NodeId node) {
+    if (is_in_order(node)) return true;
+    NodeId none = no_node;
+    damaged_.compare_exchange_strong(none, node, std::memory_order_relaxed);
+    return false;
+}
+
+Result<void> NodeChecks::check_all() {
+    if (all_sound_.load(std::memory_order_acquire)) return {};
+    const auto damaged = [](const std::string& what) {
+        return Error{ErrorCode::malformed_data, what + " Build the tree again from its mesh."};
+    };
+    // The lowest one, whichever thread gets where first.
+    constexpr NodeId grain = 4096; // nodes
+    using Range = tbb::blocked_range<NodeId>;
+    const auto lowest = [](NodeId a, NodeId b) { return std::min(a, b); };
+    const NodeId node = tbb::parallel_reduce(
+        Range(0, static_cast<NodeId>(g_.first_leaf.size()), grain), no_node,
+        [&](const Range& range, NodeId found) {
+            for (NodeId n = range.begin(); n < range.end() && n < found; ++n)
+                if (!is_in_order(n)) return n;
+            return found;
+        },
+        lowest);
+    if (node != no_node) {
+        look(node);
+        return damaged("Node " + std::to_string(node) + " of the mapped tree is damaged.");
+    }
+    if (const std::string fault = fault_in_sections(g_, l_); !fault.empty())
+        return damaged("The mapped tree is damaged. " + fault);
+    all_sound_.store(true, std::memory_order_release);
+    return {};
 }
 
 } // namespace unseen::vdtree

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <memory>
+#include <string>
 
 #include "vertex_tree_data.h"
 
@@ -11,7 +12,8 @@ namespace unseen::vdtree {
 // What is wrong with how an interior node refers to others; null where nothing is. It looks at the node, the links of its
 // children and the triangles that vanish at it, whatever they say, and at nothing else; where the root's parts are the whole
 // tree and every node from the root down to here is sound, children tile their parents, triangles their nodes, and each number
-// lies within its array; triangles vanish where they are said to. Cost: the number of children and triangles.
+// lies within its array; triangles vanish where they are said to. Any node may be asked about. Cost: the number of
+// children and triangles.
 const char* fault_in_links(const TreeGeometry& g, NodeId node);
 
 // That the root stands for the whole tree.
@@ -21,22 +23,32 @@ const char* fault_in_root(const TreeGeometry& g) noexcept;
 // negative radius.
 const char* fault_in_values(const TreeGeometry& g, NodeId node) noexcept;
 
+// What is wrong with the values of all nodes, triangles and leaves, as a sentence; empty where nothing is. With links in order
+// everywhere nothing that is made of the tree can lead out of bounds then. Cost: one pass over the arrays.
+std::string fault_in_sections(const TreeGeometry& g, const TreeLuminance& l);
+
 class NodeChecks {
 public:
-    explicit NodeChecks(const TreeGeometry& g);
+    // Of a file's arrays, which are to stay where they are.
+    NodeChecks(const TreeGeometry& g, const TreeLuminance& l);
 
     // Whether the links of an interior node and the values of its children can be used. Looks at them the first time.
     bool is_sound(NodeId node) {
         return (sound_[node >> 6].load(std::memory_order_relaxed) >> (node & 63) & 1) != 0 || look(node);
     }
+    // Everything; see VertexTree::check().
+    Result<void> check_all();
     NodeId first_damaged() const noexcept { return damaged_.load(std::memory_order_relaxed); }
 
 private:
     bool look(NodeId node);
+    bool is_in_order(NodeId node);
 
     const TreeGeometry& g_;
+    const TreeLuminance& l_;
     std::unique_ptr<std::atomic<std::uint64_t>[]> sound_; // one bit a node
     std::atomic<NodeId> damaged_{no_node};
+    std::atomic<bool> all_sound_{false};
 };
 
 } // namespace unseen::vdtree

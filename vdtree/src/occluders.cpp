@@ -28,7 +28,7 @@ constexpr float apart = 0.9f;
 
 class Grid {
 public:
-    Grid(const VertexTree& tree, int cells) : tree_(tree), side_(cells) {
+    Grid(const SoundTree& tree, int cells) : tree_(tree), side_(cells) {
         glm::dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
         for (const glm::vec3& p : tree.positions().subspan(tree.interior_count())) low = glm::min(low, glm::dvec3(p)), high = glm::max(high, glm::dvec3(p));
         const glm::dvec3 size = high - low;
@@ -200,7 +200,7 @@ private:
 
     static constexpr double rounding = 1e-5; // cells: more than positions are rounded by, in floats
 
-    const VertexTree& tree_;
+    const SoundTree& tree_;
     int side_;                          // cells along each axis
     double cell_ = 0;                   // mesh units
     glm::dvec3 corner_ = glm::dvec3(0); // of the first cell
@@ -211,8 +211,10 @@ private:
 } // namespace
 
 std::vector<Sphere> inner_spheres(const VertexTree& tree, const InnerSphereOptions& options) {
-    if (tree.closedness() == Closedness::open || options.count <= 0 || !tree.check()) return {};
-    Grid grid(tree, std::clamp(options.cells, fewest_cells, most_cells) + 2 * border);
+    if (tree.closedness() == Closedness::open || options.count <= 0) return {};
+    const auto sound = SoundTree::of(tree);
+    if (!sound) return {};
+    Grid grid(*sound, std::clamp(options.cells, fewest_cells, most_cells) + 2 * border);
     return grid.is_empty() ? std::vector<Sphere>{} : grid.spheres(options.count);
 }
 

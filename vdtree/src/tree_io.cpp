@@ -310,8 +310,7 @@ private:
     Result<void> read_facts(TreeGeometry& g, TreeLuminance& l);
     Result<void> check_counts(const TreeGeometry& g, const TreeLuminance& l) const;
     Result<void> check_structure(const TreeGeometry& g) const;
-    Result<void> check_values(const TreeGeometry& g, const TreeLuminance& l) const;
-    Result<void> check_sources(const TreeGeometry& g) const;
+    Result<void> check_ranges(const TreeGeometry& g) const;
 
     const std::filesystem::path& file_;
     const OpenMode mode_;
@@ -480,67 +479,10 @@ Result<void> Reader::check_structure(const TreeGeometry& g) const {
     return {};
 }
 
-template <class T>
-bool all_finite(const Array<T>& values) {
-    static_assert(sizeof(T) % sizeof(float) == 0);
-    const float* p = reinterpret_cast<const float*>(values.data());
-    const std::size_t n = values.size() * sizeof(T) / sizeof(float);
-    for (std::size_t i = 0; i < n; ++i)
-        if (!std::isfinite(p[i])) return false;
-    return true;
-}
-
-Result<void> Reader::check_values(const TreeGeometry& g, const TreeLuminance& l) const {
-    const std::pair<bool, const char*> finite[] = {
-        {all_finite(g.positions), "positions"},
-        {all_finite(g.colours), "colours"},
-        {all_finite(g.uvs), "uvs"},
-        {all_finite(g.support_spheres), "support_spheres"},
-        {all_finite(g.displacement), "displacement"},
-        {all_finite(l.ring_chroma), "ring_chroma"}};
-    for (const auto& [holds, name] : finite)
-        if (!holds) return fail("Section " + std::string(name) + " has a value that is not finite.");
-    for (const NodeBounds& b : g.bounds) {
-        const glm::dvec3 centre = b.ring.centre;
-        if (!std::isfinite(centre.x + centre.y + centre.z + b.ring.radius)) return fail("Section bounds has a value that is not finite.");
-        if (!(b.ring.radius >= 0)) return fail("A bounding sphere has a negative radius.");
-    }
-    for (const Sphere& s : g.support_spheres)
-        if (!(s.radius >= 0)) return fail("A bounding sphere has a negative radius.");
-    for (const std::uint32_t at : g.mask_at)
-        if (at >= g.mask_records.size() - most_mask_bytes) return fail("A mask begins behind the last record.");
-    for (const auto* ranges : {&l.support_range, &l.ring_range})
-        for (const PackedRange& r : *ranges)
-            if (!(r.lo <= r.hi)) return fail("A luminance range ends before it begins.");
-    for (const PackedRange& r : g.ring_texture)
-        if (!(r.lo <= r.hi)) return fail("A range of the texture's luminance ends before it begins.");
-    for (const ChromaRange& r : l.ring_chroma)
-        if (!(r.lo.x <= r.hi.x && r.lo.y <= r.hi.y)) return fail("A range of chroma ends before it begins.");
-    for (const FoldError& e : l.fold_errors)
-        for (const float value : {e.distance, e.mean_distance, e.luminance, e.wide_luminance, e.extent, e.drift})
-            if (!(value >= 0) || !std::isfinite(value)) return fail("An error of a fold is negative or not finite.");
-    for (const FoldError& e : l.fold_errors)
-        if (!l.fold_stages.empty() && e.stage >= l.fold_stages.size()) return fail("A node folds in a stage that is not there.");
-    for (const FoldStage& stage : l.fold_stages)
-        for (const auto& by_band : stage.contrast)
-            for (const auto& by_mask : by_band)
-                for (const float contrast : by_mask)
-                    if (!(contrast >= 0) || !std::isfinite(contrast)) return fail("A contrast of a stage is negative or not finite.");
-    for (const float moved : g.displacement)
-        if (!(moved >= 0)) return fail("A displacement is negative.");
-    return {};
-}
-
-// What refers to the mesh that the tree was built from: its users index their own arrays with these numbers.
-Result<void> Reader::check_sources(const TreeGeometry& g) const {
+// That the ranges lie in the mesh that the tree was built from.
+Result<void> Reader::check_ranges(const TreeGeometry& g) const {
     if (g.dropped_triangles > no_node) return fail("Section facts has a value out of range.");
     const std::uint64_t triangles = g.triangles.size() + g.dropped_triangles;
-    if (mode_ == OpenMode::read) {
-        for (const Index v : g.source_vertices)
-            if (v >= g.source_vertices.size()) return fail("A source vertex is out of range.");
-        for (const Index t : g.source_triangles)
-            if (t >= triangles) return fail("A source triangle is out of range.");
-    }
     for (const MeshRange& r : g.ranges)
         if (r.first_triangle > triangles || r.triangle_count > triangles - r.first_triangle)
             return fail("Range '" + r.name + "' ends after the last triangle.");
@@ -570,9 +512,10 @@ Result<void> Reader::read_facts(TreeGeometry& g, TreeLuminance& l) {
     l.prelit = f.prelit != 0;
     l.range = {f.luminance_range[0], f.luminance_range[1]};
     const double sum = g.origin.x + g.origin.y + g.origin.z;
-    const bool facts_finite = std::isfinite(sum) && all_finite(Array(std::vector<Sphere>{g.bounding_sphere})) &&
-                              all_finite(Array(std::vector<Light>{l.light})) && l.range.lo >= 0 && l.range.lo <= l.range.hi &&
-                              l.range.hi <= 1 && g.bounding_sphere.radius >= 0;
+    const auto is_finite = [](glm::vec3 v, float w) { return std::isfinite(v.x + v.y + v.z + w); };
+    const bool facts_finite = std::isfinite(sum) && is_finite(g.bounding_sphere.centre, g.bounding_sphere.radius) &&
+                              is_finite(l.light.direction, l.light.ambient) && l.range.lo >= 0 &&
+                              l.range.lo <= l.range.hi && l.range.hi <= 1 && g.bounding_sphere.radius >= 0;
     if (!facts_finite) return fail("Section facts has a value out of range.");
     return {};
 }
@@ -600,17 +543,17 @@ Result<VertexTree> Reader::read() {
     if (!state) return state.error();
     if (const auto r = read_facts(g, l); !r) return r.error();
     if (const auto r = check_counts(g, l); !r) return r.error();
+    if (const auto r = check_ranges(g); !r) return r.error();
     l.textured = !g.texture.empty();
     if (mode_ == OpenMode::map) {
-        data->checks = std::make_shared<NodeChecks>(g);
+        data->checks = std::make_shared<NodeChecks>(g, l);
         const char* fault = fault_in_root(g);
         if (fault) return fail(std::string("Node 0 ") + fault);
         if (!data->checks->is_sound(0)) return fail("Node 0 is damaged.");
     } else {
         if (const auto r = check_structure(g); !r) return r.error();
-        if (const auto r = check_values(g, l); !r) return r.error();
+        if (const std::string fault = fault_in_sections(g, l); !fault.empty()) return fail(fault);
     }
-    if (const auto r = check_sources(g); !r) return r.error();
     data->geometry = std::move(geometry);
     return VertexTree(std::move(data));
 }

@@ -32,7 +32,7 @@ bool contains(const ChromaRange& outer, const ChromaRange& inner) {
 
 class Verifier {
 public:
-    explicit Verifier(const VertexTree& tree) : tree_(tree), g_(*tree.data().geometry), l_(tree.data().light) {}
+    explicit Verifier(const SoundTree& tree) : tree_(tree), g_(*tree.data().geometry), l_(tree.data().light) {}
 
     Result<void> run() {
         for (NodeId node = 0; node < tree_.interior_count(); ++node) {
@@ -188,7 +188,7 @@ private:
 
     static constexpr Index most_leaves_measured = 4096;
 
-    const VertexTree& tree_;
+    const SoundTree& tree_;
     const TreeGeometry& g_;
     const TreeLuminance& l_;
     const std::optional<TexturePyramid> pyramid_ = l_.textured ? std::optional<TexturePyramid>(g_.texture_view()) : std::nullopt;
@@ -199,8 +199,9 @@ private:
 } // namespace
 
 Result<void> verify(const VertexTree& tree) {
-    if (const auto sound = tree.check(); !sound) return sound;
-    return Verifier(tree).run();
+    const auto sound = SoundTree::of(tree);
+    if (!sound) return sound.error();
+    return Verifier(*sound).run();
 }
 
 } // namespace unseen::vdtree

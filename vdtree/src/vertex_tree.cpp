@@ -272,24 +272,23 @@ bool VertexTree::looks_sound(NodeId node) const { return checks_->is_sound(node)
 
 NodeId VertexTree::first_damaged() const noexcept { return checks_ ? checks_->first_damaged() : no_node; }
 
-Result<void> VertexTree::check() const {
-    for (NodeId node = 0; checks_ && node < interior_count(); ++node)
-        if (!checks_->is_sound(node))
-            return Error{ErrorCode::malformed_data, "Node " + std::to_string(node) +
-                                                        " of the mapped tree is damaged. Build the tree again from its mesh."};
-    return {};
+Result<void> VertexTree::check() const { return checks_ ? checks_->check_all() : Result<void>(); }
+
+Result<SoundTree> SoundTree::of(const VertexTree& tree) {
+    if (const auto sound = tree.check(); !sound) return sound.error();
+    return SoundTree(tree.share());
 }
 
 namespace {
 
-// The data of a tree whose luminance is found anew.
+// The data of a tree whose luminance is found anew. There is nothing left to check.
 Result<std::shared_ptr<const VertexTree::Data>> shaded_anew(const VertexTree& tree, const Light& light, bool prelit, bool textured) {
-    if (const auto sound = tree.check(); !sound) return sound.error();
+    const auto sound = SoundTree::of(tree);
+    if (!sound) return sound.error();
     auto data = std::make_shared<VertexTree::Data>();
     data->geometry = tree.data().geometry;
-    data->checks = tree.data().checks;
     TreeParts parts(links_of(*data->geometry));
-    parts.assign_triangles(tree.first_triangle(), tree.triangles());
+    parts.assign_triangles(sound->first_triangle(), sound->triangles());
     data->light = derive_luminance(*data->geometry, parts, light, prelit, textured);
     return std::shared_ptr<const VertexTree::Data>(std::move(data));
 }

@@ -97,7 +97,7 @@ class NodeChecks;
 struct VertexTree::Data {
     std::shared_ptr<const TreeGeometry> geometry;
     TreeLuminance light;
-    std::shared_ptr<NodeChecks> checks; // none: everything has been checked or comes from the builder
+    std::shared_ptr<NodeChecks> checks; // of mapped files; none: everything has been checked, or built
 };
 
 // In memory of its own, whatever the given arrays view; without fold errors and stages.

@@ -7,6 +7,7 @@
 #include <vdtree/vertex_tree.h>
 
 #include "prefetch.h"
+#include "unchecked_links.h"
 
 namespace unseen::vdtree {
 
@@ -16,7 +17,7 @@ void walk_children(const VertexTree& tree, std::size_t count, NodeAt node_at, F&
     // Places between a prefetch and its use: first the node's own link; then that of its second child, which most have and which is
     // anywhere. (The first one is the node's neighbour.)
     constexpr std::size_t far = 32, near = 16;
-    const auto subtree_end = tree.subtree_end();
+    const auto subtree_end = unchecked_links(tree).subtree_end;
     const auto prefetch_second = [&](NodeId node) {
         if (const NodeId child = node + 1, end = subtree_end[node]; child < end && subtree_end[child] < end)
             prefetch(&subtree_end[subtree_end[child]]);

@@ -23,8 +23,8 @@ struct WindowOptions {
     int samples = 8;          // a pixel, wished for; 0: exact pixels
 };
 
-// A move-only handle; current on the thread that made it until another one is made or used there; stays on that thread. What draws in it
-// keeps a handle of its own, so the context, and its window, end with the last of them. GL debug
+// A move-only handle; current on the thread that made it until another one is made or used there; stays on that thread.
+// What draws in it keeps a handle of its own, so the context, and its window, end with the last of them. GL debug
 // output of severity medium and high is collected as errors, see take_errors(); remarks on performance are not.
 class Context {
 public:

@@ -42,8 +42,8 @@ struct Frame {
     double draw_ms = 0;            // drawing of all samples and reading back, wall clock
 };
 
-// Keeps handles to the context and to the tree's data, whatever becomes of the objects given, and the tree's vertices on the GPU, and its texture if it has one: filtered trilinearly in linear light, and multiplied with the
-// colours.
+// Keeps the tree's vertices on the GPU, and its texture if it has one: filtered trilinearly in linear light, and multiplied
+// with the colours. Keeps handles of its own to the context and to the tree's data: the objects given may go first.
 class Renderer {
 public:
     static Result<Renderer> create(Context& context, const vdtree::VertexTree& tree);

@@ -24,7 +24,8 @@ struct Clustering {
 
 struct BuildOptions;
 
-// What a clusterer is given, for the time of its call: the mesh, and per-vertex luminance (relative, 0..1), unit normals and area weights.
+// What a clusterer is given, for the time of its call: the mesh, and per-vertex luminance (relative, 0..1), unit normals
+// and area weights.
 struct ClusterInput {
     MeshView mesh;
     std::span<const float> luminance;
@@ -57,9 +58,11 @@ struct BuildOptions {
     Light light = {};
     int threads = 0; // 0: as many as there are cores. The tree does not depend on it.
     std::uint64_t dropped_before = 0; // triangles that a reader has dropped; counted with the tree's
-    Progress progress = {}; // owned; copies of the options share what it refers to
+    Progress progress = {};
     // Other processes that help to analyse the mesh and to cluster it, by help_build_tree() with the same mesh and options; this is
-    // member 0. The team is the caller's and must outlive the calls that get it. Only where `clusterer` is quadric is there work for them. The tree does not depend on it. Do not cancel then: the others would wait for ever.
+    // member 0. The team is the caller's and must outlive the calls that get it.
+    // Only where `clusterer` is quadric is there work for them. The tree does not depend on it. Do not cancel then: the
+    // others would wait for ever.
     Team* team = nullptr;
     int threads_alone = 0; // like `threads`, for what comes after the clustering, when the team's others have gone
 };

@@ -12,8 +12,8 @@ namespace unseen::vdtree {
 
 // A criterion of the caller's own, for Cut::adjust(). (Those of Unseen are all in distance form: DistanceCriterion.)
 // Fills the fold cost of each interior node in `nodes`: 0 and more, fold where cost <= 1, NaN unfolds. Costs must not
-// fall from a node to its parent. Called in batches on the thread that adjusts the cut; must not throw. A parameter: refers to the caller's
-// object for the time of the call.
+// fall from a node to its parent. Called in batches on the thread that adjusts the cut; must not throw.
+// A parameter: refers to the caller's object for the time of the call.
 using FoldCriterion = FunctionRef<void(const VertexTree&, std::span<const NodeId> nodes, std::span<float> costs)>;
 
 // Costs from here on are infinite: no finite change of distance hides the fold. They differ so that budgets have an order.
@@ -22,7 +22,8 @@ inline bool is_unbounded(float cost) noexcept { return !(cost < least_unbounded_
 inline float unbounded_cost(float order) noexcept { return least_unbounded_cost * (1 + order); }
 
 // Fills, for each interior node, whether its ring can be seen. Nodes that are out are folded at no cost. A child
-// of a node that is out must be out, and a child of one that is wholly in must be wholly in. Owns a copy of the callable.
+// of a node that is out must be out, and a child of one that is wholly in must be wholly in.
+// Owns a copy of the callable.
 enum class Visibility : std::uint8_t { out, partly, wholly_in };
 using VisibilityTest = Callback<void(const VertexTree&, std::span<const NodeId> nodes, std::span<Visibility> seen)>;
 

@@ -71,8 +71,8 @@ struct IndexWrite {
 // Not thread-safe; several cuts over one tree may be used from several threads.
 class Cut {
 public:
-    // Starts wholly folded: no triangle. Keeps a handle of its own to the tree's data, so the tree given may go or move: the data live as
-    // long as the cut, and so does what tree() returns.
+    // Starts wholly folded: no triangle. Keeps a handle of its own to the tree's data, which tree() returns: the tree
+    // given may go or move.
     explicit Cut(const VertexTree& tree);
     Cut(Cut&&) noexcept;
     Cut& operator=(Cut&&) noexcept;

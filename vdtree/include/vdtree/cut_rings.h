@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include <vdtree/result.h>
 #include <vdtree/vertex_tree.h>
 
 namespace unseen::vdtree {
@@ -45,7 +46,7 @@ struct CutRings {
 };
 
 // Under the tree's light, with its texture: mean shifts count what that shows. Cost: some microseconds a triangle, some tens with a texture;
-// in parallel. Results do not depend on the threads.
-CutRings bound_cut_rings(const VertexTree& tree);
+// in parallel. Results do not depend on the threads. Fails where VertexTree::check() does.
+Result<CutRings> bound_cut_rings(const VertexTree& tree);
 
 } // namespace unseen::vdtree

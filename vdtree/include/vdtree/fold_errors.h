@@ -43,10 +43,11 @@ struct FoldError {
 };
 static_assert(sizeof(FoldError) == 40);
 
-// The tree with the errors of its folds, under its light and with its luminances as they are, as VertexTree::fold_errors() and fold_stages().
-// Everything else is the given tree's. Folds err less with proxies whose luminances conserve the light: see conserve_light(), to be called before.
-// Fails where check() does, and on trees with a texture, of which nothing is measured.
-// Cost: some 50 us a node, and a second; in parallel. The result does not depend on the threads. `threads`: 0: all cores.
+// The tree with the errors of its folds, under its light and with its luminances as they are, as
+// VertexTree::fold_errors() and fold_stages(). Everything else is the given tree's. Folds err less with proxies whose
+// luminances conserve the light: see conserve_light(), to be called before. Fails where check() does, and on trees with
+// a texture, of which nothing is measured. Cost: some 50 us a node, and a second; in parallel. The result does not
+// depend on the threads. `threads`: 0: all cores.
 Result<VertexTree> with_fold_errors(const VertexTree& tree, int threads = 0);
 
 } // namespace unseen::vdtree

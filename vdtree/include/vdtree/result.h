@@ -1,8 +1,8 @@
 // A value or the reason why there is none: what every fallible function of Unseen returns.
 //
 // The member names are those of C++23's std::expected. Libraries never print and never throw for bad
-// data; a broken precondition is a programmer's error and asserts. The value of a Result that holds an error is nowhere undefined:
-// whoever asks for it has not looked, and the program ends with the error's sentence, in every build.
+// data; a broken precondition is a programmer's error and asserts. Taking the value of a Result that holds an error is
+// never undefined: the program ends with the error's sentence, in every build.
 #pragma once
 
 #include <cassert>

@@ -23,8 +23,9 @@ Result<VertexTree> read_tree(const std::filesystem::path& file, const Progress& 
 // Opens a tree without reading it: its arrays are views of the file, which the system reads page by page where a cut comes by
 // and shares between processes. Checked at once are the header, the section table, the facts, the ranges and the root; a
 // node's links, and the values of its children, when is_sound() is first asked about it, so that a file's bytes cannot lead
-// out of bounds either. The checksums of pages, flags, luminances and the numbers in source_vertices() and
-// source_triangles() are not checked: use read_tree, or verify(), on files that nobody vouches for.
+// out of bounds either; and everything but the checksums of pages, before what goes through the whole tree (VertexTree::check()). Values
+// of which neither has been asked, as the numbers in source_vertices(), may be anything, and a wrong value that is possible is
+// found by nobody: use read_tree, or verify(), on files that nobody vouches for.
 //
 // The file must not be written to or cut short in place while it is mapped: reading a page that is gone ends the process
 // (SIGBUS). write_tree and other programs that replace a file by renaming do no harm: the old file lives until it is

@@ -21,6 +21,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <utility>
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -100,21 +101,16 @@ public:
 
     // Whether an interior node can be unfolded: its links, its triangles, and the positions and bounds of its children are in
     // order. Always, but for trees from map_tree, whose nodes are looked at when they are first asked about, from the root
-    // down; a damaged node must stay folded, and has no children for for_each_child. What is read of mapped nodes of which
-    // this has not been asked may be anything. Cost: one bit; the first time, the children and triangles.
+    // down; a damaged node must stay folded, and has no children for for_each_child. Values that are read of mapped nodes of
+    // which this has not been asked may be anything; how nodes hang together is told by for_each_child and SoundTree only.
+    // Cost: one bit; the first time, the children and triangles.
     bool is_sound(NodeId node) const { return !checks_ || looks_sound(node); }
     NodeId first_damaged() const noexcept; // the first node for which is_sound was false, or no_node
-    Result<void> check() const;            // is_sound for all nodes; the error names one that is not
 
-    // Structure. By node: the parent (no_node for the root). By interior node: the leaves supported,
-    // [first_leaf, leaf_end), the end of its subtree among the interior nodes, and its triangles,
-    // [first_triangle[n], first_triangle[n + 1]) (one longer than the nodes).
-    std::span<const NodeId> parents() const noexcept { return links_.parents; }
-    std::span<const Index> first_leaf() const noexcept { return links_.first_leaf; }
-    std::span<const Index> leaf_end() const noexcept { return links_.leaf_end; }
-    std::span<const NodeId> subtree_end() const noexcept { return links_.subtree_end; }
-    std::span<const Index> first_triangle() const noexcept { return links_.first_triangle; }
-    std::span<const Triangle> triangles() const noexcept { return links_.triangles; } // corners are leaf numbers, oriented like the input
+    // Of trees from map_tree: looks at all that read_tree looks at, but for the checksums of pages: is_sound for all nodes,
+    // and every value's range. The error names a damaged node or section. Cost: the first time one pass over the whole file,
+    // in parallel; nothing once it has succeeded, and for other trees.
+    Result<void> check() const;
 
     // Calls f(child) for each child of an interior node in depth-first order. Cost: the number of children.
     template <class F>
@@ -177,6 +173,8 @@ public:
     const Data& data() const noexcept { return *data_; }
 
 private:
+    friend class SoundTree;
+    friend struct UncheckedLinks; // for what asks is_sound() node by node
     bool looks_sound(NodeId node) const;
 
     std::shared_ptr<const Data> data_;
@@ -190,6 +188,27 @@ private:
     Links links_;
 };
 
+// A tree all of which has been looked at: what walks a whole tree takes one of these, so that no file can lead it out of bounds.
+// Another handle to the tree's data.
+class SoundTree : public VertexTree {
+public:
+    // Fails where VertexTree::check() does, and costs as much: nothing for trees that were built or read.
+    static Result<SoundTree> of(const VertexTree& tree);
+
+    // By node: the parent (no_node for the root). By interior node: the leaves supported, [first_leaf, leaf_end), the end of
+    // its subtree among the interior nodes, and its triangles, [first_triangle[n], first_triangle[n + 1]) (one longer than
+    // the nodes). Corners of triangles are leaf numbers, oriented like the input.
+    std::span<const NodeId> parents() const noexcept { return links_.parents; }
+    std::span<const Index> first_leaf() const noexcept { return links_.first_leaf; }
+    std::span<const Index> leaf_end() const noexcept { return links_.leaf_end; }
+    std::span<const NodeId> subtree_end() const noexcept { return links_.subtree_end; }
+    std::span<const Index> first_triangle() const noexcept { return links_.first_triangle; }
+    std::span<const Triangle> triangles() const noexcept { return links_.triangles; }
+
+private:
+    explicit SoundTree(VertexTree tree) : VertexTree(std::move(tree)) {}
+};
+
 // Checks everything that the tree promises: that spheres, masks, slabs, intervals and displacements contain what they
 // should and nest, and that every triangle vanishes where it is said to. Displacements are compared with the first 4096 leaves of a node; of
 // fold errors, that they are numbers and nest. The error names the first offender.
@@ -199,8 +218,8 @@ Result<void> verify(const VertexTree& tree);
 template <class F>
 void VertexTree::for_each_child(NodeId node, F&& f) const {
     if (!is_sound(node)) return;
-    const auto first = first_leaf(), end = leaf_end();
-    const auto skip = subtree_end();
+    const auto first = links_.first_leaf, end = links_.leaf_end;
+    const auto skip = links_.subtree_end;
     NodeId child = node + 1;
     for (Index leaf = first[node]; leaf < end[node];) {
         if (child < skip[node] && first[child] == leaf) {

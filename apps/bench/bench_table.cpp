@@ -1,0 +1,59 @@
+#include "bench_table.h"
+
+#include <cstdio>
+
+#include "terminal.h"
+
+namespace unseen::app {
+namespace {
+
+bool holds(const BenchRow& row, double bound) {
+    return row.more_is_better ? *row.value >= bound : *row.value <= bound;
+}
+
+std::string bound_text(const std::optional<double>& bound) {
+    return bound ? rounded(*bound, 4) : "";
+}
+
+// Of the two the better that is met, or else the one that had to be.
+std::string verdict(const BenchRow& row) {
+    const auto& [must, aim] = row.target;
+    if (!row.value || (!must && !aim)) return "";
+    if (aim && holds(row, *aim)) return "aim met";
+    if (!must) return "aim missed";
+    return holds(row, *must) ? "must met" : "must missed";
+}
+
+} // namespace
+
+void print(const std::string& title, const std::vector<BenchRow>& rows) {
+    std::printf("%s\n\n", title.c_str());
+    std::vector<std::vector<std::string>> table = {{"measure", "measured", "unit", "must", "aim", "verdict"}};
+    for (const BenchRow& row : rows)
+        table.push_back({row.name, row.value ? with_decimals(*row.value, row.decimals) : "not available", row.unit, bound_text(row.target.must),
+                         bound_text(row.target.aim), verdict(row)});
+    print_table(table);
+    std::printf("\n");
+    for (const BenchRow& row : rows)
+        if (!row.note.empty()) std::printf("%s: %s\n", row.name.c_str(), row.note.c_str());
+}
+
+Json to_json(const std::vector<BenchRow>& rows) {
+    Json json = Json::array();
+    const auto bound = [](const std::optional<double>& value) { return value ? number_or_null(*value) : Json(nullptr); };
+    const auto held = [](const BenchRow& row, const std::optional<double>& value) {
+        return row.value && value ? Json(holds(row, *value)) : Json(nullptr);
+    };
+    for (const BenchRow& row : rows)
+        json.push_back({{"name", row.name},
+                        {"value", bound(row.value)},
+                        {"unit", row.unit},
+                        {"must", bound(row.target.must)},
+                        {"aim", bound(row.target.aim)},
+                        {"holds_must", held(row, row.target.must)},
+                        {"holds_aim", held(row, row.target.aim)},
+                        {"note", row.note}});
+    return json;
+}
+
+} // namespace unseen::app

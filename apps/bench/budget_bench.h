@@ -1,0 +1,32 @@
+// Two ways to spend one triangle budget, side by side: node extent, and the perceptual fold test. After figure 5 of Luebke and Hallen 2001.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include <vdtree/vertex_tree.h>
+
+#include "report.h"
+
+namespace unseen::app {
+
+struct BudgetBenchOptions {
+    std::string mesh;    // or a tree
+    std::string picture; // of the two wireframes, side by side; empty: none
+    vdtree::Index triangles = 18'000;
+    glm::dvec3 direction = {1, 0, 0}; // from the model towards the eye; not 0
+};
+
+// Of each: triangles; pixels that differ visibly from the full model, and their largest V; and the share of triangles with a corner within
+// four pixels of the full model's contour.
+struct BudgetBenchResult {
+    std::vector<std::vector<std::string>> table; // the first row is the header
+    Json tests = Json::array();
+};
+
+// Needs OpenGL.
+Result<BudgetBenchResult> bench_budget(const BudgetBenchOptions& options);
+
+} // namespace unseen::app

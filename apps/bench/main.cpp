@@ -1,0 +1,290 @@
+// The command `unseen-bench`: measures how fast, how small and how invisible Unseen is on this machine, apart from the command that people use.
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <iterator>
+#include <memory>
+
+#include <perception/csf.h>
+
+#include "bench_tools.h"
+#include "budget_bench.h"
+#include "effects_bench.h"
+#include "engine_bench.h"
+#include "options.h"
+#include "output_files.h"
+#include "perception_bench.h"
+#include "program.h"
+#include "report.h"
+#include "terminal.h"
+
+namespace unseen::app {
+namespace {
+
+// A benchmark from its options to its report: what it reads, what it writes, and the load of the machine before.
+class BenchRun {
+public:
+    static Result<BenchRun> open(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs,
+                                const std::string& json) {
+        std::vector<std::string> all = outputs;
+        all.push_back(json);
+        if (const auto ready = check_outputs(inputs, all); !ready) return ready.error();
+        auto report = JsonReport::open(json);
+        if (!report) return report.error();
+        const MachineLoad load = machine_load();
+        if (load.is_high()) print_note(load.advice());
+        return BenchRun(std::move(*report), load);
+    }
+
+    // Writes the report; `print` is for people, where stdout is theirs.
+    template <class Print>
+    Result<int> close(Json json, Print print) {
+        json["load_average"] = number_or_null(load_.average);
+        if (auto ok = report_.prepare(json); !ok) return ok.error();
+        if (auto ok = report_.publish(); !ok) return ok.error();
+        if (report_.is_on_stdout()) return exit_done;
+        print();
+        if (load_.is_high()) std::printf("\nNote: %s\n", load_.advice().c_str());
+        return exit_done;
+    }
+
+private:
+    BenchRun(JsonReport report, MachineLoad load) : report_(std::move(report)), load_(load) {}
+
+    JsonReport report_;
+    MachineLoad load_;
+};
+
+void add_targets_option(CLI::App& verb, std::string& file) {
+    verb.add_option("--targets", file,
+                    "What each figure has to reach, in place of what is built in (apps/bench/targets.json)")
+        ->type_name("FILE.json");
+}
+
+struct EngineArguments {
+    EngineBenchOptions options;
+    std::string sizes = "70k,0.9M,3.5M,14M,28M", targets, json;
+};
+
+constexpr const char* quick_sizes = "70k,0.9M";
+
+// "70k" or "3.5M" or "871414".
+std::optional<std::uint64_t> parse_size(std::string_view text) {
+    double scale = 1;
+    if (text.ends_with('k') || text.ends_with('K')) scale = 1e3;
+    if (text.ends_with('M')) scale = 1e6;
+    if (scale > 1) text.remove_suffix(1);
+    double value = 0;
+    const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (code != std::errc() || end != text.data() + text.size()) return std::nullopt;
+    constexpr double least = 100, most = 1e9;
+    if (!(value * scale >= least && value * scale <= most)) return std::nullopt;
+    return static_cast<std::uint64_t>(std::llround(value * scale));
+}
+
+std::vector<std::uint64_t> parse_sizes(std::string_view list) {
+    std::vector<std::uint64_t> sizes;
+    while (true) {
+        const std::size_t comma = list.find(',');
+        const auto size = parse_size(list.substr(0, comma));
+        if (!size || (!sizes.empty() && *size <= sizes.back()))
+            refuse("--sizes must be ascending counts of triangles from 100 to 1000M, such as 70k,0.9M,14M.");
+        sizes.push_back(*size);
+        if (comma == std::string_view::npos) return sizes;
+        list.remove_prefix(comma + 1);
+    }
+}
+
+Result<int> run(EngineArguments& a) {
+    const auto targets = Targets::read(a.targets);
+    if (!targets) return targets.error();
+    a.options.targets = *targets;
+    auto bench = BenchRun::open({a.options.mesh, a.targets}, {}, a.json);
+    if (!bench) return bench.error();
+    const auto result = bench_engine(a.options);
+    if (!result) return result.error();
+    return bench->close({{"mesh", result->mesh}, {"rows", to_json(result->rows)}, {"sizes", result->sizes}},
+                          [&] { print(result->mesh, result->rows); });
+}
+
+Command engine_command(CLI::App& app) {
+    auto a = std::make_shared<EngineArguments>();
+    CLI::App* verb = app.add_subcommand("engine", "Cuts, budgets, memory and building, against what is promised");
+    verb->add_option("--mesh", a->options.mesh, "PLY, OBJ, OFF, STL or glTF (default: the dragon, as ./quickstart gets it; "
+                                                "without it a sphere with bumps)")
+        ->type_name("MESH");
+    CLI::Option* sizes = verb->add_option("--sizes", a->sizes, "Triangles (default: 70k,0.9M,3.5M,14M,28M; with --quick: 70k,0.9M)")
+                             ->type_name("LIST");
+    verb->add_option("--keep", a->options.keep, "Keep meshes and trees there, and take those that are there")->type_name("FOLDER");
+    verb->add_flag("--quick", a->options.quick, "Few frames and sizes: rough figures");
+    add_targets_option(*verb, a->targets);
+    add_json_option(*verb, a->json);
+    verb->callback([a, sizes] {
+        if (sizes->empty() && a->options.quick) a->sizes = quick_sizes;
+        a->options.sizes = parse_sizes(a->sizes);
+    });
+    verb->footer(
+        "The machine should be idle. Building the largest trees takes minutes; --keep spares that the next time.\n\n"
+        "Examples:\n  unseen-bench engine --quick\n"
+        "  unseen-bench engine --mesh dragon.ply --keep /tmp/bench --json engine.json");
+    return {verb, [a] { return run(*a); }};
+}
+
+struct PerceptionArguments {
+    PerceptionBenchOptions options;
+    std::string only, targets, json;
+};
+
+std::vector<std::string> parse_groups(std::string_view list) {
+    std::vector<std::string> groups;
+    std::string known;
+    for (const char* group : perception_groups) known += (known.empty() ? "" : ", ") + std::string(group);
+    while (!list.empty()) {
+        const std::size_t comma = list.find(',');
+        groups.emplace_back(list.substr(0, comma));
+        if (std::find(std::begin(perception_groups), std::end(perception_groups), groups.back()) == std::end(perception_groups))
+            refuse("--only takes a list of " + known + ", not '" + groups.back() + "'.");
+        list.remove_prefix(comma == std::string_view::npos ? list.size() : comma + 1);
+    }
+    return groups;
+}
+
+std::vector<std::string> achromatic_models() {
+    std::vector<std::string> names;
+    for (const perception::CsfModel model : perception::csf_models)
+        if (perception::is_achromatic(model)) names.emplace_back(perception::name(model));
+    return names;
+}
+
+Result<int> run(PerceptionArguments& a) {
+    const auto targets = Targets::read(a.targets);
+    if (!targets) return targets.error();
+    a.options.targets = *targets;
+    std::vector<std::string> inputs = a.options.meshes;
+    inputs.insert(inputs.end(), a.options.others.begin(), a.options.others.end());
+    inputs.push_back(a.targets);
+    auto bench = BenchRun::open(inputs, {}, a.json);
+    if (!bench) return bench.error();
+    const auto result = bench_perception(a.options);
+    if (!result) return result.error();
+    return bench->close({{"title", result->title}, {"rows", to_json(result->rows)}, {"views", result->views}}, [&] {
+        print(result->title, result->rows);
+        for (const BenchDetails& details : result->details) {
+            std::printf("\n%s\n\n", details.title.c_str());
+            print_table(details.rows);
+        }
+    });
+}
+
+Command perception_command(CLI::App& app) {
+    auto a = std::make_shared<PerceptionArguments>();
+    PerceptionBenchOptions& o = a->options;
+    CLI::App* verb = app.add_subcommand(
+        "perception", "What fold tests save, whether it can be seen, and what it costs, against what is promised");
+    verb->add_option("--mesh", o.meshes, "Meshes or trees (default: the bunny and the dragon, as ./quickstart gets them; without them a sphere with bumps); "
+                                             "of the dragon, unless it is named, only random views, from afar, and speed")
+        ->type_name("MESH");
+    verb->add_option("--other", o.others, "More of them, for the random views and from afar")->type_name("MESH");
+    verb->add_option("--only", a->only, "Groups: savings,random,far,hard,tolerance,csf,observers,speed (default: all)")->type_name("LIST");
+    verb->add_option("--reference", o.reference, "Published sensitivities, as CSV (default: tests/data in the checkout)")
+        ->type_name("FOLDER")
+        ->check(CLI::Validator(CLI::ExistingDirectory).description(""));
+    verb->add_option("--pictures", o.pictures, "A picture of each group: the worst views, and what the judge saw")->type_name("FOLDER");
+    verb->add_option("--second-judge", o.second_judge, "Its model of contrast sensitivity: barten-1999 (default), stela, daly, ...")
+        ->type_name("MODEL")
+        ->check(one_of(achromatic_models()));
+    verb->add_option("--window", o.window_px, "Its side; promises are about 1024 (default)")->type_name("PIXELS")->check(whole(64, 4096));
+    verb->add_flag("--quick", o.quick, "Few views: rough figures");
+    add_targets_option(*verb, a->targets);
+    add_json_option(*verb, a->json);
+    verb->callback([a] { a->options.only = parse_groups(a->only); });
+    verb->footer(
+        "Pictures are drawn with 64 samples a pixel; all of it takes about half an hour without a graphics card.\n\n"
+        "Examples:\n  unseen-bench perception --quick\n"
+        "  unseen-bench perception --mesh bunny.ply horse.ply armadillo.ply gargoyle.ply --pictures judged --json "
+        "perception.json\n"
+        "  unseen-bench perception --only far,hard");
+    return {verb, [a] { return run(*a); }};
+}
+
+struct EffectsArguments {
+    EffectsBenchOptions options;
+    std::string json;
+};
+
+Result<int> run(EffectsArguments& a) {
+    auto bench = BenchRun::open(a.options.meshes, {}, a.json);
+    if (!bench) return bench.error();
+    const auto result = bench_effects(a.options);
+    if (!result) return result.error();
+    return bench->close({{"effects", result->effects}}, [&] {
+        print_table(result->table);
+        std::printf("\n");
+        for (const std::string& note : result->notes) std::printf("%s\n", note.c_str());
+    });
+}
+
+Command effects_command(CLI::App& app) {
+    auto a = std::make_shared<EffectsArguments>();
+    CLI::App* verb =
+        app.add_subcommand("effects", "What each effect of the perceptual test saves in triangles and costs in time");
+    verb->add_option("--mesh", a->options.meshes, "Meshes or trees (default: as for 'unseen-bench perception')")
+        ->type_name("MESH");
+    verb->add_flag("--quick", a->options.quick, "Few repetitions");
+    add_json_option(*verb, a->json);
+    verb->footer("Examples:\n  unseen-bench effects --mesh bunny.ply horse.ply dragon.ply");
+    return {verb, [a] { return run(*a); }};
+}
+
+struct BudgetArguments {
+    BudgetBenchOptions options;
+    std::optional<glm::dvec3> direction;
+    std::string json;
+};
+
+Result<int> run(BudgetArguments& a) {
+    if (a.direction) a.options.direction = *a.direction;
+    auto bench = BenchRun::open({a.options.mesh}, {a.options.picture}, a.json);
+    if (!bench) return bench.error();
+    const auto result = bench_budget(a.options);
+    if (!result) return result.error();
+    return bench->close({{"tests", result->tests}}, [&] { print_table(result->table); });
+}
+
+Command budget_command(CLI::App& app) {
+    auto a = std::make_shared<BudgetArguments>();
+    CLI::App* verb = app.add_subcommand(
+        "budget", "What two fold tests make of one triangle budget: node extent, and the perceptual test");
+    verb->add_option("MODEL", a->options.mesh, "A mesh or a tree")->required()->type_name("TREE.vdt|MESH");
+    verb->add_option("-o,--output", a->options.picture, "The two wireframes side by side")
+        ->type_name("OUT.png")
+        ->check(ending_in({".png"}));
+    add_triangles_option(*verb, a->options.triangles, "The budget (default: 18000)");
+    add_vector(*verb, "--direction", a->direction, "From the model towards the eye (default: 1 0 0)");
+    add_json_option(*verb, a->json);
+    verb->callback([a] {
+        if (a->direction && *a->direction == glm::dvec3(0)) refuse("--direction must not be 0 0 0.");
+    });
+    verb->footer("Examples:\n  unseen-bench budget horse.vdt --triangles 18000 --direction 1 0 0 -o horse.png");
+    return {verb, [a] { return run(*a); }};
+}
+
+constexpr const char* about =
+    "unseen-bench measures how fast, how small and how invisible Unseen is on this machine, against what is promised.";
+constexpr const char* examples = R"(Examples:
+  unseen-bench engine --quick
+  unseen-bench perception --quick
+
+'unseen-bench VERB --help' tells more. Exit status: 0 done, 1 failed, 2 wrong usage.)";
+
+} // namespace
+} // namespace unseen::app
+
+int main(int argc, char** argv) {
+    using namespace unseen::app;
+    return run_program(argc, argv, {"unseen-bench", about, examples, UNSEEN_VERSION, {}}, [](CLI::App& app) {
+        return std::vector<Command>{engine_command(app), perception_command(app), effects_command(app),
+                                    budget_command(app)};
+    });
+}

@@ -1,0 +1,19 @@
+// The benchmarks that draw, in a build without OpenGL: they say so.
+#include "budget_bench.h"
+#include "perception_bench.h"
+
+namespace unseen::app {
+namespace {
+
+Error no_pictures() {
+    return {ErrorCode::unsupported,
+            "This build cannot judge pictures, for it was made without OpenGL; configure it with "
+            "-DUNSEEN_BUILD_RENDER=ON."};
+}
+
+} // namespace
+
+Result<PerceptionBenchResult> bench_perception(const PerceptionBenchOptions&) { return no_pictures(); }
+Result<BudgetBenchResult> bench_budget(const BudgetBenchOptions&) { return no_pictures(); }
+
+} // namespace unseen::app

@@ -1,0 +1,52 @@
+// Measures perception: what the fold tests save, whether anything of it can be seen, how good the models behind them are, and what
+// they cost; against what was promised.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "bench_table.h"
+
+namespace unseen::app {
+
+inline constexpr const char* perception_groups[] = {"savings", "random", "far", "hard", "tolerance", "csf", "observers", "speed"};
+
+struct PerceptionBenchOptions {
+    std::vector<std::string> meshes;        // of all groups; empty: bunny and dragon where they are installed, or a sphere with bumps
+    std::vector<std::string> others;        // in the random views and far away, too
+    std::vector<std::string> only;          // of perception_groups; empty: all
+    std::string pictures;                   // a folder for a picture of each group; empty: none
+    std::string reference;                  // a folder of published sensitivities; empty: the checkout's own
+    std::string second_judge;               // its model of contrast sensitivity; empty: Barten's of 1999
+    int window_px = 1024;
+    bool quick = false;                     // few views
+    Targets targets = Targets::built_in();
+};
+
+// Figures of the same things side by side.
+struct BenchDetails {
+    std::string title;
+    std::vector<std::vector<std::string>> rows; // the first one is the header
+};
+
+struct PerceptionBenchResult {
+    std::string title;
+    std::vector<BenchRow> rows;
+    std::vector<BenchDetails> details;
+    Json views = Json::array(); // every view that was judged
+};
+
+// Needs OpenGL, but for the groups csf and observers. The picture files are replaced.
+Result<PerceptionBenchResult> bench_perception(const PerceptionBenchOptions& options);
+
+// The groups that need no pictures (csf, observers): rows only.
+struct SensitivityBenchOptions {
+    std::string reference;
+    std::string pictures;
+    bool quick = false;
+    Targets targets = Targets::built_in();
+};
+Result<std::vector<BenchRow>> bench_csf(const SensitivityBenchOptions& options);
+Result<std::vector<BenchRow>> bench_observers(const SensitivityBenchOptions& options);
+
+} // namespace unseen::app

@@ -1,0 +1,327 @@
+#include "options.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <memory>
+
+#include <perception/criterion.h>
+
+#include "terminal.h"
+
+namespace unseen::app {
+namespace {
+
+constexpr int largest_window_px = 32768; // a side, as vdtree::validate has it
+
+std::optional<double> parse_number(std::string_view text) {
+    if (text.starts_with('+')) text.remove_prefix(1);
+    double value = 0;
+    const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (code != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+    return value;
+}
+
+// "a, b or c".
+std::string listed(const std::vector<std::string>& names) {
+    std::string list;
+    for (std::size_t i = 0; i < names.size(); ++i) list += (i == 0 ? "" : i + 1 < names.size() ? ", " : " or ") + names[i];
+    return list;
+}
+
+// A validator that passes numbers which `accepts`, and says `requirement` about others.
+template <class Accepts>
+CLI::Validator number_that(const std::string& requirement, Accepts accepts) {
+    return CLI::Validator(
+        [requirement, accepts](std::string& text) {
+            const auto value = parse_number(text);
+            if (value && accepts(*value)) return std::string();
+            return "must be " + requirement + ", not '" + text + "'";
+        },
+        "");
+}
+
+// "1024x768".
+std::string parse_size(const std::string& text, int& width, int& height) {
+    const std::size_t x = text.find('x');
+    const auto side = [](std::string_view digits, int& value) {
+        const auto [end, code] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+        return code == std::errc() && end == digits.data() + digits.size() && value >= 1 && value <= largest_window_px;
+    };
+    if (x != std::string::npos && side(std::string_view(text).substr(0, x), width) &&
+        side(std::string_view(text).substr(x + 1), height))
+        return {};
+    return "must be WIDTHxHEIGHT with 1 to " + std::to_string(largest_window_px) + " pixels a side, not '" + text + "'";
+}
+
+void check(const ViewOptions& view) {
+    const bool by_direction = view.direction || view.fill;
+    if (view.eye && by_direction) refuse("--eye and --direction (or --fill) exclude each other: give one of them.");
+    if (view.target && !view.eye) refuse("--target needs --eye; without an eye the whole model is framed.");
+    if (view.direction && *view.direction == glm::dvec3(0)) refuse("--direction must not be 0 0 0.");
+    if (view.light && *view.light == glm::dvec3(0)) refuse("--light must not be 0 0 0.");
+    if (!view.lights.empty() && (view.light || view.ambient))
+        refuse("--lights excludes --light and --ambient: say all of it in the file.");
+    if (view.up && *view.up == glm::dvec3(0)) refuse("--up must not be 0 0 0.");
+    if (view.eye && view.target && *view.eye == *view.target) refuse("--eye and --target are the same point.");
+}
+
+void check(const WhatOptions& what) {
+    const bool is_perceptual = app::is_perceptual(what.test());
+    if (what.mode == Mode::pixels && is_perceptual)
+        refuse("--pixels needs --fold-test extent or displacement: " + name_of(what.test()) + " knows no pixels.");
+    if (what.mode == Mode::imperceptible && !is_perceptual)
+        refuse("--fold-test " + name_of(what.test()) +
+               " cannot tell what is imperceptible: add --triangles N or --pixels E.");
+    // Where none was asked for, one that knows colours is taken.
+    const bool knows_chroma = !what.chosen || what.test() == FoldTest::luebke_hallen || what.test() == FoldTest::luebke_hallen_safe;
+    if (what.chroma && (!knows_chroma || what.mode == Mode::full))
+        refuse("--chroma needs --fold-test luebke-hallen or luebke-hallen-safe, and not --full.");
+}
+
+} // namespace
+
+void refuse(const std::string& message) { throw CLI::ValidationError(message, CLI::ExitCodes::ValidationError); }
+
+std::string name_of(FoldTest test) { return std::string(perception::fold_test_names[static_cast<std::size_t>(test)]); }
+
+CLI::Validator finite() {
+    return number_that("a finite number", [](double) { return true; });
+}
+CLI::Validator positive() {
+    return number_that("a finite number above 0", [](double v) { return v > 0; });
+}
+CLI::Validator not_negative() {
+    return number_that("a finite number of 0 or more", [](double v) { return v >= 0; });
+}
+CLI::Validator within(double low, double high) {
+    return number_that("a number from " + shortest(low) + " to " + shortest(high),
+                       [low, high](double v) { return v >= low && v <= high; });
+}
+
+CLI::Validator whole(double low, double high) {
+    return CLI::Validator(
+        [low, high](std::string& text) {
+            const bool has_digits_only = !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
+            const auto value = parse_number(text);
+            if (has_digits_only && value && *value >= low && *value <= high) return std::string();
+            return "must be a whole number from " + shortest(low) + " to " + shortest(high) + ", not '" + text + "'";
+        },
+        "");
+}
+
+CLI::Option* add_number(CLI::App& verb, const std::string& name, std::optional<double>& value,
+                        const CLI::Validator& validator, const std::string& unit, const std::string& text) {
+    return verb
+        .add_option_function<double>(
+            name, [&value](const double& v) { value = v; }, text)
+        ->type_name(unit)
+        ->check(validator);
+}
+
+CLI::Option* add_vector(CLI::App& verb, const std::string& name, std::optional<glm::dvec3>& value,
+                        const std::string& text) {
+    return verb
+        .add_option_function<std::array<double, 3>>(
+            name, [&value](const std::array<double, 3>& v) { value = glm::dvec3(v[0], v[1], v[2]); }, text)
+        ->type_name("X Y Z")
+        ->check(finite());
+}
+
+CLI::Validator one_of(std::vector<std::string> names) {
+    return CLI::Validator(
+        [names = std::move(names)](std::string& text) {
+            if (std::find(names.begin(), names.end(), text) != names.end()) return std::string();
+            return "must be " + listed(names) + ", not '" + text + "'";
+        },
+        "");
+}
+
+bool has_ending(const std::string& file, const std::string& ending) {
+    std::string own = std::filesystem::path(file).extension().string();
+    std::transform(own.begin(), own.end(), own.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return own == ending;
+}
+
+CLI::Validator ending_in(std::vector<std::string> endings) {
+    return CLI::Validator(
+        [endings = std::move(endings)](std::string& text) {
+            if (std::any_of(endings.begin(), endings.end(), [&](const std::string& ending) { return has_ending(text, ending); })) return std::string();
+            return "must end in " + listed(endings) + ", not '" + text + "'";
+        },
+        "");
+}
+
+void add_texture_options(CLI::App& verb, TextureOptions& o) {
+    CLI::Option* file = verb.add_option("--texture", o.file, "Of a mesh with texture coordinates: the image that lies over it, instead of its materials' images")
+                            ->type_name("IMAGE");
+    verb.add_flag("--no-texture", o.is_left_out, "Leave images out")->excludes(file);
+}
+
+void add_geomorph_option(CLI::App& verb, std::optional<double>& seconds) {
+    add_number(verb, "--geomorph", seconds, within(0, 60), "SECONDS",
+               "Vertices glide for so long where the cut changes, up to 60 s (default: they do not); what folds is "
+               "drawn until then");
+}
+
+void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px) {
+    verb.add_option_function<std::array<double, 2>>(
+            "--gaze", [&gaze_px](const std::array<double, 2>& v) { gaze_px = glm::dvec2(v[0], v[1]); },
+            "Where the viewer looks, in pixels from the top left; may lie outside of the window "
+            "(default: nowhere known, so everything is seen as sharply as at the fovea)")
+        ->type_name("X Y")
+        ->check(finite());
+}
+
+void add_moving_gaze_options(CLI::App& verb, GazeOptions& o, bool allows_mouse) {
+    CLI::App& group = *verb.add_option_group("GAZE", "Where the viewer looks, frame by frame, instead of --gaze");
+    std::vector<std::pair<std::string, GazeSource>> sources = {{"simulated", GazeSource::simulated}, {"head", GazeSource::head}};
+    if (allows_mouse) sources.push_back({"mouse", GazeSource::mouse});
+    CLI::Option* mode = add_choice(group, "--gaze-mode", o.source, std::move(sources),
+                                   std::string("simulated: fixations and saccades by published statistics; head: no tracker, within 15 "
+                                               "degrees of the middle") + (allows_mouse ? "; mouse: at the pointer" : ""));
+    CLI::Option* trace = group.add_option("--gaze-trace", o.trace, "A recording: CSV with the header time_s,x_px,y_px")->type_name("FILE.csv");
+    CLI::Option* seed = group
+        .add_option_function<double>(
+            "--seed", [&o](const double& v) { o.seed = static_cast<std::uint64_t>(v); }, "Of simulated gazes (default: 1)")
+        ->type_name("N")
+        ->check(whole(0, 9007199254740992.0)); // 2^53, to which doubles count
+    group.add_option("--gaze-error", o.tracker.error_deg, "The tracker's error, which widens the fovea (default: 0)")
+        ->type_name("DEGREES")
+        ->check(within(0, 180));
+    CLI::Option* latency = group
+        .add_option_function<double>(
+            "--gaze-latency", [&o](const double& ms) { o.tracker.latency_s = ms / 1000; },
+            "From the eye to the picture; widens the fovea by the gaze's speed (default: 0)")
+        ->type_name("MILLISECONDS")
+        ->check(within(0, 10000));
+    CLI::Option* suppression = group.add_flag("--suppression", o.tracker.suppression, "Keep still during saccades, when nothing is seen");
+    group.callback([=, &o] {
+        if (*mode && *trace) refuse("--gaze-mode and --gaze-trace exclude each other: give one of them.");
+        if (*trace) o.source = GazeSource::trace;
+        if (*seed && o.source != GazeSource::simulated) refuse("--seed needs --gaze-mode simulated.");
+        const bool is_tracked = o.source == GazeSource::trace || o.source == GazeSource::simulated;
+        if ((*latency || *suppression) && !is_tracked)
+            refuse("--gaze-latency and --suppression need --gaze-mode simulated or --gaze-trace: only these know how the eye moves.");
+    });
+}
+
+void check_gaze(const WhatOptions& what, const GazeOptions& gaze) {
+    if (what.gaze_px && gaze.source != GazeSource::none) refuse("--gaze excludes --gaze-trace and --gaze-mode.");
+}
+
+void check_geomorph(const std::optional<double>& seconds, const ViewOptions& view) {
+    if (seconds && !view.lights.empty()) refuse("--geomorph and --lights exclude each other: vertices that glide are not lit.");
+}
+
+void add_fold_test_option(CLI::App& verb, std::optional<ChosenTest>& chosen, std::span<const FoldTest> tests, const std::string& text) {
+    std::vector<std::pair<std::string, ChosenTest>> choices;
+    for (const FoldTest test : tests) choices.push_back({name_of(test), ChosenTest{test}});
+    add_choice(verb, "--fold-test", chosen, std::move(choices), text);
+}
+
+void add_json_option(CLI::App& verb, std::string& file) {
+    verb.add_option("--json", file, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
+}
+
+CLI::Option* add_triangles_option(CLI::App& verb, std::uint32_t& triangles, const std::string& text) {
+    // The parser's own conversion of unsigned numbers takes "-1" and wraps it.
+    return verb
+        .add_option_function<std::string>(
+            "--triangles",
+            [&triangles](const std::string& digits) {
+                std::uint64_t value = 0;
+                const auto [end, code] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+                if (code != std::errc() || end != digits.data() + digits.size() || value == 0)
+                    refuse("--triangles: must be a whole number of 1 or more, not '" + digits + "'");
+                triangles = static_cast<std::uint32_t>(
+                    std::min<std::uint64_t>(value, std::numeric_limits<std::uint32_t>::max()));
+            },
+            text)
+        ->type_name("N");
+}
+
+void add_view_options(CLI::App& verb, ViewOptions& o) {
+    CLI::App& group = *verb.add_option_group("VIEW", "Where from (world units are metres; see --unit)");
+    add_vector(group, "--eye", o.eye, "The eye");
+    add_vector(group, "--target", o.target, "What it looks at (default: the model's centre)");
+    add_vector(group, "--up", o.up, "Up in the picture (default: 0 1 0)");
+    add_vector(group, "--direction", o.direction, "Instead of --eye: from the model towards the eye (default: 0 0 1)");
+    add_number(group, "--fill", o.fill, within(1e-6, 1e6), "F",
+               "With --direction: the share of the window's height that the bounding sphere takes (default: 0.9)");
+    add_number(group, "--fov", o.fov_degrees, within(1e-3, 179.9), "DEGREES",
+               "Vertical field of view (default: the field that the window fills on the display)");
+    group
+        .add_option_function<std::string>(
+            "--size",
+            [&o](const std::string& text) {
+                if (const auto complaint = parse_size(text, o.width, o.height); !complaint.empty())
+                    refuse("--size: " + complaint);
+            },
+            "The window in pixels (default: 1024x1024)")
+        ->type_name("WxH");
+    add_vector(group, "--light", o.light, "Direction towards the light (default: 0.4 0.7 0.6; colours come pre-lit)");
+    add_number(group, "--ambient", o.ambient, within(0, 1), "A", "Share of light from everywhere, 0..1 (default: 0.2)");
+    group
+        .add_option("--lights", o.lights,
+                    "Lights instead of these two: directional, point, spot, headlight, ambient, with highlights; with --path, and in the "
+                    "viewer, they may move (the keys: docs/perception.md, Dynamic light)")
+        ->type_name("FILE.json");
+    add_number(group, "--background", o.background_cdm2, not_negative(), "CDM2", "Background luminance (default: 20)");
+    group.add_option("--unit", o.unit_metres, "Metres a mesh unit (default: 1)")
+        ->type_name("METRES")
+        ->check(positive());
+    add_texture_options(group, o.texture);
+    group.callback([&o] { check(o); });
+}
+
+void add_display_options(CLI::App& verb, DisplayOptions& o) {
+    CLI::App& group = *verb.add_option_group("DISPLAY", "On what display (default: 20 inch, 1600x1200, at 0.5 m)");
+    group.add_option("--display", o.file, "A display profile")->type_name("FILE.json");
+    add_number(group, "--ppd", o.pixels_per_degree, within(0.1, 1e5), "N", "Pixels per degree at the display's centre");
+    add_number(group, "--distance", o.distance_m, positive(), "METRES", "From the eye to the screen");
+    add_number(group, "--peak", o.peak_cdm2, positive(), "CDM2", "Luminance of white");
+    add_number(group, "--black", o.black_cdm2, positive(), "CDM2", "Luminance of black");
+    group.add_option("--csf", o.csf, "Contrast sensitivity: a model of unseen csf (default: castle), or a viewer's table")
+        ->type_name("MODEL|FILE");
+}
+
+void add_what_options(CLI::App& verb, WhatOptions& o) {
+    CLI::App& group = *verb.add_option_group("WHAT", "Which simplification (default: --imperceptible)");
+    const auto counted = [](std::int64_t) {}; // the options themselves know whether they were given
+    CLI::Option* full = group.add_flag_function("--full", counted, "The input, whole");
+    CLI::Option* imperceptible =
+        group.add_flag_function("--imperceptible", counted, "Fold what nobody can see on this display");
+    CLI::Option* triangles =
+        add_triangles_option(group, o.triangles, "At most N triangles, as inconspicuous as can be");
+    CLI::Option* fill = group.add_flag("--fill-budget", o.fill_budget, "With --triangles: use all of them, even where it cannot be seen");
+    add_number(group, "--milliseconds", o.milliseconds, not_negative(), "T", "The best cut that T milliseconds are enough for");
+    CLI::Option* pixels = group.add_option("--pixels", o.pixels, "Fold what is smaller than E pixels, seen or not")
+                              ->type_name("E")
+                              ->check(positive());
+    add_fold_test_option(group, o.chosen,
+                         std::array{FoldTest::error, FoldTest::luebke_hallen, FoldTest::luebke_hallen_safe, FoldTest::extent, FoldTest::displacement},
+                         "error (perceptual: what folds change in fact; default), luebke-hallen (perceptual: what they could change at most), "
+                         "luebke-hallen-safe (the same with its known holes closed, more triangles), extent or displacement (in pixels; of --pixels: "
+                         "extent)");
+    group.add_flag("--chroma", o.chroma, "Keep changes of colour that can be seen, too, not only those of luminance");
+    add_gaze_option(group, o.gaze_px);
+    group.callback([=, &o] {
+        const std::size_t given = full->count() + imperceptible->count() + triangles->count() + pixels->count();
+        if (given > 1)
+            refuse("--full, --imperceptible, --triangles and --pixels exclude each other: give one of them.");
+        if (*fill && !*triangles) refuse("--fill-budget needs --triangles N.");
+        if (o.milliseconds && *full) refuse("--milliseconds and --full exclude each other.");
+        if (*full) o.mode = Mode::full;
+        if (*triangles) o.mode = Mode::budget;
+        if (*pixels) o.mode = Mode::pixels;
+        if (*pixels && !o.chosen) o.chosen = ChosenTest{FoldTest::extent};
+        check(o);
+    });
+}
+
+} // namespace unseen::app

@@ -1,0 +1,136 @@
+// The options that several verbs share: where from, on what display, and what.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+
+#include <perception/gaze.h>
+
+namespace unseen::app {
+
+struct TextureOptions {
+    std::string file;         // instead of the materials'
+    bool is_left_out = false; // --no-texture
+};
+
+// VIEW. What is not given follows from the model and the display, see scene.h.
+struct ViewOptions {
+    std::optional<glm::dvec3> eye, target, up; // world units
+    std::optional<glm::dvec3> direction;       // from the model towards the eye
+    std::optional<double> fill;                // share of the window's height
+    std::optional<double> fov_degrees;         // vertical
+    int width = 1024, height = 1024;           // pixels
+    std::optional<glm::dvec3> light;           // towards it
+    std::optional<double> ambient;             // 0..1
+    std::string lights;                        // a file of lights instead
+    std::optional<double> background_cdm2;
+    double unit_metres = 1; // world units a mesh unit
+    TextureOptions texture;
+};
+
+// DISPLAY.
+struct DisplayOptions {
+    std::string file;
+    std::optional<double> pixels_per_degree, distance_m, peak_cdm2, black_cdm2;
+    std::string csf; // a model's name or a file's
+};
+
+enum class Mode { full, imperceptible, budget, pixels };
+enum class FoldTest { luebke_hallen, luebke_hallen_safe, error, extent, displacement }; // like perception::fold_test_names
+
+constexpr bool is_perceptual(FoldTest test) { return test != FoldTest::extent && test != FoldTest::displacement; }
+std::string name_of(FoldTest test); // as --fold-test has it
+
+// A fold test, and why it is taken in place of the default; asked for, it needs no reason.
+struct ChosenTest {
+    FoldTest test = FoldTest::error;
+    std::string why = {};
+};
+
+// WHAT.
+struct WhatOptions {
+    Mode mode = Mode::imperceptible;
+    std::optional<ChosenTest> chosen = {};   // none: by the scene, see settle_fold_test() in fold_test.h
+    std::uint32_t triangles = 0;             // of Mode::budget
+    double pixels = 0;                       // of Mode::pixels
+    bool chroma = false;                     // look at colour, too
+    bool fill_budget = false;                // of Mode::budget: go on where nothing more can be seen
+    std::optional<double> milliseconds;      // at most so long for the cut
+    std::optional<glm::dvec2> gaze_px;
+    double gaze_margin_deg = 0;              // the true gaze may be so far from it
+
+    FoldTest test() const { return chosen ? chosen->test : FoldTest::error; }
+};
+
+// Where gazes come from.
+enum class GazeSource { none, mouse, head, trace, simulated }; // a fixed one is WhatOptions::gaze_px
+struct GazeOptions {
+    GazeSource source = GazeSource::none;
+    std::string trace; // a file
+    std::uint64_t seed = 1;
+    perception::TrackerOptions tracker;
+};
+
+// Each adds a group of options to a verb. The structs must outlive the parser. Impossible values and combinations end
+// the parse with an error that names the option.
+void add_view_options(CLI::App& verb, ViewOptions& options);
+void add_display_options(CLI::App& verb, DisplayOptions& options);
+void add_what_options(CLI::App& verb, WhatOptions& options);
+// Beside add_what_options(), for verbs with frames in time: gazes that move. `allows_mouse`: the verb has a window.
+void add_moving_gaze_options(CLI::App& verb, GazeOptions& options, bool allows_mouse);
+// What add_what_options() and add_moving_gaze_options(), or the view's options, do not allow together.
+void check_gaze(const WhatOptions& what, const GazeOptions& gaze);
+void check_geomorph(const std::optional<double>& seconds, const ViewOptions& view);
+void add_texture_options(CLI::App& verb, TextureOptions& options);
+void add_geomorph_option(CLI::App& verb, std::optional<double>& seconds);
+void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px);
+// Of `tests`.
+void add_fold_test_option(CLI::App& verb, std::optional<ChosenTest>& chosen, std::span<const FoldTest> tests, const std::string& text);
+void add_json_option(CLI::App& verb, std::string& file);
+CLI::Option* add_triangles_option(CLI::App& verb, std::uint32_t& triangles, const std::string& text);
+
+// Validators. All of them refuse NaN and infinities.
+CLI::Validator finite();
+CLI::Validator positive();
+CLI::Validator not_negative();
+CLI::Validator within(double low, double high);
+CLI::Validator whole(double low, double high); // a whole number
+CLI::Validator one_of(std::vector<std::string> names);
+// Upper case is fine in the name; `ending` is in lower case, with the point.
+bool has_ending(const std::string& file, const std::string& ending);
+// The file name ends in one of these (lower case, with the point); upper case is fine in the name.
+CLI::Validator ending_in(std::vector<std::string> endings);
+
+// An option that takes one of these names and puts the value of the same place into `target`, which is left as it is where the option is not
+// given. What Value is, Target can be set to.
+template <class Target, class Value>
+CLI::Option* add_choice(CLI::App& verb, const std::string& option, Target& target, std::vector<std::pair<std::string, Value>> choices,
+                        const std::string& text) {
+    std::vector<std::string> names;
+    for (const auto& [name, value] : choices) names.push_back(name);
+    const auto take = [&target, choices = std::move(choices)](const std::string& given) {
+        for (const auto& [name, value] : choices)
+            if (name == given) target = value;
+    };
+    return verb.add_option_function<std::string>(option, take, text)->type_name("NAME")->check(one_of(std::move(names)));
+}
+
+// An option that takes a number.
+CLI::Option* add_number(CLI::App& verb, const std::string& name, std::optional<double>& value, const CLI::Validator& validator,
+                        const std::string& unit, const std::string& text);
+
+// An option that takes three numbers.
+CLI::Option* add_vector(CLI::App& verb, const std::string& name, std::optional<glm::dvec3>& value, const std::string& text);
+
+// Ends the parse: exit status 2.
+[[noreturn]] void refuse(const std::string& message);
+
+} // namespace unseen::app

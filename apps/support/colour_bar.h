@@ -1,0 +1,27 @@
+// Maps of values as colours, with the scale that says which is which.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include <perception/image.h>
+
+namespace unseen::app {
+
+struct ColourBar {
+    struct Tick {
+        double share = 0; // of the bar, 0..1
+        std::string text;
+    };
+    glm::vec3 (*colour_at)(double share) = nullptr; // 0..1
+    std::vector<Tick> ticks;                        // ascending; those that would run into the one before are left out
+    std::string unit;
+};
+
+// A map in code values with the bar and its unit below it: pixels keep their places. Wider than the map where that is too narrow for the
+// text, the rest black.
+Result<perception::Image> with_colour_bar(const perception::Image& map, const ColourBar& bar);
+
+} // namespace unseen::app

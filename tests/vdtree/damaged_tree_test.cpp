@@ -1,0 +1,150 @@
+// Tree files with flipped bits, mapped, so that nobody has looked at all of them: whatever is asked of them gives an
+// error or stays within the file. Sanitizers see most.
+#include <cstddef>
+#include <filesystem>
+#include <map>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <vdtree/cut_rings.h>
+#include <vdtree/fold_errors.h>
+#include <vdtree/tree_io.h>
+
+#include "built.h"
+#include "shapes.h"
+#include "temp_folder.h"
+#include "textures.h"
+#include "tree_file.h"
+#include "tree_use.h"
+
+namespace unseen::vdtree {
+namespace {
+
+using support::built;
+using support::TreeFile;
+using ::testing::HasSubstr;
+
+// Links are given by trees alone that somebody has looked at.
+template <class Tree>
+concept GivesLinks = requires(const Tree& tree) {
+    tree.parents();
+}
+|| requires(const Tree& tree) { tree.subtree_end(); }
+|| requires(const Tree& tree) { tree.first_leaf(); }
+|| requires(const Tree& tree) { tree.triangles(); };
+static_assert(GivesLinks<SoundTree> && !GivesLinks<VertexTree>);
+static_assert(!std::is_constructible_v<SoundTree, VertexTree> && !std::is_assignable_v<SoundTree&, VertexTree>);
+
+struct Kind {
+    const char* name;
+    VertexTree (*make)();
+};
+
+VertexTree measured() { return *with_fold_errors(built(shapes::bumpy_sphere(2)), 1); }
+VertexTree plain() { return built(shapes::bumpy_sphere(3)); }
+VertexTree coloured() { return built(shapes::with_attributes(shapes::bumpy_sphere(3))); }
+VertexTree textured() {
+    Mesh mesh = shapes::with_attributes(shapes::bumpy_sphere(3));
+    mesh.texture = textures::noise(8, 8, 1);
+    return built(mesh);
+}
+VertexTree open_and_large() { return built(shapes::grid(48)); } // in several parts for several threads
+
+class DamagedTrees : public ::testing::TestWithParam<Kind> {
+protected:
+    Result<VertexTree> mapped(const TreeFile& bytes) {
+        support::write_bytes(file_, bytes.bytes());
+        return map_tree(file_);
+    }
+    // Made once: measuring folds takes a second.
+    const TreeFile& honest() {
+        static std::map<std::string, TreeFile> made;
+        const auto [at, is_new] = made.try_emplace(GetParam().name);
+        if (is_new) {
+            if (!write_tree(file_, GetParam().make())) throw std::runtime_error("cannot write the tree");
+            at->second = TreeFile::parse(support::read_bytes(file_));
+        }
+        return at->second;
+    }
+
+    support::TempFolder folder_;
+    std::filesystem::path file_ = folder_ / "tree.vdt";
+};
+
+TEST_P(DamagedTrees, LeadNobodyOutOfBounds) {
+    std::mt19937_64 random(5);
+    int damaged = 0, harmless = 0;
+    for (int round = 0; round < 120; ++round) {
+        TreeFile file = honest();
+        const std::uint64_t most = round % 2 ? 8 : 1;
+        for (std::uint64_t flipped = 0; flipped < most; ++flipped) {
+            TreeFile::Section& s = file.sections[random() % file.sections.size()];
+            if (s.name == "facts" || s.name == "ranges" || s.data.empty()) continue;
+            s.data[random() % s.data.size()] ^= static_cast<char>(1u << (random() % 8));
+        }
+        const auto tree = mapped(file);
+        if (!tree) continue;
+        ASSERT_TRUE(support::use_everything(*tree, false)) << GetParam().name << ", round " << round;
+        ++(tree->check() ? harmless : damaged);
+    }
+    EXPECT_GT(damaged, 30);
+    EXPECT_GT(harmless, 10); // normals, flags, luminances and finite values
+}
+
+// One parent, which no cut comes by.
+TEST_P(DamagedTrees, AreToldWithTheNode) {
+    TreeFile file = honest();
+    const std::size_t interior = file["first_leaf"].count();
+    file["parents"].set(interior - 1, 0x40000000u);
+    const auto tree = mapped(file);
+    ASSERT_TRUE(tree) << tree.error().message;
+    const auto rings = bound_cut_rings(*tree);
+    ASSERT_FALSE(rings);
+    EXPECT_THAT(rings.error().message, HasSubstr("of the mapped tree is damaged. Build the tree again"));
+    EXPECT_FALSE(SoundTree::of(*tree));
+    EXPECT_EQ(SoundTree::of(*tree).error().message, rings.error().message);
+    EXPECT_THAT(rings.error().message, HasSubstr("Node " + std::to_string(tree->first_damaged())));
+}
+
+// What no node's own check looks at.
+TEST_P(DamagedTrees, AreToldWithTheSection) {
+    const auto expect_fault = [&](const char* section, std::size_t at, std::uint32_t bits, const char* what) {
+        TreeFile file = honest();
+        file[section].set(at, bits);
+        const auto tree = mapped(file);
+        ASSERT_TRUE(tree) << tree.error().message;
+        const auto sound = SoundTree::of(*tree);
+        ASSERT_FALSE(sound) << section;
+        EXPECT_THAT(sound.error().message, HasSubstr(what));
+        EXPECT_EQ(tree->first_damaged(), no_node);
+    };
+    expect_fault("displacement", 1, 0x7fc00000, "displacement has a value that is not finite");
+    expect_fault("displacement", 1, 0xbf800000, "displacement is negative");
+    expect_fault("ring_range", 1, 0x00000001, "luminance range");
+    expect_fault("mask_at", 1, 0xffffffff, "mask");
+    expect_fault("source_vertices", 1, 0xffffffff, "source vertex");
+}
+
+// What passes costs nothing more, and is what was written.
+TEST_P(DamagedTrees, AreNotSeenWhereThereAreNone) {
+    const auto tree = mapped(honest());
+    ASSERT_TRUE(tree);
+    const auto sound = SoundTree::of(*tree);
+    ASSERT_TRUE(sound) << sound.error().message;
+    EXPECT_EQ(sound->parents().data(), SoundTree::of(*tree)->parents().data());
+    EXPECT_EQ(sound->node_count(), tree->node_count());
+    EXPECT_TRUE(support::use_everything(*tree, false));
+}
+
+INSTANTIATE_TEST_SUITE_P(All, DamagedTrees,
+                         ::testing::Values(Kind{"plain", plain}, Kind{"coloured", coloured}, Kind{"textured", textured},
+                                           Kind{"measured", measured}, Kind{"large", open_and_large}),
+                         [](const auto& kind) { return kind.param.name; });
+
+} // namespace
+} // namespace unseen::vdtree
