@@ -39,10 +39,12 @@ struct CutState::Indices {
     explicit Indices(const VertexTree& tree) : buffer(tree) {}
     IndexBuffer buffer;
     bool is_stale = true;
-    bool is_patched = false;      // writes are the whole difference to the buffer before the last change
-    unsigned quiet_frames = 0;    // in a row, of few changes
+    bool is_patched = false;   // writes are the whole difference to the buffer before the last change
+    unsigned quiet_frames = 0; // in a row, of few changes
 
-    void count_changes(std::size_t changes, Index triangles) { quiet_frames = changes < few_changes(triangles) ? quiet_frames + 1 : 0; }
+    void count_changes(std::size_t changes, Index triangles) {
+        quiet_frames = changes < few_changes(triangles) ? quiet_frames + 1 : 0;
+    }
     std::uint64_t version = 0, writes_from = 0; // of the buffer, and before the last writes
 
     void change_version() {
@@ -52,7 +54,8 @@ struct CutState::Indices {
 };
 
 CutState::CutState(const VertexTree& tree)
-    : tree_(tree.share()), unfolded_((tree.interior_count() + 63) / 64), proxy_(tree.leaf_count(), VertexTree::root()), revision_(first_revision()) {}
+    : tree_(tree.share()), unfolded_((tree.interior_count() + 63) / 64), proxy_(tree.leaf_count(), VertexTree::root()),
+      revision_(first_revision()) {}
 CutState::~CutState() = default;
 
 CutFollower& CutState::follower() {
@@ -172,8 +175,8 @@ bool CutState::is_patching() {
     return false;
 }
 
-// Reads follow from reads: links, lists, and what is drawn. Those of many changes are made to overlap. Leaves the children in soon_, where
-// those of each node end.
+// Reads follow from reads: links, lists, and what is drawn. Those of many changes are made to overlap. Leaves the
+// children in soon_, where those of each node end.
 void CutState::prefetch_changes(std::span<const NodeId> nodes, bool folds) {
     const auto& links = unchecked_links(tree_);
     const auto first_leaf = links.first_leaf, leaf_end = links.leaf_end, first_triangle = links.first_triangle;
@@ -188,8 +191,10 @@ void CutState::prefetch_changes(std::span<const NodeId> nodes, bool folds) {
         prefetch(&subtree_end[node]);
         prefetch(&first_triangle[node]);
     }
-    for (const NodeId node : nodes) // the first child is the node's neighbour; the next one, which most nodes have, is anywhere
-        if (const NodeId child = node + 1; child < subtree_end[node] && subtree_end[child] < subtree_end[node]) prefetch_leaves(subtree_end[child]);
+    // The first child is the node's neighbour; the next one, which most nodes have, is anywhere.
+    for (const NodeId node : nodes)
+        if (const NodeId child = node + 1; child < subtree_end[node] && subtree_end[child] < subtree_end[node])
+            prefetch_leaves(subtree_end[child]);
     soon_.clear();
     soon_ends_.clear();
     for (const NodeId node : nodes) {
@@ -291,8 +296,8 @@ void CutState::change_further(std::vector<std::uint64_t> unfolded) {
     changes_.insert(changes_.begin(), before.begin(), before.end());
 }
 
-// Node numbers ascend from parents to children: unfolds run upward through them, so every node is active when its turn comes,
-// and folds run downward.
+// Node numbers ascend from parents to children: unfolds run upward through them, so every node is active when its turn
+// comes, and folds run downward.
 void CutState::replay(std::span<const std::uint64_t> unfolded) {
     for (std::size_t word = 0; word < unfolded.size(); ++word)
         for (std::uint64_t bits = unfolded[word] & ~unfolded_[word]; bits; bits &= bits - 1)
@@ -306,7 +311,8 @@ void CutState::replay(std::span<const std::uint64_t> unfolded) {
     }
 }
 
-// The proxies of all leaves, in order: what is folded under unfolded nodes stands for its leaves, and other leaves for themselves.
+// The proxies of all leaves, in order: what is folded under unfolded nodes stands for its leaves, and other leaves for
+// themselves.
 void CutState::assign_all(std::span<const std::uint64_t> unfolded) {
     const auto& links = unchecked_links(tree_);
     const auto first_leaf = links.first_leaf, leaf_end = links.leaf_end, subtree_end = links.subtree_end;
@@ -317,7 +323,8 @@ void CutState::assign_all(std::span<const std::uint64_t> unfolded) {
         while (folded == 0 && ++word < unfolded.size()) folded = ~unfolded[word];
         return folded == 0 ? end : static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(folded)));
     };
-    // How many leaves a node has, nobody could foretell: a few places are written at once, those too many by the next ones again.
+    // How many leaves a node has, nobody could foretell: a few places are written at once, those too many by the next
+    // ones again.
     constexpr Index at_once = 16;
     const Index leaves = tree_.leaf_count(), last_begin = leaves - std::min(leaves, at_once);
     NodeId* const proxies = proxy_.data();
@@ -328,9 +335,7 @@ void CutState::assign_all(std::span<const std::uint64_t> unfolded) {
         for (; leaf < leaves_end; ++leaf) proxies[leaf] = proxy_of(leaf);
         leaf = leaves_end;
     };
-    const auto stand_for_themselves = [&](Index leaves_end) {
-        write(leaves_end, [end](Index l) { return end + l; });
-    };
+    const auto stand_for_themselves = [&](Index leaves_end) { write(leaves_end, [end](Index l) { return end + l; }); };
     for (NodeId node = 0; node < end; node = subtree_end[node]) {
         node = next_folded(node);
         if (node >= end) break;
@@ -346,7 +351,8 @@ void CutState::become(std::vector<std::uint64_t> unfolded, AdjustStats& stats) {
     ++revision_;
     for (std::size_t word = 0; word < unfolded.size(); ++word)
         for (std::uint64_t bits = unfolded[word] & ~unfolded_[word]; bits; bits &= bits - 1)
-            changes_.push_back({static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))), false});
+            changes_.push_back(
+                {static_cast<NodeId>(word * 64 + static_cast<std::size_t>(std::countr_zero(bits))), false});
     for (std::size_t word = unfolded.size(); word-- > 0;) {
         for (std::uint64_t bits = unfolded_[word] & ~unfolded[word]; bits;) {
             const int highest = 63 - std::countl_zero(bits);

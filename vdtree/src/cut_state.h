@@ -39,11 +39,12 @@ public:
     bool is_unfolded(NodeId node) const noexcept { return !tree_.is_leaf(node) && is_unfolded_interior(node); }
     bool is_active(NodeId node) const noexcept {
         // Not by its parent, which a damaged file may lie about.
-        const Index leaf = tree_.is_leaf(node) ? node - tree_.interior_count() : unchecked_links(tree_).first_leaf[node];
+        const Index leaf =
+            tree_.is_leaf(node) ? node - tree_.interior_count() : unchecked_links(tree_).first_leaf[node];
         return leaf < tree_.leaf_count() && proxy_[leaf] == node;
     }
 
-    CutFollower& follower(); // made when it is first asked for
+    CutFollower& follower();         // made when it is first asked for
     void forget_followed() noexcept; // the cut is changed by others than the follower
 
     // ---- by hand

@@ -24,18 +24,19 @@ struct Kernel {
     void (*find_batch_costs)(const KernelView&, const CostTables&, const FoldBatch&, float*, float*) noexcept;
     decltype(&vdtree::decide) decide;
     decltype(&vdtree::decide_range) decide_range;
-    void (*find_costs)(const KernelView&, const NodeArrays&, const CostTables&, std::span<const NodeId>, const NodeCosts&) noexcept;
+    void (*find_costs)(const KernelView&, const NodeArrays&, const CostTables&, std::span<const NodeId>,
+                       const NodeCosts&) noexcept;
     decltype(&vdtree::find_cost_bounds) find_cost_bounds;
     decltype(&vdtree::move_blocks) move_blocks;
     decltype(&vdtree::keep_inside) keep_inside;
     decltype(&vdtree::look_at_blocks) look_at_blocks;
-    decltype(&vdtree::find_dues) find_dues;
-    decltype(&vdtree::find_due) find_due;
+    decltype(&vdtree::find_deadlines) find_deadlines;
+    decltype(&vdtree::find_due_blocks) find_due_blocks;
 };
 
-// GCC takes vectors apart that it meets in functions for others, even where these are inlined. So the arithmetic is included once for each kind
-// of register, as a whole, within the region that is compiled for it. (With registers of sixteen floats, tests from the cache take four fifths
-// of the time, but frames and jumps take as long.)
+// GCC takes vectors apart that it meets in functions for others, even where these are inlined. So the arithmetic is
+// included once for each kind of register, as a whole, within the region that is compiled for it. (With registers of
+// sixteen floats, tests from the cache take four fifths of the time, but frames and jumps take as long.)
 namespace four_wide {
 
 using Vectors = FourWide;
@@ -97,33 +98,40 @@ const Kernel kernel = best_kernel();
 
 } // namespace
 
-void test(const KernelView& view, std::span<const FoldCandidate* const> lanes, TestBatch& tested) noexcept { kernel.test(view, lanes, tested); }
+void test(const KernelView& view, std::span<const FoldCandidate* const> lanes, TestBatch& tested) noexcept {
+    kernel.test(view, lanes, tested);
+}
 
 void find_verdicts(const KernelView& view, std::span<const FoldCandidate* const> lanes, FoldBatch& batch) noexcept {
     kernel.find_verdicts(view, lanes, batch);
 }
 
-void find_slacks(const KernelView& view, const FoldBatch& batch, TestBatch& tested) noexcept { kernel.find_slacks(view, batch, tested); }
+void find_slacks(const KernelView& view, const FoldBatch& batch, TestBatch& tested) noexcept {
+    kernel.find_slacks(view, batch, tested);
+}
 
-void find_costs(const KernelView& view, const CostTables& tables, const FoldBatch& batch, float* cost, float* seen_cost) noexcept {
+void find_costs(const KernelView& view, const CostTables& tables, const FoldBatch& batch, float* cost,
+                float* seen_cost) noexcept {
     kernel.find_batch_costs(view, tables, batch, cost, seen_cost);
 }
 
-void decide(const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes, std::uint64_t* unfolded) noexcept {
+void decide(const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes,
+            std::uint64_t* unfolded) noexcept {
     kernel.decide(view, arrays, nodes, unfolded);
 }
 
-void decide_range(const KernelView& view, const NodeArrays& arrays, NodeId first, std::size_t count, std::uint64_t* unfolded) noexcept {
+void decide_range(const KernelView& view, const NodeArrays& arrays, NodeId first, std::size_t count,
+                  std::uint64_t* unfolded) noexcept {
     kernel.decide_range(view, arrays, first, count, unfolded);
 }
 
-void find_costs(const KernelView& view, const NodeArrays& arrays, const CostTables& tables, std::span<const NodeId> nodes,
-                const NodeCosts& costs) noexcept {
+void find_costs(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
+                std::span<const NodeId> nodes, const NodeCosts& costs) noexcept {
     kernel.find_costs(view, arrays, tables, nodes, costs);
 }
 
-void find_cost_bounds(const KernelView& view, const NodeArrays& arrays, const CostTables& tables, std::span<const NodeId> nodes,
-                      float no_silhouette_over, float* cost, float* seen_cost) noexcept {
+void find_cost_bounds(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
+                      std::span<const NodeId> nodes, float no_silhouette_over, float* cost, float* seen_cost) noexcept {
     kernel.find_cost_bounds(view, arrays, tables, nodes, no_silhouette_over, cost, seen_cost);
 }
 
@@ -131,20 +139,22 @@ void move_blocks(const float (&eye_high)[3], const float (&eye_low)[3], float pa
     kernel.move_blocks(eye_high, eye_low, path, spheres);
 }
 
-void keep_inside(const KernelView& view, float margin, const KernelClock& clock, const BlockSpheres& spheres, float* deadlines) noexcept {
+void keep_inside(const KernelView& view, float margin, const KernelClock& clock, const BlockSpheres& spheres,
+                 float* deadlines) noexcept {
     kernel.keep_inside(view, margin, clock, spheres, deadlines);
 }
 
-std::size_t look_at_blocks(std::span<const std::uint32_t> which, float position_clock, float facing_clock, const BlockDues* dues,
-                           const std::uint16_t* unfolded, const BlockSpheres& spheres, BlockDeadlines& deadlines, std::uint32_t* due) noexcept {
+std::size_t look_at_blocks(std::span<const std::uint32_t> which, float position_clock, float facing_clock,
+                           const SlotDeadlines* dues, const std::uint16_t* unfolded, const BlockSpheres& spheres,
+                           EarliestDeadlines& deadlines, std::uint32_t* due) noexcept {
     return kernel.look_at_blocks(which, position_clock, facing_clock, dues, unfolded, spheres, deadlines, due);
 }
 
-void find_dues(const TestBatch& tested, DueBatch& dues) noexcept { kernel.find_dues(tested, dues); }
+void find_deadlines(const TestBatch& tested, DeadlineBatch& dues) noexcept { kernel.find_deadlines(tested, dues); }
 
-void find_due(float position_clock, float facing_clock, const BlockSpheres& spheres, const BlockDeadlines& deadlines,
-              std::uint64_t* due) noexcept {
-    kernel.find_due(position_clock, facing_clock, spheres, deadlines, due);
+void find_due_blocks(float position_clock, float facing_clock, const BlockSpheres& spheres,
+                     const EarliestDeadlines& deadlines, std::uint64_t* due) noexcept {
+    kernel.find_due_blocks(position_clock, facing_clock, spheres, deadlines, due);
 }
 
 } // namespace unseen::vdtree

@@ -1,8 +1,9 @@
-// The arithmetic of fold tests, many nodes at once: where their spheres are, seen from the eye, what their rings face, and what follows from
-// both: verdicts, slacks and costs. FoldTester is the way to it for everybody else.
+// The arithmetic of fold tests, many nodes at once: where their spheres are, seen from the eye, what their rings face,
+// and what follows from both: verdicts, slacks and costs. FoldTester is the way to it for everybody else.
 //
-// Everything is computed in registers of four or eight nodes, from one source: kernel_measure.h (distances, angles, heights), kernel_facing.h (what
-// rings face), kernel_decide.h (verdicts), kernel_slacks.h (for how long they hold) and kernel_costs.h. Same bits on every processor.
+// Everything is computed in registers of four or eight nodes, from one source: kernel_measure.h (distances, angles,
+// heights), kernel_facing.h (what rings face), kernel_decide.h (verdicts), kernel_slacks.h (for how long they hold) and
+// kernel_costs.h. Same bits on every processor.
 #pragma once
 
 #include <cstddef>
@@ -17,7 +18,8 @@
 namespace unseen::vdtree {
 
 inline constexpr std::size_t kernel_lanes = 16;
-inline constexpr float least_length = 1e-30f; // mesh units; stands for 0 where a division or an infinite reach would make no number of it
+// Mesh units; stands for 0 where a division or an infinite reach would make no number of it.
+inline constexpr float least_length = 1e-30f;
 
 // What all nodes are measured from, and by.
 struct KernelView {
@@ -37,58 +39,63 @@ struct KernelView {
     };
     std::vector<Occluder> occluders;
 
-    std::span<const float> reach; // [row * bins + bin], in lengths; infinite: from everywhere; minus infinity: from nowhere
+    // [row * bins + bin], in lengths; infinite: from everywhere; minus infinity: from nowhere.
+    std::span<const float> reach;
     std::int32_t bins = 1;
     float bins_per_radian = 0;
     float inverse_threshold = 1;
-    float turn_per_length = 0;    // radians that the gaze may turn while the position clock advances by 1
+    float turn_per_length = 0; // radians that the gaze may turn while the position clock advances by 1
 
     // Whose facing has to be found out: nodes within their silhouette's distance but not the interior's, and ...
-    bool near_ones_too = false;   // ... nodes within the interior's, too, or
-    bool everybody = false;       // ... all, or
-    bool nobody = false;          // ... none
+    bool near_ones_too = false; // ... nodes within the interior's, too, or
+    bool everybody = false;     // ... all, or
+    bool nobody = false;        // ... none
 
-    bool is_inside_out = false;   // the surface: the side that is seen is the one that its normals point away from
+    bool is_inside_out = false; // the surface: the side that is seen is the one that its normals point away from
 };
 
 // What tests read, by interior node; null where a criterion has none of it.
 struct NodeArrays {
     const NodeBounds* bounds = nullptr;
-    const Sphere* support = nullptr;      // whose distance counts; null: the ring's
+    const Sphere* support = nullptr; // whose distance counts; null: the ring's
     const FoldClass* classes = nullptr;
-    const NormalSlabs* facing = nullptr;  // null: those of the bounds
+    const NormalSlabs* facing = nullptr;                           // null: those of the bounds
     const float *lengths = nullptr, *silhouette_lengths = nullptr; // null: the radii, and the lengths
 };
 
-// Only whether nodes unfold, bit for bit as the tests with slacks below find it: one bit a node, the first node's lowest, of as many
-// whole words as that takes. Cost: some nanoseconds a node where these are neighbours, and memory's latency overlaps where not.
-void decide(const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes, std::uint64_t* unfolded) noexcept;
-void decide_range(const KernelView& view, const NodeArrays& arrays, NodeId first, std::size_t count, std::uint64_t* unfolded) noexcept;
+// Only whether nodes unfold, bit for bit as the tests with slacks below find it: one bit a node, the first node's
+// lowest, of as many whole words as that takes. Cost: some nanoseconds a node where these are neighbours, and memory's
+// latency overlaps where not.
+void decide(const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes,
+            std::uint64_t* unfolded) noexcept;
+void decide_range(const KernelView& view, const NodeArrays& arrays, NodeId first, std::size_t count,
+                  std::uint64_t* unfolded) noexcept;
 
 // What the costs of folds are looked up in: a criterion's own tables, [row * bins + bin]; the second one may be null.
 struct CostTables {
     const float *reach = nullptr, *least_cost = nullptr;
 };
-// The thresholds at which nodes would just fold, without and with their least costs, and whether they unfold at the view's. `view` must
-// ask for the facing of everybody.
+// The thresholds at which nodes would just fold, without and with their least costs, and whether they unfold at the
+// view's. `view` must ask for the facing of everybody.
 struct NodeCosts {
-    float *cost, *seen_cost;  // by place in `nodes`
-    std::uint64_t* unfolded;  // like decide()'s
+    float *cost, *seen_cost; // by place in `nodes`
+    std::uint64_t* unfolded; // like decide()'s
 };
-void find_costs(const KernelView& view, const NodeArrays& arrays, const CostTables& tables, std::span<const NodeId> nodes,
-                const NodeCosts& costs) noexcept;
-// At least what both costs of a node are, whatever it faces, or, where it would cost more than `no_silhouette_over` as a silhouette, as none.
-void find_cost_bounds(const KernelView& view, const NodeArrays& arrays, const CostTables& tables, std::span<const NodeId> nodes,
-                      float no_silhouette_over, float* cost, float* seen_cost) noexcept;
+void find_costs(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
+                std::span<const NodeId> nodes, const NodeCosts& costs) noexcept;
+// At least what both costs of a node are, whatever it faces, or, where it would cost more than `no_silhouette_over` as
+// a silhouette, as none.
+void find_cost_bounds(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
+                      std::span<const NodeId> nodes, float no_silhouette_over, float* cost, float* seen_cost) noexcept;
 
 // What a test reads of a node, in one cache line.
 struct alignas(64) FoldCandidate {
-    Sphere sphere;           // whose distance counts
+    Sphere sphere; // whose distance counts
     float length = 0, silhouette_length = 0;
     FoldClass rows;
-    Sphere ring;             // whose facing counts
-    NormalSlabs slabs;       // of the directions in the ring
-    std::uint8_t flags = 0;  // NodeFlags
+    Sphere ring;                  // whose facing counts
+    NormalSlabs slabs;            // of the directions in the ring
+    std::uint8_t flags = 0;       // NodeFlags
     bool is_unfolded : 1 = false; // for the one who keeps it; tests do not ask
     bool is_waiting : 1 = false;  // likewise: to be unfolded
     NodeId node = no_node;
@@ -105,9 +112,11 @@ struct TestBatch {
 // Without lights.
 void test(const KernelView& view, std::span<const FoldCandidate* const> lanes, TestBatch& tested) noexcept;
 
-// The same in steps, for those that do something in between (lights): find_verdicts(), then find_slacks() or find_costs().
+// The same in steps, for those that do something in between (lights): find_verdicts(), then find_slacks() or
+// find_costs().
 //
-// Up to sixteen nodes, and what their verdicts are made of; see Measures and Verdicts in kernel_measure.h and kernel_decide.h.
+// Up to sixteen nodes, and what their verdicts are made of; see Measures and Verdicts in kernel_measure.h and
+// kernel_decide.h.
 struct FoldBatch {
     alignas(64) float radius[kernel_lanes], length[kernel_lanes], silhouette_length[kernel_lanes];
     alignas(64) std::int32_t interior_row[kernel_lanes], silhouette_row[kernel_lanes];
@@ -121,10 +130,11 @@ struct FoldBatch {
 void find_verdicts(const KernelView& view, std::span<const FoldCandidate* const> lanes, FoldBatch& batch) noexcept;
 void find_slacks(const KernelView& view, const FoldBatch& batch, TestBatch& tested) noexcept;
 // `view` must have asked for the facing of everybody. Sixteen costs each.
-void find_costs(const KernelView& view, const CostTables& tables, const FoldBatch& batch, float* cost, float* seen_cost) noexcept;
+void find_costs(const KernelView& view, const CostTables& tables, const FoldBatch& batch, float* cost,
+                float* seen_cost) noexcept;
 
-// Slacks are shortened so that rounding in a later test cannot change a verdict before its time: by less than this share of the
-// distance and the radius.
+// Slacks are shortened so that rounding in a later test cannot change a verdict before its time: by less than this
+// share of the distance and the radius.
 inline constexpr float test_rounding = 2e-5f;
 
 } // namespace unseen::vdtree

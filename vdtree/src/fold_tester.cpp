@@ -18,16 +18,22 @@ constexpr float infinity = std::numeric_limits<float>::infinity();
 
 } // namespace
 
-FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterion, bool cull_back_faces, float threshold, bool least_costs)
+FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterion, bool cull_back_faces,
+                       float threshold, bool least_costs)
     : tree_(tree), criterion_(criterion) {
     const DistanceCriterion::Parts& parts = criterion.parts();
     const auto data_of = [](const auto& values) { return values.empty() ? nullptr : values.data(); };
-    arrays_ = {tree.bounds().data(), parts.spheres == DistanceCriterion::Spheres::support ? tree.support_spheres().data() : nullptr,
-               data_of(parts.classes), data_of(parts.facing), data_of(parts.lengths), data_of(parts.silhouette_lengths)};
+    arrays_ = {tree.bounds().data(),
+               parts.spheres == DistanceCriterion::Spheres::support ? tree.support_spheres().data() : nullptr,
+               data_of(parts.classes),
+               data_of(parts.facing),
+               data_of(parts.lengths),
+               data_of(parts.silhouette_lengths)};
     const bool has_least_costs = least_costs && !parts.least_cost.empty();
     reach_.resize(parts.reach.size());
     for (std::size_t i = 0; i < reach_.size(); ++i) {
-        const bool always = parts.reach[i] >= DistanceCriterion::always_visible || (has_least_costs && parts.least_cost[i] > threshold);
+        const bool always =
+            parts.reach[i] >= DistanceCriterion::always_visible || (has_least_costs && parts.least_cost[i] > threshold);
         const bool never = parts.reach[i] <= DistanceCriterion::never_visible;
         reach_[i] = never ? -infinity : always ? infinity : parts.reach[i];
     }
@@ -55,7 +61,8 @@ void FoldTester::look_from(const Viewpoint& viewpoint, double length_per_radian)
         view_.first_plane.push_back(view_.planes.size());
         for (const Plane& plane : frustum.planes) {
             const glm::vec3 n(plane.normal);
-            view_.planes.push_back({{n.x, n.y, n.z}, static_cast<float>(glm::dot(plane.normal, viewpoint.eye) + plane.offset)});
+            view_.planes.push_back(
+                {{n.x, n.y, n.z}, static_cast<float>(glm::dot(plane.normal, viewpoint.eye) + plane.offset)});
         }
     }
     view_.first_plane.push_back(view_.planes.size());
@@ -94,7 +101,8 @@ void FoldTester::prefetch(NodeId node) const {
     if (lit_) lit_->prefetch(node);
 }
 
-void FoldTester::test(std::span<const FoldCandidate> candidates, std::span<const std::uint32_t> which, std::size_t first, TestBatch& tested) const {
+void FoldTester::test(std::span<const FoldCandidate> candidates, std::span<const std::uint32_t> which,
+                      std::size_t first, TestBatch& tested) const {
     constexpr std::size_t ahead = 2 * kernel_lanes; // candidates between a prefetch and its use
     const std::size_t count = std::min(kernel_lanes, which.size() - first);
     for (std::size_t i = first == 0 ? 0 : first + ahead; i < std::min(first + ahead + kernel_lanes, which.size()); ++i)
@@ -102,7 +110,8 @@ void FoldTester::test(std::span<const FoldCandidate> candidates, std::span<const
     std::array<const FoldCandidate*, kernel_lanes> lanes;
     for (std::size_t i = 0; i < count; ++i) lanes[i] = &candidates[which[first + i]];
     if (!lit_) return vdtree::test(view_, {lanes.data(), count}, tested);
-    for (std::size_t i = first + kernel_lanes; i < std::min(first + 2 * kernel_lanes, which.size()); ++i) lit_->prefetch(candidates[which[i]].node);
+    for (std::size_t i = first + kernel_lanes; i < std::min(first + 2 * kernel_lanes, which.size()); ++i)
+        lit_->prefetch(candidates[which[i]].node);
     test_lit({lanes.data(), count}, tested);
 }
 
@@ -155,8 +164,10 @@ CostTables FoldTester::cost_tables() const {
     return {parts.reach.data(), parts.least_cost.empty() ? nullptr : parts.least_cost.data()};
 }
 
-void FoldTester::find_cost_bounds(std::span<const NodeId> nodes, const float* folded_at, float* cost, float* seen_cost) const {
-    vdtree::find_cost_bounds(costs_view_, arrays_, cost_tables(), nodes, folded_at ? *folded_at : infinity, cost, seen_cost);
+void FoldTester::find_cost_bounds(std::span<const NodeId> nodes, const float* folded_at, float* cost,
+                                  float* seen_cost) const {
+    vdtree::find_cost_bounds(costs_view_, arrays_, cost_tables(), nodes, folded_at ? *folded_at : infinity, cost,
+                             seen_cost);
 }
 
 void FoldTester::decide_at(float threshold, std::span<const NodeId> nodes, std::uint64_t* unfolded) const {
@@ -177,7 +188,8 @@ void FoldTester::for_each_batch(const KernelView& view, std::span<const NodeId> 
         // Nodes lie anywhere in a large tree: the next ones are on their way while these are tested.
         constexpr std::size_t ahead = kernel_lanes;
         const std::size_t count = std::min(kernel_lanes, nodes.size() - first);
-        for (std::size_t i = first + ahead; i < std::min(first + ahead + kernel_lanes, nodes.size()); ++i) prefetch(nodes[i]);
+        for (std::size_t i = first + ahead; i < std::min(first + ahead + kernel_lanes, nodes.size()); ++i)
+            prefetch(nodes[i]);
         for (std::size_t i = 0; i < count; ++i) candidates[i] = candidate(nodes[first + i]);
         LitFindings lit;
         FoldBatch batch;
@@ -201,7 +213,8 @@ void FoldTester::find_lit_verdicts(const KernelView& view, Lanes lanes, LitFindi
             lit.row[i] = lit_->silhouette_row();
         }
         lit_candidates[i] = *lanes[i];
-        lit_candidates[i].rows = {static_cast<std::uint16_t>(lit.row[i]), static_cast<std::uint16_t>(lit_->silhouette_row())};
+        lit_candidates[i].rows = {static_cast<std::uint16_t>(lit.row[i]),
+                                  static_cast<std::uint16_t>(lit_->silhouette_row())};
         lit_lanes[i] = &lit_candidates[i];
     }
     find_verdicts(view, {lit_lanes.data(), lanes.size()}, batch);
@@ -216,8 +229,8 @@ void FoldTester::test_lit(Lanes lanes, TestBatch& tested) const {
     std::copy_n(lit.slack, kernel_lanes, tested.light_slack);
 }
 
-// Parts what is left between a verdict and its contrary among the lights' motion and the eye's: the rows from here on are those that the
-// lights may lead to within their slack.
+// Parts what is left between a verdict and its contrary among the lights' motion and the eye's: the rows from here on
+// are those that the lights may lead to within their slack.
 void FoldTester::leave_room_for_lights(LitFindings& lit, FoldBatch& batch) const {
     alignas(64) float units[kernel_lanes];
     for (std::size_t i = 0; i < kernel_lanes; ++i) {
@@ -236,18 +249,23 @@ void FoldTester::leave_room_for_lights(LitFindings& lit, FoldBatch& batch) const
             lit.slack[i] = infinity;
             continue;
         }
-        const auto reach = [&](std::int32_t row) { return view_.reach[static_cast<std::size_t>(row * view_.bins + batch.bin[i])]; };
+        const auto reach = [&](std::int32_t row) {
+            return view_.reach[static_cast<std::size_t>(row * view_.bins + batch.bin[i])];
+        };
         batch.interior_row[i] = lit.farthest_row[i];
         batch.interior[i] = units[i] * reach(batch.interior_row[i]);
-        const float outline = std::max(batch.silhouette_length[i], least_length) * view_.inverse_threshold * reach(batch.silhouette_row[i]);
+        const float outline = std::max(batch.silhouette_length[i], least_length) * view_.inverse_threshold *
+                              reach(batch.silhouette_row[i]);
         batch.silhouette[i] = std::max(batch.interior[i], outline);
     }
 }
 
-Motion FoldTester::motion(const VertexTree& tree, const Viewpoint& from, const Viewpoint& to, double length_per_radian) {
+Motion FoldTester::motion(const VertexTree& tree, const Viewpoint& from, const Viewpoint& to,
+                          double length_per_radian) {
     constexpr Motion jump{.position = std::numeric_limits<double>::infinity(),
                           .facing = std::numeric_limits<double>::infinity()};
-    if (from.gaze.has_value() != to.gaze.has_value() || from.frusta.size() != to.frusta.size() || from.occluders != to.occluders)
+    if (from.gaze.has_value() != to.gaze.has_value() || from.frusta.size() != to.frusta.size() ||
+        from.occluders != to.occluders)
         return jump;
     const Sphere& root = tree.bounds()[VertexTree::root()].ring; // contains the centres of all spheres
     const glm::dvec3 centre(root.centre);
@@ -260,8 +278,9 @@ Motion FoldTester::motion(const VertexTree& tree, const Viewpoint& from, const V
     motion.facing = glm::length(to.eye - from.eye);
     // Seen as a shift of the eye: everything comes nearer by its path at most, and the gaze turns by its angle.
     motion.position = motion.facing + (from.gaze ? length_per_radian * angle_between(*from.gaze, *to.gaze) : 0);
-    // Seen as a turn of the tree around its centre, and a shift along the line from there: points move by the angle times
-    // the radius at most, and the gaze turns by what it turns beyond the tree's turn. Nearly always the smaller one.
+    // Seen as a turn of the tree around its centre, and a shift along the line from there: points move by the angle
+    // times the radius at most, and the gaze turns by what it turns beyond the tree's turn. Nearly always the smaller
+    // one.
     const glm::dvec3 a = from.eye - centre, b = to.eye - centre;
     const double da = glm::length(a), db = glm::length(b);
     if (da > radius && db > radius) {
@@ -273,7 +292,8 @@ Motion FoldTester::motion(const VertexTree& tree, const Viewpoint& from, const V
             glm::dvec3 gaze = *from.gaze;
             if (sine > 0) { // Rodrigues' formula
                 const glm::dvec3 k = axis / sine;
-                gaze = gaze * std::cos(angle) + glm::cross(k, gaze) * std::sin(angle) + k * (glm::dot(k, gaze) * (1 - std::cos(angle)));
+                gaze = gaze * std::cos(angle) + glm::cross(k, gaze) * std::sin(angle) +
+                       k * (glm::dot(k, gaze) * (1 - std::cos(angle)));
             }
             turned += length_per_radian * angle_between(gaze, *to.gaze);
         }
@@ -284,11 +304,13 @@ Motion FoldTester::motion(const VertexTree& tree, const Viewpoint& from, const V
         if (before.size() != after.size()) return jump;
         for (std::size_t p = 0; p < before.size(); ++p) {
             const glm::dvec3 turn = after[p].normal - before[p].normal;
-            const double change = std::abs(glm::dot(turn, centre) + after[p].offset - before[p].offset) + glm::length(turn) * radius;
+            const double change =
+                std::abs(glm::dot(turn, centre) + after[p].offset - before[p].offset) + glm::length(turn) * radius;
             motion.planes = std::max(motion.planes, change);
         }
     }
-    // Rounding of all this in double, far below what the slacks leave for floats; a comparison with NaN must not stand still.
+    // Rounding of all this in double, far below what the slacks leave for floats; a comparison with NaN must not stand
+    // still.
     motion.position *= 1 + 1e-9;
     motion.facing *= 1 + 1e-9;
     motion.planes *= 1 + 1e-9;

@@ -46,13 +46,14 @@ struct Geomorph::State {
         double weight = 0; // 0: the children are at the proxy, 1: at their own places
         bool unfolds = true;
         NodeId parent = no_node;
-        MovedVertex own;                   // the node, in its own place
-        MovedVertex drawn;                 // where it would be drawn, as of the step `placed`
+        MovedVertex own;   // the node, in its own place
+        MovedVertex drawn; // where it would be drawn, as of the step `placed`
         std::uint64_t placed = 0;
         std::vector<MovedVertex> children; // in their own places
     };
 
-    State(const VertexTree& tree, const GeomorphOptions& options_) : options(options_), drawn_cut(tree), drawn(CutState::of(drawn_cut)) {}
+    State(const VertexTree& tree, const GeomorphOptions& options_)
+        : options(options_), drawn_cut(tree), drawn(CutState::of(drawn_cut)) {}
 
     void step(const CutState& cut, double seconds);
     std::span<const FoldChange> changes_of(const CutState& cut);
@@ -252,9 +253,9 @@ std::uint64_t Geomorph::State::byte_size() const noexcept {
     std::uint64_t children = 0;
     for (const Glide& glide : glides) children += glide.children.capacity();
     return drawn.byte_size() + sizeof(Glide) * glides.capacity() + sizeof(MovedVertex) * children +
-           sizeof(Slot) * slot_of_node.capacity() +
-           sizeof(MovedVertex) * moved.capacity() + sizeof(FoldChange) * found.capacity() +
-           sizeof(NodeId) * arrived_nodes.capacity() + sizeof(Slot) * unplaced.capacity();
+           sizeof(Slot) * slot_of_node.capacity() + sizeof(MovedVertex) * moved.capacity() +
+           sizeof(FoldChange) * found.capacity() + sizeof(NodeId) * arrived_nodes.capacity() +
+           sizeof(Slot) * unplaced.capacity();
 }
 
 } // namespace unseen::vdtree

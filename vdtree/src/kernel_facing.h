@@ -1,25 +1,27 @@
 // What rings face: how far the eye may move while everything in a ring still faces it, or still faces away.
 //
-// The directions of a ring's triangles lie in slabs (NormalSlabs), a least and a largest coordinate along seven axes. Any three independent
-// slabs make a parallelepiped P around the directions; the box of x, y and z and the twelve with a diagonal in place of one of these
-// are tried. P proves that everything faces the eye, from every point of the ring's sphere, where
+// The directions of a ring's triangles lie in slabs (NormalSlabs), a least and a largest coordinate along seven axes.
+// Any three independent slabs make a parallelepiped P around the directions; the box of x, y and z and the twelve with
+// a diagonal in place of one of these are tried. P proves that everything faces the eye, from every point of the ring's
+// sphere, where
 //
 //     min over x in P of x . (eye - centre)  >  radius * reach,      reach: the longest vector in P;
 //
-// over reach, the difference of both sides is the way that the eye may go meanwhile. Likewise with the maximum for facing away.
-// A node without a proof has no ancestor with one: an ancestor's P contains the node's, so its reach is no less, and moving the centre by the
-// difference of the radii changes x . (eye - centre) by at most reach times that.
+// over reach, the difference of both sides is the way that the eye may go meanwhile. Likewise with the maximum for
+// facing away. A node without a proof has no ancestor with one: an ancestor's P contains the node's, so its reach is no
+// less, and moving the centre by the difference of the radii changes x . (eye - centre) by at most reach times that.
 
-constexpr float slab_units = 127;                    // of NormalSlabs in 1
-constexpr float sqrt3 = 1.7320508075688772f;         // of the diagonals' coordinates
-// 1 / sqrt(s) from below, for squares s of lengths in units of slabs: tangents at 1.2 and 2, and what it is at the longest vector that any
-// parallelepiped holds: a diagonal's replaced coordinate of up to sqrt(3) + 2, and two of 1.
+constexpr float slab_units = 127;            // of NormalSlabs in 1
+constexpr float sqrt3 = 1.7320508075688772f; // of the diagonals' coordinates
+// 1 / sqrt(s) from below, for squares s of lengths in units of slabs: tangents at 1.2 and 2, and what it is at the
+// longest vector that any parallelepiped holds: a diagonal's replaced coordinate of up to sqrt(3) + 2, and two of 1.
 struct Tangent {
     float at_0, slope;
 };
-constexpr Tangent tangent_of(double root) { // at the square of `root`
+constexpr Tangent tangent_of(double root) {        // at the square of `root`
     constexpr double units = 127, less = 1 - 1e-6; // covers the rounding of the products
-    return {static_cast<float>(1.5 / (root * units) * less), static_cast<float>(0.5 / (root * root * root * units * units * units))};
+    return {static_cast<float>(1.5 / (root * units) * less),
+            static_cast<float>(0.5 / (root * root * root * units * units * units))};
 }
 constexpr Tangent near_tangent = tangent_of(1.0954), middle_tangent = tangent_of(1.4142);
 constexpr float least_inverse_reach = 0.25f / slab_units;
@@ -39,13 +41,16 @@ UNSEEN_INLINE Interval turned(const Interval& slab, float sign) {
     return sign > 0 ? slab : Interval{-slab.hi, -slab.lo};
 }
 
-// Not more than 1 over the root of a squared reach of a parallelepiped, and falling with it: tangents, for the curve is convex.
+// Not more than 1 over the root of a squared reach of a parallelepiped, and falling with it: tangents, for the curve is
+// convex.
 UNSEEN_INLINE Floats inverse_reach(const Floats& squared) {
-    const Floats near = max_of(near_tangent.at_0 - near_tangent.slope * squared, middle_tangent.at_0 - middle_tangent.slope * squared);
+    const Floats near =
+        max_of(near_tangent.at_0 - near_tangent.slope * squared, middle_tangent.at_0 - middle_tangent.slope * squared);
     return max_of(near, all(least_inverse_reach));
 }
 
-// Keeps the best of the parallelepipeds: the largest minimum, and the smallest maximum, each over the length that vectors may have there.
+// Keeps the best of the parallelepipeds: the largest minimum, and the smallest maximum, each over the length that
+// vectors may have there.
 struct Best {
     Floats least, largest;
     UNSEEN_INLINE void offer(const Floats& low, const Floats& high, const Floats& squared_reach) {
@@ -55,8 +60,8 @@ struct Best {
     }
 };
 
-// The eye's ways while everything faces it (front), or faces away (back); mesh units. Not positive: not everything does; then it is minus
-// the way after which everything might.
+// The eye's ways while everything faces it (front), or faces away (back); mesh units. Not positive: not everything
+// does; then it is minus the way after which everything might.
 struct Gaps {
     Floats front, back;
 };
@@ -78,9 +83,8 @@ UNSEEN_INLINE Gaps find_gaps(const Floats (&e)[3], const Floats& radius, const I
     const Floats needed = radius + distance * product_rounding;
     constexpr float plenty = 0.125f; // of the distance
     const auto gaps = [&]() UNSEEN_INLINE_LAMBDA { return Gaps{best.least - needed, -best.largest - needed}; };
-    const auto is_proved = [&](const Gaps& found) UNSEEN_INLINE_LAMBDA {
-        return !any(asked & ~((found.front > 0) | (found.back > 0)));
-    };
+    const auto is_proved = [&](const Gaps& found)
+                               UNSEEN_INLINE_LAMBDA { return !any(asked & ~((found.front > 0) | (found.back > 0))); };
     if constexpr (signs_only) {
         const Gaps found = gaps();
         if (is_proved(found)) return found;
@@ -123,7 +127,8 @@ struct Words {
         return (four[at / 4] << (24 - 8 * (at % 4))) >> 24;
     }
     UNSEEN_INLINE Ints is_irregular() const { return (byte<14>() & std::int32_t{irregular_ring}) != 0; }
-    UNSEEN_INLINE Ints is_empty() const { return byte<0>() > byte<NormalSlabs::axis_count>(); } // no triangle with an area
+    // No triangle with an area.
+    UNSEEN_INLINE Ints is_empty() const { return byte<0>() > byte<NormalSlabs::axis_count>(); }
     UNSEEN_INLINE Interval slab(std::size_t axis) const {
         const auto byte_at = [&](std::size_t at) UNSEEN_INLINE_LAMBDA {
             return __builtin_convertvector((four[at / 4] << static_cast<int>(24 - 8 * (at % 4))) >> 24, Floats);
@@ -137,9 +142,11 @@ struct Facing {
     Floats front, back; // as in Gaps, with what needs no proof: infinite, or minus infinity
     UNSEEN_INLINE Ints is_silhouette() const { return ~((front > 0) | (back > 0)); }
 };
-UNSEEN_INLINE Facing facing_of(const KernelView& view, const Gaps& gaps, const Ints& is_irregular, const Ints& is_empty) {
+UNSEEN_INLINE Facing facing_of(const KernelView& view, const Gaps& gaps, const Ints& is_irregular,
+                               const Ints& is_empty) {
     const Floats always = all(std::numeric_limits<float>::infinity());
-    const Floats &shown = view.is_inside_out ? gaps.back : gaps.front, &hidden = view.is_inside_out ? gaps.front : gaps.back;
+    const Floats &shown = view.is_inside_out ? gaps.back : gaps.front,
+                 &hidden = view.is_inside_out ? gaps.front : gaps.back;
     // An irregular ring is an outline from everywhere; what has no triangle with an area faces everything.
     return {is_irregular ? -always : is_empty ? always : shown, is_irregular | is_empty ? -always : hidden};
 }
@@ -150,17 +157,20 @@ UNSEEN_INLINE Facing facing_signs(const KernelView& view, const NodeArrays& arra
     Floats ring[4], towards[3], columns[4];
     Vectors::load_columns([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return &arrays.bounds[at(lane)].ring; }, ring);
     for (int k = 0; k < 3; ++k) towards[k] = (view.eye_high[k] - ring[k]) + view.eye_low[k];
-    Vectors::load_columns([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return &arrays.bounds[at(lane)].slabs; }, columns);
+    Vectors::load_columns([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return &arrays.bounds[at(lane)].slabs; },
+                          columns);
     static_assert(offsetof(NodeBounds, slabs) == 16 && offsetof(NodeBounds, flags) == 30 && sizeof(NodeBounds) == 32);
     Words words;
     std::memcpy(words.four, columns, sizeof columns);
     const Ints is_irregular = words.is_irregular();
     if (arrays.facing) {
         float slabs[width][4] = {}; // the last two bytes are of no slab
-        for (std::size_t lane = 0; lane < width; ++lane) std::memcpy(slabs[lane], &arrays.facing[at(lane)], sizeof(NormalSlabs));
+        for (std::size_t lane = 0; lane < width; ++lane)
+            std::memcpy(slabs[lane], &arrays.facing[at(lane)], sizeof(NormalSlabs));
         Vectors::load_columns([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return slabs[lane]; }, columns);
         std::memcpy(words.four, columns, sizeof columns);
     }
-    const Gaps gaps = find_gaps<true>(towards, ring[3], ~is_irregular, [&](std::size_t axis) UNSEEN_INLINE_LAMBDA { return words.slab(axis); });
+    const Gaps gaps = find_gaps<true>(towards, ring[3], ~is_irregular,
+                                      [&](std::size_t axis) UNSEEN_INLINE_LAMBDA { return words.slab(axis); });
     return facing_of(view, gaps, is_irregular, words.is_empty());
 }

@@ -1,7 +1,8 @@
 // Registers of floats and integers, a node a lane: what all of the kernel's arithmetic is written in.
 //
-// This header and the other kernel_*.h are for fold_kernel.cpp alone, which includes them once for each kind of register, in a namespace of
-// its own, where `Vectors` is that kind (simd.h). So they include nothing and have no guard.
+// This header and the other kernel_*.h are for fold_kernel.cpp alone, which includes them once for each kind of
+// register, in a namespace of its own, where `Vectors` is that kind (simd.h). So they include nothing and have no
+// guard.
 
 using Floats = Vectors::Floats;
 using Ints = Vectors::Ints;
@@ -37,7 +38,8 @@ UNSEEN_INLINE Floats root_of(const Floats& square) { return Vectors::root_of(squ
 UNSEEN_INLINE Floats angle_of_cosine(const Floats& cosine) {
     const Floats x = min_of(abs_of(cosine), all(1));
     Floats series = all(-0.0012624911f);
-    for (const float term : {0.0066700901f, -0.0170881256f, 0.0308918810f, -0.0501743046f, 0.0889789874f, -0.2145988016f, 1.5707963050f})
+    for (const float term :
+         {0.0066700901f, -0.0170881256f, 0.0308918810f, -0.0501743046f, 0.0889789874f, -0.2145988016f, 1.5707963050f})
         series = series * x + term;
     const Floats angle = root_of(1 - x) * series;
     return cosine < 0 ? pi - angle : angle;

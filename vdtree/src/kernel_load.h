@@ -17,7 +17,8 @@ UNSEEN_INLINE Floats load_values(const float* from, At at) {
 template <class At>
 UNSEEN_INLINE Nodes load_nodes(const NodeArrays& arrays, At at) {
     Nodes nodes;
-    if (arrays.support) load_sphere([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return &arrays.support[at(lane)]; }, nodes);
+    if (arrays.support)
+        load_sphere([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return &arrays.support[at(lane)]; }, nodes);
     else load_sphere([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return &arrays.bounds[at(lane)].ring; }, nodes);
     nodes.length = arrays.lengths ? load_values(arrays.lengths, at) : nodes.radius;
     nodes.silhouette_length = arrays.silhouette_lengths ? load_values(arrays.silhouette_lengths, at) : nodes.length;
@@ -41,16 +42,23 @@ struct Candidates {
 
 template <class At>
 UNSEEN_INLINE Candidates load_candidates(At at) {
-    static_assert(offsetof(FoldCandidate, length) == 16 && offsetof(FoldCandidate, rows) == 24 && offsetof(FoldCandidate, ring) == 28 &&
-                  offsetof(FoldCandidate, slabs) == 44 && offsetof(FoldCandidate, flags) == 58);
-    static_assert(sizeof(FoldClass) == 4 && offsetof(FoldClass, interior) == 0 && std::endian::native == std::endian::little);
+    static_assert(offsetof(FoldCandidate, length) == 16 && offsetof(FoldCandidate, rows) == 24 &&
+                  offsetof(FoldCandidate, ring) == 28 && offsetof(FoldCandidate, slabs) == 44 &&
+                  offsetof(FoldCandidate, flags) == 58);
+    static_assert(sizeof(FoldClass) == 4 && offsetof(FoldClass, interior) == 0 &&
+                  std::endian::native == std::endian::little);
     Floats c[16];
     for (std::size_t quarter = 0; quarter < 4; ++quarter)
-        Vectors::load_columns([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return reinterpret_cast<const std::byte*>(at(lane)) + 16 * quarter; },
-                              c + 4 * quarter);
+        Vectors::load_columns(
+            [&](std::size_t lane)
+                UNSEEN_INLINE_LAMBDA { return reinterpret_cast<const std::byte*>(at(lane)) + 16 * quarter; },
+            c + 4 * quarter);
     const auto bits = [&](std::size_t column) UNSEEN_INLINE_LAMBDA { return reinterpret_cast<Ints>(c[column]); };
     const Ints interior_row = bits(6) & 0xffff, silhouette_row = (bits(6) >> 16) & 0xffff;
-    return {{{c[0], c[1], c[2]}, c[3], c[4], c[5], interior_row, silhouette_row}, {c[7], c[8], c[9]}, c[10], {{bits(11), bits(12), bits(13), bits(14)}}};
+    return {{{c[0], c[1], c[2]}, c[3], c[4], c[5], interior_row, silhouette_row},
+            {c[7], c[8], c[9]},
+            c[10],
+            {{bits(11), bits(12), bits(13), bits(14)}}};
 }
 
 UNSEEN_INLINE void prefetch_node(const NodeArrays& arrays, NodeId node) {

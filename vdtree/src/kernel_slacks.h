@@ -3,20 +3,21 @@
 // With a gaze, a node is tested again after this share of its gap at the latest; see position_slack().
 constexpr float longest_path = 0.125f;
 constexpr float shift_per_gap = 1.16f; // asin(x) / x / (1 - longest_path) for x up to longest_path / (1 - longest_path)
-// Slacks are shortened by these, so that rounding in a later test cannot change a verdict before its time. Shares of the
-// distance to the eye: a dozen roundings of a float; the facing gap sums a few dozen products.
+// Slacks are shortened by these, so that rounding in a later test cannot change a verdict before its time. Shares of
+// the distance to the eye: a dozen roundings of a float; the facing gap sums a few dozen products.
 constexpr float position_rounding = 2e-6f;
 constexpr float facing_rounding = 2e-5f;
 static_assert(position_rounding <= test_rounding && facing_rounding <= test_rounding);
 // Radians: angles come from cosines in floats, which near 1 tell angles apart to about half of this.
 constexpr float angle_rounding = 1e-3f;
 
-// With a gaze, the distance within which a node unfolds depends on its eccentricity, by bins: the node has to stay within (inward = 1), or
-// beyond (-1), the distances of all bins that it may come to. The farther the bins that are looked at, the more the gaze may turn, and the less path is left: the best of a few.
+// With a gaze, the distance within which a node unfolds depends on its eccentricity, by bins: the node has to stay
+// within (inward = 1), or beyond (-1), the distances of all bins that it may come to. The farther the bins that are
+// looked at, the more the gaze may turn, and the less path is left: the best of a few.
 //
-// While the clock advances by `path`, the gaze turns by path * turn_per_length, and a point at least `gap` away shifts by
-// asin(step / rest) for each step, the rest of the gap being what longest_path leaves: less than shift_per_gap * path / gap
-// in all.
+// While the clock advances by `path`, the gaze turns by path * turn_per_length, and a point at least `gap` away shifts
+// by asin(step / rest) for each step, the rest of the gap being what longest_path leaves: less than shift_per_gap *
+// path / gap in all.
 struct SlackQuery {
     Floats gap, inward, eccentricity, length, other_length;
     Ints row, other_row, bin;
@@ -57,8 +58,9 @@ struct Slacks {
 UNSEEN_INLINE Slacks slacks_of(const KernelView& view, const Nodes& of, const Measures& m, const Verdicts& v) {
     Floats left; // of the distance
     if (view.has_gaze) {
-        left = gaze_slack(view, {m.gap, v.unfolded ? all(1) : all(-1), m.eccentricity, of.length, v.by_silhouette ? of.silhouette_length : of.length,
-                                 of.interior_row, v.by_silhouette ? of.silhouette_row : of.interior_row, m.bin});
+        left = gaze_slack(view, {m.gap, v.unfolded ? all(1) : all(-1), m.eccentricity, of.length,
+                                 v.by_silhouette ? of.silhouette_length : of.length, of.interior_row,
+                                 v.by_silhouette ? of.silhouette_row : of.interior_row, m.bin});
     } else {
         const Floats reach = v.by_silhouette ? m.silhouette : m.interior;
         left = v.unfolded ? reach - m.gap : m.gap - reach;

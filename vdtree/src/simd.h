@@ -1,16 +1,17 @@
 // The one layer for SIMD: what the rest of the library knows of compilers and processors.
 //
 // There are two ways to use it.
-//   Loops over arrays are left to the compiler. Such a function is UNSEEN_INLINE, and is called by two others: a plain one, and one marked
-//   UNSEEN_AVX2; has_avx2() chooses between them.
-//   Arithmetic on registers is written once, on `Vectors`, in headers that are included once for each kind of register: see fold_kernel.cpp.
+// - Loops over arrays are left to the compiler. Such a function is UNSEEN_INLINE, and is called by two others: a plain
+//   one, and one marked UNSEEN_AVX2; has_avx2() chooses between them.
+// - Arithmetic on registers is written once, on `Vectors`, in headers that are included once for each kind of register:
+//   see fold_kernel.cpp.
 // Vectors are the extension that GCC and Clang share.
 //
-// Every way gives the same bits on every processor: files that use this are compiled without contraction to fused operations, square
-// roots are rounded correctly, and there are no approximations.
+// Every way gives the same bits on every processor: files that use this are compiled without contraction to fused
+// operations, square roots are rounded correctly, and there are no approximations.
 //
-// Highway 1.0.3 (Debian 12) gives the same bits, too, but it has no SSE2, and took 1.2 to 1.5 times as long for distance tests of nodes anywhere in
-// a tree: lookups in tables are collected lane by lane here.
+// Highway 1.0.3 (Debian 12) gives the same bits, too, but it has no SSE2, and took 1.2 to 1.5 times as long for
+// distance tests of nodes anywhere in a tree: lookups in tables are collected lane by lane here.
 #pragma once
 
 #include <algorithm>
@@ -54,13 +55,16 @@ using Int8 = std::int32_t __attribute__((vector_size(32)));
 
 // Rows of four floats become columns.
 UNSEEN_INLINE void transpose(const Float4 (&rows)[4], Float4* columns) {
-    const Float4 a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 1, 5), b = __builtin_shufflevector(rows[0], rows[1], 2, 6, 3, 7);
-    const Float4 c = __builtin_shufflevector(rows[2], rows[3], 0, 4, 1, 5), d = __builtin_shufflevector(rows[2], rows[3], 2, 6, 3, 7);
+    const Float4 a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 1, 5),
+                 b = __builtin_shufflevector(rows[0], rows[1], 2, 6, 3, 7);
+    const Float4 c = __builtin_shufflevector(rows[2], rows[3], 0, 4, 1, 5),
+                 d = __builtin_shufflevector(rows[2], rows[3], 2, 6, 3, 7);
     columns[0] = __builtin_shufflevector(a, c, 0, 1, 4, 5), columns[1] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
     columns[2] = __builtin_shufflevector(b, d, 0, 1, 4, 5), columns[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
 
-// Registers of one kind. Masks have all or no bits of a lane; bits_of() makes one bit a lane of them, the first lane's lowest.
+// Registers of one kind. Masks have all or no bits of a lane; bits_of() makes one bit a lane of them, the first lane's
+// lowest.
 struct FourWide {
     using Floats = Float4;
     using Ints = Int4;
@@ -105,7 +109,8 @@ struct EightWide {
         return static_cast<std::uint32_t>(__builtin_ia32_movmskps256(reinterpret_cast<Floats>(mask)));
     }
     static UNSEEN_INLINE float least_of(const Floats& values) {
-        const auto low = __builtin_shufflevector(values, values, 0, 1, 2, 3), high = __builtin_shufflevector(values, values, 4, 5, 6, 7);
+        const auto low = __builtin_shufflevector(values, values, 0, 1, 2, 3),
+                   high = __builtin_shufflevector(values, values, 4, 5, 6, 7);
         return FourWide::least_of(low < high ? low : high);
     }
     template <class At>
