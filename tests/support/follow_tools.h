@@ -23,8 +23,9 @@ inline std::vector<bool> from_scratch(const VertexTree& tree, const DistanceCrit
     tester.look_from(viewpoint, 1);
     std::vector<bool> unfolded(tree.interior_count(), false);
     for (NodeId node = 0; node < tree.interior_count();) {
+        const FoldCandidate candidate = tester.candidate(node);
         Verdict verdict;
-        tester.test({&node, 1}, {&verdict, 1});
+        tester.test({&candidate, 1}, {&verdict, 1});
         unfolded[node] = verdict.unfolded;
         node = verdict.unfolded ? node + 1 : support::sound(tree).subtree_end()[node];
     }

@@ -15,6 +15,7 @@
 
 #include "drift.h"
 #include "pyramid.h"
+#include "simd.h"
 
 namespace unseen::vdtree {
 
@@ -188,8 +189,7 @@ private:
 // Of a grating's amplitude, in cycles a cell: cells show the mean over their area.
 double share_in_cells(double frequency) { return std::sin(std::numbers::pi * frequency) / (std::numbers::pi * frequency); }
 
-// Four numbers at a time (an extension that GCC and Clang share).
-using Floats = float __attribute__((vector_size(16)));
+using Floats = Float4; // four numbers at a time
 constexpr std::size_t width = sizeof(Floats) / sizeof(float);
 
 Floats absolute(Floats v) { return v < 0 ? -v : v; }

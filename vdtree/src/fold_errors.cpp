@@ -11,6 +11,7 @@
 #include <tbb/task_arena.h>
 
 #include "contacts.h"
+#include "tree/directions.h"
 #include "drift.h"
 #include "find_stages.h"
 #include "fold_picture.h"
@@ -65,33 +66,18 @@ public:
         const float squared = glm::dot(n, n);
         if (!(squared > 0)) return;
         n /= std::sqrt(squared);
-        const float along[NormalSlabs::axis_count] = {n.x,
-                                                      n.y,
-                                                      n.z,
-                                                      (n.x + n.y + n.z) * inverse_sqrt3,
-                                                      (-n.x + n.y + n.z) * inverse_sqrt3,
-                                                      (n.x - n.y + n.z) * inverse_sqrt3,
-                                                      (n.x + n.y - n.z) * inverse_sqrt3};
+        const SlabCoordinates<float> along = along_slab_axes(n.x, n.y, n.z);
         for (std::size_t i = 0; i < NormalSlabs::axis_count; ++i) {
             low_[i] = std::min(low_[i], along[i]);
             high_[i] = std::max(high_[i], along[i]);
         }
     }
 
-    NormalSlabs slabs() const {
-        NormalSlabs slabs;
-        if (low_[0] > high_[0]) return slabs;
-        for (std::size_t i = 0; i < NormalSlabs::axis_count; ++i) {
-            slabs.lo[i] = static_cast<std::int8_t>(std::max(std::floor(low_[i] * units - margin), -units));
-            slabs.hi[i] = static_cast<std::int8_t>(std::min(std::ceil(high_[i] * units + margin), units));
-        }
-        return slabs;
-    }
+    NormalSlabs slabs() const { return low_[0] > high_[0] ? NormalSlabs{} : slabs_between(low_, high_, margin); }
 
 private:
-    static constexpr float inverse_sqrt3 = 0.57735026918962576f, units = 127;
     static constexpr float margin = 1e-3f; // units; a hundred times the rounding of a normal
-    std::array<float, NormalSlabs::axis_count> low_{2, 2, 2, 2, 2, 2, 2}, high_{-2, -2, -2, -2, -2, -2, -2};
+    SlabCoordinates<float> low_{2, 2, 2, 2, 2, 2, 2}, high_{-2, -2, -2, -2, -2, -2, -2};
 };
 
 // Triangles by columns, so that one point is compared with several at once.

@@ -27,10 +27,6 @@ inline float unbounded_cost(float order) noexcept { return least_unbounded_cost 
 enum class Visibility : std::uint8_t { out, partly, wholly_in };
 using VisibilityTest = Callback<void(const VertexTree&, std::span<const NodeId> nodes, std::span<Visibility> seen)>;
 
-// Takes a simplification to be drawn: indices three a triangle, into the tree's proxy vertices (positions(), luminance(), ...).
-// Called on the thread that asks for it; the indices are valid until the cut changes.
-using RenderCallback = FunctionRef<void(const VertexTree&, std::span<const NodeId> indices)>;
-
 // The eye in the tree's own frame. Relative to VertexTree::origin().
 glm::dvec3 eye_in_tree(const VertexTree& tree, const View& view, const Similarity& placement);
 

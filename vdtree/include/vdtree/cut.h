@@ -17,8 +17,7 @@
 
 namespace unseen::vdtree {
 
-class CutFollower;
-struct SceneObject;
+class CutState;
 
 struct AdjustOptions {
     VisibilityTest visibility = {};                  // default: everything can be seen
@@ -82,7 +81,7 @@ public:
     const VertexTree& tree() const noexcept { return *tree_; }
     bool is_unfolded(NodeId node) const noexcept;
     bool is_active(NodeId node) const noexcept; // its proxy (or leaf) is a vertex of the simplification
-    NodeId proxy_of_leaf(Index leaf) const noexcept { return proxy_[leaf]; }
+    NodeId proxy_of_leaf(Index leaf) const noexcept { return proxies_[leaf]; }
 
     // One fold or unfold; each returns whether anything changed.
     bool unfold(NodeId node);            // precondition: interior and active
@@ -112,7 +111,7 @@ public:
                                const FollowOptions& options = {});
 
     // What the last adjust() or follow() changed, in order: nodes are active when their turn comes.
-    std::span<const FoldChange> changes() const noexcept { return changes_; }
+    std::span<const FoldChange> changes() const noexcept;
 
     // The simplification: triangles over node numbers (positions()[index] is the vertex), oriented like the
     // input, no index twice in one triangle. Valid until the cut changes. Cost: what changed, or the active triangles if
@@ -125,56 +124,16 @@ public:
     // version `index_writes_from()` to this one.
     std::uint64_t index_version() const noexcept;
     std::uint64_t index_writes_from() const noexcept;
-    void render(const RenderCallback& callback) const { callback(*tree_, indices()); }
-    Index triangle_count() const noexcept { return triangle_count_; }
+    Index triangle_count() const noexcept;
 
     std::uint64_t byte_size() const noexcept; // of the cut itself, with its index buffer; resident bytes
 
 private:
-    friend class CutFollower;
-    friend class Geomorph;
+    friend class CutState;
 
-    bool is_unfolded_interior(NodeId node) const noexcept { return (unfolded_[node >> 6] >> (node & 63)) & 1; }
-    void set_unfolded(NodeId node);
-    void set_folded(NodeId node);
-    void assign(NodeId node);
-    void make_stale();
-
-    // For those who change the cut in steps that are to be patched into the index buffer.
-    void begin_changes();
-    bool is_patching();
-    void prefetch_changes(std::span<const NodeId> nodes, bool folds);
-    std::span<const NodeId> fetched_children(std::size_t i) const { // of the i-th of those nodes
-        return std::span(soon_).first(soon_ends_[i]).subspan(i == 0 ? 0 : soon_ends_[i - 1]);
-    }
-    void apply_unfold(NodeId node) { apply_unfold(node, children_of(node)); }
-    void apply_unfold(NodeId node, std::span<const NodeId> children);
-    void fold_below(NodeId node, const FunctionRef<void(NodeId)>& on_fold); // tells each node, descendants first
-    void apply_fold(NodeId node) { apply_fold(node, children_of(node)); }
-    void apply_fold(NodeId node, std::span<const NodeId> children);
-    void end_changes(AdjustStats& stats);
-    friend Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objects, Index triangle_budget);
-    void become(std::vector<std::uint64_t> unfolded, AdjustStats& stats);
-    void count_triangles();
-    void assign_changed(const std::vector<std::uint64_t>& unfolded);
-    void assign_all(std::span<const std::uint64_t> unfolded);
-    void change_to(std::vector<std::uint64_t> unfolded, AdjustStats& stats);
-    void change_further(std::vector<std::uint64_t> unfolded); // within changes in steps
-    bool are_few_changes(std::span<const std::uint64_t> unfolded) const;
-    void replay(std::span<const std::uint64_t> unfolded);
-    std::span<const NodeId> children_of(NodeId node);
-
-    std::shared_ptr<const VertexTree> tree_; // a handle of its own, whose place moves of the cut do not change
-    std::vector<std::uint64_t> unfolded_;  // one bit per interior node
-    std::vector<NodeId> proxy_;            // by leaf: the active node that stands for it
-    Index triangle_count_ = 0;
-    std::vector<FoldChange> changes_;
-    std::uint64_t revision_;               // of the state: one more for what changes_ tells, two for what nobody knows
-    std::vector<NodeId> children_, soon_, others_; // scratch
-    std::vector<std::size_t> soon_ends_;
-    std::unique_ptr<CutFollower> follower_;
-    struct Indices;
-    mutable std::unique_ptr<Indices> indices_; // made when it is first asked for
+    std::unique_ptr<CutState> state_;
+    const VertexTree* tree_; // of the state, like the following, whose places moves of the cut do not change
+    const NodeId* proxies_;  // by leaf: the active node that stands for it
 };
 
 // One object of a scene that shares a budget.

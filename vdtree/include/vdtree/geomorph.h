@@ -17,8 +17,8 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
-#include <vector>
 
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
@@ -48,6 +48,10 @@ struct MovedVertex {
 // bytes an interior node, and about 200 bytes a gliding vertex.
 class Geomorph {
 public:
+    Geomorph(Geomorph&&) noexcept;
+    Geomorph& operator=(Geomorph&&) noexcept;
+    ~Geomorph();
+
     // Keeps the tree's data. Fails where an option is negative or NaN, or the time infinite.
     static Result<Geomorph> create(const VertexTree& tree, const GeomorphOptions& options = {});
 
@@ -58,56 +62,21 @@ public:
     // nothing, where the time is negative or not finite, or the tree another one.
     Result<void> step(const Cut& cut, double seconds);
 
-    const Cut& drawn() const noexcept { return drawn_; }
+    const Cut& drawn() const noexcept;
 
     // The vertices of the drawn cut that may not be in their own places, each once; all others are.
-    std::span<const MovedVertex> moved() const noexcept { return moved_; }
+    std::span<const MovedVertex> moved() const noexcept;
     // False: steps do nothing until the followed cut changes.
-    bool is_gliding() const noexcept { return !glides_.empty(); }
+    bool is_gliding() const noexcept;
 
-    double seconds() const noexcept { return options_.seconds; }
+    double seconds() const noexcept;
     std::uint64_t byte_size() const noexcept; // the drawn cut's included
 
 private:
-    using Slot = std::uint32_t;
-    static constexpr Slot no_slot = 0xffffffffu;
+    struct State;
+    explicit Geomorph(std::unique_ptr<State> state) noexcept;
 
-    // A node of the drawn cut whose children are on their way. What frames read of the tree is kept here, side by side.
-    struct Glide {
-        double weight = 0; // 0: the children are at the proxy, 1: at their own places
-        bool unfolds = true;
-        NodeId parent = no_node;
-        MovedVertex own;                   // the node, in its own place
-        MovedVertex drawn;                 // where it would be drawn, as of the step `placed`
-        std::uint64_t placed = 0;
-        std::vector<MovedVertex> children; // in their own places
-    };
-
-    Geomorph(const VertexTree& tree, const GeomorphOptions& options);
-    std::span<const FoldChange> changes_of(const Cut& cut);
-    bool is_jump(const Cut& cut, std::span<const FoldChange> changes) const;
-    void become(const Cut& cut);
-    void pass(double seconds);
-    void take_up(const Cut& cut, std::span<const FoldChange> changes);
-    void end_glides();
-    void move_vertices();
-
-    Slot slot_of(NodeId node) const { return slot_of_node_.empty() || node == no_node ? no_slot : slot_of_node_[node]; }
-    bool is_gliding(NodeId node) const { return slot_of(node) != no_slot; }
-    void begin(NodeId node, double weight);
-    void end(NodeId node);
-    void place(Slot slot);
-
-    GeomorphOptions options_;
-    Cut drawn_;
-    std::uint64_t revision_ = 0; // of the followed cut, when it was last taken up
-    std::uint64_t steps_ = 0;
-    std::vector<Glide> glides_;
-    std::vector<Slot> slot_of_node_; // of a node's glide; made when the first one begins
-    std::vector<MovedVertex> moved_;
-    std::vector<FoldChange> changes_; // scratch, as the following
-    std::vector<NodeId> arrived_;
-    std::vector<Slot> unplaced_;
+    std::unique_ptr<State> state_;
 };
 
 } // namespace unseen::vdtree

@@ -14,9 +14,7 @@
 #include <immintrin.h>
 #endif
 
-// Vectors wider than the target's are only handed to functions that are inlined.
-#pragma GCC diagnostic ignored "-Wpsabi"
-#define UNSEEN_INLINE [[gnu::always_inline]] inline
+#include "simd.h"
 
 namespace unseen::vdtree {
 
@@ -451,20 +449,10 @@ void find_with_any(const Sets& sets, const Row& from, FarthestOfLanes& out) { Ke
 void begin_with_any(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far) { Kernel<2>::begin(sets, slack, bases, far); }
 
 // Neither has fused operations, so both give the same bits.
-#if defined(__x86_64__) && defined(__GNUC__)
-
-[[gnu::target("avx2")]] void find_with_avx2(const Sets& sets, const Row& from, FarthestOfLanes& out) { Kernel<4>::find_farthest(sets, from, out); }
-[[gnu::target("avx2")]] void begin_with_avx2(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far) { Kernel<4>::begin(sets, slack, bases, far); }
-const bool has_avx2 = __builtin_cpu_supports("avx2");
-FindFarthest* const find = has_avx2 ? find_with_avx2 : find_with_any;
-Begin* const begin_bases = has_avx2 ? begin_with_avx2 : begin_with_any;
-
-#else
-
-FindFarthest* const find = find_with_any;
-Begin* const begin_bases = begin_with_any;
-
-#endif
+UNSEEN_AVX2 void find_with_avx2(const Sets& sets, const Row& from, FarthestOfLanes& out) { Kernel<4>::find_farthest(sets, from, out); }
+UNSEEN_AVX2 void begin_with_avx2(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far) { Kernel<4>::begin(sets, slack, bases, far); }
+FindFarthest* const find = has_avx2() ? find_with_avx2 : find_with_any;
+Begin* const begin_bases = has_avx2() ? begin_with_avx2 : begin_with_any;
 
 } // namespace
 

@@ -18,13 +18,9 @@
 
 #include <vdtree/mesh.h>
 
+#include "simd.h"
+
 namespace unseen::vdtree {
-
-// Floats that are computed with at once; eight where the processor has AVX2.
-using Float4 = float __attribute__((vector_size(16)));
-using Float8 = float __attribute__((vector_size(32)));
-
-#define UNSEEN_INLINE __attribute__((always_inline)) inline
 
 // Where the numbers of one quadric lie: x'Mx + 2 h'x + k, and for each channel G'x + D - W s, the derivative by s.
 namespace quadric {

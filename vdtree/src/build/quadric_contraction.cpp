@@ -16,9 +16,6 @@
 #include "build/quadric.h"
 #include "build/spatial_order.h"
 
-// Vectors wider than the target's are only handed to functions that are inlined.
-#pragma GCC diagnostic ignored "-Wpsabi"
-
 namespace unseen::vdtree {
 
 namespace {
@@ -48,50 +45,22 @@ constexpr Index none = std::numeric_limits<Index>::max();
 
 // ---- quadrics of several clusters side by side
 
-// The first `floats` numbers of four clusters' quadrics, one cluster a lane.
-UNSEEN_INLINE void gather(const float* quadrics, const Index (&clusters)[4], std::size_t floats, Float4* out) {
+// The first `floats` numbers of as many clusters' quadrics as F has lanes, one cluster a lane.
+template <class F, std::size_t lanes>
+UNSEEN_INLINE void gather(const float* quadrics, const Index (&clusters)[lanes], std::size_t floats, F* out) {
     const std::size_t stride = floats;
     for (std::size_t i = 0; i < floats; i += 4) {
-        Float4 row[4];
-        for (std::size_t l = 0; l < 4; ++l) std::memcpy(&row[l], quadrics + clusters[l] * stride + i, sizeof(Float4));
-        const Float4 low01 = __builtin_shufflevector(row[0], row[1], 0, 4, 1, 5);
-        const Float4 low23 = __builtin_shufflevector(row[2], row[3], 0, 4, 1, 5);
-        const Float4 high01 = __builtin_shufflevector(row[0], row[1], 2, 6, 3, 7);
-        const Float4 high23 = __builtin_shufflevector(row[2], row[3], 2, 6, 3, 7);
-        out[i] = __builtin_shufflevector(low01, low23, 0, 1, 4, 5);
-        out[i + 1] = __builtin_shufflevector(low01, low23, 2, 3, 6, 7);
-        out[i + 2] = __builtin_shufflevector(high01, high23, 0, 1, 4, 5);
-        out[i + 3] = __builtin_shufflevector(high01, high23, 2, 3, 6, 7);
-    }
-}
-
-#if defined(__x86_64__) && defined(__GNUC__)
-
-const bool has_avx2 = __builtin_cpu_supports("avx2");
-
-// Likewise of eight: the halves of the registers are as above.
-UNSEEN_INLINE void gather(const float* quadrics, const Index (&clusters)[8], std::size_t floats, Float8* out) {
-    const std::size_t stride = floats;
-    for (std::size_t i = 0; i < floats; i += 4) {
-        Float8 row[4];
-        for (std::size_t l = 0; l < 4; ++l) {
-            Float4 low, high;
-            std::memcpy(&low, quadrics + clusters[l] * stride + i, sizeof(Float4));
-            std::memcpy(&high, quadrics + clusters[l + 4] * stride + i, sizeof(Float4));
-            row[l] = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
+        const auto numbers_of = [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return quadrics + clusters[lane] * stride + i; };
+        if constexpr (lanes == 4) {
+            FourWide::load_columns(numbers_of, out + i);
+        } else {
+            Float4 low[4], high[4];
+            FourWide::load_columns(numbers_of, low);
+            FourWide::load_columns([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return numbers_of(lane + 4); }, high);
+            for (std::size_t k = 0; k < 4; ++k) out[i + k] = __builtin_shufflevector(low[k], high[k], 0, 1, 2, 3, 4, 5, 6, 7);
         }
-        const Float8 low01 = __builtin_shufflevector(row[0], row[1], 0, 8, 1, 9, 4, 12, 5, 13);
-        const Float8 low23 = __builtin_shufflevector(row[2], row[3], 0, 8, 1, 9, 4, 12, 5, 13);
-        const Float8 high01 = __builtin_shufflevector(row[0], row[1], 2, 10, 3, 11, 6, 14, 7, 15);
-        const Float8 high23 = __builtin_shufflevector(row[2], row[3], 2, 10, 3, 11, 6, 14, 7, 15);
-        out[i] = __builtin_shufflevector(low01, low23, 0, 1, 8, 9, 4, 5, 12, 13);
-        out[i + 1] = __builtin_shufflevector(low01, low23, 2, 3, 10, 11, 6, 7, 14, 15);
-        out[i + 2] = __builtin_shufflevector(high01, high23, 0, 1, 8, 9, 4, 5, 12, 13);
-        out[i + 3] = __builtin_shufflevector(high01, high23, 2, 3, 10, 11, 6, 7, 14, 15);
     }
 }
-
-#endif
 
 // ---- a part's first clusters
 
@@ -529,18 +498,12 @@ private:
         }
     }
     void errors_by_fours(std::span<const ClusterPair> pairs, float* errors) const { errors_of_all<Float4>(pairs, errors); }
-#if defined(__x86_64__) && defined(__GNUC__)
+    UNSEEN_AVX2 void errors_by_eights(std::span<const ClusterPair> pairs, float* errors) const { errors_of_all<Float8>(pairs, errors); }
     // Neither has fused operations, so both give the same bits.
-    [[gnu::target("avx2")]] void errors_by_eights(std::span<const ClusterPair> pairs, float* errors) const {
-        errors_of_all<Float8>(pairs, errors);
-    }
     void find_errors(std::span<const ClusterPair> pairs, float* errors) const {
-        if (has_avx2) errors_by_eights(pairs, errors);
+        if (has_avx2()) errors_by_eights(pairs, errors);
         else errors_by_fours(pairs, errors);
     }
-#else
-    void find_errors(std::span<const ClusterPair> pairs, float* errors) const { errors_by_fours(pairs, errors); }
-#endif
 
     // Ward's measure: by how much the sum of squared distances from the clusters' middles grows.
     float gap_error(ClusterPair p) const {

@@ -1,15 +1,17 @@
 #include <vdtree/geomorph.h>
 
-#include "tree/unchecked_links.h"
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <functional>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include <glm/common.hpp>
+
+#include "cut/state.h"
+#include "tree/unchecked_links.h"
 
 namespace unseen::vdtree {
 
@@ -35,165 +37,225 @@ Error invalid(const char* what) { return {ErrorCode::invalid_argument, what}; }
 
 } // namespace
 
+struct Geomorph::State {
+    using Slot = std::uint32_t;
+    static constexpr Slot no_slot = 0xffffffffu;
+
+    // A node of the drawn cut whose children are on their way. What frames read of the tree is kept here, side by side.
+    struct Glide {
+        double weight = 0; // 0: the children are at the proxy, 1: at their own places
+        bool unfolds = true;
+        NodeId parent = no_node;
+        MovedVertex own;   // the node, in its own place
+        MovedVertex drawn; // where it would be drawn, as of the step `placed`
+        std::uint64_t placed = 0;
+        std::vector<MovedVertex> children; // in their own places
+    };
+
+    State(const VertexTree& tree, const GeomorphOptions& options_)
+        : options(options_), drawn_cut(tree), drawn(CutState::of(drawn_cut)) {}
+
+    void step(const CutState& cut, double seconds);
+    std::span<const FoldChange> changes_of(const CutState& cut);
+    bool is_jump(const CutState& cut, std::span<const FoldChange> changes) const;
+    void become(const CutState& cut);
+    void pass(double seconds);
+    void take_up(const CutState& cut, std::span<const FoldChange> changes);
+    void end_glides();
+    void move_vertices();
+
+    Slot slot_of(NodeId node) const { return slot_of_node.empty() || node == no_node ? no_slot : slot_of_node[node]; }
+    bool is_gliding(NodeId node) const { return slot_of(node) != no_slot; }
+    void begin(NodeId node, double weight);
+    void end(NodeId node);
+    void place(Slot slot);
+    std::uint64_t byte_size() const noexcept;
+
+    GeomorphOptions options;
+    Cut drawn_cut;
+    CutState& drawn;            // of that cut
+    std::uint64_t revision = 0; // of the followed cut, when it was last taken up
+    std::uint64_t steps = 0;
+    std::vector<Glide> glides;
+    std::vector<Slot> slot_of_node; // of a node's glide; made when the first one begins
+    std::vector<MovedVertex> moved;
+    std::vector<FoldChange> found; // scratch, as the following
+    std::vector<NodeId> arrived_nodes;
+    std::vector<Slot> unplaced;
+};
+
+Geomorph::Geomorph(std::unique_ptr<State> state) noexcept : state_(std::move(state)) {}
+Geomorph::Geomorph(Geomorph&&) noexcept = default;
+Geomorph& Geomorph::operator=(Geomorph&&) noexcept = default;
+Geomorph::~Geomorph() = default;
+
+const Cut& Geomorph::drawn() const noexcept { return state_->drawn_cut; }
+std::span<const MovedVertex> Geomorph::moved() const noexcept { return state_->moved; }
+bool Geomorph::is_gliding() const noexcept { return !state_->glides.empty(); }
+double Geomorph::seconds() const noexcept { return state_->options.seconds; }
+std::uint64_t Geomorph::byte_size() const noexcept { return state_->byte_size(); }
+
 Result<Geomorph> Geomorph::create(const VertexTree& tree, const GeomorphOptions& options) {
     if (!(options.seconds >= 0) || !std::isfinite(options.seconds))
         return invalid("The time of a geomorph must be 0 or more seconds, and finite.");
     if (!(options.jump_share >= 0)) return invalid("The share of triangles that makes a jump must be 0 or more.");
-    return Geomorph(tree, options);
+    return Geomorph(std::make_unique<State>(tree, options));
 }
-
-Geomorph::Geomorph(const VertexTree& tree, const GeomorphOptions& options) : options_(options), drawn_(tree) {}
 
 Result<void> Geomorph::step(const Cut& cut, double seconds) {
     if (!(seconds >= 0) || !std::isfinite(seconds))
         return invalid("A geomorph's time step must be 0 or more seconds, and finite.");
-    if (std::addressof(cut.tree().data()) != std::addressof(drawn_.tree().data()))
+    if (std::addressof(cut.tree().data()) != std::addressof(state_->drawn_cut.tree().data()))
         return invalid("The cut belongs to another tree than the geomorph's; make a geomorph for that tree.");
-    const bool is_first = revision_ == 0;
-    const auto changes = changes_of(cut);
-    revision_ = cut.revision_;
-    if (is_first || is_jump(cut, changes)) {
-        become(cut);
-        return {};
-    }
-    AdjustStats unused;
-    drawn_.begin_changes();
-    pass(seconds);
-    take_up(cut, changes);
-    end_glides();
-    drawn_.end_changes(unused);
-    move_vertices();
+    state_->step(CutState::of(cut), seconds);
     return {};
 }
 
-// What leads from the cut at the last step, or from the drawn one, to this cut; parents unfold before their children.
-std::span<const FoldChange> Geomorph::changes_of(const Cut& cut) {
-    if (cut.revision_ == revision_) return {};
-    if (cut.revision_ == revision_ + 1) return cut.changes_;
-    changes_.clear();
-    for (std::size_t word = 0; word < cut.unfolded_.size(); ++word) {
-        for (std::uint64_t bits = cut.unfolded_[word] ^ drawn_.unfolded_[word]; bits; bits &= bits - 1) {
-            const int bit = std::countr_zero(bits);
-            const bool folded = (drawn_.unfolded_[word] >> bit) & 1;
-            changes_.push_back({static_cast<NodeId>(word * 64 + static_cast<std::size_t>(bit)), folded});
-        }
+void Geomorph::State::step(const CutState& cut, double seconds) {
+    const bool is_first = revision == 0;
+    const auto changes = changes_of(cut);
+    revision = cut.revision();
+    if (is_first || is_jump(cut, changes)) {
+        become(cut);
+        return;
     }
-    return changes_;
+    AdjustStats unused;
+    drawn.begin_changes();
+    pass(seconds);
+    take_up(cut, changes);
+    end_glides();
+    drawn.end_changes(unused);
+    move_vertices();
 }
 
-bool Geomorph::is_jump(const Cut& cut, std::span<const FoldChange> changes) const {
+// What leads from the cut at the last step, or from the drawn one, to this cut; parents unfold before their children.
+std::span<const FoldChange> Geomorph::State::changes_of(const CutState& cut) {
+    if (cut.revision() == revision) return {};
+    if (cut.revision() == revision + 1) return cut.changes();
+    found.clear();
+    for (std::size_t word = 0; word < cut.unfolded().size(); ++word) {
+        for (std::uint64_t bits = cut.unfolded()[word] ^ drawn.unfolded()[word]; bits; bits &= bits - 1) {
+            const int bit = std::countr_zero(bits);
+            const bool folded = (drawn.unfolded()[word] >> bit) & 1;
+            found.push_back({static_cast<NodeId>(word * 64 + static_cast<std::size_t>(bit)), folded});
+        }
+    }
+    return found;
+}
+
+bool Geomorph::State::is_jump(const CutState& cut, std::span<const FoldChange> changes) const {
     if (changes.size() <= fewest_of_a_jump) return false;
     const auto first = unchecked_links(cut.tree()).first_triangle;
     std::uint64_t triangles = 0;
     for (const FoldChange& change : changes) triangles += first[change.node + 1] - first[change.node];
-    const double shown = std::max(cut.triangle_count(), drawn_.triangle_count());
-    return static_cast<double>(triangles) > options_.jump_share * shown;
+    const double shown = std::max(cut.triangle_count(), drawn.triangle_count());
+    return static_cast<double>(triangles) > options.jump_share * shown;
 }
 
-void Geomorph::become(const Cut& cut) {
-    for (const Glide& glide : glides_) slot_of_node_[glide.own.node] = no_slot;
-    glides_.clear();
-    moved_.clear();
+void Geomorph::State::become(const CutState& cut) {
+    for (const Glide& glide : glides) slot_of_node[glide.own.node] = no_slot;
+    glides.clear();
+    moved.clear();
     AdjustStats unused;
-    drawn_.change_to(cut.unfolded_, unused);
+    drawn.change_to({cut.unfolded().begin(), cut.unfolded().end()}, unused);
 }
 
-void Geomorph::pass(double seconds) {
-    if (glides_.empty()) return;
-    const double share = seconds < options_.seconds ? seconds / options_.seconds : 1;
-    for (Glide& glide : glides_)
+void Geomorph::State::pass(double seconds) {
+    if (glides.empty()) return;
+    const double share = seconds < options.seconds ? seconds / options.seconds : 1;
+    for (Glide& glide : glides)
         glide.weight = glide.unfolds ? std::min(glide.weight + share, 1.0) : std::max(glide.weight - share, 0.0);
 }
 
 // A node may have changed more than once: only what it is now counts.
-void Geomorph::take_up(const Cut& cut, std::span<const FoldChange> changes) {
+void Geomorph::State::take_up(const CutState& cut, std::span<const FoldChange> changes) {
     for (const auto [node, folded] : changes) {
-        const bool is_drawn_unfolded = drawn_.is_unfolded_interior(node);
+        const bool is_drawn_unfolded = drawn.is_unfolded_interior(node);
         if (cut.is_unfolded_interior(node)) {
             if (is_drawn_unfolded) continue;
-            drawn_.apply_unfold(node);
+            drawn.apply_unfold(node);
             begin(node, 0);
         } else if (is_drawn_unfolded && !is_gliding(node)) {
             begin(node, 1);
         }
     }
-    for (Glide& glide : glides_) glide.unfolds = cut.is_unfolded_interior(glide.own.node);
+    for (Glide& glide : glides) glide.unfolds = cut.is_unfolded_interior(glide.own.node);
 }
 
 // A child never has more of its way left to the proxy than its parent, for it folds no later and unfolds no sooner;
 // where rounding says otherwise, the parent waits for it.
-void Geomorph::end_glides() {
-    arrived_.clear();
-    const bool at_once = !(options_.seconds > 0);
-    for (const Glide& glide : glides_)
+void Geomorph::State::end_glides() {
+    arrived_nodes.clear();
+    const bool at_once = !(options.seconds > 0);
+    for (const Glide& glide : glides)
         if (at_once || (glide.unfolds ? glide.weight >= 1 - arrived : glide.weight <= arrived))
-            arrived_.push_back(glide.own.node);
-    std::sort(arrived_.begin(), arrived_.end(), std::greater<>()); // children first
-    for (const NodeId node : arrived_) {
-        if (!glides_[slot_of_node_[node]].unfolds) {
+            arrived_nodes.push_back(glide.own.node);
+    std::sort(arrived_nodes.begin(), arrived_nodes.end(), std::greater<>()); // children first
+    for (const NodeId node : arrived_nodes) {
+        if (!glides[slot_of_node[node]].unfolds) {
             bool is_flat = true;
-            for (const MovedVertex& child : glides_[slot_of_node_[node]].children)
-                is_flat &= !drawn_.is_unfolded(child.node);
+            for (const MovedVertex& child : glides[slot_of_node[node]].children)
+                is_flat &= !drawn.is_unfolded(child.node);
             if (!is_flat) continue;
-            drawn_.apply_fold(node);
+            drawn.apply_fold(node);
         }
         end(node);
     }
 }
 
-void Geomorph::move_vertices() {
-    moved_.clear();
-    ++steps_;
-    for (Slot slot = 0; slot < glides_.size(); ++slot) {
+void Geomorph::State::move_vertices() {
+    moved.clear();
+    ++steps;
+    for (Slot slot = 0; slot < glides.size(); ++slot) {
         place(slot);
-        const Glide& glide = glides_[slot];
+        const Glide& glide = glides[slot];
         const float share = static_cast<float>(glide.weight);
         for (const MovedVertex& child : glide.children) // those of a node that is unfolded are active, or unfolded, too
-            if (!drawn_.is_unfolded(child.node)) moved_.push_back(between(glide.drawn, child, share));
+            if (!drawn.is_unfolded(child.node)) moved.push_back(between(glide.drawn, child, share));
     }
 }
 
 // Finds out where a gliding node's vertex would be drawn, and those above it as far as they glide, once a step. Without
 // recursion, for trees may be as deep as they have vertices.
-void Geomorph::place(Slot slot) {
-    unplaced_.clear();
-    for (; slot != no_slot && glides_[slot].placed != steps_; slot = slot_of(glides_[slot].parent))
-        unplaced_.push_back(slot);
-    for (; !unplaced_.empty(); unplaced_.pop_back()) {
-        Glide& glide = glides_[unplaced_.back()];
+void Geomorph::State::place(Slot slot) {
+    unplaced.clear();
+    for (; slot != no_slot && glides[slot].placed != steps; slot = slot_of(glides[slot].parent))
+        unplaced.push_back(slot);
+    for (; !unplaced.empty(); unplaced.pop_back()) {
+        Glide& glide = glides[unplaced.back()];
         const Slot parent = slot_of(glide.parent);
-        glide.placed = steps_;
+        glide.placed = steps;
         glide.drawn = parent == no_slot
                           ? glide.own
-                          : between(glides_[parent].drawn, glide.own, static_cast<float>(glides_[parent].weight));
+                          : between(glides[parent].drawn, glide.own, static_cast<float>(glides[parent].weight));
     }
 }
 
-void Geomorph::begin(NodeId node, double weight) {
-    const VertexTree& tree = drawn_.tree();
-    if (slot_of_node_.empty()) slot_of_node_.assign(tree.interior_count(), no_slot);
-    slot_of_node_[node] = static_cast<Slot>(glides_.size());
-    glides_.push_back({weight, weight == 0, unchecked_links(tree).parents[node], at_rest(tree, node), {}, 0, {}});
-    tree.for_each_child(node, [&](NodeId child) { glides_.back().children.push_back(at_rest(tree, child)); });
+void Geomorph::State::begin(NodeId node, double weight) {
+    const VertexTree& tree = drawn.tree();
+    if (slot_of_node.empty()) slot_of_node.assign(tree.interior_count(), no_slot);
+    slot_of_node[node] = static_cast<Slot>(glides.size());
+    glides.push_back({weight, weight == 0, unchecked_links(tree).parents[node], at_rest(tree, node), {}, 0, {}});
+    tree.for_each_child(node, [&](NodeId child) { glides.back().children.push_back(at_rest(tree, child)); });
 }
 
-void Geomorph::end(NodeId node) {
-    const Slot slot = slot_of_node_[node];
-    slot_of_node_[node] = no_slot;
-    if (slot + 1 < glides_.size()) {
-        glides_[slot] = std::move(glides_.back());
-        slot_of_node_[glides_[slot].own.node] = slot;
+void Geomorph::State::end(NodeId node) {
+    const Slot slot = slot_of_node[node];
+    slot_of_node[node] = no_slot;
+    if (slot + 1 < glides.size()) {
+        glides[slot] = std::move(glides.back());
+        slot_of_node[glides[slot].own.node] = slot;
     }
-    glides_.pop_back();
+    glides.pop_back();
 }
 
-std::uint64_t Geomorph::byte_size() const noexcept {
+std::uint64_t Geomorph::State::byte_size() const noexcept {
     std::uint64_t children = 0;
-    for (const Glide& glide : glides_) children += glide.children.capacity();
-    return drawn_.byte_size() + sizeof(Glide) * glides_.capacity() + sizeof(MovedVertex) * children +
-           sizeof(Slot) * slot_of_node_.capacity() +
-           sizeof(MovedVertex) * moved_.capacity() + sizeof(FoldChange) * changes_.capacity() +
-           sizeof(NodeId) * arrived_.capacity() + sizeof(Slot) * unplaced_.capacity();
+    for (const Glide& glide : glides) children += glide.children.capacity();
+    return drawn.byte_size() + sizeof(Glide) * glides.capacity() + sizeof(MovedVertex) * children +
+           sizeof(Slot) * slot_of_node.capacity() + sizeof(MovedVertex) * moved.capacity() +
+           sizeof(FoldChange) * found.capacity() + sizeof(NodeId) * arrived_nodes.capacity() +
+           sizeof(Slot) * unplaced.capacity();
 }
 
 } // namespace unseen::vdtree

@@ -2,24 +2,26 @@
 
 #include <cstring>
 
+#include "simd.h"
+
 namespace unseen::vdtree {
 
 void SideDeadlines::clear() {
-    dues_.clear();
+    slots_.clear();
     earliest_unfolded_.clear();
     earliest_folded_.clear();
     set_clock(0);
 }
 
 void SideDeadlines::reserve(std::size_t blocks) {
-    dues_.reserve(blocks);
+    slots_.reserve(blocks);
     earliest_unfolded_.reserve(blocks);
     earliest_folded_.reserve(blocks);
 }
 
 void SideDeadlines::push_back() {
-    dues_.emplace_back();
-    std::ranges::fill(dues_.back().slots, never);
+    slots_.emplace_back();
+    std::ranges::fill(slots_.back().slots, never);
     earliest_unfolded_.push_back(never);
     earliest_folded_.push_back(never);
 }
@@ -32,7 +34,7 @@ void SideDeadlines::set_clock(double now) {
 void SideDeadlines::restart(double longest) {
     if (!(now_ > longest)) return;
     const auto set_back = [&](float& due) { due = std::max(due - clock_.early, 0.0f) * just_less; };
-    for (SlotDues& dues : dues_) std::ranges::for_each(dues.slots, set_back);
+    for (BlockSlots& dues : slots_) std::ranges::for_each(dues.slots, set_back);
     std::ranges::for_each(earliest_unfolded_, set_back);
     std::ranges::for_each(earliest_folded_, set_back);
     set_clock(0);
@@ -41,8 +43,8 @@ void SideDeadlines::restart(double longest) {
 void SideDeadlines::find_due_blocks(std::vector<std::uint32_t>& blocks) const {
     blocks.clear();
     constexpr std::size_t run = 16; // blocks looked at together: mostly none is due
-    for (std::size_t first = 0; first < dues_.size(); first += run) {
-        const std::size_t end = std::min(first + run, dues_.size());
+    for (std::size_t first = 0; first < slots_.size(); first += run) {
+        const std::size_t end = std::min(first + run, slots_.size());
         const auto is_due = [&](std::size_t block) {
             return static_cast<unsigned>(earliest_unfolded_[block] <= clock_.late) |
                    static_cast<unsigned>(earliest_folded_[block] <= clock_.late);
@@ -55,15 +57,15 @@ void SideDeadlines::find_due_blocks(std::vector<std::uint32_t>& blocks) const {
     }
 }
 
-bool SideDeadlines::hand_over(std::size_t block, std::uint32_t unfolded, BlockDues& dues) {
-    using Floats = float __attribute__((vector_size(16))); // an extension that GCC and Clang share
-    using Ints = std::int32_t __attribute__((vector_size(16)));
+bool SideDeadlines::hand_over(std::size_t block, std::uint32_t unfolded, SlotDeadlines& dues) {
+    using Floats = FourWide::Floats;
+    using Ints = FourWide::Ints;
     const Floats none = Floats{} + never;
     Floats earliest_unfolded = none, earliest_folded = none;
     bool any = false;
     for (std::size_t i = 0; i < block_slots; i += 4) {
         Floats due, facing;
-        std::memcpy(&due, &dues_[block].slots[i], sizeof due);
+        std::memcpy(&due, &slots_[block].slots[i], sizeof due);
         std::memcpy(&facing, &dues.facing[i], sizeof facing);
         const auto is_due = due <= clock_.late;
         any |= (is_due[0] | is_due[1] | is_due[2] | is_due[3]) != 0;
@@ -73,12 +75,11 @@ bool SideDeadlines::hand_over(std::size_t block, std::uint32_t unfolded, BlockDu
         const Floats of_unfolded = unfolds ? due : none, of_folded = unfolds ? none : due;
         earliest_unfolded = of_unfolded < earliest_unfolded ? of_unfolded : earliest_unfolded;
         earliest_folded = of_folded < earliest_folded ? of_folded : earliest_folded;
-        std::memcpy(&dues_[block].slots[i], &due, sizeof due);
+        std::memcpy(&slots_[block].slots[i], &due, sizeof due);
         std::memcpy(&dues.facing[i], &facing, sizeof facing);
     }
-    const auto least = [](const Floats& of) { return std::min(std::min(of[0], of[1]), std::min(of[2], of[3])); };
-    earliest_unfolded_[block] = least(earliest_unfolded);
-    earliest_folded_[block] = least(earliest_folded);
+    earliest_unfolded_[block] = FourWide::least_of(earliest_unfolded);
+    earliest_folded_[block] = FourWide::least_of(earliest_folded);
     return any;
 }
 

@@ -7,14 +7,14 @@
 #include <limits>
 #include <vector>
 
-#include "cut/kernel/fold_kernel.h"
+#include "cut/kernel/deadline_kernel.h"
 #include "cut/kernel/prefetch.h"
 
 namespace unseen::vdtree {
 
-// A deadline for every slot of every block, and the earliest ones of each block: of the slots whose verdict is that they
-// unfold, and of the others. The clock starts at 0; deadlines are what it may run to, and are infinite where there are none.
-// What is not in use has no blocks.
+// A deadline for every slot of every block, and the earliest ones of each block: of the slots whose verdict is that
+// they unfold, and of the others. The clock starts at 0; deadlines are what it may run to, and are infinite where there
+// are none. What is not in use has no blocks.
 class SideDeadlines {
 public:
     static constexpr float never = std::numeric_limits<float>::infinity();
@@ -30,32 +30,33 @@ public:
     // `slack`: what there is left from now on; 0 or more.
     void set(std::size_t block, std::size_t place, bool is_unfolded, float slack) {
         const float due = (clock_.early + slack) * just_less;
-        dues_[block].slots[place] = due;
+        slots_[block].slots[place] = due;
         float& earliest = (is_unfolded ? earliest_unfolded_ : earliest_folded_)[block];
         earliest = std::min(earliest, due);
     }
     float left(std::size_t block, std::size_t place) const {
-        return std::max(dues_[block].slots[place] - clock_.early, 0.0f);
+        return std::max(slots_[block].slots[place] - clock_.early, 0.0f);
     }
-    void remove(std::size_t block, std::size_t place) { dues_[block].slots[place] = never; }
-    void prefetch(std::size_t block) const { vdtree::prefetch(&dues_[block]); }
+    void remove(std::size_t block, std::size_t place) { slots_[block].slots[place] = never; }
+    void prefetch(std::size_t block) const { vdtree::prefetch(&slots_[block]); }
 
     void advance(double motion) { set_clock(now_ + motion); }
     // Sets the clock back to 0 where it has run beyond `longest`, so that deadlines in floats stay fine enough.
     void restart(double longest);
     const KernelClock& clock() const noexcept { return clock_; }
-    // By block; for those who can prove later ones. Slots keep their own: they are handed over when the block's has come.
+    // By block; for those who can prove later ones. Slots keep their own: they are handed over when the block's has
+    // come.
     float* earliest_unfolded() noexcept { return earliest_unfolded_.data(); }
 
     void find_due_blocks(std::vector<std::uint32_t>& blocks) const; // in order, in place of what was there
     // Makes the block's slots that are due the facing clock's: due at once by that one, and not any more by this.
     // `unfolded`: a bit a slot. Returns whether there are any.
-    bool hand_over(std::size_t block, std::uint32_t unfolded, BlockDues& dues);
+    bool hand_over(std::size_t block, std::uint32_t unfolded, SlotDeadlines& dues);
 
-    std::uint64_t byte_size() const noexcept { return (sizeof(SlotDues) + 2 * sizeof(float)) * dues_.capacity(); }
+    std::uint64_t byte_size() const noexcept { return (sizeof(BlockSlots) + 2 * sizeof(float)) * slots_.capacity(); }
 
 private:
-    struct alignas(64) SlotDues {
+    struct alignas(64) BlockSlots {
         float slots[block_slots];
     };
     void set_clock(double now);
@@ -63,7 +64,7 @@ private:
     bool is_used_ = false;
     double now_ = 0;
     KernelClock clock_;
-    std::vector<SlotDues> dues_; // by block, like the others
+    std::vector<BlockSlots> slots_; // by block, like the others
     std::vector<float> earliest_unfolded_, earliest_folded_;
 };
 

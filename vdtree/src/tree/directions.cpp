@@ -3,8 +3,7 @@
 #include <bit>
 #include <cstring>
 
-// Vectors of eight floats are passed between functions of this file only, all of which are inlined.
-#pragma GCC diagnostic ignored "-Wpsabi"
+#include "simd.h"
 
 namespace unseen::vdtree {
 
@@ -13,21 +12,15 @@ namespace {
 constexpr float units = 127;    // of NormalSlabs in 1
 constexpr float margin = 2e-4f; // units; covers the rounding of unit vectors in floats, here and in what checks them
 
-// Four numbers at a time (an extension that GCC and Clang share).
-using Floats = float __attribute__((vector_size(16)));
-using Ints = int __attribute__((vector_size(16)));
-
 // The slabs' axes, as NormalSlabs has them; the last one is none.
 constexpr float s = 0.57735026918962576f;
-using EightFloats = float __attribute__((vector_size(32)));
-using EightInts = int __attribute__((vector_size(32)));
-constexpr EightFloats axis_x = {1, 0, 0, s, -s, s, s, 0};
-constexpr EightFloats axis_y = {0, 1, 0, s, s, -s, s, 0};
-constexpr EightFloats axis_z = {0, 0, 1, s, s, s, -s, 0};
-constexpr Ints is_axis = {-1, -1, -1, 0}; // of the second four
+constexpr Float8 axis_x = {1, 0, 0, s, -s, s, s, 0};
+constexpr Float8 axis_y = {0, 1, 0, s, s, -s, s, 0};
+constexpr Float8 axis_z = {0, 0, 1, s, s, s, -s, 0};
+constexpr Int4 is_axis = {-1, -1, -1, 0}; // of the second four
 
 // 128 more than the least whole units not below `along`.
-[[gnu::always_inline]] inline EightInts reached(EightFloats along) { return 255 - __builtin_convertvector(units - margin - along, EightInts); }
+UNSEEN_INLINE Int8 reached(Float8 along) { return 255 - __builtin_convertvector(units - margin - along, Int8); }
 
 // Which of the eight rows, as in cell_of().
 inline double row(double along, double b0, double b1, double b2) {
@@ -46,24 +39,20 @@ struct Batch {
 
 // Coordinate `axis` of corner `corner` of all triangles is number 3 * corner + axis.
 template <std::size_t capacity>
-[[gnu::always_inline]] inline void transpose(const Corner (&triangles)[capacity][3], float (&coordinates)[9][capacity]) {
+UNSEEN_INLINE void transpose(const Corner (&triangles)[capacity][3], float (&coordinates)[9][capacity]) {
     for (std::size_t i = 0; i < capacity; i += 4) {
         for (std::size_t corner = 0; corner < 3; ++corner) {
-            const Floats a = triangles[i][corner], b = triangles[i + 1][corner];
-            const Floats c = triangles[i + 2][corner], d = triangles[i + 3][corner];
-            const Floats low_ab = __builtin_shufflevector(a, b, 0, 4, 1, 5), low_cd = __builtin_shufflevector(c, d, 0, 4, 1, 5);
-            const Floats high_ab = __builtin_shufflevector(a, b, 2, 6, 3, 7), high_cd = __builtin_shufflevector(c, d, 2, 6, 3, 7);
-            const Floats out[3] = {__builtin_shufflevector(low_ab, low_cd, 0, 1, 4, 5),
-                                   __builtin_shufflevector(low_ab, low_cd, 2, 3, 6, 7),
-                                   __builtin_shufflevector(high_ab, high_cd, 0, 1, 4, 5)};
+            const Float4 rows[4] = {triangles[i][corner], triangles[i + 1][corner], triangles[i + 2][corner], triangles[i + 3][corner]};
+            Float4 out[4]; // the last one does not matter
+            vdtree::transpose(rows, out);
             for (std::size_t axis = 0; axis < 3; ++axis)
-                std::memcpy(&coordinates[3 * corner + axis][i], &out[axis], sizeof(Floats));
+                std::memcpy(&coordinates[3 * corner + axis][i], &out[axis], sizeof(Float4));
         }
     }
 }
 
 template <std::size_t capacity>
-[[gnu::always_inline]] inline void measure_all(const Batch<capacity>& batch) {
+UNSEEN_INLINE void measure_all(const Batch<capacity>& batch) {
     // In doubles: cross products of differences of floats neither overflow when squared nor lose what cells depend on.
     alignas(64) float corners[9][capacity], x[capacity], y[capacity], z[capacity];
     transpose(batch.triangles, corners);
@@ -96,9 +85,9 @@ template <std::size_t capacity>
     }
     // Whole units outward: what is cut off is below the ends of the scale. Four numbers of eight bits are shifted into each lane.
     for (std::size_t i = 0; i < batch.count; ++i) {
-        const EightFloats along = x[i] * axis_x + y[i] * axis_y + z[i] * axis_z;
-        const EightInts reach = reached(along) | reached(-along) << 8;
-        Ints first, second;
+        const Float8 along = x[i] * axis_x + y[i] * axis_y + z[i] * axis_z;
+        const Int8 reach = reached(along) | reached(-along) << 8;
+        Int4 first, second;
         std::memcpy(&first, &reach, sizeof first);
         std::memcpy(&second, reinterpret_cast<const char*>(&reach) + sizeof first, sizeof second);
         batch.reach[i] = std::bit_cast<Directions::Reach>(first | (second & is_axis) << 16);
@@ -107,24 +96,14 @@ template <std::size_t capacity>
 
 using FullBatch = Batch<NormalBatch::capacity>;
 
-#if defined(__x86_64__) && defined(__GNUC__)
-
-[[gnu::target("avx2")]] void measure_avx2(const FullBatch& batch) { measure_all(batch); }
-const bool has_avx2 = __builtin_cpu_supports("avx2");
-
-#else
-
-void measure_avx2(const FullBatch&) {}
-constexpr bool has_avx2 = false;
-
-#endif
+UNSEEN_AVX2 void measure_avx2(const FullBatch& batch) { measure_all(batch); }
 
 } // namespace
 
 // Neither has fused operations, so both give the same bits.
 void NormalBatch::measure() noexcept {
     const FullBatch batch{count_, triangles_, cells_, reach_};
-    if (has_avx2) measure_avx2(batch);
+    if (has_avx2()) measure_avx2(batch);
     else measure_all(batch);
     count_ = 0;
 }

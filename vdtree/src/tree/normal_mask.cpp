@@ -95,21 +95,9 @@ Facing facing(const NormalMask& mask, glm::vec3 to_eye, float distance, float ra
 }
 
 void NormalSlabs::insert(glm::dvec3 n) noexcept {
-    const double along[axis_count] = {n.x,
-                                      n.y,
-                                      n.z,
-                                      (n.x + n.y + n.z) * inverse_sqrt3,
-                                      (-n.x + n.y + n.z) * inverse_sqrt3,
-                                      (n.x - n.y + n.z) * inverse_sqrt3,
-                                      (n.x + n.y - n.z) * inverse_sqrt3};
-    for (std::size_t i = 0; i < axis_count; ++i) {
-        const double units = std::clamp(along[i], -1.0, 1.0) * slab_units;
-        // The margin must not lead beyond the ends: 128 is no std::int8_t.
-        const double low = std::max(std::floor(units - slab_margin), -slab_units);
-        const double high = std::min(std::ceil(units + slab_margin), slab_units);
-        lo[i] = std::min(lo[i], static_cast<std::int8_t>(low));
-        hi[i] = std::max(hi[i], static_cast<std::int8_t>(high));
-    }
+    SlabCoordinates<double> along = along_slab_axes(n.x, n.y, n.z);
+    for (double& coordinate : along) coordinate = std::clamp(coordinate, -1.0, 1.0);
+    *this |= slabs_between(along, along, slab_margin);
 }
 
 namespace {

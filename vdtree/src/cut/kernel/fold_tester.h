@@ -1,5 +1,5 @@
-// Tests nodes against a distance criterion from one viewpoint: whether they unfold, and how far the eye may move before that can
-// change.
+// Tests nodes against a distance criterion from one viewpoint: whether they unfold, and how far the eye may move before
+// that can change.
 #pragma once
 
 #include <optional>
@@ -16,15 +16,13 @@
 namespace unseen::vdtree {
 
 // What a test found. The verdict holds while the position clock has advanced by less than `position_slack`, the facing
-// clock by less than `facing_slack`, the planes' by less than `plane_slack` and the lights' by less than `light_slack` (mesh
-// units, 0 or more; see Motion).
+// clock by less than `facing_slack`, the planes' by less than `plane_slack` and the lights' by less than `light_slack`
+// (mesh units, 0 or more; see Motion).
 struct Verdict {
     float position_slack = 0;
     float facing_slack = 0;
     float plane_slack = 0; // without planes: huge
     float light_slack = 0; // without lights it counts for nothing
-    float cost = 0;      // D over the distance, by which budgets go; infinite where the eye is inside
-    float seen_cost = 0; // not less than the class's least cost: folded where at most the threshold
     bool unfolded = false;
 };
 
@@ -38,14 +36,17 @@ struct Motion {
 
 class FoldTester final : public CostSource {
 public:
-    // Nodes unfold where their seen cost exceeds `threshold`; without `least_costs`, where their cost does. Cost: a copy of the
-    // criterion's table.
-    FoldTester(const VertexTree& tree, const DistanceCriterion& criterion, bool cull_back_faces, float threshold, bool least_costs = true);
+    // Nodes unfold where their seen cost exceeds `threshold`; without `least_costs`, where their cost does. Cost: a
+    // copy of the criterion's table.
+    FoldTester(const VertexTree& tree, const DistanceCriterion& criterion, bool cull_back_faces, float threshold,
+               bool least_costs = true);
     FoldTester(const FoldTester&) = delete;
     FoldTester& operator=(const FoldTester&) = delete;
 
     // Only without least costs.
-    void set_threshold(float threshold) noexcept { view_.inverse_threshold = costs_view_.inverse_threshold = 1 / threshold; }
+    void set_threshold(float threshold) noexcept {
+        view_.inverse_threshold = costs_view_.inverse_threshold = 1 / threshold;
+    }
 
     // `length_per_radian` is what a rotation of the gaze counts as on the
     // position clock; any positive value will do, and it must be the same for verdicts and motions.
@@ -59,47 +60,41 @@ public:
     FoldCandidate candidate(NodeId node) const;
     void prefetch(NodeId node) const; // what candidate(node) will read
 
-    // Tests those of the candidates that `which` names from place `first` on, up to sixteen, and fetches some after them ahead.
-    void test(std::span<const FoldCandidate> candidates, std::span<const std::uint32_t> which, std::size_t first, TestBatch& tested) const;
-    // One verdict for each candidate, or for each node. Cost: some ten nanoseconds each.
+    // Tests those of the candidates that `which` names from place `first` on, up to sixteen, and fetches some after
+    // them ahead.
+    void test(std::span<const FoldCandidate> candidates, std::span<const std::uint32_t> which, std::size_t first,
+              TestBatch& tested) const;
+    // One verdict for each candidate. Cost: some ten nanoseconds each.
     void test(std::span<const FoldCandidate> candidates, std::span<Verdict> verdicts) const;
-    void test(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const;
     // Only whether they unfold, one bit each; the same verdicts.
     void decide(std::span<const NodeId> nodes, std::uint64_t* unfolded) const;
     void decide_range(NodeId first, std::size_t count, std::uint64_t* unfolded) const;
     void decide_at(float threshold, std::span<const NodeId> nodes, std::uint64_t* unfolded) const override;
-    // Both costs of nodes, and whether they unfold; the same as those of test_costs().
+    // The thresholds at which nodes would just fold, without and with their least costs (see NodeCosts), and whether
+    // they unfold. What nodes face is always found out, also where the verdict does not depend on it.
     void find_costs(std::span<const NodeId> nodes, const NodeCosts& costs) const override;
-    // Without a look at what faces the eye: at a third of the price. Not with lights.
+    // Bounds: without a look at what faces the eye, at a third of the price. Not with lights.
     bool has_bounds() const noexcept override { return !has_lights(); }
     void find_cost_bounds(std::span<const NodeId> nodes, const float* folded_at, float* cost,
                           float* seen_cost) const override;
     bool has_lights() const noexcept { return lit_.has_value(); }
     bool is_monotone() const noexcept override { return criterion_.is_monotone(); }
-    // The same where costs count, not only what is above the threshold: what nodes face is always found out. (In the above, the
-    // costs of nodes that are far from the threshold may be those of another facing.)
-    void test_costs(std::span<const NodeId> nodes, std::span<Verdict> verdicts) const;
-
-    // But for the lights: from one viewpoint to another with as many frusta of as many planes; infinite where these differ.
+    // But for the lights: from one viewpoint to another with as many frusta of as many planes; infinite where these
+    // differ.
     static Motion motion(const VertexTree& tree, const Viewpoint& from, const Viewpoint& to, double length_per_radian);
 
 private:
     using Lanes = std::span<const FoldCandidate* const>; // of one batch, at most sixteen
 
-    void test_nodes(std::span<const NodeId> nodes, std::span<Verdict> verdicts, bool costs) const;
-    void test_batch(Lanes lanes, Verdict* verdicts, bool costs) const;
-    void test_in_stages(Lanes lanes, TestBatch& tested, Verdict* costs) const;
-    void find_facings(Lanes lanes, const FoldBatch& batch, bool costs, Findings& findings) const;
-    void find_position_slacks(const FoldBatch& batch, Findings& findings) const;
-    void light(Lanes lanes, FoldBatch& batch, LitFindings& lit) const;
+    template <class F>
+    void for_each_batch(const KernelView& view, std::span<const NodeId> nodes, F&& f) const;
+    void find_lit_verdicts(const KernelView& view, Lanes lanes, LitFindings& lit, FoldBatch& batch) const;
+    void test_lit(Lanes lanes, TestBatch& tested) const;
+    void leave_room_for_lights(LitFindings& lit, FoldBatch& batch) const;
     CostTables cost_tables() const;
-    void leave_room_for_lights(LitFindings& lit, FoldBatch& batch, const Findings& findings) const;
-    void set_costs(Verdict& verdict, const FoldBatch& batch, std::size_t lane, bool is_silhouette) const;
-    void set_costs(Verdict& verdict, std::int32_t row, std::int32_t bin, float unit, float gap) const;
 
     const VertexTree& tree_;
     const DistanceCriterion& criterion_;
-    bool cull_back_faces_, has_silhouettes_;
     NodeArrays arrays_;        // of the tree and the criterion
     std::vector<float> reach_; // of the criterion; infinite where the fold is seen from everywhere
     KernelView view_, costs_view_;

@@ -5,39 +5,43 @@
 
 #include <glm/geometric.hpp>
 
+#include "simd.h"
+
 namespace unseen::vdtree {
 
 namespace {
-
-#define UNSEEN_INLINE __attribute__((always_inline)) inline
 
 // Covers the rounding of some dozens of operations on floats, as a share and as relative luminance.
 constexpr float range_rounding = 1e-5f;
 constexpr float position_rounding = 1e-6f; // of centres, as a share
 constexpr float tiny = 1e-30f;
-constexpr float brightest = 1e12f; // relative luminance; what the least facing and albedo that are not 0 leave of it is still beyond 1
+// Relative luminance; what the least facing and albedo that are not 0 leave of it is still beyond 1.
+constexpr float brightest = 1e12f;
 constexpr float largest_ratio = 1e15f; // of distances
 
 // How far a light may move for the rates to hold, and what they grow by until then.
-constexpr float longest_turn = 0.5f;    // radians, of directional lights: intensities change by exp(0.5 / 8) at most, 0.129 a unit
+// Radians, of directional lights: intensities change by exp(0.5 / 8) at most, 0.129 a unit.
+constexpr float longest_turn = 0.5f;
 constexpr float intensity_rate = 0.13f, turn_growth = 1.07f;
-constexpr float longest_step = 0.1f;    // of the distance to the sphere: (1 / (1 - 0.1))^2 - 1 < 2.4 * 0.1; cubed 1.372
+constexpr float longest_step = 0.1f; // of the distance to the sphere: (1 / (1 - 0.1))^2 - 1 < 2.4 * 0.1; cubed 1.372
 constexpr float square_rate = 2.4f, cube_growth = 1.372f, step_growth = 1.3f, arc_rate = 1.02f;
-constexpr float steepest_sine = 0.8f;   // of the sphere's half-angle seen from the light; from nearer by, rates hold for no step at all
-constexpr float widening_rate = 2.1f;   // of the half-angle: 1 / (cosine (1 - longest_step)), with the sine below that
+// Of the sphere's half-angle seen from the light; from nearer by, rates hold for no step at all.
+constexpr float steepest_sine = 0.8f;
+constexpr float widening_rate = 2.1f; // of the half-angle: 1 / (cosine (1 - longest_step)), with the sine below that
 constexpr float longest_highlight_turn = 0.1f; // radians
 
 // What all lanes have of one light.
 struct Direction {
     float x, y, z;
-    float sine, cosine;     // of the half-angle that directions from the sphere's points are within
-    float turn, widen;      // rates of the direction and the half-angle
+    float sine, cosine; // of the half-angle that directions from the sphere's points are within
+    float turn, widen;  // rates of the direction and the half-angle
     bool anywhere;
 };
 
 UNSEEN_INLINE float squared(float x) { return x * x; }
 
-// Cosines of the angles nearest and farthest from a direction at angle (c, s) within the angle (cg, sg): largest and least.
+// Cosines of the angles nearest and farthest from a direction at angle (c, s) within the angle (cg, sg): largest and
+// least.
 struct Window {
     float largest, least;
     float beyond; // minus the cosine of the nearest angle, where that is beyond 90 degrees; else 0
@@ -52,7 +56,8 @@ UNSEEN_INLINE Window window(float c, float s, float cg, float sg) {
     return w;
 }
 
-// The same for directions whose coordinates lie in the lane's box, and which differ from the one given by no more than a chord.
+// The same for directions whose coordinates lie in the lane's box, and which differ from the one given by no more than
+// a chord.
 struct BoxBounds {
     float largest, least;
 };
@@ -69,14 +74,17 @@ UNSEEN_INLINE BoxBounds box_bounds(const LitBatch& b, std::size_t i, float x, fl
     return {has_box ? hi + chord + rounding : 2.0f, has_box ? lo - chord - rounding : -2.0f};
 }
 // Between unit vectors at an angle.
-UNSEEN_INLINE float chord_of(float sine, float cosine) { return sine / std::sqrt(std::max((1 + cosine) * 0.5f, 1e-6f)); }
+UNSEEN_INLINE float chord_of(float sine, float cosine) {
+    return sine / std::sqrt(std::max((1 + cosine) * 0.5f, 1e-6f));
+}
 
 UNSEEN_INLINE float angle_sine(float ax, float ay, float az, float bx, float by, float bz) {
     return std::sqrt(squared(ay * bz - az * by) + squared(az * bx - ax * bz) + squared(ax * by - ay * bx));
 }
 
 // From a sphere's points to a point.
-UNSEEN_INLINE Direction towards(const float (&from)[3], float radius, const float (&to)[3], float tree_radius, float& near, float& far) {
+UNSEEN_INLINE Direction towards(const float (&from)[3], float radius, const float (&to)[3], float tree_radius,
+                                float& near, float& far) {
     const float x = to[0] - from[0], y = to[1] - from[1], z = to[2] - from[2];
     const float distance = std::sqrt(x * x + y * y + z * z), inverse = 1 / std::max(distance, tiny);
     Direction d;
@@ -96,111 +104,186 @@ UNSEEN_INLINE float step_of(float cosine, float outer, float inner) {
     return t * t * (3 - 2 * t);
 }
 
+// What a light sends to a vertex with the normal n and the albedo r is
+//
+//     L = I (n.l)+ (r + k (n.h)+^e),      h = (l + v) / |l + v|,
+//
+// where I is its intensity there, l and v are the directions to the light and to the eye, ()+ is no less than 0, and k
+// and e are the highlight's. Of a node's vertices it is known that their normals are in a cone (and in a box), their
+// albedos in an interval, and their places in a sphere. With the largest and least values of each factor over these,
+//
+//     L <= I_most (n.l)_most (r_most + k (n.h)_most^e),      L >= I_least (n.l)_least (r_least + k (n.h)_least^e).
+//
+// Each factor also has a rate: by how much it changes at most while the lights move by 1 (see light_motion()), for
+// moves up to the cap.
+
+// A light as a node's sphere sees it.
+struct Beam {
+    Direction to;                // the directions to it
+    float most, least;           // intensity
+    float most_rate, least_rate; // shares of these
+    float spread_rate;           // of most * largest albedo - least * least albedo
+    float fade_rate;             // of the intensity, by a spot's edge
+    float growth;                // of other rates, until the cap
+    float cap;                   // moves, as light_motion() counts them
+};
+
+// The edge of a spot: which share of the intensity comes through, and how fast that changes.
+UNSEEN_INLINE void fade(const KernelLights::Light& light, float largest_albedo, Beam& beam) {
+    const Direction& l = beam.to;
+    const float c = -(l.x * light.direction[0] + l.y * light.direction[1] + l.z * light.direction[2]);
+    const float s = angle_sine(l.x, l.y, l.z, light.direction[0], light.direction[1], light.direction[2]);
+    const Window off_axis = window(c, s, l.anywhere ? -1.0f : l.cosine, l.anywhere ? -1.0f : l.sine);
+    const float moves = l.turn + l.widen + 1, reach = moves * beam.cap;
+    const bool fades =
+        !(off_axis.largest + reach <= light.outer_cosine || off_axis.least - reach >= light.inner_cosine);
+    beam.fade_rate = fades ? light.fade * moves * beam.most : 0.0f;
+    // Rounding of the cosines, where the step is steep.
+    const float inexact = 1e-6f * light.fade;
+    beam.most *= std::min(step_of(off_axis.largest, light.outer_cosine, light.inner_cosine) + inexact, 1.0f);
+    beam.least *= std::max(step_of(off_axis.least, light.outer_cosine, light.inner_cosine) - inexact, 0.0f);
+    beam.spread_rate = beam.most_rate * beam.most * largest_albedo; // the step may keep one and lower the other
+    if (beam.most <= 2 * inexact && !fades) beam.most_rate = beam.spread_rate = 0;
+}
+
+template <LightSource::Kind kind>
+UNSEEN_INLINE Beam beam_of(const KernelLights& all, const KernelLights::Light& light, const float (&centre)[3],
+                           float radius, float largest_albedo, float least_albedo) {
+    Beam beam;
+    beam.fade_rate = 0;
+    if constexpr (kind == LightSource::Kind::directional) {
+        beam.to = {light.direction[0], light.direction[1], light.direction[2], 0, 1, 1, 0, false};
+        beam.most = beam.least = light.intensity;
+        beam.most_rate = beam.least_rate = intensity_rate;
+        beam.spread_rate = intensity_rate * light.intensity * (largest_albedo - least_albedo);
+        beam.cap = longest_turn;
+        beam.growth = turn_growth;
+        return beam;
+    }
+    float near, far;
+    beam.to = towards(centre, radius + light.inexact, light.position, all.radius, near, far);
+    // So near that a float would not hold it, a light is as bright as any.
+    beam.most = std::min(brightest, light.intensity * squared(std::min(light.distance / near, largest_ratio)));
+    beam.least = beam.to.anywhere
+                     ? 0.0f
+                     : std::min(brightest, light.intensity * squared(std::min(light.distance / far, largest_ratio)));
+    beam.most_rate = square_rate * all.radius / near + intensity_rate;
+    beam.least_rate = square_rate * all.radius / far + intensity_rate;
+    // Both fall with the distance: their difference changes by the difference of the changes.
+    beam.spread_rate =
+        2 * all.radius * (cube_growth * beam.most * largest_albedo / near - beam.least * least_albedo / far) +
+        intensity_rate * (beam.most * largest_albedo - beam.least * least_albedo);
+    beam.cap = beam.to.sine > steepest_sine ? 0.0f : longest_step * near / all.radius;
+    beam.growth = step_growth;
+    if constexpr (kind == LightSource::Kind::spot) fade(light, largest_albedo, beam);
+    return beam;
+}
+
+// How the lane's normals face a light: the extremes of (n.l)+, and what their rates are made of.
+struct LitFacing {
+    float most, least;
+    float beyond;  // of Window; 0: some of it is lit
+    float nearest; // of the least n.l to 0, from either side
+    bool faces;    // all of it
+    float sine;    // of the half-angle of normals and directions together
+    float moves;   // most change of n.l while the lights move by 1
+};
+UNSEEN_INLINE LitFacing facing_of(const LitBatch& b, std::size_t i, const Direction& l) {
+    const float ax = b.axis[0][i], ay = b.axis[1][i], az = b.axis[2][i];
+    const float c = ax * l.x + ay * l.y + az * l.z, s = angle_sine(ax, ay, az, l.x, l.y, l.z);
+    const float cosine = l.anywhere ? -1.0f : b.cosine[i] * l.cosine - b.sine[i] * l.sine;
+    const float sine = l.anywhere ? -1.0f : b.sine[i] * l.cosine + b.cosine[i] * l.sine;
+    const Window cone = window(c, s, cosine, sine);
+    const BoxBounds box = box_bounds(b, i, l.x, l.y, l.z, l.anywhere ? 4.0f : chord_of(l.sine, l.cosine));
+    const float largest = std::min(cone.largest, box.largest), least = std::max(cone.least, box.least);
+    return {std::max(largest, 0.0f),
+            std::max(least, 0.0f),
+            std::max(-largest, 0.0f),
+            std::abs(least),
+            least > 0,
+            sine,
+            (l.turn + l.widen) * std::max(b.steepness[i], 1.0f)};
+}
+
+// The matt surface: I (n.l)+ r.
+UNSEEN_INLINE void add_matt(const Beam& beam, const LitFacing& facing, LitBatch& b, std::size_t i) {
+    const float largest_albedo = b.largest_albedo[i], least_albedo = b.least_albedo[i], moves = facing.moves;
+    b.hi[i] += beam.most * facing.most * largest_albedo;
+    b.lo[i] += beam.least * facing.least * least_albedo;
+    const float rise = beam.growth * beam.most * largest_albedo * moves + beam.most_rate * beam.most * largest_albedo +
+                       beam.fade_rate * largest_albedo;
+    const float full = rise + beam.growth * beam.least * least_albedo * moves +
+                       beam.least_rate * beam.least * least_albedo + beam.fade_rate * largest_albedo;
+    // Where all of it faces the light, the difference of the extremes of n.l changes by less than 2 sine a radian, or
+    // the spread of the box; where some of it faces away, by the largest alone, and where all of it does, not at all.
+    const float turning_rate =
+        beam.growth * (beam.least * least_albedo *
+                           (std::max(2 * std::max(facing.sine, 0.0f), b.spread[i]) * beam.to.turn + 2 * beam.to.widen) +
+                       (beam.most * largest_albedo - beam.least * least_albedo) * moves) +
+        beam.spread_rate + 2 * beam.fade_rate * largest_albedo;
+    const float facing_rate = turning_rate + beam.least_rate * beam.least * least_albedo * (facing.most - facing.least);
+    const bool is_dark = facing.beyond > 0;
+    b.fine_rate[i] += is_dark ? 0.0f : facing.faces ? facing_rate : rise;
+    // Whichever of these it comes to be; with the largest n.l at 1 and beyond, lo alone counts.
+    b.rough_rate[i] +=
+        std::max(std::max(rise, full - rise), turning_rate + beam.least_rate * beam.least * least_albedo);
+    b.fine_sum_rate[i] += is_dark ? 0.0f : facing.faces ? full : rise;
+    const float fine_cap = (is_dark ? facing.beyond : facing.nearest) / moves;
+    b.full_rate[i] += full;
+    b.rise_rate[i] += rise;
+    b.fine_cap[i] = std::min(b.fine_cap[i], fine_cap);
+    b.cap[i] = std::min(b.cap[i], beam.to.anywhere ? 0.0f : beam.cap);
+}
+
+// The highlight: I (n.l)+ k (n.h)+^e. Its steps have no rates: as far as the cap allows them, they are part of the
+// jump.
+UNSEEN_INLINE void add_highlight(const KernelLights& all, const Beam& beam, const LitFacing& facing,
+                                 const float (&centre)[3], float radius, LitBatch& b, std::size_t i) {
+    const Direction& l = beam.to;
+    const float ax = b.axis[0][i], ay = b.axis[1][i], az = b.axis[2][i];
+    float near_eye, far_eye;
+    const Direction v = towards(centre, radius + all.eye_inexact, all.eye, all.radius, near_eye, far_eye);
+    const float x = l.x + v.x, y = l.y + v.y, z = l.z + v.z;
+    const float length = std::sqrt(x * x + y * y + z * z), inverse = 1 / std::max(length, tiny);
+    // How far from their sum's direction the sum of two directions can be that differ by these chords from the
+    // centre's.
+    const auto chord = [](const Direction& d) { return d.anywhere ? 2.0f : chord_of(d.sine, d.cosine); };
+    const float chords = chord(l) + chord(v) + 1e-6f;
+    // Of the axis and h.
+    const float hc = (ax * x + ay * y + az * z) * inverse, hs = angle_sine(ax, ay, az, x, y, z) * inverse;
+    const auto highlight = [&](float total, bool largest) { // (n.h)+^e
+        const float sine = total * inverse;
+        if (!(sine < 1)) return largest ? 1.0f : 0.0f;
+        const float cosine = std::sqrt(1 - sine * sine);
+        const Window h =
+            window(hc, hs, b.cosine[i] * cosine - b.sine[i] * sine, b.sine[i] * cosine + b.cosine[i] * sine);
+        // A float's cosine near 1 is good to a millionth, and the exponent makes more of it.
+        const BoxBounds within = box_bounds(b, i, x * inverse, y * inverse, z * inverse, chord_of(sine, cosine));
+        const float base = largest ? std::min(std::min(h.largest, within.largest) + 2e-7f, 1.0f)
+                                   : std::max(h.least, within.least) - 2e-7f;
+        return base > 0 ? std::pow(base, all.shininess) : 0.0f;
+    };
+    b.hi[i] += all.specular * beam.most * facing.most * highlight(chords, true);
+    b.lo[i] += all.specular * beam.least * facing.least * highlight(chords, false);
+    const float all_moves = facing.moves + v.turn + v.widen;
+    const float window_cap =
+        v.sine > steepest_sine
+            ? 0.0f
+            : std::min({b.cap[i], longest_step * near_eye / all.radius, longest_highlight_turn / all_moves});
+    b.cap[i] = window_cap;
+    b.jump[i] += all.specular * beam.most * step_growth * highlight(chords + all_moves * window_cap, true);
+}
+
 // One light on one lane.
 template <LightSource::Kind kind, bool shines>
 UNSEEN_INLINE void add(const KernelLights& all, const KernelLights::Light& light, LitBatch& b, std::size_t i) {
     const float centre[3] = {b.centre[0][i], b.centre[1][i], b.centre[2][i]};
     const float at_centre = std::abs(centre[0]) + std::abs(centre[1]) + std::abs(centre[2]);
     const float radius = b.radius[i] + position_rounding * (at_centre + b.radius[i]);
-    const float ah = b.largest_albedo[i], al = b.least_albedo[i];
-
-    // Where it is, how bright it is there, and how fast that changes.
-    Direction l;
-    float most, least, most_rate, least_rate, spread_rate, cap, growth, fade_rate = 0;
-    if constexpr (kind == LightSource::Kind::directional) {
-        l = {light.direction[0], light.direction[1], light.direction[2], 0, 1, 1, 0, false};
-        most = least = light.intensity;
-        most_rate = least_rate = intensity_rate;
-        spread_rate = intensity_rate * light.intensity * (ah - al);
-        cap = longest_turn;
-        growth = turn_growth;
-    } else {
-        float near, far;
-        l = towards(centre, radius + light.inexact, light.position, all.radius, near, far);
-        // So near that a float would not hold it, a light is as bright as any.
-        most = std::min(brightest, light.intensity * squared(std::min(light.distance / near, largest_ratio)));
-        least = l.anywhere ? 0.0f : std::min(brightest, light.intensity * squared(std::min(light.distance / far, largest_ratio)));
-        most_rate = square_rate * all.radius / near + intensity_rate;
-        least_rate = square_rate * all.radius / far + intensity_rate;
-        // Both fall with the distance: their difference changes by the difference of the changes.
-        spread_rate = 2 * all.radius * (cube_growth * most * ah / near - least * al / far) + intensity_rate * (most * ah - least * al);
-        cap = l.sine > steepest_sine ? 0.0f : longest_step * near / all.radius;
-        growth = step_growth;
-        if constexpr (kind == LightSource::Kind::spot) {
-            const float c = -(l.x * light.direction[0] + l.y * light.direction[1] + l.z * light.direction[2]);
-            const float s = angle_sine(l.x, l.y, l.z, light.direction[0], light.direction[1], light.direction[2]);
-            const Window w = window(c, s, l.anywhere ? -1.0f : l.cosine, l.anywhere ? -1.0f : l.sine);
-            const float moves = l.turn + l.widen + 1, reach = moves * cap;
-            const bool fades = !(w.largest + reach <= light.outer_cosine || w.least - reach >= light.inner_cosine);
-            fade_rate = fades ? light.fade * moves * most : 0.0f;
-            // Rounding of the cosines, where the step is steep.
-            const float inexact = 1e-6f * light.fade;
-            most *= std::min(step_of(w.largest, light.outer_cosine, light.inner_cosine) + inexact, 1.0f);
-            least *= std::max(step_of(w.least, light.outer_cosine, light.inner_cosine) - inexact, 0.0f);
-            spread_rate = most_rate * most * ah; // the step may keep one and lower the other
-            if (most <= 2 * inexact && !fades) most_rate = spread_rate = 0;
-        }
-    }
-
-    // The matt surface.
-    const float ax = b.axis[0][i], ay = b.axis[1][i], az = b.axis[2][i];
-    const float c = ax * l.x + ay * l.y + az * l.z, s = angle_sine(ax, ay, az, l.x, l.y, l.z);
-    const float cg = l.anywhere ? -1.0f : b.cosine[i] * l.cosine - b.sine[i] * l.sine;
-    const float sg = l.anywhere ? -1.0f : b.sine[i] * l.cosine + b.cosine[i] * l.sine;
-    Window facing = window(c, s, cg, sg);
-    const BoxBounds box = box_bounds(b, i, l.x, l.y, l.z, l.anywhere ? 4.0f : chord_of(l.sine, l.cosine));
-    facing.largest = std::min(facing.largest, box.largest);
-    facing.least = std::max(facing.least, box.least);
-    facing.beyond = std::max(-facing.largest, 0.0f);
-    const float u = std::max(facing.largest, 0.0f), w = std::max(facing.least, 0.0f);
-    const float moves = (l.turn + l.widen) * std::max(b.steepness[i], 1.0f);
-    b.hi[i] += most * u * ah;
-    b.lo[i] += least * w * al;
-    const float rise = growth * most * ah * moves + most_rate * most * ah + fade_rate * ah;
-    const float full = rise + growth * least * al * moves + least_rate * least * al + fade_rate * ah;
-    // Where all of it faces the light, u - w changes by less than 2 sin gamma a radian, or the spread of the box; where some of it faces away, by u alone, and where
-    // all of it does, not at all.
-    const float turning_rate = growth * (least * al * (std::max(2 * std::max(sg, 0.0f), b.spread[i]) * l.turn + 2 * l.widen) + (most * ah - least * al) * moves) +
-                               spread_rate + 2 * fade_rate * ah;
-    const float facing_rate = turning_rate + least_rate * least * al * (u - w);
-    const bool is_dark = facing.beyond > 0, faces = facing.least > 0;
-    b.fine_rate[i] += is_dark ? 0.0f : faces ? facing_rate : rise;
-    // Whichever of these it comes to be; with u at 1 and beyond, lo alone counts.
-    b.rough_rate[i] += std::max(std::max(rise, full - rise), turning_rate + least_rate * least * al);
-    b.fine_sum_rate[i] += is_dark ? 0.0f : faces ? full : rise;
-    const float fine_cap = (is_dark ? facing.beyond : std::abs(facing.least)) / moves;
-    b.full_rate[i] += full;
-    b.rise_rate[i] += rise;
-    b.fine_cap[i] = std::min(b.fine_cap[i], fine_cap);
-    b.cap[i] = std::min(b.cap[i], l.anywhere ? 0.0f : cap);
-
-    // The highlight.
-    if constexpr (!shines) return;
-    float near_eye, far_eye;
-    const Direction v = towards(centre, radius + all.eye_inexact, all.eye, all.radius, near_eye, far_eye);
-    const float x = l.x + v.x, y = l.y + v.y, z = l.z + v.z;
-    const float length = std::sqrt(x * x + y * y + z * z), inverse = 1 / std::max(length, tiny);
-    // How far from their sum's direction the sum of two directions can be that differ by these chords from the centre's.
-    const auto chord = [](const Direction& d) { return d.anywhere ? 2.0f : chord_of(d.sine, d.cosine); };
-    const float chords = chord(l) + chord(v) + 1e-6f;
-    const float hc = (ax * x + ay * y + az * z) * inverse, hs = angle_sine(ax, ay, az, x, y, z) * inverse;
-    const auto highlight = [&](float total, bool largest) {
-        const float sine = total * inverse;
-        if (!(sine < 1)) return largest ? 1.0f : 0.0f;
-        const float cosine = std::sqrt(1 - sine * sine);
-        const Window h = window(hc, hs, b.cosine[i] * cosine - b.sine[i] * sine, b.sine[i] * cosine + b.cosine[i] * sine);
-        // A float's cosine near 1 is good to a millionth, and the exponent makes more of it.
-        const BoxBounds within = box_bounds(b, i, x * inverse, y * inverse, z * inverse, chord_of(sine, cosine));
-        const float base = largest ? std::min(std::min(h.largest, within.largest) + 2e-7f, 1.0f) : std::max(h.least, within.least) - 2e-7f;
-        return base > 0 ? std::pow(base, all.shininess) : 0.0f;
-    };
-    b.hi[i] += all.specular * most * u * highlight(chords, true);
-    b.lo[i] += all.specular * least * w * highlight(chords, false);
-    const float window_cap = v.sine > steepest_sine ? 0.0f
-                                                    : std::min({b.cap[i], longest_step * near_eye / all.radius,
-                                                                longest_highlight_turn / (moves + v.turn + v.widen)});
-    b.cap[i] = window_cap;
-    b.jump[i] += all.specular * most * step_growth * highlight(chords + (moves + v.turn + v.widen) * window_cap, true);
+    const Beam beam = beam_of<kind>(all, light, centre, radius, b.largest_albedo[i], b.least_albedo[i]);
+    const LitFacing facing = facing_of(b, i, beam.to);
+    add_matt(beam, facing, b, i);
+    if constexpr (shines) add_highlight(all, beam, facing, centre, radius, b, i);
 }
 
 template <bool shines>
@@ -226,8 +309,10 @@ UNSEEN_INLINE void prepare_box(LitBatch& b, std::size_t i) {
     b.across[0][0][i] = 1 + sign * x * x * a, b.across[0][1][i] = sign * xya, b.across[0][2][i] = -sign * x;
     b.across[1][0][i] = xya, b.across[1][1][i] = sign + y * y * a, b.across[1][2][i] = -y;
     const float short_by = squared(1 - b.cosine[i]);
-    const float far0 = squared(std::max(-b.least_across[0][i], b.largest_across[0][i])), far1 = squared(std::max(-b.least_across[1][i], b.largest_across[1][i]));
-    const float width0 = b.largest_across[0][i] - b.least_across[0][i], width1 = b.largest_across[1][i] - b.least_across[1][i];
+    const float far0 = squared(std::max(-b.least_across[0][i], b.largest_across[0][i])),
+                far1 = squared(std::max(-b.least_across[1][i], b.largest_across[1][i]));
+    const float width0 = b.largest_across[0][i] - b.least_across[0][i],
+                width1 = b.largest_across[1][i] - b.least_across[1][i];
     // One bound may be the cone's, whose normals are within a chord of the axis, and the other the box's.
     const float mixed = std::sqrt(2 - 2 * b.cosine[i]) + std::sqrt(far0 + far1 + short_by);
     const bool has_box = width0 > 0;
@@ -256,13 +341,7 @@ UNSEEN_INLINE void run(const KernelLights& all, LitBatch& b) {
     }
 }
 
-#if defined(__x86_64__) && defined(__GNUC__)
-[[gnu::target("avx2")]] void run_avx2(const KernelLights& all, LitBatch& b) { run(all, b); }
-const bool has_avx2 = __builtin_cpu_supports("avx2");
-#else
-constexpr bool has_avx2 = false;
-void run_avx2(const KernelLights&, LitBatch&) {}
-#endif
+UNSEEN_AVX2 void run_avx2(const KernelLights& all, LitBatch& b) { run(all, b); }
 
 } // namespace
 
@@ -271,8 +350,8 @@ KernelLights::KernelLights(const VertexTree& tree, const Lighting& lighting, glm
 
 KernelLights::KernelLights(const Lighting& lighting, glm::dvec3 eye_, double tree_radius)
     : ambient(static_cast<float>(lighting.ambient)),
-      specular(static_cast<float>(lighting.specular * (lighting.shininess + 8) / 8)), shininess(static_cast<float>(lighting.shininess)),
-      radius(static_cast<float>(tree_radius)) {
+      specular(static_cast<float>(lighting.specular * (lighting.shininess + 8) / 8)),
+      shininess(static_cast<float>(lighting.shininess)), radius(static_cast<float>(tree_radius)) {
     constexpr double float_rounding = 1e-7;
     const auto size = [](glm::dvec3 v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); };
     for (int k = 0; k < 3; ++k) eye[k] = static_cast<float>(eye_[k]);
@@ -307,12 +386,13 @@ void LitBatch::set(std::size_t lane, const VertexCone& cone, const Sphere& spher
     centre[0][lane] = sphere.centre.x, centre[1][lane] = sphere.centre.y, centre[2][lane] = sphere.centre.z;
     radius[lane] = sphere.radius;
 
-    for (std::size_t k = 0; k < 2; ++k) least_across[k][lane] = cone.least_across[k], largest_across[k][lane] = cone.largest_across[k];
+    for (std::size_t k = 0; k < 2; ++k)
+        least_across[k][lane] = cone.least_across[k], largest_across[k][lane] = cone.largest_across[k];
 }
 
 // Neither has fused operations, so both give the same bits.
 void find_ranges(const KernelLights& lights, LitBatch& batch) noexcept {
-    if (has_avx2) run_avx2(lights, batch);
+    if (has_avx2()) run_avx2(lights, batch);
     else run(lights, batch);
 }
 

@@ -2,10 +2,11 @@
 
 #include <cstring>
 
+#include "simd.h"
+
 namespace unseen::vdtree {
 
 // Loops over all lanes are such as compilers make vectors of.
-#define UNSEEN_INLINE __attribute__((always_inline)) inline
 
 namespace {
 
@@ -80,7 +81,7 @@ UNSEEN_INLINE void LitTester::find_classes(LitFindings& lit) const {
 
 UNSEEN_INLINE void LitTester::find_room(LitFindings& lit) const {
     const LitBatch& batch = lit.ranges;
-    const auto reach = [&](std::int32_t luminance, std::int32_t contrast, std::int32_t bin) __attribute__((always_inline)) {
+    const auto reach = [&](std::int32_t luminance, std::int32_t contrast, std::int32_t bin) UNSEEN_INLINE_LAMBDA {
         return at(reach_, row(luminance, contrast) * bins_ + bin);
     };
     // Any class of luminance where that changes nothing, else the next one or the same.
@@ -107,7 +108,7 @@ UNSEEN_INLINE void LitTester::find_room(LitFindings& lit) const {
         }
     }
     // Of the way to the limit, in classes: most of it; the rest is for the eye.
-    const auto lights_share = [](std::int32_t classes) __attribute__((always_inline)) { return classes - classes / 8; };
+    const auto lights_share = [](std::int32_t classes) UNSEEN_INLINE_LAMBDA { return classes - classes / 8; };
     for (std::size_t i = 0; i < kernel_lanes; ++i) {
         const std::int32_t own = lit.contrast[i];
         const std::int32_t below = own - std::min(first[i], own), above = std::max(first[i], own + 1) - 1 - own;
@@ -140,25 +141,18 @@ UNSEEN_INLINE void LitTester::find_room(LitFindings& lit) const {
     }
 }
 
-#if defined(__x86_64__) && defined(__GNUC__)
-[[gnu::target("avx2")]] void LitTester::find_classes_avx2(LitFindings& lit) const { find_classes(lit); }
-[[gnu::target("avx2")]] void LitTester::find_room_avx2(LitFindings& lit) const { find_room(lit); }
-static const bool has_avx2 = __builtin_cpu_supports("avx2");
-#else
-constexpr bool has_avx2 = false;
-void LitTester::find_classes_avx2(LitFindings&) const {}
-void LitTester::find_room_avx2(LitFindings&) const {}
-#endif
+UNSEEN_AVX2 void LitTester::find_classes_avx2(LitFindings& lit) const { find_classes(lit); }
+UNSEEN_AVX2 void LitTester::find_room_avx2(LitFindings& lit) const { find_room(lit); }
 
 // Neither has fused operations, so both give the same bits.
 void LitTester::find_rows(LitFindings& lit) const {
     find_ranges(lights_, lit.ranges);
-    if (has_avx2) find_classes_avx2(lit);
+    if (has_avx2()) find_classes_avx2(lit);
     else find_classes(lit);
 }
 
 void LitTester::leave_room(LitFindings& lit) const {
-    if (has_avx2) find_room_avx2(lit);
+    if (has_avx2()) find_room_avx2(lit);
     else find_room(lit);
 }
 

@@ -1,4 +1,8 @@
+<<<<<<<< HEAD:vdtree/src/cut/watch_list.cpp
 #include "cut/watch_list.h"
+========
+#include "cut/deadlines.h"
+>>>>>>>> kernel:vdtree/src/cut_deadlines.cpp
 
 #include <algorithm>
 #include <bit>
@@ -13,16 +17,17 @@
 namespace unseen::vdtree {
 
 template <class F>
-void WatchList::for_each_used(BlockId block, F&& f) const {
+void CutFront::for_each_used(BlockId block, F&& f) const {
     for (std::uint32_t left = used_[block]; left; left &= left - 1)
         f(static_cast<Slot>(block * block_slots + static_cast<std::size_t>(std::countr_zero(left))));
 }
 
-void WatchList::clear() {
+void CutFront::clear() {
     // Node by node where these are few, so that the cost does not go with the tree.
     if (size_ > slots_of_nodes_.size() / 32) std::ranges::fill(slots_of_nodes_, no_slot);
-    else for (BlockId block = 0; block < blocks_.size(); ++block)
-        for_each_used(block, [&](Slot slot) { slots_of_nodes_[candidates_[slot].node] = no_slot; });
+    else
+        for (BlockId block = 0; block < blocks_.size(); ++block)
+            for_each_used(block, [&](Slot slot) { slots_of_nodes_[candidates_[slot].node] = no_slot; });
     candidates_.clear();
     blocks_.clear();
     used_.clear();
@@ -39,9 +44,10 @@ void WatchList::clear() {
     set_clocks(0, 0);
 }
 
-void WatchList::reserve(std::size_t nodes) {
+void CutFront::reserve(std::size_t nodes) {
     if (slots_of_nodes_.empty()) slots_of_nodes_.assign(interior_count_, no_slot);
-    const std::size_t blocks = nodes / appended_slots + nodes / (8 * appended_slots) + 1; // an eighth for what comes later
+    // An eighth for what comes later.
+    const std::size_t blocks = nodes / appended_slots + nodes / (8 * appended_slots) + 1;
     candidates_.reserve(blocks * block_slots);
     blocks_.reserve(blocks);
     used_.reserve(blocks);
@@ -54,7 +60,7 @@ void WatchList::reserve(std::size_t nodes) {
 
 // ---- slots
 
-WatchList::BlockId WatchList::new_block() {
+CutFront::BlockId CutFront::new_block() {
     BlockId block;
     if (free_blocks_.empty()) {
         block = static_cast<BlockId>(blocks_.size());
@@ -75,7 +81,7 @@ WatchList::BlockId WatchList::new_block() {
     return block;
 }
 
-WatchList::Slot WatchList::take(BlockId block, const FoldCandidate& candidate) {
+CutFront::Slot CutFront::take(BlockId block, const FoldCandidate& candidate) {
     const auto place = static_cast<std::size_t>(std::countr_one(used_[block]));
     const Slot slot = static_cast<Slot>(block * block_slots + place);
     used_[block] = static_cast<std::uint16_t>(used_[block] | (1u << place));
@@ -85,16 +91,16 @@ WatchList::Slot WatchList::take(BlockId block, const FoldCandidate& candidate) {
     return slot;
 }
 
-WatchList::Slot WatchList::append(const FoldCandidate& candidate) {
+CutFront::Slot CutFront::append(const FoldCandidate& candidate) {
     if (first_unplaced_ == blocks_.size() || std::popcount(used_.back()) == appended_slots) new_block();
     return take(static_cast<BlockId>(blocks_.size() - 1), candidate);
 }
 
-void WatchList::end_append() {
+void CutFront::end_append() {
     for (; first_unplaced_ < blocks_.size(); ++first_unplaced_) place(first_unplaced_);
 }
 
-WatchList::Slot WatchList::insert(const FoldCandidate& candidate, Slot near) {
+CutFront::Slot CutFront::insert(const FoldCandidate& candidate, Slot near) {
     if (near == no_slot) {
         const BlockId block = new_block();
         const Slot slot = take(block, candidate);
@@ -112,7 +118,7 @@ WatchList::Slot WatchList::insert(const FoldCandidate& candidate, Slot near) {
     return take(block, candidate);
 }
 
-void WatchList::remove(NodeId node) {
+void CutFront::remove(NodeId node) {
     const Slot slot = slots_of_nodes_[node];
     if (slot == no_slot) return;
     slots_of_nodes_[node] = no_slot;
@@ -130,7 +136,7 @@ void WatchList::remove(NodeId node) {
 
 // ---- spheres
 
-float WatchList::distance_to(const glm::vec3& point) const noexcept {
+float CutFront::distance_to(const glm::vec3& point) const noexcept {
     float square = 0;
     for (int k = 0; k < 3; ++k) {
         const float e = (eye_high_[k] - point[k]) + eye_low_[k];
@@ -140,7 +146,7 @@ float WatchList::distance_to(const glm::vec3& point) const noexcept {
 }
 
 // Around the nodes that the block has.
-void WatchList::place(BlockId block) {
+void CutFront::place(BlockId block) {
     glm::vec3 lowest(std::numeric_limits<float>::infinity()), highest(-lowest);
     for_each_used(block, [&](Slot slot) {
         const glm::vec3& c = candidates_[slot].sphere.centre;
@@ -152,35 +158,38 @@ void WatchList::place(BlockId block) {
     for_each_used(block, [&](Slot slot) { include(block, candidates_[slot]); });
 }
 
-void WatchList::include(BlockId block, const FoldCandidate& candidate) {
+void CutFront::include(BlockId block, const FoldCandidate& candidate) {
     const glm::vec3 away = candidate.sphere.centre - spheres_.centre(block);
-    // Rounding of the differences in floats, of coordinates about as far from the origin as the centre and the radius are.
+    // Rounding of the differences in floats, of coordinates about as far from the origin as the centre and the radius
+    // are.
     const float inexact = sum_rounding * (glm::length(spheres_.centre(block)) + glm::length(away));
     spheres_.radius[block] = std::max(spheres_.radius[block], glm::length(away) + inexact);
 }
 
-void WatchList::reset_earliest(BlockId block) {
+void CutFront::reset_earliest(BlockId block) {
     earliest_.set(block, never, never, never);
     for (SideDeadlines* side : {&lights_, &planes_})
         if (side->is_used()) side->reset_earliest(block);
 }
 
 // What is left of them now.
-WatchList::Slacks WatchList::slacks_of(Slot slot) const noexcept {
+CutFront::Slacks CutFront::slacks_of(Slot slot) const noexcept {
     const std::size_t block = slot / block_slots, place = slot % block_slots;
-    const BlockDues& dues = blocks_[block];
+    const SlotDeadlines& deadlines = blocks_[block];
     const bool unfolded = (unfolded_[block] >> place) & 1;
     const float passed = spheres_.error[block] + position_clock_float_, distance = spheres_.distance[block];
-    const float position = (dues.position[place] - passed) + (unfolded ? -distance : distance) - sum_rounding * (passed + distance);
+    const float position =
+        (deadlines.position[place] - passed) + (unfolded ? -distance : distance) - sum_rounding * (passed + distance);
     const auto left = [&](const SideDeadlines& side) { return side.is_used() ? side.left(block, place) : 0.0f; };
-    return {unfolded, std::max(position, 0.0f), std::max(dues.facing[place] - facing_clock_float_.early, 0.0f),
+    return {unfolded, std::max(position, 0.0f), std::max(deadlines.facing[place] - facing_clock_float_.early, 0.0f),
             left(planes_), left(lights_)};
 }
 
-void WatchList::split(BlockId block) {
+void CutFront::split(BlockId block) {
     std::array<Slot, block_slots> slots;
     for (std::size_t i = 0; i < block_slots; ++i) slots[i] = static_cast<Slot>(block * block_slots + i);
-    std::ranges::nth_element(slots, slots.begin() + block_slots / 2, {}, [&](Slot slot) { return candidates_[slot].node; });
+    std::ranges::nth_element(slots, slots.begin() + block_slots / 2, {},
+                             [&](Slot slot) { return candidates_[slot].node; });
     const BlockId other = new_block();
     looked_at_.push_back(other);
     std::array<Slacks, block_slots> left; // by the block as it is
@@ -193,12 +202,12 @@ void WatchList::split(BlockId block) {
     place(block);
     place(other);
     reset_earliest(block);
-    for (std::size_t i = 0; i < block_slots; ++i) set_deadlines(slots[i], left[i]);
+    for (std::size_t i = 0; i < block_slots; ++i) set_left(slots[i], left[i]);
 }
 
 // ---- deadlines
 
-void WatchList::set_deadlines(Slot slot, const Slacks& slacks) {
+void CutFront::set_left(Slot slot, const Slacks& slacks) {
     const BlockId block = static_cast<BlockId>(slot / block_slots);
     const std::size_t place = slot % block_slots;
     const float passed = spheres_.error[block] + position_clock_float_, distance = spheres_.distance[block];
@@ -207,7 +216,8 @@ void WatchList::set_deadlines(Slot slot, const Slacks& slacks) {
     const float facing = (facing_clock_float_.early + slacks.facing) * just_less;
     blocks_[block].position[place] = position;
     blocks_[block].facing[place] = facing;
-    unfolded_[block] = static_cast<std::uint16_t>((unfolded_[block] & ~(1u << place)) | (std::uint32_t{slacks.unfolded} << place));
+    unfolded_[block] =
+        static_cast<std::uint16_t>((unfolded_[block] & ~(1u << place)) | (std::uint32_t{slacks.unfolded} << place));
     float& earliest = (slacks.unfolded ? earliest_.recede : earliest_.approach)[block];
     earliest = std::min(earliest, position);
     earliest_.facing[block] = std::min(earliest_.facing[block], facing);
@@ -215,40 +225,49 @@ void WatchList::set_deadlines(Slot slot, const Slacks& slacks) {
     if (planes_.is_used()) planes_.set(block, place, slacks.unfolded, slacks.planes);
 }
 
-void WatchList::set_deadlines(std::span<const Slot> slots, const TestBatch& tested, const Cutting& cutting) {
-    DueBatch dues;
-    dues.facing_clock = facing_clock_float_.early;
-    dues.longest = cutting.longest;
-    dues.hair = cutting.hair;
+// Unfolded nodes speak for their ancestors, too, whose tests round in their own way.
+void CutFront::set_deadlines(Slot slot, const Verdict& verdict) {
+    const float margin = verdict.unfolded ? rounding_margin_ : 0;
+    const float position_slack = std::min(verdict.position_slack, static_cast<float>(longest_slack_));
+    const auto less_margin = [&](float slack) { return std::max(slack - margin, 0.0f); };
+    set_left(slot, {verdict.unfolded, less_margin(position_slack), less_margin(verdict.facing_slack),
+                    less_margin(verdict.plane_slack), less_margin(verdict.light_slack)});
+}
+
+void CutFront::set_deadlines(std::span<const Slot> slots, const TestBatch& tested) {
+    DeadlineBatch found;
+    found.facing_clock = facing_clock_float_.early;
+    found.longest = static_cast<float>(longest_slack_);
+    found.margin = rounding_margin_;
     for (std::size_t i = 0; i < kernel_lanes; ++i) {
         const std::size_t block = slots[i < slots.size() ? i : 0] / block_slots;
-        dues.passed[i] = spheres_.error[block] + position_clock_float_;
-        dues.distance[i] = spheres_.distance[block];
+        found.passed[i] = spheres_.error[block] + position_clock_float_;
+        found.distance[i] = spheres_.distance[block];
     }
-    find_dues(tested, dues);
+    find_deadlines(tested, found);
     for (std::size_t i = 0; i < slots.size(); ++i) {
         const std::size_t block = slots[i] / block_slots, place = slots[i] % block_slots;
         const std::uint32_t unfolded = (tested.unfolded >> i) & 1;
-        blocks_[block].position[place] = dues.position[i];
-        blocks_[block].facing[place] = dues.facing[i];
+        blocks_[block].position[place] = found.position[i];
+        blocks_[block].facing[place] = found.facing[i];
         unfolded_[block] = static_cast<std::uint16_t>((unfolded_[block] & ~(1u << place)) | (unfolded << place));
         float& earliest = (unfolded ? earliest_.recede : earliest_.approach)[block];
-        earliest = std::min(earliest, dues.position[i]);
-        earliest_.facing[block] = std::min(earliest_.facing[block], dues.facing[i]);
-        const auto less_hair = [&](float slack) { return std::max(slack - (unfolded ? cutting.hair : 0), 0.0f); };
-        if (lights_.is_used()) lights_.set(block, place, unfolded, less_hair(tested.light_slack[i]));
-        if (planes_.is_used()) planes_.set(block, place, unfolded, less_hair(tested.plane_slack[i]));
+        earliest = std::min(earliest, found.position[i]);
+        earliest_.facing[block] = std::min(earliest_.facing[block], found.facing[i]);
+        const auto less_margin = [&](float slack) { return std::max(slack - (unfolded ? rounding_margin_ : 0), 0.0f); };
+        if (lights_.is_used()) lights_.set(block, place, unfolded, less_margin(tested.light_slack[i]));
+        if (planes_.is_used()) planes_.set(block, place, unfolded, less_margin(tested.plane_slack[i]));
     }
 }
 
-void WatchList::set_clocks(double position, double facing) {
+void CutFront::set_clocks(double position, double facing) {
     position_clock_ = position;
     facing_clock_ = facing;
     position_clock_float_ = static_cast<float>(position);
     facing_clock_float_ = kernel_clock(facing);
 }
 
-void WatchList::move_to(const glm::dvec3& eye, double facing) {
+void CutFront::move_to(const glm::dvec3& eye, double facing) {
     const double path = glm::length(eye - eye_);
     eye_ = eye;
     for (int k = 0; k < 3; ++k) {
@@ -261,7 +280,7 @@ void WatchList::move_to(const glm::dvec3& eye, double facing) {
     move_blocks(eye_high_, eye_low_, rounded_up(path), spheres_);
 }
 
-void WatchList::restart_clocks(double longest) {
+void CutFront::restart_clocks(double longest) {
     lights_.restart(longest);
     planes_.restart(longest);
     if (!(std::max({position_clock_, facing_clock_, path_}) > longest)) return;
@@ -272,27 +291,27 @@ void WatchList::restart_clocks(double longest) {
         spheres_.error[block] = 0;
         reset_earliest(block);
         set_clocks(0, 0);
-        for_each_used(block, [&](Slot slot) { set_deadlines(slot, left[slot % block_slots]); });
+        for_each_used(block, [&](Slot slot) { set_left(slot, left[slot % block_slots]); });
         set_clocks(position, facing);
     }
     set_clocks(0, 0);
     path_ = 0;
 }
 
-void WatchList::advance_lights(double light) {
+void CutFront::advance_lights(double light) {
     if (!lights_.is_used()) return;
     lights_.advance(light);
     hand_over(lights_);
 }
 
-void WatchList::advance_planes(double planes, const KernelView& view, float hair) {
+void CutFront::advance_planes(double planes, const KernelView& view) {
     if (!planes_.is_used()) return;
     planes_.advance(planes);
-    keep_inside(view, hair, planes_.clock(), spheres_, planes_.earliest_unfolded());
+    keep_inside(view, rounding_margin_, planes_.clock(), spheres_, planes_.earliest_unfolded());
     hand_over(planes_);
 }
 
-void WatchList::hand_over(SideDeadlines& side) {
+void CutFront::hand_over(SideDeadlines& side) {
     side.find_due_blocks(looked_at_);
     for (std::size_t i = 0; i < looked_at_.size(); ++i) {
         constexpr std::size_t ahead = 12; // blocks between a prefetch and its use
@@ -305,15 +324,15 @@ void WatchList::hand_over(SideDeadlines& side) {
     }
 }
 
-std::span<const WatchList::Slot> WatchList::collect_due() {
+std::span<const CutFront::Slot> CutFront::collect_due() {
     find_due_blocks(0);
     return collect_due(looked_at_);
 }
 
-void WatchList::find_due_blocks(BlockId first) {
+void CutFront::find_due_blocks(BlockId first) {
     due_blocks_.resize((blocks_.size() + 63) / 64);
     // In floats the clock may be a little late.
-    find_due(position_clock_float_, facing_clock_float_.late, spheres_, earliest_, due_blocks_.data());
+    vdtree::find_due_blocks(position_clock_float_, facing_clock_float_.late, spheres_, earliest_, due_blocks_.data());
     std::size_t count = 0;
     for (const std::uint64_t word : due_blocks_) count += static_cast<std::size_t>(std::popcount(word));
     looked_at_.resize(count);
@@ -324,16 +343,16 @@ void WatchList::find_due_blocks(BlockId first) {
     std::rotate(looked_at_.begin(), std::ranges::lower_bound(looked_at_, first), looked_at_.end());
 }
 
-std::span<const WatchList::Slot> WatchList::collect_due(std::span<const BlockId> blocks) {
+std::span<const CutFront::Slot> CutFront::collect_due(std::span<const BlockId> blocks) {
     if (const std::size_t room = blocks.size() * block_slots; due_.size() < room) due_.resize(room);
     // The blocks keep the earliest deadlines of what is not due; those of the others come back when they are set.
     return std::span(due_).first(look_at_blocks(blocks, position_clock_float_, facing_clock_float_.late, blocks_.data(),
                                                 unfolded_.data(), spheres_, earliest_, due_.data()));
 }
 
-std::uint64_t WatchList::byte_size() const noexcept {
+std::uint64_t CutFront::byte_size() const noexcept {
     return sizeof(FoldCandidate) * candidates_.capacity() + sizeof(Slot) * slots_of_nodes_.capacity() +
-           sizeof(BlockDues) * blocks_.capacity() + 2 * sizeof(std::uint16_t) * used_.capacity() +
+           sizeof(SlotDeadlines) * blocks_.capacity() + 2 * sizeof(std::uint16_t) * used_.capacity() +
            spheres_.byte_size() + earliest_.byte_size() + lights_.byte_size() + planes_.byte_size();
 }
 

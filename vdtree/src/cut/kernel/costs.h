@@ -1,0 +1,107 @@
+// Costs of folds: the thresholds at which nodes would just fold.
+
+struct Costs {
+    Floats cost, seen; // without and with the least cost of the row
+};
+// By one row of the criterion's own tables: the distance within which the node unfolds at the threshold 1, over its
+// gap.
+UNSEEN_INLINE Costs costs_of(const KernelView& view, const CostTables& tables, const Ints& row, const Measures& m,
+                             const Floats& unit) {
+    const Floats reach = entries(view, tables.reach, row, m.bin), length = unit * reach;
+    const Ints seldom = (reach < 0) | ((length <= 0) & (m.gap > 0)); // from nowhere, or from inside only
+    const Ints always = (reach >= DistanceCriterion::always_visible) | (m.gap <= 0);
+    const Floats cost = always ? all(std::numeric_limits<float>::infinity()) : length / m.gap;
+    Costs costs{seldom ? all(0) : cost, {}};
+    costs.seen = costs.cost;
+    if (tables.least_cost) costs.seen = seldom ? all(0) : max_of(cost, entries(view, tables.least_cost, row, m.bin));
+    return costs;
+}
+
+// As a silhouette's, which are the larger ones; of the interior where both are the same.
+UNSEEN_INLINE Costs silhouette_costs(const KernelView& view, const CostTables& tables, const Nodes& of,
+                                     const Measures& m, const Costs& inner) {
+    const Costs own = costs_of(view, tables, of.silhouette_row, m, of.silhouette_length);
+    return {max_of(inner.cost, own.cost), max_of(inner.seen, own.seen)};
+}
+
+// The one place where it is chosen which of these a node costs, for lanes and for single nodes.
+template <class Mask, class Cost>
+UNSEEN_INLINE Cost cost_as_seen(const Mask& is_silhouette, const Mask& is_away, const Cost& interior,
+                                const Cost& silhouette) {
+    return is_away ? Cost{} : is_silhouette ? silhouette : interior;
+}
+
+UNSEEN_INLINE void find_bounds_listed(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
+                                      std::span<const NodeId> nodes, float no_silhouette_over, float* cost,
+                                      float* seen) {
+    const Listed listed{arrays, nodes.data(), nodes.size() - 1};
+    for (std::size_t i = 0; i < nodes.size(); i += width) {
+        listed.prefetch(i);
+        const Nodes of = load_nodes(arrays, [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return listed(i + lane); });
+        const Measures m = measures_of(view, of);
+        const Costs inner = costs_of(view, tables, of.interior_row, m, of.length),
+                    silhouette = silhouette_costs(view, tables, of, m, inner);
+        const Ints is_none = silhouette.cost > no_silhouette_over;
+        const Floats bound = m.is_inside ? (is_none ? inner.cost : silhouette.cost) : all(0);
+        const Floats seen_bound = m.is_inside ? (is_none ? inner.seen : silhouette.seen) : all(0);
+        if (i + width <= nodes.size()) {
+            store(cost + i, bound);
+            store(seen + i, seen_bound);
+        } else {
+            for (std::size_t lane = 0; i + lane < nodes.size(); ++lane)
+                cost[i + lane] = bound[lane], seen[i + lane] = seen_bound[lane];
+        }
+    }
+}
+
+// Like decide_all().
+UNSEEN_INLINE void find_costs_listed(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
+                                     std::span<const NodeId> nodes, const NodeCosts& out) {
+    constexpr std::size_t piece = 256;
+    const Listed listed{arrays, nodes.data(), nodes.size() - 1};
+    for (std::size_t start = 0; start < nodes.size(); start += piece) {
+        const std::size_t size = std::min(piece, nodes.size() - start);
+        // Of the interior, and of the silhouette, where it is one.
+        alignas(64) float cost[piece + width], seen[piece + width], silhouette_cost[piece + width],
+            silhouette_seen[piece + width];
+        std::uint8_t is_near[piece + width], is_within[piece + width], unfolded[piece + width];
+        std::uint16_t asked[piece + width];
+        std::size_t asked_count = 0;
+        for (std::size_t i = 0; i < size; i += width) {
+            listed.prefetch(start + i);
+            const Nodes of =
+                load_nodes(arrays, [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return listed(start + i + lane); });
+            const Measures m = measures_of(view, of);
+            const Costs inner = costs_of(view, tables, of.interior_row, m, of.length);
+            const Costs silhouette = silhouette_costs(view, tables, of, m, inner);
+            store(cost + i, m.is_inside ? inner.cost : all(0));
+            store(seen + i, m.is_inside ? inner.seen : all(0));
+            store(silhouette_cost + i, silhouette.cost);
+            store(silhouette_seen + i, silhouette.seen);
+            const std::uint32_t near = bits_of(m.is_near & m.is_inside), within = bits_of(m.gap < m.silhouette);
+            const std::uint32_t asked_bits = bits_of(m.is_asked);
+            for (std::size_t lane = 0; lane < width; ++lane) {
+                is_near[i + lane] = unfolded[i + lane] = (near >> lane) & 1;
+                is_within[i + lane] = (within >> lane) & 1;
+                asked[asked_count] = static_cast<std::uint16_t>(i + lane);
+                asked_count += (asked_bits >> lane) & 1 & (i + lane < size);
+            }
+        }
+        const auto at = [&](std::size_t i) UNSEEN_INLINE_LAMBDA { return listed(start + i); };
+        for_each_asked(view, arrays, asked, asked_count, at,
+                       [&](std::size_t i, std::uint32_t silhouette, std::uint32_t away) UNSEEN_INLINE_LAMBDA {
+                           cost[i] = cost_as_seen(silhouette, away, cost[i], silhouette_cost[i]);
+                           seen[i] = cost_as_seen(silhouette, away, seen[i], silhouette_seen[i]);
+                           unfolded[i] = static_cast<std::uint8_t>(
+                               unfolds<std::uint32_t>(is_near[i], is_within[i], silhouette, away) & 1);
+                       });
+        std::copy_n(cost, size, out.cost + start);
+        std::copy_n(seen, size, out.seen_cost + start);
+        for (std::size_t first = 0; first < size; first += 64) {
+            std::uint64_t bits = 0;
+            for (std::size_t i = first; i < std::min(first + 64, size); ++i)
+                bits |= std::uint64_t{unfolded[i]} << (i - first);
+            out.unfolded[(start + first) / 64] = bits;
+        }
+    }
+}

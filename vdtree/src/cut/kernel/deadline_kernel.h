@@ -1,0 +1,110 @@
+// The arithmetic of deadlines, many watched slots or blocks of them at once; for CutFront, which keeps them.
+//
+// A verdict holds while the eye's motion uses up its slack. A deadline is what a clock of that motion may run to
+// meanwhile. The *position clock* bounds the change of every node's distance, the *facing clock* is the path of the
+// eye. Blocks of sixteen slots have a sphere, whose distance is measured anew in every frame: that tells far better
+// what the motion did to the distances of its nodes.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include "cut/kernel/fold_kernel.h"
+
+namespace unseen::vdtree {
+
+// Spheres around the centres of some nodes each, and what the eye's way has made of them.
+struct BlockSpheres {
+    std::vector<float> x, y, z, radius;
+    std::vector<float> distance; // of the sphere's centre from the eye
+    std::vector<float> error;    // how much more than `distance` a node's distance may have changed, in all
+
+    void push_back() {
+        for (auto* values : {&x, &y, &z, &radius, &distance, &error}) values->push_back(0);
+    }
+    void clear() noexcept {
+        for (auto* values : {&x, &y, &z, &radius, &distance, &error}) values->clear();
+    }
+    void reserve(std::size_t blocks) {
+        for (auto* values : {&x, &y, &z, &radius, &distance, &error}) values->reserve(blocks);
+    }
+    void set(std::size_t block, const glm::vec3& centre, float r, float d) noexcept {
+        x[block] = centre.x, y[block] = centre.y, z[block] = centre.z;
+        radius[block] = r, distance[block] = d, error[block] = 0;
+    }
+    glm::vec3 centre(std::size_t block) const noexcept { return {x[block], y[block], z[block]}; }
+    std::uint64_t byte_size() const noexcept { return 6 * sizeof(float) * x.capacity(); }
+};
+// The eye goes by `path` to a new place.
+void move_blocks(const float (&eye_high)[3], const float (&eye_low)[3], float path, BlockSpheres& spheres) noexcept;
+
+inline float rounded_down(double clock) { return clock > 0 ? std::nextafter(static_cast<float>(clock), 0.0f) : 0.0f; }
+inline float rounded_up(double clock) {
+    return std::nextafter(static_cast<float>(clock), std::numeric_limits<float>::infinity());
+}
+// A clock in floats: not later than it is, and not earlier.
+struct KernelClock {
+    float early = 0, late = std::numeric_limits<float>::min();
+};
+inline KernelClock kernel_clock(double now) { return {rounded_down(now), rounded_up(now)}; }
+// Defers deadlines by planes, one a block, that have come although the block is wholly inside a frustum: to when the
+// centre of one of its nodes may be less than `margin` inside: more than the rounding of any node's test, and of this.
+void keep_inside(const KernelView& view, float margin, const KernelClock& clock, const BlockSpheres& spheres,
+                 float* deadlines) noexcept;
+
+// When distances that grow, or shrink, and the facing clock may change something.
+struct EarliestDeadlines {
+    std::vector<float> recede, approach, facing;
+
+    void push_back(float value) {
+        for (auto* values : {&recede, &approach, &facing}) values->push_back(value);
+    }
+    void clear() noexcept {
+        for (auto* values : {&recede, &approach, &facing}) values->clear();
+    }
+    void reserve(std::size_t blocks) {
+        for (auto* values : {&recede, &approach, &facing}) values->reserve(blocks);
+    }
+    void set(std::size_t block, float receding, float approaching, float turning) noexcept {
+        recede[block] = receding, approach[block] = approaching, facing[block] = turning;
+    }
+    std::uint64_t byte_size() const noexcept { return 3 * sizeof(float) * recede.capacity(); }
+};
+// The deadlines of a block's slots; of slots that are not used: infinite.
+inline constexpr std::size_t block_slots = 16;
+struct alignas(64) SlotDeadlines {
+    float position[block_slots];
+    float facing[block_slots];
+};
+// Looks at the slots of some blocks: tells those that are due, in order, and sets the blocks' deadlines to the earliest
+// of the others. `due` has room for block_slots a block. Returns how many are due.
+std::size_t look_at_blocks(std::span<const std::uint32_t> which, float position_clock, float facing_clock,
+                           const SlotDeadlines* dues, const std::uint16_t* unfolded, const BlockSpheres& spheres,
+                           EarliestDeadlines& deadlines, std::uint32_t* due) noexcept;
+
+// The deadlines of up to sixteen slots that were tested.
+struct DeadlineBatch {
+    // Of their blocks, now: what their distances have changed by beyond the sphere's, and that one's distance.
+    alignas(64) float passed[kernel_lanes], distance[kernel_lanes];
+    float facing_clock; // or a little less
+    float longest;      // no slack of distances is longer
+    float margin;       // for rounding: slacks of unfolded nodes are shortened by this
+    alignas(64) float position[kernel_lanes], facing[kernel_lanes]; // out
+};
+// Of what a deadline for distances is summed from: a dozen roundings of floats, when it is set and when it is compared.
+inline constexpr float sum_rounding = 4e-6f;
+// Times a number: at least a unit in the last place less.
+inline constexpr float just_less = 1 - std::numeric_limits<float>::epsilon();
+void find_deadlines(const TestBatch& tested, DeadlineBatch& dues) noexcept;
+
+// One bit a block: a deadline has come.
+void find_due_blocks(float position_clock, float facing_clock, const BlockSpheres& spheres,
+                     const EarliestDeadlines& deadlines, std::uint64_t* due) noexcept;
+
+} // namespace unseen::vdtree

@@ -1,0 +1,115 @@
+// What a cut is made of, for those that change it: Cut itself, the follower and geomorphs.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <vdtree/cut.h>
+#include <vdtree/function_ref.h>
+#include <vdtree/vertex_tree.h>
+
+#include "tree/unchecked_links.h"
+
+namespace unseen::vdtree {
+
+class CutFollower;
+
+// Public functions of Cut's names do what Cut says. Not copied and not moved: cuts hold pointers into it.
+class CutState {
+public:
+    explicit CutState(const VertexTree& tree);
+    CutState(const CutState&) = delete;
+    CutState& operator=(const CutState&) = delete;
+    ~CutState();
+
+    static CutState& of(Cut& cut) noexcept { return *cut.state_; }
+    static const CutState& of(const Cut& cut) noexcept { return *cut.state_; }
+
+    const VertexTree& tree() const noexcept { return tree_; }
+    std::span<const std::uint64_t> unfolded() const noexcept { return unfolded_; } // one bit an interior node
+    std::span<const NodeId> proxies() const noexcept { return proxy_; }            // by leaf; always in the same place
+    Index triangle_count() const noexcept { return triangle_count_; }
+    std::span<const FoldChange> changes() const noexcept { return changes_; }
+    // One more for what changes() tells, two for what nobody knows; other numbers for every cut.
+    std::uint64_t revision() const noexcept { return revision_; }
+    bool is_unfolded_interior(NodeId node) const noexcept { return (unfolded_[node >> 6] >> (node & 63)) & 1; }
+    bool is_unfolded(NodeId node) const noexcept { return !tree_.is_leaf(node) && is_unfolded_interior(node); }
+    bool is_active(NodeId node) const noexcept {
+        // Not by its parent, which a damaged file may lie about.
+        const Index leaf =
+            tree_.is_leaf(node) ? node - tree_.interior_count() : unchecked_links(tree_).first_leaf[node];
+        return leaf < tree_.leaf_count() && proxy_[leaf] == node;
+    }
+
+    CutFollower& follower();         // made when it is first asked for
+    void forget_followed() noexcept; // the cut is changed by others than the follower
+
+    // ---- by hand
+
+    bool unfold(NodeId node);
+    bool fold(NodeId node);
+    bool unfold_ancestors(NodeId node);
+    bool fold_subtree(NodeId node);
+    void unfold_all();
+
+    // ---- in steps, which are patched into the index buffer: between begin_changes() and end_changes()
+
+    void begin_changes();
+    // Brings nearer what changes of these nodes will read, some tens of them at once, and finds their children.
+    void prefetch_changes(std::span<const NodeId> nodes, bool folds);
+    std::span<const NodeId> fetched_children() const noexcept { return soon_; } // of all of those nodes
+    std::span<const NodeId> fetched_children(std::size_t i) const {             // of the i-th one
+        return std::span(soon_).first(soon_ends_[i]).subspan(i == 0 ? 0 : soon_ends_[i - 1]);
+    }
+    void apply_unfold(NodeId node) { apply_unfold(node, children_of(node)); }
+    void apply_unfold(NodeId node, std::span<const NodeId> children);
+    void fold_below(NodeId node, const FunctionRef<void(NodeId)>& on_fold); // tells each node, descendants first
+    void apply_fold(NodeId node) { apply_fold(node, children_of(node)); }
+    void apply_fold(NodeId node, std::span<const NodeId> children);
+    void change_further(std::vector<std::uint64_t> unfolded); // to another cut as a whole, within the steps
+    void end_changes(AdjustStats& stats);
+
+    // ---- to another cut as a whole
+
+    void change_to(std::vector<std::uint64_t> unfolded, AdjustStats& stats);
+
+    // ---- the index buffer
+
+    std::span<const NodeId> indices() const;
+    std::optional<std::span<const IndexWrite>> index_writes() const noexcept;
+    std::uint64_t index_version() const noexcept;
+    std::uint64_t index_writes_from() const noexcept;
+
+    std::uint64_t byte_size() const noexcept;
+
+private:
+    void set_unfolded(NodeId node);
+    void set_folded(NodeId node);
+    void assign(NodeId node);
+    void make_stale();
+    bool is_patching();
+    std::span<const NodeId> children_of(NodeId node);
+    bool are_few_changes(std::span<const std::uint64_t> unfolded) const;
+    void replay(std::span<const std::uint64_t> unfolded);
+    void become(std::vector<std::uint64_t> unfolded, AdjustStats& stats);
+    void count_triangles();
+    void assign_changed(const std::vector<std::uint64_t>& unfolded);
+    void assign_all(std::span<const std::uint64_t> unfolded);
+
+    const VertexTree tree_; // a handle of its own
+    std::vector<std::uint64_t> unfolded_;
+    std::vector<NodeId> proxy_; // by leaf: the active node that stands for it
+    Index triangle_count_ = 0;
+    std::vector<FoldChange> changes_;
+    std::uint64_t revision_;
+    std::vector<NodeId> children_, soon_, others_; // scratch
+    std::vector<std::size_t> soon_ends_;
+    std::unique_ptr<CutFollower> follower_;
+    struct Indices;
+    mutable std::unique_ptr<Indices> indices_; // made when it is first asked for
+};
+
+} // namespace unseen::vdtree
