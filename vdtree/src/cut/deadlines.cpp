@@ -1,8 +1,4 @@
-<<<<<<<< HEAD:vdtree/src/cut/watch_list.cpp
-#include "cut/watch_list.h"
-========
 #include "cut/deadlines.h"
->>>>>>>> kernel:vdtree/src/cut_deadlines.cpp
 
 #include <algorithm>
 #include <bit>

@@ -21,15 +21,9 @@
 
 #include <glm/vec3.hpp>
 
-<<<<<<<< HEAD:vdtree/src/cut/watch_list.h
-#include "cut/kernel/fold_kernel.h"
-#include "cut/kernel/fold_tester.h"
-#include "cut/side_deadlines.h"
-========
 #include "cut/kernel/deadline_kernel.h"
 #include "cut/kernel/fold_tester.h"
 #include "cut/side_deadlines.h"
->>>>>>>> kernel:vdtree/src/cut_deadlines.h
 
 namespace unseen::vdtree {
 
