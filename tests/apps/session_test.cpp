@@ -123,7 +123,7 @@ TEST(Session, FoldsObjectsBeforeTheLuminanceOfAll) {
     white.colours.assign(white.positions.size(), glm::vec4(1));
     const auto triangles_of_grey = [](Session& session) {
         vdtree::View view = session.default_view();
-        view.eye = {0, 0, 20};
+        view.eye = {0, 0, 100};
         view.target = {0, 0, 0};
         auto simplified = session.simplify(view, {.fold_test = FoldTest::luebke_hallen});
         return simplified->cuts[0].triangle_count();

@@ -24,7 +24,7 @@ public:
     Result<void> set_glide(double seconds);
     void let_pass(double seconds); // for the glides of the next call; precondition: not negative, finite
 
-    // Makes the cuts what the request asks for. Fails where Session::simplify() does, and changes nothing then.
+    // Makes the cuts what the request asks for. Fails where Session::simplify() does.
     Result<Report> follow(const vdtree::View& view, const Request& request);
 
     // As of the last call of follow(), from which on there is a cut.
