@@ -20,7 +20,7 @@ constexpr float infinity = std::numeric_limits<float>::infinity();
 
 FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterion, bool cull_back_faces,
                        float threshold, bool least_costs)
-    : tree_(tree), criterion_(criterion) {
+    : criterion_(criterion) {
     const DistanceCriterion::Parts& parts = criterion.parts();
     const auto data_of = [](const auto& values) { return values.empty() ? nullptr : values.data(); };
     arrays_ = {tree.bounds().data(),

@@ -93,7 +93,6 @@ private:
     void leave_room_for_lights(LitFindings& lit, FoldBatch& batch) const;
     CostTables cost_tables() const;
 
-    const VertexTree& tree_;
     const DistanceCriterion& criterion_;
     NodeArrays arrays_;        // of the tree and the criterion
     std::vector<float> reach_; // of the criterion; infinite where the fold is seen from everywhere

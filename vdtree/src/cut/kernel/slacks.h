@@ -48,7 +48,7 @@ UNSEEN_INLINE Floats gaze_slack(const KernelView& view, const SlackQuery& of) {
     }
     // From inside, or nearly, the eccentricity may be anything soon.
     const Floats anywhere = (within(last) - gap) * inward;
-    return (gap > 0) | (inward < 0) ? best : max_of(anywhere, all(0));
+    return ((gap > 0) | (inward < 0)) ? best : max_of(anywhere, all(0));
 }
 
 struct Slacks {
@@ -67,13 +67,12 @@ UNSEEN_INLINE Slacks slacks_of(const KernelView& view, const Nodes& of, const Me
     }
     const Ints is_outside = ~m.is_inside;
     const Floats inexact = (m.distance + of.radius) * position_rounding;
-    const Floats position = is_outside | v.away ? all(huge) : max_of(left - inexact, all(0));
+    const Floats position = (is_outside | v.away) ? all(huge) : max_of(left - inexact, all(0));
     Floats facing = v.facing - m.distance * facing_rounding;
     facing = v.unfolded ? min_of(facing, m.uncovered - inexact) : facing;
     facing = is_outside ? (m.height < 0 ? all(huge) : -m.uncovered - inexact) : facing;
-    const Floats planes = v.unfolded                    ? m.height - inexact
-                          : is_outside & (m.height < 0) ? -m.height - inexact
-                                                        : all(huge);
+    const Ints is_below = is_outside & (m.height < 0);
+    const Floats planes = v.unfolded ? m.height - inexact : is_below ? -m.height - inexact : all(huge);
     return {position, max_of(facing, all(0)), max_of(planes, all(0))};
 }
 
