@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 
 #include <perception/criterion.h>
+#include <session/model_file.h>
 #include <session/session.h>
 
 #include "bench_tools.h"
@@ -178,7 +179,7 @@ Result<EffectsBenchResult> bench_effects(const EffectsBenchOptions& options) {
     }
     const Pinned pinned;
     for (auto& [name, tree] : *trees) {
-        auto measured_tree = measured(tree, 1);
+        auto measured_tree = session::measured(tree, 1);
         if (!measured_tree) return measured_tree.error();
         const auto session = session::Session::create(session::Scene::of(std::move(tree)));
         const auto with_errors = session::Session::create(session::Scene::of(std::move(*measured_tree)));

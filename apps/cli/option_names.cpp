@@ -31,7 +31,7 @@ constexpr OptionName option_names[] = {
     {"Follower::set_glide()", "--geomorph"},
     {"session::read_textured_mesh()", "unseen build"},
     {"vdtree::write_tree()", "'unseen build'"},
-    {"vdtree::with_fold_errors()", "unseen build --fold-errors"},
+    {"session::measured()", "unseen build --fold-errors"},
 };
 
 } // namespace

@@ -13,8 +13,9 @@
 #include <malloc.h>
 #endif
 
+#include <session/model_file.h>
+
 #include "build_team.h"
-#include "fold_test.h"
 #include "memory_plan.h"
 #include "model_file.h"
 #include "options.h"
@@ -169,7 +170,7 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
     if (!tree) return tree.error();
     if (a.fold_errors) {
         print_note("measuring what folds change ...");
-        tree = measured(*tree, a.threads);
+        tree = session::measured(*tree, a.threads);
         if (!tree) return tree.error();
     }
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -37,7 +37,7 @@ Choice suitable_test(const Sight& sight, bool chroma, bool may_measure) {
     if (!tree.fold_errors().empty() || (may_measure && tree.interior_count() <= most_measured)) return {};
     return {
         FoldTest::luebke_hallen,
-        "the tree does not hold the errors of its folds, and measuring them takes long: vdtree::with_fold_errors()"};
+        "the tree does not hold the errors of its folds, and measuring them takes long: session::measured()"};
 }
 
 // Whether a test knows what it would have to look at.
@@ -122,8 +122,11 @@ Result<vdtree::DistanceCriterion> make_criterion(const Sight& sight, const Decis
     if (key.farthest_gaze_px) options.gaze_px = glm::dvec2(view.width * 0.5 + *key.farthest_gaze_px, view.height * 0.5);
     if (sight.lighting) return perception::lit_distances(tree, sight.cache.light_bounds, view, options);
     if (decision.test == FoldTest::luebke_hallen) return perception::luebke_hallen_distances(tree, view, options);
-    if (decision.test == FoldTest::luebke_hallen_safe)
-        return perception::luebke_hallen_safe_distances(tree, cut_rings(sight.object, sight.cache), view, options);
+    if (decision.test == FoldTest::luebke_hallen_safe) {
+        const auto rings = cut_rings(sight.object, sight.cache);
+        if (!rings) return rings.error();
+        return perception::luebke_hallen_safe_distances(tree, **rings, view, options);
+    }
     return perception::error_distances(tree, view, options);
 }
 
@@ -172,7 +175,7 @@ Result<Decision> decide(const Sight& sight, const Request& request) {
     if (measures && !request.may_measure)
         return invalid(
             "request.fold_test = error goes by errors that the tree does not hold: allow request.may_measure, or call "
-            "vdtree::with_fold_errors().");
+            "session::measured().");
     return Decision{request, choice.test, std::move(choice.why), measures};
 }
 

@@ -1,5 +1,7 @@
 #include <session/model_file.h>
 
+#include <vdtree/conserve_light.h>
+#include <vdtree/fold_errors.h>
 #include <vdtree/builder.h>
 #include <vdtree/tree_io.h>
 
@@ -55,6 +57,12 @@ Result<vdtree::VertexTree> open_tree(const fs::path& file, const LoadOptions& op
     const bool is_large = fs::file_size(file, unknown) >= mapped_bytes && !unknown;
     return is_large && vdtree::is_tree_file(file) ? with_texture(vdtree::map_tree(file), file, options)
                                                   : load_tree(file, options);
+}
+
+Result<vdtree::VertexTree> measured(const vdtree::VertexTree& tree, int threads) {
+    const auto conserved = vdtree::conserve_light(tree);
+    if (!conserved) return conserved.error();
+    return vdtree::with_fold_errors(*conserved, threads);
 }
 
 } // namespace unseen::session

@@ -7,7 +7,6 @@
 
 #include <perception/gaze.h>
 #include <session/follower.h>
-#include <vdtree/fold_errors.h>
 #include <vdtree/occluders.h>
 
 #include "session_state.h"
@@ -51,9 +50,13 @@ std::span<const vdtree::Sphere> inner_spheres(const Object& object, ObjectCache&
     return *cache.inner_spheres;
 }
 
-const vdtree::CutRings& cut_rings(const Object& object, ObjectCache& cache) {
-    if (!cache.cut_rings) cache.cut_rings = vdtree::bound_cut_rings(object.tree);
-    return *cache.cut_rings;
+Result<const vdtree::CutRings*> cut_rings(const Object& object, ObjectCache& cache) {
+    if (!cache.cut_rings) {
+        auto bounded = vdtree::bound_cut_rings(object.tree);
+        if (!bounded) return bounded.error();
+        cache.cut_rings = std::move(*bounded);
+    }
+    return &*cache.cut_rings;
 }
 
 // ---- how objects are seen
@@ -135,10 +138,10 @@ Result<void> Session::State::measure(std::size_t object) {
     constexpr vdtree::NodeId told_from = 20'000; // nodes; about half a second on one core
     vdtree::VertexTree& tree = scene.objects[object].tree;
     if (messages.note && tree.interior_count() >= told_from)
-        messages.note("measuring what folds change (vdtree::with_fold_errors() keeps that in the tree) ...");
-    auto measured = vdtree::with_fold_errors(tree);
-    if (!measured) return measured.error();
-    tree = std::move(*measured);
+        messages.note("measuring what folds change (session::measured() keeps that in the tree) ...");
+    auto with_errors = measured(tree);
+    if (!with_errors) return with_errors.error();
+    tree = std::move(*with_errors);
     caches[object] = {};
     ++tree_count[object];
     return {};
@@ -242,7 +245,7 @@ std::span<const vdtree::Sphere> Session::inner_spheres(std::size_t object) const
     return session::inner_spheres(state_->scene.objects[object], state_->caches[object]);
 }
 
-const vdtree::CutRings& Session::cut_rings(std::size_t object) const {
+Result<const vdtree::CutRings*> Session::cut_rings(std::size_t object) const {
     return session::cut_rings(state_->scene.objects[object], state_->caches[object]);
 }
 

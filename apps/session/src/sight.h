@@ -47,6 +47,6 @@ struct Decision {
 
 WorldSphere world_sphere(const Object& object);
 std::span<const vdtree::Sphere> inner_spheres(const Object& object, ObjectCache& cache);
-const vdtree::CutRings& cut_rings(const Object& object, ObjectCache& cache);
+Result<const vdtree::CutRings*> cut_rings(const Object& object, ObjectCache& cache);
 
 } // namespace unseen::session

@@ -88,7 +88,7 @@ public:
     Result<perception::SceneLuminance> luminance(const vdtree::View& view) const;
     // Spheres inside a solid, and rings of all cuts; made when they are first asked for. Refer to the session.
     std::span<const vdtree::Sphere> inner_spheres(std::size_t object = 0) const;
-    const vdtree::CutRings& cut_rings(std::size_t object = 0) const;
+    Result<const vdtree::CutRings*> cut_rings(std::size_t object = 0) const;
 
 private:
     friend class Follower;
