@@ -737,7 +737,7 @@ Image to_luminance(const ImageFile& file, const Display& display) {
         double y = 0;
         for (std::size_t c = 0; c < channels; ++c) {
             const float value = in.values[p * channels + c];
-            y += (channels == 1 ? 1 : rec709_weights[c]) *
+            y += (channels == 1 ? 1 : rec709_weights[static_cast<glm::length_t>(c)]) *
                  (file.is_absolute ? static_cast<double>(value) : code_to_light(value));
         }
         out.values.push_back(static_cast<float>(file.is_absolute ? y : to_luminance(display, y).value()));
