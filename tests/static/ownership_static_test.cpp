@@ -45,7 +45,7 @@ concept owns_progress = requires(Options options) {
     requires std::is_same_v<decltype(options.progress), Callback<bool(double, const char*)>>;
     requires std::is_copy_assignable_v<Options>;
 };
-static_assert(owns_progress<BuildOptions> && owns_progress<ReadOptions>);
+static_assert(owns_progress<BuildOptions> && owns_progress<meshio::ReadOptions>);
 static_assert(std::is_same_v<decltype(AdjustOptions::visibility), VisibilityTest> &&
               std::is_copy_assignable_v<AdjustOptions>);
 

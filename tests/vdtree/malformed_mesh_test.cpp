@@ -54,18 +54,18 @@ constexpr std::size_t allowed_bytes_per_byte = 64;
 constexpr std::size_t allowed_bytes = 64 * 1024;
 
 // Reads from memory that ends where the file ends, so that an address sanitizer sees every byte read too many.
-Result<ReadResult> read_exactly(const std::string& bytes, const std::string& name) {
+Result<meshio::ReadResult> read_exactly(const std::string& bytes, const std::string& name) {
     const std::unique_ptr<char[]> copy(new char[bytes.size()]);
     std::copy(bytes.begin(), bytes.end(), copy.get());
     largest_allocation = 0;
-    Result<ReadResult> result = meshio::read_mesh_bytes({copy.get(), bytes.size()}, name);
+    Result<meshio::ReadResult> result = meshio::read_mesh_bytes({copy.get(), bytes.size()}, name);
     EXPECT_LE(largest_allocation.load(), allowed_bytes + allowed_bytes_per_byte * bytes.size()) << name;
     return result;
 }
 
 // Whatever loads must be a mesh; whatever does not must say so and name the file.
 bool is_read_or_refused(const std::string& bytes, const std::string& name) {
-    const Result<ReadResult> result = read_exactly(bytes, name);
+    const Result<meshio::ReadResult> result = read_exactly(bytes, name);
     if (!result) {
         EXPECT_TRUE(result.error().message.starts_with(name + ": ")) << result.error().message;
         return false;
@@ -77,7 +77,7 @@ bool is_read_or_refused(const std::string& bytes, const std::string& name) {
 }
 
 std::string error_of(const std::string& bytes, const std::string& name) {
-    const Result<ReadResult> result = read_exactly(bytes, name);
+    const Result<meshio::ReadResult> result = read_exactly(bytes, name);
     EXPECT_FALSE(result) << name << " was read";
     return result ? std::string() : result.error().message;
 }
@@ -223,7 +223,7 @@ TEST(MalformedMesh, NumbersBeyondDoublesAreInfiniteOrZero) {
                                                     {"0." + zeros + "1e-5", 0}, {"+1e400", infinity}};
     for (const auto& [text, expected] : cases) {
         double value = 1;
-        EXPECT_TRUE(to_number(text, value)) << text;
+        EXPECT_TRUE(meshio::to_number(text, value)) << text;
         EXPECT_EQ(value, expected) << text;
     }
 }

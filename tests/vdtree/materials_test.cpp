@@ -14,7 +14,7 @@ namespace {
 class Materials : public testing::Test {
 protected:
     void write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name, std::ios::binary) << text; }
-    Result<ReadResult> read(const std::string& mtl, const std::string& library = "m.mtl", meshio::ReadOptions options = {}) const {
+    Result<meshio::ReadResult> read(const std::string& mtl, const std::string& library = "m.mtl", meshio::ReadOptions options = {}) const {
         write("m.mtl", mtl);
         write("m.obj", "mtllib " + library + "\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n");
         return meshio::read_mesh(folder_ / "m.obj", options);

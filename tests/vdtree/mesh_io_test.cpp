@@ -27,13 +27,13 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 meshio::ReadResult read(const std::string& bytes, const std::string& name, const meshio::ReadOptions& options = {}) {
-    Result<ReadResult> result = meshio::read_mesh_bytes(bytes, name, options);
+    Result<meshio::ReadResult> result = meshio::read_mesh_bytes(bytes, name, options);
     EXPECT_TRUE(result) << result.error().message;
     return result ? std::move(*result) : meshio::ReadResult{};
 }
 
 std::string error_of(const std::string& bytes, const std::string& name) {
-    const Result<ReadResult> result = meshio::read_mesh_bytes(bytes, name);
+    const Result<meshio::ReadResult> result = meshio::read_mesh_bytes(bytes, name);
     EXPECT_FALSE(result) << name << " was read";
     return result ? std::string() : result.error().message;
 }
@@ -598,7 +598,7 @@ TEST_F(MeshFiles, GltfReadsBuffersBesideTheFileOnly) {
     EXPECT_FALSE(meshio::read_mesh(folder_ / "inner/a.gltf"));
     for (const std::string uri : {"%2e%2e/x.bin", "/etc/passwd", "file:///etc/passwd", "http://a/b.bin", "missing.bin", "", "."}) {
         save("b.gltf", with_uri(uri));
-        const Result<ReadResult> result = meshio::read_mesh(folder_ / "b.gltf");
+        const Result<meshio::ReadResult> result = meshio::read_mesh(folder_ / "b.gltf");
         ASSERT_FALSE(result) << uri;
         EXPECT_THAT(result.error().message, HasSubstr("buffer 0"));
     }
@@ -743,7 +743,7 @@ TEST(MeshIo, StopsWhenTheCallerSaysSo) {
         };
         meshio::ReadOptions options;
         options.progress = stop;
-        const Result<ReadResult> result = meshio::read_mesh_bytes(bytes, name, options);
+        const Result<meshio::ReadResult> result = meshio::read_mesh_bytes(bytes, name, options);
         if (calls == 0) continue; // a text of a few lines ends before the first call
         ASSERT_FALSE(result) << name;
         EXPECT_EQ(result.error().code, ErrorCode::cancelled) << name;
@@ -751,7 +751,7 @@ TEST(MeshIo, StopsWhenTheCallerSaysSo) {
 }
 
 TEST_F(MeshFiles, SayWhyAFileCannotBeOpened) {
-    const Result<ReadResult> missing = meshio::read_mesh(folder_ / "missing.ply");
+    const Result<meshio::ReadResult> missing = meshio::read_mesh(folder_ / "missing.ply");
     ASSERT_FALSE(missing);
     EXPECT_EQ(missing.error().code, ErrorCode::io_failure);
     EXPECT_THAT(missing.error().message, HasSubstr("missing.ply"));
@@ -791,7 +791,7 @@ TEST_F(MeshFiles, ComeBackAsTheyWereWritten) {
             const Mesh mesh = random_mesh(true, has_attributes);
             const Result<void> written = meshio::write_mesh(folder_ / name, mesh.view());
             ASSERT_TRUE(written) << written.error().message;
-            const Result<ReadResult> again = meshio::read_mesh(folder_ / name);
+            const Result<meshio::ReadResult> again = meshio::read_mesh(folder_ / name);
             ASSERT_TRUE(again) << again.error().message;
             EXPECT_EQ(again->mesh.positions, mesh.positions) << name;
             EXPECT_EQ(again->mesh.triangles, mesh.triangles) << name;
@@ -816,7 +816,7 @@ TEST_F(MeshFiles, KeepDoublesInPlyAndObj) {
     const Mesh mesh = random_mesh(false, false);
     for (const std::string name : {"a.ply", "a.obj"}) {
         ASSERT_TRUE(meshio::write_mesh(folder_ / name, mesh.view()));
-        const Result<ReadResult> again = meshio::read_mesh(folder_ / name);
+        const Result<meshio::ReadResult> again = meshio::read_mesh(folder_ / name);
         ASSERT_TRUE(again);
         EXPECT_EQ(again->mesh.positions, mesh.positions) << name;
     }
@@ -828,7 +828,7 @@ TEST_F(MeshFiles, KeepOffsetsAndScalesInGlb) {
         mesh.positions = {{offset, offset, 0.1 * size}, {offset + 0.3 * size, offset, 0}, {offset, offset + 0.7 * size, 0}};
         mesh.triangles = {{0, 1, 2}};
         ASSERT_TRUE(meshio::write_mesh(folder_ / "a.glb", mesh.view()));
-        const Result<ReadResult> again = meshio::read_mesh(folder_ / "a.glb");
+        const Result<meshio::ReadResult> again = meshio::read_mesh(folder_ / "a.glb");
         ASSERT_TRUE(again) << again.error().message;
         // Half an ulp of a float relative to the size, and of the double at the offset.
         const double tolerance = size * 0x1p-23 + offset * 0x1p-52;
@@ -845,7 +845,7 @@ TEST_F(MeshFiles, KeepMaterialsAndGroups) {
                    {"glass", MeshRange::Kind::material, 100, 50},
                    {"stone \"grey\"", MeshRange::Kind::material, 200, 100}};
     ASSERT_TRUE(meshio::write_mesh(folder_ / "a.obj", mesh.view()));
-    const Result<ReadResult> obj = meshio::read_mesh(folder_ / "a.obj");
+    const Result<meshio::ReadResult> obj = meshio::read_mesh(folder_ / "a.obj");
     ASSERT_TRUE(obj);
     ASSERT_EQ(obj->mesh.ranges.size(), 4u);
     for (std::size_t i = 0; i < 4; ++i) {
@@ -855,7 +855,7 @@ TEST_F(MeshFiles, KeepMaterialsAndGroups) {
         EXPECT_EQ(obj->mesh.ranges[i].triangle_count, mesh.ranges[i].triangle_count);
     }
     ASSERT_TRUE(meshio::write_mesh(folder_ / "a.glb", mesh.view()));
-    const Result<ReadResult> glb_file = meshio::read_mesh(folder_ / "a.glb");
+    const Result<meshio::ReadResult> glb_file = meshio::read_mesh(folder_ / "a.glb");
     ASSERT_TRUE(glb_file) << glb_file.error().message;
     EXPECT_EQ(glb_file->mesh.triangles, mesh.triangles);
     std::vector<std::string> materials;
@@ -869,7 +869,7 @@ TEST_F(MeshFiles, NamesCannotBreakTheLinesOfAnObj) {
     Mesh mesh = random_mesh(true, false);
     mesh.ranges = {{"a\nv 1 2\\", MeshRange::Kind::material, 0, 300}};
     ASSERT_TRUE(meshio::write_mesh(folder_ / "a.obj", mesh.view()));
-    const Result<ReadResult> again = meshio::read_mesh(folder_ / "a.obj");
+    const Result<meshio::ReadResult> again = meshio::read_mesh(folder_ / "a.obj");
     ASSERT_TRUE(again) << again.error().message;
     EXPECT_EQ(again->mesh.ranges[0].name, "a_v 1 2_");
 }
