@@ -12,11 +12,11 @@
 #include <utility>
 
 #include <perception/criterion.h>
+#include <perception/fold_measurement.h>
 #include <sample_mesh.h>
 #include <subdivide.h>
 #include <vdtree/criteria.h>
 #include <vdtree/cut.h>
-#include <vdtree/fold_errors.h>
 #include <meshio/mesh_io.h>
 #include <vdtree/tree_io.h>
 
@@ -206,7 +206,7 @@ Result<vdtree::VertexTree> with_errors(const Workshop& shop, const NamedMesh& ba
     if (fs::exists(file, unknown))
         if (auto kept = load_tree(file); kept) return kept;
     print_note("measuring fold errors ...");
-    auto measured = vdtree::with_fold_errors(tree);
+    auto measured = perception::measure_folds(tree);
     if (!measured) return measured.error();
     if (const auto written = vdtree::write_tree(file, *measured); !written) return written.error();
     return measured;

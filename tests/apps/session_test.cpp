@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <perception/fold_measurement.h>
 #include <session/follower.h>
 #include <session/session.h>
 #include <vdtree/builder.h>
@@ -72,7 +73,7 @@ TEST(Session, PlansBeforeItMeasures) {
     ASSERT_TRUE(first);
     EXPECT_EQ(first->fold_test, FoldTest::error);
     EXPECT_TRUE(first->measures);
-    EXPECT_TRUE(session->tree().fold_errors().empty()) << "a plan changes nothing";
+    EXPECT_FALSE(perception::has_fold_measurement(session->tree())) << "a plan changes nothing";
     const auto hurried = session->plan(view, {.may_measure = false});
     ASSERT_TRUE(hurried);
     EXPECT_EQ(hurried->fold_test, FoldTest::luebke_hallen);
@@ -82,7 +83,7 @@ TEST(Session, PlansBeforeItMeasures) {
     const auto ready = session->prepare(view, {});
     ASSERT_TRUE(ready);
     EXPECT_FALSE(ready->front().measures);
-    EXPECT_FALSE(session->tree().fold_errors().empty());
+    EXPECT_TRUE(perception::has_fold_measurement(session->tree()));
     EXPECT_EQ(session->plan(view, {.may_measure = false})->fold_test, FoldTest::error);
 }
 
@@ -173,7 +174,7 @@ TEST(Follower, OutlivesItsSessionAndTakesUpMeasuredTrees) {
     const auto folded = follower->follow(view, {}); // by errors that are measured now: of another tree
     ASSERT_TRUE(folded);
     EXPECT_EQ(folded->fold_tests.front(), FoldTest::error);
-    EXPECT_FALSE(follower->cut().tree().fold_errors().empty());
+    EXPECT_TRUE(perception::has_fold_measurement(follower->cut().tree()));
     EXPECT_LT(folded->stats.triangles, whole->stats.triangles);
 }
 

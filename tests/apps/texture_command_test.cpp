@@ -338,18 +338,16 @@ TEST_F(TextureCommandTest, OfDamagedTreesThatAreMappedLeadNobodyAstray) {
             EXPECT_THAT(complaint({"simplify", "large.vdt", "-o", "x.obj", "--fold-test", "luebke-hallen-safe"}),
                         HasSubstr("of the mapped tree is damaged"));
             EXPECT_THAT(complaint({"simplify", "large.vdt", "-o", "x.obj"}), HasSubstr("damaged"));
+            EXPECT_THAT(complaint({"simplify", "large.vdt", "-o", "x.obj", "--fold-test", "luebke-hallen"}),
+                        HasSubstr("damaged"));
             EXPECT_THAT(complaint({"simplify", "large.vdt", "-o", "x.obj", "--light", "1", "0", "0"}),
                         HasSubstr("damaged"));
             EXPECT_THAT(complaint({"info", "large.vdt"}), HasSubstr("Node"));
             EXPECT_THAT(complaint({"render", "large.vdt", "-o", "x.png"}),
                         AnyOf(HasSubstr("damaged"), HasSubstr("No OpenGL")));
             // What asks node by node goes as far as nodes are sound.
-            for (const std::vector<std::string>& test : {std::vector<std::string>{"luebke-hallen"},
-                                                         {"extent", "--pixels", "1"},
-                                                         {"displacement", "--pixels", "1"}}) {
-                std::vector<std::string> words = {"simplify", "large.vdt", "-o", "x.obj", "--fold-test"};
-                words.insert(words.end(), test.begin(), test.end());
-                const Outcome cut = run(words);
+            for (const char* const test : {"extent", "displacement"}) {
+                const Outcome cut = run({"simplify", "large.vdt", "-o", "x.obj", "--fold-test", test, "--pixels", "1"});
                 EXPECT_EQ(cut.status, 0) << cut.err;
             }
         }

@@ -7,7 +7,7 @@
 
 #include <perception/criterion.h>
 #include <vdtree/cut.h>
-#include <vdtree/fold_errors.h>
+#include <perception/fold_measurement.h>
 
 #include "bench_mesh.h"
 
@@ -69,7 +69,7 @@ const Subject& subject(bool gazes, bool large) {
 }
 
 const vdtree::VertexTree& tree_with_errors() {
-    static const vdtree::VertexTree measured = *vdtree::with_fold_errors(tree());
+    static const vdtree::VertexTree measured = *perception::measure_folds(tree());
     return measured;
 }
 

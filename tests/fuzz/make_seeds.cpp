@@ -62,7 +62,9 @@ void make_trees(const fs::path& folder) {
         const auto tree = build_tree(mesh.view());
         if (!tree) throw std::runtime_error(tree.error().message);
         expect(write_tree(folder / (std::string(name) + ".vdt"), *tree));
-        expect(write_tree(folder / (std::string(name) + "_measured.vdt"), unseen::support::measured(*tree)));
+        const auto marked = tree->with_attribute("mark", AttributeDomain::interior_node, std::vector<float>(tree->interior_count(), 0.5f));
+        if (!marked) throw std::runtime_error(marked.error().message);
+        expect(write_tree(folder / (std::string(name) + "_marked.vdt"), *marked));
     }
 }
 

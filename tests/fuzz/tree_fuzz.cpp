@@ -43,7 +43,7 @@ void read_and_use(const std::string& bytes) {
     file.hold(bytes);
     for (const bool mapped : {false, true}) {
         const auto tree = mapped ? unseen::vdtree::map_tree(file.path()) : unseen::vdtree::read_tree(file.path());
-        if (tree ? !unseen::support::use_everything(*tree, false) : tree.error().message.empty()) std::abort();
+        if (tree ? !unseen::support::use_everything(*tree) : tree.error().message.empty()) std::abort();
     }
 }
 

@@ -1,4 +1,5 @@
 // Colour as a source of contrast: isoluminant patterns that luminance alone would fold.
+#include <perception/chroma.h>
 #include <perception/criterion.h>
 
 #include <cmath>
@@ -76,7 +77,7 @@ Result<DistanceCriterion> criterion_of(const VertexTree& tree, const View& view,
     options.scene = {0.2f, 0.4f};
     options.chroma = test.chroma;
     if (gazes) options.gaze_px = glm::dvec2(128, 128);
-    return test.safe ? luebke_hallen_safe_distances(tree, *vdtree::bound_cut_rings(tree), view, options)
+    return test.safe ? luebke_hallen_safe_distances(tree, *bound_cut_rings(tree), view, options)
                      : luebke_hallen_distances(tree, view, options);
 }
 
@@ -106,7 +107,7 @@ int inner_triangles(const Cut& cut) {
 }
 
 TEST(Chroma, IsNoneOfGreysAndThatOfTheConesOtherwise) {
-    for (const double grey : {0.0, 0.1, 1.0}) EXPECT_LT(glm::length(vdtree::opponent_chroma(glm::dvec3(grey))), 1e-15);
+    for (const double grey : {0.0, 0.1, 1.0}) EXPECT_LT(glm::length(opponent_chroma(glm::dvec3(grey))), 1e-15);
     // By way of XYZ and the cones, in their own terms.
     const glm::dmat3 xyz_of_rgb = glm::transpose(glm::dmat3(0.41239, 0.35758, 0.18048, 0.21264, 0.71517, 0.07219, 0.01933, 0.11919, 0.95053));
     const glm::dmat3 lms_of_xyz = glm::transpose(glm::dmat3(0.187596268556126, 0.585168649077728, -0.026384263306304, -0.133397430663221, 0.405505777260049,
@@ -115,7 +116,7 @@ TEST(Chroma, IsNoneOfGreysAndThatOfTheConesOtherwise) {
     for (const glm::dvec3 rgb : {glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1), glm::dvec3(0.3, 0.5, 0.1)}) {
         const glm::dvec3 delta = lms_of_xyz * (xyz_of_rgb * rgb) - white * glm::dot(rgb, rec709);
         const OpponentContrast contrast = opponent_contrast(white, delta);
-        const glm::dvec2 chroma = vdtree::opponent_chroma(rgb);
+        const glm::dvec2 chroma = opponent_chroma(rgb);
         // Published for another white and for L + M as the luminance: these are the differences.
         EXPECT_NEAR(std::abs(chroma.x), contrast.red_green, 0.01) << rgb.r;
         EXPECT_NEAR(std::abs(chroma.y), contrast.yellow_violet, 0.03) << rgb.r;
@@ -131,7 +132,7 @@ TEST(Chroma, KeepsAnIsoluminantPatternThatLuminanceFolds) {
     cycles.frequency = CyclesPerDegree(1);
     cycles.luminance = to_luminance(Display(), 0.3);
     cycles.area = patch_area(cycles.frequency);
-    const glm::dvec2 chroma = vdtree::opponent_chroma(glm::dvec3(red_or_green(0.2))) / 0.3;
+    const glm::dvec2 chroma = opponent_chroma(glm::dvec3(red_or_green(0.2))) / 0.3;
     EXPECT_GT(castle_visibility({0, std::abs(chroma.x), std::abs(chroma.y)}, cycles), 5);
 
     for (const bool safe : {false, true}) {
@@ -141,9 +142,47 @@ TEST(Chroma, KeepsAnIsoluminantPatternThatLuminanceFolds) {
     }
 }
 
+// Colours that nobody bounded are not taken for greys.
+TEST(Chroma, IsRefusedOfRingsBoundedWithoutIt) {
+    const VertexTree tree = red_green_checkerboard(0.2);
+    FoldTestOptions options;
+    const auto rings = bound_cut_rings(tree, false);
+    ASSERT_TRUE(rings);
+    EXPECT_TRUE(rings->chroma.empty());
+    EXPECT_TRUE(luebke_hallen_safe_distances(tree, *rings, view_from(near), options));
+    options.chroma = true;
+    EXPECT_FALSE(luebke_hallen_safe_distances(tree, *rings, view_from(near), options));
+}
+
+// Rings hold their corners and proxies, and those of the nodes below.
+TEST(Chroma, OfRingsNests) {
+    const VertexTree tree = checkerboard([](bool is_one) { return is_one ? glm::vec4(0.6f, 0.2f, 0.1f, 1) : glm::vec4(0.1f, 0.2f, 0.9f, 1); });
+    const auto sound = vdtree::SoundTree::of(tree);
+    ASSERT_TRUE(sound);
+    const auto rings = ring_chroma(tree);
+    ASSERT_TRUE(rings);
+    ASSERT_EQ(rings->size(), tree.interior_count());
+    const auto includes = [](const ChromaRange& outer, glm::vec2 lo, glm::vec2 hi) {
+        return outer.lo.x <= lo.x && outer.lo.y <= lo.y && hi.x <= outer.hi.x && hi.y <= outer.hi.y;
+    };
+    for (NodeId node = 1; node < tree.interior_count(); ++node) {
+        const ChromaRange &own = (*rings)[node], &above = (*rings)[sound->parents()[node]];
+        EXPECT_TRUE(includes(above, own.lo, own.hi)) << node;
+    }
+    for (const vdtree::Triangle& t : sound->triangles()) {
+        for (const Index corner : t) {
+            const NodeId leaf = tree.interior_count() + corner;
+            const glm::dvec3 rgb(tree.colours()[leaf]);
+            const glm::vec2 chroma(opponent_chroma(rgb) * (static_cast<double>(tree.luminance()[leaf]) / glm::dot(rgb, rec709)));
+            for (const Index other : t)
+                EXPECT_TRUE(includes((*rings)[sound->parents()[tree.interior_count() + other]], chroma + 1e-6f, chroma - 1e-6f));
+        }
+    }
+}
+
 TEST(Chroma, LetsGoWhatNobodySees) {
     const VertexTree tree = red_green_checkerboard(0.002);
-    ASSERT_FALSE(tree.ring_chroma().empty());
+    ASSERT_FALSE(ring_chroma(tree)->empty());
     for (const bool safe : {false, true}) EXPECT_LT(inner_triangles(cut_of(tree, near, {safe, true})), 2 * 27 * 27 / 20);
 }
 
@@ -159,7 +198,7 @@ TEST(Chroma, FoldsNothingThatLuminanceKeeps) {
 
 TEST(Chroma, OfGreyMeshesCostsNothing) {
     const VertexTree tree = checkerboard([](bool is_light) { return glm::vec4(glm::vec3(is_light ? 0.35f : 0.25f), 1); });
-    EXPECT_TRUE(tree.ring_chroma().empty());
+    EXPECT_TRUE(ring_chroma(tree)->empty());
     for (const bool safe : {false, true}) {
         for (const bool gazes : {false, true}) {
             const auto with = criterion_of(tree, view_from(near), {safe, true}, gazes), without = criterion_of(tree, view_from(near), {safe, false}, gazes);
@@ -184,7 +223,7 @@ TEST(Chroma, FollowsTheLight) {
     const VertexTree tree = red_green_checkerboard(0.3);
     const VertexTree dim = *tree.relit({.direction = {0, 0, 1}, .ambient = 0.5f}), dark = *tree.relit({.direction = {0, 0, -1}, .ambient = 0.25f});
     ASSERT_TRUE(vdtree::verify(dark));
-    const auto red = [](const VertexTree& t) { return t.ring_chroma()[0].hi.x; };
+    const auto red = [](const VertexTree& t) { return (*ring_chroma(t))[0].hi.x; };
     EXPECT_NEAR(red(dim), red(tree), 1e-4f);
     EXPECT_NEAR(red(dark), 0.25f * red(tree), 1e-4f);
 }

@@ -15,7 +15,7 @@
 #include <meshio/mesh_io.h>
 #include <vdtree/tree_io.h>
 
-#include "built.h"
+#include "measured.h"
 #include "extra_meshes.h"
 #include "luebke_hallen_oracle.h"
 #include "sound.h"
@@ -211,7 +211,7 @@ TEST_F(LuebkeHallen, DistanceFormsRefuseWhatIsNoDisplayViewGazeOrScene) {
     const auto light_bounds = vdtree::LightBounds::measure(measured);
     ASSERT_TRUE(light_bounds);
     const auto bounds = std::make_shared<const vdtree::LightBounds>(*light_bounds);
-    const vdtree::CutRings rings = *vdtree::bound_cut_rings(measured);
+    const CutRings rings = *bound_cut_rings(measured);
     const auto count_made = [&](auto change) {
         View view = window(display_, {0, 0, 5});
         FoldTestOptions options;
@@ -377,10 +377,10 @@ std::pair<int, int> survive_random_lies(const VertexTree& tree, std::uint64_t se
             EXPECT_LE(cut.indices().size(), 3 * std::size_t{mapped->triangle_count()});
             ++taken;
         };
-        options.chroma = !mapped->ring_chroma().empty() && mapped->texture().empty();
+        options.chroma = has_chroma(*mapped) && mapped->texture().empty();
         follow(luebke_hallen_distances(*mapped, view, options));
-        if (!mapped->fold_errors().empty()) follow(error_distances(*mapped, view, options));
-        const auto rings = vdtree::bound_cut_rings(*mapped);
+        if (has_fold_measurement(*mapped)) follow(error_distances(*mapped, view, options));
+        const auto rings = bound_cut_rings(*mapped);
         EXPECT_EQ(rings.has_value(), mapped->check().has_value());
         if (rings) follow(luebke_hallen_safe_distances(*mapped, *rings, view, options));
         if (const auto bounds = vdtree::LightBounds::measure(*mapped))
@@ -393,7 +393,7 @@ TEST(FoldTests, SurviveMappedTreesOfRandomLies) {
     Mesh mesh = bumpy_sphere(8);
     const auto grey = vdtree::build_tree(mesh.view());
     ASSERT_TRUE(grey);
-    const auto measured = vdtree::with_fold_errors(*grey, 1);
+    const auto measured = measure_folds(*grey, 1);
     ASSERT_TRUE(measured);
     for (const glm::dvec3& p : mesh.positions) {
         mesh.colours.emplace_back(0.5 + 0.4 * p.x, 0.5, 0.5 - 0.4 * p.y, 1);

@@ -11,13 +11,13 @@
 #include <gtest/gtest.h>
 
 #include "built.h"
+#include "fold/error_distances.h"
 #include "shapes.h"
-#include "tree/vertex_tree_data.h"
+#include "sound.h"
 
 namespace unseen::perception {
 namespace {
 
-using vdtree::FoldError;
 using vdtree::Mesh;
 using vdtree::NodeId;
 using vdtree::VertexTree;
@@ -33,19 +33,13 @@ Mesh noisy_height_field(int n, std::mt19937_64& random) {
     return mesh;
 }
 
-VertexTree with_errors(const VertexTree& tree, std::vector<FoldError> errors) {
-    auto data = std::make_shared<VertexTree::Data>();
-    data->geometry = tree.data().geometry;
-    data->light = vdtree::copy_without_errors(tree.data().light);
-    data->light.fold_errors = std::move(errors);
-    return VertexTree(std::move(data));
-}
-
 // Errors as different as can be, which nest.
 std::vector<FoldError> various_errors(const VertexTree& tree, std::mt19937_64& random) {
     const auto log_uniform = [&](double low, double high) {
         return static_cast<float>(std::exp2(shapes::random_between(random, low, high)));
     };
+    const vdtree::SoundTree sound = support::sound(tree);
+    const auto parents = sound.parents();
     std::vector<FoldError> errors(tree.interior_count());
     for (NodeId node = tree.interior_count(); node-- > 0;) {
         FoldError& e = errors[node];
@@ -58,7 +52,7 @@ std::vector<FoldError> various_errors(const VertexTree& tree, std::mt19937_64& r
         e.drift = log_uniform(-10, -2);
         e.fading = static_cast<std::uint8_t>(random() % 4);
         if (node == 0) break;
-        FoldError& above = errors[tree.parents()[node]];
+        FoldError& above = errors[parents[node]];
         above.distance = std::max(above.distance, e.distance);
         above.extent = std::max(above.extent, e.extent);
     }
@@ -67,20 +61,22 @@ std::vector<FoldError> various_errors(const VertexTree& tree, std::mt19937_64& r
 
 // By interior node: the longest way down to a leaf.
 std::vector<int> heights_of(const VertexTree& tree) {
+    const vdtree::SoundTree sound = support::sound(tree);
+    const auto parents = sound.parents();
     std::vector<int> heights(tree.interior_count(), 1);
     for (NodeId node = tree.interior_count(); node-- > 1;) {
-        int& above = heights[tree.parents()[node]];
+        int& above = heights[parents[node]];
         above = std::max(above, heights[node] + 1);
     }
     return heights;
 }
 
-// Patterns are rounded to fewer until there are rows for all. The exact distances are those of nodes with no errors
-// below them, so few that each pattern has its row.
+// Here about 80,000 patterns are rounded to fewer. The exact distances are those of nodes with no errors below them, few enough for a row each.
 TEST(ErrorDistances, OfMorePatternsThanRowsAreNoLess) {
     constexpr std::size_t most_rows = 0x10000;
     std::mt19937_64 random(5);
     const VertexTree tree = support::built(noisy_height_field(320, random));
+    const vdtree::SoundTree sound = support::sound(tree);
     const std::vector<FoldError> errors = various_errors(tree, random);
     const std::vector<int> heights = heights_of(tree);
     vdtree::View view;
@@ -88,7 +84,7 @@ TEST(ErrorDistances, OfMorePatternsThanRowsAreNoLess) {
     view.eye = {0.5, 0.5, 3};
     view.fov_y_degrees = physical_field(options.display, view.height).value();
     options.gaze_px = glm::dvec2(100, 100);
-    const auto all = error_distances(with_errors(tree, errors), view, options);
+    const auto all = criterion_of(sound, {errors, {}}, view, options);
     ASSERT_TRUE(all) << all.error().message;
     EXPECT_TRUE(all->is_monotone());
     const vdtree::DistanceCriterion::Parts& parts = all->parts();
@@ -99,7 +95,7 @@ TEST(ErrorDistances, OfMorePatternsThanRowsAreNoLess) {
         std::vector<FoldError> of_height(errors.size());
         for (NodeId node = 0; node < errors.size(); ++node)
             if (heights[node] == height) of_height[node] = errors[node];
-        const auto exact = error_distances(with_errors(tree, std::move(of_height)), view, options);
+        const auto exact = criterion_of(sound, {std::move(of_height), {}}, view, options);
         ASSERT_TRUE(exact) << exact.error().message;
         const vdtree::DistanceCriterion::Parts& own = exact->parts();
         ASSERT_LT(own.reach.size(), most_rows * bins);

@@ -204,7 +204,7 @@ std::uint64_t visible_pixels(const Cut& cut, const View& view) {
 // What the safe test makes of the scene.
 Cut safe_cut(const Scene& scene, const View& view) {
     const auto criterion =
-        luebke_hallen_safe_distances(*scene.tree, *vdtree::bound_cut_rings(*scene.tree), view, fold_test(*scene.tree));
+        luebke_hallen_safe_distances(*scene.tree, *perception::bound_cut_rings(*scene.tree), view, fold_test(*scene.tree));
     if (!criterion) throw std::runtime_error(criterion.error().message);
     EXPECT_TRUE(criterion->is_monotone());
     Cut cut(*scene.tree);
@@ -407,7 +407,7 @@ TEST(LuebkeHallenSafe, FoldsNothingThatLuebkeHallenKeeps) {
     mesh = flat_grid(even_lines(lines, 1), [](int row, int column) { return 0.5f + 0.1f * static_cast<float>(std::sin(0.7 * row) * std::cos(1.3 * column)); });
     for (glm::dvec3& p : mesh.positions) p.z = 3 * std::sin(0.2 * p.x) * std::cos(0.3 * p.y);
     const VertexTree tree = std::move(*vdtree::build_tree(mesh.view()));
-    const vdtree::CutRings rings = *vdtree::bound_cut_rings(tree);
+    const perception::CutRings rings = *perception::bound_cut_rings(tree);
     View view = view_of_screen();
     std::size_t kept = 0, more = 0;
     for (int trial = 0; trial < 8; ++trial) {

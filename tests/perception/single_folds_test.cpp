@@ -15,13 +15,16 @@
 
 #include <vdtree/builder.h>
 #include <vdtree/cut.h>
-#include <vdtree/cut_rings.h>
+#include <perception/cut_rings.h>
 #include <vdtree/normal_mask.h>
 
 #include "shapes.h"
 #include "sound.h"
 
-namespace unseen::vdtree {
+namespace unseen::perception {
+
+using namespace vdtree;
+
 namespace {
 
 // In all, over all meshes; UNSEEN_FOLDS sets it.
@@ -323,4 +326,4 @@ TEST_P(SingleFolds, StayWithinTheCutsRing) {
 }
 
 } // namespace
-} // namespace unseen::vdtree
+} // namespace unseen::perception

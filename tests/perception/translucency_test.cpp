@@ -8,7 +8,7 @@
 #include <vdtree/builder.h>
 #include <vdtree/cut.h>
 
-#include "built.h"
+#include "measured.h"
 
 namespace unseen::perception {
 namespace {
@@ -67,7 +67,7 @@ enum class Form { in_distances, safe, by_errors };
 
 Result<vdtree::DistanceCriterion> criterion_of(const VertexTree& tree, const View& view, const FoldTestOptions& options, Form form) {
     if (form == Form::by_errors) return error_distances(tree, view, options);
-    if (form == Form::safe) return luebke_hallen_safe_distances(tree, *vdtree::bound_cut_rings(tree), view, options);
+    if (form == Form::safe) return luebke_hallen_safe_distances(tree, *bound_cut_rings(tree), view, options);
     return luebke_hallen_distances(tree, view, options);
 }
 

@@ -12,7 +12,7 @@
 #include <render/context.h>
 #include <render/renderer.h>
 
-#include "built.h"
+#include "measured.h"
 #include "oracle.h"
 #include "shapes.h"
 
@@ -91,7 +91,7 @@ TEST_P(FoldOracleRuns, SeeNothingOfWhatLuebkeAndHallensTestFolds) {
 
 TEST_P(FoldOracleRuns, SeeNothingOfWhatTheSafeTestFolds) {
     const VertexTree tree = built(GetParam().make());
-    const vdtree::CutRings rings = *vdtree::bound_cut_rings(tree);
+    const perception::CutRings rings = *perception::bound_cut_rings(tree);
     run(
         tree, [&](const View& view, const perception::FoldTestOptions& options) { return perception::luebke_hallen_safe_distances(tree, rings, view, options); },
         [](const perception::Judgement& judged) { EXPECT_EQ(judged.visible_pixels, 0u); });

@@ -141,7 +141,7 @@ TEST_P(Lit, RefusesLightsThatCannotBe) {
     auto renderer = render::Renderer::create(*context_, tree);
     ASSERT_TRUE(renderer) << renderer.error().message;
     render::DrawOptions options;
-    options.lighting = dark;
+    options.lighting = Lighting(); // dark
     View view;
     view.eye = {0, 0, 5};
     const auto frame = renderer->draw(Cut(tree), view, options);

@@ -65,7 +65,7 @@ INSTANTIATE_TEST_SUITE_P(Meshes, TexturedOracle, testing::ValuesIn(cases), [](co
 
 TEST_P(TexturedOracle, SeesNothingOfWhatTheSafeTestFolds) {
     const VertexTree tree = built(GetParam().make());
-    const vdtree::CutRings rings = *vdtree::bound_cut_rings(tree);
+    const perception::CutRings rings = *perception::bound_cut_rings(tree);
     auto context = render::Context::headless();
     if (!context) GTEST_SKIP() << context.error().message;
     auto renderer = render::Renderer::create(*context, tree);
@@ -97,7 +97,7 @@ TEST(TextureDeviation, LetsEvenTexturesOnPlanesFold) {
     const Texture texture = textures::checkerboard(128, 128, 8, 20, 240);
     const auto inner_triangles = [](const Mesh& mesh) {
         const VertexTree tree = built(mesh);
-        const vdtree::CutRings rings = *vdtree::bound_cut_rings(tree);
+        const perception::CutRings rings = *perception::bound_cut_rings(tree);
         const perception::Display display;
         View view;
         view.width = view.height = window_px;

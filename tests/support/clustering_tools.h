@@ -7,7 +7,7 @@
 #include <vdtree/builder.h>
 
 #include "build/surface.h"
-#include "tree/vertex_tree_data.h"
+#include <vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::support {
 

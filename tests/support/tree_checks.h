@@ -53,7 +53,6 @@ inline std::string difference(const VertexTree& a, const VertexTree& b) {
     if (!same_bytes(a.support_luminance(), b.support_luminance())) return "support_luminance";
     if (!same_bytes(a.ring_luminance(), b.ring_luminance())) return "ring_luminance";
     if (!same_bytes(a.adaptation_luminance(), b.adaptation_luminance())) return "adaptation_luminance";
-    if (!same_bytes(a.ring_chroma(), b.ring_chroma())) return "ring_chroma";
     if (!same_bytes(a.displacement(), b.displacement())) return "displacement";
     if (!same_bytes(a.source_vertices(), b.source_vertices())) return "source_vertices";
     if (!same_bytes(a.source_triangles(), b.source_triangles())) return "source_triangles";

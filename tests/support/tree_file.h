@@ -37,12 +37,13 @@ struct TreeFile {
     // Offsets in the header and in an entry of the section table.
     static constexpr std::size_t version_at = 8, section_count_at = 12, file_bytes_at = 16, page_count_at = 24,
                                  table_checksum_at = 32, header_checksum_at = 40;
-    static constexpr std::size_t element_bytes_at = 24, component_bytes_at = 28, count_at = 32, offset_at = 40;
+    static constexpr std::size_t domain_at = 20, element_bytes_at = 24, component_bytes_at = 28, count_at = 32, offset_at = 40;
 
     struct Section {
         std::string name;
         std::uint32_t element_bytes = 1, component_bytes = 1;
         std::string data;
+        std::uint32_t domain = 0; // 1, 2 and 3: of an attribute
 
         template <class T>
         T get(std::size_t i) const {
@@ -63,8 +64,9 @@ struct TreeFile {
         for (std::uint32_t i = 0; i < count; ++i) {
             const std::size_t entry = header_bytes + i * entry_bytes;
             Section s;
-            s.name = std::string(bytes.substr(entry, 24));
+            s.name = std::string(bytes.substr(entry, domain_at));
             s.name.resize(std::strlen(s.name.c_str()));
+            s.domain = load<std::uint32_t>(bytes, entry + domain_at);
             s.element_bytes = load<std::uint32_t>(bytes, entry + element_bytes_at);
             s.component_bytes = load<std::uint32_t>(bytes, entry + component_bytes_at);
             if (s.element_bytes == 0) throw std::out_of_range("element size");
@@ -88,7 +90,7 @@ struct TreeFile {
                 checksums.push_back(xxh3(std::string_view(s.data).substr(at, page_bytes)));
         std::string out(header_bytes + sections.size() * entry_bytes, '\0');
         std::memcpy(out.data(), "UNSEENVT", 8);
-        store(out, version_at, std::uint32_t{3});
+        store(out, version_at, std::uint32_t{4});
         store(out, section_count_at, static_cast<std::uint32_t>(sections.size()));
         store(out, page_count_at, std::uint64_t{checksums.size()});
         for (const std::uint64_t sum : checksums) {
@@ -99,7 +101,8 @@ struct TreeFile {
             const Section& s = sections[i];
             const std::size_t entry = header_bytes + i * entry_bytes;
             out.resize((out.size() + alignment - 1) / alignment * alignment);
-            std::memcpy(out.data() + entry, s.name.data(), std::min<std::size_t>(s.name.size(), 24));
+            std::memcpy(out.data() + entry, s.name.data(), std::min(s.name.size(), domain_at));
+            store(out, entry + domain_at, s.domain);
             store(out, entry + element_bytes_at, s.element_bytes);
             store(out, entry + component_bytes_at, s.component_bytes);
             store(out, entry + count_at, s.count());

@@ -7,8 +7,6 @@
 #include <vdtree/conserve_light.h>
 #include <vdtree/criteria.h>
 #include <vdtree/cut.h>
-#include <vdtree/cut_rings.h>
-#include <vdtree/fold_errors.h>
 #include <vdtree/geomorph.h>
 #include <vdtree/lighting.h>
 #include <vdtree/occluders.h>
@@ -17,16 +15,16 @@
 namespace unseen::support {
 
 // Returns whether every mesh that came out was valid, and all that looks at the whole tree agreed on whether it is
-// damaged. Measuring folds takes a second, however small the tree is, and with sanitizers ten.
-inline bool use_everything(const vdtree::VertexTree& tree, bool measures_folds = true) {
+// damaged.
+inline bool use_everything(const vdtree::VertexTree& tree) {
     using namespace vdtree;
     // First, for nobody has looked at a mapped tree yet.
-    const bool is_sound = bound_cut_rings(tree).has_value();
+    const bool is_sound = LightBounds::measure(tree).has_value();
     bool valid = is_sound == tree.check().has_value();
     valid &= is_sound || !verify(tree);
-    valid &= is_sound == LightBounds::measure(tree).has_value();
     valid &= is_sound == tree.untextured().has_value();
-    if (measures_folds || !is_sound) valid &= !with_fold_errors(tree, 1) || is_sound;
+    valid &= is_sound || !conserve_light(tree);
+    for (const AttributeInfo& attribute : tree.attributes()) (void)tree.attribute<std::uint8_t>(attribute.name).size();
     for (const double distance : {0.5, 1.5})
         (void)check_lights(tree,
                            {.lights = {{.kind = LightSource::Kind::point, .position = glm::dvec3(distance, 0.1, 0.2)}}})
@@ -60,10 +58,7 @@ inline bool use_everything(const vdtree::VertexTree& tree, bool measures_folds =
     extract();
     cut.adjust(bright_ones, {.triangle_budget = tree.triangle_count() / 2});
     extract();
-    if (measures_folds) {
-        const auto conserved = conserve_light(tree);
-        if (conserved) (void)with_fold_errors(*conserved, 1).has_value();
-    }
+    if (is_sound) (void)conserve_light(tree).has_value(); // not those with a texture
     (void)LightBounds::measure(tree).has_value();
     const auto everything = DistanceCriterion::create(tree, {.reach = {DistanceCriterion::always_visible}});
     valid &= everything.has_value();

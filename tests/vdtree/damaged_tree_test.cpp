@@ -11,8 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <vdtree/cut_rings.h>
-#include <vdtree/fold_errors.h>
+#include <vdtree/lighting.h>
 #include <vdtree/tree_io.h>
 
 #include "built.h"
@@ -45,7 +44,10 @@ struct Kind {
     VertexTree (*make)();
 };
 
-VertexTree measured() { return *with_fold_errors(built(shapes::bumpy_sphere(2)), 1); }
+VertexTree marked() {
+    const VertexTree tree = built(shapes::bumpy_sphere(2));
+    return *tree.with_attribute("mark", AttributeDomain::interior_node, std::vector<float>(tree.interior_count(), 0.5f));
+}
 VertexTree plain() { return built(shapes::bumpy_sphere(3)); }
 VertexTree coloured() { return built(shapes::with_attributes(shapes::bumpy_sphere(3))); }
 VertexTree textured() {
@@ -61,7 +63,7 @@ protected:
         support::write_bytes(file_, bytes.bytes());
         return map_tree(file_);
     }
-    // Made once: measuring folds takes a second.
+    // Made once.
     const TreeFile& honest() {
         static std::map<std::string, TreeFile> made;
         const auto [at, is_new] = made.try_emplace(GetParam().name);
@@ -89,7 +91,7 @@ TEST_P(DamagedTrees, LeadNobodyOutOfBounds) {
         }
         const auto tree = mapped(file);
         if (!tree) continue;
-        ASSERT_TRUE(support::use_everything(*tree, false)) << GetParam().name << ", round " << round;
+        ASSERT_TRUE(support::use_everything(*tree)) << GetParam().name << ", round " << round;
         ++(tree->check() ? harmless : damaged);
     }
     EXPECT_GT(damaged, 30);
@@ -103,12 +105,12 @@ TEST_P(DamagedTrees, AreToldWithTheNode) {
     file["parents"].set(interior - 1, 0x40000000u);
     const auto tree = mapped(file);
     ASSERT_TRUE(tree) << tree.error().message;
-    const auto rings = bound_cut_rings(*tree);
-    ASSERT_FALSE(rings);
-    EXPECT_THAT(rings.error().message, HasSubstr("of the mapped tree is damaged. Build the tree again"));
+    const auto lit = LightBounds::measure(*tree);
+    ASSERT_FALSE(lit);
+    EXPECT_THAT(lit.error().message, HasSubstr("of the mapped tree is damaged. Build the tree again"));
     EXPECT_FALSE(SoundTree::of(*tree));
-    EXPECT_EQ(SoundTree::of(*tree).error().message, rings.error().message);
-    EXPECT_THAT(rings.error().message, HasSubstr("Node " + std::to_string(tree->first_damaged())));
+    EXPECT_EQ(SoundTree::of(*tree).error().message, lit.error().message);
+    EXPECT_THAT(lit.error().message, HasSubstr("Node " + std::to_string(tree->first_damaged())));
 }
 
 // What no node's own check looks at.
@@ -138,12 +140,12 @@ TEST_P(DamagedTrees, AreNotSeenWhereThereAreNone) {
     ASSERT_TRUE(sound) << sound.error().message;
     EXPECT_EQ(sound->parents().data(), SoundTree::of(*tree)->parents().data());
     EXPECT_EQ(sound->node_count(), tree->node_count());
-    EXPECT_TRUE(support::use_everything(*tree, false));
+    EXPECT_TRUE(support::use_everything(*tree));
 }
 
 INSTANTIATE_TEST_SUITE_P(All, DamagedTrees,
                          ::testing::Values(Kind{"plain", plain}, Kind{"coloured", coloured}, Kind{"textured", textured},
-                                           Kind{"measured", measured}, Kind{"large", open_and_large}),
+                                           Kind{"marked", marked}, Kind{"large", open_and_large}),
                          [](const auto& kind) { return kind.param.name; });
 
 } // namespace

@@ -7,6 +7,7 @@
 #include <functional>
 #include <iterator>
 #include <limits>
+#include <numeric>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -71,16 +72,20 @@ protected:
         support::write_bytes(file_, bytes);
         return read_tree(file_);
     }
-    // All the sections that there are: errors of folds, which nobody measures with a texture, too.
+    // All the sections that there are, and two that others keep.
     std::string bytes_with_everything() {
         Mesh mesh = shapes::with_attributes(shapes::cube(2));
-        TreeFile::Section errors = TreeFile::parse(bytes_of(support::measured(built(mesh))))["fold_errors"];
         mesh.texture = textures::noise(4, 3, 1);
-        TreeFile file = TreeFile::parse(bytes_of(built(mesh)));
-        const std::string first = errors.data.substr(0, errors.element_bytes);
-        for (errors.data.clear(); errors.data.size() < file["first_leaf"].count() * errors.element_bytes;) errors.data += first;
-        file.sections.push_back(errors);
-        return file.bytes();
+        return bytes_of(marked(built(mesh)));
+    }
+    static VertexTree marked(const VertexTree& tree) {
+        std::vector<float> of_nodes(tree.interior_count());
+        std::iota(of_nodes.begin(), of_nodes.end(), 0.5f);
+        const auto once = tree.with_attribute("mark", AttributeDomain::interior_node, std::move(of_nodes));
+        EXPECT_TRUE(once) << once.error().message;
+        auto twice = once->with_attribute("note", AttributeDomain::tree, std::vector<std::uint16_t>{1, 2, 3});
+        EXPECT_TRUE(twice) << twice.error().message;
+        return std::move(*twice);
     }
     void expect_refused(std::string_view bytes, const std::string& reason) {
         const auto tree = read_bytes(bytes);
@@ -202,11 +207,17 @@ TEST_F(TreeIo, SaysWhatIsWrongWithTheHeader) {
     EXPECT_FALSE(is_tree_file(file_));
 
     std::string bad = good;
-    for (const std::uint32_t version : {0u, 2u, 4u, ~0u}) {
+    for (const std::uint32_t version : {5u, ~0u}) {
         support::store(bad, TreeFile::version_at, version);
         TreeFile::seal(bad);
         expect_refused(bad, "version " + std::to_string(version) + " of the format");
         expect_refused(bad, "Build the tree again from its mesh");
+        EXPECT_EQ(read_bytes(bad).error().code, ErrorCode::unsupported);
+    }
+    for (const std::uint32_t version : {0u, 2u, 3u}) {
+        support::store(bad, TreeFile::version_at, version);
+        TreeFile::seal(bad);
+        expect_refused(bad, "tree.vdt was written by an earlier version; build it again with: unseen build MESH -o FILE");
         EXPECT_EQ(read_bytes(bad).error().code, ErrorCode::unsupported);
     }
 
@@ -252,6 +263,61 @@ TEST_F(TreeIo, RefusesTablesThatDoNotFit) {
         TreeFile::seal(bad);
         ASSERT_FALSE(read_bytes(bad)) << size;
     }
+}
+
+// ---- attributes
+
+// Names that nobody here knows come back from files that were read and from files that were mapped, and go into the next.
+TEST_F(TreeIo, KeepsAttributesOfAnyName) {
+    const VertexTree tree = marked(built(shapes::bumpy_sphere(2)));
+    const auto expect_kept = [&](const VertexTree& kept) {
+        ASSERT_EQ(kept.attributes().size(), 2u);
+        EXPECT_TRUE(std::ranges::equal(kept.attribute<float>("mark"), tree.attribute<float>("mark")));
+        EXPECT_THAT(kept.attribute<std::uint16_t>("note"), testing::ElementsAre(1, 2, 3));
+    };
+    expect_kept(tree);
+    const std::string bytes = bytes_of(tree);
+    const auto other = folder_ / "other.vdt";
+    for (const auto& open : {read_tree(file_), map_tree(file_)}) {
+        ASSERT_TRUE(open) << open.error().message;
+        expect_kept(*open);
+        EXPECT_TRUE(open->check());
+        ASSERT_TRUE(write_tree(other, *open));
+        EXPECT_EQ(support::read_bytes(other), bytes);
+        const auto more = open->with_attribute("more", AttributeDomain::node, std::vector<double>(tree.node_count(), 7));
+        ASSERT_TRUE(more) << more.error().message;
+        ASSERT_TRUE(write_tree(other, *more));
+        const auto again = read_tree(other);
+        ASSERT_TRUE(again) << again.error().message;
+        EXPECT_EQ(again->attributes().size(), 3u);
+        EXPECT_EQ(again->attribute<double>("more").size(), tree.node_count());
+        EXPECT_EQ(support::difference(*again, tree), "");
+    }
+}
+
+TEST_F(TreeIo, GivesAttributesOfOneTypeOnly) {
+    const VertexTree plain = built(shapes::cube(2)), tree = marked(plain);
+    EXPECT_TRUE(plain.attributes().empty());
+    EXPECT_TRUE(plain.attribute<float>("mark").empty());
+    EXPECT_FALSE(tree.attribute<float>("mark").empty());
+    EXPECT_TRUE(tree.attribute<double>("mark").empty()) << "of another size";
+    EXPECT_TRUE(tree.attribute<float>("marks").empty());
+    EXPECT_EQ(tree.positions().data(), plain.positions().data()) << "all else is shared";
+    const auto replaced = tree.with_attribute("mark", AttributeDomain::tree, std::vector<float>{1});
+    ASSERT_TRUE(replaced);
+    EXPECT_EQ(replaced->attribute<float>("mark").size(), 1u);
+    EXPECT_EQ(replaced->attributes().size(), 2u);
+    for (const char* name : {"", "with space", "a name longer than it may be"})
+        EXPECT_FALSE(tree.with_attribute(name, AttributeDomain::tree, std::vector<float>{1})) << name;
+    EXPECT_FALSE(tree.with_attribute("mark", AttributeDomain::node, std::vector<float>{1}));
+    EXPECT_TRUE(tree.relit({.direction = {0, 0, 1}})->attributes().empty());
+    VertexTree full = tree.share();
+    for (std::size_t i = 2; i < most_attributes; ++i)
+        full = *full.with_attribute("a" + std::to_string(i), AttributeDomain::tree, std::vector<float>{1});
+    EXPECT_FALSE(full.with_attribute("more", AttributeDomain::tree, std::vector<float>{1}));
+    EXPECT_TRUE(full.with_attribute("mark", AttributeDomain::tree, std::vector<float>{1}));
+    ASSERT_TRUE(write_tree(file_, full));
+    EXPECT_TRUE(read_tree(file_));
 }
 
 // ---- files that lie: every checksum is right, the values are not
@@ -333,9 +399,6 @@ std::vector<Lie> lies() {
         {"the facts: a bounding sphere of negative radius", set("facts", 9, -1.0f)},
         {"the facts: a light that is no number", set("facts", 10, nan)},
         {"the facts: a luminance that is no number", set("facts", 14, nan)},
-        {"a chroma that is no number", set("ring_chroma", 2, nan)},
-        {"a range of chroma in reverse", [](TreeFile& f) { f["ring_chroma"].set(4, 5.0f), f["ring_chroma"].set(6, 4.0f); }},
-        {"chroma without colours", [](TreeFile& f) { f["colours"].data.clear(); }},
         {"the facts: luminances in reverse", [](TreeFile& f) { f["facts"].set(14, 0.9f), f["facts"].set(15, 0.1f); }},
         {"the facts: no closedness", set("facts", 18, 3u)},
         {"the facts: twice", [](TreeFile& f) { f["facts"].data += f["facts"].data; }},
@@ -357,10 +420,20 @@ std::vector<Lie> lies() {
              f["first_triangle"].data.resize(4);
          }},
         {"nothing at all", [](TreeFile& f) { f.sections.clear(); }},
-        {"an error that is no number", set("fold_errors", 0, nan)},
-        {"an infinite error of luminance", set("fold_errors", 2, inf)},
-        {"a negative extent", set("fold_errors", 4, -1.0f)},
-        {"an infinite drift", set("fold_errors", 5, inf)},
+        {"an attribute of other nodes", [](TreeFile& f) { f["mark"].data.resize(4); }},
+        {"an attribute of nothing", [](TreeFile& f) { f["mark"].domain = 4; }},
+        {"an attribute without a name", [](TreeFile& f) { f["mark"].name = ""; }},
+        {"an attribute whose name is no text", [](TreeFile& f) { f["mark"].name = "a b"; }},
+        {"an attribute that is there twice", [](TreeFile& f) { f["mark"].name = "note"; }},
+        {"an attribute of no components", [](TreeFile& f) { f["mark"].component_bytes = 0; }},
+        {"an attribute of odd components", [](TreeFile& f) { f["mark"].component_bytes = 3; }},
+        {"too many attributes",
+         [](TreeFile& f) {
+             for (std::size_t i = 0; i < most_attributes; ++i) {
+                 f.sections.push_back(f["note"]);
+                 f.sections.back().name = "note" + std::to_string(i);
+             }
+         }},
         {"a texture of no width", set("texture", 0, 0u)},
         {"a texture of endless height", set("texture", 1, 0xffffffffu)},
         {"a texture of other texels", set("texture", 0, 5u)},
@@ -374,8 +447,8 @@ std::vector<Lie> lies() {
     for (const char* section : {"parents",          "positions",      "normals",    "colours",     "uvs",
                                 "luminance",        "first_leaf",     "leaf_end",   "subtree_end", "first_triangle",
                                 "bounds",           "support_spheres", "mask_at",
-                                "displacement",     "support_range",  "ring_range", "adaptation",  "ring_chroma", "triangles",
-                                "source_triangles", "source_vertices", "fold_errors", "texels",     "ring_texture"})
+                                "displacement",     "support_range",  "ring_range", "adaptation",  "triangles",
+                                "source_triangles", "source_vertices", "mark", "texels",     "ring_texture"})
         all.push_back({section, drop_last(section)});
     return all;
 }
@@ -407,21 +480,6 @@ TEST_F(TreeIo, MissesNoSection) {
         file.sections.erase(file.sections.begin() + static_cast<std::ptrdiff_t>(i));
         expect_refused(file.bytes(), name);
     }
-}
-
-// What a tree has not takes no place in its file.
-TEST_F(TreeIo, WritesChromaOnlyOfColours) {
-    const auto has_chroma = [&](const Mesh& mesh) {
-        const TreeFile file = TreeFile::parse(bytes_of(built(mesh)));
-        return std::any_of(file.sections.begin(), file.sections.end(), [](const auto& s) { return s.name == "ring_chroma"; });
-    };
-    Mesh mesh = shapes::cube(2);
-    EXPECT_FALSE(has_chroma(mesh));
-    mesh.colours.assign(mesh.positions.size(), glm::vec4(0.5f, 0.5f, 0.5f, 1));
-    mesh.colours[3] = glm::vec4(0.2f, 0.2f, 0.2f, 1);
-    EXPECT_FALSE(has_chroma(mesh));
-    mesh.colours[3] = glm::vec4(0.5f, 0.4f, 0.5f, 1);
-    EXPECT_TRUE(has_chroma(mesh));
 }
 
 // Random values in random places, all checksums right: an error, or a tree with which everything can be done.

@@ -1,3 +1,5 @@
+#include <perception/chroma.h>
+
 #include "effects.h"
 
 #include <cmath>
@@ -89,7 +91,7 @@ Effect texture_effect(const Sight& sight, const Decision& decision) {
 Effect chroma_effect(const Sight& sight, const Decision& decision) {
     if (!is_perceptual(decision)) return {"chroma", false, "only the perceptual fold test knows it"};
     if (!decision.request.chroma) return {"chroma", false, "without request.chroma only luminance counts"};
-    if (sight.object.tree.ring_chroma().empty()) return {"chroma", false, "nothing has any colour"};
+    if (!perception::has_chroma(sight.object.tree)) return {"chroma", false, "nothing has any colour"};
     return {"chroma", true, "red-green and yellow-violet contrast count beside that of luminance, by castleCSF"};
 }
 

@@ -1,3 +1,5 @@
+#include <perception/fold_measurement.h>
+
 #include "fold_test.h"
 
 #include <algorithm>
@@ -34,7 +36,7 @@ Choice suitable_test(const Sight& sight, bool chroma, bool may_measure) {
     if (sight.lighting) return {FoldTest::luebke_hallen, "the test error does not know lights that move"};
     if (!tree.texture().empty()) return {FoldTest::luebke_hallen_safe, "the test error does not know textures"};
     if (chroma) return {FoldTest::luebke_hallen, "the test error does not know colours"};
-    if (!tree.fold_errors().empty() || (may_measure && tree.interior_count() <= most_measured)) return {};
+    if (perception::has_fold_measurement(tree) || (may_measure && tree.interior_count() <= most_measured)) return {};
     return {
         FoldTest::luebke_hallen,
         "the tree does not hold the errors of its folds, and measuring them takes long: session::measured()"};
@@ -165,7 +167,7 @@ struct KeptCriterion {
 
 Result<Decision> decide(const Sight& sight, const Request& request) {
     const bool folds = request.goal.kind != Goal::Kind::full;
-    const bool has_errors = !sight.object.tree.fold_errors().empty();
+    const bool has_errors = perception::has_fold_measurement(sight.object.tree);
     Choice choice = suitable_test(sight, request.chroma, folds && request.may_measure);
     if (!folds) return Decision{request, choice.test, std::move(choice.why)};
     if (request.goal.kind == Goal::Kind::pixels) choice = {FoldTest::extent};

@@ -1,7 +1,7 @@
 #include <session/model_file.h>
 
 #include <vdtree/conserve_light.h>
-#include <vdtree/fold_errors.h>
+#include <perception/fold_measurement.h>
 #include <vdtree/builder.h>
 #include <vdtree/tree_io.h>
 
@@ -62,7 +62,7 @@ Result<vdtree::VertexTree> open_tree(const fs::path& file, const LoadOptions& op
 Result<vdtree::VertexTree> measured(const vdtree::VertexTree& tree, int threads) {
     const auto conserved = vdtree::conserve_light(tree);
     if (!conserved) return conserved.error();
-    return vdtree::with_fold_errors(*conserved, threads);
+    return perception::measure_folds(*conserved, threads);
 }
 
 } // namespace unseen::session

@@ -50,9 +50,9 @@ std::span<const vdtree::Sphere> inner_spheres(const Object& object, ObjectCache&
     return *cache.inner_spheres;
 }
 
-Result<const vdtree::CutRings*> cut_rings(const Object& object, ObjectCache& cache) {
+Result<const perception::CutRings*> cut_rings(const Object& object, ObjectCache& cache) {
     if (!cache.cut_rings) {
-        auto bounded = vdtree::bound_cut_rings(object.tree);
+        auto bounded = perception::bound_cut_rings(object.tree);
         if (!bounded) return bounded.error();
         cache.cut_rings = std::move(*bounded);
     }
@@ -245,7 +245,7 @@ std::span<const vdtree::Sphere> Session::inner_spheres(std::size_t object) const
     return session::inner_spheres(state_->scene.objects[object], state_->caches[object]);
 }
 
-Result<const vdtree::CutRings*> Session::cut_rings(std::size_t object) const {
+Result<const perception::CutRings*> Session::cut_rings(std::size_t object) const {
     return session::cut_rings(state_->scene.objects[object], state_->caches[object]);
 }
 

@@ -9,7 +9,7 @@
 #include <session/observer.h>
 #include <session/scene.h>
 #include <session/session.h>
-#include <vdtree/cut_rings.h>
+#include <perception/cut_rings.h>
 
 namespace unseen::session {
 
@@ -18,7 +18,7 @@ struct KeptCriterion; // see fold_test.cpp
 // What is derived from an object's tree, made when it is first asked for. Dropped when the tree is replaced.
 struct ObjectCache {
     std::optional<std::vector<vdtree::Sphere>> inner_spheres = {};
-    std::optional<vdtree::CutRings> cut_rings = {};
+    std::optional<perception::CutRings> cut_rings = {};
     std::shared_ptr<const vdtree::LightBounds> light_bounds = {};
     std::shared_ptr<const KeptCriterion> criterion = {}; // the last that was asked for
 };
@@ -47,6 +47,6 @@ struct Decision {
 
 WorldSphere world_sphere(const Object& object);
 std::span<const vdtree::Sphere> inner_spheres(const Object& object, ObjectCache& cache);
-Result<const vdtree::CutRings*> cut_rings(const Object& object, ObjectCache& cache);
+Result<const perception::CutRings*> cut_rings(const Object& object, ObjectCache& cache);
 
 } // namespace unseen::session

@@ -8,11 +8,10 @@
 #include <glm/vec2.hpp>
 
 #include <perception/csf.h>
+#include <perception/cut_rings.h>
 #include <perception/display.h>
 #include <vdtree/criteria.h>
-#include <vdtree/cut_rings.h>
 #include <vdtree/distance_criterion.h>
-#include <vdtree/fold_errors.h>
 #include <vdtree/lighting.h>
 
 namespace unseen::perception {
@@ -31,7 +30,7 @@ struct FoldTestOptions {
     std::optional<glm::dvec2> gaze_px = {}; // in the window, from the top left; may lie outside. Default: foveal everywhere
     std::shared_ptr<const CsfTable> csf = {}; // shared with the criteria that look it up; default: CsfTable::standard()
     // Look at colour, too, where the tree has any: the Luebke-Hallen tests in distance form then fold where sqrt((c S)^2 + (c_rg S_rg)^2 +
-    // (c_yv S_yv)^2) <= 1, with the contrasts of the ring's range in both opponent directions and castleCSF's sensitivities to them.
+    // (c_yv S_yv)^2) <= 1, with the contrasts of the ring's range in both opponent directions and castleCSF's sensitivities to them. The ranges are found anew for each criterion (ring_chroma(): one pass over the tree).
     bool chroma = false;
 };
 
@@ -63,7 +62,7 @@ Result<vdtree::DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTr
 //   c      = Michelson contrast of hat R, for silhouettes united with the scene's range
 //   folds where  c S(1 / (2 theta')) <= 1  and  m / L S_peak <= 1, L the middle of hat R
 // Costs at least what the above does for every node. Cost: as the above.
-Result<vdtree::DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree& tree, const vdtree::CutRings& rings,
+Result<vdtree::DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree& tree, const CutRings& rings,
                                                                const vdtree::View& view, const FoldTestOptions& options);
 
 // luebke_hallen_distances() under lights that may move: ranges are what they can make of the normals, albedos and places in a ring, and follow the
@@ -78,10 +77,10 @@ SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBoun
                          glm::dvec3 eye, float background);
 
 // The test by errors: what a fold changes in fact, not what could change within its ring. In distance form, like the above. Fails, too,
-// where the tree has no fold_errors() (vdtree::with_fold_errors).
+// where the tree's folds have not been measured (measure_folds()), and where what files say of it is no measurement.
 //
 // With D the angular width of what changes: twice the larger of the support's radius and the extent; h, eY and their means hm, em of
-// FoldError, in cd/m2 where they are luminances; the ring's range lo1..hi1 and its sphere's r1; L the middle of the range; S the
+// what the model makes of the measurement (src/fold_model.h), in cd/m2 where they are luminances; the ring's range lo1..hi1 and its sphere's r1; L the middle of the range; S the
 // table's conservative form; and by eccentricity. A pattern is invisible where what the bands of an octave each see of it, c(rho) S(rho),
 // comes to less than 1 in their sum of powers of 3.5:
 //   patch       c = 1.9 (em + (hi1 - lo1) min(1, hm / r1)) / L, and in parts half as wide four times that, up to the largest,
@@ -89,7 +88,7 @@ SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBoun
 //   drift       of areas 2^k times as wide, k = 1 up to the mesh's size, W:  c = drift / 2^(k fading / 2);  c(rho) = c min(1, (W rho)^2)
 //   silhouette  a strip of width w, the angle of 1.4 h, that changes between the ring's luminance and anything in the scene, with the
 //               contrast cs over the pair's mean:  c(rho) = cs min(1, 2 rho w)
-// Where the tree has fold_stages(), a node folds as well from where nobody can tell the whole mesh from the mesh in the node's stage, by
+// Where the mesh was measured in stages, too, a node folds as well from where nobody can tell the whole mesh from the mesh in the node's stage, by
 // pictures of both: seldom near, but most of it far away.
 // rho goes up to the display's limit: below a pixel a fold counts by the share of the pixel that it covers, so from far enough away
 // everything folds, and drawing must be antialiased. Measured, not proven: see docs/perception.md for where it fails. Open and

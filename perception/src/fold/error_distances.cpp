@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include <perception/criterion.h>
-
+#include "fold/error_distances.h"
+#include "fold/fold_model.h"
 #include "fold/fold_screen.h"
 #include "fold/luminance_classes.h"
 #include "fold/stage_distances.h"
@@ -30,14 +30,8 @@ constexpr int luminance_count = static_cast<int>(LuminanceClasses::count);
 // Of the frequencies at which patterns are looked for that a strip may hold, from the lowest one up to the display's limit.
 constexpr double frequency_step = 1.0905077326652577; // an eighth of an octave
 
-constexpr int steepest_spike = 8 * contrasts_per_octave; // sharper ones count as this: a sixteenth of the width
+constexpr int steepest_spike = steepest_spike_octaves * contrasts_per_octave;
 
-// Of a sine, whose mean is 2 / pi of it: of the distances that shift what a ring shows.
-constexpr double amplitude_of_mean = 1.6;
-
-// A picture of 64 samples a pixel tells no finer shifts of an outline than about this, two thirds of the step of one sample. Found by comparing pictures.
-// Where pixels are so coarse that half of what can be seen is less, it would take more samples, not more triangles.
-constexpr double sampled_shift_px = 0.011;
 // The widest mesh there can be, in widths of a node: also where nodes have none.
 constexpr float widest = 1e9f;
 
@@ -83,8 +77,8 @@ Pattern above(const Pattern& a, const Pattern& b) {
     return all;
 }
 
-// Few patterns are to stand for many: rounded up, onto one grid, so that what is above two of them is there, too.
-// `coarseness`: of the grid, 1 or a power of two.
+// Few patterns are to stand for many: rounded up, onto one grid, so that what is above two of them is there, too. `coarseness`: of the grid,
+// 1 or a power of two.
 Pattern rounded(Pattern p, int coarseness) {
     constexpr int coarsest_fading = 32; // on coarser grids drift does not fade at all, which is above any that does
     const int typical_step = coarseness * contrasts_per_octave / 8, spike_step = coarseness * contrasts_per_octave / 4;
@@ -114,8 +108,8 @@ public:
             bands.push_back({std::min(low * frequency_step, highest_cpd),
                              csf.monotone_sensitivity(CyclesPerDegree(low), Degrees(eccentricity_deg), Luminance(luminance_cdm2))});
         for (std::size_t i = 0; i < width_count; ++i) {
-            patches_[i] = 1 / visibility(bands, width(i), share_of_patches);
-            areas_[i] = 1 / visibility(bands, width(i), share_of_area);
+            patches_[i] = 1 / visibility(bands, width(i), share_of_patches<double>);
+            areas_[i] = 1 / visibility(bands, width(i), share_of_area<double>);
             strips_[i] = 1 / visibility(bands, width(i), share_of_strip);
         }
     }
@@ -143,18 +137,7 @@ private:
     static double width(std::size_t i) { return widest_deg * std::pow(width_step, static_cast<double>(i)); }
     using Thresholds = std::array<double, width_count>; // contrasts, by width
 
-    // What a band sees of a pattern, as a share of its contrast, by the pattern's width in the band's waves. Of an area: the share of the
-    // band's own patches that it covers.
-    static double share_of_area(double waves) { return std::min(1.0, waves * waves); }
-    // Of patches side by side whose signs differ at random, also: more of the band's patch, in 1 / n of the contrast for n times the
-    // width. What more of them come to, drift says.
-    static double share_of_patches(double waves) {
-        constexpr double most_side_by_side = 4;
-        double most = 0;
-        for (double side = 1; side <= most_side_by_side; side *= 2) most = std::max(most, share_of_area(side * waves) / side);
-        return most;
-    }
-    // Of a strip whose width is half of this.
+    // What a band sees of a strip whose width is half of this, in the band's waves, as a share of its contrast.
     static double share_of_strip(double waves) { return std::min(1.0, waves); }
 
     // Of unit contrast, in thresholds.
@@ -194,8 +177,8 @@ private:
     Thresholds patches_, areas_, strips_;
 };
 
-// The reach of patterns by eccentricity, computed when they are first asked for. Where patterns are too many for the
-// rows' numbers, begin again with coarser ones.
+// The reach of patterns by eccentricity, computed when they are first asked for. Where patterns are too many for the rows' numbers, begin again with
+// coarser ones.
 class Reaches {
 public:
     // `added`: rows that add() will ask for.
@@ -217,10 +200,9 @@ public:
         pattern.is_strip ? add_strip(pattern) : add_patch(pattern);
         return row;
     }
-    bool has_too_few() const { return has_too_few_; } // then nothing found so far is of use
-    // Forgets all rows. In the end they suffice: at a coarseness of 256 each contrast is one of two, so a typical and a
-    // largest one combine in four ways at most; with 16 luminances, 121 quarters and without fading that is 16,000
-    // patches, and there are 3,600 strips.
+    bool has_too_few() const { return has_too_few_; } // of what there is, nothing is to be used then
+    // Forgets all rows. Ends well: at a coarseness of 256 each contrast is one of two, and there are no more than 16 luminances, 121 quarters and four
+    // ways to combine a typical and a largest contrast: 16,000 patches.
     void coarsen() {
         coarseness_ *= 2;
         begin();
@@ -393,9 +375,8 @@ void cover(Reaches& reaches, Shown& a, const Shown& b) {
 }
 
 // What nodes show, no less than their children: patches, and strips where they are outlines. False where the rows do not suffice.
-bool find_shown(const vdtree::SoundTree& tree, const SceneLuminance& scene, const Levels& levels, const CsfTable& csf, Reaches& reaches,
+bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors, const SceneLuminance& scene, const Levels& levels, const CsfTable& csf, Reaches& reaches,
                 std::vector<Shown>& patches, std::vector<Shown>& strips) {
-    const std::span<const vdtree::FoldError> errors = tree.fold_errors();
     const double darkest = levels.in_cdm2(scene.darkest), brightest = levels.in_cdm2(scene.brightest);
     const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
     const vdtree::LuminanceRange all = tree.ring_luminance()[vdtree::VertexTree::root()];
@@ -414,7 +395,7 @@ bool find_shown(const vdtree::SoundTree& tree, const SceneLuminance& scene, cons
         Shown patch;
         patch.pattern.luminance = levels.luminance_level(middle);
         patch.pattern.largest = levels.contrast_level(change(errors[node].luminance, errors[node].distance), middle);
-        const int typical = levels.contrast_level(change(errors[node].wide_luminance, amplitude_of_mean * errors[node].mean_distance), middle);
+        const int typical = levels.contrast_level(change(errors[node].wide_luminance, amplitude_of_shift_mean * errors[node].mean_distance), middle);
         if (patch.pattern.largest != no_contrast)
             patch.pattern.typical = std::clamp(typical, std::max(patch.pattern.largest - steepest_spike, 0), patch.pattern.largest);
         patch.length = std::max(tree.support_spheres()[node].radius, errors[node].extent);
@@ -451,9 +432,8 @@ bool find_shown(const vdtree::SoundTree& tree, const SceneLuminance& scene, cons
 
 // A node folds as well where the whole mesh does, as far as the node's stage: takes the stage where that is nowhere seen from farther, unless a
 // child would then be. Children before parents.
-void fold_in_stages(const vdtree::SoundTree& tree, const Reaches& reaches, std::span<const Shown> stages,
+void fold_in_stages(const vdtree::SoundTree& tree, std::span<const FoldError> errors, const Reaches& reaches, std::span<const Shown> stages,
                     std::span<Shown> shown) {
-    const std::span<const vdtree::FoldError> errors = tree.fold_errors();
     std::vector<bool> may_take(shown.size(), true);
     for (std::size_t node = shown.size(); node-- > 0;) {
         const std::size_t number = errors[node].stage;
@@ -470,13 +450,9 @@ void fold_in_stages(const vdtree::SoundTree& tree, const Reaches& reaches, std::
 
 } // namespace
 
-Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options) {
-    const std::span<const vdtree::FoldError> errors = tree.fold_errors();
-    if (errors.empty())
-        return Error{ErrorCode::invalid_argument, "The errors of the tree's folds have not been measured (vdtree::with_fold_errors)."};
-    if (const auto valid = check_arguments(view, options); !valid) return valid.error();
-    const auto sound = vdtree::SoundTree::of(tree);
-    if (!sound) return sound.error();
+Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const FoldErrors& measured, const vdtree::View& view,
+                                       const FoldTestOptions& options) {
+    const std::span<const FoldError> errors = measured.of_nodes;
     const NodeId nodes = tree.interior_count();
     const Screen screen(view, options);
     const Levels levels(options.display);
@@ -491,18 +467,18 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
     parts.lengths.resize(nodes);
     parts.silhouette_lengths.resize(nodes);
     const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
-    Reaches reaches(levels, screen, csf, parts.eccentricity_bins, tree.fold_stages().size());
+    Reaches reaches(levels, screen, csf, parts.eccentricity_bins, measured.stages.size());
     std::vector<Shown> patches, strips;
-    while (!find_shown(*sound, options.scene, levels, csf, reaches, patches, strips)) reaches.coarsen();
-    const std::vector<float> distances = stage_distances(tree, screen, options, parts.eccentricity_bins);
+    while (!find_shown(tree, errors, options.scene, levels, csf, reaches, patches, strips)) reaches.coarsen();
+    const std::vector<float> distances = stage_distances(tree, measured.stages, screen, options, parts.eccentricity_bins);
     if (!distances.empty() && object_radius > 0) {
         std::vector<Shown> stages;
         for (std::size_t first = 0; first < distances.size(); first += parts.eccentricity_bins) {
             const std::uint16_t row = reaches.add(std::span(distances).subspan(first, parts.eccentricity_bins), object_radius);
             stages.push_back({.pattern = {}, .length = object_radius, .row = row});
         }
-        fold_in_stages(*sound, reaches, stages, patches);
-        fold_in_stages(*sound, reaches, stages, strips);
+        fold_in_stages(tree, errors, reaches, stages, patches);
+        fold_in_stages(tree, errors, reaches, stages, strips);
     }
     for (NodeId node = 0; node < nodes; ++node) {
         parts.classes[node] = {patches[node].row, strips[node].row};
@@ -512,6 +488,15 @@ Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree
     }
     parts.reach = reaches.take();
     return DistanceCriterion::create(tree, std::move(parts));
+}
+
+Result<DistanceCriterion> error_distances(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options) {
+    if (const auto valid = check_arguments(view, options); !valid) return valid.error();
+    const auto sound = vdtree::SoundTree::of(tree);
+    if (!sound) return sound.error();
+    const auto errors = fold_errors_of(*sound);
+    if (!errors) return errors.error();
+    return criterion_of(*sound, *errors, view, options);
 }
 
 } // namespace unseen::perception

@@ -11,7 +11,7 @@
 #include <glm/common.hpp>
 
 #include <perception/display.h>
-#include <vdtree/chroma.h>
+#include <perception/chroma.h>
 #include <vdtree/vertex_tree.h>
 
 #include "fold/luminance_classes.h"

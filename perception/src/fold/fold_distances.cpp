@@ -19,7 +19,6 @@ namespace unseen::perception {
 
 namespace {
 
-using vdtree::ChromaRange;
 using vdtree::DistanceCriterion;
 using vdtree::NodeId;
 
@@ -320,16 +319,24 @@ Result<DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTree& tree
     const auto sound = vdtree::SoundTree::of(tree);
     if (!sound) return sound.error();
     Rings rings{tree.ring_luminance(), {}};
-    if (options.chroma) rings.chroma = tree.ring_chroma();
+    std::vector<ChromaRange> chroma;
+    if (options.chroma && tree.texture().empty()) {
+        auto found = ring_chroma(tree);
+        if (!found) return found.error();
+        chroma = std::move(*found);
+    }
+    rings.chroma = chroma;
     return make_criterion(*sound, rings, {}, view, options);
 }
 
-Result<DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree& tree, const vdtree::CutRings& cut_rings,
+Result<DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree& tree, const CutRings& cut_rings,
                                                        const vdtree::View& view, const FoldTestOptions& options) {
     const auto sound = vdtree::SoundTree::of(tree);
     if (!sound) return sound.error();
     Rings rings{cut_rings.luminance, {}, cut_rings.mean_shift};
     if (options.chroma) {
+        if (cut_rings.chroma.empty() && tree.texture().empty() && has_chroma(tree))
+            return Error{ErrorCode::invalid_argument, "The rings were bounded without their colours, which are to be looked at."};
         rings.chroma = cut_rings.chroma;
         rings.mean_chroma_shift = cut_rings.mean_chroma_shift;
     }

@@ -16,10 +16,6 @@ inline constexpr std::size_t bin_count = 128;   // up to 64 degrees; beyond, sen
 // The lowest frequency that a sensitivity table must know.
 inline constexpr double lowest_table_cpd = 0.5;
 
-// Minkowski's exponent of probability summation over bands, and what a band adds to the sum by what it sees, in thresholds.
-inline constexpr double pooling = 3.5;
-inline double to_power_of_pooling(double seen) { return seen * seen * seen * std::sqrt(seen); }
-
 // Covers the rounding of a reach to float.
 inline constexpr double reach_rounding = 1e-6;
 

@@ -8,16 +8,12 @@
 #include <limits>
 #include <numbers>
 
+#include "fold/fold_model.h"
 #include "judge/masking.h"
 
 namespace unseen::perception {
 
 namespace {
-
-using vdtree::FoldStage;
-
-// The worst direction may lie between those of the pictures. Found by comparing pictures.
-constexpr double between_directions = 1.15;
 
 // The angles, in degrees, that the mesh's sphere is seen under, from far to near.
 constexpr double least_angle = 0.01, angle_step = 1.0905077326652577; // an eighth of an octave
@@ -89,8 +85,7 @@ private:
 
 } // namespace
 
-std::vector<float> stage_distances(const vdtree::VertexTree& tree, const Screen& screen, const FoldTestOptions& options, std::size_t bins) {
-    const std::span<const FoldStage> stages = tree.fold_stages();
+std::vector<float> stage_distances(const vdtree::VertexTree& tree, std::span<const FoldStage> stages, const Screen& screen, const FoldTestOptions& options, std::size_t bins) {
     const vdtree::LuminanceRange behind = options.scene.behind.value_or(vdtree::LuminanceRange{options.scene.darkest, options.scene.brightest});
     std::size_t first = 0, last = FoldStage::backgrounds.size() - 1; // the nearest ones that are not brighter, and not darker
     while (first < last && FoldStage::backgrounds[first + 1] <= behind.lo) ++first;

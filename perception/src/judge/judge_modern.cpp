@@ -24,14 +24,11 @@
 
 #include "judge/judge_input.h"
 #include "judge/masking.h"
+#include "pyramid_kernel.h"
 
 namespace unseen::perception {
 namespace {
 
-// The pyramid's kernel (Burt and Adelson 1983, a = 0.4).
-constexpr double tap0 = 0.4, tap1 = 0.25, tap2 = 0.05;
-// Nominal frequency of band 1 over that of band 0, which is the Nyquist frequency; then an octave a band.
-constexpr double second_band_ratio = 0.3228;
 constexpr double lowest_frequency = 1.0 / 16; // cpd, end of the CSF's domain; the base band is not below it
 constexpr int smallest_base_side = 4;         // pixels; a smaller base would be all edge
 constexpr double contrast_limit = 1000;       // of one band, so that a black reference stays finite
@@ -69,16 +66,16 @@ int mirrored(int i, int n) {
 template <class Read>
 double reduced(int i, int n, Read in) {
     const int c = 2 * i;
-    return tap0 * in(c) + tap1 * (in(mirrored(c - 1, n)) + in(mirrored(c + 1, n))) +
-           tap2 * (in(mirrored(c - 2, n)) + in(mirrored(c + 2, n)));
+    return kernel_middle * in(c) + kernel_near * (in(mirrored(c - 1, n)) + in(mirrored(c + 1, n))) +
+           kernel_far * (in(mirrored(c - 2, n)) + in(mirrored(c + 2, n)));
 }
 // One axis of the expansion: pixel x between coarse samples at even positions; the coarse row ends with its last
 // sample.
 template <class Read>
 double expanded(int x, int coarse_n, Read in) {
     const int c = x / 2, next = std::min(c + 1, coarse_n - 1);
-    if (x % 2 == 1) return 2 * tap1 * (in(c) + in(next));
-    return 2 * (tap0 * in(c) + tap2 * (in(std::max(c - 1, 0)) + in(next)));
+    if (x % 2 == 1) return 2 * kernel_near * (in(c) + in(next));
+    return 2 * (kernel_middle * in(c) + kernel_far * (in(std::max(c - 1, 0)) + in(next)));
 }
 
 Plane reduce(const Plane& in) {
@@ -127,7 +124,6 @@ Plane smooth(const Plane& in) {
 
 // ---- frequency responses ------------------------------------------------------------------------------------------
 
-double kernel_response(double omega) { return tap0 + 2 * tap1 * std::cos(omega) + 2 * tap2 * std::cos(2 * omega); }
 double smooth_response(double omega) { return 0.5 + 0.5 * std::cos(omega); }
 // Radians a pixel of level `level`, of a grating along an axis.
 double angular_frequency(double freq_cpd, double ppd, int level) {

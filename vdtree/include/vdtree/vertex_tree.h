@@ -21,15 +21,15 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
-#include <vdtree/chroma.h>
-#include <vdtree/fold_errors.h>
-#include <vdtree/fold_stages.h>
+#include <vdtree/attribute.h>
 #include <vdtree/mesh.h>
 #include <vdtree/normal_mask.h>
 #include <vdtree/packed.h>
@@ -134,10 +134,7 @@ public:
     std::span<const PackedRange> support_luminance() const noexcept; // of vertices, without the texture
     std::span<const PackedRange> ring_luminance() const noexcept;    // as drawn: with the texture
     std::span<const PackedRange> ring_texture() const noexcept;      // the texture's own luminance there; empty without one
-    std::span<const ChromaRange> ring_chroma() const noexcept; // of vertices, as drawn; empty where all of them are grey
     std::span<const Unorm16> adaptation_luminance() const noexcept; // middle of ring_luminance, saturated up the tree
-    std::span<const FoldError> fold_errors() const noexcept; // of with_fold_errors(); else empty
-    std::span<const FoldStage> fold_stages() const noexcept; // likewise; empty, too, where vertices are translucent
     std::span<const float> displacement() const noexcept; // largest distance of a supported leaf from the proxy
 
     // The mesh. By leaf: the input vertex. The input's ranges (groups, materials), over its triangles, and by triangle
@@ -150,18 +147,39 @@ public:
     Sphere bounding_sphere() const noexcept; // of the triangles' corners
     LuminanceRange luminance_range() const noexcept; // of all that is drawn
 
-    // Luminance and its bounds under another light, without fold_errors() and fold_stages(), which were measured under this one; everything
-    // else is shared with this tree. Cost: one pass over the
-    // triangles and the nodes. A pre-lit mesh (with colours) is shaded by its colours times the light.
+    // Luminance and its bounds under another light, without attributes; everything else is shared with this tree. Cost: one pass
+    // over the triangles and the nodes. A pre-lit mesh (with colours) is shaded by its colours times the light.
     const Light& light() const noexcept;
     bool is_prelit() const noexcept; // luminance comes from the colours alone
     // Fails where check() does.
     Result<VertexTree> relit(const Light& light) const;
 
-    // The same tree without its texture, under its light, with luminance and bounds of its vertices alone; everything else is shared, but for
-    // fold_errors() and fold_stages(), which it has not.
-    // Vertices without colours then have the default albedo, lit. Fails where check() does. Cost: as relit().
+    // The same tree without its texture, under its light, with luminance and bounds of its vertices alone; everything else is shared, but
+    // for attributes, which it has not. Vertices without colours then have the default albedo, lit. Fails where check() does. Cost: as relit().
     Result<VertexTree> untextured() const;
+
+    // Named values that others keep with the tree: see <vdtree/attribute.h>. Empty where there are none of that name, or of another
+    // type's sizes. Valid as long as a handle with the attribute. Of read and mapped files nobody has looked at them, SoundTree
+    // neither: the owner of a name checks each value where it uses it, and what has the sizes of T may have been anything.
+    template <class T>
+    std::span<const T> attribute(std::string_view name) const noexcept {
+        static_assert(is_attribute_value<T>());
+        const auto bytes = attribute_bytes(name, sizeof(T), attribute_component_bytes<T>());
+        return {reinterpret_cast<const T*>(bytes.data()), bytes.size() / sizeof(T)};
+    }
+    std::vector<AttributeInfo> attributes() const;
+
+    // Another handle that has this attribute, in place of one of the same name, and shares all else. relit(), untextured() and
+    // conserve_light() drop all attributes: they were measured under another light. Files keep them, those of names that no program
+    // knows, too. Fails on names that are none (AttributeInfo), on a number of values that is not the domain's, and where there are
+    // most_attributes already. Cost: none.
+    template <class T>
+    Result<VertexTree> with_attribute(std::string_view name, AttributeDomain domain, std::vector<T> values) const {
+        static_assert(is_attribute_value<T>());
+        const auto kept = std::make_shared<const std::vector<T>>(std::move(values));
+        return with_attribute(Attribute{{std::string(name), domain, sizeof(T), attribute_component_bytes<T>(), kept->size()},
+                                        kept, std::as_bytes(std::span(*kept))});
+    }
 
     std::uint64_t byte_size() const noexcept; // of all arrays; those of a mapped tree are resident only where they were used
 
@@ -176,6 +194,8 @@ private:
     friend class SoundTree;
     friend struct UncheckedLinks; // for what asks is_sound() node by node
     bool looks_sound(NodeId node) const;
+    std::span<const std::byte> attribute_bytes(std::string_view name, std::size_t element, std::uint32_t component) const noexcept;
+    Result<VertexTree> with_attribute(Attribute attribute) const;
 
     std::shared_ptr<const Data> data_;
     NodeChecks* checks_ = nullptr; // of data_
@@ -210,8 +230,8 @@ private:
 };
 
 // Checks everything that the tree promises: that spheres, masks, slabs, intervals and displacements contain what they
-// should and nest, and that every triangle vanishes where it is said to. Displacements are compared with the first 4096 leaves of a node; of
-// fold errors, that they are numbers and nest. The error names the first offender.
+// should and nest, and that every triangle vanishes where it is said to. Displacements are compared with the first 4096 leaves of a node;
+// attributes are their owners'. The error names the first offender.
 // Cost: leaves times depth.
 Result<void> verify(const VertexTree& tree);
 

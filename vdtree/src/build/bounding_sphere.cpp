@@ -14,7 +14,7 @@
 #include <immintrin.h>
 #endif
 
-#include "simd.h"
+#include <vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
 

@@ -22,9 +22,9 @@
 #include "build/parallel_array.h"
 #include "build/place_proxies.h"
 #include "build/surface.h"
-#include "tree/texture_bounds.h"
-#include "texture_fit.h"
-#include "tree/vertex_tree_data.h"
+#include <vdtree/internal/texture_bounds.h>
+#include <vdtree/internal/texture_fit.h>
+#include <vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::vdtree {
 
@@ -279,7 +279,7 @@ Result<VertexTree> TreeBuilder::build(const Clusterer& clusterer) {
     g_->dropped_triangles = clean_.dropped + options_.dropped_before;
     g_->ranges.assign(source_.ranges.begin(), source_.ranges.end());
     auto data = std::make_shared<VertexTree::Data>();
-    data->light = derive_luminance(*g_, *parts_, options_.light, prelit_, is_textured());
+    data->light = std::make_shared<TreeLuminance>(derive_luminance(*g_, *parts_, options_.light, prelit_, is_textured()));
     data->geometry = std::move(g_);
     if (reporter_.cancelled(1.0, "done")) return cancelled_error();
     return VertexTree(std::move(data));

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "tree/tree_shape.h"
+#include <vdtree/internal/tree_shape.h>
 
 namespace unseen::vdtree {
 

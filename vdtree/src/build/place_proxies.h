@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "tree/tree_parts.h"
+#include <vdtree/internal/tree_parts.h>
 
 namespace unseen::vdtree {
 

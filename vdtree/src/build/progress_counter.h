@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstddef>
 #include <thread>
+#include <utility>
 
 #include <vdtree/mesh.h>
 
@@ -14,8 +15,8 @@ namespace unseen::vdtree {
 class ProgressCounter {
 public:
     // `all`: what is to be done, in any unit.
-    ProgressCounter(const Progress& progress, std::size_t all)
-        : progress_(progress), all_(static_cast<double>(std::max<std::size_t>(all, 1))) {}
+    ProgressCounter(Progress progress, std::size_t all)
+        : progress_(std::move(progress)), all_(static_cast<double>(std::max<std::size_t>(all, 1))) {}
 
     // False when all are to stop.
     bool add(std::size_t done) {
@@ -28,7 +29,7 @@ public:
     bool stopped() const { return stopped_; }
 
 private:
-    const Progress& progress_; // of the caller, which waits for the work
+    Progress progress_; // its own copy: a helping process has none, and an empty one must live as long
     std::thread::id caller_ = std::this_thread::get_id();
     double all_;
     std::atomic<std::size_t> done_ = 0;

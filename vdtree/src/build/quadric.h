@@ -18,7 +18,7 @@
 
 #include <vdtree/mesh.h>
 
-#include "simd.h"
+#include <vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
 

@@ -2,7 +2,7 @@
 
 #include <cstring>
 
-#include "simd.h"
+#include <vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
 

@@ -20,17 +20,16 @@
 #include "files/mapped_file.h"
 #include "tree/mask_pool.h"
 #include "tree/node_check.h"
-#include "tree/vertex_tree_data.h"
+#include <vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::vdtree {
 
 namespace {
 
 constexpr std::array<char, 8> magic = {'U', 'N', 'S', 'E', 'E', 'N', 'V', 'T'};
-constexpr std::uint32_t format_version = 3;
+constexpr std::uint32_t format_version = 4;
 constexpr std::uint64_t page_bytes = 1 << 20;
-constexpr std::uint32_t most_sections = 64;
-constexpr std::size_t most_stages = 256; // that a byte can name
+constexpr std::uint32_t most_sections = 64; // the tree's own, and most_attributes
 constexpr std::uint64_t section_alignment = 64; // bytes; a cache line, and what any mapped element needs
 
 // All integers and floats little-endian.
@@ -46,13 +45,17 @@ struct Header {
 static_assert(sizeof(Header) == 48);
 
 struct Section {
-    std::array<char, 24> name;
+    std::array<char, 20> name;
+    std::uint32_t domain; // an AttributeDomain; part_of_tree: one of the tree's own arrays
     std::uint32_t element_bytes;
     std::uint32_t component_bytes; // what a host of the other byte order swaps
     std::uint64_t count;
     std::uint64_t offset;
 };
-static_assert(sizeof(Section) == 48);
+static_assert(sizeof(Section) == 48 && longest_attribute_name == std::tuple_size_v<decltype(Section::name)>);
+constexpr std::uint32_t part_of_tree = 0;
+
+std::string_view name_of(const Section& s) { return {s.name.data(), strnlen(s.name.data(), s.name.size())}; }
 
 // What is not an array.
 struct Facts {
@@ -72,12 +75,10 @@ std::uint64_t pages_of(const Section& s) {
     return (s.count * s.element_bytes + page_bytes - 1) / page_bytes;
 }
 
-// A section's elements, of which fold errors and bounds begin with floats and end with single bytes.
+// A section's elements, of which bounds begin with floats and end with single bytes.
 ElementLayout layout_of(const Section& s) {
-    const std::size_t numbers = s.element_bytes == sizeof(FoldError)    ? offsetof(FoldError, facing)
-                                : s.element_bytes == sizeof(NodeBounds) ? sizeof(Sphere)
-                                                                        : s.element_bytes;
-    return {s.element_bytes, numbers, s.component_bytes};
+    const bool is_bounds = s.domain == part_of_tree && name_of(s) == "bounds" && s.element_bytes == sizeof(NodeBounds);
+    return {s.element_bytes, is_bounds ? sizeof(Sphere) : s.element_bytes, s.component_bytes};
 }
 
 // Walks every stored array of a tree, in file order: f(name, vector).
@@ -101,9 +102,6 @@ void for_each_array(Geometry& g, Luminance& l, F&& f) {
     f("support_range", l.support_range);
     f("ring_range", l.ring_range);
     f("adaptation", l.adaptation);
-    f("ring_chroma", l.ring_chroma);
-    f("fold_errors", l.fold_errors);
-    f("fold_stages", l.fold_stages);
     f("triangles", g.triangles);
     f("source_triangles", g.source_triangles);
     f("source_vertices", g.source_vertices);
@@ -115,7 +113,7 @@ void for_each_array(Geometry& g, Luminance& l, F&& f) {
 bool is_of_texture(std::string_view name) { return name == "texture" || name == "texels" || name == "ring_texture"; }
 
 // Sections that are there only where they have elements.
-bool is_optional(std::string_view name) { return name == "ring_chroma" || name == "fold_errors" || name == "fold_stages" || is_of_texture(name); }
+bool is_optional(std::string_view name) { return is_of_texture(name); }
 
 enum class OpenMode { read, map };
 
@@ -185,14 +183,9 @@ class Writer {
 public:
     template <class T>
     void add(std::string_view name, std::span<const T> values, std::uint32_t component) {
-        Section s{};
-        std::copy_n(name.begin(), std::min(name.size(), s.name.size()), s.name.begin());
-        s.element_bytes = sizeof(T);
-        s.component_bytes = component;
-        s.count = values.size();
-        sections_.push_back(s);
-        data_.push_back(std::as_bytes(values));
+        add(name, part_of_tree, sizeof(T), component, std::as_bytes(values));
     }
+    void add(const Attribute& a) { add(a.name, static_cast<std::uint32_t>(a.domain), a.element_bytes, a.component_bytes, a.bytes); }
 
     Result<void> write(const std::filesystem::path& file, const Progress& progress) {
         layout();
@@ -212,6 +205,17 @@ public:
     }
 
 private:
+    void add(std::string_view name, std::uint32_t domain, std::size_t element, std::uint32_t component, std::span<const std::byte> bytes) {
+        Section s{};
+        std::copy_n(name.begin(), std::min(name.size(), s.name.size()), s.name.begin());
+        s.domain = domain;
+        s.element_bytes = static_cast<std::uint32_t>(element);
+        s.component_bytes = component;
+        s.count = bytes.size() / element;
+        sections_.push_back(s);
+        data_.push_back(bytes);
+    }
+
     std::uint64_t table_bytes() const {
         return sizeof(Header) + sections_.size() * sizeof(Section) + checksums_.size() * sizeof(std::uint64_t);
     }
@@ -252,7 +256,7 @@ private:
         h.page_count = sums.size();
         if constexpr (std::endian::native == std::endian::big) {
             for (Section& s : table) {
-                swap_components(reinterpret_cast<std::byte*>(&s.element_bytes), 8, 4);
+                swap_components(reinterpret_cast<std::byte*>(&s.domain), 12, 4);
                 swap_components(reinterpret_cast<std::byte*>(&s.count), 16, 8);
             }
             swap_components(reinterpret_cast<std::byte*>(sums.data()), sums.size() * 8, 8);
@@ -303,8 +307,11 @@ private:
     const Section* find(std::string_view name) const;
     template <class T>
     Result<void> read_section(std::string_view name, std::vector<T>& out);
+    Result<void> read_pages(const Section& section, std::byte* bytes);
+    Result<std::span<const std::byte>> mapped_bytes(const Section& section) const;
     template <class T>
     Result<void> map_section(std::string_view name, Array<T>& out);
+    Result<void> read_attributes(std::size_t interior_count, std::size_t node_count, std::vector<Attribute>& attributes);
     template <class T>
     Result<void> open_section(std::string_view name, Array<T>& out);
     Result<void> read_facts(TreeGeometry& g, TreeLuminance& l);
@@ -338,10 +345,11 @@ Result<void> Reader::read_table() {
         swap_components(reinterpret_cast<std::byte*>(&h.file_bytes), 32, 8);
     }
     if (h.version != format_version)
-        return Error{ErrorCode::unsupported, file_.string() + ": version " + std::to_string(h.version) +
-                                                 " of the format is not known to this program, which reads version " +
-                                                 std::to_string(format_version) +
-                                                 ". Build the tree again from its mesh."};
+        return Error{ErrorCode::unsupported, file_.string() + (h.version < format_version
+                                                 ? " was written by an earlier version; build it again with: unseen build MESH -o FILE"
+                                                 : ": version " + std::to_string(h.version) +
+                                                       " of the format is not known to this program, which reads version " +
+                                                       std::to_string(format_version) + ". Build the tree again from its mesh.")};
     if (h.header_checksum != sum) return fail("The header is damaged.");
     if (h.file_bytes != file_bytes_)
         return fail("The file has " + std::to_string(file_bytes_) + " bytes instead of " +
@@ -359,14 +367,14 @@ Result<void> Reader::read_table() {
         std::memcpy(checksums_.data(), bytes.data() + h.section_count * sizeof(Section), h.page_count * 8);
     if constexpr (std::endian::native == std::endian::big) {
         for (Section& s : sections_) {
-            swap_components(reinterpret_cast<std::byte*>(&s.element_bytes), 8, 4);
+            swap_components(reinterpret_cast<std::byte*>(&s.domain), 12, 4);
             swap_components(reinterpret_cast<std::byte*>(&s.count), 16, 8);
         }
         swap_components(reinterpret_cast<std::byte*>(checksums_.data()), checksums_.size() * 8, 8);
     }
     std::uint64_t pages = 0;
     for (const Section& s : sections_) {
-        const std::string name(s.name.data(), strnlen(s.name.data(), s.name.size()));
+        const std::string name(name_of(s));
         if (s.element_bytes == 0 || s.offset > file_bytes_ || s.count > (file_bytes_ - s.offset) / s.element_bytes)
             return fail("Section " + name + " does not fit in the file.");
         pages += pages_of(s);
@@ -377,7 +385,7 @@ Result<void> Reader::read_table() {
 
 const Section* Reader::find(std::string_view name) const {
     for (const Section& s : sections_)
-        if (std::string_view(s.name.data(), strnlen(s.name.data(), s.name.size())) == name) return &s;
+        if (s.domain == part_of_tree && name_of(s) == name) return &s;
     return nullptr;
 }
 
@@ -387,21 +395,35 @@ Result<void> Reader::read_section(std::string_view name, std::vector<T>& out) {
     if (!section) return fail("Section " + std::string(name) + " is missing.");
     if (section->element_bytes != sizeof(T)) return fail("Section " + std::string(name) + " has elements of another size.");
     out.resize(section->count);
+    return read_pages(*section, reinterpret_cast<std::byte*>(out.data()));
+}
+
+Result<void> Reader::read_pages(const Section& section, std::byte* bytes) {
+    const std::string name(name_of(section));
     in_.clear();
-    in_.seekg(static_cast<std::streamoff>(section->offset));
-    auto* bytes = reinterpret_cast<std::byte*>(out.data());
+    in_.seekg(static_cast<std::streamoff>(section.offset));
     std::uint64_t page = 0;
-    for (const Section* before = sections_.data(); before != section; ++before) page += pages_of(*before);
-    const std::uint64_t total = section->count * section->element_bytes;
+    for (const Section* before = sections_.data(); before != &section; ++before) page += pages_of(*before);
+    const std::uint64_t total = section.count * section.element_bytes;
     for (std::uint64_t at = 0; at < total; at += page_bytes, ++page) {
         const std::uint64_t size = std::min(page_bytes, total - at);
         if (!in_.read(reinterpret_cast<char*>(bytes + at), static_cast<std::streamsize>(size)))
-            return fail("The file ends within section " + std::string(name) + "; it was cut short while it was read.");
+            return fail("The file ends within section " + name + "; it was cut short while it was read.");
         if (checksum(bytes + at, size) != checksums_[page])
-            return fail("Page " + std::to_string(at / page_bytes) + " of section " + std::string(name) + " is damaged.");
-        if constexpr (std::endian::native == std::endian::big) swap_elements(bytes + at, size, at, layout_of(*section));
+            return fail("Page " + std::to_string(at / page_bytes) + " of section " + name + " is damaged.");
+        if constexpr (std::endian::native == std::endian::big) swap_elements(bytes + at, size, at, layout_of(section));
     }
     return {};
+}
+
+Result<std::span<const std::byte>> Reader::mapped_bytes(const Section& section) const {
+    const std::string name(name_of(section));
+    if (section.offset % section_alignment != 0) return fail("Section " + name + " does not begin at a multiple of 64.");
+    // The mapping was made after the table was read: the file may have been replaced in between.
+    const auto bytes = mapping_->bytes();
+    const std::uint64_t size = section.count * section.element_bytes;
+    if (section.offset > bytes.size() || size > bytes.size() - section.offset) return fail("Section " + name + " does not fit in the file.");
+    return bytes.subspan(section.offset, size);
 }
 
 template <class T>
@@ -409,14 +431,34 @@ Result<void> Reader::map_section(std::string_view name, Array<T>& out) {
     const Section* section = find(name);
     if (!section) return fail("Section " + std::string(name) + " is missing.");
     if (section->element_bytes != sizeof(T)) return fail("Section " + std::string(name) + " has elements of another size.");
-    if (section->offset % section_alignment != 0)
-        return fail("Section " + std::string(name) + " does not begin at a multiple of 64.");
-    // The mapping was made after the table was read: the file may have been replaced in between.
-    const auto bytes = mapping_->bytes();
-    const std::uint64_t size = section->count * section->element_bytes;
-    if (section->offset > bytes.size() || size > bytes.size() - section->offset)
-        return fail("Section " + std::string(name) + " does not fit in the file.");
-    out = Array<T>(std::span(reinterpret_cast<const T*>(bytes.data() + section->offset), section->count));
+    const auto bytes = mapped_bytes(*section);
+    if (!bytes) return bytes.error();
+    out = Array<T>(std::span(reinterpret_cast<const T*>(bytes->data()), section->count));
+    return {};
+}
+
+// Attributes of names that nobody here knows, too. Their values are their owners' to check.
+Result<void> Reader::read_attributes(std::size_t interior_count, std::size_t node_count, std::vector<Attribute>& attributes) {
+    for (const Section& s : sections_) {
+        if (s.domain == part_of_tree) continue;
+        Attribute a{{std::string(name_of(s)), AttributeDomain{s.domain}, s.element_bytes, s.component_bytes, s.count}, nullptr, {}};
+        if (const std::string fault = fault_in_attribute(a, interior_count, node_count); !fault.empty()) return fail(fault);
+        for (const Attribute& before : attributes)
+            if (before.name == a.name) return fail("Attribute " + a.name + " is there twice.");
+        if (attributes.size() == most_attributes) return fail("There are more attributes than a tree can have.");
+        if (mode_ == OpenMode::map) {
+            const auto bytes = mapped_bytes(s);
+            if (!bytes) return bytes.error();
+            a.owner = mapping_;
+            a.bytes = *bytes;
+        } else {
+            const auto bytes = std::make_shared<std::vector<std::byte>>(s.count * s.element_bytes);
+            if (const auto r = read_pages(s, bytes->data()); !r) return r;
+            a.bytes = *bytes;
+            a.owner = bytes;
+        }
+        attributes.push_back(std::move(a));
+    }
     return {};
 }
 
@@ -455,9 +497,6 @@ Result<void> Reader::check_counts(const TreeGeometry& g, const TreeLuminance& l)
         {l.support_range.size() == interior, "support_range"},
         {l.ring_range.size() == interior, "ring_range"},
         {l.adaptation.size() == interior, "adaptation"},
-        {l.ring_chroma.empty() || (l.ring_chroma.size() == interior && !g.colours.empty()), "ring_chroma"},
-        {l.fold_errors.empty() || l.fold_errors.size() == interior, "fold_errors"},
-        {l.fold_stages.empty() || (!l.fold_errors.empty() && l.fold_stages.size() <= most_stages), "fold_stages"},
         {g.source_triangles.size() == (g.ranges.empty() ? 0 : triangles), "source_triangles"},
         {g.source_vertices.size() == leaves, "source_vertices"},
         {g.texture.size() <= 1 && (g.texture.empty() || !g.uvs.empty()), "texture"},
@@ -530,7 +569,8 @@ Result<VertexTree> Reader::read() {
     auto geometry = std::make_shared<TreeGeometry>();
     auto data = std::make_shared<VertexTree::Data>();
     TreeGeometry& g = *geometry;
-    TreeLuminance& l = data->light;
+    const auto light = std::make_shared<TreeLuminance>();
+    TreeLuminance& l = *light;
     g.mapping = mapping_;
     Result<void> state;
     std::size_t done = 0;
@@ -544,6 +584,7 @@ Result<VertexTree> Reader::read() {
     if (const auto r = read_facts(g, l); !r) return r.error();
     if (const auto r = check_counts(g, l); !r) return r.error();
     if (const auto r = check_ranges(g); !r) return r.error();
+    if (const auto r = read_attributes(g.first_leaf.size(), g.parents.size(), data->attributes); !r) return r.error();
     l.textured = !g.texture.empty();
     if (mode_ == OpenMode::map) {
         data->checks = std::make_shared<NodeChecks>(g, l);
@@ -555,6 +596,7 @@ Result<VertexTree> Reader::read() {
         if (const std::string fault = fault_in_sections(g, l); !fault.empty()) return fail(fault);
     }
     data->geometry = std::move(geometry);
+    data->light = light;
     return VertexTree(std::move(data));
 }
 
@@ -569,7 +611,7 @@ Result<void> prepare_tree_file(const std::filesystem::path& file) {
 
 Result<void> write_tree(const std::filesystem::path& file, const VertexTree& tree, const Progress& progress) {
     const TreeGeometry& g = *tree.data().geometry;
-    const TreeLuminance& l = tree.data().light;
+    const TreeLuminance& l = *tree.data().light;
     Writer writer;
     for_each_array(g, l, [&](std::string_view name, const auto& values) {
         using T = typename std::remove_cvref_t<decltype(values)>::value_type;
@@ -587,6 +629,7 @@ Result<void> write_tree(const std::filesystem::path& file, const VertexTree& tre
     const std::vector<std::byte> ranges = pack_ranges(g.ranges);
     writer.add("facts", std::span<const Facts>(&facts, 1), 1);
     writer.add("ranges", std::span<const std::byte>(ranges), 1);
+    for (const Attribute& a : tree.data().attributes) writer.add(a);
     return writer.write(file, progress);
 }
 

@@ -3,7 +3,7 @@
 #include <bit>
 #include <cstring>
 
-#include "simd.h"
+#include <vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
 

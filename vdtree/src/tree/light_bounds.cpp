@@ -11,7 +11,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include "tree/texture_bounds.h"
+#include <vdtree/internal/texture_bounds.h>
 
 namespace unseen::vdtree {
 

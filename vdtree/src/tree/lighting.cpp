@@ -8,7 +8,7 @@
 
 #include "tree/unchecked_links.h"
 #include "tree/unit_vector.h"
-#include "tree/vertex_tree_data.h"
+#include <vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::vdtree {
 

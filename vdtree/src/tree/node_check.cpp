@@ -135,8 +135,7 @@ std::string fault_in_sections(const TreeGeometry& g, const TreeLuminance& l) {
                                                    {all_finite(g.colours), "colours"},
                                                    {all_finite(g.uvs), "uvs"},
                                                    {all_finite(g.support_spheres), "support_spheres"},
-                                                   {all_finite(g.displacement), "displacement"},
-                                                   {all_finite(l.ring_chroma), "ring_chroma"}};
+                                                   {all_finite(g.displacement), "displacement"}};
     for (const auto& [holds, name] : finite)
         if (!holds) return "Section " + std::string(name) + " has a value that is not finite.";
     for (const NodeBounds& b : g.bounds) {
@@ -154,20 +153,6 @@ std::string fault_in_sections(const TreeGeometry& g, const TreeLuminance& l) {
             if (!(r.lo <= r.hi)) return "A luminance range ends before it begins.";
     for (const PackedRange& r : g.ring_texture)
         if (!(r.lo <= r.hi)) return "A range of the texture's luminance ends before it begins.";
-    for (const ChromaRange& r : l.ring_chroma)
-        if (!(r.lo.x <= r.hi.x && r.lo.y <= r.hi.y)) return "A range of chroma ends before it begins.";
-    for (const FoldError& e : l.fold_errors)
-        for (const float value : {e.distance, e.mean_distance, e.luminance, e.wide_luminance, e.extent, e.drift})
-            if (!(value >= 0) || !std::isfinite(value)) return "An error of a fold is negative or not finite.";
-    for (const FoldError& e : l.fold_errors)
-        if (!l.fold_stages.empty() && e.stage >= l.fold_stages.size())
-            return "A node folds in a stage that is not there.";
-    for (const FoldStage& stage : l.fold_stages)
-        for (const auto& by_band : stage.contrast)
-            for (const auto& by_mask : by_band)
-                for (const float contrast : by_mask)
-                    if (!(contrast >= 0) || !std::isfinite(contrast))
-                        return "A contrast of a stage is negative or not finite.";
     for (const float moved : g.displacement)
         if (!(moved >= 0)) return "A displacement is negative.";
     // Users index their own arrays with these.

@@ -1,4 +1,4 @@
-#include "tree/scaled_geometry.h"
+#include <vdtree/internal/scaled_geometry.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,10 +1,10 @@
-#include "tree/texture_bounds.h"
+#include <vdtree/colour.h>
+#include <vdtree/internal/texture_bounds.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include <tbb/parallel_for.h>
-#include <vdtree/colour.h>
 
 namespace unseen::vdtree {
 

@@ -1,4 +1,4 @@
-#include "tree/tree_parts.h"
+#include <vdtree/internal/tree_parts.h>
 
 #include <algorithm>
 #include <iterator>

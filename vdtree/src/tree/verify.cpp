@@ -7,9 +7,8 @@
 
 #include <glm/geometric.hpp>
 
-#include "chroma.h"
-#include "tree/texture_bounds.h"
-#include "tree/vertex_tree_data.h"
+#include <vdtree/internal/texture_bounds.h>
+#include <vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::vdtree {
 
@@ -26,13 +25,9 @@ bool contains(const Sphere& outer, glm::vec3 point, double radius) {
 
 bool contains(PackedRange outer, PackedRange inner) { return outer.lo <= inner.lo && inner.hi <= outer.hi; }
 
-bool contains(const ChromaRange& outer, const ChromaRange& inner) {
-    return outer.lo.x <= inner.lo.x && outer.lo.y <= inner.lo.y && inner.hi.x <= outer.hi.x && inner.hi.y <= outer.hi.y;
-}
-
 class Verifier {
 public:
-    explicit Verifier(const SoundTree& tree) : tree_(tree), g_(*tree.data().geometry), l_(tree.data().light) {}
+    explicit Verifier(const SoundTree& tree) : tree_(tree), g_(*tree.data().geometry), l_(*tree.data().light) {}
 
     Result<void> run() {
         for (NodeId node = 0; node < tree_.interior_count(); ++node) {
@@ -63,11 +58,6 @@ private:
         const glm::vec3 proxy = g_.positions[node];
         expect(contains(g_.support_spheres[node], proxy, 0), "the support's sphere does not contain the proxy.");
         expect(contains(g_.bounds[node].ring, proxy, 0), "the ring's sphere does not contain the proxy.");
-        if (!l_.fold_errors.empty()) {
-            const FoldError& e = l_.fold_errors[node];
-            const float values[] = {e.distance, e.mean_distance, e.luminance, e.wide_luminance, e.extent, e.drift};
-            expect(std::ranges::all_of(values, [](float value) { return value >= 0 && std::isfinite(value); }), "a fold error is no number of 0 or more.");
-        }
         const Unorm16 y = l_.luminance[node];
         expect(contains(l_.support_range[node], {y, y}), "the support's luminance does not contain the proxy's.");
         if (pyramid_) {
@@ -76,20 +66,12 @@ private:
             expect(g_.support_spheres[node].radius == 0 || contains(l_.ring_range[node], product(shade_of({node}), texture)),
                    "the ring's luminance does not contain what its proxy shows.");
         }
-        expect(!has_chroma_ || contains(l_.ring_chroma[node], chroma_of(node)), "the ring's chroma does not contain the proxy's.");
         const Index measured = std::min<Index>(g_.leaf_end[node], g_.first_leaf[node] + most_leaves_measured);
         for (Index leaf = g_.first_leaf[node]; leaf < measured; ++leaf) {
             const glm::vec3 p = g_.positions[tree_.interior_count() + leaf];
             expect(glm::distance(glm::dvec3(p), glm::dvec3(proxy)) <= g_.displacement[node] * (1 + slack),
                    "a leaf moves farther than the displacement.");
         }
-    }
-
-    void check_errors(NodeId node, NodeId child) {
-        const FoldError &own = l_.fold_errors[node], &below = l_.fold_errors[child];
-        expect(own.distance >= below.distance && own.extent >= below.extent, "a child's fold error is larger.");
-        expect(own.facing.includes(below.facing), "a child's fold moves outlines seen from elsewhere.");
-        expect(own.stage >= below.stage, "a child folds in a later stage.");
     }
 
     void check_children(NodeId node) {
@@ -109,11 +91,9 @@ private:
             expect((g_.bounds[child].flags & ~g_.bounds[node].flags) == 0, "a child has other flags.");
             expect(g_.displacement[node] >= g_.displacement[child], "a child's displacement is larger.");
             expect(l_.adaptation[node] >= l_.adaptation[child], "a child's adaptation luminance is higher.");
-            if (!l_.fold_errors.empty()) check_errors(node, child);
             expect(contains(l_.support_range[node], l_.support_range[child]), "a child's support luminance sticks out.");
             expect(contains(l_.ring_range[node], l_.ring_range[child]), "a child's ring luminance sticks out.");
             expect(!pyramid_ || contains(g_.ring_texture[node], g_.ring_texture[child]), "a child's texture sticks out.");
-            expect(!has_chroma_ || contains(l_.ring_chroma[node], l_.ring_chroma[child]), "a child's ring chroma sticks out.");
         });
     }
 
@@ -143,8 +123,6 @@ private:
                        "a corner is outside of the ring sphere of another corner's parent.");
                 expect(pyramid_ || contains(l_.ring_range[node], {y, y}),
                        "a corner's luminance is outside of the ring's of another corner's parent.");
-                expect(!has_chroma_ || contains(l_.ring_chroma[node], chroma_of(interior + corner)),
-                       "a corner's chroma is outside of the ring's of another corner's parent.");
             }
         }
     }
@@ -164,11 +142,6 @@ private:
             range = {std::min(range.lo, shade.lo), std::max(range.hi, shade.hi)};
         }
         return range;
-    }
-
-    ChromaRange chroma_of(NodeId node) const {
-        const glm::vec2 chroma = drawn_chroma(g_.colours[node], l_.luminance[node]);
-        return {chroma, chroma};
     }
 
     NodeId vanishing_node(const Triangle& t) const {
@@ -192,7 +165,6 @@ private:
     const TreeGeometry& g_;
     const TreeLuminance& l_;
     const std::optional<TexturePyramid> pyramid_ = l_.textured ? std::optional<TexturePyramid>(g_.texture_view()) : std::nullopt;
-    const bool has_chroma_ = !l_.ring_chroma.empty() && !g_.colours.empty();
     std::string fault_;
 };
 

@@ -1,4 +1,5 @@
-#include "tree/vertex_tree_data.h"
+#include <vdtree/colour.h>
+#include <vdtree/internal/vertex_tree_data.h>
 
 #include <algorithm>
 #include <cmath>
@@ -7,14 +8,12 @@
 #include <glm/geometric.hpp>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <vdtree/colour.h>
 
-#include "chroma.h"
 #include "tree/mask_pool.h"
 #include "tree/node_check.h"
-#include "tree/packed_range.h"
-#include "tree/texture_bounds.h"
-#include "tree/tree_parts.h"
+#include <vdtree/internal/packed_range.h>
+#include <vdtree/internal/texture_bounds.h>
+#include <vdtree/internal/tree_parts.h>
 
 namespace unseen::vdtree {
 
@@ -211,17 +210,15 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
             out.adaptation[node] = std::max(adaptation, middle(ring));
         };
     });
-    std::vector<ChromaRange> chroma = derive_ring_chroma(g, parts, out.luminance);
     TreeLuminance done{{std::move(out.luminance), std::move(out.support_range), std::move(out.ring_range),
-                        std::move(out.adaptation), std::move(chroma), {}, {}},
+                        std::move(out.adaptation)},
                        light, prelit, textured, textured ? product(leaf.corners, g.ring_texture[VertexTree::root()]) : leaf.corners};
     return done;
 }
 
-TreeLuminance copy_without_errors(const TreeLuminance& light) {
-    const auto copy_of = [](const auto& values) { return std::vector(values.begin(), values.end()); };
-    return {{copy_of(light.luminance), copy_of(light.support_range), copy_of(light.ring_range), copy_of(light.adaptation),
-             copy_of(light.ring_chroma), {}, {}},
+TreeLuminance copy_of(const TreeLuminance& light) {
+    const auto copy = [](const auto& values) { return std::vector(values.begin(), values.end()); };
+    return {{copy(light.luminance), copy(light.support_range), copy(light.ring_range), copy(light.adaptation)},
             light.light, light.prelit, light.textured, light.range};
 }
 
@@ -235,27 +232,24 @@ VertexTree::~VertexTree() = default;
 
 glm::dvec3 VertexTree::origin() const noexcept { return data_->geometry->origin; }
 std::span<const glm::vec3> VertexTree::positions() const noexcept { return data_->geometry->positions; }
-std::span<const Unorm16> VertexTree::luminance() const noexcept { return data_->light.luminance; }
+std::span<const Unorm16> VertexTree::luminance() const noexcept { return data_->light->luminance; }
 std::span<const PackedNormal> VertexTree::normals() const noexcept { return data_->geometry->normals; }
 std::span<const glm::vec4> VertexTree::colours() const noexcept { return data_->geometry->colours; }
 std::span<const glm::vec2> VertexTree::uvs() const noexcept { return data_->geometry->uvs; }
 
-TextureView VertexTree::texture() const noexcept { return data_->light.textured ? data_->geometry->texture_view() : TextureView{}; }
+TextureView VertexTree::texture() const noexcept { return data_->light->textured ? data_->geometry->texture_view() : TextureView{}; }
 
 std::span<const NodeBounds> VertexTree::bounds() const noexcept { return data_->geometry->bounds; }
 NormalMask VertexTree::mask(NodeId node) const noexcept {
     return unpack_mask(data_->geometry->mask_records, data_->geometry->mask_at[node]);
 }
 std::span<const Sphere> VertexTree::support_spheres() const noexcept { return data_->geometry->support_spheres; }
-std::span<const PackedRange> VertexTree::support_luminance() const noexcept { return data_->light.support_range; }
-std::span<const PackedRange> VertexTree::ring_luminance() const noexcept { return data_->light.ring_range; }
+std::span<const PackedRange> VertexTree::support_luminance() const noexcept { return data_->light->support_range; }
+std::span<const PackedRange> VertexTree::ring_luminance() const noexcept { return data_->light->ring_range; }
 std::span<const PackedRange> VertexTree::ring_texture() const noexcept {
-    return data_->light.textured ? std::span<const PackedRange>(data_->geometry->ring_texture) : std::span<const PackedRange>();
+    return data_->light->textured ? std::span<const PackedRange>(data_->geometry->ring_texture) : std::span<const PackedRange>();
 }
-std::span<const ChromaRange> VertexTree::ring_chroma() const noexcept { return data_->light.ring_chroma; }
-std::span<const FoldError> VertexTree::fold_errors() const noexcept { return data_->light.fold_errors; }
-std::span<const FoldStage> VertexTree::fold_stages() const noexcept { return data_->light.fold_stages; }
-std::span<const Unorm16> VertexTree::adaptation_luminance() const noexcept { return data_->light.adaptation; }
+std::span<const Unorm16> VertexTree::adaptation_luminance() const noexcept { return data_->light->adaptation; }
 std::span<const float> VertexTree::displacement() const noexcept { return data_->geometry->displacement; }
 
 std::span<const Index> VertexTree::source_vertices() const noexcept { return data_->geometry->source_vertices; }
@@ -264,10 +258,10 @@ std::span<const MeshRange> VertexTree::ranges() const noexcept { return data_->g
 std::uint64_t VertexTree::dropped_triangles() const noexcept { return data_->geometry->dropped_triangles; }
 Closedness VertexTree::closedness() const noexcept { return data_->geometry->closedness; }
 Sphere VertexTree::bounding_sphere() const noexcept { return data_->geometry->bounding_sphere; }
-LuminanceRange VertexTree::luminance_range() const noexcept { return data_->light.range; }
+LuminanceRange VertexTree::luminance_range() const noexcept { return data_->light->range; }
 
-const Light& VertexTree::light() const noexcept { return data_->light.light; }
-bool VertexTree::is_prelit() const noexcept { return data_->light.prelit; }
+const Light& VertexTree::light() const noexcept { return data_->light->light; }
+bool VertexTree::is_prelit() const noexcept { return data_->light->prelit; }
 
 bool VertexTree::looks_sound(NodeId node) const { return checks_->is_sound(node); }
 
@@ -290,14 +284,14 @@ Result<std::shared_ptr<const VertexTree::Data>> shaded_anew(const VertexTree& tr
     data->geometry = tree.data().geometry;
     TreeParts parts(links_of(*data->geometry));
     parts.assign_triangles(sound->first_triangle(), sound->triangles());
-    data->light = derive_luminance(*data->geometry, parts, light, prelit, textured);
+    data->light = std::make_shared<TreeLuminance>(derive_luminance(*data->geometry, parts, light, prelit, textured));
     return std::shared_ptr<const VertexTree::Data>(std::move(data));
 }
 
 } // namespace
 
 Result<VertexTree> VertexTree::relit(const Light& light) const {
-    auto data = shaded_anew(*this, light, false, data_->light.textured);
+    auto data = shaded_anew(*this, light, false, data_->light->textured);
     if (!data) return data.error();
     return VertexTree(std::move(*data));
 }
@@ -308,15 +302,57 @@ Result<VertexTree> VertexTree::untextured() const {
     return VertexTree(std::move(*data));
 }
 
+std::string fault_in_attribute(const AttributeInfo& a, std::size_t interior_count, std::size_t node_count) {
+    const auto is_plain = [](char c) { return c > ' ' && c <= '~'; };
+    if (a.name.empty() || a.name.size() > longest_attribute_name || !std::all_of(a.name.begin(), a.name.end(), is_plain))
+        return "An attribute's name must have 1 to 20 printable characters and no spaces.";
+    const std::uint32_t component = a.component_bytes;
+    if (!(component == 1 || component == 2 || component == 4 || component == 8) || a.element_bytes == 0 || a.element_bytes % component != 0)
+        return "Attribute " + a.name + " has values that are no numbers of 1, 2, 4 or 8 bytes.";
+    switch (a.domain) {
+    case AttributeDomain::tree: return {};
+    case AttributeDomain::interior_node:
+        if (a.count == interior_count) return {};
+        break;
+    case AttributeDomain::node:
+        if (a.count == node_count) return {};
+        break;
+    default: return "Attribute " + a.name + " is of nothing that a tree has.";
+    }
+    return "Attribute " + a.name + " has " + std::to_string(a.count) + " values, not one for each node.";
+}
+
+std::span<const std::byte> VertexTree::attribute_bytes(std::string_view name, std::size_t element, std::uint32_t component) const noexcept {
+    for (const Attribute& a : data_->attributes)
+        if (a.name == name && a.element_bytes == element && a.component_bytes == component) return a.bytes;
+    return {};
+}
+
+std::vector<AttributeInfo> VertexTree::attributes() const { return {data_->attributes.begin(), data_->attributes.end()}; }
+
+Result<VertexTree> VertexTree::with_attribute(Attribute attribute) const {
+    if (const std::string fault = fault_in_attribute(attribute, interior_count(), node_count()); !fault.empty())
+        return Error{ErrorCode::invalid_argument, fault};
+    auto data = std::make_shared<Data>(*data_);
+    std::erase_if(data->attributes, [&](const Attribute& a) { return a.name == attribute.name; });
+    if (data->attributes.size() == most_attributes)
+        return Error{ErrorCode::invalid_argument,
+                     "A tree has at most " + std::to_string(most_attributes) + " attributes; there is no room for " + attribute.name + "."};
+    data->attributes.push_back(std::move(attribute));
+    return VertexTree(std::move(data));
+}
+
 std::uint64_t VertexTree::byte_size() const noexcept {
+    std::uint64_t attributes = 0;
+    for (const Attribute& a : data_->attributes) attributes += a.bytes.size();
     const TreeGeometry& g = *data_->geometry;
-    const TreeLuminance& l = data_->light;
-    return bytes_of(g.parents) + bytes_of(g.positions) + bytes_of(g.normals) + bytes_of(g.colours) + bytes_of(g.uvs) +
+    const TreeLuminance& l = *data_->light;
+    return attributes + bytes_of(g.parents) + bytes_of(g.positions) + bytes_of(g.normals) + bytes_of(g.colours) + bytes_of(g.uvs) +
            bytes_of(g.first_leaf) + bytes_of(g.leaf_end) + bytes_of(g.subtree_end) + bytes_of(g.first_triangle) +
            bytes_of(g.bounds) + bytes_of(g.support_spheres) + bytes_of(g.mask_at) + bytes_of(g.mask_records) +
            bytes_of(g.displacement) + bytes_of(g.triangles) + bytes_of(g.source_triangles) +
            bytes_of(g.source_vertices) + bytes_of(g.texels) + bytes_of(g.ring_texture) + g.ranges.capacity() * sizeof(MeshRange) + bytes_of(l.luminance) + bytes_of(l.support_range) +
-           bytes_of(l.ring_range) + bytes_of(l.adaptation) + bytes_of(l.fold_errors) + bytes_of(l.fold_stages) + bytes_of(l.ring_chroma);
+           bytes_of(l.ring_range) + bytes_of(l.adaptation);
 }
 
 } // namespace unseen::vdtree

@@ -16,7 +16,7 @@
 #include <session/plan.h>
 #include <session/scene.h>
 #include <session/simplification.h>
-#include <vdtree/cut_rings.h>
+#include <perception/cut_rings.h>
 #include <vdtree/distance_criterion.h>
 
 namespace unseen::session {
@@ -88,7 +88,7 @@ public:
     Result<perception::SceneLuminance> luminance(const vdtree::View& view) const;
     // Spheres inside a solid, and rings of all cuts; made when they are first asked for. Refer to the session.
     std::span<const vdtree::Sphere> inner_spheres(std::size_t object = 0) const;
-    Result<const vdtree::CutRings*> cut_rings(std::size_t object = 0) const;
+    Result<const perception::CutRings*> cut_rings(std::size_t object = 0) const;
 
 private:
     friend class Follower;

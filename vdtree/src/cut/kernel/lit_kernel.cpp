@@ -5,7 +5,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "simd.h"
+#include <vdtree/internal/simd.h>
 
 namespace unseen::vdtree {
 

@@ -1,0 +1,30 @@
+// What folding each node of a tree changes, measured: for error_distances() in <perception/criterion.h>.
+#pragma once
+
+#include <vdtree/result.h>
+#include <vdtree/vertex_tree.h>
+
+namespace unseen::perception {
+
+// The tree with what its folds change, under its light and with its luminances as they are, as attributes (fold_errors,
+// fold_facing, fold_stage, fold_stages and fold_measurement; docs/file-format.md), which files keep. Everything else is
+// shared with the given tree. Folds err less with proxies whose luminances conserve the light: see
+// vdtree::conserve_light(), to be called before.
+//
+// Compared are small pictures of both surfaces, seen along the node's normal; points: the children's proxies, leaves
+// spread over the support, the leaves that were worst in the children, and three points of the edges that the fold
+// moves; and pictures of the whole mesh, folded in stages (none where vertices are translucent). Kept are the numbers
+// as they were measured, with the settings of the measurement; what they come to for an eye is decided when a criterion
+// is made.
+//
+// A measurement, not a bound over all cuts: neighbours may be folded in other ways, and the pictures' cells and the
+// points are few.
+//
+// Fails where check() does, and on trees with a texture, of which nothing is measured. Cost: some 50 us a node, and a
+// second; in parallel. The result does not depend on the threads. `threads`: 0: all cores.
+Result<vdtree::VertexTree> measure_folds(const vdtree::VertexTree& tree, int threads = 0);
+
+// Whether a tree comes from there. What files say is looked at when a criterion is made.
+bool has_fold_measurement(const vdtree::VertexTree& tree);
+
+} // namespace unseen::perception

@@ -1,0 +1,132 @@
+#include "fold/fold_errors.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "fold/fold_model.h"
+#include "measure/measurement.h"
+#include "measure/pyramid.h"
+
+namespace unseen::perception {
+
+using namespace vdtree;
+
+namespace {
+
+using Amplitudes = decltype(FoldRecord::amplitudes);
+
+// What waves see of a patch, `waves` of theirs wide, of one grating's amplitude: of patches side by side, and of its
+// parts half as wide, four times the amplitude.
+float share_in_wave(float waves) {
+    return waves >= 1 ? std::exp2(2 * std::floor(std::log2(waves))) : share_of_patches(waves);
+}
+
+struct BandShares {
+    Amplitudes of_wave; // by picture and band
+
+    BandShares() {
+        for (std::size_t size = 0; size < measurement::picture_sizes.size(); ++size)
+            for (std::size_t band = 0; band < measurement::picture_bands; ++band)
+                of_wave[size][band] =
+                    share_in_wave(measurement::picture_side * static_cast<float>(nominal_frequency(band)) /
+                                  measurement::picture_sizes[size]);
+    }
+};
+
+void find_luminance(const FoldRecord& record, const BandShares& shares, FoldError& error) {
+    for (std::size_t size = 0; size < measurement::picture_sizes.size(); ++size)
+        for (std::size_t band = 0; band < measurement::picture_bands; ++band) {
+            const float amplitude = record.amplitudes[size][band];
+            error.luminance = std::max(error.luminance, amplitude);
+            error.wide_luminance = std::max(error.wide_luminance, amplitude / shares.of_wave[size][band]);
+        }
+    error.luminance = std::max(error.luminance, error.wide_luminance);
+}
+
+Error refused(const std::string& what) {
+    return {ErrorCode::malformed_data, "The measurement of the tree's folds is damaged: " + what +
+                                           " Measure it again, or build the tree again from its mesh."};
+}
+
+} // namespace
+
+std::vector<FoldError> nested_errors(const SoundTree& tree, std::span<const FoldRecord> records,
+                                     std::span<const FoldFacing> facing) {
+    static const BandShares shares;
+    std::vector<FoldError> errors(records.size());
+    for (NodeId node = tree.interior_count(); node-- > 0;) { // children before parents
+        const FoldRecord& record = records[node];
+        FoldError& error = errors[node]; // it has the children's distance, extent and directions
+        const float ring = tree.bounds()[node].ring.radius,
+                    width = std::max(tree.support_spheres()[node].radius, record.extent);
+        const float shift = peak_of_shift * record.shift, moved_point = moved_by_neighbours * record.farthest;
+        error.mean_distance = record.mean_distance;
+        find_luminance(record, shares, error);
+        const bool is_shown = facing[node].is_height_field != 0 && ring <= longest_ring * width;
+        if (is_shown) {
+            error.distance = std::max({error.distance, shift, record.mean_distance});
+        } else { // something may be under what was drawn, or beside it
+            error.distance = std::max({error.distance, shift, moved_point});
+            error.luminance = std::max(error.luminance, record.largest_luminance);
+            error.wide_luminance = std::max(error.wide_luminance, amplitude_of_point_mean * record.mean_luminance);
+        }
+        error.extent = std::max(error.extent, record.extent);
+        error.facing |= facing[node].facing;
+        error.drift = record.drift, error.fading = facing[node].fading;
+        // Where parts meet, a fold moves the line along which the one hides the other, like an outline, whatever they
+        // face: the farther, the flatter they meet. That is nothing that a mean over cells would tell.
+        const float moved = std::max(error.distance, moved_point);
+        if (moved > 0 && record.gap < contact_reach * moved) {
+            error.facing = NormalSlabs::everything();
+            error.distance = std::max(moved, std::min(moved / std::max(record.sine, least_sine), ring));
+        }
+        if (node == 0) break;
+        FoldError& parent = errors[tree.parents()[node]];
+        parent.distance = std::max(parent.distance, error.distance);
+        parent.extent = std::max(parent.extent, error.extent);
+        parent.facing |= error.facing;
+    }
+    return errors;
+}
+
+Result<FoldErrors> fold_errors_of(const SoundTree& tree) {
+    const auto records = tree.attribute<FoldRecord>(record_name);
+    const auto facing = tree.attribute<FoldFacing>(facing_name);
+    const auto stage_of = tree.attribute<std::uint8_t>(stage_of_name);
+    const auto settings = tree.attribute<float>(settings_name);
+    if (records.empty())
+        return Error{ErrorCode::invalid_argument,
+                     "The errors of the tree's folds have not been measured (perception::measure_folds)."};
+    if (!std::ranges::equal(settings, measurement::settings))
+        return Error{ErrorCode::unsupported, "The tree's folds were measured with other settings than this program "
+                                             "knows: measure them again (perception::measure_folds)."};
+    const std::size_t nodes = tree.interior_count();
+    if (records.size() != nodes || facing.size() != nodes || stage_of.size() != nodes)
+        return refused("a part of it is missing.");
+    FoldErrors all;
+    all.stages = tree.attribute<FoldStage>(stages_name);
+    for (const FoldStage& stage : all.stages)
+        if (!is_sound(stage)) return refused("a contrast of a stage is negative or not finite.");
+    for (NodeId node = 0; node < nodes; ++node) {
+        const bool has_stage = all.stages.empty() || stage_of[node] < all.stages.size();
+        if (!is_sound(records[node]) || facing[node].fading > most_fading)
+            return refused("an error of node " + std::to_string(node) + " is negative or not finite.");
+        if (!has_stage) return refused("node " + std::to_string(node) + " folds in a stage that is not there.");
+    }
+    all.of_nodes = nested_errors(tree, records, facing);
+    for (NodeId node = tree.interior_count(); node-- > 0;) {
+        FoldError& error = all.of_nodes[node];
+        error.stage = std::max(error.stage, stage_of[node]);
+        if (node > 0)
+            all.of_nodes[tree.parents()[node]].stage = std::max(all.of_nodes[tree.parents()[node]].stage, error.stage);
+        // Factors may lead beyond all numbers.
+        for (const float value : {error.distance, error.luminance, error.wide_luminance})
+            if (!std::isfinite(value)) return refused("an error of node " + std::to_string(node) + " is too large.");
+    }
+    return all;
+}
+
+} // namespace unseen::perception

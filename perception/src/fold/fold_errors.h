@@ -1,0 +1,45 @@
+// What folding a node gets wrong, by the model (fold_model.h), of what was measured of it (measure/fold_record.h).
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <vdtree/vertex_tree.h>
+
+#include "measure/fold_record.h"
+
+namespace unseen::perception {
+
+// Of an interior node: where it is folded instead of the mesh's own surface, the larger of two cases: neighbours folded
+// as far as nodes no larger than it, or unfolded.
+struct FoldError {
+    // Mesh units. By how far an outline moves, no less than the children's; and the mean distance of points.
+    float distance = 0, mean_distance = 0;
+    // Relative, 0..1: what bands of spatial frequency see, as the amplitude of a grating. A band sees no more than of a
+    // patch as wide as the node of the amplitude `wide_luminance`, side by side with others like it of random signs,
+    // and of parts 2^-k as wide of 4^k times that, up to `luminance`.
+    float luminance = 0, wide_luminance = 0;
+    float extent = 0;           // mesh units: see FoldRecord; no less than the children's
+    float drift = 0;            // see FoldRecord
+    vdtree::NormalSlabs facing; // see FoldFacing; all where parts of the surface meet; it includes the children's
+    std::uint8_t fading = 0;
+    std::uint8_t stage = 0; // in which it folds: see fold_stages.h; no earlier than the children
+
+    bool operator==(const FoldError&) const = default;
+};
+
+// The model's errors of measured folds, all of them numbers, without stages. Cost: one pass over the nodes.
+std::vector<FoldError> nested_errors(const vdtree::SoundTree& tree, std::span<const FoldRecord> records,
+                                     std::span<const FoldFacing> facing);
+
+struct FoldErrors {
+    std::vector<FoldError> of_nodes;
+    std::span<const FoldStage> stages; // of the tree; empty where there are none
+};
+
+// Of a tree from measure_folds(). Fails where it is not, where it was measured with other settings, and where a value
+// is none that is measured: attributes of files are looked at here, by nobody before.
+Result<FoldErrors> fold_errors_of(const vdtree::SoundTree& tree);
+
+} // namespace unseen::perception

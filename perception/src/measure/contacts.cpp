@@ -1,0 +1,229 @@
+#include "measure/contacts.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <span>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <tbb/parallel_for.h>
+
+#include "measure/leaf_triangles.h"
+#include <vdtree/internal/scaled_geometry.h>
+
+namespace unseen::perception {
+
+using namespace vdtree;
+
+namespace {
+
+using Corners = std::array<glm::vec3, 3>;
+
+constexpr float near_share = 0.25f; // of a triangle's size: no triangles of a smooth surface come so near but neighbours
+// Looked at for one triangle: amid more than these, it counts as touching one.
+constexpr int most_nodes = 4000;
+constexpr std::size_t most_triangles = 16000; // around corners: no vertex of very many triangles costs their square
+constexpr std::size_t most_boxes = std::size_t{1} << 32; // of all triangles together, in trees so flat that nodes have very many: some seconds
+constexpr float infinity = std::numeric_limits<float>::infinity();
+
+float unit(float part, float whole) { return whole > 0 ? std::clamp(part / whole, 0.0f, 1.0f) : 0.0f; }
+
+glm::vec3 shorter(const glm::vec3& a, const glm::vec3& b) { return glm::dot(b, b) < glm::dot(a, a) ? b : a; }
+
+// The shortest ways from a triangle to a point, and from one edge, a + [0, 1] u, to another, b + [0, 1] v.
+glm::vec3 way_to_point(const Corners& t, const glm::vec3& p) {
+    const glm::vec3 n = glm::cross(t[1] - t[0], t[2] - t[0]);
+    const float squared = glm::dot(n, n);
+    bool is_over = squared > 0;
+    glm::vec3 least(infinity);
+    for (std::size_t k = 0; k < 3; ++k) {
+        const glm::vec3 a = t[k], ab = t[(k + 1) % 3] - a, ap = p - a;
+        is_over = is_over && glm::dot(glm::cross(ab, ap), n) >= 0;
+        least = shorter(least, ap - unit(glm::dot(ap, ab), glm::dot(ab, ab)) * ab);
+    }
+    return is_over ? (glm::dot(p - t[0], n) / squared) * n : least;
+}
+
+glm::vec3 way_between_edges(const glm::vec3& a, const glm::vec3& u, const glm::vec3& b, const glm::vec3& v) {
+    const glm::vec3 w = a - b;
+    const float uu = glm::dot(u, u), uv = glm::dot(u, v), vv = glm::dot(v, v), uw = glm::dot(u, w), vw = glm::dot(v, w);
+    const float determinant = uu * vv - uv * uv;
+    float s = determinant > 0 ? std::clamp((uv * vw - vv * uw) / determinant, 0.0f, 1.0f) : 0.0f;
+    const float t = unit(s * uv + vw, vv);
+    s = unit(t * uv - uw, uu);
+    return w + s * u - t * v;
+}
+
+bool passes_through(const glm::vec3& a, const glm::vec3& b, const Corners& t) {
+    const glm::vec3 n = glm::cross(t[1] - t[0], t[2] - t[0]);
+    const float over_a = glm::dot(a - t[0], n), over_b = glm::dot(b - t[0], n);
+    if (!(over_a * over_b < 0)) return false;
+    const glm::vec3 at = a + (over_a / (over_a - over_b)) * (b - a);
+    for (std::size_t k = 0; k < 3; ++k)
+        if (!(glm::dot(glm::cross(t[(k + 1) % 3] - t[k], at - t[k]), n) >= 0)) return false;
+    return true;
+}
+
+// The shortest way between triangles, whichever way round; none where they intersect.
+glm::vec3 way_between(const Corners& a, const Corners& b) {
+    glm::vec3 least(infinity);
+    for (std::size_t i = 0; i < 3; ++i) {
+        if (passes_through(a[i], a[(i + 1) % 3], b) || passes_through(b[i], b[(i + 1) % 3], a)) return glm::vec3(0);
+        least = shorter(shorter(least, way_to_point(b, a[i])), way_to_point(a, b[i]));
+        for (std::size_t k = 0; k < 3; ++k) least = shorter(least, way_between_edges(a[i], a[(i + 1) % 3] - a[i], b[k], b[(k + 1) % 3] - b[k]));
+    }
+    return least;
+}
+
+// Whether the one lies beside the other in one sheet, not over it: the way between them runs along both.
+bool is_beside(const Corners& a, const Corners& b, const glm::vec3& way) {
+    constexpr float along = 0.5f; // the cosine between way and normal, at most
+    const auto runs_along = [&](const Corners& t) {
+        const glm::vec3 n = glm::cross(t[1] - t[0], t[2] - t[0]);
+        return std::abs(glm::dot(n, way)) <= along * glm::length(n) * glm::length(way);
+    };
+    return glm::dot(way, way) > 0 && runs_along(a) && runs_along(b);
+}
+
+float sine_between(const Corners& a, const Corners& b) {
+    const glm::vec3 m = glm::cross(a[1] - a[0], a[2] - a[0]), n = glm::cross(b[1] - b[0], b[2] - b[0]);
+    const float lengths = glm::length(m) * glm::length(n);
+    return lengths > 0 ? std::min(glm::length(glm::cross(m, n)) / lengths, 1.0f) : 0.0f;
+}
+
+// Which of them is in front makes no difference: they face alike, and look alike.
+constexpr float alike_cosine = 0.9f;
+constexpr float alike_luminance = 0.01f; // relative, 0..1; of the means
+bool face_alike(const Corners& a, const Corners& b) {
+    const glm::vec3 m = glm::cross(a[1] - a[0], a[2] - a[0]), n = glm::cross(b[1] - b[0], b[2] - b[0]);
+    return glm::dot(m, n) > alike_cosine * glm::length(m) * glm::length(n);
+}
+
+struct Box {
+    glm::vec3 lo = glm::vec3(infinity), hi = glm::vec3(-infinity);
+
+    void include(const Box& other) { lo = glm::min(lo, other.lo), hi = glm::max(hi, other.hi); }
+    Box wider(float by) const { return {lo - by, hi + by}; }
+    bool meets(const Box& other) const {
+        return lo.x <= other.hi.x && lo.y <= other.hi.y && lo.z <= other.hi.z && hi.x >= other.lo.x && hi.y >= other.lo.y && hi.z >= other.lo.z;
+    }
+};
+
+// Looks for near triangles down the tree, by boxes around those that vanish at a node or below.
+class ContactFinder {
+public:
+    explicit ContactFinder(const SoundTree& tree)
+        : tree_(tree), interior_(tree.interior_count()), triangles_(tree.triangles()),
+          scale_(unit_scale(tree.bounding_sphere().radius)), luminance_(tree.luminance().subspan(interior_)),
+          first_triangle_(tree.first_triangle()), boxes_(interior_), of_leaf_(tree),
+          boxes_a_triangle_(std::max(most_triangles, most_boxes / std::max<std::size_t>(triangles_.size(), 1))) {
+        const auto leaves = tree.positions().subspan(interior_);
+        positions_.assign(leaves.begin(), leaves.end());
+        for (glm::vec3& p : positions_) p *= scale_;
+        for (NodeId node = interior_; node-- > 0;) {
+            for (Index t = first_triangle_[node]; t < first_triangle_[node + 1]; ++t) boxes_[node].include(box_of(corners(t)));
+            if (node > 0) boxes_[tree.parents()[node]].include(boxes_[node]);
+        }
+    }
+
+    std::vector<Contact> run() const {
+        const std::vector<Contact> contacts = by_triangle();
+        std::vector<Contact> all(interior_);
+        const std::span<const NodeId> parents = tree_.parents();
+        for (Index t = 0; t < contacts.size(); ++t)
+            for (const Index leaf : triangles_[t]) all[parents[interior_ + leaf]].include({contacts[t].gap / scale_, contacts[t].sine});
+        for (NodeId node = interior_; node-- > 1;) all[parents[node]].include(all[node]);
+        return all;
+    }
+
+private:
+    std::vector<Contact> by_triangle() const {
+        std::vector<Contact> contacts(triangles_.size());
+        constexpr Index piece = 1024;
+        tbb::parallel_for(Index{0}, static_cast<Index>((triangles_.size() + piece - 1) / piece), [&](Index i) {
+            std::vector<NodeId> waiting;
+            for (Index t = i * piece; t < std::min<std::size_t>(triangles_.size(), std::size_t{i + 1} * piece); ++t) contacts[t] = find(t, waiting);
+        });
+        return contacts;
+    }
+
+    Corners corners(Index triangle) const {
+        const Triangle& t = triangles_[triangle];
+        return {positions_[t[0]], positions_[t[1]], positions_[t[2]]};
+    }
+    float luminance(Index triangle) const {
+        const Triangle& t = triangles_[triangle];
+        return (luminance_[t[0]] + luminance_[t[1]] + luminance_[t[2]]) / 3;
+    }
+    static Box box_of(const Corners& c) { return {glm::min(c[0], glm::min(c[1], c[2])), glm::max(c[0], glm::max(c[1], c[2]))}; }
+
+    // Whether a corner of the one is a corner of the other, or shares a triangle with one. Adds what it looked at.
+    bool are_neighbours(const Triangle& a, const Triangle& b, std::size_t& looked_at) const {
+        for (const Index leaf : a)
+            if (leaf == b[0] || leaf == b[1] || leaf == b[2]) return true;
+        for (const Index leaf : a) {
+            for (const Index other : b) {
+                const bool is_less = of_leaf_.around(leaf).size() < of_leaf_.around(other).size();
+                const Index wanted = is_less ? other : leaf;
+                for (const Index t : of_leaf_.around(is_less ? leaf : other)) {
+                    ++looked_at;
+                    if (const Triangle& at = triangles_[t]; at[0] == wanted || at[1] == wanted || at[2] == wanted) return true;
+                    if (looked_at > most_triangles) return false;
+                }
+            }
+        }
+        return false;
+    }
+
+    Contact find(Index triangle, std::vector<NodeId>& waiting) const {
+        const Corners own = corners(triangle);
+        const glm::vec3 centre = (own[0] + own[1] + own[2]) / 3.0f;
+        const float near = near_share * std::max({glm::length(own[0] - centre), glm::length(own[1] - centre), glm::length(own[2] - centre)});
+        Contact contact;
+        if (!(near > 0)) return contact;
+        const Box around = box_of(own).wider(near);
+        int nodes = 0;
+        std::size_t looked_at = 0, boxes = 0;
+        waiting.assign(1, VertexTree::root());
+        while (!waiting.empty()) {
+            const NodeId node = waiting.back();
+            waiting.pop_back();
+            if (++nodes > most_nodes) return {0, 0};
+            for (Index other = first_triangle_[node]; other < first_triangle_[node + 1]; ++other) {
+                const Triangle& t = triangles_[other];
+                const Corners its = corners(other);
+                if (++boxes > boxes_a_triangle_) return {0, 0};
+                if (!around.meets(box_of(its)) || are_neighbours(triangles_[triangle], t, looked_at)) continue;
+                if (looked_at > most_triangles) return {0, 0};
+                const glm::vec3 way = way_between(own, its);
+                const float gap = glm::length(way);
+                if (!(gap < near) || is_beside(own, its, way)) continue;
+                const bool is_alike = face_alike(own, its) && std::abs(luminance(triangle) - luminance(other)) <= alike_luminance;
+                if (!is_alike) contact.include({gap, sine_between(own, its)});
+            }
+            tree_.for_each_child(node, [&](NodeId child) {
+                if (child < interior_ && around.meets(boxes_[child])) waiting.push_back(child);
+            });
+        }
+        return contact;
+    }
+
+    const SoundTree& tree_;
+    NodeId interior_;
+    std::span<const Triangle> triangles_;
+    float scale_;                          // in which they are measured
+    std::vector<glm::vec3> positions_;     // of leaves
+    std::span<const Unorm16> luminance_;   // likewise
+    std::span<const Index> first_triangle_;
+    std::vector<Box> boxes_; // by interior node
+    LeafTriangles of_leaf_;
+    std::size_t boxes_a_triangle_; // at most
+};
+
+} // namespace
+
+std::vector<Contact> find_contacts(const SoundTree& tree) { return ContactFinder(tree).run(); }
+
+} // namespace unseen::perception

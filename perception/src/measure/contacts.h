@@ -1,0 +1,26 @@
+// Where parts of a surface touch or pass through each other without sharing a vertex.
+#pragma once
+
+#include <algorithm>
+#include <limits>
+#include <vector>
+
+#include <vdtree/vertex_tree.h>
+
+namespace unseen::perception {
+
+// Of triangles that are near to others which are no neighbours of theirs or of their neighbours, over or under them and not beside them
+// in one sheet; unless they face and look alike, so that it makes no difference which of them is seen. Near is, as triangles go, nearer than a
+// quarter of the circle around the first.
+struct Contact {
+    float gap = std::numeric_limits<float>::infinity(); // mesh units: the least distance; 0 where they intersect; infinite where none is near
+    float sine = 1;                                     // of the least angle between the planes of such triangles
+
+    bool is_any() const { return gap < std::numeric_limits<float>::infinity(); }
+    void include(const Contact& other) { gap = std::min(gap, other.gap), sine = std::min(sine, other.sine); }
+};
+
+// By interior node: of all triangles that touch its support, or the supports below. In parallel; some microseconds a triangle.
+std::vector<Contact> find_contacts(const vdtree::SoundTree& tree);
+
+} // namespace unseen::perception

@@ -1,0 +1,422 @@
+// Bounds the rings of all cuts: from every triangle corner up the tree, and along each edge up the tree on both sides at once.
+#include <perception/cut_rings.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <type_traits>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <tbb/parallel_for.h>
+
+#include <vdtree/internal/packed_range.h>
+#include <vdtree/internal/texture_bounds.h>
+#include <vdtree/internal/texture_fit.h>
+#include <vdtree/internal/tree_parts.h>
+#include <vdtree/internal/vertex_tree_data.h>
+
+#include "measure/contacts.h"
+#include "measure/ring_chroma.h"
+
+namespace unseen::perception {
+
+using namespace vdtree;
+
+namespace {
+
+// Trees are some tens of nodes deep. Where one is deeper than this, as only made-up ones are, whatever is above counts as reaching
+// everywhere, so that no tree costs the square of its depth.
+constexpr int most_steps = 1024;
+
+constexpr float infinity = std::numeric_limits<float>::infinity();
+
+struct Box {
+    glm::vec3 low = glm::vec3(infinity), high = glm::vec3(-infinity);
+
+    void include(const glm::vec3& p) {
+        low = glm::min(low, p);
+        high = glm::max(high, p);
+    }
+    bool is_empty() const { return !(low.x <= high.x); }
+    double farthest_from(const glm::vec3& point) const {
+        const glm::dvec3 p(point);
+        return glm::length(glm::max(glm::abs(glm::dvec3(low) - p), glm::abs(glm::dvec3(high) - p)));
+    }
+};
+
+// An area, and what is drawn there times the area.
+template <class Light> // luminance, or luminance and chroma
+struct Lit {
+    double area = 0;
+    Light light = Light(0);
+    Lit& operator+=(const Lit& other) {
+        area += other.area;
+        light += other.light;
+        return *this;
+    }
+};
+
+// Of grey trees.
+struct GreyVertices {
+    using Light = double;
+    explicit GreyVertices(const VertexTree& tree) : luminance(tree.luminance()) {}
+    double operator[](NodeId node) const { return static_cast<double>(luminance[node].value) / Unorm16::largest; }
+    double mean(NodeId a, NodeId b, NodeId c) const { return ((*this)[a] + (*this)[b] + (*this)[c]) / 3; }
+    std::span<const Unorm16> luminance;
+};
+
+// Of textured trees: the vertices' luminance alone, and times the texture's.
+struct TexturedVertices {
+    using Light = glm::dvec2;
+    explicit TexturedVertices(const VertexTree& tree) : luminance(tree.luminance()), uvs(tree.uvs()), pyramid(tree.texture()) {}
+
+    glm::dvec2 mean(NodeId a, NodeId b, NodeId c) const {
+        const glm::dvec3 y(luminance[a].value, luminance[b].value, luminance[c].value);
+        const glm::dvec2 u(uvs[a]), v(uvs[b]), w(uvs[c]);
+        const double width = std::max({glm::length(v - u), glm::length(w - v), glm::length(u - w)}) / parts;
+        double sum = 0;
+        const auto add = [&](double second, double third) { // weights of the middle of one of the parts
+            const glm::dvec3 weights(1 - second - third, second, third);
+            sum += glm::dot(weights, y) * pyramid.mean(weights.x * u + weights.y * v + weights.z * w, width);
+        };
+        for (int i = 0; i < parts; ++i)
+            for (int k = 0; i + k < parts; ++k) {
+                add((i + 1.0 / 3) / parts, (k + 1.0 / 3) / parts);
+                if (i + k + 1 < parts) add((i + 2.0 / 3) / parts, (k + 2.0 / 3) / parts);
+            }
+        return glm::dvec2((y.x + y.y + y.z) / 3, sum / (parts * parts)) / double{Unorm16::largest};
+    }
+
+    static constexpr int parts = 3; // of a side: 9 triangles, the texture's mean in each
+    std::span<const Unorm16> luminance;
+    std::span<const glm::vec2> uvs;
+    TexturePyramid pyramid;
+};
+
+struct ColouredVertices {
+    using Light = glm::dvec3;
+    explicit ColouredVertices(const VertexTree& tree) : luminance(tree.luminance()), chroma(luminance.size()) {
+        tbb::parallel_for(std::size_t{0}, chroma.size(),
+                          [&](std::size_t node) { chroma[node] = drawn_chroma(tree.colours()[node], luminance[node]); });
+    }
+    glm::dvec3 operator[](NodeId node) const {
+        return {static_cast<double>(luminance[node].value) / Unorm16::largest, chroma[node].x, chroma[node].y};
+    }
+    glm::dvec3 mean(NodeId a, NodeId b, NodeId c) const { return ((*this)[a] + (*this)[b] + (*this)[c]) / 3.0; }
+    std::span<const Unorm16> luminance;
+    std::vector<glm::vec2> chroma;
+};
+
+template <class Vertices>
+class RingBounder {
+    using Light = typename Vertices::Light;
+    using Lit = perception::Lit<Light>;
+    static constexpr bool has_chroma = std::is_same_v<Light, glm::dvec3>;
+    static constexpr bool is_textured = std::is_same_v<Light, glm::dvec2>;
+
+public:
+    RingBounder(const SoundTree& tree, std::vector<ChromaRange> ring_chroma)
+        : tree_(tree), ring_chroma_(std::move(ring_chroma)), g_(*tree.data().geometry), l_(*tree.data().light), interior_(tree.interior_count()),
+          vertices_(tree), parts_(links_of(g_)), around_(interior_), left_(interior_) {
+        parts_.assign_triangles(g_.first_triangle, g_.triangles);
+    }
+
+    CutRings run() {
+        rings_.luminance.assign(g_.bounds.size(), {});
+        rings_.radius.resize(interior_);
+        rings_.mean_shift.assign(interior_, 0);
+        if constexpr (has_chroma) {
+            rings_.chroma = ring_chroma_;
+            rings_.mean_chroma_shift.assign(interior_, glm::vec2(0));
+        }
+        for (NodeId node = 0; node < interior_; ++node) {
+            rings_.luminance[node] = l_.ring_range[node];
+            rings_.radius[node] = g_.bounds[node].ring.radius;
+        }
+        if constexpr (is_textured) begin_texture();
+        sum_up_triangles();
+        parts_.for_each_triangle([&](const TreePart& part) {
+            return [&](Index triangle) {
+                const Triangle& t = g_.triangles[triangle];
+                for (std::size_t k = 0; k < 3; ++k) {
+                    const Index here = t[k], next = t[(k + 1) % 3], last = t[(k + 2) % 3];
+                    bound_along(part, here, next);
+                    bound_along(part, here, last);
+                    add_light(part, here, next, last);
+                }
+            };
+        });
+        if constexpr (is_textured) bound_texture();
+        find_mean_shifts();
+        for (NodeId node = interior_; node-- > 1;) nest(node, g_.parents[node]);
+        if constexpr (is_textured) narrow_unmoved();
+        return std::move(rings_);
+    }
+
+private:
+    bool supports(NodeId node, Index leaf) const { return g_.first_leaf[node] <= leaf && leaf < g_.leaf_end[node]; }
+    bool is_larger(NodeId a, NodeId b) const {
+        const float ra = g_.support_spheres[a].radius, rb = g_.support_spheres[b].radius;
+        return ra != rb ? ra > rb : a < b;
+    }
+    NodeId parent_of_leaf(Index leaf) const { return g_.parents[interior_ + leaf]; }
+
+    // What the nodes above `here` that do not support its neighbour must know of those above the neighbour.
+    void bound_along(const TreePart& part, Index here, Index neighbour) {
+        NodeId other = parent_of_leaf(neighbour);
+        Box places;
+        PackedRange lights{{Unorm16::largest}, {0}};
+        ChromaRange colours = no_chroma_yet;
+        UvBox uvs;
+        thread_local std::vector<NodeId> others; // with a texture: those seen so far
+        if constexpr (is_textured) others.assign(1, interior_ + neighbour);
+        int steps = 0;
+        for (NodeId node = parent_of_leaf(here); node != no_node && !supports(node, neighbour); node = g_.parents[node]) {
+            for (; !supports(other, here) && !is_larger(other, node); other = g_.parents[other]) {
+                places.include(g_.positions[other]);
+                if constexpr (is_textured) {
+                    lights = unite(lights, shade_of(other));
+                    uvs.include(g_.uvs[other]);
+                    others.push_back(other);
+                } else {
+                    lights = unite(lights, {l_.luminance[other], l_.luminance[other]});
+                }
+                if constexpr (has_chroma) colours = unite(colours, {vertices_.chroma[other], vertices_.chroma[other]});
+                ++steps;
+            }
+            if (++steps > most_steps) return reach_everywhere(part, node);
+            if (!parts_.owns(part, node)) continue;
+            if constexpr (is_textured) {
+                for (const NodeId vertex : others) residuals_[node] = std::max(residuals_[node], fits_.residual(node, vertex));
+                footprints_[node].include(uvs);
+            }
+            if (places.is_empty()) continue;
+            if constexpr (is_textured) rings_.vertices[node] = unite(rings_.vertices[node], lights);
+            if (is_coincident(node)) continue;
+            if constexpr (!is_textured) rings_.luminance[node] = unite(rings_.luminance[node], lights);
+            if constexpr (has_chroma) rings_.chroma[node] = unite(rings_.chroma[node], colours);
+            include(rings_.radius[node], places.farthest_from(g_.bounds[node].ring.centre));
+        }
+    }
+
+    // What is true of the lowest node that the part owns is true of all above.
+    void reach_everywhere(const TreePart& part, NodeId node) {
+        while (node != no_node && !parts_.owns(part, node)) node = parts_.is_top(node) ? no_node : g_.parents[node];
+        if (node == no_node) return;
+        rings_.luminance[node] = {{0}, {Unorm16::largest}};
+        if constexpr (is_textured) {
+            rings_.vertices[node] = {{0}, {Unorm16::largest}};
+            footprints_[node] = footprints_[VertexTree::root()];
+            residuals_[node] = std::numeric_limits<double>::infinity();
+        }
+        if constexpr (has_chroma) rings_.chroma[node] = ring_chroma_[VertexTree::root()];
+        rings_.radius[node] = std::numeric_limits<float>::max();
+    }
+
+    // When it folds nothing moves.
+    bool is_coincident(NodeId node) const { return g_.support_spheres[node].radius == 0; }
+
+    // Rounded up.
+    static void include(float& radius, double distance) {
+        float up = static_cast<float>(distance);
+        if (static_cast<double>(up) < distance) up = std::nextafter(up, infinity);
+        radius = std::max(radius, up);
+    }
+
+    // To the nodes above `here` that support none of the triangle's other corners: the triangle stays when they fold.
+    void add_light(const TreePart& part, Index here, Index next, Index last) {
+        const Lit before = light_of(interior_ + here, interior_ + next, interior_ + last);
+        int steps = 0;
+        for (NodeId node = parent_of_leaf(here); node != no_node && !supports(node, next) && !supports(node, last);
+             node = g_.parents[node]) {
+            if (++steps > most_steps) return; // it reaches everywhere
+            if (!parts_.owns(part, node)) continue;
+            around_[node] += before;
+            left_[node] += light_of(node, interior_ + next, interior_ + last);
+        }
+    }
+
+    Lit light_of(NodeId a, NodeId b, NodeId c) const {
+        const glm::dvec3 at = g_.positions[a];
+        const double area = glm::length(glm::cross(glm::dvec3(g_.positions[b]) - at, glm::dvec3(g_.positions[c]) - at)) / 2;
+        return {area, vertices_.mean(a, b, c) * area};
+    }
+
+    // ---- textures
+
+    PackedRange shade_of(NodeId node) const {
+        const Unorm16 y = l_.luminance[node];
+        return g_.colours.empty() ? PackedRange{y, y} : channel_range(g_.colours[node], y);
+    }
+
+    // Without the neighbours' proxies: the mesh's own rings and the subtrees.
+    void begin_texture() {
+        footprints_ = bound_footprints(g_, parts_);
+        fits_ = TextureFits(g_, parts_);
+        residuals_.assign(interior_, 0);
+        rings_.vertices.assign(interior_, {{Unorm16::largest}, {0}});
+        parts_.for_each_triangle([&](const TreePart& part) {
+            return [&](Index triangle) {
+                const Triangle& t = g_.triangles[triangle];
+                PackedRange range{{Unorm16::largest}, {0}};
+                for (const Index leaf : t) range = unite(range, shade_of(interior_ + leaf));
+                for (const Index leaf : t)
+                    if (const NodeId parent = parent_of_leaf(leaf); parts_.owns(part, parent)) rings_.vertices[parent] = unite(rings_.vertices[parent], range);
+            };
+        });
+        for (NodeId node = interior_; node-- > 0;) {
+            rings_.vertices[node] = unite(rings_.vertices[node], shade_of(node));
+            if (node > 0) rings_.vertices[g_.parents[node]] = unite(rings_.vertices[g_.parents[node]], rings_.vertices[node]);
+        }
+        parts_.bottom_up([&] {
+            return [&](NodeId node) { residuals_[node] = fits_.residual_of_subtree(node); };
+        });
+    }
+
+    // When all that the rings can show is known.
+    void bound_texture() {
+        rings_.texture.resize(interior_);
+        rings_.texture_deviation.resize(interior_);
+        for (NodeId node = interior_; node-- > 1;) {
+            const NodeId parent = g_.parents[node];
+            footprints_[parent].include(footprints_[node]);
+            rings_.vertices[parent] = unite(rings_.vertices[parent], rings_.vertices[node]);
+        }
+        tbb::parallel_for(NodeId{0}, interior_, [&](NodeId node) {
+            const TexturePyramid::Range texture = vertices_.pyramid.range(footprints_[node]);
+            rings_.texture[node] = {texture.lo, texture.hi};
+            if (!is_still(node)) rings_.luminance[node] = unite(rings_.luminance[node], product(rings_.vertices[node], rings_.texture[node]));
+            float deviation = 0;
+            include(deviation, 2 * residuals_[node]);
+            rings_.texture_deviation[node] = deviation;
+        });
+        for (NodeId node = interior_; node-- > 1;)
+            rings_.texture_deviation[g_.parents[node]] = std::max(rings_.texture_deviation[g_.parents[node]], rings_.texture_deviation[node]);
+    }
+
+    // When it folds nothing moves, not even the texture.
+    bool is_still(NodeId node) const { return is_coincident(node) && !fits_.moves(node); }
+
+    // There no more changes than the coincident vertices differ by, and that shows best where the texture is brightest.
+    void narrow_unmoved() {
+        float& of_root = rings_.texture_deviation[VertexTree::root()];
+        of_root = std::min(of_root, 2 * rings_.radius[VertexTree::root()]);
+        for (NodeId node = 0; node < interior_; ++node) {
+            if (!is_still(node)) continue;
+            PackedRange spread = shade_of(node);
+            for (NodeId below = node; below < g_.subtree_end[node]; ++below) spread = unite(spread, shade_of(below));
+            for (Index leaf = g_.first_leaf[node]; leaf < g_.leaf_end[node]; ++leaf) spread = unite(spread, shade_of(interior_ + leaf));
+            PackedRange& vertices = rings_.vertices[node];
+            const int hi = vertices.lo.value + (spread.hi.value - spread.lo.value);
+            vertices.hi.value = static_cast<std::uint16_t>(std::min<int>(vertices.hi.value, hi));
+            rings_.texture[node].lo = rings_.texture[node].hi;
+            rings_.texture_deviation[node] = 0;
+        }
+    }
+
+    // What the light shifts by, of vertices alone and of all that is drawn. The latter is measured, by means over parts of triangles; where
+    // the texture hardly moves, what it can add to the former is less than what such means are wrong by.
+    double shift_of_both(NodeId node, glm::dvec2 shift) const {
+        const double texture_lo = rings_.texture[node].lo, texture_hi = rings_.texture[node].hi, vertices_hi = rings_.vertices[node].hi;
+        const double radius = g_.support_spheres[node].radius, deviation = rings_.texture_deviation[node];
+        // Triangles whose points move by the deviation, against corners that do not, are stretched by it over their heights, about.
+        constexpr double heights_in_radius = 2;
+        const double stretch = radius > 0 ? std::min(1.0, heights_in_radius * deviation / radius) : 1.0;
+        return std::min(shift.y, shift.x * texture_hi + vertices_hi * (texture_hi - texture_lo) * stretch);
+    }
+
+    // Running sums: over the triangles in their order, and over the leaves of a third of the areas around each.
+    void sum_up_triangles() {
+        before_triangle_.resize(g_.triangles.size() + 1);
+        std::vector<double> of_leaf(tree_.leaf_count(), 0.0);
+        for (std::size_t t = 0; t < g_.triangles.size(); ++t) {
+            const Triangle& corners = g_.triangles[t];
+            const Lit light = light_of(interior_ + corners[0], interior_ + corners[1], interior_ + corners[2]);
+            before_triangle_[t + 1] = before_triangle_[t];
+            before_triangle_[t + 1] += light;
+            for (const Index leaf : corners) of_leaf[leaf] += light.area / 3;
+        }
+        before_leaf_.assign(of_leaf.size() + 1, 0.0);
+        for (std::size_t leaf = 0; leaf < of_leaf.size(); ++leaf) before_leaf_[leaf + 1] = before_leaf_[leaf] + of_leaf[leaf];
+    }
+
+    void find_mean_shifts() {
+        // Below this share of the whole area the differences of running sums are rounding, and nothing that is seen.
+        constexpr double least_share = 1e-12;
+        const double whole = before_leaf_.back();
+        for (NodeId node = 0; node < interior_; ++node) {
+            // With two corners or more in the support they vanish somewhere under the node.
+            const Lit &first = before_triangle_[g_.first_triangle[node]], &end = before_triangle_[g_.first_triangle[g_.subtree_end[node]]];
+            const double area = around_[node].area + end.area - first.area;
+            const Light light = around_[node].light + end.light - first.light;
+            const double own = before_leaf_[g_.leaf_end[node]] - before_leaf_[g_.first_leaf[node]];
+            if (!(own > least_share * whole) || !(area > 0)) continue;
+            const Light shift = glm::abs(left_[node].light - light * (left_[node].area / area)) / own;
+            if constexpr (has_chroma) {
+                rings_.mean_shift[node] = static_cast<float>(std::min(shift.x, 1.0));
+                rings_.mean_chroma_shift[node] = glm::vec2(shift.y, shift.z);
+            } else if constexpr (is_textured) {
+                rings_.mean_shift[node] = static_cast<float>(std::min(shift_of_both(node, shift), 1.0));
+            } else {
+                rings_.mean_shift[node] = static_cast<float>(std::min(shift, 1.0));
+            }
+        }
+    }
+
+    void nest(NodeId child, NodeId parent) {
+        rings_.luminance[parent] = unite(rings_.luminance[parent], rings_.luminance[child]);
+        rings_.radius[parent] = std::max(rings_.radius[parent], rings_.radius[child]);
+        rings_.mean_shift[parent] = std::max(rings_.mean_shift[parent], rings_.mean_shift[child]);
+        if constexpr (is_textured) // radii are those of all children now
+            rings_.texture_deviation[child] = std::min(rings_.texture_deviation[child], 2 * rings_.radius[child]);
+        if constexpr (has_chroma) {
+            rings_.chroma[parent] = unite(rings_.chroma[parent], rings_.chroma[child]);
+            rings_.mean_chroma_shift[parent] = glm::max(rings_.mean_chroma_shift[parent], rings_.mean_chroma_shift[child]);
+        }
+    }
+
+    const SoundTree& tree_;
+    std::vector<ChromaRange> ring_chroma_; // where colours are looked at
+    const TreeGeometry& g_;
+    const TreeLuminance& l_;
+    NodeId interior_;
+    Vertices vertices_;
+    TreeParts parts_;
+    CutRings rings_;
+    std::vector<Lit> around_, left_; // by node: of the triangles with one corner in the support, before and after its fold
+    std::vector<Lit> before_triangle_;
+    std::vector<double> before_leaf_;
+
+    // With a texture, by node.
+    std::vector<UvBox> footprints_;
+    TextureFits fits_;
+    std::vector<double> residuals_; // mesh units
+};
+
+} // namespace
+
+Result<CutRings> bound_cut_rings(const VertexTree& tree, bool with_chroma) {
+    const auto sound = SoundTree::of(tree);
+    if (!sound) return sound.error();
+    const bool is_textured = !tree.texture().empty();
+    std::vector<ChromaRange> chroma;
+    if (with_chroma && !is_textured) {
+        auto found = ring_chroma(tree);
+        if (!found) return found.error();
+        chroma = std::move(*found);
+    }
+    CutRings rings = is_textured      ? RingBounder<TexturedVertices>(*sound, {}).run()
+                     : chroma.empty() ? RingBounder<GreyVertices>(*sound, {}).run()
+                                      : RingBounder<ColouredVertices>(*sound, std::move(chroma)).run();
+    // What comes as near as a quarter of a triangle is in the way of any fold.
+    const std::vector<Contact> contacts = find_contacts(*sound);
+    if (std::any_of(contacts.begin(), contacts.end(), std::mem_fn(&Contact::is_any))) {
+        rings.meets_another.resize(contacts.size());
+        std::transform(contacts.begin(), contacts.end(), rings.meets_another.begin(), std::mem_fn(&Contact::is_any));
+    }
+    return rings;
+}
+
+} // namespace unseen::perception

@@ -1,0 +1,21 @@
+// What the errors of many folds add up to.
+#pragma once
+
+#include <algorithm>
+#include <span>
+
+#include <vdtree/vertex_tree.h>
+
+#include "fold/fold_errors.h"
+
+namespace unseen::perception {
+
+// Reads the luminance errors and extents, and adds the drift. Cost: as of folding the mesh once, one node after the other.
+void find_drift(const vdtree::SoundTree& tree, std::span<FoldError> errors);
+
+// The radius of what a fold of the node changes, in mesh units.
+inline float changed_radius(const vdtree::VertexTree& tree, std::span<const FoldError> errors, vdtree::NodeId node) {
+    return std::max(tree.support_spheres()[node].radius, errors[node].extent);
+}
+
+} // namespace unseen::perception

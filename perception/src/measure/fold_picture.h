@@ -1,0 +1,56 @@
+// What a fold changes, as a small picture: the mesh's own surface and the folded one, seen along the node's normal, and how much of the difference
+// of their luminances lies in which band of spatial frequency.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include <glm/vec3.hpp>
+
+#include "measure/measurement.h"
+
+namespace unseen::perception {
+
+struct LitPoint {
+    glm::vec3 position;
+    float luminance;
+};
+
+class FoldPicture {
+public:
+    static constexpr std::size_t side = measurement::picture_side; // cells
+    static constexpr std::size_t bands = measurement::picture_bands; // an octave each, the finest first
+
+    // Looks against the normal, a unit vector, at a square of `half_width`, mesh units, to each side of the centre. Nothing is seen yet.
+    void look(glm::vec3 centre, glm::vec3 normal, float half_width);
+
+    // Draws a triangle of one of the surfaces, whichever way it is turned; what lies highest along the normal is seen.
+    enum class Layer { mesh, folded };
+    void draw(Layer layer, const LitPoint& a, const LitPoint& b, const LitPoint& c);
+    void clear(Layer layer);
+
+    // Whether all that was drawn since look() is turned to one side: then nothing is hidden under something else.
+    bool is_height_field() const { return !(has_front_ && has_back_); }
+
+    // The largest difference of the luminances in each band, as the amplitude of a grating of the band's own frequency; where only one
+    // surface is seen, they do not differ. Bands are those of a Laplacian pyramid: the lowest has waves longer than the picture.
+    std::array<float, bands> amplitudes() const;
+    float wavelength(std::size_t band) const; // mesh units
+
+    // The largest difference of their heights, mesh units, in the mean over some cells, as outlines are seen.
+    float shift() const;
+
+private:
+    using Cells = std::array<float, side * side>;
+    struct Picture {
+        Cells luminance, height; // no height: nothing is seen
+    };
+    bool is_seen(std::size_t cell) const;
+
+    glm::vec3 centre_, right_, up_, normal_;
+    float cell_ = 1; // mesh units
+    bool has_front_ = false, has_back_ = false;
+    std::array<Picture, 2> pictures_; // by layer
+};
+
+} // namespace unseen::perception

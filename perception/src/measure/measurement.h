@@ -1,0 +1,90 @@
+// How folds are measured: what decides how fine and how dear a measurement is. The numbers are kept with it, and a
+// criterion refuses those of a measurement with others. Factors that a criterion applies stand in fold_model.h.
+//
+// Where a comment does not say otherwise, a number was chosen by trial: larger ones cost more and changed little on the
+// meshes of the tests. None was fitted, and there is no script that finds them again.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace unseen::perception::measurement {
+
+inline constexpr int revision = 1; // one more where the same settings give other numbers
+
+// ---- points
+// Leaves of a node for its parent: the worst in distance, the worst in luminance.
+inline constexpr std::size_t witness_count = 4;
+inline constexpr std::uint32_t spread_count = 8;       // leaves compared besides, at equal steps through the support
+inline constexpr std::size_t triangles_compared = 16;  // of each surface, at equal steps
+inline constexpr std::size_t most_fine_triangles = 64; // in rings of more, some neighbours are folded
+// Neighbours with more than so many times the node's luminance range fold later than it: they are not folded with it.
+inline constexpr int much_more = 2;
+// Trees are some tens of nodes deep. Up deeper ones, as only made-up ones are, neighbours are folded no farther than
+// this, so that no tree costs the square of its depth.
+inline constexpr int most_steps = 1024;
+
+// ---- pictures of a fold
+inline constexpr std::size_t picture_side = 16;           // cells
+inline constexpr std::size_t picture_bands = 4;           // an octave each, the finest first
+inline constexpr std::size_t most_triangles_drawn = 4096; // of the mesh's own; in place of more, those of the children
+// Half of a picture's side, in widths of what changes. Half an octave apart, so that nothing lies between bands.
+inline constexpr std::array<float, 2> picture_sizes = {1.5f, 2.1f};
+
+// ---- shifts of the mean (drift.cpp)
+inline constexpr float levels_per_octave = 1; // of the order in which nodes fold
+inline constexpr int most_levels = 40;
+// Of a surface's area that its vector area must come to; else its parts count without cancelling.
+inline constexpr float flat_share = 0.5f;
+inline constexpr float spread = 1; // standard deviations by which what is folded may differ from all that could be
+inline constexpr float least_contrast = 2e-3f; // relative luminance: below, errors do not order the folds any more
+inline constexpr float darkest = 0.01f;        // relative luminance of areas; about a display's black
+inline constexpr float least_side = 0.25f;     // of a surface's area, as seen: less is not what the mean is taken of
+// Of a node, from the nearest on, that are looked at: trees may be as deep as they have vertices.
+inline constexpr int most_ancestors = 4096;
+
+// ---- pictures of the whole mesh, in stages (find_stages.cpp)
+inline constexpr std::size_t stage_side = 128; // of pictures, in cells
+// Samples along each side of a cell; with one, what single samples jump by at outlines hides what folds change.
+inline constexpr std::size_t cell_samples = 4;
+inline constexpr float stage_margin = 1.05f; // of the picture around the mesh's sphere: proxies may stand out of it
+inline constexpr std::size_t direction_count = 26;
+// Of the nodes that the first stage leaves; finer ones are for near views, which go by other errors.
+inline constexpr double first_share = 0.8;
+inline constexpr double stages_per_halving = 2;
+inline constexpr double fewest_left = 4; // nodes; then all fold
+// Of a typical outline: what a distance between surfaces changes of the light.
+inline constexpr float outline_contrast = 0.6f;
+
+// What is kept with a measurement.
+inline constexpr auto settings = std::to_array<float>({revision,
+                                                       witness_count,
+                                                       spread_count,
+                                                       triangles_compared,
+                                                       most_fine_triangles,
+                                                       much_more,
+                                                       most_steps,
+                                                       picture_side,
+                                                       picture_bands,
+                                                       most_triangles_drawn,
+                                                       picture_sizes[0],
+                                                       picture_sizes[1],
+                                                       levels_per_octave,
+                                                       most_levels,
+                                                       flat_share,
+                                                       spread,
+                                                       least_contrast,
+                                                       darkest,
+                                                       least_side,
+                                                       most_ancestors,
+                                                       stage_side,
+                                                       cell_samples,
+                                                       stage_margin,
+                                                       direction_count,
+                                                       static_cast<float>(first_share),
+                                                       static_cast<float>(stages_per_halving),
+                                                       static_cast<float>(fewest_left),
+                                                       outline_contrast});
+
+} // namespace unseen::perception::measurement

@@ -1,0 +1,94 @@
+#include "measure/ring_chroma.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <vdtree/colour.h>
+#include <vdtree/internal/tree_parts.h>
+#include <vdtree/internal/vertex_tree_data.h>
+
+namespace unseen::perception {
+
+using namespace vdtree;
+
+namespace {
+
+// Of relative luminance; a hundredth of the least contrast of colour that eyes can see, and above the rounding of greys.
+constexpr float grey_slack = 1e-5f;
+// Pure blue as bright as white has 11: whatever is beyond comes from impossible colours.
+constexpr double most_chroma = 100;
+
+} // namespace
+
+glm::vec2 drawn_chroma(const glm::vec4& colour, float luminance) {
+    const glm::dvec3 rgb(colour);
+    const double own = rec709_luminance(rgb);
+    if (!(own > 0)) return glm::vec2(0); // drawn grey
+    const glm::dvec2 chroma = opponent_chroma(rgb) * (static_cast<double>(luminance) / own);
+    const auto bounded = [](double c) { return static_cast<float>(c > -most_chroma ? std::min(c, most_chroma) : -most_chroma); };
+    return {bounded(chroma.x), bounded(chroma.y)};
+}
+
+bool has_chroma(const VertexTree& tree) {
+    const auto colours = tree.colours();
+    const auto luminance = tree.luminance();
+    for (std::size_t node = 0; node < colours.size(); ++node) {
+        const glm::vec2 chroma = drawn_chroma(colours[node], luminance[node]);
+        if (!(std::max(std::abs(chroma.x), std::abs(chroma.y)) <= grey_slack)) return true;
+    }
+    return false;
+}
+
+Result<std::vector<ChromaRange>> ring_chroma(const VertexTree& given) {
+    const auto sound = SoundTree::of(given);
+    if (!sound) return sound.error();
+    if (!has_chroma(given)) return std::vector<ChromaRange>();
+    const TreeGeometry& g = *given.data().geometry;
+    const std::span<const Unorm16> luminance = given.luminance();
+    TreeParts parts(links_of(g));
+    parts.assign_triangles(sound->first_triangle(), sound->triangles());
+    const TreeLinks tree = links_of(g);
+    const NodeId interior = tree.interior();
+    std::vector<glm::vec2> chroma(luminance.size());
+    constexpr std::size_t grain = 4096;
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, chroma.size(), grain), [&](const auto& range) {
+        for (std::size_t node = range.begin(); node < range.end(); ++node) chroma[node] = drawn_chroma(g.colours[node], luminance[node]);
+    });
+
+    const auto of_leaf = [&](Index leaf) { return ChromaRange{chroma[interior + leaf], chroma[interior + leaf]}; };
+    std::vector<ChromaRange> around(tree.leaves());
+    for (Index leaf = 0; leaf < tree.leaves(); ++leaf) around[leaf] = of_leaf(leaf);
+    parts.for_each_triangle([&](const TreePart& part) {
+        return [&](Index triangle) {
+            const Triangle& t = g.triangles[triangle];
+            ChromaRange range = of_leaf(t[0]);
+            for (const Index leaf : t) range = unite(range, of_leaf(leaf));
+            for (const Index leaf : t)
+                if (parts.owns_leaf(part, leaf)) around[leaf] = unite(around[leaf], range);
+        };
+    });
+    std::vector<ChromaRange> ring(interior);
+    parts.bottom_up([&] {
+        return [&](NodeId node) {
+            const bool is_coincident = g.support_spheres[node].radius == 0; // nothing moves
+            ChromaRange range{chroma[node], chroma[node]};
+            tree.for_each_child(
+                node,
+                [&](NodeId child) {
+                    range = unite(range, ring[child]);
+                    if (g.support_spheres[child].radius == 0 && !is_coincident) // it has its own leaves only
+                        for (Index l = g.first_leaf[child]; l < g.leaf_end[child]; ++l) range = unite(range, around[l]);
+                },
+                [&](Index leaf) { range = unite(range, is_coincident ? of_leaf(leaf) : around[leaf]); });
+            ring[node] = range;
+        };
+    });
+    return ring;
+}
+
+} // namespace unseen::perception

@@ -1,0 +1,166 @@
+// Stages in which a whole mesh folds, and their pictures: the pyramid against gratings and sums that are known, stages against surfaces that show
+// nothing, and against the background alone.
+#include "measure/fold_stages.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <span>
+
+#include <gtest/gtest.h>
+
+#include <vdtree/tree_io.h>
+
+#include "fold/fold_errors.h"
+#include "measure/pyramid.h"
+#include "measured.h"
+#include "shapes.h"
+#include "sound.h"
+#include "temp_folder.h"
+
+namespace unseen::perception {
+
+using namespace vdtree;
+
+namespace {
+
+VertexTree built(const Mesh& mesh, int threads = 1) {
+    return support::measured(support::built(mesh, {.threads = 1}), threads);
+}
+
+std::span<const FoldStage> stages_of(const VertexTree& tree) { return tree.attribute<FoldStage>(stages_name); }
+std::vector<FoldError> errors_of(const VertexTree& tree) { return fold_errors_of(support::sound(tree))->of_nodes; }
+
+Mesh grey(Mesh mesh, float luminance) {
+    mesh.colours.assign(mesh.positions.size(), {luminance, luminance, luminance, 1});
+    return mesh;
+}
+
+std::size_t background(float luminance) {
+    const auto& all = FoldStage::backgrounds;
+    return static_cast<std::size_t>(std::find(all.begin(), all.end(), luminance) - all.begin());
+}
+
+float largest(const FoldStage& stage, std::size_t background) {
+    float most = 0;
+    for (const auto& band : stage.contrast[background])
+        for (const float contrast : band) most = std::max(most, contrast);
+    return most;
+}
+
+double sum(const Raster& plane) {
+    double all = 0;
+    for (const float value : plane.values) all += static_cast<double>(value);
+    return all;
+}
+
+// Every sample's weight in the next level is a quarter, also at the border, where that reaches farther out.
+TEST(Pyramid, KeepsLight) {
+    for (const std::size_t side : {5u, 8u, 31u, 128u}) {
+        Raster plane(side);
+        for (std::size_t i = 0; i < plane.values.size(); ++i) plane.values[i] = static_cast<float>((i * 7919) % 101);
+        EXPECT_NEAR(4 * sum(reduce(plane)) / sum(plane), 1, 1e-5) << side;
+    }
+}
+
+TEST(Pyramid, BandsHaveTheirGainAtTheirFrequency) {
+    constexpr std::size_t side = 512;
+    for (const std::size_t level : {1u, 2u, 3u}) {
+        Raster plane(side);
+        const double omega = 2 * std::numbers::pi * nominal_frequency(level);
+        for (std::size_t y = 0; y < side; ++y)
+            for (std::size_t x = 0; x < side; ++x) plane.row(y)[x] = static_cast<float>(std::sin(omega * static_cast<double>(x)));
+        for (std::size_t i = 0; i < level; ++i) plane = reduce(plane);
+        const Raster mean = expand(reduce(plane), plane.side);
+        float amplitude = 0;
+        const std::size_t middle = plane.side / 2;
+        for (std::size_t y = middle - 2; y < middle + 2; ++y)
+            for (std::size_t x = middle - 20; x < middle + 20; ++x) amplitude = std::max(amplitude, std::abs(plane.row(y)[x] - mean.row(y)[x]));
+        EXPECT_NEAR(static_cast<double>(amplitude) / band_gain(level), 1, 0.1) << level; // some of the expanded mean is an image of the grating
+    }
+}
+
+// What sensitivities far away count on: of the mean over the area that a band looks at, a disc as wide as the mesh makes up no more than under a Gaussian.
+TEST(Pyramid, MeansAreThoseUnderAGaussian) {
+    constexpr std::size_t side = 128;
+    constexpr double margin = 1.05, radius = side / (2 * margin);
+    Raster plane(side);
+    for (std::size_t y = 0; y < side; ++y)
+        for (std::size_t x = 0; x < side; ++x)
+            plane.row(y)[x] = std::hypot(static_cast<double>(x) - side / 2.0 + 0.5, static_cast<double>(y) - side / 2.0 + 0.5) < radius ? 1.0f : 0.0f;
+    for (std::size_t band = 0; band < FoldStage::band_count; ++band) {
+        const Raster next = reduce(plane);
+        const Raster mean = expand(next, plane.side);
+        const double most = static_cast<double>(*std::max_element(mean.values.begin(), mean.values.end()));
+        const double frequency = FoldStage::frequency(band), gaussian = 1 - std::exp(-frequency * frequency);
+        EXPECT_LT(most, 1.1 * gaussian) << band;
+        if (band >= 5) { EXPECT_GT(most, 0.5 * gaussian) << band; }
+        plane = next;
+    }
+}
+
+TEST(FoldStages, GoFromFineToTheRoot) {
+    const VertexTree tree = built(shapes::torus(48, 24));
+    const auto errors = errors_of(tree);
+    ASSERT_FALSE(stages_of(tree).empty());
+    for (NodeId node = 1; node < tree.interior_count(); ++node)
+        EXPECT_LE(errors[node].stage, errors[support::sound(tree).parents()[node]].stage);
+    EXPECT_EQ(errors[VertexTree::root()].stage + 1u, stages_of(tree).size());
+    EXPECT_EQ(errors[tree.interior_count() - 1].stage < stages_of(tree).size(), true);
+    // Coarse stages show more.
+    const std::size_t dark = background(0);
+    EXPECT_LT(largest(stages_of(tree).front(), dark), largest(stages_of(tree).back(), dark));
+}
+
+// An outline that moves by a hundredth of a cell changes the light of its cells by about that: no single sample that it passes counts as a whole cell.
+TEST(FoldStages, ShowSmallMovesOfOutlinesAsSmall) {
+    const VertexTree tree = built(grey(shapes::bumpy_sphere(5, 0), 0.1f));
+    EXPECT_LT(largest(stages_of(tree).front(), background(1)), 0.5f); // with one sample a cell: 2.7
+    EXPECT_GT(largest(stages_of(tree).front(), background(1)), 0);
+}
+
+// What cannot be told from its background, nor from what is left of it, shows nothing in any stage.
+TEST(FoldStages, OfWhatLooksLikeItsBackgroundShowNothing) {
+    const VertexTree tree = built(grey(shapes::torus(32, 16), 0.2f));
+    for (const FoldStage& stage : stages_of(tree)) EXPECT_LT(largest(stage, background(0.2f)), 1e-3f);
+    EXPECT_GT(largest(stages_of(tree).back(), background(0.5f)), 0.1f);
+}
+
+// When the last stage has folded, the background is where the mesh was: over areas far wider than the mesh, the contrast is its own light over that of
+// the area's background.
+TEST(FoldStages, EndInTheBackground) {
+    constexpr float luminance = 0.8f, behind = 0.2f;
+    const VertexTree tree = built(grey(shapes::torus(32, 16), luminance));
+    const auto& last = stages_of(tree).back().contrast[background(behind)];
+    const auto over_masks = [&](std::size_t band) { return *std::max_element(std::begin(last[band]), std::end(last[band])); };
+    constexpr std::size_t coarsest = FoldStage::band_count - 1;
+    // Half the frequency: four times the area.
+    EXPECT_NEAR(over_masks(coarsest - 1) / over_masks(coarsest), 4, 0.5);
+    EXPECT_GT(over_masks(3), (luminance - behind) / luminance / 2);
+}
+
+TEST(FoldStages, DoNotDependOnTheThreads) {
+    const Mesh mesh = shapes::bumpy_sphere(4, 0.02);
+    const VertexTree one = built(mesh, 1), four = built(mesh, 4);
+    EXPECT_TRUE(std::ranges::equal(stages_of(one), stages_of(four)));
+    EXPECT_TRUE(std::ranges::equal(errors_of(one), errors_of(four)));
+}
+
+TEST(FoldStages, OfTranslucentVerticesAreNone) {
+    Mesh mesh = grey(shapes::torus(16, 8), 0.5f);
+    mesh.colours[3].a = 0.5f;
+    EXPECT_TRUE(stages_of(built(mesh)).empty());
+}
+
+TEST(FoldStages, AreKeptInFiles) {
+    const support::TempFolder folder;
+    const VertexTree tree = built(shapes::torus(24, 12));
+    ASSERT_TRUE(write_tree(folder / "tree.vdt", tree));
+    for (const auto& read : {read_tree(folder / "tree.vdt"), map_tree(folder / "tree.vdt")}) {
+        ASSERT_TRUE(read) << read.error().message;
+        EXPECT_TRUE(std::ranges::equal(stages_of(*read), stages_of(tree)));
+    }
+}
+
+} // namespace
+} // namespace unseen::perception

@@ -1,0 +1,23 @@
+// Trees whose folds are known to be measurable.
+#pragma once
+
+#include <stdexcept>
+#include <utility>
+
+#include <perception/fold_measurement.h>
+#include <vdtree/conserve_light.h>
+
+#include "built.h"
+
+namespace unseen::support {
+
+// With its light conserved, and what its folds change.
+inline vdtree::VertexTree measured(const vdtree::VertexTree& tree, int threads = 1) {
+    const Result<vdtree::VertexTree> conserved = vdtree::conserve_light(tree);
+    if (!conserved) throw std::runtime_error("the test's tree does not conserve light: " + conserved.error().message);
+    Result<vdtree::VertexTree> with_folds = perception::measure_folds(*conserved, threads);
+    if (!with_folds) throw std::runtime_error("the test's tree cannot be measured: " + with_folds.error().message);
+    return std::move(*with_folds);
+}
+
+} // namespace unseen::support
