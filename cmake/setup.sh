@@ -1,5 +1,8 @@
 # What ./quickstart and ./check share. Sourced from the source folder.
 
+# Without this ccache passes over files that are compiled with precompiled headers.
+export CCACHE_SLOPPINESS="${CCACHE_SLOPPINESS:-pch_defines,time_macros}"
+
 say() { printf '\n== %s\n' "$*"; }
 die() { printf '%s: %s\n' "$(basename "$0")" "$*" >&2; exit 1; }
 

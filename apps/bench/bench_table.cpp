@@ -7,13 +7,9 @@
 namespace unseen::app {
 namespace {
 
-bool holds(const BenchRow& row, double bound) {
-    return row.more_is_better ? *row.value >= bound : *row.value <= bound;
-}
+bool holds(const BenchRow& row, double bound) { return row.more_is_better ? *row.value >= bound : *row.value <= bound; }
 
-std::string bound_text(const std::optional<double>& bound) {
-    return bound ? rounded(*bound, 4) : "";
-}
+std::string bound_text(const std::optional<double>& bound) { return bound ? rounded(*bound, 4) : ""; }
 
 // Of the two the better that is met, or else the one that had to be.
 std::string verdict(const BenchRow& row) {
@@ -30,8 +26,8 @@ void print(const std::string& title, const std::vector<BenchRow>& rows) {
     std::printf("%s\n\n", title.c_str());
     std::vector<std::vector<std::string>> table = {{"measure", "measured", "unit", "must", "aim", "verdict"}};
     for (const BenchRow& row : rows)
-        table.push_back({row.name, row.value ? with_decimals(*row.value, row.decimals) : "not available", row.unit, bound_text(row.target.must),
-                         bound_text(row.target.aim), verdict(row)});
+        table.push_back({row.name, row.value ? with_decimals(*row.value, row.decimals) : "not available", row.unit,
+                         bound_text(row.target.must), bound_text(row.target.aim), verdict(row)});
     print_table(table);
     std::printf("\n");
     for (const BenchRow& row : rows)
@@ -40,7 +36,9 @@ void print(const std::string& title, const std::vector<BenchRow>& rows) {
 
 Json to_json(const std::vector<BenchRow>& rows) {
     Json json = Json::array();
-    const auto bound = [](const std::optional<double>& value) { return value ? number_or_null(*value) : Json(nullptr); };
+    const auto bound = [](const std::optional<double>& value) {
+        return value ? number_or_null(*value) : Json(nullptr);
+    };
     const auto held = [](const BenchRow& row, const std::optional<double>& value) {
         return row.value && value ? Json(holds(row, *value)) : Json(nullptr);
     };

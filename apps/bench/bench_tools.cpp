@@ -20,7 +20,9 @@ constexpr double active_tolerance = 0.002; // how near a threshold must come to 
 
 } // namespace
 
-double seconds_since(BenchClock::time_point start) { return std::chrono::duration<double>(BenchClock::now() - start).count(); }
+double seconds_since(BenchClock::time_point start) {
+    return std::chrono::duration<double>(BenchClock::now() - start).count();
+}
 
 double median(std::vector<double> values) {
     if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
@@ -79,7 +81,8 @@ MachineLoad machine_load() {
 }
 
 std::vector<std::string> installed_meshes() {
-    constexpr const char* bunny = "/usr/share/glmark2/models/bunny.obj"; // of Debian's glmark2-data, which quickstart installs
+    constexpr const char* bunny =
+        "/usr/share/glmark2/models/bunny.obj"; // of Debian's glmark2-data, which quickstart installs
     std::vector<std::string> files;
     std::error_code unknown;
     if (fs::exists(bunny, unknown)) files.push_back(bunny);
@@ -88,18 +91,20 @@ std::vector<std::string> installed_meshes() {
 }
 
 Result<vdtree::VertexTree> sample_tree() {
-    print_note("neither the bunny nor the dragon is there ('./quickstart' fetches them): a sphere with bumps stands in.");
+    print_note(
+        "neither the bunny nor the dragon is there ('./quickstart' fetches them): a sphere with bumps stands in.");
     constexpr int rows = 130; // 67,600 triangles
     const vdtree::Mesh mesh = bumpy_sphere(rows);
     return vdtree::build_tree(mesh.view());
 }
 
-double full_tests_per_second(const vdtree::VertexTree& tree, const vdtree::DistanceCriterion& criterion, const vdtree::Viewpoint& viewpoint,
-                             const vdtree::FollowOptions& options, int repeats) {
+double full_tests_per_second(const vdtree::VertexTree& tree, const vdtree::DistanceCriterion& criterion,
+                             const vdtree::Viewpoint& viewpoint, const vdtree::FollowOptions& options, int repeats) {
     std::vector<double> rates;
     for (int i = 0; i < repeats; ++i) {
         const auto start = BenchClock::now();
-        if (!vdtree::test_every_node(tree, criterion, viewpoint, options)) return std::numeric_limits<double>::quiet_NaN();
+        if (!vdtree::test_every_node(tree, criterion, viewpoint, options))
+            return std::numeric_limits<double>::quiet_NaN();
         rates.push_back(static_cast<double>(tree.interior_count()) / seconds_since(start));
     }
     return median(rates);

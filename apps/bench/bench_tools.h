@@ -56,8 +56,8 @@ Result<vdtree::VertexTree> sample_tree();
 
 // Of all nodes of the tree, one by one from the first to the last, results only: nodes a second, median of `repeats`; NaN where the
 // viewpoint is refused.
-double full_tests_per_second(const vdtree::VertexTree& tree, const vdtree::DistanceCriterion& criterion, const vdtree::Viewpoint& viewpoint,
-                             const vdtree::FollowOptions& options, int repeats);
+double full_tests_per_second(const vdtree::VertexTree& tree, const vdtree::DistanceCriterion& criterion,
+                             const vdtree::Viewpoint& viewpoint, const vdtree::FollowOptions& options, int repeats);
 
 // The threshold at which follow(threshold) leaves about so many triangles, by bisection; `follow` returns how many it leaves.
 struct AimedThreshold {

@@ -210,7 +210,8 @@ Result<BudgetBenchResult> bench_budget(const BudgetBenchOptions& options) {
     if (auto drawn = comparison.draw_reference(); !drawn) return drawn.error();
     const auto extent = vdtree::extent_criterion(*tree, comparison.view(), 1);
     if (!extent) return extent.error();
-    const auto perceptual = perception::luebke_hallen_distances(*tree, comparison.view(), comparison.fold_test_options());
+    const auto perceptual =
+        perception::luebke_hallen_distances(*tree, comparison.view(), comparison.fold_test_options());
     if (!perceptual) return perceptual.error();
     const auto left = comparison.spend("extent", *extent, options.triangles);
     if (!left) return left.error();

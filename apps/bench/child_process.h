@@ -9,9 +9,9 @@
 namespace unseen::app {
 
 struct ChildOutcome {
-    int status = 0;      // exit status; minus the signal that ended it
-    double seconds = 0;  // wall clock
-    std::string out;     // stdout
+    int status = 0;     // exit status; minus the signal that ended it
+    double seconds = 0; // wall clock
+    std::string out;    // stdout
 };
 
 // Runs a program (found by PATH where its name has no slash) and waits for it; its stderr is this one's. Fails where it cannot be

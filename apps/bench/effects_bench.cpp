@@ -38,7 +38,8 @@ Result<DistanceCriterion> plain(const session::Session& session, const perceptio
 }
 
 // With other classes of contrast: `change` is given those of a node.
-Result<DistanceCriterion> with_classes(const session::Session& session, const perception::FoldTestOptions& options, void (*change)(vdtree::FoldClass&)) {
+Result<DistanceCriterion> with_classes(const session::Session& session, const perception::FoldTestOptions& options,
+                                       void (*change)(vdtree::FoldClass&)) {
     const auto made = plain(session, options);
     if (!made) return made.error();
     DistanceCriterion::Parts parts = made->parts();
@@ -48,11 +49,14 @@ Result<DistanceCriterion> with_classes(const session::Session& session, const pe
 
 std::vector<Variation> variations() {
     std::vector<Variation> all;
-    all.push_back({"luebke-hallen, all effects", "silhouettes, contrast, gaze 29 degrees aside, back faces and what the solid hides folded", plain});
+    all.push_back({"luebke-hallen, all effects",
+                   "silhouettes, contrast, gaze 29 degrees aside, back faces and what the solid hides folded", plain});
     all.push_back({"no gaze", "what eccentricity saves", plain, false});
     all.push_back({"no back-face folding", "what faces away is kept like what faces the eye", plain, true, false});
-    all.push_back({"no hidden folding", "what is behind spheres inside the solid is kept", plain, true, true, false, false, false});
-    all.push_back({"no contrast", "every fold counts as one against anything in the scene: what knowing luminance saves",
+    all.push_back({"no hidden folding", "what is behind spheres inside the solid is kept", plain, true, true, false,
+                   false, false});
+    all.push_back({"no contrast",
+                   "every fold counts as one against anything in the scene: what knowing luminance saves",
                    [](const session::Session& session, const perception::FoldTestOptions& options) {
                        return with_classes(session, options, [](vdtree::FoldClass& c) { c.interior = c.silhouette; });
                    }});
@@ -65,13 +69,16 @@ std::vector<Variation> variations() {
                        options.chroma = true;
                        return plain(session, options);
                    }});
-    all.push_back({"dynamic light", "bounds over the normals in a ring in place of baked luminances: ambient 0.2, directional 0.8",
+    all.push_back({"dynamic light",
+                   "bounds over the normals in a ring in place of baked luminances: ambient 0.2, directional 0.8",
                    nullptr, true, true, false, true});
     all.push_back({"luebke-hallen-safe", "rings of all cuts, and shifts of the mean",
-                   [](const session::Session& session, const perception::FoldTestOptions& options) -> Result<vdtree::DistanceCriterion> {
+                   [](const session::Session& session,
+                      const perception::FoldTestOptions& options) -> Result<vdtree::DistanceCriterion> {
                        const auto rings = session.cut_rings();
                        if (!rings) return rings.error();
-                       return perception::luebke_hallen_safe_distances(session.tree(), **rings, session.default_view(), options);
+                       return perception::luebke_hallen_safe_distances(session.tree(), **rings, session.default_view(),
+                                                                       options);
                    }});
     all.push_back({"error", "what folds change in fact, in place of what they could",
                    [](const session::Session& session, const perception::FoldTestOptions& options) {
@@ -89,7 +96,9 @@ std::vector<Variation> variations() {
 // This thread's own time, whatever else the machine does.
 double thread_seconds() {
     timespec now;
-    return clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now) == 0 ? static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec) : 0;
+    return clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now) == 0
+               ? static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec)
+               : 0;
 }
 
 vdtree::Lighting one_light() {
@@ -114,13 +123,16 @@ Result<perception::FoldTestOptions> test_options(const session::Session& session
 }
 
 // Sets the lights of the viewpoint, too.
-Result<DistanceCriterion> criterion_of(const Variation& variation, const session::Session& session, perception::FoldTestOptions options, vdtree::Viewpoint& viewpoint) {
+Result<DistanceCriterion> criterion_of(const Variation& variation, const session::Session& session,
+                                       perception::FoldTestOptions options, vdtree::Viewpoint& viewpoint) {
     if (!variation.is_lit) return variation.criterion(session, options);
     const auto bounds = vdtree::LightBounds::measure(session.tree());
     if (!bounds) return bounds.error();
     viewpoint.lighting = one_light();
-    options.scene = perception::lit_scene(session.tree(), *bounds, viewpoint.lighting, viewpoint.eye, session.background());
-    return perception::lit_distances(session.tree(), std::make_shared<const vdtree::LightBounds>(*bounds), session.default_view(), options);
+    options.scene =
+        perception::lit_scene(session.tree(), *bounds, viewpoint.lighting, viewpoint.eye, session.background());
+    return perception::lit_distances(session.tree(), std::make_shared<const vdtree::LightBounds>(*bounds),
+                                     session.default_view(), options);
 }
 
 Result<Measured> measure(const session::Session& session, const Variation& variation, int repeats) {
@@ -128,7 +140,9 @@ Result<Measured> measure(const session::Session& session, const Variation& varia
     if (!asked) return asked.error();
     const perception::FoldTestOptions& options = *asked;
     vdtree::Viewpoint viewpoint = perception::viewpoint_of(session.tree(), session.default_view(), options);
-    if (variation.hides) viewpoint.occluders.assign(session.inner_spheres().begin(), session.inner_spheres().end()); // of open surfaces, none
+    if (variation.hides)
+        viewpoint.occluders.assign(session.inner_spheres().begin(),
+                                   session.inner_spheres().end()); // of open surfaces, none
     const auto criterion = criterion_of(variation, session, options, viewpoint);
     if (!criterion) return criterion.error();
     vdtree::FollowOptions following;
@@ -191,7 +205,10 @@ Result<EffectsBenchResult> bench_effects(const EffectsBenchOptions& options) {
             const auto found = measure(all[i].needs_errors ? *with_errors : *session, all[i], options.quick ? 3 : 11);
             if (!found) return found.error();
             result.table[i + 2].push_back(grouped(found->triangles) + "; " + rounded(found->milliseconds, 3));
-            result.effects.push_back({{"mesh", name}, {"variation", all[i].name}, {"triangles", found->triangles}, {"milliseconds", found->milliseconds}});
+            result.effects.push_back({{"mesh", name},
+                                      {"variation", all[i].name},
+                                      {"triangles", found->triangles},
+                                      {"milliseconds", found->milliseconds}});
         }
     }
     return result;

@@ -11,13 +11,13 @@
 #include <unordered_map>
 #include <utility>
 
+#include <meshio/mesh_io.h>
 #include <perception/criterion.h>
 #include <perception/fold_measurement.h>
 #include <sample_mesh.h>
 #include <subdivide.h>
 #include <vdtree/criteria.h>
 #include <vdtree/cut.h>
-#include <meshio/mesh_io.h>
 #include <vdtree/tree_io.h>
 
 #include "bench_tools.h"
@@ -34,11 +34,11 @@ using Clock = BenchClock;
 
 constexpr vdtree::Index wanted_active = 100'000; // triangles of the cuts that are measured
 constexpr vdtree::Index budget_triangles = 100'000;
-constexpr double most_of_mesh = 0.5;             // at small meshes: so much of them is active
-constexpr double fill = 0.9;                     // of the window's height
-constexpr int sphere_rows = 466;                 // 868,624 triangles, about as many as the dragon
-constexpr double orbit_steps[] = {0.1, 1, 5};    // degrees a frame
-constexpr bool has_mpi = UNSEEN_HAS_MPI;         // the command `unseen` has
+constexpr double most_of_mesh = 0.5;          // at small meshes: so much of them is active
+constexpr double fill = 0.9;                  // of the window's height
+constexpr int sphere_rows = 466;              // 868,624 triangles, about as many as the dragon
+constexpr double orbit_steps[] = {0.1, 1, 5}; // degrees a frame
+constexpr bool has_mpi = UNSEEN_HAS_MPI;      // the command `unseen` has
 
 double share_below(std::vector<double> values, double share) {
     if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
@@ -69,10 +69,12 @@ public:
             shop.folder_ = name;
         }
         if (failed)
-            return Error{ErrorCode::io_failure, "Cannot make the folder '" + shop.folder_.string() + "': " + failed.message() + "."};
+            return Error{ErrorCode::io_failure,
+                         "Cannot make the folder '" + shop.folder_.string() + "': " + failed.message() + "."};
         return shop;
     }
-    Workshop(Workshop&& other) noexcept : folder_(std::move(other.folder_)), is_kept_(std::exchange(other.is_kept_, true)) {}
+    Workshop(Workshop&& other) noexcept
+        : folder_(std::move(other.folder_)), is_kept_(std::exchange(other.is_kept_, true)) {}
     Workshop& operator=(Workshop&&) = delete;
     ~Workshop() {
         std::error_code ignored;
@@ -162,7 +164,7 @@ Result<fs::path> mesh_file(const Workshop& shop, const NamedMesh& base, std::uin
 
 struct Building {
     fs::path tree;
-    double seconds = 0;    // of building alone, without reading and writing
+    double seconds = 0; // of building alone, without reading and writing
     double wall_seconds = 0;
     double peak_bytes = 0; // of the whole process
     double triangles = 0;
@@ -184,7 +186,8 @@ Result<Building> build(const fs::path& mesh, const fs::path& tree, std::vector<s
 }
 
 // The tree of a size; built where it is not kept.
-Result<vdtree::VertexTree> tree_of_size(const Workshop& shop, const NamedMesh& base, std::uint64_t triangles, Json& json) {
+Result<vdtree::VertexTree> tree_of_size(const Workshop& shop, const NamedMesh& base, std::uint64_t triangles,
+                                        Json& json) {
     const auto mesh = mesh_file(shop, base, triangles);
     if (!mesh) return mesh.error();
     fs::path file = *mesh;
@@ -228,7 +231,8 @@ public:
     Orbit(const vdtree::VertexTree& tree, const Kind& kind) : tree_(tree), kind_(kind) {
         window_.fov_y_degrees = perception::physical_field(options_.display, window_.height).value();
         const vdtree::LuminanceRange range = tree.luminance_range();
-        const auto background = static_cast<float>(perception::to_relative(options_.display, perception::Luminance(20)));
+        const auto background =
+            static_cast<float>(perception::to_relative(options_.display, perception::Luminance(20)));
         options_.scene = {std::min(range.lo, background), std::max(range.hi, background)};
         if (!kind.with_gaze) return;
         options_.gaze_px = session::gaze_aside(options_.display, window_, session::usual_degrees_aside);
@@ -272,13 +276,16 @@ public:
     const Orbit& orbit() const { return orbit_; }
     float threshold() const { return threshold_; }
 
-    vdtree::AdjustStats follow(vdtree::Cut& cut, double degrees) const { return follow(cut, orbit_.at(degrees), threshold_); }
+    vdtree::AdjustStats follow(vdtree::Cut& cut, double degrees) const {
+        return follow(cut, orbit_.at(degrees), threshold_);
+    }
     vdtree::AdjustStats follow(vdtree::Cut& cut, const vdtree::Viewpoint& viewpoint, float threshold) const {
         vdtree::FollowOptions options;
         options.threshold = threshold;
         return follow(cut, viewpoint, options);
     }
-    vdtree::AdjustStats follow(vdtree::Cut& cut, const vdtree::Viewpoint& viewpoint, const vdtree::FollowOptions& options) const {
+    vdtree::AdjustStats follow(vdtree::Cut& cut, const vdtree::Viewpoint& viewpoint,
+                               const vdtree::FollowOptions& options) const {
         const auto stats = cut.follow(criterion_, viewpoint, options);
         return stats ? *stats : vdtree::AdjustStats{};
     }
@@ -330,7 +337,8 @@ OrbitFigures measure_orbit(const Subject& subject, double step, int frames) {
         const auto written = cut.index_writes();
         writes.push_back(written ? static_cast<double>(written->size()) : static_cast<double>(cut.indices().size()));
     }
-    return {median(microseconds), share_below(microseconds, 0.99), median(changes), median(tests), median(triangles), median(writes)};
+    return {median(microseconds), share_below(microseconds, 0.99), median(changes), median(tests), median(triangles),
+            median(writes)};
 }
 
 Json to_json(const OrbitFigures& f) {
@@ -387,7 +395,9 @@ public:
             ++changes_;
         }
     }
-    double percent() const { return changes_ > 0 ? 100.0 * static_cast<double>(undone_) / static_cast<double>(changes_) : 0; }
+    double percent() const {
+        return changes_ > 0 ? 100.0 * static_cast<double>(undone_) / static_cast<double>(changes_) : 0;
+    }
 
 private:
     std::unordered_map<vdtree::NodeId, int> last_change_;
@@ -480,7 +490,8 @@ private:
     std::uint64_t main_size() const {
         const auto have = static_cast<double>(base_.mesh.triangles.size());
         return *std::min_element(options_.sizes.begin(), options_.sizes.end(), [&](auto a, auto b) {
-            return std::abs(std::log(static_cast<double>(a) / have)) < std::abs(std::log(static_cast<double>(b) / have));
+            return std::abs(std::log(static_cast<double>(a) / have)) <
+                   std::abs(std::log(static_cast<double>(b) / have));
         });
     }
     std::uint64_t teleport_size() const { // the largest up to 14 M
@@ -496,8 +507,10 @@ private:
         auto subject = Subject::create(tree, {});
         if (!subject) return subject.error();
         // The same at all sizes that have it.
-        const auto smaller = static_cast<double>(std::min<std::size_t>(tree.triangle_count(), base_.mesh.triangles.size()));
-        const vdtree::Index active = subject->aim_for(std::min(wanted_active, static_cast<vdtree::Index>(most_of_mesh * smaller)));
+        const auto smaller =
+            static_cast<double>(std::min<std::size_t>(tree.triangle_count(), base_.mesh.triangles.size()));
+        const vdtree::Index active =
+            subject->aim_for(std::min(wanted_active, static_cast<vdtree::Index>(most_of_mesh * smaller)));
         const int frames = options_.quick ? 40 : 400, jumps = options_.quick ? 6 : 40;
         json["size"] = size;
         json["triangles"] = tree.triangle_count();
@@ -518,7 +531,8 @@ private:
         return {};
     }
 
-    Result<void> measure_main(const Subject& subject, vdtree::Index active, const std::vector<OrbitFigures>& orbits, double jump_ms) {
+    Result<void> measure_main(const Subject& subject, vdtree::Index active, const std::vector<OrbitFigures>& orbits,
+                              double jump_ms) {
         const std::string how = grouped(active) + " active triangles, perceptual test with silhouettes, no gaze, " +
                                 rounded(fill * 100, 2) + "% of the window's height; folds cost up to " +
                                 rounded(static_cast<double>(subject.threshold()), 4) + " so that so many are left";
@@ -556,7 +570,8 @@ private:
         const std::string so_many = "budget of " + grouped(budget_triangles) + " triangles, ";
         std::vector<double> cold_ms;
         for (int i = 0; i < cold_starts; ++i) cold_ms.push_back(measure_budget(subject, 1, 1, 0).cold_ms);
-        const Budget stable = measure_budget(subject, 1, usual_hysteresis, frames), best = measure_budget(subject, 1, 1, frames);
+        const Budget stable = measure_budget(subject, 1, usual_hysteresis, frames),
+                     best = measure_budget(subject, 1, 1, frames);
         const Budget slow = measure_budget(subject, 0.1, usual_hysteresis, 2 * frames);
         at_main_.push_back({so_many + "cold", "ms", "a new cut, with its index buffer", median(cold_ms),
                             target("budget, cold, ms"), false, 2});
@@ -579,13 +594,14 @@ private:
         const auto subject = Subject::create(tree, {.with_gaze = true});
         if (!subject) return subject.error();
         const OrbitFigures f = measure_orbit(*subject, 1, options_.quick ? 20 : 200);
-        at_main_.push_back({"the same, gaze " + shortest(session::usual_degrees_aside) + " degrees aside, 1 degree a frame",
-                            "us",
-                            rounded(f.triangles, 6) + " active triangles, threshold 1",
-                            f.median_us,
-                            {},
-                            false,
-                            1});
+        at_main_.push_back(
+            {"the same, gaze " + shortest(session::usual_degrees_aside) + " degrees aside, 1 degree a frame",
+             "us",
+             rounded(f.triangles, 6) + " active triangles, threshold 1",
+             f.median_us,
+             {},
+             false,
+             1});
         return {};
     }
 
@@ -610,7 +626,7 @@ private:
                 at_main_.push_back({name, "tests", "", f.tests, {}, false, 0});
                 tests[with_frustum] = f.tests;
             }
-            BenchRow row{of + ", tests with the frustum over without", "x", "", {},
+            BenchRow row{of + ", tests with the frustum over without",     "x",   "", {},
                          target("tests with the frustum over without, x"), false, 2};
             if (tests[0] > 0) row.value = tests[1] / tests[0];
             else row.note = "nothing was tested without a frustum";
@@ -621,7 +637,8 @@ private:
 
     // From the mesh's size to the largest up to 14 M.
     void add_growth() {
-        if (far_teleport_) at_main_.insert(at_main_.begin() + static_cast<std::ptrdiff_t>(teleport_place_), *far_teleport_);
+        if (far_teleport_)
+            at_main_.insert(at_main_.begin() + static_cast<std::ptrdiff_t>(teleport_place_), *far_teleport_);
         const Json *main = nullptr, *far = nullptr;
         for (const Json& json : result_.sizes) {
             if (json["size"] == main_size()) main = &json;
@@ -691,7 +708,8 @@ private:
         if (!out_of_core) return out_of_core.error();
         row.value = out_of_core->wall_seconds / in_core->wall_seconds;
         row.note = size_name(size) + " triangles, --memory " + rounded(memory, 3) + ", peak " +
-                   rounded(out_of_core->peak_bytes / (1 << 30), 3) + " GiB against " + rounded(in_core->peak_bytes / (1 << 30), 3);
+                   rounded(out_of_core->peak_bytes / (1 << 30), 3) + " GiB against " +
+                   rounded(in_core->peak_bytes / (1 << 30), 3);
         building_.push_back(row);
         return {};
     }
@@ -700,8 +718,9 @@ private:
         BenchRow row{"mpirun -np 2 over 1", "x", "", {}, target("build, two processes over one, x"), true, 2};
         double seconds[2] = {};
         for (int ranks = 1; ranks <= 2 && has_mpi && row.note.empty(); ++ranks) {
-            const auto built = build(mesh, shop_ / "measured.vdt", {"--threads", "1"},
-                                     {"mpirun", "--allow-run-as-root", "--oversubscribe", "-np", std::to_string(ranks)});
+            const auto built =
+                build(mesh, shop_ / "measured.vdt", {"--threads", "1"},
+                      {"mpirun", "--allow-run-as-root", "--oversubscribe", "-np", std::to_string(ranks)});
             if (built) seconds[ranks - 1] = built->wall_seconds;
             else row.note = "Open MPI's mpirun did not do: " + built.error().message;
         }

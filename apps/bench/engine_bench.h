@@ -10,10 +10,11 @@
 namespace unseen::app {
 
 struct EngineBenchOptions {
-    std::string mesh;                 // empty: the dragon where quickstart has put it, else a sphere with bumps
-    std::vector<std::uint64_t> sizes; // triangles, ascending; smaller ones than the mesh are simplified, larger ones subdivided
-    std::string keep;                 // a folder for meshes and trees, used again where they are there; empty: none
-    bool quick = false;               // few frames
+    std::string mesh; // empty: the dragon where quickstart has put it, else a sphere with bumps
+    std::vector<std::uint64_t>
+        sizes;          // triangles, ascending; smaller ones than the mesh are simplified, larger ones subdivided
+    std::string keep;   // a folder for meshes and trees, used again where they are there; empty: none
+    bool quick = false; // few frames
     Targets targets = Targets::built_in();
 };
 

@@ -10,7 +10,8 @@ namespace {
 constexpr int samples_to_judge = 64; // a pixel; with fewer, samples that jump at outlines can be seen
 
 bool is_same(const vdtree::View& a, const vdtree::View& b) {
-    return a.eye == b.eye && a.target == b.target && a.up == b.up && a.fov_y_degrees == b.fov_y_degrees && a.width == b.width && a.height == b.height;
+    return a.eye == b.eye && a.target == b.target && a.up == b.up && a.fov_y_degrees == b.fov_y_degrees &&
+           a.width == b.width && a.height == b.height;
 }
 
 FoldTest test_of(const WhatOptions& what) { return what.request.fold_test.value_or(FoldTest::error); }
@@ -18,8 +19,8 @@ bool needs_errors(FoldTest test) { return test == FoldTest::error; }
 
 } // namespace
 
-Result<JudgedModel> JudgedModel::create(const render::Context& context, std::string name, vdtree::VertexTree tree, int window_px,
-                                        perception::CsfModel second) {
+Result<JudgedModel> JudgedModel::create(const render::Context& context, std::string name, vdtree::VertexTree tree,
+                                        int window_px, perception::CsfModel second) {
     JudgedModel model;
     model.context_ = context;
     model.name_ = std::move(name);
@@ -38,7 +39,8 @@ Result<JudgedModel::Stand> JudgedModel::make_stand(vdtree::VertexTree tree) {
     if (!session) return session.error();
     auto renderer = render::Renderer::create(*context_, session->tree());
     if (!renderer) return renderer.error();
-    return Stand{std::make_unique<session::Session>(std::move(*session)), std::make_unique<render::Renderer>(std::move(*renderer))};
+    return Stand{std::make_unique<session::Session>(std::move(*session)),
+                 std::make_unique<render::Renderer>(std::move(*renderer))};
 }
 
 Result<JudgedModel::Stand*> JudgedModel::stand(FoldTest test) {

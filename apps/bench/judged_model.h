@@ -19,7 +19,8 @@ namespace unseen::app {
 // as squares.
 enum class Judge { modern, second };
 inline constexpr std::array judges = {Judge::modern, Judge::second};
-inline constexpr perception::CsfModel usual_second = perception::CsfModel::barten_1999; // of the eye's physics, not fitted to castleCSF's data
+inline constexpr perception::CsfModel usual_second =
+    perception::CsfModel::barten_1999; // of the eye's physics, not fitted to castleCSF's data
 
 struct Verdicts {
     vdtree::Index triangles = 0;
@@ -30,8 +31,8 @@ struct Verdicts {
 class JudgedModel {
 public:
     // Keeps a handle to the context.
-    static Result<JudgedModel> create(const render::Context& context, std::string name, vdtree::VertexTree tree, int window_px,
-                                      perception::CsfModel second = usual_second);
+    static Result<JudgedModel> create(const render::Context& context, std::string name, vdtree::VertexTree tree,
+                                      int window_px, perception::CsfModel second = usual_second);
 
     const std::string& name() const { return name_; }
     const vdtree::VertexTree& tree() const { return plain_.session->tree(); }

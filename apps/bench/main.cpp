@@ -27,7 +27,7 @@ namespace {
 class BenchRun {
 public:
     static Result<BenchRun> open(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs,
-                                const std::string& json) {
+                                 const std::string& json) {
         std::vector<std::string> all = outputs;
         all.push_back(json);
         if (const auto ready = check_outputs(inputs, all); !ready) return ready.error();
@@ -104,18 +104,21 @@ Result<int> run(EngineArguments& a) {
     const auto result = bench_engine(a.options);
     if (!result) return result.error();
     return bench->close({{"mesh", result->mesh}, {"rows", to_json(result->rows)}, {"sizes", result->sizes}},
-                          [&] { print(result->mesh, result->rows); });
+                        [&] { print(result->mesh, result->rows); });
 }
 
 Command engine_command(CLI::App& app) {
     auto a = std::make_shared<EngineArguments>();
     CLI::App* verb = app.add_subcommand("engine", "Cuts, budgets, memory and building, against what is promised");
-    verb->add_option("--mesh", a->options.mesh, "PLY, OBJ, OFF, STL or glTF (default: the dragon, as ./quickstart gets it; "
-                                                "without it a sphere with bumps)")
+    verb->add_option("--mesh", a->options.mesh,
+                     "PLY, OBJ, OFF, STL or glTF (default: the dragon, as ./quickstart gets it; "
+                     "without it a sphere with bumps)")
         ->type_name("MESH");
-    CLI::Option* sizes = verb->add_option("--sizes", a->sizes, "Triangles (default: 70k,0.9M,3.5M,14M,28M; with --quick: 70k,0.9M)")
-                             ->type_name("LIST");
-    verb->add_option("--keep", a->options.keep, "Keep meshes and trees there, and take those that are there")->type_name("FOLDER");
+    CLI::Option* sizes =
+        verb->add_option("--sizes", a->sizes, "Triangles (default: 70k,0.9M,3.5M,14M,28M; with --quick: 70k,0.9M)")
+            ->type_name("LIST");
+    verb->add_option("--keep", a->options.keep, "Keep meshes and trees there, and take those that are there")
+        ->type_name("FOLDER");
     verb->add_flag("--quick", a->options.quick, "Few frames and sizes: rough figures");
     add_targets_option(*verb, a->targets);
     add_json_option(*verb, a->json);
@@ -142,7 +145,8 @@ std::vector<std::string> parse_groups(std::string_view list) {
     while (!list.empty()) {
         const std::size_t comma = list.find(',');
         groups.emplace_back(list.substr(0, comma));
-        if (std::find(std::begin(perception_groups), std::end(perception_groups), groups.back()) == std::end(perception_groups))
+        if (std::find(std::begin(perception_groups), std::end(perception_groups), groups.back()) ==
+            std::end(perception_groups))
             refuse("--only takes a list of " + known + ", not '" + groups.back() + "'.");
         list.remove_prefix(comma == std::string_view::npos ? list.size() : comma + 1);
     }
@@ -181,19 +185,27 @@ Command perception_command(CLI::App& app) {
     PerceptionBenchOptions& o = a->options;
     CLI::App* verb = app.add_subcommand(
         "perception", "What fold tests save, whether it can be seen, and what it costs, against what is promised");
-    verb->add_option("--mesh", o.meshes, "Meshes or trees (default: the bunny and the dragon, as ./quickstart gets them; without them a sphere with bumps); "
-                                             "of the dragon, unless it is named, only random views, from afar, and speed")
+    verb->add_option("--mesh", o.meshes,
+                     "Meshes or trees (default: the bunny and the dragon, as ./quickstart gets them; without them a "
+                     "sphere with bumps); "
+                     "of the dragon, unless it is named, only random views, from afar, and speed")
         ->type_name("MESH");
     verb->add_option("--other", o.others, "More of them, for the random views and from afar")->type_name("MESH");
-    verb->add_option("--only", a->only, "Groups: savings,random,far,hard,tolerance,csf,observers,speed (default: all)")->type_name("LIST");
-    verb->add_option("--reference", o.reference, "Published sensitivities, as CSV (default: tests/data in the checkout)")
+    verb->add_option("--only", a->only, "Groups: savings,random,far,hard,tolerance,csf,observers,speed (default: all)")
+        ->type_name("LIST");
+    verb->add_option("--reference", o.reference,
+                     "Published sensitivities, as CSV (default: tests/data in the checkout)")
         ->type_name("FOLDER")
         ->check(CLI::Validator(CLI::ExistingDirectory).description(""));
-    verb->add_option("--pictures", o.pictures, "A picture of each group: the worst views, and what the judge saw")->type_name("FOLDER");
-    verb->add_option("--second-judge", o.second_judge, "Its model of contrast sensitivity: barten-1999 (default), stela, daly, ...")
+    verb->add_option("--pictures", o.pictures, "A picture of each group: the worst views, and what the judge saw")
+        ->type_name("FOLDER");
+    verb->add_option("--second-judge", o.second_judge,
+                     "Its model of contrast sensitivity: barten-1999 (default), stela, daly, ...")
         ->type_name("MODEL")
         ->check(one_of(achromatic_models()));
-    verb->add_option("--window", o.window_px, "Its side; promises are about 1024 (default)")->type_name("PIXELS")->check(whole(64, 4096));
+    verb->add_option("--window", o.window_px, "Its side; promises are about 1024 (default)")
+        ->type_name("PIXELS")
+        ->check(whole(64, 4096));
     verb->add_flag("--quick", o.quick, "Few views: rough figures");
     add_targets_option(*verb, a->targets);
     add_json_option(*verb, a->json);

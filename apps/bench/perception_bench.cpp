@@ -45,7 +45,8 @@ constexpr std::uint64_t random_seed = 20;
 const glm::dvec3 directions[] = {{0, 0, 1}, {1, 0, 0}, {1, 1, 1}};
 
 std::string thousands(double triangles) {
-    return triangles < 10'000 ? grouped(static_cast<std::uint64_t>(std::llround(triangles))) : rounded(triangles / 1e3, 4) + "k";
+    return triangles < 10'000 ? grouped(static_cast<std::uint64_t>(std::llround(triangles)))
+                              : rounded(triangles / 1e3, 4) + "k";
 }
 
 std::string gaze_name(double degrees) { return degrees > 0 ? rounded(degrees, 2) + " degrees aside" : "fovea"; }
@@ -73,12 +74,13 @@ using Models = std::vector<std::unique_ptr<JudgedModel>>;
 
 Image halved(const Image& image) {
     Image half{image.width / 2, image.height / 2, image.channels, {}};
-    half.values.resize(static_cast<std::size_t>(half.width) * static_cast<std::size_t>(half.height) * static_cast<std::size_t>(half.channels));
+    half.values.resize(static_cast<std::size_t>(half.width) * static_cast<std::size_t>(half.height) *
+                       static_cast<std::size_t>(half.channels));
     for (int y = 0; y < half.height; ++y)
         for (int x = 0; x < half.width; ++x)
             for (int c = 0; c < half.channels; ++c)
-                half.at(x, y, c) = 0.25f * (image.at(2 * x, 2 * y, c) + image.at(2 * x + 1, 2 * y, c) + image.at(2 * x, 2 * y + 1, c) +
-                                            image.at(2 * x + 1, 2 * y + 1, c));
+                half.at(x, y, c) = 0.25f * (image.at(2 * x, 2 * y, c) + image.at(2 * x + 1, 2 * y, c) +
+                                            image.at(2 * x, 2 * y + 1, c) + image.at(2 * x + 1, 2 * y + 1, c));
     return half;
 }
 
@@ -92,7 +94,9 @@ class Sheet {
 public:
     static constexpr int side = 512; // at most, in pixels
 
-    void add_row(std::string text, std::vector<Image> pictures) { rows_.push_back({std::move(text), std::move(pictures)}); }
+    void add_row(std::string text, std::vector<Image> pictures) {
+        rows_.push_back({std::move(text), std::move(pictures)});
+    }
 
     Result<void> write(const fs::path& file) const {
         if (rows_.empty()) return {};
@@ -134,9 +138,9 @@ WhatOptions what_of(FoldTest test, const Look& look) {
 }
 
 std::string words(const Judged& judged, const JudgedModel& model) {
-    return model.name() + ", " + judged.look.text + ", " + name_of(judged.test) + ": " + grouped(judged.verdicts.triangles) + " of " +
-           grouped(model.triangles()) + " triangles, " + grouped(judged.verdicts.visible_pixels[0]) + " pixels visible, V " +
-           rounded(judged.verdicts.largest[0], 3);
+    return model.name() + ", " + judged.look.text + ", " + name_of(judged.test) + ": " +
+           grouped(judged.verdicts.triangles) + " of " + grouped(model.triangles()) + " triangles, " +
+           grouped(judged.verdicts.visible_pixels[0]) + " pixels visible, V " + rounded(judged.verdicts.largest[0], 3);
 }
 
 // The full model, the cut, its triangles, and what the judge sees.
@@ -162,7 +166,7 @@ Result<void> add_exhibit(Sheet& sheet, JudgedModel& model, const Judged& judged)
 struct Totals {
     std::size_t views = 0, views_seen = 0; // with visible pixels
     std::uint64_t pixels = 0;
-    double largest = 0;                    // V
+    double largest = 0; // V
     const Judged* worst = nullptr;
 };
 
@@ -186,7 +190,8 @@ Totals total(const std::vector<Judged>& all, FoldTest test, std::size_t judge) {
 
 class PerceptionBench {
 public:
-    PerceptionBench(const PerceptionBenchOptions& options, perception::CsfModel second) : options_(options), second_(second), bar_("judging") {}
+    PerceptionBench(const PerceptionBenchOptions& options, perception::CsfModel second)
+        : options_(options), second_(second), bar_("judging") {}
 
     Result<PerceptionBenchResult> run() {
         if (needs_models() || is_wanted("hard")) { // the other groups draw nothing
@@ -198,9 +203,10 @@ public:
         const struct {
             const char* group;
             Result<void> (PerceptionBench::*measure)();
-        } steps[] = {{"savings", &PerceptionBench::savings}, {"random", &PerceptionBench::random_views}, {"far", &PerceptionBench::far_away},
-                     {"hard", &PerceptionBench::hard},       {"tolerance", &PerceptionBench::tolerance}, {"csf", &PerceptionBench::csf},             {"observers", &PerceptionBench::observers},
-                     {"speed", &PerceptionBench::speed}};
+        } steps[] = {{"savings", &PerceptionBench::savings},     {"random", &PerceptionBench::random_views},
+                     {"far", &PerceptionBench::far_away},        {"hard", &PerceptionBench::hard},
+                     {"tolerance", &PerceptionBench::tolerance}, {"csf", &PerceptionBench::csf},
+                     {"observers", &PerceptionBench::observers}, {"speed", &PerceptionBench::speed}};
         for (const auto& [group, measure] : steps)
             if (is_wanted(group))
                 if (auto measured = (this->*measure)(); !measured) return measured.error();
@@ -209,11 +215,13 @@ public:
 
 private:
     bool is_wanted(const std::string& group) const {
-        return options_.only.empty() || std::find(options_.only.begin(), options_.only.end(), group) != options_.only.end();
+        return options_.only.empty() ||
+               std::find(options_.only.begin(), options_.only.end(), group) != options_.only.end();
     }
     Target target(std::string_view figure) const { return options_.targets.of("perception", figure); }
     bool needs_models() const {
-        return is_wanted("savings") || is_wanted("random") || is_wanted("far") || is_wanted("tolerance") || is_wanted("speed");
+        return is_wanted("savings") || is_wanted("random") || is_wanted("far") || is_wanted("tolerance") ||
+               is_wanted("speed");
     }
 
     // ---- models
@@ -237,13 +245,15 @@ private:
             for (const std::string& file : options_.others)
                 if (auto added = add_file(file); !added) return added;
         for (std::size_t i = 0; i < models_.size(); ++i)
-            result_.title += (i ? (i == main_models_ ? "; and " : ", ") : "") + models_[i]->name() + " (" + grouped(models_[i]->triangles()) + ")";
+            result_.title += (i ? (i == main_models_ ? "; and " : ", ") : "") + models_[i]->name() + " (" +
+                             grouped(models_[i]->triangles()) + ")";
         result_.title += "; " + grouped(static_cast<std::uint64_t>(options_.window_px)) + " pixels a side";
         return {};
     }
     // Where nobody named the meshes, huge ones are looked at only at random, from afar and for speed, and with --quick not at all.
     void settle_huge_models() {
-        const auto huge = std::stable_partition(models_.begin(), models_.end(), [](const auto& model) { return model->triangles() <= huge_mesh; });
+        const auto huge = std::stable_partition(models_.begin(), models_.end(),
+                                                [](const auto& model) { return model->triangles() <= huge_mesh; });
         if (huge == models_.begin()) return; // there are no others
         main_models_ = static_cast<std::size_t>(huge - models_.begin());
         if (options_.quick) models_.erase(huge, models_.end());
@@ -268,8 +278,8 @@ private:
         look.view.direction = direction;
         look.view.fill = fill;
         if (aside_degrees > 0) look.gaze_px = session::gaze_aside({}, window(), aside_degrees);
-        look.text = "from " + rounded(direction.x, 2) + " " + rounded(direction.y, 2) + " " + rounded(direction.z, 2) + ", " + percent(fill) +
-                    " of the height, " + gaze_name(aside_degrees);
+        look.text = "from " + rounded(direction.x, 2) + " " + rounded(direction.y, 2) + " " + rounded(direction.z, 2) +
+                    ", " + percent(fill) + " of the height, " + gaze_name(aside_degrees);
         return look;
     }
     vdtree::View window() const {
@@ -278,10 +288,13 @@ private:
         return view;
     }
     std::size_t direction_count() const { return options_.quick ? 1 : std::size(directions); }
-    std::vector<double> wanted_fills() const { return options_.quick ? std::vector{0.9, 0.2} : std::vector(std::begin(fills), std::end(fills)); }
+    std::vector<double> wanted_fills() const {
+        return options_.quick ? std::vector{0.9, 0.2} : std::vector(std::begin(fills), std::end(fills));
+    }
 
     // Judges a look by all tests; what was found goes into `found`.
-    Result<void> judge(const std::string& group, Models& models, std::size_t model, const Look& how, std::vector<Judged>& found) {
+    Result<void> judge(const std::string& group, Models& models, std::size_t model, const Look& how,
+                       std::vector<Judged>& found) {
         if (auto looked = models[model]->look(how.view); !looked) return looked;
         for (const FoldTest test : tests) {
             const auto verdicts = models[model]->judge(what_of(test, how));
@@ -291,7 +304,9 @@ private:
         }
         return {};
     }
-    void progress(std::size_t done, std::size_t all, const char* group) { bar_(static_cast<double>(done) / static_cast<double>(all), group); }
+    void progress(std::size_t done, std::size_t all, const char* group) {
+        bar_(static_cast<double>(done) / static_cast<double>(all), group);
+    }
 
     void add_json(const Judged& judged, const JudgedModel& model) {
         const Verdicts& v = judged.verdicts;
@@ -368,21 +383,28 @@ private:
         for (std::size_t model = 0; model < main_models_; ++model) {
             for (std::size_t f = 0; f < wanted.size(); ++f) {
                 for (std::size_t d = 0; d < direction_count(); ++d) {
-                    for (std::size_t s = f; s < settings.size(); s += wanted.size()) { // the gazes: the full model is drawn once for all
+                    for (std::size_t s = f; s < settings.size();
+                         s += wanted.size()) { // the gazes: the full model is drawn once for all
                         progress(done++, all, "savings");
                         const std::size_t first = found.size();
-                        if (auto ok = judge("savings", models_, model, look(directions[d], settings[s].fill, settings[s].gaze), found); !ok) return ok;
+                        if (auto ok = judge("savings", models_, model,
+                                            look(directions[d], settings[s].fill, settings[s].gaze), found);
+                            !ok)
+                            return ok;
                         for (std::size_t t = 0; t < std::size(tests); ++t) {
                             cells[s][t].views.push_back(found[first + t]);
-                            cells[s][t].triangles[model] += found[first + t].verdicts.triangles / static_cast<double>(direction_count());
+                            cells[s][t].triangles[model] +=
+                                found[first + t].verdicts.triangles / static_cast<double>(direction_count());
                         }
                     }
                 }
             }
         }
-        BenchDetails details{"Triangles kept, mean of " + std::to_string(direction_count()) + " directions and " + std::to_string(main_models_) +
-                                 " meshes; what can be seen of it in the worst view; V, and by the second judge",
-                             {{"setting", "test", "triangles", "over luebke-hallen's", "visible", "largest V", "second: visible", "V"}}};
+        BenchDetails details{
+            "Triangles kept, mean of " + std::to_string(direction_count()) + " directions and " +
+                std::to_string(main_models_) +
+                " meshes; what can be seen of it in the worst view; V, and by the second judge",
+            {{"setting", "test", "triangles", "over luebke-hallen's", "visible", "largest V", "second: visible", "V"}}};
         for (std::size_t s = 0; s < settings.size(); ++s) {
             const std::string where = gaze_name(settings[s].gaze) + ", " + percent(settings[s].fill);
             for (std::size_t t = 0; t < std::size(tests); ++t) {
@@ -392,11 +414,13 @@ private:
                 for (std::size_t m = 0; m < main_models_; ++m) {
                     fewer += base.triangles[m] / cell.triangles[m] / static_cast<double>(main_models_);
                     kept += cell.triangles[m] / static_cast<double>(main_models_);
-                    note += (m ? ", " : "") + models_[m]->name() + " " + thousands(base.triangles[m]) + " -> " + thousands(cell.triangles[m]);
+                    note += (m ? ", " : "") + models_[m]->name() + " " + thousands(base.triangles[m]) + " -> " +
+                            thousands(cell.triangles[m]);
                 }
                 const Totals first = total(cell.views, tests[t], 0), second = total(cell.views, tests[t], 1);
-                details.rows.push_back({where, name_of(tests[t]), thousands(kept), rounded(1 / fewer, 3), grouped(first.pixels),
-                                        rounded(first.largest, 2), grouped(second.pixels), rounded(second.largest, 2)});
+                details.rows.push_back({where, name_of(tests[t]), thousands(kept), rounded(1 / fewer, 3),
+                                        grouped(first.pixels), rounded(first.largest, 2), grouped(second.pixels),
+                                        rounded(second.largest, 2)});
                 if (tests[t] == baseline) continue;
                 BenchRow row{"fewer triangles, " + where + ", " + name_of(tests[t]), "x", note, fewer, {}, true, 2};
                 if (tests[t] == promised) row.target = target("fewer triangles, " + where + ", x");
@@ -409,7 +433,8 @@ private:
         Sheet sheet;
         for (const double gaze : {0.0, gaze_degrees})
             for (const Judged& one : found)
-                if (one.model == 0 && one.look.text == look(directions[0], wanted[0], gaze).text && one.test != FoldTest::luebke_hallen_safe)
+                if (one.model == 0 && one.look.text == look(directions[0], wanted[0], gaze).text &&
+                    one.test != FoldTest::luebke_hallen_safe)
                     if (auto added = add_exhibit(sheet, *models_[0], one); !added) return added;
         return write_sheet(sheet, "savings.png");
     }
@@ -434,7 +459,9 @@ private:
         const std::size_t count = options_.quick ? std::min<std::size_t>(models_.size(), 6) : 72;
         const std::vector<std::size_t> order = models_of_random_views(count);
         std::mt19937_64 random(random_seed);
-        const auto uniform = [&](double low, double high) { return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53; };
+        const auto uniform = [&](double low, double high) {
+            return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
+        };
         std::vector<Judged> found;
         for (std::size_t i = 0; i < count; ++i) {
             progress(i, count, "random views");
@@ -538,7 +565,8 @@ private:
                     progress(found.size() / std::size(tests), all, "hard meshes");
                     if (auto ok = judge("hard", hard_models, m, look(direction, fill, gaze), found); !ok) return ok;
                 }
-        BenchDetails details{"Hard meshes: triangles kept of all, in all views; visible pixels; largest V; largest V of the second judge",
+        BenchDetails details{"Hard meshes: triangles kept of all, in all views; visible pixels; largest V; largest V "
+                             "of the second judge",
                              {{"mesh", "test", "kept", "visible", "largest V", "second: visible", "V"}}};
         std::vector<Judged> worst;
         for (std::size_t m = 0; m < hard_models.size(); ++m) {
@@ -549,9 +577,10 @@ private:
                 const Totals first = total(of_mesh, test, 0), second = total(of_mesh, test, 1);
                 double kept = 0;
                 for (const Judged& one : of_mesh)
-                    if (one.test == test) kept += one.verdicts.triangles / static_cast<double>(first.views) / hard_models[m]->triangles();
-                details.rows.push_back({hard_models[m]->name(), name_of(test), percent(kept), grouped(first.pixels), rounded(first.largest, 2),
-                                        grouped(second.pixels), rounded(second.largest, 2)});
+                    if (one.test == test)
+                        kept += one.verdicts.triangles / static_cast<double>(first.views) / hard_models[m]->triangles();
+                details.rows.push_back({hard_models[m]->name(), name_of(test), percent(kept), grouped(first.pixels),
+                                        rounded(first.largest, 2), grouped(second.pixels), rounded(second.largest, 2)});
                 if (test == promised) worst.push_back(*first.worst);
             }
         }
@@ -584,7 +613,10 @@ private:
                     progress(done++, all, "tolerances in pixels");
                     for (std::size_t g = 0; g < std::size(gazes); ++g)
                         for (std::size_t t = 0; t < std::size(geometric_tests); ++t)
-                            if (auto ok = lower_tolerance(safe.px[t][g], geometric_tests[t], model, look(directions[d], fill, gazes[g])); !ok) return ok.error();
+                            if (auto ok = lower_tolerance(safe.px[t][g], geometric_tests[t], model,
+                                                          look(directions[d], fill, gazes[g]));
+                                !ok)
+                                return ok.error();
                 }
         return safe;
     }
@@ -631,15 +663,18 @@ private:
         const auto looks_of = [&](double gaze, double fill) {
             Looks looks;
             for (std::size_t m = 0; m < main_models_; ++m)
-                for (std::size_t d = 0; d < direction_count(); ++d) looks.emplace_back(m, look(directions[d], fill, gaze));
+                for (std::size_t d = 0; d < direction_count(); ++d)
+                    looks.emplace_back(m, look(directions[d], fill, gaze));
             return looks;
         };
-        BenchDetails details{"One tolerance for all views against one threshold: what each keeps, in triangles, mean of " +
-                                 std::to_string(direction_count()) + " directions and " + std::to_string(main_models_) + " meshes",
-                             {{"test", "tolerance", "looked at"}}};
+        BenchDetails details{
+            "One tolerance for all views against one threshold: what each keeps, in triangles, mean of " +
+                std::to_string(direction_count()) + " directions and " + std::to_string(main_models_) + " meshes",
+            {{"test", "tolerance", "looked at"}}};
         for (const double gaze : {0.0, gaze_degrees})
             for (const double fill : wanted_fills()) details.rows[0].push_back(gaze_name(gaze) + ", " + percent(fill));
-        const auto add_line = [&](FoldTest test, double pixels, const std::string& text, const std::string& where) -> Result<void> {
+        const auto add_line = [&](FoldTest test, double pixels, const std::string& text,
+                                  const std::string& where) -> Result<void> {
             std::vector<std::string> line = {name_of(test), text, where};
             for (const double gaze : {0.0, gaze_degrees})
                 for (const double fill : wanted_fills()) {
@@ -657,7 +692,8 @@ private:
             double safe[2] = {};
             for (const double gaze : {0.0, gaze_degrees}) {
                 const double px = safe[gaze > 0] = found->px[t][gaze > 0 ? 0 : 1]; // as `gazes` has them
-                if (auto added = add_line(test, px, rounded(px, 2) + " px", "safe: " + gaze_name(gaze)); !added) return added;
+                if (auto added = add_line(test, px, rounded(px, 2) + " px", "safe: " + gaze_name(gaze)); !added)
+                    return added;
             }
             result_.rows.push_back(
                 {"safe " + name_of(test) + " at " + gaze_name(gaze_degrees) + " over that at the fovea",
@@ -692,7 +728,9 @@ private:
 
     // The largest of the models, from +Z at 90% of the window's height.
     Result<JudgedModel*> subject() {
-        const auto largest = std::max_element(models_.begin(), models_.end(), [](const auto& a, const auto& b) { return a->triangles() < b->triangles(); });
+        const auto largest = std::max_element(models_.begin(), models_.end(), [](const auto& a, const auto& b) {
+            return a->triangles() < b->triangles();
+        });
         if (auto looked = (*largest)->look(look(directions[0], fills[0], 0).view); !looked) return looked.error();
         return largest->get();
     }
@@ -726,19 +764,22 @@ private:
         if (!bounds) return bounds.error();
         const auto shared = std::make_shared<const vdtree::LightBounds>(*bounds);
         const auto wanted = static_cast<Index>(std::min<double>(lit_active, 0.5 * model.triangles()));
-        for (const auto& [kind, name] : {std::pair{TurningLight::directional, "directional"}, std::pair{TurningLight::point, "point"},
-                                         std::pair{TurningLight::highlights, "directional with highlights"}})
+        for (const auto& [kind, name] :
+             {std::pair{TurningLight::directional, "directional"}, std::pair{TurningLight::point, "point"},
+              std::pair{TurningLight::highlights, "directional with highlights"}})
             if (auto measured = moving_light(model, shared, wanted, kind, name); !measured) return measured;
         return {};
     }
 
-    Result<void> moving_light(JudgedModel& model, const std::shared_ptr<const vdtree::LightBounds>& bounds, Index wanted, TurningLight kind, const char* name) {
+    Result<void> moving_light(JudgedModel& model, const std::shared_ptr<const vdtree::LightBounds>& bounds,
+                              Index wanted, TurningLight kind, const char* name) {
         const auto session = model.session(baseline);
         if (!session) return session.error();
         const vdtree::VertexTree& tree = (*session)->tree();
         perception::FoldTestOptions options;
         vdtree::Viewpoint viewpoint = perception::viewpoint_of(tree, model.view(), options, {}, false);
-        options.scene = perception::lit_scene(tree, *bounds, lighting_at(tree, kind, 0), viewpoint.eye, (*session)->background());
+        options.scene =
+            perception::lit_scene(tree, *bounds, lighting_at(tree, kind, 0), viewpoint.eye, (*session)->background());
         const auto made = perception::lit_distances(tree, bounds, model.view(), options);
         if (!made) return made.error();
         vdtree::Cut cut(tree);
@@ -786,9 +827,12 @@ Result<PerceptionBenchResult> bench_perception(const PerceptionBenchOptions& opt
     if (!options.pictures.empty()) {
         std::error_code failed;
         fs::create_directories(options.pictures, failed);
-        if (failed) return Error{ErrorCode::io_failure, "Cannot make the folder '" + options.pictures + "': " + failed.message() + "."};
+        if (failed)
+            return Error{ErrorCode::io_failure,
+                         "Cannot make the folder '" + options.pictures + "': " + failed.message() + "."};
     }
-    const auto second = options.second_judge.empty() ? Result(usual_second) : perception::csf_model(options.second_judge);
+    const auto second =
+        options.second_judge.empty() ? Result(usual_second) : perception::csf_model(options.second_judge);
     if (!second) return second.error();
     return PerceptionBench(options, *second).run();
 }

@@ -9,17 +9,19 @@
 
 namespace unseen::app {
 
-inline constexpr const char* perception_groups[] = {"savings", "random", "far", "hard", "tolerance", "csf", "observers", "speed"};
+inline constexpr const char* perception_groups[] = {"savings",   "random", "far",       "hard",
+                                                    "tolerance", "csf",    "observers", "speed"};
 
 struct PerceptionBenchOptions {
-    std::vector<std::string> meshes;        // of all groups; empty: bunny and dragon where they are installed, or a sphere with bumps
-    std::vector<std::string> others;        // in the random views and far away, too
-    std::vector<std::string> only;          // of perception_groups; empty: all
-    std::string pictures;                   // a folder for a picture of each group; empty: none
-    std::string reference;                  // a folder of published sensitivities; empty: the checkout's own
-    std::string second_judge;               // its model of contrast sensitivity; empty: Barten's of 1999
+    std::vector<std::string>
+        meshes; // of all groups; empty: bunny and dragon where they are installed, or a sphere with bumps
+    std::vector<std::string> others; // in the random views and far away, too
+    std::vector<std::string> only;   // of perception_groups; empty: all
+    std::string pictures;            // a folder for a picture of each group; empty: none
+    std::string reference;           // a folder of published sensitivities; empty: the checkout's own
+    std::string second_judge;        // its model of contrast sensitivity; empty: Barten's of 1999
     int window_px = 1024;
-    bool quick = false;                     // few views
+    bool quick = false; // few views
     Targets targets = Targets::built_in();
 };
 

@@ -66,8 +66,9 @@ struct Reference {
 
     Result<Printed> number(const Row& row, std::size_t column) const {
         if (const auto value = printed(row.cells[column])) return *value;
-        return Error{ErrorCode::malformed_data, file.string() + ": line " + std::to_string(row.line) + ": '" + row.cells[column] + "' in column '" +
-                                                    columns[column] + "' is no number."};
+        return Error{ErrorCode::malformed_data, file.string() + ": line " + std::to_string(row.line) + ": '" +
+                                                    row.cells[column] + "' in column '" + columns[column] +
+                                                    "' is no number."};
     }
     std::optional<std::size_t> column(std::initializer_list<const char*> names) const {
         for (std::size_t i = 0; i < columns.size(); ++i)
@@ -110,7 +111,8 @@ struct Deviation {
 
     // Relative, beyond what printing has taken from the reference.
     void add(double value, const Printed& reference, double scale = 1) {
-        const double off = std::max(0.0, std::abs(value * scale - reference.value) - reference.half_unit) / std::abs(reference.value);
+        const double off =
+            std::max(0.0, std::abs(value * scale - reference.value) - reference.half_unit) / std::abs(reference.value);
         ++values;
         if (!(off <= largest)) largest = off; // NaN, too
     }
@@ -134,8 +136,12 @@ struct StimulusColumns {
 
 Result<Stimulus> stimulus_of(const Reference& reference, const Reference::Row& row, const StimulusColumns& columns) {
     double frequency = 0, luminance = 0, area = 0, eccentricity = 0, temporal = 0, field = 0;
-    for (const auto& [column, value] : {std::pair(std::optional(columns.frequency), &frequency), {columns.luminance, &luminance}, {columns.area, &area},
-                                        {columns.eccentricity, &eccentricity}, {columns.temporal, &temporal}, {columns.field, &field}}) {
+    for (const auto& [column, value] : {std::pair(std::optional(columns.frequency), &frequency),
+                                        {columns.luminance, &luminance},
+                                        {columns.area, &area},
+                                        {columns.eccentricity, &eccentricity},
+                                        {columns.temporal, &temporal},
+                                        {columns.field, &field}}) {
         if (!column) continue;
         const auto number = reference.number(row, *column);
         if (!number) return number.error();
@@ -155,7 +161,8 @@ Result<void> compare(const Reference& reference, std::initializer_list<Compared>
                      std::vector<BenchRow>& rows) {
     const auto frequency = reference.column({"frequency", "s_frequency"}), luminance = reference.column({"luminance"}),
                area = reference.column({"area"}), eccentricity = reference.column({"eccentricity"}),
-               temporal = reference.column({"temporal", "t_frequency"}), field = reference.column({"field", "vis_field"});
+               temporal = reference.column({"temporal", "t_frequency"}),
+               field = reference.column({"field", "vis_field"});
     for (const Compared& compared : models) {
         const auto column = reference.column(compared.columns);
         const std::string name = "deviation of " + std::string(perception::name(compared.model));
@@ -187,13 +194,16 @@ Result<void> compare(const Reference& reference, std::initializer_list<Compared>
 double largest_table_error(CsfModel model, int places) {
     const CsfTable table = CsfTable::from_model(model);
     std::mt19937_64 random(1);
-    const auto uniform = [&](double low, double high) { return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53; };
+    const auto uniform = [&](double low, double high) {
+        return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
+    };
     double largest = 0;
     for (int i = 0; i < places; ++i) {
         const CyclesPerDegree frequency(std::exp2(uniform(-4, 6)));
         const Degrees eccentricity(uniform(0, 1) < 0.5 ? uniform(0, 25) : uniform(0, 120));
         const Luminance luminance(std::pow(10, uniform(-3, 4)));
-        const double s = perception::sensitivity(model, perception::stimulus_of({}, frequency, eccentricity, luminance));
+        const double s =
+            perception::sensitivity(model, perception::stimulus_of({}, frequency, eccentricity, luminance));
         if (!(s > 1)) continue;
         const double off = std::abs(table.sensitivity(frequency, eccentricity, luminance) / s - 1);
         if (!(off <= largest)) largest = off;
@@ -203,20 +213,25 @@ double largest_table_error(CsfModel model, int places) {
 
 Result<void> plot_models(const fs::path& file) {
     LogLogPlot plot;
-    plot.title = "Contrast sensitivity at 100 cd/m2, of patches of 1.5 cycles radius: fovea, and dashed 20 degrees aside";
+    plot.title =
+        "Contrast sensitivity at 100 cd/m2, of patches of 1.5 cycles radius: fovea, and dashed 20 degrees aside";
     plot.x_label = "cycles per degree";
     plot.y_label = "sensitivity";
     plot.x_range = {0.25, 64};
-    const glm::vec3 colours[] = {{0.1f, 0.3f, 0.8f}, {0.1f, 0.6f, 0.7f}, {0.8f, 0.2f, 0.1f}, {0.6f, 0.4f, 0.1f}, {0.9f, 0.6f, 0.1f},
-                                 {0.4f, 0.6f, 0.1f}, {0.5f, 0.5f, 0.5f}, {0.6f, 0.2f, 0.6f}};
+    const glm::vec3 colours[] = {{0.1f, 0.3f, 0.8f}, {0.1f, 0.6f, 0.7f}, {0.8f, 0.2f, 0.1f}, {0.6f, 0.4f, 0.1f},
+                                 {0.9f, 0.6f, 0.1f}, {0.4f, 0.6f, 0.1f}, {0.5f, 0.5f, 0.5f}, {0.6f, 0.2f, 0.6f}};
     std::size_t colour = 0;
     for (const CsfModel model : perception::csf_models) {
         if (!perception::is_achromatic(model)) continue;
         for (const double degrees : {0.0, 20.0}) {
-            Curve curve{degrees > 0 ? "" : std::string(perception::name(model)), colours[colour % std::size(colours)], degrees > 0, {}};
+            Curve curve{degrees > 0 ? "" : std::string(perception::name(model)),
+                        colours[colour % std::size(colours)],
+                        degrees > 0,
+                        {}};
             for (double octave = -2; octave <= 6; octave += 0.05) {
                 const double cpd = std::exp2(octave);
-                const double s = perception::sensitivity(model, perception::stimulus_of({}, CyclesPerDegree(cpd), Degrees(degrees), Luminance(100)));
+                const double s = perception::sensitivity(
+                    model, perception::stimulus_of({}, CyclesPerDegree(cpd), Degrees(degrees), Luminance(100)));
                 if (s > plot.y_range.x && s < plot.y_range.y) curve.points.push_back({cpd, s});
             }
             plot.curves.push_back(std::move(curve));
@@ -259,8 +274,8 @@ struct ObserverErrors {
     double mean = 0, worst = 0;
 };
 
-Result<void> plot_observer(const fs::path& file, const calibration::Procedure& procedure, const calibration::SimulatedObserver& observer,
-                           const std::string& name) {
+Result<void> plot_observer(const fs::path& file, const calibration::Procedure& procedure,
+                           const calibration::SimulatedObserver& observer, const std::string& name) {
     LogLogPlot plot;
     plot.title = "Sensitivity of the simulated observer " + name + ", and dashed as calibrated in " +
                  std::to_string(procedure.answers().size()) + " trials";
@@ -313,7 +328,8 @@ Result<std::vector<BenchRow>> bench_csf(const SensitivityBenchOptions& options) 
         if (!compared) return compared.error();
     } else rows.push_back({"deviation of castle and stela", "1e-9", none, {}, castle, false, 3});
     const double scale = 1 / perception::relative_models_peak;
-    if (const auto reference = find_reference(options.reference, {"csf_classical_golden.csv", "csf_classical_grid.csv"})) {
+    if (const auto reference =
+            find_reference(options.reference, {"csf_classical_golden.csv", "csf_classical_grid.csv"})) {
         const auto compared =
             compare(*reference,
                     {{CsfModel::daly, {"daly", "daly93"}},
@@ -369,19 +385,23 @@ Result<std::vector<BenchRow>> bench_observers(const SensitivityBenchOptions& opt
                 if (!(db <= errors.worst)) errors.worst = db;
             };
             while (!procedure->is_done()) {
-                bar((static_cast<double>(at_many.size()) + static_cast<double>(run - 1) / runs) / std::size(observers), description);
+                bar((static_cast<double>(at_many.size()) + static_cast<double>(run - 1) / runs) / std::size(observers),
+                    description);
                 if (procedure->answers().size() == few) note(of_few);
                 procedure->choose(observer->choose(procedure->next(), plan.luminance));
             }
             note(of_many);
             if (run > 1 || !at_many.empty() || options.pictures.empty()) continue;
-            if (auto plotted = plot_observer(fs::path(options.pictures) / "observer.png", *procedure, *observer, description); !plotted)
+            if (auto plotted =
+                    plot_observer(fs::path(options.pictures) / "observer.png", *procedure, *observer, description);
+                !plotted)
                 return plotted.error();
         }
         at_few.push_back(std::move(of_few));
         at_many.push_back(std::move(of_many));
     }
-    const std::string of_runs = ", mean of " + std::to_string(runs) + (runs > 1 ? " runs" : " run") + ", the worst observer";
+    const std::string of_runs =
+        ", mean of " + std::to_string(runs) + (runs > 1 ? " runs" : " run") + ", the worst observer";
     const Target after_many = options.targets.of("perception", "calibration in 400 trials, dB"),
                  after_few = options.targets.of("perception", "calibration in 200 trials, dB");
     return std::vector<BenchRow>{observer_row("calibration in 400 trials" + of_runs, at_many, false, after_many),

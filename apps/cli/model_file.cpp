@@ -31,7 +31,8 @@ Result<meshio::ReadResult> read_mesh_file(const std::filesystem::path& file) {
     return read;
 }
 
-Result<meshio::ReadResult> read_textured_mesh(const std::filesystem::path& file, const meshio::ReadOptions& options, const TextureOptions& texture) {
+Result<meshio::ReadResult> read_textured_mesh(const std::filesystem::path& file, const meshio::ReadOptions& options,
+                                              const TextureOptions& texture) {
     ProgressBar bar("reading " + file.filename().string());
     return session::read_textured_mesh(file, load_options(texture, bar), options);
 }
@@ -48,7 +49,8 @@ Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file) {
     return session::load_tree(file, load_options({}, bar));
 }
 
-Result<session::Scene> load_scene(const std::filesystem::path& file, const TextureOptions& texture, double unit_metres) {
+Result<session::Scene> load_scene(const std::filesystem::path& file, const TextureOptions& texture,
+                                  double unit_metres) {
     ProgressBar bar(file.filename().string());
     session::LoadOptions options = load_options(texture, bar);
     options.unit_metres = unit_metres;

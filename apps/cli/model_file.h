@@ -3,9 +3,9 @@
 
 #include <filesystem>
 
+#include <meshio/mesh_io.h>
 #include <session/scene.h>
 #include <vdtree/builder.h>
-#include <meshio/mesh_io.h>
 #include <vdtree/tree_io.h>
 
 #include "options.h"
@@ -16,7 +16,8 @@ namespace unseen::app {
 Result<meshio::ReadResult> read_mesh_file(const std::filesystem::path& file);
 
 // A mesh with its texture.
-Result<meshio::ReadResult> read_textured_mesh(const std::filesystem::path& file, const meshio::ReadOptions& options, const TextureOptions& texture);
+Result<meshio::ReadResult> read_textured_mesh(const std::filesystem::path& file, const meshio::ReadOptions& options,
+                                              const TextureOptions& texture);
 
 // The tree of a mesh. Triangles that its reader dropped count as the tree's dropped ones.
 Result<vdtree::VertexTree> build_tree_of(meshio::ReadResult&& read, vdtree::BuildOptions options);

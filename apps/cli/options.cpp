@@ -23,7 +23,8 @@ constexpr int largest_window_px = 32768; // a side, as vdtree::validate has it
 // "a, b or c".
 std::string listed(const std::vector<std::string>& names) {
     std::string list;
-    for (std::size_t i = 0; i < names.size(); ++i) list += (i == 0 ? "" : i + 1 < names.size() ? ", " : " or ") + names[i];
+    for (std::size_t i = 0; i < names.size(); ++i)
+        list += (i == 0 ? "" : i + 1 < names.size() ? ", " : " or ") + names[i];
     return list;
 }
 
@@ -123,22 +124,28 @@ CLI::Validator one_of(std::vector<std::string> names) {
 
 bool has_ending(const std::string& file, const std::string& ending) {
     std::string own = std::filesystem::path(file).extension().string();
-    std::transform(own.begin(), own.end(), own.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    std::transform(own.begin(), own.end(), own.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     return own == ending;
 }
 
 CLI::Validator ending_in(std::vector<std::string> endings) {
     return CLI::Validator(
         [endings = std::move(endings)](std::string& text) {
-            if (std::any_of(endings.begin(), endings.end(), [&](const std::string& ending) { return has_ending(text, ending); })) return std::string();
+            if (std::any_of(endings.begin(), endings.end(),
+                            [&](const std::string& ending) { return has_ending(text, ending); }))
+                return std::string();
             return "must end in " + listed(endings) + ", not '" + text + "'";
         },
         "");
 }
 
 void add_texture_options(CLI::App& verb, TextureOptions& o) {
-    CLI::Option* file = verb.add_option("--texture", o.file, "Of a mesh with texture coordinates: the image that lies over it, instead of its materials' images")
-                            ->type_name("IMAGE");
+    CLI::Option* file =
+        verb.add_option(
+                "--texture", o.file,
+                "Of a mesh with texture coordinates: the image that lies over it, instead of its materials' images")
+            ->type_name("IMAGE");
     verb.add_flag("--no-texture", o.is_left_out, "Leave images out")->excludes(file);
 }
 
@@ -159,34 +166,41 @@ void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px) {
 
 void add_moving_gaze_options(CLI::App& verb, GazeOptions& o, bool allows_mouse) {
     CLI::App& group = *verb.add_option_group("GAZE", "Where the viewer looks, frame by frame, instead of --gaze");
-    std::vector<std::pair<std::string, GazeSource>> sources = {{"simulated", GazeSource::simulated}, {"head", GazeSource::head}};
+    std::vector<std::pair<std::string, GazeSource>> sources = {{"simulated", GazeSource::simulated},
+                                                               {"head", GazeSource::head}};
     if (allows_mouse) sources.push_back({"mouse", GazeSource::mouse});
-    CLI::Option* mode = add_choice(group, "--gaze-mode", o.source, std::move(sources),
-                                   std::string("simulated: fixations and saccades by published statistics; head: no tracker, within 15 "
-                                               "degrees of the middle") + (allows_mouse ? "; mouse: at the pointer" : ""));
-    CLI::Option* trace = group.add_option("--gaze-trace", o.trace, "A recording: CSV with the header time_s,x_px,y_px")->type_name("FILE.csv");
+    CLI::Option* mode =
+        add_choice(group, "--gaze-mode", o.source, std::move(sources),
+                   std::string("simulated: fixations and saccades by published statistics; head: no tracker, within 15 "
+                               "degrees of the middle") +
+                       (allows_mouse ? "; mouse: at the pointer" : ""));
+    CLI::Option* trace = group.add_option("--gaze-trace", o.trace, "A recording: CSV with the header time_s,x_px,y_px")
+                             ->type_name("FILE.csv");
     CLI::Option* seed = group
-        .add_option_function<double>(
-            "--seed", [&o](const double& v) { o.seed = static_cast<std::uint64_t>(v); }, "Of simulated gazes (default: 1)")
-        ->type_name("N")
-        ->check(whole(0, 9007199254740992.0)); // 2^53, to which doubles count
+                            .add_option_function<double>(
+                                "--seed", [&o](const double& v) { o.seed = static_cast<std::uint64_t>(v); },
+                                "Of simulated gazes (default: 1)")
+                            ->type_name("N")
+                            ->check(whole(0, 9007199254740992.0)); // 2^53, to which doubles count
     group.add_option("--gaze-error", o.tracker.error_deg, "The tracker's error, which widens the fovea (default: 0)")
         ->type_name("DEGREES")
         ->check(within(0, 180));
     CLI::Option* latency = group
-        .add_option_function<double>(
-            "--gaze-latency", [&o](const double& ms) { o.tracker.latency_s = ms / 1000; },
-            "From the eye to the picture; widens the fovea by the gaze's speed (default: 0)")
-        ->type_name("MILLISECONDS")
-        ->check(within(0, 10000));
-    CLI::Option* suppression = group.add_flag("--suppression", o.tracker.suppression, "Keep still during saccades, when nothing is seen");
+                               .add_option_function<double>(
+                                   "--gaze-latency", [&o](const double& ms) { o.tracker.latency_s = ms / 1000; },
+                                   "From the eye to the picture; widens the fovea by the gaze's speed (default: 0)")
+                               ->type_name("MILLISECONDS")
+                               ->check(within(0, 10000));
+    CLI::Option* suppression =
+        group.add_flag("--suppression", o.tracker.suppression, "Keep still during saccades, when nothing is seen");
     group.callback([=, &o] {
         if (*mode && *trace) refuse("--gaze-mode and --gaze-trace exclude each other: give one of them.");
         if (*trace) o.source = GazeSource::trace;
         if (*seed && o.source != GazeSource::simulated) refuse("--seed needs --gaze-mode simulated.");
         const bool is_tracked = o.source == GazeSource::trace || o.source == GazeSource::simulated;
         if ((*latency || *suppression) && !is_tracked)
-            refuse("--gaze-latency and --suppression need --gaze-mode simulated or --gaze-trace: only these know how the eye moves.");
+            refuse("--gaze-latency and --suppression need --gaze-mode simulated or --gaze-trace: only these know how "
+                   "the eye moves.");
     });
 }
 
@@ -195,10 +209,12 @@ void check_gaze(const WhatOptions& what, const GazeOptions& gaze) {
 }
 
 void check_geomorph(const std::optional<double>& seconds, const ViewOptions& view) {
-    if (seconds && !view.lights.empty()) refuse("--geomorph and --lights exclude each other: vertices that glide are not lit.");
+    if (seconds && !view.lights.empty())
+        refuse("--geomorph and --lights exclude each other: vertices that glide are not lit.");
 }
 
-void add_fold_test_option(CLI::App& verb, std::optional<FoldTest>& chosen, std::span<const FoldTest> tests, const std::string& text) {
+void add_fold_test_option(CLI::App& verb, std::optional<FoldTest>& chosen, std::span<const FoldTest> tests,
+                          const std::string& text) {
     std::vector<std::pair<std::string, FoldTest>> choices;
     for (const FoldTest test : tests) choices.emplace_back(name_of(test), test);
     add_choice(verb, "--fold-test", chosen, std::move(choices), text);
@@ -247,8 +263,9 @@ void add_view_options(CLI::App& verb, ViewOptions& o) {
     add_number(group, "--ambient", o.ambient, within(0, 1), "A", "Share of light from everywhere, 0..1 (default: 0.2)");
     group
         .add_option("--lights", o.lights,
-                    "Lights instead of these two: directional, point, spot, headlight, ambient, with highlights; with --path, and in the "
-                    "viewer, they may move (the keys: docs/perception.md, Dynamic light)")
+                    "Lights instead of these two: directional, point, spot, headlight, ambient, with highlights; with "
+                    "--path, and in the "
+                    "viewer, they may move (the keys: docs/getting-started.md, Lights)")
         ->type_name("FILE.json");
     add_number(group, "--background", o.background_cdm2, not_negative(), "CDM2", "Background luminance (default: 20)");
     group.add_option("--unit", o.unit_metres, "Metres a mesh unit (default: 1)")
@@ -265,7 +282,9 @@ void add_display_options(CLI::App& verb, DisplayOptions& o) {
     add_number(group, "--distance", o.distance_m, positive(), "METRES", "From the eye to the screen");
     add_number(group, "--peak", o.peak_cdm2, positive(), "CDM2", "Luminance of white");
     add_number(group, "--black", o.black_cdm2, positive(), "CDM2", "Luminance of black");
-    group.add_option("--csf", o.csf, "Contrast sensitivity: a model of unseen csf (default: castle), or a viewer's table")
+    group
+        .add_option("--csf", o.csf,
+                    "Contrast sensitivity: a model of unseen csf (default: castle), or a viewer's table")
         ->type_name("MODEL|FILE");
 }
 
@@ -278,17 +297,24 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
         group.add_flag_function("--imperceptible", counted, "Fold what nobody can see on this display");
     CLI::Option* triangles =
         add_triangles_option(group, goal.triangles, "At most N triangles, as inconspicuous as can be");
-    CLI::Option* fill = group.add_flag("--fill-budget", goal.fill, "With --triangles: use all of them, even where it cannot be seen");
-    add_number(group, "--milliseconds", o.request.milliseconds, not_negative(), "T", "The best cut that T milliseconds are enough for");
-    CLI::Option* pixels = group.add_option("--pixels", goal.tolerance_px, "Fold what is smaller than E pixels, seen or not")
-                              ->type_name("E")
-                              ->check(positive());
+    CLI::Option* fill =
+        group.add_flag("--fill-budget", goal.fill, "With --triangles: use all of them, even where it cannot be seen");
+    add_number(group, "--milliseconds", o.request.milliseconds, not_negative(), "T",
+               "The best cut that T milliseconds are enough for");
+    CLI::Option* pixels =
+        group.add_option("--pixels", goal.tolerance_px, "Fold what is smaller than E pixels, seen or not")
+            ->type_name("E")
+            ->check(positive());
     add_fold_test_option(group, o.request.fold_test,
-                         std::array{FoldTest::error, FoldTest::luebke_hallen, FoldTest::luebke_hallen_safe, FoldTest::extent, FoldTest::displacement},
-                         "error (perceptual: what folds change in fact; default), luebke-hallen (perceptual: what they could change at most), "
-                         "luebke-hallen-safe (the same with its known holes closed, more triangles), extent or displacement (in pixels; of --pixels: "
+                         std::array{FoldTest::error, FoldTest::luebke_hallen, FoldTest::luebke_hallen_safe,
+                                    FoldTest::extent, FoldTest::displacement},
+                         "error (perceptual: what folds change in fact; default), luebke-hallen (perceptual: what they "
+                         "could change at most), "
+                         "luebke-hallen-safe (the same with its known holes closed, more triangles), extent or "
+                         "displacement (in pixels; of --pixels: "
                          "extent)");
-    group.add_flag("--chroma", o.request.chroma, "Keep changes of colour that can be seen, too, not only those of luminance");
+    group.add_flag("--chroma", o.request.chroma,
+                   "Keep changes of colour that can be seen, too, not only those of luminance");
     add_gaze_option(group, o.gaze_px);
     group.callback([=, &o] {
         Goal::Kind& kind = o.request.goal.kind;

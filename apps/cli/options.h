@@ -72,7 +72,8 @@ void add_texture_options(CLI::App& verb, TextureOptions& options);
 void add_geomorph_option(CLI::App& verb, std::optional<double>& seconds);
 void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px);
 // Of `tests`.
-void add_fold_test_option(CLI::App& verb, std::optional<FoldTest>& chosen, std::span<const FoldTest> tests, const std::string& text);
+void add_fold_test_option(CLI::App& verb, std::optional<FoldTest>& chosen, std::span<const FoldTest> tests,
+                          const std::string& text);
 void add_json_option(CLI::App& verb, std::string& file);
 CLI::Option* add_triangles_option(CLI::App& verb, std::uint32_t& triangles, const std::string& text);
 
@@ -91,23 +92,26 @@ CLI::Validator ending_in(std::vector<std::string> endings);
 // An option that takes one of these names and puts the value of the same place into `target`, which is left as it is where the option is not
 // given. What Value is, Target can be set to.
 template <class Target, class Value>
-CLI::Option* add_choice(CLI::App& verb, const std::string& option, Target& target, std::vector<std::pair<std::string, Value>> choices,
-                        const std::string& text) {
+CLI::Option* add_choice(CLI::App& verb, const std::string& option, Target& target,
+                        std::vector<std::pair<std::string, Value>> choices, const std::string& text) {
     std::vector<std::string> names;
     for (const auto& [name, value] : choices) names.push_back(name);
     const auto take = [&target, choices = std::move(choices)](const std::string& given) {
         for (const auto& [name, value] : choices)
             if (name == given) target = value;
     };
-    return verb.add_option_function<std::string>(option, take, text)->type_name("NAME")->check(one_of(std::move(names)));
+    return verb.add_option_function<std::string>(option, take, text)
+        ->type_name("NAME")
+        ->check(one_of(std::move(names)));
 }
 
 // An option that takes a number.
-CLI::Option* add_number(CLI::App& verb, const std::string& name, std::optional<double>& value, const CLI::Validator& validator,
-                        const std::string& unit, const std::string& text);
+CLI::Option* add_number(CLI::App& verb, const std::string& name, std::optional<double>& value,
+                        const CLI::Validator& validator, const std::string& unit, const std::string& text);
 
 // An option that takes three numbers.
-CLI::Option* add_vector(CLI::App& verb, const std::string& name, std::optional<glm::dvec3>& value, const std::string& text);
+CLI::Option* add_vector(CLI::App& verb, const std::string& name, std::optional<glm::dvec3>& value,
+                        const std::string& text);
 
 // Ends the parse: exit status 2.
 [[noreturn]] void refuse(const std::string& message);

@@ -50,7 +50,10 @@ Json texture_json(const vdtree::VertexTree& tree) {
     const vdtree::TextureView texture = tree.texture();
     if (texture.empty()) return nullptr;
     const auto wrap = [](vdtree::Wrap w) { return w == vdtree::Wrap::repeat ? "repeat" : "clamp"; };
-    return {{"width", texture.width}, {"height", texture.height}, {"wrap_u", wrap(texture.wrap_u)}, {"wrap_v", wrap(texture.wrap_v)}};
+    return {{"width", texture.width},
+            {"height", texture.height},
+            {"wrap_u", wrap(texture.wrap_u)},
+            {"wrap_v", wrap(texture.wrap_v)}};
 }
 
 std::string texture_text(const vdtree::VertexTree& tree) {

@@ -9,8 +9,8 @@ namespace {
 std::string_view program = "unseen";
 
 void print_to_stderr(std::string_view kind, std::string_view text) {
-    std::fprintf(stderr, "%.*s: %.*s%.*s\n", static_cast<int>(program.size()), program.data(), static_cast<int>(kind.size()), kind.data(),
-                 static_cast<int>(text.size()), text.data());
+    std::fprintf(stderr, "%.*s: %.*s%.*s\n", static_cast<int>(program.size()), program.data(),
+                 static_cast<int>(kind.size()), kind.data(), static_cast<int>(text.size()), text.data());
 }
 
 } // namespace

@@ -77,7 +77,8 @@ Mesh plates(int count, int side) {
                    const double x = around < 0.5 ? 4 * around - 1 : 3 - 4 * around, y = 2 * down - 1;
                    const double edge = std::min({1.0, 20 * (1 - std::abs(x)), 20 * (1 - std::abs(y))});
                    const double half = 0.5 * thickness * std::sqrt(std::max(edge, 0.0));
-                   return glm::dvec3(x, y, z0 + 0.05 * std::sin(3 * x) * std::cos(2 * y) + (around < 0.5 ? half : -half));
+                   return glm::dvec3(x, y,
+                                     z0 + 0.05 * std::sin(3 * x) * std::cos(2 * y) + (around < 0.5 ? half : -half));
                }));
     }
     return mesh;
@@ -105,7 +106,9 @@ std::vector<HardMesh> hard_meshes(int triangles) {
     const int rows = std::max(16, static_cast<int>(std::sqrt(triangles / 4.0))); // of 2 rows * rows * 2
     std::mt19937_64 random(1);
     const auto noise = [&](glm::dvec3) { return 0.5 + 0.04 * (static_cast<double>(random() >> 11) * 0x1p-53 - 0.5); };
-    const auto checks = [](glm::dvec3 p) { return std::sin(20 * p.x) * std::sin(20 * p.y) * std::sin(20 * p.z + 1) > 0 ? 0.8 : 0.2; };
+    const auto checks = [](glm::dvec3 p) {
+        return std::sin(20 * p.x) * std::sin(20 * p.y) * std::sin(20 * p.z + 1) > 0 ? 0.8 : 0.2;
+    };
     Mesh inside_out = ball(rows, 2 * rows, 0.02);
     for (auto& t : inside_out.triangles) std::swap(t[1], t[2]);
     const int around = rows * rows / 10; // fifty times as long as wide, about

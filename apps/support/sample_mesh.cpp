@@ -12,8 +12,8 @@ vdtree::Mesh bumpy_sphere(int rows) {
         for (int j = 0; j < columns; ++j) {
             const double theta = std::numbers::pi * i / rows, phi = 2 * std::numbers::pi * j / columns;
             const double r = 1 + 0.02 * std::sin(20 * theta) * std::cos(14 * phi);
-            mesh.positions.push_back(r * glm::dvec3(std::sin(theta) * std::cos(phi), std::cos(theta),
-                                                    std::sin(theta) * std::sin(phi)));
+            mesh.positions.push_back(
+                r * glm::dvec3(std::sin(theta) * std::cos(phi), std::cos(theta), std::sin(theta) * std::sin(phi)));
         }
     }
     const auto at = [&](int i, int j) { return static_cast<vdtree::Index>(i * columns + j % columns); };

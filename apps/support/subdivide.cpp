@@ -48,9 +48,8 @@ std::vector<Index> first_at_position(const std::vector<glm::dvec3>& positions) {
     std::vector<Index> order(positions.size());
     for (Index v = 0; v < order.size(); ++v) order[v] = v;
     const auto key = [&](Index v) { return std::array{positions[v].x, positions[v].y, positions[v].z}; };
-    std::sort(order.begin(), order.end(), [&](Index a, Index b) {
-        return positions[a] != positions[b] ? key(a) < key(b) : a < b;
-    });
+    std::sort(order.begin(), order.end(),
+              [&](Index a, Index b) { return positions[a] != positions[b] ? key(a) < key(b) : a < b; });
     std::vector<Index> first(positions.size());
     for (std::size_t i = 0; i < order.size(); ++i) {
         const bool repeats = i > 0 && positions[order[i]] == positions[order[i - 1]];
@@ -73,8 +72,7 @@ std::vector<glm::vec3> vertex_normals(const Mesh& mesh) {
     std::vector<glm::dvec3> sums(mesh.positions.size(), glm::dvec3(0));
     for (const Triangle& t : mesh.triangles) {
         const glm::dvec3 a = mesh.positions[t[0]] / unit;
-        const glm::dvec3 normal =
-            glm::cross(mesh.positions[t[1]] / unit - a, mesh.positions[t[2]] / unit - a);
+        const glm::dvec3 normal = glm::cross(mesh.positions[t[1]] / unit - a, mesh.positions[t[2]] / unit - a);
         for (const Index v : t) sums[first[v]] += normal;
     }
     std::vector<glm::vec3> normals(sums.size());
@@ -144,7 +142,8 @@ public:
             all ? std::vector<bool>(edges.ends.size(), true) : longest(edges, at_most - triangle_count());
         const auto count = static_cast<std::uint64_t>(std::count(is_split.begin(), is_split.end(), true));
         if (mesh_.positions.size() + count >= not_split)
-            return Error{ErrorCode::unsupported, "There would be more vertices than indices can count; subdivide less."};
+            return Error{ErrorCode::unsupported,
+                         "There would be more vertices than indices can count; subdivide less."};
         const std::vector<Index> midpoints = add_midpoints(edges, is_split, count);
         edges.ends = {};
         split_triangles(edges.of_corner, midpoints);
@@ -261,8 +260,10 @@ private:
         }
         // Turned so that with one split edge it is the first, and with two the last edge is whole.
         std::size_t turn = 0;
-        if (split == 1) while (middles[turn] == not_split) ++turn;
-        if (split == 2) while (middles[(turn + 2) % 3] != not_split) ++turn;
+        if (split == 1)
+            while (middles[turn] == not_split) ++turn;
+        if (split == 2)
+            while (middles[(turn + 2) % 3] != not_split) ++turn;
         const Index a = t[turn], b = t[(turn + 1) % 3], c = t[(turn + 2) % 3];
         const Index ab = middles[turn], bc = middles[(turn + 1) % 3], ca = middles[(turn + 2) % 3];
         if (split == 1) {

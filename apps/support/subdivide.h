@@ -10,9 +10,10 @@
 namespace unseen::app {
 
 struct SubdivideOptions {
-    int times = 0;                             // every triangle becomes four, so many times
-    std::optional<std::uint64_t> triangles = {}; // instead: as often as it takes to come near to, and not above, so many
-    double noise = default_noise;              // largest displacement of a new vertex, as a share of its edge's length
+    int times = 0; // every triangle becomes four, so many times
+    std::optional<std::uint64_t> triangles =
+        {};                       // instead: as often as it takes to come near to, and not above, so many
+    double noise = default_noise; // largest displacement of a new vertex, as a share of its edge's length
     std::uint64_t seed = 1;
     Progress progress = {};
 

@@ -110,13 +110,15 @@ Result<void> check_names(const BuildArguments& a) {
 // Without words.
 Result<meshio::ReadResult> read_quietly(const std::filesystem::path& file, const meshio::ReadOptions& options,
                                         const TextureOptions& texture) {
-    return session::read_textured_mesh(file, {.texture = texture.file, .without_textures = texture.is_left_out}, options);
+    return session::read_textured_mesh(file, {.texture = texture.file, .without_textures = texture.is_left_out},
+                                       options);
 }
 
 // The mesh, if it can be built within the limit of memory. `read_file` reads it, with or without words.
 template <class ReadFile>
 Result<meshio::ReadResult> read_source(const BuildArguments& a, ProcessTeam* team, ReadFile&& read_file) {
-    const auto limit = MemoryLimit::set(a.memory_gib, a.out, a.memory_gib > 0 ? threads(a, team) : 1); // else the team may start meanwhile
+    const auto limit = MemoryLimit::set(a.memory_gib, a.out,
+                                        a.memory_gib > 0 ? threads(a, team) : 1); // else the team may start meanwhile
     if (!limit) return limit.error();
     Result<meshio::ReadResult> read = read_file(a.mesh, reading(a), a.texture);
     if (!read) {
@@ -219,16 +221,19 @@ Command build_command(CLI::App& app) {
     verb->add_option("MESH", a->mesh, "PLY, OBJ, OFF, STL or glTF")->required()->type_name("FILE");
     verb->add_option("-o,--output", a->out, "The tree")->type_name("TREE.vdt")->required()->check(ending_in({".vdt"}));
     add_choice<vdtree::ClustererKind, vdtree::ClustererKind>(
-        *verb, "--clusterer", a->clusterer, {{"quadric", vdtree::ClustererKind::quadric}, {"octree", vdtree::ClustererKind::octree}},
+        *verb, "--clusterer", a->clusterer,
+        {{"quadric", vdtree::ClustererKind::quadric}, {"octree", vdtree::ClustererKind::octree}},
         "quadric (best; default) or octree (fast)");
     add_choice<meshio::ColourEncoding, meshio::ColourEncoding>(
-        *verb, "--colours", a->colours, {{"srgb", meshio::ColourEncoding::srgb}, {"linear", meshio::ColourEncoding::linear}},
+        *verb, "--colours", a->colours,
+        {{"srgb", meshio::ColourEncoding::srgb}, {"linear", meshio::ColourEncoding::linear}},
         "How the file's colours are encoded: srgb (default) or linear");
     verb->add_option("--threads", a->threads, "Threads of each process; the tree is the same (default: all cores)")
         ->type_name("N")
         ->check(whole(1, most_threads));
     verb->add_flag("--fold-errors", a->fold_errors,
-                   "Measure what every fold changes, for the fold test 'error' (else that is done at each start), and give proxies the luminance "
+                   "Measure what every fold changes, for the fold test 'error' (else that is done at each start), and "
+                   "give proxies the luminance "
                    "that keeps the surface's light");
     add_texture_options(*verb, a->texture);
     verb->add_option("--memory", a->memory_gib,

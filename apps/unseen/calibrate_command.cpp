@@ -62,13 +62,15 @@ std::vector<GratingPlace> places_named(const CalibrateArguments& a) {
     return places;
 }
 
-Result<CalibrationPlan> make_plan(const CalibrateArguments& a, const perception::Display& display, const perception::CsfTable& expected) {
+Result<CalibrationPlan> make_plan(const CalibrateArguments& a, const perception::Display& display,
+                                  const perception::CsfTable& expected) {
     std::optional<perception::Luminance> luminance;
     if (a.luminance) {
-        const double black = perception::black_level(display).value(), white = perception::to_luminance(display, 1).value();
+        const double black = perception::black_level(display).value(),
+                     white = perception::to_luminance(display, 1).value();
         if (!(*a.luminance > black && *a.luminance < white))
-            return invalid("--luminance " + shortest(*a.luminance) + " cd/m2 is not between the display's black (" + shortest(black) +
-                           ") and white (" + shortest(white) + ").");
+            return invalid("--luminance " + shortest(*a.luminance) + " cd/m2 is not between the display's black (" +
+                           shortest(black) + ") and white (" + shortest(white) + ").");
         luminance = perception::Luminance(*a.luminance);
     }
     CalibrationPlan plan = calibration::plan_for(display, expected, luminance);
@@ -87,7 +89,8 @@ Result<CalibrationPlan> make_plan(const CalibrateArguments& a, const perception:
 Result<void> check_resumed(const CalibrateArguments& a, const CalibrationPlan& plan) {
     std::string differing;
     const auto add = [&](const std::string& option, const std::string& begun_with) {
-        differing += (differing.empty() ? "" : ", ") + option + (begun_with.empty() ? "" : " (it was " + begun_with + ")");
+        differing +=
+            (differing.empty() ? "" : ", ") + option + (begun_with.empty() ? "" : " (it was " + begun_with + ")");
     };
     const auto compare = [&](const char* option, const std::optional<double>& given, double begun_with) {
         if (given && *given != begun_with) add(option, shortest(begun_with));
@@ -101,7 +104,8 @@ Result<void> check_resumed(const CalibrateArguments& a, const CalibrationPlan& p
     if (!named.empty() && !std::is_permutation(named.begin(), named.end(), plan.places.begin(), plan.places.end()))
         add("--frequencies and --eccentricities", "");
     if (differing.empty()) return {};
-    return invalid("'" + a.state + "' was not begun so: leave away " + differing + ", or begin anew with another file.");
+    return invalid("'" + a.state + "' was not begun so: leave away " + differing +
+                   ", or begin anew with another file.");
 }
 
 // What a person is shown must be what the plan says, also where the plan comes from a file.
@@ -110,12 +114,14 @@ Result<void> check_display(const CalibrationPlan& plan, const perception::Displa
     const double mean = plan.luminance.value(), amplitude = mean * plan.highest_contrast;
     constexpr double rounding = 1e-9;
     if (!(mean - amplitude >= black - rounding * white && mean + amplitude <= white * (1 + rounding)))
-        return invalid("The display '" + display.name + "' cannot show contrasts up to " + rounded(plan.highest_contrast, 3) + " around " +
-                       rounded(mean, 4) + " cd/m2: use the one that the calibration was begun on.");
+        return invalid("The display '" + display.name + "' cannot show contrasts up to " +
+                       rounded(plan.highest_contrast, 3) + " around " + rounded(mean, 4) +
+                       " cd/m2: use the one that the calibration was begun on.");
     for (const calibration::GratingPlace& place : plan.places)
         if (!calibration::fits(display, place))
-            return invalid("The display '" + display.name + "' has no room for a grating of " + shortest(place.frequency_cpd) + " cpd at " +
-                           shortest(place.eccentricity_deg) + " degrees: choose other --frequencies and --eccentricities.");
+            return invalid("The display '" + display.name + "' has no room for a grating of " +
+                           shortest(place.frequency_cpd) + " cpd at " + shortest(place.eccentricity_deg) +
+                           " degrees: choose other --frequencies and --eccentricities.");
     return {};
 }
 
@@ -150,9 +156,12 @@ Json to_json(const Procedure& procedure, const SimulatedObserver* truth) {
     const CalibrationPlan& plan = procedure.plan();
     Json measured = Json::array();
     for (const PlaceEstimate& e : procedure.estimates()) {
-        Json row = {{"frequency_cpd", e.place.frequency_cpd}, {"eccentricity_deg", e.place.eccentricity_deg},
-                    {"sensitivity", e.sensitivity()},         {"low", e.low()},
-                    {"high", e.high()},                       {"answers", e.answers},
+        Json row = {{"frequency_cpd", e.place.frequency_cpd},
+                    {"eccentricity_deg", e.place.eccentricity_deg},
+                    {"sensitivity", e.sensitivity()},
+                    {"low", e.low()},
+                    {"high", e.high()},
+                    {"answers", e.answers},
                     {"off_shape_db", 20 * e.local.mean}};
         if (truth) {
             const double value = truth->sensitivity(e.place, plan.luminance);
@@ -161,44 +170,46 @@ Json to_json(const Procedure& procedure, const SimulatedObserver* truth) {
         }
         measured.push_back(row);
     }
-    Json json = {{"method", calibration::name(plan.method)},
-                 {"seed", plan.seed},
-                 {"answers", procedure.answers().size()},
-                 {"done", procedure.is_done()},
-                 {"luminance_cdm2", plan.luminance.value()},
-                 {"highest_contrast", plan.highest_contrast},
-                 {"misfit_db", misfit_db(procedure)},
-                 {"measured", measured}};
+    Json json = {{"method", calibration::name(plan.method)}, {"seed", plan.seed},
+                 {"answers", procedure.answers().size()},    {"done", procedure.is_done()},
+                 {"luminance_cdm2", plan.luminance.value()}, {"highest_contrast", plan.highest_contrast},
+                 {"misfit_db", misfit_db(procedure)},        {"measured", measured}};
     if (truth) json["rms_error_db"] = number_or_null(rms_db(procedure, *truth));
     return json;
 }
 
 void print(const Procedure& procedure, const SimulatedObserver* truth) {
-    std::vector<std::vector<std::string>> rows = {{"eccentricity", "frequency", "sensitivity", "95% from", "to", "answers", "off shape"}};
+    std::vector<std::vector<std::string>> rows = {
+        {"eccentricity", "frequency", "sensitivity", "95% from", "to", "answers", "off shape"}};
     if (truth) rows.front().insert(rows.front().end(), {"true", "error"});
     for (const PlaceEstimate& e : procedure.estimates()) {
-        rows.push_back({rounded(e.place.eccentricity_deg, 3) + " deg", rounded(e.place.frequency_cpd, 3) + " cpd", rounded(e.sensitivity(), 3),
-                        rounded(e.low(), 3), rounded(e.high(), 3), std::to_string(e.answers), rounded(20 * e.local.mean, 2) + " dB"});
+        rows.push_back({rounded(e.place.eccentricity_deg, 3) + " deg", rounded(e.place.frequency_cpd, 3) + " cpd",
+                        rounded(e.sensitivity(), 3), rounded(e.low(), 3), rounded(e.high(), 3),
+                        std::to_string(e.answers), rounded(20 * e.local.mean, 2) + " dB"});
         if (!truth) continue;
         const double value = truth->sensitivity(e.place, procedure.plan().luminance);
         rows.back().push_back(rounded(value, 3));
-        rows.back().push_back(is_visible(value, procedure.plan()) ? rounded(decibels(e.sensitivity() / value), 2) + " dB" : "unseen");
+        rows.back().push_back(
+            is_visible(value, procedure.plan()) ? rounded(decibels(e.sensitivity() / value), 2) + " dB" : "unseen");
     }
     print_table(rows);
-    std::printf("%zu answers at %s cd/m2, contrasts up to %s; off the fitted shape by %s dB (rms)\n", procedure.answers().size(),
-                rounded(procedure.plan().luminance.value(), 4).c_str(), rounded(procedure.plan().highest_contrast, 3).c_str(),
-                rounded(misfit_db(procedure), 2).c_str());
+    std::printf("%zu answers at %s cd/m2, contrasts up to %s; off the fitted shape by %s dB (rms)\n",
+                procedure.answers().size(), rounded(procedure.plan().luminance.value(), 4).c_str(),
+                rounded(procedure.plan().highest_contrast, 3).c_str(), rounded(misfit_db(procedure), 2).c_str());
     if (!truth) return;
-    if (const double error_db = rms_db(procedure, *truth); std::isnan(error_db)) std::printf("this observer can see none of it: no error to tell\n");
+    if (const double error_db = rms_db(procedure, *truth); std::isnan(error_db))
+        std::printf("this observer can see none of it: no error to tell\n");
     else std::printf("error %s dB (rms over what can be seen)\n", rounded(error_db, 3).c_str());
 }
 
-Result<calibration::ObserverProfile> profile_of(const Procedure& procedure, const CalibrateArguments& a, const perception::Display& display) {
+Result<calibration::ObserverProfile> profile_of(const Procedure& procedure, const CalibrateArguments& a,
+                                                const perception::Display& display) {
     calibration::ObserverProfile profile;
     profile.observer = !a.observer.empty() ? a.observer : a.simulate.empty() ? "unnamed" : "simulated: " + a.simulate;
     profile.date = a.date.empty() ? today() : a.date;
-    profile.method = std::string(calibration::name(procedure.plan().method)) + ", " + std::to_string(procedure.answers().size()) +
-                     " answers, seed " + std::to_string(procedure.plan().seed);
+    profile.method = std::string(calibration::name(procedure.plan().method)) + ", " +
+                     std::to_string(procedure.answers().size()) + " answers, seed " +
+                     std::to_string(procedure.plan().seed);
     profile.display = display.name;
     profile.conditions = a.conditions;
     profile.measured_at_cdm2 = procedure.plan().luminance.value();
@@ -264,7 +275,8 @@ Result<int> calibrate_observer(CalibrateArguments& a, const perception::Display&
         a.window.display = display;
         if (auto shown = run_calibration_window(*procedure, a.window, a.state); !shown) return shown.error();
         if (!procedure->is_done()) {
-            print_note(std::to_string(procedure->answers().size()) + " of " + std::to_string(procedure->trials()) + " answers were given" +
+            print_note(std::to_string(procedure->answers().size()) + " of " + std::to_string(procedure->trials()) +
+                       " answers were given" +
                        (a.state.empty() ? "; with --resume FILE they would have been kept."
                                         : "; go on with --resume '" + a.state + "'."));
             return a.out.empty() && a.json.empty() ? exit_done : exit_failed; // nothing is written
@@ -300,7 +312,8 @@ Result<int> calibrate_gamma(CalibrateArguments& a, perception::Display display) 
     if (!gamma) return gamma.error();
     for (const GammaMatch& m : *matches)
         std::printf("%s of white looks like code %d (a gamma of %s)\n", rounded(m.share, 3).c_str(),
-                    static_cast<int>(std::lround(m.code * 255)), rounded(std::log(m.share) / std::log(m.code), 3).c_str());
+                    static_cast<int>(std::lround(m.code * 255)),
+                    rounded(std::log(m.share) / std::log(m.code), 3).c_str());
     std::printf("gamma %s\n", rounded(*gamma, 4).c_str());
     display.transfer = perception::TransferFunction::gamma;
     display.gamma = *gamma;
@@ -320,7 +333,9 @@ Result<int> calibrate_by_photometer(const CalibrateArguments& a, const perceptio
 Result<int> run(CalibrateArguments& a) {
     // Before anybody has answered anything.
     const std::string simulated = a.simulate.substr(0, a.simulate.find(':')); // a model, or a file
-    if (const auto ready = check_outputs({a.display.file, a.display.csf, a.photometer, simulated}, {a.out, a.json, a.state, a.window.screenshot}); !ready)
+    if (const auto ready = check_outputs({a.display.file, a.display.csf, a.photometer, simulated},
+                                         {a.out, a.json, a.state, a.window.screenshot});
+        !ready)
         return ready.error();
     const auto display = make_display(a.display);
     if (!display) return display.error();
@@ -339,14 +354,17 @@ void check(const CalibrateArguments& a) {
     if (modes > 1) refuse("--simulate, --gamma, --photometer and --chart exclude each other: give one of them.");
     const std::string ending = a.chart ? ".png" : ".json";
     if (!a.out.empty() && !has_ending(a.out, ending)) refuse("-o must end in " + ending + ", not '" + a.out + "'.");
-    if (a.frequencies.empty() != a.eccentricities.empty()) refuse("--frequencies and --eccentricities need each other.");
+    if (a.frequencies.empty() != a.eccentricities.empty())
+        refuse("--frequencies and --eccentricities need each other.");
     if (!a.photometer.empty() && a.out.empty()) refuse("--photometer needs -o DISPLAY.json for what was measured.");
     const bool is_of_display = a.chart || a.gamma || !a.photometer.empty();
     if (is_of_display && !a.json.empty()) refuse("--json is for observers.");
     const bool has_plan = a.method || a.seed || a.trials || a.settings || a.luminance || !a.frequencies.empty();
     if (is_of_display && (has_plan || !a.state.empty()))
-        refuse("--method, --seed, --trials, --settings, --luminance, --frequencies, --eccentricities and --resume are for observers.");
-    if (a.trials && a.method == Method::adjustment) refuse("--trials is for --method 2ifc: with adjustment, say --settings.");
+        refuse("--method, --seed, --trials, --settings, --luminance, --frequencies, --eccentricities and --resume are "
+               "for observers.");
+    if (a.trials && a.method == Method::adjustment)
+        refuse("--trials is for --method 2ifc: with adjustment, say --settings.");
     const bool may_be_adjustment = a.method ? *a.method == Method::adjustment : !a.state.empty(); // of a file, its own
     if (a.settings && !may_be_adjustment) refuse("--settings needs --method adjustment.");
 }
@@ -355,19 +373,26 @@ void check(const CalibrateArguments& a) {
 
 Command calibrate_command(CLI::App& app) {
     auto a = std::make_shared<CalibrateArguments>();
-    CLI::App* verb = app.add_subcommand("calibrate", "Measure a viewer's contrast sensitivity, for --csf; or a display");
-    verb->add_option("-o,--output", a->out, "The observer's profile; of --gamma and --photometer the display's; of --chart a picture")
+    CLI::App* verb =
+        app.add_subcommand("calibrate", "Measure a viewer's contrast sensitivity, for --csf; or a display");
+    verb->add_option("-o,--output", a->out,
+                     "The observer's profile; of --gamma and --photometer the display's; of --chart a picture")
         ->type_name("OUT.json|.png");
-    add_choice<std::optional<Method>, Method>(*verb, "--method", a->method, {{"2ifc", Method::two_interval}, {"adjustment", Method::adjustment}},
-                                              "2ifc (default): in which of two intervals was a grating? adjustment: gratings fade in and out");
+    add_choice<std::optional<Method>, Method>(
+        *verb, "--method", a->method, {{"2ifc", Method::two_interval}, {"adjustment", Method::adjustment}},
+        "2ifc (default): in which of two intervals was a grating? adjustment: gratings fade in and out");
     add_number(*verb, "--trials", a->trials, whole(1, 1e5), "N", "Of 2ifc (default: 200)");
-    add_number(*verb, "--settings", a->settings, whole(2, 1000), "N", "Of adjustment, at each place; the first does not count (default: 7)");
+    add_number(*verb, "--settings", a->settings, whole(2, 1000), "N",
+               "Of adjustment, at each place; the first does not count (default: 7)");
     constexpr double most_seed = 9007199254740992.0; // 2^53, which JSON keeps
-    add_number(*verb, "--seed", a->seed, whole(0, most_seed), "N", "Of the order of trials, and of simulated observers (default: 1)");
+    add_number(*verb, "--seed", a->seed, whole(0, most_seed), "N",
+               "Of the order of trials, and of simulated observers (default: 1)");
     verb->add_option("--simulate", a->simulate,
-                     "Without a person: a CSF model or a profile, with gain=, frequency=, eccentricity=, slope=, lapse=, scatter=, delay=")
+                     "Without a person: a CSF model or a profile, with gain=, frequency=, eccentricity=, slope=, "
+                     "lapse=, scatter=, delay=")
         ->type_name("NAME|FILE.json[:key=value,...]");
-    verb->add_option("--resume", a->state, "Keep all answers in this file, and go on with those that are there, by the plan that is there")
+    verb->add_option("--resume", a->state,
+                     "Keep all answers in this file, and go on with those that are there, by the plan that is there")
         ->type_name("STATE.json");
     verb->add_option("--frequencies", a->frequencies, "To measure at (default: octaves that fit the display)")
         ->type_name("CPD")
@@ -375,16 +400,19 @@ Command calibrate_command(CLI::App& app) {
     verb->add_option("--eccentricities", a->eccentricities, "To measure at (default: 0, 5, 10, 20 as far as they fit)")
         ->type_name("DEG")
         ->check(not_negative());
-    add_number(*verb, "--luminance", a->luminance, positive(), "CDM2", "Mean of the gratings (default: midway from black to white)");
+    add_number(*verb, "--luminance", a->luminance, positive(), "CDM2",
+               "Mean of the gratings (default: midway from black to white)");
     verb->add_option("--observer", a->observer, "Who it is, for the profile")->type_name("NAME");
     verb->add_option("--conditions", a->conditions, "Room, light, glasses, for the profile")->type_name("TEXT");
     verb->add_option("--date", a->date, "For the profile (default: today)")->type_name("TEXT");
     add_json_option(*verb, a->json);
     verb->add_flag("--gamma", a->gamma, "Measure the display's gamma by matching patches");
-    verb->add_option("--photometer", a->photometer, "Take the display's luminances from a table, header code,cdm2")->type_name("FILE.csv");
+    verb->add_option("--photometer", a->photometer, "Take the display's luminances from a table, header code,cdm2")
+        ->type_name("FILE.csv");
     verb->add_flag("--chart", a->chart, "Campbell and Robson's chart, in a window or with -o as a picture");
     verb->add_flag("--full-screen", a->window.full_screen, "Not in a window");
-    verb->add_option("--interval", a->window.interval_s, "Seconds of a grating, and of the pause between two (default: 0.5)")
+    verb->add_option("--interval", a->window.interval_s,
+                     "Seconds of a grating, and of the pause between two (default: 0.5)")
         ->type_name("S")
         ->check(within(0.01, 60));
     verb->add_option("--fade", a->window.fade_per_s, "Of adjustment: decades of contrast a second (default: 0.25)")
@@ -395,11 +423,12 @@ Command calibrate_command(CLI::App& app) {
         ->check(ending_in({".png"}));
     add_display_options(*verb, a->display);
     verb->callback([o = a.get()] { check(*o); });
-    verb->footer(std::string(calibration_window_help) +
-                 "\nExamples:\n  unseen calibrate --display mine.json --observer anna --resume anna-state.json -o anna.json\n"
-                 "  unseen calibrate --simulate castle:gain=0.7 --seed 3 -o observer.json\n"
-                 "  unseen calibrate --gamma --display mine.json -o mine-measured.json\n"
-                 "  unseen calibrate --chart -o chart.png\n  unseen render bunny.vdt --csf anna.json -o bunny.png");
+    verb->footer(
+        std::string(calibration_window_help) +
+        "\nExamples:\n  unseen calibrate --display mine.json --observer anna --resume anna-state.json -o anna.json\n"
+        "  unseen calibrate --simulate castle:gain=0.7 --seed 3 -o observer.json\n"
+        "  unseen calibrate --gamma --display mine.json -o mine-measured.json\n"
+        "  unseen calibrate --chart -o chart.png\n  unseen render bunny.vdt --csf anna.json -o bunny.png");
     return {verb, [a] { return run(*a); }};
 }
 

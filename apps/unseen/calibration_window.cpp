@@ -36,8 +36,11 @@ class Stage {
 public:
     static Result<std::unique_ptr<Stage>> open(const CalibrationWindowOptions& options, const std::string& title) {
         constexpr int exact_pixels = 0;
-        auto context = render::Context::window({.width = options.display.width_px, .height = options.display.height_px, .title = title,
-                                                .full_screen = options.full_screen, .samples = exact_pixels});
+        auto context = render::Context::window({.width = options.display.width_px,
+                                                .height = options.display.height_px,
+                                                .title = title,
+                                                .full_screen = options.full_screen,
+                                                .samples = exact_pixels});
         if (!context) return context.error();
         auto drawer = render::TestPatternDrawer::create(*context, calibration::code_luminances(options.display));
         if (!drawer) return drawer.error();
@@ -81,8 +84,8 @@ public:
     }
 
     // Codes as grey pixels.
-    static Result<void> write_picture(render::TestPatternDrawer& drawer, const TestPattern& pattern, int width, int height,
-                                      const std::string& file) {
+    static Result<void> write_picture(render::TestPatternDrawer& drawer, const TestPattern& pattern, int width,
+                                      int height, const std::string& file) {
         auto codes = drawer.draw(pattern, width, height);
         if (!codes) return codes.error();
         return perception::write_image(file, {width, height, 1, std::move(*codes)});
@@ -132,8 +135,9 @@ public:
     // One trial, from its first frame to its answer, or to the window's end.
     Result<void> run_trial() {
         trial_ = procedure_.next();
-        stage_.set_title("Unseen - calibration, " + std::to_string(trial_.number + 1) + " of " + std::to_string(procedure_.trials()) + ": " +
-                         rounded(trial_.grating.frequency_cpd, 3) + " cpd, " + rounded(trial_.grating.eccentricity_deg, 3) + " deg");
+        stage_.set_title("Unseen - calibration, " + std::to_string(trial_.number + 1) + " of " +
+                         std::to_string(procedure_.trials()) + ": " + rounded(trial_.grating.frequency_cpd, 3) +
+                         " cpd, " + rounded(trial_.grating.eccentricity_deg, 3) + " deg");
         aim();
         return procedure_.plan().method == Method::two_interval ? two_intervals() : adjustment();
     }
@@ -198,7 +202,8 @@ private:
                 if (key == GLFW_KEY_UP || key == GLFW_KEY_DOWN) {
                     fades = false;
                     log10_contrast += key == GLFW_KEY_UP ? key_step : -key_step;
-                } else if (key == GLFW_KEY_SPACE || key == GLFW_KEY_ENTER || key == GLFW_KEY_KP_ENTER || key == GLFW_KEY_N) {
+                } else if (key == GLFW_KEY_SPACE || key == GLFW_KEY_ENTER || key == GLFW_KEY_KP_ENTER ||
+                           key == GLFW_KEY_N) {
                     procedure_.set(key == GLFW_KEY_N ? highest : std::pow(10, log10_contrast));
                     stage_.forget_keys();
                     return {};
@@ -233,7 +238,8 @@ TestPattern chart_of(const perception::Display& display) {
 
 } // namespace
 
-Result<void> run_calibration_window(Procedure& procedure, const CalibrationWindowOptions& options, const std::filesystem::path& state) {
+Result<void> run_calibration_window(Procedure& procedure, const CalibrationWindowOptions& options,
+                                    const std::filesystem::path& state) {
     std::fputs(calibration_window_help, stderr); // stdout may be for --json
     auto stage = Stage::open(options, "Unseen - calibration");
     if (!stage) return stage.error();

@@ -40,8 +40,8 @@ Result<Orbit> parse_orbit(const std::string& path) {
     int frames = 0;
     if (colon != std::string_view::npos) {
         if (!parse(text.substr(colon + 1), frames) || frames < 1 || frames > most_path_frames)
-            return invalid("'" + path + "' must be orbit:DEGREES[:FRAMES] with 1 to " + std::to_string(most_path_frames) +
-                           " frames.");
+            return invalid("'" + path + "' must be orbit:DEGREES[:FRAMES] with 1 to " +
+                           std::to_string(most_path_frames) + " frames.");
     } else if (!(std::abs(degrees) >= least_orbit_degrees)) {
         return invalid("'" + path + "' never comes around; say how many frames: orbit:DEGREES:FRAMES.");
     } else {
@@ -116,7 +116,8 @@ private:
             const auto found = std::find(column_names.begin(), column_names.end(), name);
             const auto column = static_cast<Column>(found - column_names.begin());
             if (column == column_count)
-                return malformed("column " + std::to_string(columns_.size() + 1) + ", '" + std::string(name.substr(0, 40)) +
+                return malformed("column " + std::to_string(columns_.size() + 1) + ", '" +
+                                 std::string(name.substr(0, 40)) +
                                  "', is none of eye_x, eye_y, eye_z, target_x, ..., up_x, ..., gaze_x, gaze_y.");
             if (has(column)) return malformed("column '" + std::string(name) + "' comes twice.");
             columns_.push_back(column);

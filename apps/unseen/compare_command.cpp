@@ -88,7 +88,8 @@ Result<Verdict> judge_modern(const CompareArguments& a, const Pair& pair, const 
 Result<Verdict> judge_rpg99(const CompareArguments& a, const Pair& pair, const perception::Display& display) {
     const bool as_the_program = a.profile == perceptualdiff;
     if (as_the_program && !pair.has_codes())
-        return Error{ErrorCode::invalid_argument, "--profile perceptualdiff is for PNG: PFM and EXR hold cd/m2, which that program does not know."};
+        return Error{ErrorCode::invalid_argument,
+                     "--profile perceptualdiff is for PNG: PFM and EXR hold cd/m2, which that program does not know."};
     const auto luminance = [&](const ImageFile& file) {
         return as_the_program ? perception::perceptualdiff_luminance(file.image, display.peak.value())
                               : perception::to_luminance(file, display);
@@ -129,7 +130,9 @@ Result<void> write_maps(const CompareArguments& a, const Verdict& verdict) {
 }
 
 Result<int> run(const CompareArguments& a) {
-    if (const auto ready = check_outputs({a.reference, a.test, a.display.file, a.display.csf}, {a.map, a.threshold_map, a.json}); !ready)
+    if (const auto ready =
+            check_outputs({a.reference, a.test, a.display.file, a.display.csf}, {a.map, a.threshold_map, a.json});
+        !ready)
         return ready.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
@@ -195,7 +198,8 @@ Command compare_command(CLI::App& app) {
         ->type_name("DEGREES")
         ->check(within(1e-3, 179.9));
     add_gaze_option(*verb, a->gaze_px);
-    verb->add_option("--map", a->map, "The differences, with a scale below: blue where invisible, yellow to red where visible")
+    verb->add_option("--map", a->map,
+                     "The differences, with a scale below: blue where invisible, yellow to red where visible")
         ->type_name("OUT.png")
         ->check(ending_in({".png"}));
     verb->add_option("--threshold-map", a->threshold_map, "The least visible luminance step, in cd/m2")

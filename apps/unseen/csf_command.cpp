@@ -12,9 +12,9 @@
 
 #include <calibration/observer_profile.h>
 #include <perception/csf.h>
-#include <session/observer.h>
 #include <perception/image.h>
 #include <perception/motion.h>
+#include <session/observer.h>
 #include <vdtree/internal/number_text.h>
 
 #include "log_log_plot.h"
@@ -313,7 +313,8 @@ void check(const CsfArguments& a) {
     if (!a.plot.empty() && a.stimulus.frequency) refuse("--plot draws all frequencies: leave --frequency away.");
     if (!a.save.empty() && (a.stimulus.frequency || a.stimulus.luminance || a.stimulus.eccentricity))
         refuse("--save-table holds all frequencies, luminances and eccentricities: leave these options away.");
-    if (a.stimulus.distance && a.csf.empty() && a.model_name != name(CsfModel::daly)) refuse("--distance is for --model daly: the others know none.");
+    if (a.stimulus.distance && a.csf.empty() && a.model_name != name(CsfModel::daly))
+        refuse("--distance is for --model daly: the others know none.");
     if (outputs > 0) return;
     if (!a.stimulus.frequency) refuse("--frequency is required, or else --csv, --plot or --save-table.");
     if (!a.stimulus.luminance) refuse("--luminance is required, or else --csv, --plot or --save-table.");
@@ -352,7 +353,9 @@ Command csf_command(CLI::App& app) {
         ->check(one_of({"nasal", "temporal", "worst"}));
     verb->add_option("--csv", a->csv, "Rows of stimuli, columns named like these options; adds 'sensitivity' to stdout")
         ->type_name("FILE|-");
-    verb->add_option("--plot", a->plot, "Curves over frequency")->type_name("OUT.png|.svg")->check(ending_in({".png", ".svg"}));
+    verb->add_option("--plot", a->plot, "Curves over frequency")
+        ->type_name("OUT.png|.svg")
+        ->check(ending_in({".png", ".svg"}));
     verb->add_flag("--table", a->by_table, "Through the interpolated table that fold tests use, not the closed form");
     verb->add_option("--csf", a->csf, "Through a model's table, or a viewer's")->type_name("MODEL|FILE");
     verb->add_option("--save-table", a->save, "With --table or --csf: write the table")

@@ -59,7 +59,8 @@ std::optional<NamePattern> parse_pattern(const std::string& pattern) {
     while (end < pattern.size() && pattern[end] >= '0' && pattern[end] <= '9') ++end;
     if (end == pattern.size() || pattern[end] != 'd' || end - begin > 3) return std::nullopt;
     NamePattern result{pattern.substr(0, begin), pattern.substr(end + 1), 0};
-    if (end > begin + 1) result.digits = static_cast<std::size_t>(std::stoi(pattern.substr(begin + 1, end - begin - 1)));
+    if (end > begin + 1)
+        result.digits = static_cast<std::size_t>(std::stoi(pattern.substr(begin + 1, end - begin - 1)));
     return result.digits <= most_digits ? std::optional(result) : std::nullopt;
 }
 
@@ -103,12 +104,13 @@ private:
 std::string cell(double value) { return std::isfinite(value) ? shortest(value) : std::string(); }
 
 std::string to_csv(const std::vector<FrameRecord>& frames) {
-    std::string text = "frame,triangles,folds,unfolds,changes,node_tests,cut_ms,index_ms,uploaded_bytes,draw_ms,frame_ms,"
-                       "drawn_triangles,gliding\n";
+    std::string text =
+        "frame,triangles,folds,unfolds,changes,node_tests,cut_ms,index_ms,uploaded_bytes,draw_ms,frame_ms,"
+        "drawn_triangles,gliding\n";
     for (std::size_t i = 0; i < frames.size(); ++i) {
         const FrameRecord& f = frames[i];
-        text += std::to_string(i) + "," + std::to_string(f.stats.triangles) + "," + std::to_string(f.stats.folds) + "," +
-                std::to_string(f.stats.unfolds) + "," + std::to_string(f.changes()) + "," +
+        text += std::to_string(i) + "," + std::to_string(f.stats.triangles) + "," + std::to_string(f.stats.folds) +
+                "," + std::to_string(f.stats.unfolds) + "," + std::to_string(f.changes()) + "," +
                 std::to_string(f.stats.node_tests) + "," + cell(f.cut_ms) + "," + cell(f.index_ms) + "," +
                 cell(f.uploaded_bytes) + "," + cell(f.draw_ms) + "," + cell(f.frame_ms) + "," +
                 cell(f.drawn_triangles) + "," + cell(f.gliding) + "\n";
@@ -130,7 +132,9 @@ PanelPlot plot_of(const std::vector<FrameRecord>& frames, const std::string& tit
     plot.x_label = "frame";
     plot.settled_from = 1; // the first frame makes the cut, which the others only change
     plot.panels = {
-        {"cut and index buffer, ms", {0.75f, 0.2f, 0.1f}, column(frames, [](auto& f) { return f.cut_ms + f.index_ms; })},
+        {"cut and index buffer, ms",
+         {0.75f, 0.2f, 0.1f},
+         column(frames, [](auto& f) { return f.cut_ms + f.index_ms; })},
         {"triangles", {0.1f, 0.35f, 0.75f}, column(frames, [](auto& f) { return f.stats.triangles; })},
         {"changes (folds and unfolds)", {0.1f, 0.55f, 0.25f}, column(frames, [](auto& f) { return f.changes(); })}};
     if (!frames.empty() && !std::isnan(frames.front().frame_ms) && !std::isnan(frames.front().draw_ms)) {
@@ -143,7 +147,8 @@ PanelPlot plot_of(const std::vector<FrameRecord>& frames, const std::string& tit
 }
 
 double median(std::vector<double> values) {
-    values.erase(std::remove_if(values.begin(), values.end(), [](double v) { return !std::isfinite(v); }), values.end());
+    values.erase(std::remove_if(values.begin(), values.end(), [](double v) { return !std::isfinite(v); }),
+                 values.end());
     if (values.empty()) return not_drawn;
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
     std::nth_element(values.begin(), middle, values.end());
@@ -205,16 +210,21 @@ void print(const session::Session& session, const std::vector<FrameRecord>& fram
 
 class FlyThrough {
 public:
-    FlyThrough(session::Session& session, const vdtree::View& view, const session::Request& request, const FlyThroughOptions& options)
-        : session_(session), options_(options), view_(view), request_(request), gaze_px_(options.what.gaze_px), follower_(session) {}
+    FlyThrough(session::Session& session, const vdtree::View& view, const session::Request& request,
+               const FlyThroughOptions& options)
+        : session_(session), options_(options), view_(view), request_(request), gaze_px_(options.what.gaze_px),
+          follower_(session) {}
 
-    Result<void> run(const std::vector<CameraPose>& poses, session::GazePlayer gaze, std::optional<render::Context> context, Pictures& pictures) {
+    Result<void> run(const std::vector<CameraPose>& poses, session::GazePlayer gaze,
+                     std::optional<render::Context> context, Pictures& pictures) {
         auto drawing = make_drawing(session_, std::move(context));
         if (!drawing) return drawing.error();
         if (options_.geomorph_seconds)
             if (auto set = follower_.set_glide(*options_.geomorph_seconds); !set) return set;
         const double frame_s = 1 / options_.frames_a_second;
-        if (auto begun = gaze.begin(display(), view_, static_cast<double>(poses.size()) * frame_s, terminal_messages()); !begun) return begun;
+        if (auto begun = gaze.begin(display(), view_, static_cast<double>(poses.size()) * frame_s, terminal_messages());
+            !begun)
+            return begun;
         ProgressBar bar("flying");
         for (std::size_t i = 0; i < poses.size(); ++i) {
             bar(static_cast<double>(i) / static_cast<double>(poses.size()), "frames");
@@ -301,18 +311,22 @@ Result<void> make_folder_of(const std::string& name) {
 
 std::string complaint_about_picture_names(const std::string& pattern) {
     if (parse_pattern(pattern) && has_ending(pattern, ".png")) return {};
-    return "with --path, -o must be a name with one %d or %04d for the frame's number, not in its folder's name, and end in .png, not '" + pattern + "'.";
+    return "with --path, -o must be a name with one %d or %04d for the frame's number, not in its folder's name, and "
+           "end in .png, not '" +
+           pattern + "'.";
 }
 
-Result<void> fly_through(const std::string& model, const ViewOptions& view, const DisplayOptions& display, const FlyThroughOptions& options) {
+Result<void> fly_through(const std::string& model, const ViewOptions& view, const DisplayOptions& display,
+                         const FlyThroughOptions& options) {
     std::vector<std::string> inputs = inputs_of(model, view, display);
     inputs.insert(inputs.end(), {options.path, options.gaze.trace});
     if (const auto ready = check_outputs(inputs, {options.csv, options.plot, options.json}); !ready) return ready;
     const auto path = CameraPath::read(options.path, view.up.value_or(vdtree::View().up));
     if (!path) return path.error();
     if (path->has_gaze() && (options.what.gaze_px || options.gaze.source != GazeSource::none))
-        return Error{ErrorCode::invalid_argument,
-                     "'" + options.path + "' says where the viewer looks: leave --gaze, --gaze-mode and --gaze-trace away, or its columns gaze_x and gaze_y."};
+        return Error{ErrorCode::invalid_argument, "'" + options.path +
+                                                      "' says where the viewer looks: leave --gaze, --gaze-mode and "
+                                                      "--gaze-trace away, or its columns gaze_x and gaze_y."};
     auto gaze = session::GazePlayer::create(options.gaze);
     if (!gaze) return gaze.error();
     auto report = JsonReport::open(options.json);
@@ -342,7 +356,8 @@ Result<void> fly_through(const std::string& model, const ViewOptions& view, cons
 
     FlyThrough flight(*session, first_view, request, options);
     Pictures pictures(options.pictures);
-    if (auto flown = flight.run(path->poses_from(first_view), std::move(*gaze), std::move(context), pictures); !flown) return flown;
+    if (auto flown = flight.run(path->poses_from(first_view), std::move(*gaze), std::move(context), pictures); !flown)
+        return flown;
     if (csv)
         if (auto ok = csv->write(to_csv(flight.records())); !ok) return ok;
     if (auto ok = report->prepare(to_json(*session, flight.records(), flight.last())); !ok) return ok;

@@ -28,6 +28,7 @@ std::string complaint_about_picture_names(const std::string& pattern);
 
 // Prints a summary, and writes what was asked for. Reads and checks all files before anything that takes long, such as the fold errors
 // that the fold test may need.
-Result<void> fly_through(const std::string& model, const ViewOptions& view, const DisplayOptions& display, const FlyThroughOptions& options);
+Result<void> fly_through(const std::string& model, const ViewOptions& view, const DisplayOptions& display,
+                         const FlyThroughOptions& options);
 
 } // namespace unseen::app

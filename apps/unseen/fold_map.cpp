@@ -21,7 +21,6 @@ namespace {
 using perception::Image;
 using vdtree::NodeId;
 
-
 // ---- what a node's fold is worth
 
 // How values become colours: from `low` on by logarithms, or evenly.
@@ -39,9 +38,14 @@ struct Scale {
 
 Scale scale_of(FoldMap map, const perception::Display& display, double largest) {
     switch (map) {
-    case FoldMap::cost: return {1.0 / 64, 1, true, {1.0 / 64, 1.0 / 16, 1.0 / 4, 1}, "fold cost; 1: just imperceptible, red: more"};
+    case FoldMap::cost:
+        return {1.0 / 64, 1, true, {1.0 / 64, 1.0 / 16, 1.0 / 4, 1}, "fold cost; 1: just imperceptible, red: more"};
     case FoldMap::frequency: {
-        Scale scale{0.1, perception::nyquist(perception::finest_pixels_per_degree(display)).value(), true, {0.1, 0.3, 1, 3, 10, 30}, "cycles per degree"};
+        Scale scale{0.1,
+                    perception::nyquist(perception::finest_pixels_per_degree(display)).value(),
+                    true,
+                    {0.1, 0.3, 1, 3, 10, 30},
+                    "cycles per degree"};
         std::erase_if(scale.ticks, [&](double tick) { return tick > scale.high; });
         return scale;
     }
@@ -69,7 +73,8 @@ public:
         has_gaze_ = viewpoint_.gaze.has_value();
         ahead_ = placement.direction_to_mesh(-vdtree::camera_frame(view).back);
         const double half_screen_deg = perception::physical_field(display_, view.height).value() / 2;
-        magnification_ = std::tan(half_screen_deg / perception::degrees_per_radian) / std::tan(view.fov_y_degrees / 2 / perception::degrees_per_radian);
+        magnification_ = std::tan(half_screen_deg / perception::degrees_per_radian) /
+                         std::tan(view.fov_y_degrees / 2 / perception::degrees_per_radian);
         if (has_gaze_) gaze_on_screen_ = on_screen(*viewpoint_.gaze);
     }
 
@@ -77,7 +82,8 @@ public:
         const vdtree::Sphere& ring = tree_.bounds()[node].ring;
         const glm::dvec3 to_centre = glm::dvec3(ring.centre) - viewpoint_.eye;
         const double distance = glm::length(to_centre);
-        const double angle = ring.radius < distance ? 2 * std::asin(ring.radius / distance) * perception::degrees_per_radian : 180;
+        const double angle =
+            ring.radius < distance ? 2 * std::asin(ring.radius / distance) * perception::degrees_per_radian : 180;
         return 1 / (2 * std::clamp(angle * largest_magnification(to_centre), pixel_deg_, 180.0));
     }
 
@@ -102,8 +108,10 @@ public:
         const double distance = glm::length(to_centre);
         if (!has_gaze_ || !(ring.radius < distance)) return 0;
         const glm::dvec3 seen = on_screen(to_centre);
-        const double angle = std::atan2(glm::length(glm::cross(seen, gaze_on_screen_)), glm::dot(seen, gaze_on_screen_));
-        return std::max(0.0, angle - std::asin(ring.radius / distance) * largest_magnification(to_centre)) * perception::degrees_per_radian;
+        const double angle =
+            std::atan2(glm::length(glm::cross(seen, gaze_on_screen_)), glm::dot(seen, gaze_on_screen_));
+        return std::max(0.0, angle - std::asin(ring.radius / distance) * largest_magnification(to_centre)) *
+               perception::degrees_per_radian;
     }
 
 private:
@@ -135,8 +143,9 @@ private:
 
 // From dark blue by green to yellow, evenly bright steps; for people with any kind of colour vision.
 glm::vec3 colour_at(double place) {
-    constexpr std::array<glm::vec3, 6> stops = {glm::vec3(0.16f, 0.05f, 0.37f), glm::vec3(0.20f, 0.27f, 0.54f), glm::vec3(0.14f, 0.46f, 0.55f),
-                                                glm::vec3(0.20f, 0.64f, 0.47f), glm::vec3(0.56f, 0.78f, 0.28f), glm::vec3(0.99f, 0.91f, 0.24f)};
+    constexpr std::array<glm::vec3, 6> stops = {glm::vec3(0.16f, 0.05f, 0.37f), glm::vec3(0.20f, 0.27f, 0.54f),
+                                                glm::vec3(0.14f, 0.46f, 0.55f), glm::vec3(0.20f, 0.64f, 0.47f),
+                                                glm::vec3(0.56f, 0.78f, 0.28f), glm::vec3(0.99f, 0.91f, 0.24f)};
     const double at = std::clamp(place, 0.0, 1.0) * (stops.size() - 1);
     const auto first = std::min(static_cast<std::size_t>(at), stops.size() - 2);
     return glm::mix(stops[first], stops[first + 1], static_cast<float>(at - static_cast<double>(first)));
@@ -169,17 +178,19 @@ std::vector<Corner> clipped(const std::array<Corner, 3>& triangle, double neares
 class Raster {
 public:
     Raster(const session::Session& session, const vdtree::View& view)
-        : tree_(session.tree()), width_(view.width), height_(view.height), frame_(vdtree::camera_frame(view)), eye_(view.eye),
-          placement_(session.scene().objects.front().placement),
+        : tree_(session.tree()), width_(view.width), height_(view.height), frame_(vdtree::camera_frame(view)),
+          eye_(view.eye), placement_(session.scene().objects.front().placement),
           focal_px_(view.height / 2.0 / std::tan(view.fov_y_degrees * std::numbers::pi / 360)),
-          nearness_(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), 0), nodes_(nearness_.size(), vdtree::no_node) {
+          nearness_(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), 0),
+          nodes_(nearness_.size(), vdtree::no_node) {
         nearest_ = 1e-6 * std::max(session.bounding_sphere().radius, std::numeric_limits<double>::min());
     }
 
     void draw(const vdtree::Cut& cut) {
         const auto indices = cut.indices();
         for (std::size_t i = 0; i + 2 < indices.size(); i += 3) {
-            const auto polygon = clipped({corner(indices[i]), corner(indices[i + 1]), corner(indices[i + 2])}, nearest_);
+            const auto polygon =
+                clipped({corner(indices[i]), corner(indices[i + 1]), corner(indices[i + 2])}, nearest_);
             for (std::size_t k = 2; k < polygon.size(); ++k) draw({polygon[0], polygon[k - 1], polygon[k]});
         }
     }
@@ -187,11 +198,14 @@ public:
     NodeId node_at(int x, int y) const { return nodes_[at(x, y)]; }
 
 private:
-    std::size_t at(int x, int y) const { return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x); }
+    std::size_t at(int x, int y) const {
+        return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
+    }
 
     Corner corner(NodeId node) const {
         const glm::dvec3 from_eye = placement_.to_world(tree_.origin() + glm::dvec3(tree_.positions()[node])) - eye_;
-        return {{glm::dot(from_eye, frame_.right), glm::dot(from_eye, frame_.up), -glm::dot(from_eye, frame_.back)}, node};
+        return {{glm::dot(from_eye, frame_.right), glm::dot(from_eye, frame_.up), -glm::dot(from_eye, frame_.back)},
+                node};
     }
 
     void draw(const std::array<Corner, 3>& corners) {
@@ -204,7 +218,8 @@ private:
         if (!(std::abs(area) > 0)) return;
         const auto [left, right] = std::minmax({p[0].x, p[1].x, p[2].x});
         const auto [top, bottom] = std::minmax({p[0].y, p[1].y, p[2].y});
-        const int x_end = static_cast<int>(std::min<double>(width_, std::ceil(right + 0.5))), y_end = static_cast<int>(std::min<double>(height_, std::ceil(bottom + 0.5)));
+        const int x_end = static_cast<int>(std::min<double>(width_, std::ceil(right + 0.5))),
+                  y_end = static_cast<int>(std::min<double>(height_, std::ceil(bottom + 0.5)));
         for (int y = static_cast<int>(std::max(0.0, std::floor(top - 0.5))); y < y_end; ++y) {
             for (int x = static_cast<int>(std::max(0.0, std::floor(left - 0.5))); x < x_end; ++x) {
                 const glm::dvec2 q(x + 0.5, y + 0.5);
@@ -217,7 +232,8 @@ private:
                 const double nearness = w[0] * p[0].z + w[1] * p[1].z + w[2] * p[2].z;
                 if (!(nearness > nearness_[at(x, y)])) continue;
                 nearness_[at(x, y)] = nearness;
-                nodes_[at(x, y)] = corners[static_cast<std::size_t>(std::max_element(w.begin(), w.end()) - w.begin())].node;
+                nodes_[at(x, y)] =
+                    corners[static_cast<std::size_t>(std::max_element(w.begin(), w.end()) - w.begin())].node;
             }
         }
     }
@@ -273,7 +289,8 @@ Result<Image> draw_fold_map(const vdtree::Cut& cut, session::Session& session, c
     if (map == FoldMap::eccentricity)
         for (int y = 0; y < view.height; ++y)
             for (int x = 0; x < view.width; ++x)
-                if (const NodeId node = raster.node_at(x, y); node < tree.interior_count()) largest = std::max(largest, value(node));
+                if (const NodeId node = raster.node_at(x, y); node < tree.interior_count())
+                    largest = std::max(largest, value(node));
     const Scale scale = scale_of(map, session.observer().display, largest);
     Image image{view.width, view.height, 3, {}};
     image.values.reserve(image.index(0, view.height, 0));
@@ -283,7 +300,10 @@ Result<Image> draw_fold_map(const vdtree::Cut& cut, session::Session& session, c
             const bool is_covered = node != vdtree::no_node, is_folded = is_covered && node < tree.interior_count();
             const double v = is_folded ? value(node) : 0;
             const bool is_more = is_folded && map == FoldMap::cost && !(v <= 1);
-            const glm::vec3 colour = !is_covered ? background : !is_folded ? unfolded : is_more ? too_much : colour_at(scale.place(v));
+            const glm::vec3 colour = !is_covered  ? background
+                                     : !is_folded ? unfolded
+                                     : is_more    ? too_much
+                                                  : colour_at(scale.place(v));
             image.values.insert(image.values.end(), {colour.r, colour.g, colour.b});
         }
     }

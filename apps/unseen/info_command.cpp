@@ -94,7 +94,8 @@ Result<int> describe_mesh(const InfoArguments& a) {
     const std::uint64_t bytes = bytes_of(mesh.positions) + bytes_of(mesh.triangles) + bytes_of(mesh.normals) +
                                 bytes_of(mesh.colours) + bytes_of(mesh.uvs);
     const std::uint64_t file_bytes = file_bytes_of(a.file);
-    const auto images = std::count_if(read->materials.begin(), read->materials.end(), [](const meshio::Material& m) { return m.has_image(); });
+    const auto images = std::count_if(read->materials.begin(), read->materials.end(),
+                                      [](const meshio::Material& m) { return m.has_image(); });
     Json json = {{"kind", "mesh"},
                  {"vertices", mesh.positions.size()},
                  {"triangles", mesh.triangles.size()},

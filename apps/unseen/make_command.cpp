@@ -2,8 +2,8 @@
 #include <functional>
 #include <memory>
 
-#include <subdivide.h>
 #include <meshio/mesh_io.h>
+#include <subdivide.h>
 
 #include "model_file.h"
 #include "options.h"
@@ -45,9 +45,8 @@ Result<int> run(const SubdivideArguments& a) {
     const auto mesh = subdivide_with_progress(std::move(read->mesh), a);
     if (!mesh) return mesh.error();
 
-    const Json json = {{"source_triangles", before},
-                       {"triangles", mesh->triangles.size()},
-                       {"vertices", mesh->positions.size()}};
+    const Json json = {
+        {"source_triangles", before}, {"triangles", mesh->triangles.size()}, {"vertices", mesh->positions.size()}};
     if (auto ok = report->prepare(json); !ok) return ok.error();
     if (auto ok = write(a.out, *mesh); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
@@ -59,7 +58,8 @@ Result<int> run(const SubdivideArguments& a) {
 
 Command subdivide_command(CLI::App& make) {
     auto a = std::make_shared<SubdivideArguments>();
-    CLI::App* verb = make.add_subcommand("subdivide", "Split the triangles of a mesh into smaller ones, a little rough");
+    CLI::App* verb =
+        make.add_subcommand("subdivide", "Split the triangles of a mesh into smaller ones, a little rough");
     verb->add_option("MESH", a->mesh, "PLY, OBJ, OFF, STL or glTF")->required()->type_name("FILE");
     verb->add_option("-o,--output", a->out, "The larger mesh")
         ->type_name("OUT.ply|.obj|.glb")

@@ -27,8 +27,9 @@ constexpr std::uint64_t least_triangle_bytes = 16;
 
 Error too_small(std::uint64_t least, double gib) {
     const double needed = std::ceil(static_cast<double>(least) / bytes_of_gib * 100) / 100; // two digits, rounded up
-    return {ErrorCode::invalid_argument, "--memory " + rounded(gib, 3) + " GiB is too small for this: it takes at least " +
-                                             shortest(needed) + " GiB."};
+    return {ErrorCode::invalid_argument, "--memory " + rounded(gib, 3) +
+                                             " GiB is too small for this: it takes at least " + shortest(needed) +
+                                             " GiB."};
 }
 
 } // namespace
@@ -42,7 +43,8 @@ std::uint64_t unlimited_peak(const vdtree::MeshView& mesh, vdtree::ClustererKind
 }
 
 std::uint64_t least_memory(std::size_t triangles, int threads) {
-    return least_program_bytes + static_cast<std::uint64_t>(threads) * least_thread_bytes + triangles * least_triangle_bytes;
+    return least_program_bytes + static_cast<std::uint64_t>(threads) * least_thread_bytes +
+           triangles * least_triangle_bytes;
 }
 
 Result<MemoryLimit> MemoryLimit::set(double gib, const std::filesystem::path& out, int threads) {

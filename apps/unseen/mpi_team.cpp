@@ -185,7 +185,8 @@ private:
         require(MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &machine));
         require(MPI_Comm_size(machine, &on_machine_));
         require(MPI_Comm_free(&machine));
-        if (told_rank_ && *told_rank_ != rank_) throw std::runtime_error("mpirun and MPI number the processes in different ways.");
+        if (told_rank_ && *told_rank_ != rank_)
+            throw std::runtime_error("mpirun and MPI number the processes in different ways.");
     }
 
     int cores_, rank_ = 0, size_ = 1, on_machine_ = 1;

@@ -22,7 +22,8 @@ Error no_window() {
 
 } // namespace
 
-Result<void> run_calibration_window(calibration::Procedure&, const CalibrationWindowOptions&, const std::filesystem::path&) {
+Result<void> run_calibration_window(calibration::Procedure&, const CalibrationWindowOptions&,
+                                    const std::filesystem::path&) {
     return no_window();
 }
 Result<std::vector<GammaMatch>> match_gamma(const CalibrationWindowOptions&) { return no_window(); }

@@ -39,8 +39,8 @@ constexpr std::uint64_t margin_share = 12, least_margin = std::uint64_t{12} << 2
 constexpr std::size_t sweep_step = std::size_t{4} << 20;
 
 Error failure(const fs::path& folder, const std::string& what, int cause) {
-    return {ErrorCode::io_failure, "Cannot " + what + " in '" + folder.string() + "' for --memory: " +
-                                       std::generic_category().message(cause) + "."};
+    return {ErrorCode::io_failure, "Cannot " + what + " in '" + folder.string() +
+                                       "' for --memory: " + std::generic_category().message(cause) + "."};
 }
 
 class Pager {
@@ -125,8 +125,9 @@ private:
         while (failed == EINTR) failed = ::posix_fallocate(file_, static_cast<off_t>(at), static_cast<off_t>(size));
         if (failed == 0) return;
         give_up(at, size);
-        complaint_ = "there is no room for " + std::to_string(size >> 20) + " MiB more of temporary data in '" + folder_ + "' (" +
-                     std::generic_category().message(failed) + "): free some, or write the tree to another disk.";
+        complaint_ = "there is no room for " + std::to_string(size >> 20) + " MiB more of temporary data in '" +
+                     folder_ + "' (" + std::generic_category().message(failed) +
+                     "): free some, or write the tree to another disk.";
         throw DiskFull(complaint_);
     }
 
@@ -222,7 +223,8 @@ int open_nameless(const fs::path& folder) {
 Result<void> start_paging(const fs::path& folder_or_none, std::uint64_t limit) {
     const fs::path folder = folder_or_none.empty() ? fs::path(".") : folder_or_none;
     if (lies_in_memory(folder))
-        return Error{ErrorCode::io_failure, "'" + folder.string() + "' lies in memory: with --memory, write the tree to a disk."};
+        return Error{ErrorCode::io_failure,
+                     "'" + folder.string() + "' lies in memory: with --memory, write the tree to a disk."};
     const int file = open_nameless(folder);
     if (file < 0) return failure(folder, "make a temporary file", errno);
     std::size_t length = longest_file;

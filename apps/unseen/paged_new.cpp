@@ -33,7 +33,8 @@ constexpr std::size_t large_page = std::size_t{2} << 20;
 void* with_large_pages(void* block, std::size_t size) {
 #ifdef MADV_HUGEPAGE
     if (!block || size < 2 * large_page) return block;
-    const auto begin = reinterpret_cast<std::uintptr_t>(block), inside = (begin + large_page - 1) / large_page * large_page;
+    const auto begin = reinterpret_cast<std::uintptr_t>(block),
+               inside = (begin + large_page - 1) / large_page * large_page;
     const std::uintptr_t end = (begin + size) / large_page * large_page;
     ::madvise(static_cast<std::byte*>(block) + (inside - begin), end - inside, MADV_HUGEPAGE);
 #endif

@@ -17,7 +17,7 @@ public:
 
     static bool is_there() noexcept; // this build can talk to others
 
-    virtual int cores() const = 0;            // that this machine has for all its members together
+    virtual int cores() const = 0; // that this machine has for all its members together
     virtual int members_on_machine() const = 0;
 
     // Nothing may be sent afterwards. The destructor waits, without using a core, until all members leave.

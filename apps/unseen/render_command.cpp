@@ -44,7 +44,8 @@ Result<int> run_flight(RenderArguments& a) {
 
 Result<int> run(RenderArguments& a) {
     if (!a.flight.path.empty()) return run_flight(a);
-    if (const auto ready = check_outputs(inputs_of(a.model, a.view, a.display), {a.out, a.json}); !ready) return ready.error();
+    if (const auto ready = check_outputs(inputs_of(a.model, a.view, a.display), {a.out, a.json}); !ready)
+        return ready.error();
     const auto gaze = session::GazePlayer::create(a.flight.gaze);
     if (!gaze) return gaze.error();
     auto report = JsonReport::open(a.json);
@@ -100,18 +101,25 @@ void add_path_options(CLI::App& verb, FlyThroughOptions& o) {
     group.add_option("--plot", o.plot, "Times, triangles, changes and uploaded bytes over the frames")
         ->type_name("FILE.png|.svg")
         ->check(ending_in({".png", ".svg"}));
-    group.add_option("--threshold", o.threshold,
-                     "Fold up to this cost: 1 (default) what cannot be seen, 2 what cannot be seen from twice the distance")
+    group
+        .add_option(
+            "--threshold", o.threshold,
+            "Fold up to this cost: 1 (default) what cannot be seen, 2 what cannot be seen from twice the distance")
         ->type_name("X")
         ->check(positive());
     add_geomorph_option(group, o.geomorph_seconds);
-    group.add_option("--fps", o.frames_a_second, "With --geomorph, --lights and moving gazes: frames a second of the path (default: 60)")
+    group
+        .add_option("--fps", o.frames_a_second,
+                    "With --geomorph, --lights and moving gazes: frames a second of the path (default: 60)")
         ->type_name("N")
         ->check(within(1, 1e6));
-    group.add_flag_callback("--no-draw", [&o] { o.draws = false; }, "Only cut: draw nothing");
+    group.add_flag_callback(
+        "--no-draw", [&o] { o.draws = false; }, "Only cut: draw nothing");
 }
 
-bool is_moving(const GazeOptions& gaze) { return gaze.source == GazeSource::trace || gaze.source == GazeSource::simulated; }
+bool is_moving(const GazeOptions& gaze) {
+    return gaze.source == GazeSource::trace || gaze.source == GazeSource::simulated;
+}
 
 void check(const RenderArguments& a) {
     const FlyThroughOptions& o = a.flight;
@@ -121,12 +129,15 @@ void check(const RenderArguments& a) {
     const bool may_have_gaze = a.what.gaze_px || o.gaze.source != GazeSource::none || !o.path.empty();
     if (o.gaze.tracker.error_deg > 0 && !may_have_gaze) refuse("--gaze-error needs a gaze: --gaze or --gaze-mode.");
     if (o.threshold != 1 && a.what.request.goal.kind != Goal::Kind::imperceptible)
-        refuse("--threshold is of --imperceptible: --full, --triangles and --pixels say themselves how much is folded.");
+        refuse(
+            "--threshold is of --imperceptible: --full, --triangles and --pixels say themselves how much is folded.");
     if (o.path.empty()) {
         if (a.out.empty()) refuse("-o is required (or --path).");
         if (a.map && !is_for_people(a.out)) refuse("--show draws pictures for people: -o must end in .png.");
-        if (a.map == FoldMap::cost && a.what.request.goal.kind == Goal::Kind::full) refuse("--show cost and --full exclude each other: nothing is folded.");
-        if (a.map == FoldMap::contrast && !a.view.lights.empty()) refuse("--show contrast is of the mesh's own light, and excludes --lights.");
+        if (a.map == FoldMap::cost && a.what.request.goal.kind == Goal::Kind::full)
+            refuse("--show cost and --full exclude each other: nothing is folded.");
+        if (a.map == FoldMap::contrast && !a.view.lights.empty())
+            refuse("--show contrast is of the mesh's own light, and excludes --lights.");
         if (a.map == FoldMap::eccentricity && !a.what.gaze_px && o.gaze.source == GazeSource::none)
             refuse("--show eccentricity needs --gaze: without one all counts as looked at.");
         if (!o.csv.empty() || !o.plot.empty() || o.threshold != 1 || !o.draws || o.geomorph_seconds)
@@ -149,21 +160,27 @@ Command render_command(CLI::App& app) {
         ->type_name("OUT.png|.pfm|.exr")
         ->check(ending_in({".png", ".pfm", ".exr"}));
     CLI::Option* samples =
-        verb->add_option("--samples", a->draw.samples, "Samples a pixel, 1 to 256 (default: 16; for PFM and EXR, which are to be judged: 64; with --path: 1)")
+        verb->add_option(
+                "--samples", a->draw.samples,
+                "Samples a pixel, 1 to 256 (default: 16; for PFM and EXR, which are to be judged: 64; with --path: 1)")
             ->type_name("N")
             ->check(whole(1, 256));
     verb->add_flag("--wireframe", a->draw.wireframe, "Draw the triangles' edges, too");
-    add_choice<render::Shading, render::Shading>(*verb, "--shading", a->draw.shading, {{"smooth", render::Shading::smooth}, {"flat", render::Shading::flat}},
+    add_choice<render::Shading, render::Shading>(*verb, "--shading", a->draw.shading,
+                                                 {{"smooth", render::Shading::smooth}, {"flat", render::Shading::flat}},
                                                  "smooth (default) or flat");
     std::vector<std::pair<std::string, FoldMap>> maps;
-    for (std::size_t i = 0; i < std::size(fold_map_names); ++i) maps.emplace_back(fold_map_names[i], static_cast<FoldMap>(i));
-    add_choice(*verb, "--show", a->map, std::move(maps),
-               "Instead of the model, of its folds: cost, frequency or contrast (of their worst gratings), or eccentricity");
+    for (std::size_t i = 0; i < std::size(fold_map_names); ++i)
+        maps.emplace_back(fold_map_names[i], static_cast<FoldMap>(i));
+    add_choice(
+        *verb, "--show", a->map, std::move(maps),
+        "Instead of the model, of its folds: cost, frequency or contrast (of their worst gratings), or eccentricity");
     add_json_option(*verb, a->json);
     add_path_options(*verb, a->flight);
     CLI::Option* frames_a_second = verb->get_option("--fps");
     verb->callback([a, samples, frames_a_second] {
-        if (!frames_a_second->empty() && !a->flight.geomorph_seconds && a->view.lights.empty() && !is_moving(a->flight.gaze))
+        if (!frames_a_second->empty() && !a->flight.geomorph_seconds && a->view.lights.empty() &&
+            !is_moving(a->flight.gaze))
             refuse("--fps needs --geomorph, --lights, --gaze-trace or --gaze-mode simulated.");
         check(*a);
         if (!samples->empty()) return;
@@ -174,16 +191,17 @@ Command render_command(CLI::App& app) {
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->what);
     add_moving_gaze_options(*verb, a->flight.gaze, false);
-    verb->footer("Examples:\n  unseen render bunny.vdt -o bunny.png --wireframe\n"
-                 "  unseen render bunny.vdt -o full.pfm --full --size 1024x1024\n"
-                 "  unseen render bunny.vdt -o cost.png --gaze 1603 512 --show cost\n"
-                 "  unseen render bunny.vdt -o aside.pfm --gaze 1603 512 --json -\n"
-                 "  unseen render dragon.vdt --path orbit:1 --gaze-mode simulated --seed 7 --gaze-error 0.5 --gaze-latency 50\n"
-                 "  unseen render dragon.vdt --path orbit:1 --csv orbit.csv --plot orbit.png\n"
-                 "  unseen render dragon.vdt --path flight.csv -o frames/%04d.png --threshold 2\n"
-                 "  unseen render dragon.vdt -o lit.png --lights lights.json\n"
-                 "  unseen render dragon.vdt --path orbit:0:240 --lights lights.json --fps 60 --csv light.csv\n"
-                 "  unseen render dragon.vdt --path orbit:1 -o frames/%04d.png --triangles 20000 --geomorph 0.25 --fps 60");
+    verb->footer(
+        "Examples:\n  unseen render bunny.vdt -o bunny.png --wireframe\n"
+        "  unseen render bunny.vdt -o full.pfm --full --size 1024x1024\n"
+        "  unseen render bunny.vdt -o cost.png --gaze 1603 512 --show cost\n"
+        "  unseen render bunny.vdt -o aside.pfm --gaze 1603 512 --json -\n"
+        "  unseen render dragon.vdt --path orbit:1 --gaze-mode simulated --seed 7 --gaze-error 0.5 --gaze-latency 50\n"
+        "  unseen render dragon.vdt --path orbit:1 --csv orbit.csv --plot orbit.png\n"
+        "  unseen render dragon.vdt --path flight.csv -o frames/%04d.png --threshold 2\n"
+        "  unseen render dragon.vdt -o lit.png --lights lights.json\n"
+        "  unseen render dragon.vdt --path orbit:0:240 --lights lights.json --fps 60 --csv light.csv\n"
+        "  unseen render dragon.vdt --path orbit:1 -o frames/%04d.png --triangles 20000 --geomorph 0.25 --fps 60");
     return {verb, [a] { return run(*a); }};
 }
 

@@ -33,7 +33,7 @@ struct SheetArguments {
     int samples = 64;
     int cell_px = 480;
     bool maps = false;
-    std::optional<FoldTest> test;      // default: as in 'unseen render'
+    std::optional<FoldTest> test; // default: as in 'unseen render'
 };
 
 constexpr std::uint32_t default_budget_share = 4;
@@ -80,7 +80,8 @@ vdtree::View small_view(const vdtree::View& view, int cell_px) {
 }
 
 // Where there is none, as that of the cost in the full model, nothing: such columns are shorter.
-Result<void> draw_maps(Column& column, const vdtree::Cut& cut, session::Session& session, const vdtree::View& view, const vdtree::View& small) {
+Result<void> draw_maps(Column& column, const vdtree::Cut& cut, session::Session& session, const vdtree::View& view,
+                       const vdtree::View& small) {
     for (const FoldMap map : {FoldMap::cost, FoldMap::frequency, FoldMap::contrast, FoldMap::eccentricity}) {
         if (column.request.goal.kind == Goal::Kind::full || (map == FoldMap::eccentricity && !column.gaze)) continue;
         auto drawn = draw_fold_map(cut, session, view, column.request, map, small);
@@ -127,7 +128,8 @@ Result<void> judge(Column& column, const Column& full, const session::Observer& 
     return {};
 }
 
-Result<std::vector<Column>> make_columns(session::Session& session, const vdtree::View& view, const SheetArguments& a, render::Context& context) {
+Result<std::vector<Column>> make_columns(session::Session& session, const vdtree::View& view, const SheetArguments& a,
+                                         render::Context& context) {
     std::vector<Column> columns = wishes(session, view, a);
     if (const auto ready = session.prepare(view, columns[1].request); !ready) return ready.error();
     auto renderer = render::Renderer::create(context, session.tree());
@@ -136,7 +138,8 @@ Result<std::vector<Column>> make_columns(session::Session& session, const vdtree
         session.set_gaze(column.gaze);
         auto simplified = session.simplify(view, column.request);
         if (!simplified) return simplified.error();
-        if (auto ok = draw_pictures(column, simplified->cuts.front(), session, view, a, *renderer); !ok) return ok.error();
+        if (auto ok = draw_pictures(column, simplified->cuts.front(), session, view, a, *renderer); !ok)
+            return ok.error();
         column.report = std::move(*simplified);
         if (&column == &columns.front()) continue;
         if (auto ok = judge(column, columns.front(), session.observer()); !ok) return ok.error();
@@ -164,15 +167,16 @@ std::string metres(double value) { return rounded(value, 3) + (std::isfinite(val
 struct Caption {
     std::string name, verdict;
 
-    explicit Caption(const Column& column) : name(column.name + ": " + grouped(column.report.stats.triangles) + " triangles") {
+    explicit Caption(const Column& column)
+        : name(column.name + ": " + grouped(column.report.stats.triangles) + " triangles") {
         if (column.judgement)
             verdict = grouped(column.judgement->visible_pixels) + " pixels visible; from " +
                       metres(column.report.imperceptible_from_m) + " none";
     }
 };
 
-Result<perception::Image> compose(const std::vector<Column>& columns, const perception::Display& display, const vdtree::View& view,
-                                  const std::string& model) {
+Result<perception::Image> compose(const std::vector<Column>& columns, const perception::Display& display,
+                                  const vdtree::View& view, const std::string& model) {
     constexpr int gap = 12, text_height = 17, line_height = 22; // pixels
     constexpr glm::vec3 paper{0.12f}, ink{0.95f}, weak{0.7f};
     int height = 0, cell_width = 0; // of the tallest column, and of the widest picture or line of text
@@ -193,9 +197,10 @@ Result<perception::Image> compose(const std::vector<Column>& columns, const perc
     auto drawing = Drawing::create(gap + count * (cell_width + gap), header + above + height, paper);
     if (!drawing) return drawing.error();
 
-    const std::string title = std::filesystem::path(model).filename().string() + "   " + std::to_string(view.width) + "x" +
-                              std::to_string(view.height) + " pixels, " + rounded(perception::pixels_per_degree(display).value(), 4) +
-                              " per degree, seen from " + rounded(display.distance.value(), 3) + " m";
+    const std::string title = std::filesystem::path(model).filename().string() + "   " + std::to_string(view.width) +
+                              "x" + std::to_string(view.height) + " pixels, " +
+                              rounded(perception::pixels_per_degree(display).value(), 4) + " per degree, seen from " +
+                              rounded(display.distance.value(), 3) + " m";
     drawing->text({gap, gap}, title, ink, Drawing::fitting_height(title, text_height, drawing->width() - 2 * gap));
     for (int i = 0; i < count; ++i) {
         const int left = gap + i * (cell_width + gap);
@@ -243,7 +248,8 @@ void print(const std::vector<Column>& columns) {
 }
 
 Result<int> run(const SheetArguments& a) {
-    if (const auto ready = check_outputs(inputs_of(a.model, a.view, a.display), {a.out, a.json}); !ready) return ready.error();
+    if (const auto ready = check_outputs(inputs_of(a.model, a.view, a.display), {a.out, a.json}); !ready)
+        return ready.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     auto context = render::Context::headless();
@@ -285,9 +291,11 @@ Command sheet_command(CLI::App& app) {
     verb->add_option("--cell", a->cell_px, "The longer side of a picture on the sheet (default: 480)")
         ->type_name("PIXELS")
         ->check(whole(16, 4096));
-    add_fold_test_option(*verb, a->test, std::array{FoldTest::luebke_hallen, FoldTest::luebke_hallen_safe, FoldTest::error},
+    add_fold_test_option(*verb, a->test,
+                         std::array{FoldTest::luebke_hallen, FoldTest::luebke_hallen_safe, FoldTest::error},
                          "luebke-hallen, luebke-hallen-safe or error (default: as in 'unseen render')");
-    verb->add_flag("--maps", a->maps, "Below, in place of the budget: maps of the folds' cost, frequency, contrast and eccentricity");
+    verb->add_flag("--maps", a->maps,
+                   "Below, in place of the budget: maps of the folds' cost, frequency, contrast and eccentricity");
     add_json_option(*verb, a->json);
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);

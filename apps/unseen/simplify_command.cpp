@@ -25,7 +25,8 @@ struct SimplifyArguments {
 constexpr double nothing_drawn = std::numeric_limits<double>::quiet_NaN();
 
 Result<int> run(const SimplifyArguments& a) {
-    if (const auto ready = check_outputs(inputs_of(a.model, a.view, a.display), {a.out, a.json}); !ready) return ready.error();
+    if (const auto ready = check_outputs(inputs_of(a.model, a.view, a.display), {a.out, a.json}); !ready)
+        return ready.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
     auto session = open_session(a.model, a.view, a.display);

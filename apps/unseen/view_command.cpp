@@ -25,7 +25,8 @@ Result<int> run(ViewArguments& a) {
     auto gaze = session::GazePlayer::create(a.gaze);
     if (!gaze) return gaze.error();
     // Not to be seen before there is something to see.
-    auto window = render::Context::window({.width = a.view.width, .height = a.view.height, .title = "Unseen", .visible = false});
+    auto window =
+        render::Context::window({.width = a.view.width, .height = a.view.height, .title = "Unseen", .visible = false});
     if (!window) return window.error();
     auto session = open_session(a.model, a.view, a.display);
     if (!session) return session.error();
@@ -43,7 +44,8 @@ Command view_command(CLI::App& app) {
     CLI::App* verb = app.add_subcommand("view", "Look at a model in a window");
     verb->add_option("TREE", a->model, "A tree, or a mesh")->required()->type_name("TREE.vdt|MESH");
     verb->add_flag("--wireframe", a->viewer.draw.wireframe, "Begin with the triangles' edges");
-    add_choice<render::Shading, render::Shading>(*verb, "--shading", a->viewer.draw.shading, {{"smooth", render::Shading::smooth}, {"flat", render::Shading::flat}},
+    add_choice<render::Shading, render::Shading>(*verb, "--shading", a->viewer.draw.shading,
+                                                 {{"smooth", render::Shading::smooth}, {"flat", render::Shading::flat}},
                                                  "smooth (default) or flat");
     verb->add_option("--screenshot", a->viewer.screenshot, "Write a picture when the viewer ends")
         ->type_name("OUT.png")

@@ -47,9 +47,9 @@ class Viewer {
 public:
     Viewer(session::Session& session, session::GazePlayer gaze, const ViewerOptions& options, render::Context& context,
            render::Renderer renderer)
-        : session_(session), options_(options), window_(context.glfw_window()), renderer_(std::move(renderer)), follower_(session),
-          view_(options.first_view), request_(options.what.request), gaze_px_(options.what.gaze_px), draw_(options.draw),
-          gaze_follows_pointer_(options.gaze_follows_pointer), gaze_(std::move(gaze)) {
+        : session_(session), options_(options), window_(context.glfw_window()), renderer_(std::move(renderer)),
+          follower_(session), view_(options.first_view), request_(options.what.request), gaze_px_(options.what.gaze_px),
+          draw_(options.draw), gaze_follows_pointer_(options.gaze_follows_pointer), gaze_(std::move(gaze)) {
         request_.purpose = session::Purpose::picture;
         request_.may_measure = false; // nobody waits for that here
         draw_.background = session.background();
@@ -239,7 +239,8 @@ private:
                             grouped(s.source_triangles) + " triangles, " + rounded(s.adapt_ms, 2) + " ms to adapt, " +
                             rounded(frame_ms, 2) + " ms a frame";
         if (request_.goal.kind != Goal::Kind::full)
-            title += ", " + name_of(s.fold_tests.front()) + ", unseen from " + rounded(s.imperceptible_from_m, 2) + (std::isfinite(s.imperceptible_from_m) ? " m" : "");
+            title += ", " + name_of(s.fold_tests.front()) + ", unseen from " + rounded(s.imperceptible_from_m, 2) +
+                     (std::isfinite(s.imperceptible_from_m) ? " m" : "");
         if (!s.stats.is_complete) title += ", time is up: to be continued";
         if (s.gliding > 0) title += ", " + grouped(s.gliding) + " vertices glide";
         glfwSetWindowTitle(window_, title.c_str());
@@ -298,7 +299,8 @@ private:
 
 } // namespace
 
-Result<void> run_viewer(render::Context& window, session::Session& session, session::GazePlayer gaze, const ViewerOptions& options) {
+Result<void> run_viewer(render::Context& window, session::Session& session, session::GazePlayer gaze,
+                        const ViewerOptions& options) {
     session::Request request = options.what.request;
     request.purpose = session::Purpose::picture;
     if (const auto ready = session.prepare(options.first_view, request); !ready) return ready.error();

@@ -40,15 +40,16 @@ Result<double> fit_gamma(std::span<const BrightnessMatch> matches) {
     double upper = 0, lower = 0;
     for (const BrightnessMatch& m : matches) {
         if (!(m.white > 0 && m.white < 1 && m.code > 0 && m.code < 1))
-            return invalid("A brightness match must lie between black and white, not be code " + to_text(m.code) + " for " +
-                           to_text(m.white) + " of white.");
+            return invalid("A brightness match must lie between black and white, not be code " + to_text(m.code) +
+                           " for " + to_text(m.white) + " of white.");
         upper += std::log(m.white) * std::log(m.code);
         lower += std::log(m.code) * std::log(m.code);
     }
     if (!(lower > 0)) return invalid("There are no brightness matches to fit a gamma to.");
     const double gamma = upper / lower;
     if (!(gamma >= least_gamma && gamma <= largest_gamma))
-        return invalid("The matches give a gamma of " + to_text(gamma) + ", which no display has (0.5 to 5): match again.");
+        return invalid("The matches give a gamma of " + to_text(gamma) +
+                       ", which no display has (0.5 to 5): match again.");
     return gamma;
 }
 
@@ -63,7 +64,8 @@ Result<PhotometerTable> read_photometer(const std::filesystem::path& file) {
     };
     for (std::string line; std::getline(stream, line);) {
         if (++number > most_rows) return complain("there are too many lines");
-        if (number == 1 && line.starts_with("\xef\xbb\xbf")) line.erase(0, 3); // a byte order mark, which spreadsheets write
+        if (number == 1 && line.starts_with("\xef\xbb\xbf"))
+            line.erase(0, 3); // a byte order mark, which spreadsheets write
         const std::string_view text = trimmed(line);
         if (text.empty() || text.starts_with('#')) continue;
         if (!has_header) {

@@ -45,13 +45,15 @@ Result<void> read_transfer(const JsonObject& object, Display& display) {
         display.transfer = TransferFunction::srgb;
         return {};
     }
-    for (const auto& [name, transfer] : {std::pair{"linear", TransferFunction::linear}, {"pq", TransferFunction::pq},
+    for (const auto& [name, transfer] : {std::pair{"linear", TransferFunction::linear},
+                                         {"pq", TransferFunction::pq},
                                          {"table", TransferFunction::table}}) {
         if (text != name) continue;
         display.transfer = transfer;
         return {};
     }
-    return object.key_error("transfer", "must be \"srgb\", \"linear\", \"pq\", \"table\", or a gamma as a number above 0");
+    return object.key_error("transfer",
+                            "must be \"srgb\", \"linear\", \"pq\", \"table\", or a gamma as a number above 0");
 }
 
 // The keys that only some displays have.
@@ -66,7 +68,9 @@ Result<void> read_table(const JsonObject& object, Display& display) {
 }
 
 Result<void> read_lens(const JsonObject& object, Display& display) {
-    if (auto ok = object.get("field_deg", display.field_deg, {.minimum = 0, .maximum = 359, .minimum_allowed = false}); !ok) return ok;
+    if (auto ok = object.get("field_deg", display.field_deg, {.minimum = 0, .maximum = 359, .minimum_allowed = false});
+        !ok)
+        return ok;
     if (!object.has("pixels_per_degree_at")) return {};
     const auto rows = object.array("pixels_per_degree_at");
     if (!rows) return rows.error();
@@ -83,10 +87,10 @@ Result<void> read_lens(const JsonObject& object, Display& display) {
 } // namespace
 
 Result<Display> read_display(const std::filesystem::path& file) {
-    const auto object = JsonObject::read(file, {"name", "width_px", "height_px", "pixel_pitch_m", "diagonal_m",
-                                                "viewing_distance_m", "peak_cdm2", "black_cdm2", "transfer",
-                                                "ambient_lux", "reflectivity", "source", "transfer_table",
-                                                "pixels_per_degree_at", "field_deg"});
+    const auto object =
+        JsonObject::read(file, {"name", "width_px", "height_px", "pixel_pitch_m", "diagonal_m", "viewing_distance_m",
+                                "peak_cdm2", "black_cdm2", "transfer", "ambient_lux", "reflectivity", "source",
+                                "transfer_table", "pixels_per_degree_at", "field_deg"});
     if (!object) return object.error();
 
     Display display;
@@ -157,7 +161,11 @@ Result<void> write_display(const std::filesystem::path& file, const Display& dis
     if (!display.lens.empty()) {
         std::string rows;
         for (const perception::PixelsPerDegreeAt& at : display.lens)
-            rows.append(rows.empty() ? "[[" : ", [").append(to_text(at.angle_deg)).append(", ").append(to_text(at.pixels_per_degree)).append("]");
+            rows.append(rows.empty() ? "[[" : ", [")
+                .append(to_text(at.angle_deg))
+                .append(", ")
+                .append(to_text(at.pixels_per_degree))
+                .append("]");
         add("pixels_per_degree_at", rows + "]");
     }
     if (display.field_deg > 0) add("field_deg", to_text(display.field_deg));

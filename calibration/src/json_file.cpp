@@ -179,7 +179,8 @@ Result<JsonObject> JsonObject::read(const std::filesystem::path& file,
     return result;
 }
 
-Result<JsonObject> JsonObject::child(const json& value, std::string place, std::initializer_list<std::string_view> known_keys) const {
+Result<JsonObject> JsonObject::child(const json& value, std::string place,
+                                     std::initializer_list<std::string_view> known_keys) const {
     if (!value.is_object()) return key_error(place, "must be an object, { ... }, but is " + excerpt(value));
     JsonObject result;
     result.file_ = file_;
@@ -233,8 +234,8 @@ Result<void> JsonObject::append_numbers(const json& array, const std::string& pl
                                         std::vector<double>& values) const {
     if (!array.is_array()) return key_error(place, "must be an array of numbers, but is " + excerpt(array));
     if (count && array.size() != *count) {
-        return key_error(place, "must have " + std::to_string(*count) + " values, but has " +
-                                    std::to_string(array.size()));
+        return key_error(place,
+                         "must have " + std::to_string(*count) + " values, but has " + std::to_string(array.size()));
     }
     for (std::size_t i = 0; i < array.size(); ++i) {
         if (!array[i].is_number()) {
@@ -258,9 +259,7 @@ std::string to_text(double value) {
     return std::string(text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr);
 }
 
-std::string to_json(std::string_view text) {
-    return json(text).dump(-1, ' ', false, json::error_handler_t::replace);
-}
+std::string to_json(std::string_view text) { return json(text).dump(-1, ' ', false, json::error_handler_t::replace); }
 
 Result<void> write_text(const std::filesystem::path& file, std::string_view text) {
     std::error_code ignored;

@@ -30,10 +30,13 @@ public:
                                    std::initializer_list<std::string_view> known_keys);
 
     // An object within this one, by its place in the file, such as "lights[0]", with keys of its own.
-    Result<JsonObject> child(const nlohmann::json& value, std::string place, std::initializer_list<std::string_view> known_keys) const;
+    Result<JsonObject> child(const nlohmann::json& value, std::string place,
+                             std::initializer_list<std::string_view> known_keys) const;
 
     bool has(std::string_view key) const { return object_.contains(key); }
-    const nlohmann::json& operator[](std::string_view key) const { return *object_.find(key); } // precondition: has(key)
+    const nlohmann::json& operator[](std::string_view key) const {
+        return *object_.find(key);
+    } // precondition: has(key)
 
     // The value of a key, or an error where it is of another type or outside of its range. The first two leave `value`
     // as it is where the key is missing.

@@ -45,7 +45,8 @@ Result<glm::dvec3> location(const JsonObject& object, std::string_view key) {
     const auto v = vector(object, key);
     if (!v) return v;
     for (int k = 0; k < 3; ++k)
-        if (std::abs((*v)[k]) > farthest) return object.key_error(key, "must lie within 1e12 world units of the origin, but has " + to_text((*v)[k]));
+        if (std::abs((*v)[k]) > farthest)
+            return object.key_error(key, "must lie within 1e12 world units of the origin, but has " + to_text((*v)[k]));
     return v;
 }
 
@@ -89,10 +90,12 @@ struct LightRig::Reader {
             if (auto ok = read_light(*object, value); !ok) return ok;
             const Light& light = rig.lights_.back(); // keyframes take the intensity's place
             any = any || (light.keys.empty() ? light.at_rest.intensity > 0
-                                             : std::any_of(light.keys.begin(), light.keys.end(), [](const Key& key) { return key.intensity > 0; }));
+                                             : std::any_of(light.keys.begin(), light.keys.end(),
+                                                           [](const Key& key) { return key.intensity > 0; }));
         }
         if (!any)
-            return object->error("the scene is black: give key \"ambient\" or the \"intensity\" of one of the lights a value above 0");
+            return object->error(
+                "the scene is black: give key \"ambient\" or the \"intensity\" of one of the lights a value above 0");
         return {};
     }
 
@@ -110,17 +113,23 @@ private:
     }
 
     // The keys that each type has, all of them wanted, but for the motions.
-    Result<JsonObject> object_of(const JsonObject& file, const json& value, const std::string& place, std::string& type) {
+    Result<JsonObject> object_of(const JsonObject& file, const json& value, const std::string& place,
+                                 std::string& type) {
         if (!value.is_object() || !value.contains("type") || !value["type"].is_string())
-            return file.key_error(place, "must be an object with a key \"type\": directional, point, spot or headlight");
+            return file.key_error(place,
+                                  "must be an object with a key \"type\": directional, point, spot or headlight");
         type = value["type"].get<std::string>();
-        if (type == "directional") return file.child(value, place, {"type", "direction", "intensity", "orbit", "keyframes"});
-        if (type == "point") return file.child(value, place, {"type", "position", "intensity", "distance", "orbit", "keyframes"});
+        if (type == "directional")
+            return file.child(value, place, {"type", "direction", "intensity", "orbit", "keyframes"});
+        if (type == "point")
+            return file.child(value, place, {"type", "position", "intensity", "distance", "orbit", "keyframes"});
         if (type == "spot")
-            return file.child(value, place, {"type", "position", "direction", "intensity", "distance", "inner_degrees", "outer_degrees",
-                                             "orbit", "keyframes"});
+            return file.child(value, place,
+                              {"type", "position", "direction", "intensity", "distance", "inner_degrees",
+                               "outer_degrees", "orbit", "keyframes"});
         if (type == "headlight") return file.child(value, place, {"type", "intensity"});
-        return file.key_error(place + ".type", "must be directional, point, spot or headlight, but is " + to_json(type));
+        return file.key_error(place + ".type",
+                              "must be directional, point, spot or headlight, but is " + to_json(type));
     }
 
     Result<void> read_light(const JsonObject& file, const json& value) {
@@ -157,18 +166,21 @@ private:
     }
 
     Result<void> read_angles(const JsonObject& object, vdtree::LightSource& source) {
-        const auto inner = object.number("inner_degrees", half_angle), outer = object.number("outer_degrees", half_angle);
+        const auto inner = object.number("inner_degrees", half_angle),
+                   outer = object.number("outer_degrees", half_angle);
         if (!inner) return inner.error();
         if (!outer) return outer.error();
         source.inner_cosine = std::cos(radians(*inner));
         source.outer_cosine = std::cos(radians(*outer));
         constexpr double least_edge_deg = 0.5;
-        if (!(*outer - *inner >= least_edge_deg)) return object.key_error("inner_degrees", "must be half a degree less than outer_degrees, at least");
+        if (!(*outer - *inner >= least_edge_deg))
+            return object.key_error("inner_degrees", "must be half a degree less than outer_degrees, at least");
         return {};
     }
 
     Result<void> read_motion(const JsonObject& object, Light& light) {
-        if (object.has("orbit") && object.has("keyframes")) return object.key_error("orbit", "and \"keyframes\" exclude each other: remove one");
+        if (object.has("orbit") && object.has("keyframes"))
+            return object.key_error("orbit", "and \"keyframes\" exclude each other: remove one");
         if (object.has("orbit")) return read_orbit(object, light);
         if (object.has("keyframes")) return read_keys(object, light);
         return {};
@@ -176,12 +188,14 @@ private:
 
     Result<void> read_orbit(const JsonObject& object, Light& light) {
         const bool has_position = light.at_rest.kind != Kind::directional;
-        const auto orbit = has_position ? object.child(object["orbit"], "orbit", {"axis", "degrees_per_second", "centre"})
-                                        : object.child(object["orbit"], "orbit", {"axis", "degrees_per_second"});
+        const auto orbit = has_position
+                               ? object.child(object["orbit"], "orbit", {"axis", "degrees_per_second", "centre"})
+                               : object.child(object["orbit"], "orbit", {"axis", "degrees_per_second"});
         if (!orbit) return orbit.error();
         const auto axis = direction(*orbit, "axis");
         if (!axis) return axis.error();
-        const auto speed = orbit->number("degrees_per_second", {.minimum = -fastest_deg_per_s, .maximum = fastest_deg_per_s});
+        const auto speed =
+            orbit->number("degrees_per_second", {.minimum = -fastest_deg_per_s, .maximum = fastest_deg_per_s});
         if (!speed) return speed.error();
         light.axis = *axis;
         light.degrees_per_second = *speed;
@@ -197,7 +211,8 @@ private:
         const auto keys = object.array("keyframes");
         if (!keys) return keys.error();
         if ((*keys)->empty()) return object.key_error("keyframes", "is empty");
-        const bool has_position = light.at_rest.kind != Kind::directional, has_direction = light.at_rest.kind != Kind::point;
+        const bool has_position = light.at_rest.kind != Kind::directional,
+                   has_direction = light.at_rest.kind != Kind::point;
         const json* first = nullptr;
         for (const json& value : **keys) {
             const std::string place = "keyframes[" + std::to_string(light.keys.size()) + "]";
@@ -205,9 +220,12 @@ private:
             if (!frame) return frame.error();
             if (!first) first = &value;
             for (const char* key : {"position", "direction", "intensity"})
-                if (frame->has(key) != first->contains(key)) return frame->key_error(key, "must be in all keyframes of the light, or in none");
-            if (frame->has("position") && !has_position) return frame->key_error("position", "is nothing that a directional light has");
-            if (frame->has("direction") && !has_direction) return frame->key_error("direction", "is nothing that a point light has");
+                if (frame->has(key) != first->contains(key))
+                    return frame->key_error(key, "must be in all keyframes of the light, or in none");
+            if (frame->has("position") && !has_position)
+                return frame->key_error("position", "is nothing that a directional light has");
+            if (frame->has("direction") && !has_direction)
+                return frame->key_error("direction", "is nothing that a point light has");
             Key key{0, light.at_rest.position, light.at_rest.direction, light.at_rest.intensity};
             const auto seconds = frame->number("time_s", any_number);
             if (!seconds) return seconds.error();
@@ -224,8 +242,11 @@ private:
                 const auto v = direction(*frame, "direction");
                 if (!v) return v.error();
                 key.direction = *v;
-                if (!light.keys.empty() && angle_between(light.keys.back().direction, key.direction) > std::numbers::pi - opposite)
-                    return frame->key_error("direction", "is opposite to the one before: put a keyframe between them that says which way round");
+                if (!light.keys.empty() &&
+                    angle_between(light.keys.back().direction, key.direction) > std::numbers::pi - opposite)
+                    return frame->key_error(
+                        "direction",
+                        "is opposite to the one before: put a keyframe between them that says which way round");
             }
             light.keys.push_back(key);
         }
@@ -249,7 +270,8 @@ vdtree::Lighting LightRig::at(double seconds, const vdtree::VertexTree& tree, co
         vdtree::LightSource source = light.at_rest;
         if (light.is_headlight) source.direction = vdtree::camera_frame(view).back;
         if (!light.keys.empty()) {
-            const auto next = std::upper_bound(light.keys.begin(), light.keys.end(), seconds, [](double s, const Key& key) { return s < key.seconds; });
+            const auto next = std::upper_bound(light.keys.begin(), light.keys.end(), seconds,
+                                               [](double s, const Key& key) { return s < key.seconds; });
             const Key& to = next == light.keys.end() ? light.keys.back() : *next;
             const Key& from = next == light.keys.begin() ? light.keys.front() : *std::prev(next);
             const double way = to.seconds > from.seconds ? (seconds - from.seconds) / (to.seconds - from.seconds) : 0;
@@ -260,7 +282,8 @@ vdtree::Lighting LightRig::at(double seconds, const vdtree::VertexTree& tree, co
         if (light.degrees_per_second != 0) {
             const glm::dvec3 model = placement.to_world(tree.origin() + glm::dvec3(tree.bounding_sphere().centre));
             const glm::dvec3 centre = light.has_centre ? light.centre : model;
-            const glm::dquat turn = glm::angleAxis(radians(std::fmod(light.degrees_per_second * seconds, 360)), light.axis);
+            const glm::dquat turn =
+                glm::angleAxis(radians(std::fmod(light.degrees_per_second * seconds, 360)), light.axis);
             source.position = centre + turn * (source.position - centre);
             source.direction = turn * source.direction;
         }
@@ -278,7 +301,10 @@ std::string LightRig::description() const {
     std::map<std::string, int> counts;
     for (const Light& light : lights_) {
         const Kind kind = light.at_rest.kind;
-        ++counts[light.is_headlight ? "headlight" : kind == Kind::point ? "point" : kind == Kind::spot ? "spot" : "directional"];
+        ++counts[light.is_headlight    ? "headlight"
+                 : kind == Kind::point ? "point"
+                 : kind == Kind::spot  ? "spot"
+                                       : "directional"];
     }
     std::string text;
     for (const auto& [name, count] : counts) text += (text.empty() ? "" : ", ") + std::to_string(count) + " " + name;

@@ -59,14 +59,16 @@ Result<int> read_version(const JsonObject& object) {
     const auto version = object.number("version", {.minimum = 1, .maximum = 1e9, .whole = true});
     if (!version) return version.error();
     if (*version <= measured_version) return static_cast<int>(*version);
-    Error error = object.key_error("version", "must be 1 or 2, but is " + to_text(*version) + ": a newer program wrote it");
+    Error error =
+        object.key_error("version", "must be 1 or 2, but is " + to_text(*version) + ": a newer program wrote it");
     error.code = ErrorCode::unsupported;
     return error;
 }
 
 constexpr const char* text_keys[] = {"observer", "date", "method", "display", "conditions"};
-constexpr std::string ObserverProfile::* texts[] = {&ObserverProfile::observer, &ObserverProfile::date, &ObserverProfile::method,
-                                                    &ObserverProfile::display, &ObserverProfile::conditions};
+constexpr std::string ObserverProfile::*texts[] = {&ObserverProfile::observer, &ObserverProfile::date,
+                                                   &ObserverProfile::method, &ObserverProfile::display,
+                                                   &ObserverProfile::conditions};
 
 Result<std::vector<Measurement>> read_measurements(const JsonObject& object) {
     const auto rows = object.array("measured");
@@ -79,9 +81,11 @@ Result<std::vector<Measurement>> read_measurements(const JsonObject& object) {
         const bool is_place = v[0] > 0 && v[1] >= 0;
         const bool is_interval = v[3] > 0 && v[3] <= v[2] && v[2] <= v[4];
         constexpr double most_answers = 1e6;
-        if (!is_place) return object.key_error(where, "must begin with a frequency above 0 and an eccentricity of 0 or more");
+        if (!is_place)
+            return object.key_error(where, "must begin with a frequency above 0 and an eccentricity of 0 or more");
         if (!is_interval) return object.key_error(where, "must have a sensitivity above 0 that lies in its interval");
-        if (!(v[5] >= 0 && v[5] <= most_answers)) return object.key_error(where, "must end in how many answers there were");
+        if (!(v[5] >= 0 && v[5] <= most_answers))
+            return object.key_error(where, "must end in how many answers there were");
         measured.push_back({{v[0], v[1]}, v[2], v[3], v[4], static_cast<int>(v[5])});
     }
     return measured;
@@ -110,8 +114,8 @@ std::string to_array(std::span<const double> values) {
 
 Result<ObserverProfile> read_observer(const std::filesystem::path& file) {
     const auto object = JsonObject::read(file, {"format", "version", "source", "frequency_cpd", "eccentricity_deg",
-                                                "luminance_cdm2", "sensitivity", "observer", "date", "method", "display",
-                                                "conditions", "measured_at_cdm2", "measured"});
+                                                "luminance_cdm2", "sensitivity", "observer", "date", "method",
+                                                "display", "conditions", "measured_at_cdm2", "measured"});
     if (!object) return object.error();
     const auto version = read_version(*object);
     if (!version) return version.error();
@@ -121,9 +125,9 @@ Result<ObserverProfile> read_observer(const std::filesystem::path& file) {
 
     perception::CsfSamples samples;
     if (auto ok = object->get("source", samples.source); !ok) return ok.error();
-    for (const auto& [key, axis] : {std::pair{"frequency_cpd", &samples.frequency_cpd},
-                                    std::pair{"eccentricity_deg", &samples.eccentricity_deg},
-                                    std::pair{"luminance_cdm2", &samples.luminance_cdm2}}) {
+    for (const auto& [key, axis] :
+         {std::pair{"frequency_cpd", &samples.frequency_cpd}, std::pair{"eccentricity_deg", &samples.eccentricity_deg},
+          std::pair{"luminance_cdm2", &samples.luminance_cdm2}}) {
         auto values = read_axis(*object, key);
         if (!values) return values.error();
         *axis = *std::move(values);
@@ -183,7 +187,7 @@ Result<void> write_observer(const std::filesystem::path& file, const ObserverPro
     text += ",\n\"measured_at_cdm2\": " + to_text(profile.measured_at_cdm2) + ",\n\"measured\": [";
     for (std::size_t i = 0; i < profile.measured.size(); ++i) {
         const Measurement& m = profile.measured[i];
-        const double row[] = {m.place.frequency_cpd, m.place.eccentricity_deg, m.sensitivity, m.low, m.high,
+        const double row[] = {m.place.frequency_cpd,         m.place.eccentricity_deg, m.sensitivity, m.low, m.high,
                               static_cast<double>(m.answers)};
         text += (i > 0 ? ",\n" : "\n") + to_array(row);
     }

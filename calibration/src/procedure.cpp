@@ -26,7 +26,7 @@ constexpr int most_places = 1000, most_trials = 100'000, most_settings = 1000;
 constexpr double widest_eccentricity_deg = 90;
 constexpr double brightest_cdm2 = 1e6;
 constexpr std::uint64_t exact_integers = std::uint64_t{1} << 53; // what JSON keeps
-constexpr double two_sided_95 = 1.959964; // standard deviations
+constexpr double two_sided_95 = 1.959964;                        // standard deviations
 
 // Sweeps over all places until the beliefs keep still; more than enough, as each answer changes little.
 constexpr int most_sweeps = 8;
@@ -48,7 +48,9 @@ constexpr double least_chance = 1e-6;
 
 Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
 
-std::string in_brackets(const char* name, std::size_t i) { return std::string(name).append("[").append(std::to_string(i)).append("]"); }
+std::string in_brackets(const char* name, std::size_t i) {
+    return std::string(name).append("[").append(std::to_string(i)).append("]");
+}
 
 // How far a patch reaches: two standard deviations of its envelope.
 double patch_radius_deg(double frequency_cpd) { return 2 * 1.5 / frequency_cpd; }
@@ -60,7 +62,8 @@ double farthest_eccentricity_deg(const perception::Display& display, double freq
 }
 
 double log10_expected(const CsfTable& table, const GratingPlace& place, Luminance luminance) {
-    return std::log10(table.sensitivity(CyclesPerDegree(place.frequency_cpd), Degrees(place.eccentricity_deg), luminance));
+    return std::log10(
+        table.sensitivity(CyclesPerDegree(place.frequency_cpd), Degrees(place.eccentricity_deg), luminance));
 }
 
 } // namespace
@@ -73,7 +76,8 @@ bool fits(const perception::Display& display, const GratingPlace& place) {
 
 std::string_view name(Method method) { return method == Method::two_interval ? "2ifc" : "adjustment"; }
 
-CalibrationPlan plan_for(const perception::Display& display, const CsfTable& expected, std::optional<Luminance> luminance) {
+CalibrationPlan plan_for(const perception::Display& display, const CsfTable& expected,
+                         std::optional<Luminance> luminance) {
     CalibrationPlan plan;
     const double black = perception::black_level(display).value(), white = perception::to_luminance(display, 1).value();
     plan.luminance = luminance.value_or(Luminance((black + white) / 2));
@@ -107,7 +111,8 @@ Result<void> validate(const CalibrationPlan& plan) {
         if (!(frequency >= coarsest_cpd && frequency <= finest_cpd))
             return invalid(where + ": the frequency must lie in 1/16 to 64 cpd, not " + to_text(frequency) + ".");
         if (!(eccentricity >= 0 && eccentricity <= widest_eccentricity_deg))
-            return invalid(where + ": the eccentricity must lie in 0 to 90 degrees, not " + to_text(eccentricity) + ".");
+            return invalid(where + ": the eccentricity must lie in 0 to 90 degrees, not " + to_text(eccentricity) +
+                           ".");
         if (std::find(plan.places.begin(), plan.places.begin() + static_cast<std::ptrdiff_t>(i), plan.places[i]) !=
             plan.places.begin() + static_cast<std::ptrdiff_t>(i))
             return invalid(where + " is there twice.");
@@ -117,16 +122,22 @@ Result<void> validate(const CalibrationPlan& plan) {
     if (plan.settings < 2 || plan.settings > most_settings)
         return invalid("There must be 2 to 1000 settings a place, not " + std::to_string(plan.settings) + ".");
     if (!(plan.luminance.value() > 0 && plan.luminance.value() <= brightest_cdm2))
-        return invalid("The luminance must be above 0 and at most 1e6 cd/m2, not " + to_text(plan.luminance.value()) + ".");
-    if (plan.seed > exact_integers) return invalid("The seed must be at most 2^53, not " + std::to_string(plan.seed) + ".");
+        return invalid("The luminance must be above 0 and at most 1e6 cd/m2, not " + to_text(plan.luminance.value()) +
+                       ".");
+    if (plan.seed > exact_integers)
+        return invalid("The seed must be at most 2^53, not " + std::to_string(plan.seed) + ".");
     if (!(plan.highest_contrast > 0 && plan.highest_contrast <= 1))
         return invalid("The highest contrast must lie in 0..1, not " + to_text(plan.highest_contrast) + ".");
     return {};
 }
 
 double PlaceEstimate::sensitivity() const { return std::pow(10, log10_sensitivity.mean); }
-double PlaceEstimate::low() const { return std::pow(10, log10_sensitivity.mean - two_sided_95 * log10_sensitivity.deviation); }
-double PlaceEstimate::high() const { return std::pow(10, log10_sensitivity.mean + two_sided_95 * log10_sensitivity.deviation); }
+double PlaceEstimate::low() const {
+    return std::pow(10, log10_sensitivity.mean - two_sided_95 * log10_sensitivity.deviation);
+}
+double PlaceEstimate::high() const {
+    return std::pow(10, log10_sensitivity.mean + two_sided_95 * log10_sensitivity.deviation);
+}
 
 Procedure::Procedure(CalibrationPlan plan, CsfTable expected, QuestPlus blank)
     : plan_(std::move(plan)), expected_(std::move(expected)), field_(plan_.places, expected_, plan_.luminance),
@@ -146,7 +157,8 @@ Result<Procedure> Procedure::create(CalibrationPlan plan, CsfTable expected) {
         const double threshold = -log10_expected(expected, plan.places[i], plan.luminance);
         if (!(threshold >= lowest_log10_contrast))
             return invalid(in_brackets("places", i) + ": a sensitivity of " + to_text(std::pow(10, -threshold)) +
-                           " is expected, but none above " + to_text(std::round(std::pow(10, -lowest_log10_contrast))) + " can be measured.");
+                           " is expected, but none above " + to_text(std::round(std::pow(10, -lowest_log10_contrast))) +
+                           " can be measured.");
         highest_threshold = std::max(highest_threshold, std::min(threshold, farthest_log10_threshold));
     }
     std::vector<double>& thresholds = grid.log10_threshold;
@@ -156,7 +168,8 @@ Result<Procedure> Procedure::create(CalibrationPlan plan, CsfTable expected) {
     const double highest = std::log10(plan.highest_contrast);
     std::erase_if(grid.log10_contrast, [&](double c) { return c > highest; });
     if (grid.log10_contrast.empty())
-        return invalid("The display's highest contrast, " + to_text(plan.highest_contrast) + ", shows nothing that could be measured.");
+        return invalid("The display's highest contrast, " + to_text(plan.highest_contrast) +
+                       ", shows nothing that could be measured.");
     if (grid.log10_contrast.back() < highest) grid.log10_contrast.push_back(highest);
     auto blank = QuestPlus::create(grid);
     if (!blank) return blank.error();
@@ -214,14 +227,16 @@ Procedure::Prospect Procedure::look_ahead() const {
 
 // The variance of a threshold is expected to become smaller by the square of its covariance with the answer over the answer's variance.
 // Places vary together by what they say about each other, and by the slope that they have in common.
-double Procedure::gain_of(const QuestPlus::Forecast& answer, const std::vector<double>& pulled, const Prospect& prospect) {
+double Procedure::gain_of(const QuestPlus::Forecast& answer, const std::vector<double>& pulled,
+                          const Prospect& prospect) {
     const std::size_t functions = answer.right.size();
     const double right = std::accumulate(answer.right.begin(), answer.right.end(), 0.0);
     if (!(right > 0 && right < 1)) return 0;
     double sum = 0;
     for (std::size_t place = 0; place < pulled.size(); ++place) {
         double covariance = pulled[place] * answer.pull;
-        for (std::size_t f = 0; f < functions; ++f) covariance += answer.right[f] * prospect.shifts[place * functions + f];
+        for (std::size_t f = 0; f < functions; ++f)
+            covariance += answer.right[f] * prospect.shifts[place * functions + f];
         sum += prospect.visible[place] * covariance * covariance;
     }
     return sum / (right * (1 - right));
@@ -319,18 +334,22 @@ void Procedure::weigh_settings() {
     std::size_t freedom = 0;
     for (const std::vector<double>& of_place : settings) {
         if (of_place.empty()) continue;
-        const double mean = std::accumulate(of_place.begin(), of_place.end(), 0.0) / static_cast<double>(of_place.size());
+        const double mean =
+            std::accumulate(of_place.begin(), of_place.end(), 0.0) / static_cast<double>(of_place.size());
         for (const double s : of_place) squares += (s - mean) * (s - mean);
         freedom += of_place.size() - 1;
     }
     constexpr double usual_scatter = 0.15; // until it is known
-    const double scatter = freedom < count ? usual_scatter : std::max(least_scatter, std::sqrt(squares / static_cast<double>(freedom)));
+    const double scatter =
+        freedom < count ? usual_scatter : std::max(least_scatter, std::sqrt(squares / static_cast<double>(freedom)));
     const double highest = std::log10(plan_.highest_contrast);
     const std::vector<double>& thresholds = quests_.front().grid().log10_threshold;
     std::vector<double> likelihood(thresholds.size());
     for (std::size_t p = 0; p < count; ++p) {
         for (std::size_t t = 0; t < thresholds.size(); ++t) {
-            likelihood[t] = unseen[p] * std::log(std::erfc((highest - thresholds[t]) / (scatter * std::numbers::sqrt2)) + least_chance);
+            likelihood[t] =
+                unseen[p] *
+                std::log(std::erfc((highest - thresholds[t]) / (scatter * std::numbers::sqrt2)) + least_chance);
             for (const double s : settings[p]) {
                 const double z = (s - thresholds[t]) / scatter;
                 likelihood[t] -= z * z / 2;
@@ -356,7 +375,8 @@ Result<CsfTable> Procedure::table(std::string source) const {
     samples.source = std::move(source);
     for (int i = -16; i <= 24; ++i) samples.frequency_cpd.push_back(std::exp2(i / 4.0)); // quarter octaves, 1/16 to 64
     samples.eccentricity_deg = {0, 1, 2, 3, 4, 5, 6, 8, 10, 12.5, 15, 17.5, 20, 25, 30, 40, 50, 60, 80, 100, 120};
-    for (int i = -12; i <= 16; ++i) samples.luminance_cdm2.push_back(std::pow(10, i / 4.0)); // quarter decades, 1e-3 to 1e4
+    for (int i = -12; i <= 16; ++i)
+        samples.luminance_cdm2.push_back(std::pow(10, i / 4.0)); // quarter decades, 1e-3 to 1e4
 
     GratingPlace least{1e300, 1e300}, most{0, 0}; // of the measured
     for (const GratingPlace& p : plan_.places) {
@@ -366,15 +386,18 @@ Result<CsfTable> Procedure::table(std::string source) const {
     std::vector<double> deviations; // by eccentricity and frequency
     for (const double e : samples.eccentricity_deg)
         for (const double f : samples.frequency_cpd)
-            deviations.push_back(field_.deviation({std::clamp(f, least.frequency_cpd, most.frequency_cpd),
-                                                   std::clamp(e, least.eccentricity_deg, most.eccentricity_deg)}).mean);
+            deviations.push_back(field_
+                                     .deviation({std::clamp(f, least.frequency_cpd, most.frequency_cpd),
+                                                 std::clamp(e, least.eccentricity_deg, most.eccentricity_deg)})
+                                     .mean);
     const std::size_t frequencies = samples.frequency_cpd.size();
     for (std::size_t e = 0; e < samples.eccentricity_deg.size(); ++e)
         for (const double luminance : samples.luminance_cdm2)
             for (std::size_t f = 0; f < frequencies; ++f) {
                 const GratingPlace place{samples.frequency_cpd[f], samples.eccentricity_deg[e]};
                 constexpr double least_log10 = -30; // sensitivities of castleCSF at 64 cpd far aside, kept above 0
-                const double value = log10_expected(expected_, place, Luminance(luminance)) + deviations[e * frequencies + f];
+                const double value =
+                    log10_expected(expected_, place, Luminance(luminance)) + deviations[e * frequencies + f];
                 samples.sensitivity.push_back(std::pow(10, std::max(value, least_log10)));
             }
     return CsfTable::create(std::move(samples));
@@ -393,12 +416,14 @@ std::string hash_of(const CsfTable& table) {
         for (int byte = 0; byte < 4; ++byte) hash = (hash ^ ((bits >> (8 * byte)) & 0xff)) * 0x100000001b3u;
     };
     const perception::CsfSamples& s = table.samples();
-    for (const std::vector<double>* values : {&s.frequency_cpd, &s.eccentricity_deg, &s.luminance_cdm2, &s.sensitivity}) {
+    for (const std::vector<double>* values :
+         {&s.frequency_cpd, &s.eccentricity_deg, &s.luminance_cdm2, &s.sensitivity}) {
         add(static_cast<std::uint32_t>(values->size()));
         for (const double value : *values) add(std::bit_cast<std::uint32_t>(static_cast<float>(value)));
     }
     std::string text(16, '0');
-    for (std::size_t digit = 0; digit < text.size(); ++digit) text[digit] = "0123456789abcdef"[(hash >> (60 - 4 * digit)) & 15];
+    for (std::size_t digit = 0; digit < text.size(); ++digit)
+        text[digit] = "0123456789abcdef"[(hash >> (60 - 4 * digit)) & 15];
     return text;
 }
 
@@ -427,10 +452,12 @@ Result<CalibrationPlan> read_plan(const JsonObject& object) {
     const auto method = read_method(object);
     if (!method) return method.error();
     plan.method = *method;
-    const auto seed = object.number("seed", {.minimum = 0, .maximum = static_cast<double>(exact_integers), .whole = true});
+    const auto seed =
+        object.number("seed", {.minimum = 0, .maximum = static_cast<double>(exact_integers), .whole = true});
     const auto trials = object.number("trials", {.minimum = 1, .maximum = most_trials, .whole = true});
     const auto settings = object.number("settings", {.minimum = 2, .maximum = most_settings, .whole = true});
-    const auto luminance = object.number("luminance_cdm2", {.minimum = 0, .maximum = brightest_cdm2, .minimum_allowed = false});
+    const auto luminance =
+        object.number("luminance_cdm2", {.minimum = 0, .maximum = brightest_cdm2, .minimum_allowed = false});
     const auto contrast = object.number("highest_contrast", {.minimum = 0, .maximum = 1, .minimum_allowed = false});
     for (const auto* number : {&seed, &trials, &settings, &luminance, &contrast})
         if (!*number) return number->error();
@@ -449,35 +476,41 @@ Result<CalibrationPlan> read_plan(const JsonObject& object) {
 } // namespace
 
 Result<void> Procedure::save(const std::filesystem::path& file) const {
-    std::string text = "{\n\"format\": " + to_json(state_format) + ",\n\"version\": 1,\n\"method\": " + to_json(name(plan_.method));
+    std::string text =
+        "{\n\"format\": " + to_json(state_format) + ",\n\"version\": 1,\n\"method\": " + to_json(name(plan_.method));
     text += ",\n\"seed\": " + std::to_string(plan_.seed) + ",\n\"trials\": " + std::to_string(plan_.trials) +
             ",\n\"settings\": " + std::to_string(plan_.settings);
     text += ",\n\"luminance_cdm2\": " + to_text(plan_.luminance.value()) +
             ",\n\"highest_contrast\": " + to_text(plan_.highest_contrast) + ",\n\"places\": [";
     for (std::size_t i = 0; i < plan_.places.size(); ++i)
-        text += (i > 0 ? ", [" : "[") + to_text(plan_.places[i].frequency_cpd) + ", " + to_text(plan_.places[i].eccentricity_deg) + "]";
-    text += "],\n\"expected\": " + to_json(expected_.samples().source) + ",\n\"expected_hash\": " + to_json(hash_of(expected_));
+        text += (i > 0 ? ", [" : "[") + to_text(plan_.places[i].frequency_cpd) + ", " +
+                to_text(plan_.places[i].eccentricity_deg) + "]";
+    text += "],\n\"expected\": " + to_json(expected_.samples().source) +
+            ",\n\"expected_hash\": " + to_json(hash_of(expected_));
     text += ",\n\"answers\": [";
     for (std::size_t i = 0; i < answers_.size(); ++i)
-        text += (i > 0 ? ",\n[" : "\n[") + std::to_string(answers_[i].place) + ", " + to_text(answers_[i].log10_contrast) + ", " +
-                (answers_[i].is_right ? "1" : "0") + "]";
+        text += (i > 0 ? ",\n[" : "\n[") + std::to_string(answers_[i].place) + ", " +
+                to_text(answers_[i].log10_contrast) + ", " + (answers_[i].is_right ? "1" : "0") + "]";
     return write_text(file, text + "]\n}\n");
 }
 
 Result<Procedure> Procedure::resume(const std::filesystem::path& file, CsfTable expected) {
-    const auto object = JsonObject::read(file, {"format", "version", "method", "seed", "trials", "settings", "luminance_cdm2",
-                                                "highest_contrast", "places", "expected", "expected_hash", "answers"});
+    const auto object =
+        JsonObject::read(file, {"format", "version", "method", "seed", "trials", "settings", "luminance_cdm2",
+                                "highest_contrast", "places", "expected", "expected_hash", "answers"});
     if (!object) return object.error();
     std::string format = "missing";
     if (auto ok = object->get("format", format); !ok) return ok.error();
     if (format != state_format)
         return object->key_error("format", "must be \"unseen-calibration\": this is no interrupted calibration");
-    if (auto version = object->number("version", {.minimum = 1, .maximum = 1, .whole = true}); !version) return version.error();
+    if (auto version = object->number("version", {.minimum = 1, .maximum = 1, .whole = true}); !version)
+        return version.error();
     std::string begun_with = "another", hash = hash_of(expected);
     if (auto ok = object->get("expected", begun_with); !ok) return ok.error();
     if (auto ok = object->get("expected_hash", hash); !ok) return ok.error();
     if (hash != hash_of(expected))
-        return object->key_error("expected", "is " + to_json(begun_with) + ", but the expected table is " + to_json(expected.samples().source) +
+        return object->key_error("expected", "is " + to_json(begun_with) + ", but the expected table is " +
+                                                 to_json(expected.samples().source) +
                                                  ": go on with the one that the calibration was begun with");
     auto plan = read_plan(*object);
     if (!plan) return plan.error();
@@ -495,11 +528,14 @@ Result<Procedure> Procedure::resume(const std::filesystem::path& file, CsfTable 
         if (!(row[0] >= 0 && row[0] < places && row[0] == std::trunc(row[0])))
             return object->key_error(where, "has no place " + to_text(row[0]));
         constexpr double least_log10 = -10;
-        if (!(row[1] >= least_log10 && row[1] <= 0)) return object->key_error(where, "has a log10 contrast that is not in -10..0");
-        if (row[2] != 0 && row[2] != 1) return object->key_error(where, "must end in 1 (right, seen) or 0 (wrong, unseen)");
+        if (!(row[1] >= least_log10 && row[1] <= 0))
+            return object->key_error(where, "has a log10 contrast that is not in -10..0");
+        if (row[2] != 0 && row[2] != 1)
+            return object->key_error(where, "must end in 1 (right, seen) or 0 (wrong, unseen)");
         if (procedure->plan_.method == Method::adjustment) {
             const std::size_t due = procedure->next().place;
-            if (static_cast<std::size_t>(row[0]) != due) return object->key_error(where, "is not of the place whose turn it was");
+            if (static_cast<std::size_t>(row[0]) != due)
+                return object->key_error(where, "is not of the place whose turn it was");
         }
         procedure->take({static_cast<std::size_t>(row[0]), std::max(row[1], lowest_log10_contrast), row[2] == 1});
         procedure->combine(); // each time, so that beliefs come out to the last bit as if there had been no break

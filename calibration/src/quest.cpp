@@ -36,12 +36,16 @@ double Psychometric::probability(double x) const {
 }
 
 Result<void> validate(const Psychometric& f) {
-    if (!(f.slope > 0 && std::isfinite(f.slope))) return invalid("The slope must be above 0, not " + to_text(f.slope) + ".");
-    if (!(f.lapse >= 0 && f.lapse < 1)) return invalid("The lapse rate must lie in 0..1, not " + to_text(f.lapse) + ".");
-    if (!(f.guess >= 0 && f.guess < 1)) return invalid("The guess rate must lie in 0..1, not " + to_text(f.guess) + ".");
+    if (!(f.slope > 0 && std::isfinite(f.slope)))
+        return invalid("The slope must be above 0, not " + to_text(f.slope) + ".");
+    if (!(f.lapse >= 0 && f.lapse < 1))
+        return invalid("The lapse rate must lie in 0..1, not " + to_text(f.lapse) + ".");
+    if (!(f.guess >= 0 && f.guess < 1))
+        return invalid("The guess rate must lie in 0..1, not " + to_text(f.guess) + ".");
     if (!std::isfinite(f.shift()))
-        return invalid("The threshold cannot be at " + to_text(f.at_threshold) + " right answers: with a guess rate of " +
-                       to_text(f.guess) + " and a lapse rate of " + to_text(f.lapse) + " they never are so many or so few.");
+        return invalid("The threshold cannot be at " + to_text(f.at_threshold) +
+                       " right answers: with a guess rate of " + to_text(f.guess) + " and a lapse rate of " +
+                       to_text(f.lapse) + " they never are so many or so few.");
     return {};
 }
 
@@ -57,20 +61,23 @@ QuestGrid standard_grid() {
 struct QuestPlus::Tables {
     QuestGrid grid;
     std::vector<Psychometric> functions; // by lapse and slope
-    std::vector<float> right; // by stimulus and combination: the probability of a right answer
+    std::vector<float> right;            // by stimulus and combination: the probability of a right answer
 
     std::size_t combinations() const { return functions.size() * grid.log10_threshold.size(); }
 };
 
 QuestPlus::QuestPlus(std::shared_ptr<const Tables> tables)
     : tables_(std::move(tables)), log_prior_(tables_->grid.log10_threshold.size(), 0.0),
-      log_prior_of_functions_(tables_->functions.size(), 0.0), log_likelihood_(tables_->combinations(), 0.0), posterior_(tables_->combinations()) {
+      log_prior_of_functions_(tables_->functions.size(), 0.0), log_likelihood_(tables_->combinations(), 0.0),
+      posterior_(tables_->combinations()) {
     refresh();
 }
 
 Result<QuestPlus> QuestPlus::create(const QuestGrid& grid) {
-    for (const auto& [axis, name] : {std::pair{&grid.log10_threshold, "log10_threshold"}, {&grid.slope, "slope"},
-                                     {&grid.lapse, "lapse"}, {&grid.log10_contrast, "log10_contrast"}})
+    for (const auto& [axis, name] : {std::pair{&grid.log10_threshold, "log10_threshold"},
+                                     {&grid.slope, "slope"},
+                                     {&grid.lapse, "lapse"},
+                                     {&grid.log10_contrast, "log10_contrast"}})
         if (auto ok = check_axis(*axis, name); !ok) return ok.error();
     auto tables = std::make_shared<Tables>();
     tables->grid = grid;
@@ -129,7 +136,7 @@ void QuestPlus::set_log_likelihood(std::span<const double> by_threshold) {
 
 void QuestPlus::refresh() {
     const std::size_t thresholds = log_prior_.size();
-    for (std::size_t i = 0; i < posterior_.size(); ++i) 
+    for (std::size_t i = 0; i < posterior_.size(); ++i)
         posterior_[i] = log_likelihood_[i] + log_prior_[i % thresholds] + log_prior_of_functions_[i / thresholds];
     const double largest = *std::max_element(posterior_.begin(), posterior_.end());
     double sum = 0;
@@ -144,9 +151,11 @@ QuestPlus::Belief QuestPlus::log10_threshold() const {
     Belief belief;
     for (std::size_t t = 0; t < values.size(); ++t) belief.mean += marginal[t] * values[t];
     double variance = 0;
-    for (std::size_t t = 0; t < values.size(); ++t) variance += marginal[t] * (values[t] - belief.mean) * (values[t] - belief.mean);
+    for (std::size_t t = 0; t < values.size(); ++t)
+        variance += marginal[t] * (values[t] - belief.mean) * (values[t] - belief.mean);
     belief.deviation = std::sqrt(variance);
-    belief.mode = values[static_cast<std::size_t>(std::max_element(marginal.begin(), marginal.end()) - marginal.begin())];
+    belief.mode =
+        values[static_cast<std::size_t>(std::max_element(marginal.begin(), marginal.end()) - marginal.begin())];
     return belief;
 }
 
@@ -169,7 +178,8 @@ void QuestPlus::forecast(const FunctionRef<void(const Forecast&)>& f) const {
     const std::size_t count = thresholds.size(), functions = tables_->functions.size();
     const std::vector<double> means = log10_thresholds();
     std::vector<double> off_mean; // by combination, weighted
-    for (std::size_t i = 0; i < posterior_.size(); ++i) off_mean.push_back(posterior_[i] * (thresholds[i % count] - means[i / count]));
+    for (std::size_t i = 0; i < posterior_.size(); ++i)
+        off_mean.push_back(posterior_[i] * (thresholds[i % count] - means[i / count]));
     std::vector<double> by_function(functions);
     for (std::size_t s = 0; s < tables_->grid.log10_contrast.size(); ++s) {
         const float* right = &tables_->right[s * posterior_.size()];

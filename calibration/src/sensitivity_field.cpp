@@ -32,16 +32,18 @@ double aside(const GratingPlace& p) { return std::log2(1 + p.eccentricity_deg / 
 
 double shape_covariance(const Site& a, const Site& b) {
     const auto square = [](double x) { return x * x; };
-    const double fa = a.place.frequency_cpd, fb = b.place.frequency_cpd, ea = a.place.eccentricity_deg, eb = b.place.eccentricity_deg;
-    return square(gain) + square(tilt_per_octave) * octaves(a.place) * octaves(b.place) + square(cutoff_per_cpd) * fa * fb +
-           square(decline_per_degree) * ea * eb + square(fall_per_cpd_degree) * fa * ea * fb * eb +
-           square(share_of_loss) * a.loss * b.loss;
+    const double fa = a.place.frequency_cpd, fb = b.place.frequency_cpd, ea = a.place.eccentricity_deg,
+                 eb = b.place.eccentricity_deg;
+    return square(gain) + square(tilt_per_octave) * octaves(a.place) * octaves(b.place) +
+           square(cutoff_per_cpd) * fa * fb + square(decline_per_degree) * ea * eb +
+           square(fall_per_cpd_degree) * fa * ea * fb * eb + square(share_of_loss) * a.loss * b.loss;
 }
 
 double local_deviation_of(const Site& s) { return local + local_share_of_loss * s.loss; }
 
 double local_covariance(const Site& a, const Site& b) {
-    const double du = (octaves(a.place) - octaves(b.place)) / local_octaves, dv = (aside(a.place) - aside(b.place)) / local_octaves;
+    const double du = (octaves(a.place) - octaves(b.place)) / local_octaves,
+                 dv = (aside(a.place) - aside(b.place)) / local_octaves;
     return local_deviation_of(a) * local_deviation_of(b) * std::exp(-(du * du + dv * dv) / 2);
 }
 
@@ -79,7 +81,8 @@ std::vector<double> weighted_factor(const std::vector<double>& prior, const std:
 
 } // namespace
 
-SensitivityField::SensitivityField(const std::vector<GratingPlace>& places, perception::CsfTable expected, perception::Luminance luminance)
+SensitivityField::SensitivityField(const std::vector<GratingPlace>& places, perception::CsfTable expected,
+                                   perception::Luminance luminance)
     : table_(std::move(expected)), luminance_(luminance), precision_(places.size(), 0.0), shift_(places.size(), 0.0) {
     for (const GratingPlace& place : places) {
         sites_.push_back(site(place));
@@ -88,13 +91,14 @@ SensitivityField::SensitivityField(const std::vector<GratingPlace>& places, perc
     const std::size_t n = places.size();
     prior_.resize(n * n);
     for (std::size_t i = 0; i < n; ++i)
-        for (std::size_t j = 0; j < n; ++j) prior_[i * n + j] = covariance(sites_[i], sites_[j]) + (i == j ? jitter : 0.0);
+        for (std::size_t j = 0; j < n; ++j)
+            prior_[i * n + j] = covariance(sites_[i], sites_[j]) + (i == j ? jitter : 0.0);
     update();
 }
 
 double SensitivityField::log10_expected(const GratingPlace& at) const {
-    return std::log10(
-        table_.sensitivity(perception::CyclesPerDegree(at.frequency_cpd), perception::Degrees(at.eccentricity_deg), luminance_));
+    return std::log10(table_.sensitivity(perception::CyclesPerDegree(at.frequency_cpd),
+                                         perception::Degrees(at.eccentricity_deg), luminance_));
 }
 
 Site SensitivityField::site(const GratingPlace& at) const {
@@ -114,7 +118,8 @@ SensitivityField::Belief SensitivityField::without_own(std::size_t i) const {
 
 std::vector<double> SensitivityField::pulled_by(std::size_t i) const {
     std::vector<double> shares;
-    for (std::size_t j = 0; j < size(); ++j) shares.push_back(covariance_[i * size() + j] / covariance_[i * size() + i]);
+    for (std::size_t j = 0; j < size(); ++j)
+        shares.push_back(covariance_[i * size() + j] / covariance_[i * size() + i]);
     return shares;
 }
 
@@ -124,7 +129,8 @@ void SensitivityField::set_own(std::size_t i, const Belief& with_own) {
     const double precision = 1 / (with_own.deviation * with_own.deviation);
     // Surprising answers can widen a belief; a factor of negative precision would be no distribution.
     const double own = std::max(precision - rest_precision, 1e-6 * rest_precision);
-    const double shift = (with_own.mean - expected_[i]) * (own + rest_precision) - (rest.mean - expected_[i]) * rest_precision;
+    const double shift =
+        (with_own.mean - expected_[i]) * (own + rest_precision) - (rest.mean - expected_[i]) * rest_precision;
     change_factor(i, own - precision_[i], shift - shift_[i]);
 }
 
@@ -171,7 +177,8 @@ namespace {
 
 // The posterior of a quantity whose covariances with the places' deviations are `with_places`.
 SensitivityField::Belief predict(const std::vector<double>& prior, const std::vector<double>& precision,
-                                 const std::vector<double>& shift, const std::vector<double>& with_places, double variance) {
+                                 const std::vector<double>& shift, const std::vector<double>& with_places,
+                                 double variance) {
     const std::size_t n = precision.size();
     const std::vector<double> factor = weighted_factor(prior, precision);
     // w = R (I + R K R)^-1 R applied to the factors' means, where they have any precision.

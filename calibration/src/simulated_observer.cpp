@@ -18,8 +18,8 @@ Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, wh
 
 struct Key {
     std::string_view name;
-    double SimulatedObserver::* value = nullptr;
-    double Psychometric::* of_psychometric = nullptr;
+    double SimulatedObserver::*value = nullptr;
+    double Psychometric::*of_psychometric = nullptr;
     double least, most;
 };
 // Wider than people differ; whether the thresholds that come of it can be measured, check_measurable() says.
@@ -54,7 +54,8 @@ Result<perception::CsfTable> table_named(const std::string& name) {
     if (name.ends_with(".json")) return read_csf(name);
     const auto model = perception::csf_model(name);
     if (!model) return invalid("observer: '" + name + "' is neither a CSF model nor the file of a profile (.json).");
-    if (!perception::is_achromatic(*model)) return invalid("observer: " + name + " is sensitivity to colour, not to luminance contrast.");
+    if (!perception::is_achromatic(*model))
+        return invalid("observer: " + name + " is sensitivity to colour, not to luminance contrast.");
     return perception::CsfTable::from_model(*model);
 }
 
@@ -78,7 +79,8 @@ int SimulatedObserver::choose(const Trial& trial, perception::Luminance luminanc
 
 double SimulatedObserver::set(const Trial& trial, const CalibrationPlan& plan) const {
     const double threshold = -std::log10(sensitivity(trial.grating, plan.luminance));
-    const double setting = threshold + scatter * chance(seed, trial.number).normal() + (trial.is_ascending ? delay : -delay);
+    const double setting =
+        threshold + scatter * chance(seed, trial.number).normal() + (trial.is_ascending ? delay : -delay);
     return std::min(std::pow(10, setting), plan.highest_contrast);
 }
 
@@ -86,9 +88,10 @@ Result<void> check_measurable(const SimulatedObserver& observer, const Calibrati
     for (const GratingPlace& place : plan.places) {
         const double sensitivity = observer.sensitivity(place, plan.luminance);
         if (!(std::log10(sensitivity) <= -lowest_log10_contrast))
-            return invalid("observer: the sensitivity at " + to_text(place.frequency_cpd) + " cpd and " + to_text(place.eccentricity_deg) +
-                           " degrees is " + to_text(std::round(sensitivity)) + ", but none above " +
-                           to_text(std::round(std::pow(10, -lowest_log10_contrast))) + " can be measured: give a lower gain.");
+            return invalid("observer: the sensitivity at " + to_text(place.frequency_cpd) + " cpd and " +
+                           to_text(place.eccentricity_deg) + " degrees is " + to_text(std::round(sensitivity)) +
+                           ", but none above " + to_text(std::round(std::pow(10, -lowest_log10_contrast))) +
+                           " can be measured: give a lower gain.");
     }
     return {};
 }

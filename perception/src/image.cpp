@@ -29,9 +29,9 @@
 #include <ImfOutputFile.h>
 #include <png.h>
 
+#include <vdtree/colour.h>
 #include <vdtree/internal/atomic_file.h>
 #include <vdtree/internal/number_text.h>
-#include <vdtree/colour.h>
 
 namespace unseen::perception {
 namespace {
@@ -40,8 +40,8 @@ constexpr std::uint64_t largest_side = 32768;                   // pixels
 constexpr std::uint64_t largest_count = std::uint64_t{1} << 28; // pixels
 // No compressed byte of PNG or EXR's deflate can grow to more than 1032 bytes; other EXR methods stay near that.
 constexpr std::uint64_t largest_expansion = 2048;
-constexpr std::uint64_t small_buffer = std::uint64_t{1} << 26;  // bytes that any file may ask for
-constexpr std::uint64_t most_exr_channels = 64;                 // of one file; more is no picture
+constexpr std::uint64_t small_buffer = std::uint64_t{1} << 26; // bytes that any file may ask for
+constexpr std::uint64_t most_exr_channels = 64;                // of one file; more is no picture
 
 using Bytes = std::vector<unsigned char>;
 
@@ -467,11 +467,30 @@ private:
     // OpenEXR reads what a known type needs, whatever length the file gives; where the two differ it would go on in the
     // middle of an attribute and see another header than this walk.
     bool has_its_length(std::string_view type, std::size_t position, std::size_t size) const {
-        static constexpr std::pair<std::string_view, std::size_t> lengths[] = {
-            {"box2f", 16}, {"box2i", 16}, {"chromaticities", 32}, {"compression", 1}, {"deepImageState", 1},
-            {"double", 8}, {"envmap", 1}, {"float", 4}, {"int", 4}, {"keycode", 28}, {"lineOrder", 1}, {"m33f", 36},
-            {"m33d", 72}, {"m44f", 64}, {"m44d", 128}, {"rational", 8}, {"tiledesc", 9}, {"timecode", 8}, {"v2f", 8},
-            {"v2i", 8}, {"v2d", 16}, {"v3f", 12}, {"v3i", 12}, {"v3d", 24}};
+        static constexpr std::pair<std::string_view, std::size_t> lengths[] = {{"box2f", 16},
+                                                                               {"box2i", 16},
+                                                                               {"chromaticities", 32},
+                                                                               {"compression", 1},
+                                                                               {"deepImageState", 1},
+                                                                               {"double", 8},
+                                                                               {"envmap", 1},
+                                                                               {"float", 4},
+                                                                               {"int", 4},
+                                                                               {"keycode", 28},
+                                                                               {"lineOrder", 1},
+                                                                               {"m33f", 36},
+                                                                               {"m33d", 72},
+                                                                               {"m44f", 64},
+                                                                               {"m44d", 128},
+                                                                               {"rational", 8},
+                                                                               {"tiledesc", 9},
+                                                                               {"timecode", 8},
+                                                                               {"v2f", 8},
+                                                                               {"v2i", 8},
+                                                                               {"v2d", 16},
+                                                                               {"v3f", 12},
+                                                                               {"v3i", 12},
+                                                                               {"v3d", 24}};
         for (const auto& [known, length] : lengths) {
             if (type == known) return size == length;
         }
@@ -584,9 +603,9 @@ void read_exr_pixels(Imf::InputFile& input, const std::vector<std::string>& chan
         const int top = window.min.y + row;
         Imf::FrameBuffer frame;
         for (std::size_t c = 0; c < channels.size(); ++c) {
-            frame.insert(channels[c], Imf::Slice::Make(Imf::FLOAT, strip.data() + c, Imath::V2i(window.min.x, top),
-                                                       image.width, rows, pixel_bytes,
-                                                       pixel_bytes * static_cast<std::size_t>(image.width)));
+            frame.insert(channels[c],
+                         Imf::Slice::Make(Imf::FLOAT, strip.data() + c, Imath::V2i(window.min.x, top), image.width,
+                                          rows, pixel_bytes, pixel_bytes * static_cast<std::size_t>(image.width)));
         }
         input.setFrameBuffer(frame);
         input.readPixels(top, top + rows - 1);
@@ -607,8 +626,8 @@ Result<ImageFile> read_exr(const std::filesystem::path& file, const Bytes& bytes
         ImageFile out;
         out.is_absolute = true;
         out.bits = 32;
-        out.image = {window.max.x - window.min.x + 1, window.max.y - window.min.y + 1,
-                     static_cast<int>(channels->size()), {}};
+        out.image = {
+            window.max.x - window.min.x + 1, window.max.y - window.min.y + 1, static_cast<int>(channels->size()), {}};
         read_exr_pixels(input, *channels, out.image);
         if (auto error = non_finite(file, out.image)) return *std::move(error);
         return out;
@@ -656,8 +675,8 @@ Result<Bytes> encode(const std::filesystem::path& file, const Image& image) {
     if (ending == ".png") return encode_png(file, image);
     if (ending == ".pfm") return encode_pfm(image);
     if (ending == ".exr") return encode_exr(file, image);
-    return Error{ErrorCode::invalid_argument, file.string() + ": images are written as .png, .pfm or .exr, not '" +
-                                                  ending + "'"};
+    return Error{ErrorCode::invalid_argument,
+                 file.string() + ": images are written as .png, .pfm or .exr, not '" + ending + "'"};
 }
 
 bool begins_with(const Bytes& bytes, std::initializer_list<unsigned char> magic) {

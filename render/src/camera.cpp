@@ -24,8 +24,7 @@ double near_plane(glm::dvec3 centre_in_view, double radius, double tan_x, double
     const double distance = glm::length(centre_in_view);
     const double nearest = distance - radius;
     const double floor = least_near * std::max(radius, point_radius);
-    if (!(nearest > 0))
-        return floor;
+    if (!(nearest > 0)) return floor;
     // A point that far away in the corner of the picture has the least depth.
     const double corner_cosine = 1 / std::sqrt(1 + tan_x * tan_x + tan_y * tan_y);
     const double depth = std::max(-centre_in_view.z - radius, nearest * corner_cosine);
@@ -39,8 +38,7 @@ UnitFrame unit_frame(const vdtree::Sphere& bounds) {
     frame.centre = glm::dvec3(bounds.centre);
     int exponent = 0;
     const double radius = bounds.radius;
-    if (radius > 0 && std::isfinite(radius))
-        std::frexp(radius, &exponent);
+    if (radius > 0 && std::isfinite(radius)) std::frexp(radius, &exponent);
     frame.unit = std::ldexp(1.0, exponent);
     frame.radius = radius / frame.unit;
     return frame;

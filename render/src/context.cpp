@@ -16,8 +16,7 @@ Result<void> check_version(const std::string& version) {
     GLint major = 0, minor = 0;
     glGetIntegerv(GL_MAJOR_VERSION, &major);
     glGetIntegerv(GL_MINOR_VERSION, &minor);
-    if (major > 4 || (major == 4 && minor >= 5))
-        return {};
+    if (major > 4 || (major == 4 && minor >= 5)) return {};
     return Error{ErrorCode::unsupported, "OpenGL 4.5 is needed, but the driver gives only " + version + "."};
 }
 
@@ -29,15 +28,13 @@ Context::Impl::~Impl() {
 
 Result<Context> Context::headless() {
     auto platform = make_egl_platform();
-    if (!platform)
-        return platform.error();
+    if (!platform) return platform.error();
     return adopt(std::move(*platform));
 }
 
 Result<Context> Context::window(const WindowOptions& options) {
     auto platform = make_glfw_platform(options);
-    if (!platform)
-        return platform.error();
+    if (!platform) return platform.error();
     return adopt(std::move(*platform));
 }
 
@@ -46,31 +43,21 @@ Result<Context> Context::adopt(std::unique_ptr<Platform> platform) {
     impl->platform = std::move(platform);
     impl->version = gl_text(GL_VERSION);
     impl->renderer_name = gl_text(GL_RENDERER);
-    if (auto enough = check_version(impl->version); !enough)
-        return enough.error();
+    if (auto enough = check_version(impl->version); !enough) return enough.error();
     impl->errors.attach();
     return Context(std::move(impl));
 }
 
-Result<void> Context::make_current() const {
-    return impl_->platform->make_current();
-}
+Result<void> Context::make_current() const { return impl_->platform->make_current(); }
 
-std::string Context::renderer_name() const {
-    return impl_->renderer_name;
-}
+std::string Context::renderer_name() const { return impl_->renderer_name; }
 
-std::string Context::version() const {
-    return impl_->version;
-}
+std::string Context::version() const { return impl_->version; }
 
-GLFWwindow* Context::glfw_window() const noexcept {
-    return impl_->platform->window();
-}
+GLFWwindow* Context::glfw_window() const noexcept { return impl_->platform->window(); }
 
 std::string Context::take_errors() const {
-    if (auto current = make_current(); !current)
-        return current.error().message;
+    if (auto current = make_current(); !current) return current.error().message;
     return impl_->errors.take_all();
 }
 

@@ -38,8 +38,7 @@ bool has_extension(const char* list, std::string_view name) {
     const std::string_view all = list ? list : "";
     for (std::size_t start = 0; start < all.size();) {
         const std::size_t end = std::min(all.find(' ', start), all.size());
-        if (all.substr(start, end - start) == name)
-            return true;
+        if (all.substr(start, end - start) == name) return true;
         start = end + 1;
     }
     return false;
@@ -57,9 +56,7 @@ struct Candidate {
     std::string name;
 };
 
-const char* client_extensions() {
-    return eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
-}
+const char* client_extensions() { return eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS); }
 
 std::vector<EGLDeviceEXT> devices() {
     const char* extensions = client_extensions();
@@ -67,11 +64,9 @@ std::vector<EGLDeviceEXT> devices() {
         return {};
     const auto query = egl_function<PFNEGLQUERYDEVICESEXTPROC>("eglQueryDevicesEXT");
     EGLint count = 0;
-    if (!query || !query(0, nullptr, &count) || count <= 0)
-        return {};
+    if (!query || !query(0, nullptr, &count) || count <= 0) return {};
     std::vector<EGLDeviceEXT> found(static_cast<std::size_t>(count));
-    if (!query(count, found.data(), &count))
-        return {};
+    if (!query(count, found.data(), &count)) return {};
     found.resize(static_cast<std::size_t>(count));
     return found;
 }
@@ -87,10 +82,8 @@ std::vector<Candidate> candidates() {
     int number = 0;
     for (EGLDeviceEXT device : can_open ? devices() : std::vector<EGLDeviceEXT>{}) {
         const std::string name = "EGL device " + std::to_string(number++);
-        if (is_software(device))
-            software.push_back({EGL_PLATFORM_DEVICE_EXT, device, name + " (software)"});
-        else
-            hardware.push_back({EGL_PLATFORM_DEVICE_EXT, device, name});
+        if (is_software(device)) software.push_back({EGL_PLATFORM_DEVICE_EXT, device, name + " (software)"});
+        else hardware.push_back({EGL_PLATFORM_DEVICE_EXT, device, name});
     }
     std::vector<Candidate> all = std::move(hardware);
     all.insert(all.end(), software.begin(), software.end());
@@ -122,34 +115,33 @@ private:
     EGLSurface surface_ = EGL_NO_SURFACE; // a pixel buffer where EGL cannot do without
 };
 
-Error unsupported(std::string reason) {
-    return {ErrorCode::unsupported, std::move(reason)};
-}
+Error unsupported(std::string reason) { return {ErrorCode::unsupported, std::move(reason)}; }
 
 Result<void> EglPlatform::open(const Candidate& candidate) {
     const auto get_display = egl_function<PFNEGLGETPLATFORMDISPLAYEXTPROC>("eglGetPlatformDisplayEXT");
-    if (!get_display)
-        return unsupported("EGL has no platform displays");
+    if (!get_display) return unsupported("EGL has no platform displays");
     display_ = get_display(candidate.platform, candidate.native, nullptr);
     EGLint major = 0, minor = 0;
     if (display_ == EGL_NO_DISPLAY || !eglInitialize(display_, &major, &minor))
         return unsupported(failed("initialising"));
-    if (!eglBindAPI(EGL_OPENGL_API))
-        return unsupported(failed("choosing desktop OpenGL"));
-    if (auto config = choose_config(); !config)
-        return config;
+    if (!eglBindAPI(EGL_OPENGL_API)) return unsupported(failed("choosing desktop OpenGL"));
+    if (auto config = choose_config(); !config) return config;
 
-    const EGLint context_attributes[] = {EGL_CONTEXT_MAJOR_VERSION, 4, EGL_CONTEXT_MINOR_VERSION, 5,
-                                         EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
-                                         EGL_CONTEXT_OPENGL_DEBUG, EGL_TRUE, EGL_NONE};
+    const EGLint context_attributes[] = {EGL_CONTEXT_MAJOR_VERSION,
+                                         4,
+                                         EGL_CONTEXT_MINOR_VERSION,
+                                         5,
+                                         EGL_CONTEXT_OPENGL_PROFILE_MASK,
+                                         EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT,
+                                         EGL_CONTEXT_OPENGL_DEBUG,
+                                         EGL_TRUE,
+                                         EGL_NONE};
     context_ = eglCreateContext(display_, config_, EGL_NO_CONTEXT, context_attributes);
-    if (context_ == EGL_NO_CONTEXT)
-        return unsupported(failed("making an OpenGL 4.5 core context"));
+    if (context_ == EGL_NO_CONTEXT) return unsupported(failed("making an OpenGL 4.5 core context"));
     if (!has_extension(eglQueryString(display_, EGL_EXTENSIONS), "EGL_KHR_surfaceless_context")) {
         const EGLint size[] = {EGL_WIDTH, 1, EGL_HEIGHT, 1, EGL_NONE};
         surface_ = eglCreatePbufferSurface(display_, config_, size);
-        if (surface_ == EGL_NO_SURFACE)
-            return unsupported(failed("making a pixel buffer"));
+        if (surface_ == EGL_NO_SURFACE) return unsupported(failed("making a pixel buffer"));
     }
     return make_current();
 }
@@ -157,27 +149,22 @@ Result<void> EglPlatform::open(const Candidate& candidate) {
 Result<void> EglPlatform::choose_config() {
     const EGLint wanted[] = {EGL_SURFACE_TYPE, EGL_PBUFFER_BIT, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_NONE};
     EGLint count = 0;
-    if (!eglChooseConfig(display_, wanted, &config_, 1, &count))
-        return unsupported(failed("choosing a configuration"));
-    if (count == 0)
-        return unsupported("it has no configuration for desktop OpenGL");
+    if (!eglChooseConfig(display_, wanted, &config_, 1, &count)) return unsupported(failed("choosing a configuration"));
+    if (count == 0) return unsupported("it has no configuration for desktop OpenGL");
     return {};
 }
 
 EglPlatform::~EglPlatform() {
     if (context_ != EGL_NO_CONTEXT) {
-        if (eglGetCurrentContext() == context_)
-            release_egl_thread();
+        if (eglGetCurrentContext() == context_) release_egl_thread();
         eglDestroyContext(display_, context_);
     }
-    if (surface_ != EGL_NO_SURFACE)
-        eglDestroySurface(display_, surface_);
+    if (surface_ != EGL_NO_SURFACE) eglDestroySurface(display_, surface_);
 }
 
 Result<void> EglPlatform::make_current() {
     eglBindAPI(EGL_OPENGL_API); // current contexts are kept by thread and by API
-    if (eglGetCurrentContext() == context_)
-        return {};
+    if (eglGetCurrentContext() == context_) return {};
     release_glfw_thread();
     if (!eglMakeCurrent(display_, surface_, surface_, context_))
         return unsupported(failed("making the OpenGL context current on this thread"));
@@ -188,8 +175,7 @@ Result<void> EglPlatform::make_current() {
 
 void release_egl_thread() {
     const EGLDisplay display = eglGetCurrentDisplay();
-    if (display != EGL_NO_DISPLAY)
-        eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+    if (display != EGL_NO_DISPLAY) eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
 }
 
 Result<std::unique_ptr<Platform>> make_egl_platform() {
@@ -197,12 +183,10 @@ Result<std::unique_ptr<Platform>> make_egl_platform() {
     for (const Candidate& candidate : candidates()) {
         auto platform = std::make_unique<EglPlatform>();
         const auto opened = platform->open(candidate);
-        if (opened)
-            return std::unique_ptr<Platform>(std::move(platform));
+        if (opened) return std::unique_ptr<Platform>(std::move(platform));
         reasons += (reasons.empty() ? "" : "; ") + candidate.name + ": " + opened.error().message;
     }
-    if (reasons.empty())
-        reasons = "EGL offers neither devices nor the surfaceless platform";
+    if (reasons.empty()) reasons = "EGL offers neither devices nor the surfaceless platform";
     return unsupported("No OpenGL 4.5 device found (" + reasons +
                        "); install a graphics driver, or libgl1-mesa-dri and libegl-mesa0 for software rendering.");
 }

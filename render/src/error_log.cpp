@@ -30,20 +30,16 @@ const char* flag_name(GLenum flag) {
 // Remarks on speed are no errors at any severity: NVIDIA's driver sends them at medium severity for reading back a
 // frame.
 bool is_error(GLenum type, GLenum severity) {
-    if (type == GL_DEBUG_TYPE_ERROR)
-        return true;
-    if (type == GL_DEBUG_TYPE_PERFORMANCE)
-        return false;
+    if (type == GL_DEBUG_TYPE_ERROR) return true;
+    if (type == GL_DEBUG_TYPE_PERFORMANCE) return false;
     return severity == GL_DEBUG_SEVERITY_HIGH || severity == GL_DEBUG_SEVERITY_MEDIUM;
 }
 
 void APIENTRY receive(GLenum, GLenum type, GLuint, GLenum severity, GLsizei, const GLchar* text, const void* log) {
-    if (!is_error(type, severity))
-        return;
+    if (!is_error(type, severity)) return;
     try {
         std::string_view message(text); // GL ends it in 0
-        while (!message.empty() && message.back() == '\n')
-            message.remove_suffix(1);
+        while (!message.empty() && message.back() == '\n') message.remove_suffix(1);
         static_cast<ErrorLog*>(const_cast<void*>(log))->add(std::string(message));
     } catch (const std::exception&) {
         // Nothing may be thrown through the driver; out of memory, the error flag still tells.
@@ -61,8 +57,7 @@ void ErrorLog::attach() {
 
 void ErrorLog::begin() {
     collect_flags();
-    for (std::string& text : recent_.texts)
-        earlier_.add(std::move(text));
+    for (std::string& text : recent_.texts) earlier_.add(std::move(text));
     earlier_.left_out += recent_.left_out;
     recent_ = {};
 }
@@ -85,27 +80,21 @@ void ErrorLog::add(std::string message) {
 void ErrorLog::collect_flags() {
     for (int i = 0; i < most_flags; ++i) {
         const GLenum flag = glGetError();
-        if (flag == GL_NO_ERROR)
-            break;
-        if (!flag_told_)
-            recent_.add(flag_name(flag));
+        if (flag == GL_NO_ERROR) break;
+        if (!flag_told_) recent_.add(flag_name(flag));
     }
     flag_told_ = false;
 }
 
 void ErrorLog::Messages::add(std::string text) {
-    if (texts.size() < most_messages)
-        texts.push_back(std::move(text));
-    else
-        ++left_out;
+    if (texts.size() < most_messages) texts.push_back(std::move(text));
+    else ++left_out;
 }
 
 std::string ErrorLog::Messages::take() {
     std::string joined;
-    for (const std::string& text : texts)
-        joined += (joined.empty() ? "" : "; ") + text;
-    if (left_out > 0)
-        joined += "; and " + std::to_string(left_out) + " more";
+    for (const std::string& text : texts) joined += (joined.empty() ? "" : "; ") + text;
+    if (left_out > 0) joined += "; and " + std::to_string(left_out) + " more";
     texts.clear();
     left_out = 0;
     return joined;

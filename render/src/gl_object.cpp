@@ -45,15 +45,13 @@ template <class Traits>
 GlObject<Traits> GlObject<Traits>::create(std::string_view label) {
     GLuint id = 0;
     Traits::create(&id);
-    if (id != 0 && !label.empty())
-        glObjectLabel(Traits::kind, id, static_cast<GLsizei>(label.size()), label.data());
+    if (id != 0 && !label.empty()) glObjectLabel(Traits::kind, id, static_cast<GLsizei>(label.size()), label.data());
     return GlObject(id);
 }
 
 template <class Traits>
 GlObject<Traits>::~GlObject() {
-    if (id_ != 0)
-        Traits::destroy(id_);
+    if (id_ != 0) Traits::destroy(id_);
 }
 
 template class GlObject<BufferTraits>;

@@ -8,9 +8,9 @@
 namespace unseen::render {
 namespace {
 
-constexpr unsigned group_size = 64;                  // of patch.comp
+constexpr unsigned group_size = 64; // of patch.comp
 constexpr std::uint64_t index_bytes = sizeof(std::uint32_t);
-constexpr GLuint64 wait_ns = 1'000'000'000;          // a turn of waiting for the GPU; it repeats
+constexpr GLuint64 wait_ns = 1'000'000'000; // a turn of waiting for the GPU; it repeats
 constexpr GLuint writes_binding = 0, window_binding = 1;
 constexpr int write_count_location = 0, window_first_location = 1, window_size_location = 2;
 
@@ -48,15 +48,13 @@ Result<void> GpuIndices::prepare_patching() {
 
 Result<void> GpuIndices::update(const IndexState& state) {
     uploaded_bytes_ = 0;
-    if (state.version != 0 && state.version == version_)
-        return {};
+    if (state.version != 0 && state.version == version_) return {};
     const bool follows = can_follow(state);
     version_ = 0; // until it is done
     if (follows)
         if (auto prepared = prepare_patching(); !prepared) return count_ = 0, prepared;
     if (follows && mapped_ && window_indices_ > 0) {
-        if (auto reserved = reserve(state.indices.size(), true); !reserved)
-            return reserved;
+        if (auto reserved = reserve(state.indices.size(), true); !reserved) return reserved;
         patch(*state.writes, state.indices);
     } else if (auto uploaded = upload_all(state.indices); !uploaded) {
         return uploaded;
@@ -74,8 +72,7 @@ bool GpuIndices::can_follow(const IndexState& state) const {
 
 // A half more than is asked for, so that cuts that grow need not move each time.
 Result<void> GpuIndices::reserve(std::uint64_t count, bool keep) {
-    if (count <= capacity_)
-        return {};
+    if (count <= capacity_) return {};
     const std::uint64_t wanted = count + count / 2;
     Buffer larger = Buffer::create("triangles");
     glNamedBufferStorage(larger.id(), static_cast<GLsizeiptr>(wanted * index_bytes), nullptr, GL_DYNAMIC_STORAGE_BIT);
@@ -94,10 +91,8 @@ Result<void> GpuIndices::reserve(std::uint64_t count, bool keep) {
 
 Result<void> GpuIndices::upload_all(std::span<const std::uint32_t> indices) {
     count_ = 0;
-    if (auto reserved = reserve(indices.size(), false); !reserved)
-        return reserved;
-    if (indices.empty())
-        return {};
+    if (auto reserved = reserve(indices.size(), false); !reserved) return reserved;
+    if (indices.empty()) return {};
     glInvalidateBufferData(buffer_.id()); // so that the driver need not wait for the last frame
     glNamedBufferSubData(buffer_.id(), 0, static_cast<GLsizeiptr>(indices.size_bytes()), indices.data());
     uploaded_bytes_ = indices.size_bytes();
@@ -109,14 +104,12 @@ void GpuIndices::patch(std::span<const vdtree::IndexWrite> writes, std::span<con
     for (std::size_t i = 0; i < writes.size();) {
         const std::size_t part = next_part_;
         next_part_ = (next_part_ + 1) % part_count;
-        if (in_use_[part])
-            wait_for(in_use_[part].get());
+        if (in_use_[part]) wait_for(in_use_[part].get());
         Write* const out = mapped_ + part * part_writes;
         std::size_t count = 0;
         for (; i < writes.size() && count < part_writes; ++i) {
             const std::uint32_t place = writes[i].place;
-            if (place < indices.size())
-                out[count++] = {place, indices[place]};
+            if (place < indices.size()) out[count++] = {place, indices[place]};
         }
         apply(part, count);
         in_use_[part].reset(glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0));
@@ -127,8 +120,7 @@ void GpuIndices::patch(std::span<const vdtree::IndexWrite> writes, std::span<con
 
 // One pass for each window onto the index buffer that a shader can see: nearly always one.
 void GpuIndices::apply(std::size_t part, std::size_t writes) {
-    if (writes == 0)
-        return;
+    if (writes == 0) return;
     glBindBufferRange(GL_SHADER_STORAGE_BUFFER, writes_binding, staging_.id(),
                       static_cast<GLintptr>(part * part_writes * sizeof(Write)),
                       static_cast<GLsizeiptr>(writes * sizeof(Write)));

@@ -9,8 +9,7 @@
 namespace unseen::render {
 
 std::vector<glm::dvec2> n_rooks(int n, std::uint32_t seed) {
-    if (n <= 0)
-        return {};
+    if (n <= 0) return {};
     std::vector<int> row_of_column(static_cast<std::size_t>(n));
     std::iota(row_of_column.begin(), row_of_column.end(), 0);
     // The pattern must be the same everywhere, which std::shuffle does not promise. The bias of the modulus is below 2^-55 for the 256

@@ -49,8 +49,7 @@ private:
 
 std::string prologue(std::span<const std::string_view> defines) {
     std::string text = "#version 450 core\n";
-    for (std::string_view define : defines)
-        text.append("#define ").append(define).append(" 1\n");
+    for (std::string_view define : defines) text.append("#define ").append(define).append(" 1\n");
     return text + "#line 1\n";
 }
 
@@ -60,14 +59,12 @@ using GetLog = void (*)(GLuint, GLsizei, GLsizei*, GLchar*);
 std::string info_log(GLuint id, GetParameter get_parameter, GetLog get_log) {
     GLint size = 0;
     get_parameter(id, GL_INFO_LOG_LENGTH, &size);
-    if (size <= 1)
-        return "the compiler gives no reason";
+    if (size <= 1) return "the compiler gives no reason";
     std::string text(static_cast<std::size_t>(size), '\0');
     GLsizei written = 0;
     get_log(id, size, &written, text.data());
     text.resize(static_cast<std::size_t>(written));
-    while (!text.empty() && text.back() == '\n')
-        text.pop_back();
+    while (!text.empty() && text.back() == '\n') text.pop_back();
     return text;
 }
 
@@ -97,8 +94,7 @@ Result<Program> Program::build(std::string_view label, std::span<const ShaderSou
         glAttachShader(program.id(), shader.id());
     }
     glLinkProgram(program.id());
-    for (const Shader& shader : shaders)
-        glDetachShader(program.id(), shader.id());
+    for (const Shader& shader : shaders) glDetachShader(program.id(), shader.id());
     GLint linked = GL_FALSE;
     glGetProgramiv(program.id(), GL_LINK_STATUS, &linked);
     if (linked != GL_TRUE)
@@ -106,17 +102,11 @@ Result<Program> Program::build(std::string_view label, std::span<const ShaderSou
     return Program(std::move(program));
 }
 
-void Program::use() const {
-    glUseProgram(id());
-}
+void Program::use() const { glUseProgram(id()); }
 
-void Program::set(int location, float value) const {
-    glProgramUniform1f(id(), location, value);
-}
+void Program::set(int location, float value) const { glProgramUniform1f(id(), location, value); }
 
-void Program::set(int location, unsigned value) const {
-    glProgramUniform1ui(id(), location, value);
-}
+void Program::set(int location, unsigned value) const { glProgramUniform1ui(id(), location, value); }
 
 void Program::set(int location, const glm::vec4& value) const {
     glProgramUniform4fv(id(), location, 1, glm::value_ptr(value));

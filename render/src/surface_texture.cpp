@@ -13,8 +13,8 @@
 namespace unseen::render {
 namespace {
 
-constexpr unsigned image_binding = 1;    // of surface.frag
-constexpr unsigned uv_location = 4;      // of surface.vert
+constexpr unsigned image_binding = 1;     // of surface.frag
+constexpr unsigned uv_location = 4;       // of surface.vert
 constexpr unsigned uv_buffer_binding = 2; // of the vertex array: 0 and 1 are the vertices' and the lit ones'
 
 // An image in linear light.
@@ -52,7 +52,8 @@ Level halved(int width, int height, Pixel&& pixel) {
         for (const Cover& cover : columns) {
             glm::vec3 sum(0);
             for (int i = 0; i < rows.count; ++i)
-                for (int k = 0; k < cover.count; ++k) sum += rows.shares[i] * cover.shares[k] * pixel(cover.first + k, rows.first + i);
+                for (int k = 0; k < cover.count; ++k)
+                    sum += rows.shares[i] * cover.shares[k] * pixel(cover.first + k, rows.first + i);
             level.pixels.push_back(sum);
         }
     }
@@ -68,7 +69,8 @@ void set_unpacking() {
 void upload_all(const Texture2d& image, const vdtree::TextureView& texture, int levels) {
     const int width = static_cast<int>(texture.width), height = static_cast<int>(texture.height);
     const auto texel = [&](int x, int y) {
-        return glm::vec3(vdtree::linear_colour(texture.texels[static_cast<std::size_t>(y) * texture.width + static_cast<std::size_t>(x)]));
+        return glm::vec3(vdtree::linear_colour(
+            texture.texels[static_cast<std::size_t>(y) * texture.width + static_cast<std::size_t>(x)]));
     };
     set_unpacking();
     std::vector<glm::vec3> row(texture.width);
@@ -80,8 +82,10 @@ void upload_all(const Texture2d& image, const vdtree::TextureView& texture, int 
     for (int number = 1; number < levels; ++number) {
         if (number == 1) level = halved(width, height, texel);
         else
-            level = halved(level.width, level.height,
-                           [&](int x, int y) { return level.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(level.width) + static_cast<std::size_t>(x)]; });
+            level = halved(level.width, level.height, [&](int x, int y) {
+                return level.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(level.width) +
+                                    static_cast<std::size_t>(x)];
+            });
         glTextureSubImage2D(image.id(), number, 0, 0, level.width, level.height, GL_RGB, GL_FLOAT, level.pixels.data());
     }
 }
@@ -95,19 +99,23 @@ Result<SurfaceTexture> SurfaceTexture::create(const vdtree::TextureView& texture
     glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest);
     const std::string size = std::to_string(texture.width) + " x " + std::to_string(texture.height);
     if (std::max(texture.width, texture.height) > static_cast<std::uint32_t>(largest))
-        return Error{ErrorCode::unsupported, "The graphics processor takes textures of up to " + std::to_string(largest) + " texels a side, and the model's has " +
+        return Error{ErrorCode::unsupported, "The graphics processor takes textures of up to " +
+                                                 std::to_string(largest) + " texels a side, and the model's has " +
                                                  size + ": scale it down and build the tree again."};
     SurfaceTexture made;
     for (const glm::vec2 uv : uvs) made.box_.include(uv);
     made.uvs_ = Buffer::create("texture coordinates");
-    glNamedBufferStorage(made.uvs_.id(), static_cast<GLsizeiptr>(std::max<std::size_t>(uvs.size_bytes(), 1)), uvs.data(), 0);
+    glNamedBufferStorage(made.uvs_.id(), static_cast<GLsizeiptr>(std::max<std::size_t>(uvs.size_bytes(), 1)),
+                         uvs.data(), 0);
     made.image_ = Texture2d::create("texture");
     const int levels = std::bit_width(std::max(texture.width, texture.height));
     // Linear light, and not sRGB codes: their decoding in hardware and drivers is off by up to a fifth of a percent, and coarse levels would
     // be rounded to codes.
-    glTextureStorage2D(made.image_.id(), levels, GL_RGB16F, static_cast<GLsizei>(texture.width), static_cast<GLsizei>(texture.height));
+    glTextureStorage2D(made.image_.id(), levels, GL_RGB16F, static_cast<GLsizei>(texture.width),
+                       static_cast<GLsizei>(texture.height));
     if (glGetError() == GL_OUT_OF_MEMORY)
-        return Error{ErrorCode::unsupported, "The graphics memory does not hold the model's texture of " + size + " texels and its coordinates."};
+        return Error{ErrorCode::unsupported, "The graphics memory does not hold the model's texture of " + size +
+                                                 " texels and its coordinates."};
     upload_all(made.image_, texture, levels);
     glTextureParameteri(made.image_.id(), GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
     glTextureParameteri(made.image_.id(), GL_TEXTURE_MAG_FILTER, GL_LINEAR);

@@ -19,13 +19,24 @@ namespace {
 
 constexpr std::size_t code_count = 256, most_marks = 8;
 
-enum UniformLocation { kind_location, screen_location, grating_location, place_location, chart_location, overlay_location, frame_location, marks_location };
+enum UniformLocation {
+    kind_location,
+    screen_location,
+    grating_location,
+    place_location,
+    chart_location,
+    overlay_location,
+    frame_location,
+    marks_location
+};
 
 Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
 
 Result<void> check(const TestPattern& p) {
-    const double finite[] = {p.mean, p.frequency_cpd, p.highest_frequency_cpd, p.decades, p.sigma_deg, p.phase_deg,
-                             p.centre.x, p.centre.y, p.mark_code, p.code, p.tangent_per_pixel};
+    const double finite[] = {p.mean,     p.frequency_cpd,    p.highest_frequency_cpd,
+                             p.decades,  p.sigma_deg,        p.phase_deg,
+                             p.centre.x, p.centre.y,         p.mark_code,
+                             p.code,     p.tangent_per_pixel};
     for (const double value : finite)
         if (!std::isfinite(value)) return invalid("A test pattern's numbers must be finite.");
     if (!(p.tangent_per_pixel > 0)) return invalid("A test pattern's pixels must have a size above 0.");
@@ -34,7 +45,8 @@ Result<void> check(const TestPattern& p) {
     if (!(p.frequency_cpd > 0 && p.sigma_deg > 0)) return invalid("A grating's frequency and size must be above 0.");
     if (p.kind == TestPattern::Kind::chart && !(p.highest_frequency_cpd > p.frequency_cpd))
         return invalid("A chart's frequencies must ascend.");
-    if (!(p.rows >= 1 && p.white_rows >= 0 && p.white_rows <= p.rows)) return invalid("White rows must be 0 to all of the rows.");
+    if (!(p.rows >= 1 && p.white_rows >= 0 && p.white_rows <= p.rows))
+        return invalid("White rows must be 0 to all of the rows.");
     if (p.marks.size() > most_marks) return invalid("A test pattern has at most 8 marks.");
     return {};
 }
@@ -62,12 +74,14 @@ TestPatternDrawer& TestPatternDrawer::operator=(TestPatternDrawer&&) noexcept = 
 TestPatternDrawer::~TestPatternDrawer() = default;
 
 Result<TestPatternDrawer> TestPatternDrawer::create(const Context& context, std::span<const double> code_luminances) {
-    if (code_luminances.size() != code_count) return invalid("A display has 256 codes, not " + std::to_string(code_luminances.size()) + ".");
+    if (code_luminances.size() != code_count)
+        return invalid("A display has 256 codes, not " + std::to_string(code_luminances.size()) + ".");
     std::array<float, code_count> levels;
     for (std::size_t i = 0; i < code_count; ++i) {
         levels[i] = static_cast<float>(code_luminances[i]);
         if (!std::isfinite(levels[i]) || (i > 0 && !(levels[i] >= levels[i - 1])))
-            return invalid("The luminances of a display's codes must ascend; that of code " + std::to_string(i) + " does not.");
+            return invalid("The luminances of a display's codes must ascend; that of code " + std::to_string(i) +
+                           " does not.");
     }
     auto impl = std::make_unique<Impl>(context);
     auto made = in_context(context, "Making test patterns", [&]() -> Result<void> {
@@ -93,15 +107,19 @@ void TestPatternDrawer::Impl::draw(const TestPattern& p, int width, int height, 
     program->set(screen_location, vec4(width, height, p.tangent_per_pixel, top_first ? 1 : 0));
     program->set(grating_location, vec4(p.mean, p.contrast, p.frequency_cpd, p.sigma_deg));
     program->set(place_location, vec4(p.phase_deg * std::numbers::pi / 180, p.centre.x, p.centre.y, p.code));
-    program->set(chart_location, vec4(std::log2(p.highest_frequency_cpd / p.frequency_cpd), p.decades, p.rows, p.white_rows));
+    program->set(chart_location,
+                 vec4(std::log2(p.highest_frequency_cpd / p.frequency_cpd), p.decades, p.rows, p.white_rows));
     program->set(overlay_location, vec4(static_cast<double>(p.marks.size()), p.mark_code, 0, 0));
     program->set(frame_location, p.frame);
     for (std::size_t i = 0; i < p.marks.size(); ++i)
-        program->set(marks_location + static_cast<int>(i), vec4(p.marks[i].x, p.marks[i].y, p.marks[i].z, p.marks[i].w));
+        program->set(marks_location + static_cast<int>(i),
+                     vec4(p.marks[i].x, p.marks[i].y, p.marks[i].z, p.marks[i].w));
 
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, framebuffer);
     glViewport(0, 0, width, height);
-    for (const GLenum off : {GL_DEPTH_TEST, GL_BLEND, GL_CULL_FACE, GL_SCISSOR_TEST, GL_FRAMEBUFFER_SRGB, GL_MULTISAMPLE, GL_DITHER}) glDisable(off);
+    for (const GLenum off :
+         {GL_DEPTH_TEST, GL_BLEND, GL_CULL_FACE, GL_SCISSOR_TEST, GL_FRAMEBUFFER_SRGB, GL_MULTISAMPLE, GL_DITHER})
+        glDisable(off);
     glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
     glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
     glClipControl(GL_LOWER_LEFT, GL_ZERO_TO_ONE);

@@ -29,8 +29,7 @@ std::uint64_t vertices_in_a_window() {
 Result<VertexMover> VertexMover::create(Programs& programs) {
     const ShaderSource source[] = {{ShaderSource::Stage::compute, shaders::move_comp}};
     const auto program = programs.named("move vertices", source);
-    if (!program)
-        return program.error();
+    if (!program) return program.error();
     VertexMover mover(*program);
     mover.moves_ = Buffer::create("moved vertices");
     mover.window_vertices_ = vertices_in_a_window();

@@ -44,8 +44,7 @@ public:
     GLFWwindow* window() const noexcept override { return window_; }
 
     Result<void> make_current() override {
-        if (glfwGetCurrentContext() == window_)
-            return {};
+        if (glfwGetCurrentContext() == window_) return {};
         release_egl_thread();
         glfwGetError(nullptr); // an older error is not ours
         glfwMakeContextCurrent(window_);
@@ -61,8 +60,7 @@ private:
 } // namespace
 
 void release_glfw_thread() {
-    if (glfw_started && glfwGetCurrentContext())
-        glfwMakeContextCurrent(nullptr);
+    if (glfw_started && glfwGetCurrentContext()) glfwMakeContextCurrent(nullptr);
 }
 
 Result<std::unique_ptr<Platform>> make_glfw_platform(const WindowOptions& options) {
@@ -70,19 +68,16 @@ Result<std::unique_ptr<Platform>> make_glfw_platform(const WindowOptions& option
         return Error{ErrorCode::invalid_argument, "A window of " + std::to_string(options.width) + "x" +
                                                       std::to_string(options.height) +
                                                       " pixels cannot be opened: it needs at least 1x1."};
-    if (!glfwInit())
-        return no_window("No window can be opened");
+    if (!glfwInit()) return no_window("No window can be opened");
     glfw_started = true;
     set_hints(options);
     GLFWmonitor* monitor = options.full_screen ? glfwGetPrimaryMonitor() : nullptr;
     const GLFWvidmode* mode = monitor ? glfwGetVideoMode(monitor) : nullptr;
     GLFWwindow* window = glfwCreateWindow(mode ? mode->width : options.width, mode ? mode->height : options.height,
                                           options.title.c_str(), mode ? monitor : nullptr, nullptr);
-    if (!window)
-        return no_window("No window with an OpenGL 4.5 context can be opened");
+    if (!window) return no_window("No window with an OpenGL 4.5 context can be opened");
     auto platform = std::make_unique<GlfwPlatform>(window);
-    if (auto current = platform->make_current(); !current)
-        return current.error();
+    if (auto current = platform->make_current(); !current) return current.error();
     return std::unique_ptr<Platform>(std::move(platform));
 }
 

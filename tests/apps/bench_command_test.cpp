@@ -31,8 +31,11 @@ TEST_F(BenchCommandTest, MeasuresEveryRow) {
             EXPECT_FALSE(row["note"].get<std::string>().empty()) << name << " is not available, and does not say why";
             continue;
         }
-        if (row["unit"] == "%") { EXPECT_GE(row["value"], 0) << name; }
-        else { EXPECT_GT(row["value"], 0) << name; }
+        if (row["unit"] == "%") {
+            EXPECT_GE(row["value"], 0) << name;
+        } else {
+            EXPECT_GT(row["value"], 0) << name;
+        }
         if (row["must"].is_number()) {
             EXPECT_EQ(row["holds_aim"].get<bool>() && !row["holds_must"].get<bool>(), false) << name;
         }
@@ -70,8 +73,8 @@ TEST_F(BenchCommandTest, TakesTargetsFromAFile) {
     write_ball("ball.obj");
     write_text(path("t.json"),
                R"({"engine": {"still view, us": {"must": 1e9, "aim": 1e-9}, "full tests, M/s": {"must": 1e9}}})");
-    const Outcome outcome = bench({"engine", "--quick", "--mesh", "ball.obj", "--sizes", "1472", "--targets", "t.json",
-                                   "--json", "r.json"});
+    const Outcome outcome = bench(
+        {"engine", "--quick", "--mesh", "ball.obj", "--sizes", "1472", "--targets", "t.json", "--json", "r.json"});
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     const Json report = Json::parse(read_text(path("r.json")));
     EXPECT_EQ(row_named(report, "still view")["holds_must"], true);

@@ -11,8 +11,9 @@ using ::testing::HasSubstr;
 class CalibrateCommandTest : public CommandTest {};
 
 TEST_F(CalibrateCommandTest, MeasuresASimulatedObserver) {
-    const Outcome outcome = run({"calibrate", "--simulate", "castle:gain=0.7", "--seed", "3", "--trials", "400", "-o", "observer.json",
-                                 "--json", "report.json", "--date", "2001-06-25", "--conditions", "dim room"});
+    const Outcome outcome =
+        run({"calibrate", "--simulate", "castle:gain=0.7", "--seed", "3", "--trials", "400", "-o", "observer.json",
+             "--json", "report.json", "--date", "2001-06-25", "--conditions", "dim room"});
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     EXPECT_THAT(outcome.out, HasSubstr("400 answers"));
     EXPECT_THAT(outcome.out, HasSubstr("dB (rms over what can be seen)"));
@@ -78,7 +79,10 @@ TEST_F(CalibrateCommandTest, GoesOnOnlyAsItWasBegun) {
         more.insert(more.begin(), {"calibrate", "--simulate", "castle", "--date", "now", "--resume", "state.json"});
         return run(more);
     };
-    ASSERT_EQ(with({"--trials", "30", "--seed", "4", "--frequencies", "1", "4", "--eccentricities", "0", "10", "-o", "a.json"}).status, 0);
+    ASSERT_EQ(with({"--trials", "30", "--seed", "4", "--frequencies", "1", "4", "--eccentricities", "0", "10", "-o",
+                    "a.json"})
+                  .status,
+              0);
     const auto takes_half_away = [&] {
         Json state = Json::parse(read_text(path("state.json")));
         state["answers"].erase(state["answers"].begin() + 15, state["answers"].end());
@@ -105,24 +109,30 @@ TEST_F(CalibrateCommandTest, GoesOnOnlyAsItWasBegun) {
     EXPECT_EQ(with({"-o", "b.json"}).status, 0);
     EXPECT_TRUE(read_text(path("a.json")) == read_text(path("b.json")));
     takes_half_away();
-    EXPECT_EQ(with({"--trials", "30", "--seed", "4", "--frequencies", "4", "1", "--eccentricities", "0", "10", "-o", "c.json"}).status, 0);
+    EXPECT_EQ(with({"--trials", "30", "--seed", "4", "--frequencies", "4", "1", "--eccentricities", "0", "10", "-o",
+                    "c.json"})
+                  .status,
+              0);
     EXPECT_TRUE(read_text(path("a.json")) == read_text(path("c.json")));
 }
 
 // Places are chosen by what is seen at the luminance that is shown.
 TEST_F(CalibrateCommandTest, PlacesAreVisibleAtTheLuminanceThatIsGiven) {
     const auto places = [&](const char* luminance) {
-        const Outcome outcome = run({"calibrate", "--simulate", "castle", "--trials", "1", "--luminance", luminance, "--json", "-"});
+        const Outcome outcome =
+            run({"calibrate", "--simulate", "castle", "--trials", "1", "--luminance", luminance, "--json", "-"});
         EXPECT_EQ(outcome.status, 0) << outcome.err;
         const Json json = outcome.json();
-        for (const Json& row : json["measured"]) EXPECT_GE(row["true_sensitivity"].get<double>() * json["highest_contrast"].get<double>(), 3);
+        for (const Json& row : json["measured"])
+            EXPECT_GE(row["true_sensitivity"].get<double>() * json["highest_contrast"].get<double>(), 3);
         return json["measured"].size();
     };
     EXPECT_LT(places("0.6"), places("50"));
 }
 
 TEST_F(CalibrateCommandTest, WhereNothingIsSeenThereIsNoError) {
-    const std::vector<std::string> words = {"calibrate", "--simulate", "castle", "--trials", "20", "--frequencies", "60", "--eccentricities", "40"};
+    const std::vector<std::string> words = {"calibrate",     "--simulate", "castle",           "--trials", "20",
+                                            "--frequencies", "60",         "--eccentricities", "40"};
     const Outcome outcome = run(words);
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     EXPECT_THAT(outcome.out, HasSubstr("this observer can see none of it"));
@@ -133,8 +143,9 @@ TEST_F(CalibrateCommandTest, WhereNothingIsSeenThereIsNoError) {
 
 // Settings that all agree make a place as certain as the grid is fine, and no more.
 TEST_F(CalibrateCommandTest, ManySettingsThatAgreeStayFinite) {
-    const Outcome outcome = run({"calibrate", "--simulate", "castle:gain=20,scatter=0,delay=0", "--method", "adjustment", "--settings", "300",
-                                 "--frequencies", "2", "--eccentricities", "0", "--json", "-", "-o", "X.JSON"});
+    const Outcome outcome =
+        run({"calibrate", "--simulate", "castle:gain=20,scatter=0,delay=0", "--method", "adjustment", "--settings",
+             "300", "--frequencies", "2", "--eccentricities", "0", "--json", "-", "-o", "X.JSON"});
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     EXPECT_LT(outcome.json()["rms_error_db"], 0.2);
     const Json row = outcome.json()["measured"][0];
@@ -144,7 +155,8 @@ TEST_F(CalibrateCommandTest, ManySettingsThatAgreeStayFinite) {
 }
 
 TEST_F(CalibrateCommandTest, AdjustsToo) {
-    const Outcome outcome = run({"calibrate", "--simulate", "castle:gain=0.5", "--method", "adjustment", "--json", "-"});
+    const Outcome outcome =
+        run({"calibrate", "--simulate", "castle:gain=0.5", "--method", "adjustment", "--json", "-"});
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     EXPECT_LT(outcome.json()["rms_error_db"], 1.0);
     EXPECT_EQ(outcome.json()["method"], "adjustment");
@@ -171,7 +183,8 @@ TEST_F(CalibrateCommandTest, TheChartIsAPicture) {
     EXPECT_EQ(chart->image.height, 1200);
     const auto spread = [&](int y) {
         float lo = 1, hi = 0;
-        for (int x = 0; x < 1600; ++x) lo = std::min(lo, chart->image.at(x, y)), hi = std::max(hi, chart->image.at(x, y));
+        for (int x = 0; x < 1600; ++x)
+            lo = std::min(lo, chart->image.at(x, y)), hi = std::max(hi, chart->image.at(x, y));
         return hi - lo;
     };
     EXPECT_GT(spread(1199), 0.9f);
@@ -180,12 +193,21 @@ TEST_F(CalibrateCommandTest, TheChartIsAPicture) {
 
 TEST_F(CalibrateCommandTest, RefusesWhatMakesNoSense) {
     const std::vector<std::vector<std::string>> wrong = {
-        {"--simulate", "castle", "--trials", "0"},   {"--simulate", "castle", "--trials", "1.5"}, {"--simulate", "castle", "--trials", "nan"},
-        {"--simulate", "castle", "--seed", "-1"},    {"--simulate", "castle", "--method", "3ifc"}, {"--simulate", "castle", "-o", "x.txt"},
-        {"--simulate", "castle", "--chart"},         {"--photometer", "p.csv"},                   {"--chart", "-o", "x.json"},
-        {"--simulate", "castle", "--luminance", "0"}, {"--simulate", "castle", "--frequencies", "4"},
-        {"--simulate", "castle", "--settings", "9"}, {"--simulate", "castle", "--method", "adjustment", "--trials", "9"},
-        {"--chart", "--seed", "2"},                  {"--gamma", "--resume", "state.json"}};
+        {"--simulate", "castle", "--trials", "0"},
+        {"--simulate", "castle", "--trials", "1.5"},
+        {"--simulate", "castle", "--trials", "nan"},
+        {"--simulate", "castle", "--seed", "-1"},
+        {"--simulate", "castle", "--method", "3ifc"},
+        {"--simulate", "castle", "-o", "x.txt"},
+        {"--simulate", "castle", "--chart"},
+        {"--photometer", "p.csv"},
+        {"--chart", "-o", "x.json"},
+        {"--simulate", "castle", "--luminance", "0"},
+        {"--simulate", "castle", "--frequencies", "4"},
+        {"--simulate", "castle", "--settings", "9"},
+        {"--simulate", "castle", "--method", "adjustment", "--trials", "9"},
+        {"--chart", "--seed", "2"},
+        {"--gamma", "--resume", "state.json"}};
     for (std::vector<std::string> words : wrong) {
         words.insert(words.begin(), "calibrate");
         const Outcome outcome = run(words);

@@ -343,18 +343,24 @@ TEST_F(SimplifyTest, ImperceptibleCutsKeepMoreNearTheGaze) {
 }
 
 TEST_F(SimplifyTest, TheSafeTestKeepsNoLess) {
-    const Json plain = simplify({"--fold-test", "luebke-hallen"}), safe = simplify({"--fold-test", "luebke-hallen-safe"});
+    const Json plain = simplify({"--fold-test", "luebke-hallen"}),
+               safe = simplify({"--fold-test", "luebke-hallen-safe"});
     EXPECT_GE(safe["triangles"], plain["triangles"]);
     EXPECT_THAT(effect_named(safe, "fold test")["why"], HasSubstr("luebke-hallen-safe"));
     EXPECT_TRUE(safe["max_fold_cost"] <= 1);
 }
 
 TEST_F(SimplifyTest, TheDefaultTestGoesByErrorsWhereTheseKnowTheScene) {
-    const auto fold_test = [](const Json& report) { return effect_named(report, "fold test")["why"].get<std::string>(); };
+    const auto fold_test = [](const Json& report) {
+        return effect_named(report, "fold test")["why"].get<std::string>();
+    };
     EXPECT_THAT(fold_test(simplify({})), StartsWith("error"));
-    EXPECT_THAT(fold_test(simplify({"--chroma"})), AllOf(StartsWith("luebke-hallen:"), HasSubstr("does not know colours")));
-    write_text(path("lights.json"), R"({"ambient": 0.2, "lights": [{"type": "directional", "direction": [0, 0, 1], "intensity": 0.8}]})");
-    EXPECT_THAT(fold_test(simplify({"--lights", "lights.json"})), AllOf(StartsWith("luebke-hallen:"), HasSubstr("does not know lights")));
+    EXPECT_THAT(fold_test(simplify({"--chroma"})),
+                AllOf(StartsWith("luebke-hallen:"), HasSubstr("does not know colours")));
+    write_text(path("lights.json"),
+               R"({"ambient": 0.2, "lights": [{"type": "directional", "direction": [0, 0, 1], "intensity": 0.8}]})");
+    EXPECT_THAT(fold_test(simplify({"--lights", "lights.json"})),
+                AllOf(StartsWith("luebke-hallen:"), HasSubstr("does not know lights")));
 }
 
 // The ball in red and green of one luminance, with an alpha for all vertices.
@@ -473,7 +479,8 @@ TEST_F(SimplifyTest, ReadsDisplaysAndViewers) {
     EXPECT_EQ(effect_named(by_file, "csf table")["on"], true);
     EXPECT_EQ(effect_named(by_name, "csf table")["on"], true);
     EXPECT_EQ(by_file["triangles"], by_name["triangles"]);
-    for (const std::string model : {"castle", "daly", "barten-1989", "barten-1999", "barten-2004", "mannos-sakrison", "rushmeier"})
+    for (const std::string model :
+         {"castle", "daly", "barten-1989", "barten-1999", "barten-2004", "mannos-sakrison", "rushmeier"})
         EXPECT_GT(simplify({"--csf", model})["triangles"], 0) << model;
     const Outcome unknown = run({"simplify", "ball.vdt", "-o", "o.ply", "--csf", "stella"});
     EXPECT_EQ(unknown.status, 1);

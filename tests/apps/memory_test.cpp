@@ -21,15 +21,18 @@ protected:
     }
 
     Outcome build(const std::string& out, const std::string& clusterer, std::vector<std::string> more) const {
-        std::vector<std::string> words = {"build", "large.ply", "-o", out, "--clusterer", clusterer, "--threads", "1", "--json", "-"};
+        std::vector<std::string> words = {"build",   "large.ply", "-o", out,      "--clusterer",
+                                          clusterer, "--threads", "1",  "--json", "-"};
         words.insert(words.end(), more.begin(), more.end());
         return run(words);
     }
 
     // With a disk that has room for so many bytes of temporary data.
     Outcome build_with_room(long long bytes, const std::string& clusterer) const {
-        return run_shell("UNSEEN_TEST_ROOM=" + std::to_string(bytes) + " ASAN_OPTIONS=verify_asan_link_order=0 LD_PRELOAD='" UNSEEN_FULL_DISK
-                         "' '" UNSEEN_COMMAND "' build large.ply -o large.vdt --clusterer " + clusterer + " --threads 1 --memory " + limit);
+        return run_shell("UNSEEN_TEST_ROOM=" + std::to_string(bytes) +
+                         " ASAN_OPTIONS=verify_asan_link_order=0 LD_PRELOAD='" UNSEEN_FULL_DISK "' '" UNSEEN_COMMAND
+                         "' build large.ply -o large.vdt --clusterer " +
+                         clusterer + " --threads 1 --memory " + limit);
     }
 
     static bool is_not_empty(const fs::path& file) {
@@ -37,7 +40,10 @@ protected:
         const auto size = fs::file_size(file, gone);
         return !gone && size > 0;
     }
-    bool lies_in_memory() const { return run({"build", "large.ply", "-o", "t.vdt", "--memory", limit}).err.find("lies in memory") != std::string::npos; }
+    bool lies_in_memory() const {
+        return run({"build", "large.ply", "-o", "t.vdt", "--memory", limit}).err.find("lies in memory") !=
+               std::string::npos;
+    }
 
     static constexpr const char* limit = "0.1";
 };
@@ -47,7 +53,8 @@ TEST_F(MemoryTest, TheTreeIsTheSame) {
     if (lies_in_memory()) GTEST_SKIP() << "the folder for temporary files lies in memory";
     fs::remove(path("t.vdt"));
     for (const std::string clusterer : {"octree", "quadric"}) {
-        const Outcome usual = build("usual.vdt", clusterer, {}), limited = build("limited.vdt", clusterer, {"--memory", limit});
+        const Outcome usual = build("usual.vdt", clusterer, {}),
+                      limited = build("limited.vdt", clusterer, {"--memory", limit});
         ASSERT_EQ(usual.status, 0) << usual.err;
         ASSERT_EQ(limited.status, 0) << limited.err;
         EXPECT_TRUE(read_text(path("limited.vdt")) == read_text(path("usual.vdt"))) << clusterer;
@@ -69,7 +76,8 @@ TEST_F(MemoryTest, ALimitThatIsTooSmallIsSaid) {
         EXPECT_THAT(files(), ElementsAre("ball.obj"));
     }
     write_large();
-    const Outcome built = build("large.vdt", "quadric", {"--memory", "0.08"}); // enough for a ball, but not for this one
+    const Outcome built =
+        build("large.vdt", "quadric", {"--memory", "0.08"}); // enough for a ball, but not for this one
     EXPECT_EQ(built.status, 1);
     EXPECT_THAT(built.err, HasSubstr("--memory 0.08 GiB is too small"));
     EXPECT_THAT(files(), ElementsAre("large.ply"));

@@ -10,8 +10,8 @@ class TeamTest : public CommandTest {
 protected:
     // `mpirun -np N COMMAND`, each process a shell, where rank is $OMPI_COMM_WORLD_RANK.
     Outcome run_team(int processes, const std::string& command) const {
-        return run_shell("exec '" UNSEEN_MPIRUN "' --allow-run-as-root --oversubscribe -np " + std::to_string(processes) +
-                         " sh -c '" + command + "'");
+        return run_shell("exec '" UNSEEN_MPIRUN "' --allow-run-as-root --oversubscribe -np " +
+                         std::to_string(processes) + " sh -c '" + command + "'");
     }
 
     // Several parts, of 2^15 vertices each at most.
@@ -79,9 +79,10 @@ TEST_F(TeamTest, AMemberThatDiesLeavesNoPartOfATree) {
     build_alone();
     // Member 1 is killed while it clusters or before; the others must not wait for it for ever.
     for (const std::string seconds : {"0.05", "0.3"}) {
-        const Outcome built = run_team(2, "if [ $OMPI_COMM_WORLD_RANK = 1 ]; then exec timeout -s KILL " + seconds + " " UNSEEN_COMMAND
-                                          " build large.obj -o team.vdt --threads 1; else exec " UNSEEN_COMMAND
-                                          " build large.obj -o team.vdt --threads 1; fi");
+        const Outcome built =
+            run_team(2, "if [ $OMPI_COMM_WORLD_RANK = 1 ]; then exec timeout -s KILL " + seconds +
+                            " " UNSEEN_COMMAND " build large.obj -o team.vdt --threads 1; else exec " UNSEEN_COMMAND
+                            " build large.obj -o team.vdt --threads 1; fi");
         expect_whole_or_none(built);
     }
 }
@@ -91,9 +92,10 @@ TEST_F(TeamTest, WhatADeadTeamLeavesIsRemovedAtTheNextStart) {
     build_alone();
     // Member 0 is killed sooner or later, perhaps while it writes.
     for (const std::string seconds : {"0.1", "0.4", "0.6"}) {
-        const Outcome built = run_team(2, "if [ $OMPI_COMM_WORLD_RANK = 0 ]; then exec timeout -s KILL " + seconds + " " UNSEEN_COMMAND
-                                          " build large.obj -o team.vdt --memory 0.1; else exec " UNSEEN_COMMAND
-                                          " build large.obj -o team.vdt --memory 0.1; fi");
+        const Outcome built =
+            run_team(2, "if [ $OMPI_COMM_WORLD_RANK = 0 ]; then exec timeout -s KILL " + seconds +
+                            " " UNSEEN_COMMAND " build large.obj -o team.vdt --memory 0.1; else exec " UNSEEN_COMMAND
+                            " build large.obj -o team.vdt --memory 0.1; fi");
         expect_whole_or_none(built);
     }
     const Outcome built = run({"build", "large.obj", "-o", "team.vdt"});

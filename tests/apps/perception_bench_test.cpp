@@ -144,21 +144,28 @@ TEST_F(PerceptionBenchTest, NumbersNeedNoOpenGl) {
 
 TEST_F(PerceptionBenchTest, BadReferencesAreNamedWithTheirLine) {
     fs::create_directory(path("figures"));
-    for (const auto& [cell, column] : {std::pair("4x", "frequency"), {"", "frequency"}, {"nan", "frequency"}, {"1e999", "frequency"}}) {
-        write_text(path("figures") / "csf_golden.csv", "# a remark\nfrequency,luminance,area,eccentricity,castle,stela\n4,100,1,0,200,200\n" +
-                                                           std::string(cell) + ",100,1,0,200,200\n");
+    for (const auto& [cell, column] :
+         {std::pair("4x", "frequency"), {"", "frequency"}, {"nan", "frequency"}, {"1e999", "frequency"}}) {
+        write_text(path("figures") / "csf_golden.csv",
+                   "# a remark\nfrequency,luminance,area,eccentricity,castle,stela\n4,100,1,0,200,200\n" +
+                       std::string(cell) + ",100,1,0,200,200\n");
         const Outcome outcome = bench({"perception", "--quick", "--only", "csf", "--reference", "figures"});
         EXPECT_EQ(outcome.status, 1) << cell;
-        EXPECT_THAT(outcome.err, HasSubstr("csf_golden.csv: line 4: '" + std::string(cell) + "' in column '" + column + "' is no number"));
+        EXPECT_THAT(outcome.err, HasSubstr("csf_golden.csv: line 4: '" + std::string(cell) + "' in column '" + column +
+                                           "' is no number"));
     }
-    write_text(path("figures") / "csf_golden.csv", "frequency,luminance,area,eccentricity,castle,stela\n4,1e+2,1.0,0,2.0e+02,2e2\n");
+    write_text(path("figures") / "csf_golden.csv",
+               "frequency,luminance,area,eccentricity,castle,stela\n4,1e+2,1.0,0,2.0e+02,2e2\n");
     EXPECT_EQ(bench({"perception", "--quick", "--only", "csf", "--reference", "figures"}).err.find("no number"),
               std::string::npos);
 }
 
 TEST_F(PerceptionBenchTest, RefusesWrongUsage) {
-    for (const std::vector<std::string>& words : std::vector<std::vector<std::string>>{
-             {"--only", "saving"}, {"--window", "1"}, {"--second-judge", "castle-red-green"}, {"--reference", "missing"}}) {
+    for (const std::vector<std::string>& words :
+         std::vector<std::vector<std::string>>{{"--only", "saving"},
+                                               {"--window", "1"},
+                                               {"--second-judge", "castle-red-green"},
+                                               {"--reference", "missing"}}) {
         std::vector<std::string> all = {"perception", "--quick"};
         all.insert(all.end(), words.begin(), words.end());
         EXPECT_EQ(bench(all).status, 2) << words[0];

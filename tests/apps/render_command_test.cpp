@@ -83,7 +83,8 @@ std::vector<std::vector<double>> numbers_of(const std::string& csv) {
     while (std::getline(lines, line)) {
         std::istringstream cells(line);
         rows.emplace_back();
-        for (std::string cell; std::getline(cells, cell, ',');) rows.back().push_back(cell.empty() ? -1 : std::stod(cell));
+        for (std::string cell; std::getline(cells, cell, ',');)
+            rows.back().push_back(cell.empty() ? -1 : std::stod(cell));
         rows.back().resize(11, -1);
     }
     return rows;
@@ -145,7 +146,8 @@ TEST_F(RenderCommandTest, AnOrbitFollowsWithOneCut) {
 TEST_F(RenderCommandTest, PathsComeFromFiles) {
     write_text(path("path.csv"), "eye_x, eye_y,eye_z,target_x,target_y,target_z,gaze_x,gaze_y\r\n"
                                  "0,0,4,0,0,0,48,40\r\n\n+0.1,0,4,0,0,0,48,41\n0.1,0,4,0,0,0,48,41\n");
-    const Outcome flown = run({"render", "ball.vdt", "--path", "path.csv", "--size", "96x80", "--csv", "out.csv", "--no-draw"});
+    const Outcome flown =
+        run({"render", "ball.vdt", "--path", "path.csv", "--size", "96x80", "--csv", "out.csv", "--no-draw"});
     ASSERT_EQ(flown.status, 0) << flown.err;
     EXPECT_THAT(flown.out, HasSubstr("frames"));
     const auto rows = numbers_of(read_text(path("out.csv")));
@@ -157,8 +159,8 @@ TEST_F(RenderCommandTest, PathsComeFromFiles) {
 
 TEST_F(RenderCommandTest, GazesArePlayedAndRepeat) {
     const auto triangles = [&](std::vector<std::string> more) {
-        more.insert(more.begin(), {"render", "ball.vdt", "--path", "orbit:0:40", "--size", "800x640", "--fold-test", "error", "--csv", "out.csv",
-                                   "--no-draw"});
+        more.insert(more.begin(), {"render", "ball.vdt", "--path", "orbit:0:40", "--size", "800x640", "--fold-test",
+                                   "error", "--csv", "out.csv", "--no-draw"});
         const Outcome flown = run(more);
         EXPECT_EQ(flown.status, 0) << flown.err;
         std::vector<double> column;
@@ -184,7 +186,8 @@ TEST_F(RenderCommandTest, GazesArePlayedAndRepeat) {
     EXPECT_EQ(traced[5], traced[25]);
     EXPECT_EQ(traced[32], traced[39]);
     EXPECT_LT(traced[25], traced[35]);
-    const Outcome still = run({"render", "ball.vdt", "-o", "head.png", "--gaze-mode", "head", "--size", "96x80", "--json", "-"});
+    const Outcome still =
+        run({"render", "ball.vdt", "-o", "head.png", "--gaze-mode", "head", "--size", "96x80", "--json", "-"});
     ASSERT_EQ(still.status, 0) << still.err;
     EXPECT_THAT(effect_named(still.json(), "gaze")["why"].get<std::string>(), HasSubstr("give or take 15 degrees"));
 }
@@ -203,14 +206,23 @@ TEST_F(RenderCommandTest, BadGazesAreRefused) {
     EXPECT_EQ(with({"--gaze-trace", "missing.csv"}).status, 1);
     // What is quickly read is told before the model is read and measured.
     EXPECT_THAT(run({"render", "missing.vdt", "--path", "missing.csv"}).err, HasSubstr("missing.csv"));
-    EXPECT_THAT(run({"render", "missing.vdt", "--path", "orbit:1", "--gaze-trace", "missing.csv"}).err, HasSubstr("missing.csv"));
+    EXPECT_THAT(run({"render", "missing.vdt", "--path", "orbit:1", "--gaze-trace", "missing.csv"}).err,
+                HasSubstr("missing.csv"));
     EXPECT_THAT(run({"view", "missing.vdt", "--gaze-trace", "missing.csv"}).err, HasSubstr("missing.csv"));
-    for (const std::vector<std::string>& more : std::vector<std::vector<std::string>>{
-             {"--gaze-mode", "nobody"}, {"--gaze-mode", "mouse"}, {"--gaze-error", "-1"}, {"--gaze-error", "nan"}, {"--gaze-latency", "1e9"},
-             {"--gaze-mode", "head", "--gaze-trace", "gap.csv"}, {"--gaze", "1", "2", "--gaze-mode", "head"}, {"--seed", "3"},
-             {"--gaze-mode", "head", "--gaze-latency", "20"}, {"--gaze", "1", "2", "--suppression"}})
+    for (const std::vector<std::string>& more :
+         std::vector<std::vector<std::string>>{{"--gaze-mode", "nobody"},
+                                               {"--gaze-mode", "mouse"},
+                                               {"--gaze-error", "-1"},
+                                               {"--gaze-error", "nan"},
+                                               {"--gaze-latency", "1e9"},
+                                               {"--gaze-mode", "head", "--gaze-trace", "gap.csv"},
+                                               {"--gaze", "1", "2", "--gaze-mode", "head"},
+                                               {"--seed", "3"},
+                                               {"--gaze-mode", "head", "--gaze-latency", "20"},
+                                               {"--gaze", "1", "2", "--suppression"}})
         EXPECT_EQ(with(more).status, 2) << more.back();
-    EXPECT_EQ(run({"render", "ball.vdt", "-o", "o.png", "--gaze-mode", "simulated"}).status, 2) << "one picture has no time";
+    EXPECT_EQ(run({"render", "ball.vdt", "-o", "o.png", "--gaze-mode", "simulated"}).status, 2)
+        << "one picture has no time";
     EXPECT_EQ(run({"render", "ball.vdt", "-o", "o.png", "--gaze-error", "3"}).status, 2) << "of no gaze";
     // Clocks that have nothing to do with each other.
     write_text(path("late.csv"), "time_s,x_px,y_px\n1690000000,1,2\n1690000000.1,1,2\n");
@@ -249,11 +261,14 @@ TEST_F(RenderCommandTest, BadPathsAreNamedByLineAndColumn) {
         EXPECT_THAT(outcome.err, HasSubstr(complaint)) << text;
         EXPECT_FALSE(fs::exists(path("out.csv")));
     }
-    for (const std::string orbit : {"orbit:", "orbit:x", "orbit:1:0", "orbit:1:x", "orbit:0", "orbit:nan:5", "missing.csv"})
+    for (const std::string orbit :
+         {"orbit:", "orbit:x", "orbit:1:0", "orbit:1:x", "orbit:0", "orbit:nan:5", "missing.csv"})
         EXPECT_EQ(run({"render", "ball.vdt", "--path", orbit, "--no-draw"}).status, 1) << orbit;
-    const std::vector<std::vector<std::string>> wrong = {{"--csv", "a.csv"}, {"--path", "orbit:1", "-o", "same.png"},
+    const std::vector<std::vector<std::string>> wrong = {{"--csv", "a.csv"},
+                                                         {"--path", "orbit:1", "-o", "same.png"},
                                                          {"--path", "orbit:1", "-o", "%d%d.png"},
-                                                         {"--path", "orbit:1", "-o", "%s.png"}, {"--threshold", "2", "-o", "a.png"},
+                                                         {"--path", "orbit:1", "-o", "%s.png"},
+                                                         {"--threshold", "2", "-o", "a.png"},
                                                          {"--path", "orbit:1", "--threshold", "0"},
                                                          {"--geomorph", "0.2", "-o", "a.png"},
                                                          {"--path", "orbit:1", "--geomorph", "-1"},
@@ -270,7 +285,8 @@ TEST_F(RenderCommandTest, AFlightGlidesWhenItIsAskedTo) {
     std::string away = "eye_x,eye_y,eye_z,target_x,target_y,target_z\n";
     for (int i = 0; i < 20; ++i) away += "0,0," + std::to_string(60 + 2 * i) + ",0,0,0\n";
     write_text(path("away.csv"), away);
-    const std::vector<std::string> flight = {"render", "ball.vdt", "--path", "away.csv", "--size", "96x80", "--pixels", "6"};
+    const std::vector<std::string> flight = {"render", "ball.vdt", "--path",   "away.csv",
+                                             "--size", "96x80",    "--pixels", "6"};
     const auto fly = [&](std::vector<std::string> more) {
         more.insert(more.begin(), flight.begin(), flight.end());
         const Outcome flown = run(more);
@@ -280,7 +296,8 @@ TEST_F(RenderCommandTest, AFlightGlidesWhenItIsAskedTo) {
     const Json still = fly({"--csv", "still.csv", "-o", "still%d.png", "--json", "-"});
     EXPECT_EQ(effect_named(still, "geomorphs")["on"], false);
     EXPECT_TRUE(still["gliding"]["largest"].is_null());
-    const Json gliding = fly({"--csv", "gliding.csv", "-o", "gliding%d.png", "--json", "-", "--geomorph", "0.25", "--fps", "25"});
+    const Json gliding =
+        fly({"--csv", "gliding.csv", "-o", "gliding%d.png", "--json", "-", "--geomorph", "0.25", "--fps", "25"});
     EXPECT_EQ(effect_named(gliding, "geomorphs")["on"], true);
     EXPECT_THAT(std::string(effect_named(gliding, "geomorphs")["why"]), HasSubstr("0.25 s"));
     EXPECT_GT(gliding["gliding"]["largest"], 0);
@@ -291,12 +308,15 @@ TEST_F(RenderCommandTest, AFlightGlidesWhenItIsAskedTo) {
     EXPECT_TRUE(read_text(path("still0.png")) == read_text(path("gliding0.png"))) << "nothing glides at first";
     bool differs = false;
     for (int i = 1; i < 20; ++i)
-        differs |= read_text(path("still" + std::to_string(i) + ".png")) != read_text(path("gliding" + std::to_string(i) + ".png"));
+        differs |= read_text(path("still" + std::to_string(i) + ".png")) !=
+                   read_text(path("gliding" + std::to_string(i) + ".png"));
     EXPECT_TRUE(differs);
     // In no time, every frame is the one without.
     fly({"-o", "nothing%d.png", "--json", "-", "--geomorph", "0"});
     for (int i = 0; i < 20; ++i)
-        EXPECT_TRUE(read_text(path("still" + std::to_string(i) + ".png")) == read_text(path("nothing" + std::to_string(i) + ".png"))) << i;
+        EXPECT_TRUE(read_text(path("still" + std::to_string(i) + ".png")) ==
+                    read_text(path("nothing" + std::to_string(i) + ".png")))
+            << i;
 }
 
 TEST_F(RenderCommandTest, OptionsChangeThePicture) {
@@ -365,7 +385,8 @@ TEST_F(RenderCommandTest, MapsShowWhatFoldsCost) {
         double model = 0, coloured = 0;
         for (int y = 0; y < 160; ++y) {
             for (int x = 0; x < 200; ++x) {
-                const float r = picture->image.at(x, y, 0), g = picture->image.at(x, y, 1), b = picture->image.at(x, y, 2);
+                const float r = picture->image.at(x, y, 0), g = picture->image.at(x, y, 1),
+                            b = picture->image.at(x, y, 2);
                 model += r + g + b > 0;
                 coloured += r != g || g != b;
             }
@@ -374,10 +395,12 @@ TEST_F(RenderCommandTest, MapsShowWhatFoldsCost) {
         return coloured / model;
     };
     const std::vector<std::string> aside = {"--gaze", "1191", "80"};
-    for (const std::string map : {"cost", "frequency", "contrast", "eccentricity"}) EXPECT_GT(share_of_colour(map, aside), 0.05) << map;
+    for (const std::string map : {"cost", "frequency", "contrast", "eccentricity"})
+        EXPECT_GT(share_of_colour(map, aside), 0.05) << map;
     EXPECT_GT(share_of_colour("cost", aside), share_of_colour("cost", {})) << "more is folded in the corner of the eye";
     // Angles are those on the screen: whatever field the camera shows there, the same place has nearly the same colour.
-    for (const std::string field : {"4.65", "20"}) render({"--show", "eccentricity", "--gaze", "1191", "80", "--fov", field, "--triangles", "60"}, field + ".png");
+    for (const std::string field : {"4.65", "20"})
+        render({"--show", "eccentricity", "--gaze", "1191", "80", "--fov", field, "--triangles", "60"}, field + ".png");
     const auto usual = read_image(path("4.65.png")), wide = read_image(path("20.png"));
     ASSERT_TRUE(wide && usual);
     double difference = 0, places = 0;
@@ -386,7 +409,8 @@ TEST_F(RenderCommandTest, MapsShowWhatFoldsCost) {
             const auto is_coloured = [&](const auto& image) { return image.at(x, y, 0) != image.at(x, y, 1); };
             if (!is_coloured(wide->image) || !is_coloured(usual->image)) continue;
             ++places;
-            for (int k = 0; k < 3; ++k) difference += std::abs(static_cast<double>(wide->image.at(x, y, k) - usual->image.at(x, y, k)));
+            for (int k = 0; k < 3; ++k)
+                difference += std::abs(static_cast<double>(wide->image.at(x, y, k) - usual->image.at(x, y, k)));
         }
     }
     EXPECT_GT(places, 2000);
@@ -398,7 +422,8 @@ TEST_F(RenderCommandTest, MapsShowWhatFoldsCost) {
     EXPECT_EQ(run({"render", "ball.vdt", "-o", "map.png", "--show", "beauty"}).status, 2);
     EXPECT_EQ(run({"render", "ball.vdt", "--path", "orbit:10", "--show", "cost"}).status, 2);
 
-    const Outcome outcome = run({"sheet", "ball.vdt", "-o", "maps.png", "--maps", "--size", "256x256", "--samples", "4", "--cell", "64", "--json", "-"});
+    const Outcome outcome = run({"sheet", "ball.vdt", "-o", "maps.png", "--maps", "--size", "256x256", "--samples", "4",
+                                 "--cell", "64", "--json", "-"});
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     EXPECT_EQ(outcome.json()["cuts"].size(), 3u);
     const auto sheet = read_image(path("maps.png"));
@@ -408,20 +433,20 @@ TEST_F(RenderCommandTest, MapsShowWhatFoldsCost) {
 
 TEST_F(RenderCommandTest, WrongUsageIsStatusTwo) {
     const auto before = files();
-    for (const std::vector<std::string>& words :
-         std::vector<std::vector<std::string>>{{"render", "ball.vdt", "-o", "out.gif"},
-                                               {"render", "ball.vdt", "-o", "out.png", "--samples", "257"},
-                                               {"render", "ball.vdt", "-o", "out.png", "--samples", "0"},
-                                               {"render", "ball.vdt", "-o", "out.png", "--shading", "toon"},
-                                               {"sheet", "ball.vdt", "-o", "out.png", "--cell", "0"},
-                                               {"sheet", "ball.vdt", "-o", "out.png", "--full"},
-                                               {"render", "ball.vdt", "--path", "orbit:0:2", "--threshold", "2", "--triangles", "20"},
-                                               {"render", "ball.vdt", "--path", "orbit:0:2", "-o", "%d/o.png"},
-                                               {"render", "ball.vdt", "-o", "out.png", "--show", "contrast", "--lights", "l.json"},
-                                               {"view", "ball.vdt", "--frames", "0"},
-                                               {"view", "ball.vdt", "--gaze", "1", "2", "--gaze-mode", "head"},
-                                               {"view", "ball.vdt", "--lights", "l.json", "--geomorph", "1"},
-                                               {"view", "ball.vdt", "--screenshot", "out.ply"}}) {
+    for (const std::vector<std::string>& words : std::vector<std::vector<std::string>>{
+             {"render", "ball.vdt", "-o", "out.gif"},
+             {"render", "ball.vdt", "-o", "out.png", "--samples", "257"},
+             {"render", "ball.vdt", "-o", "out.png", "--samples", "0"},
+             {"render", "ball.vdt", "-o", "out.png", "--shading", "toon"},
+             {"sheet", "ball.vdt", "-o", "out.png", "--cell", "0"},
+             {"sheet", "ball.vdt", "-o", "out.png", "--full"},
+             {"render", "ball.vdt", "--path", "orbit:0:2", "--threshold", "2", "--triangles", "20"},
+             {"render", "ball.vdt", "--path", "orbit:0:2", "-o", "%d/o.png"},
+             {"render", "ball.vdt", "-o", "out.png", "--show", "contrast", "--lights", "l.json"},
+             {"view", "ball.vdt", "--frames", "0"},
+             {"view", "ball.vdt", "--gaze", "1", "2", "--gaze-mode", "head"},
+             {"view", "ball.vdt", "--lights", "l.json", "--geomorph", "1"},
+             {"view", "ball.vdt", "--screenshot", "out.ply"}}) {
         const Outcome outcome = run(words);
         EXPECT_EQ(outcome.status, 2) << ::testing::PrintToString(words);
         EXPECT_EQ(outcome.err.rfind("unseen: ", 0), 0U) << outcome.err;
@@ -430,7 +455,8 @@ TEST_F(RenderCommandTest, WrongUsageIsStatusTwo) {
 }
 
 TEST_F(RenderCommandTest, FollowsLightsThatMove) {
-    write_text(path("lights.json"), R"({"ambient": 0.1, "lights": [{"type": "directional", "direction": [1, 1, 1], "intensity": 0.8,
+    write_text(path("lights.json"),
+               R"({"ambient": 0.1, "lights": [{"type": "directional", "direction": [1, 1, 1], "intensity": 0.8,
                              "orbit": {"axis": [0, 1, 0], "degrees_per_second": 60}}]})");
     const Json still = render({"--lights", "lights.json"}, "lit.png");
     const auto effect = [](const Json& report, const std::string& name) {
@@ -440,8 +466,8 @@ TEST_F(RenderCommandTest, FollowsLightsThatMove) {
     };
     EXPECT_TRUE(effect(still, "light")["on"]);
     EXPECT_THAT(effect(still, "light")["why"].get<std::string>(), HasSubstr("1 directional, ambient 0.1"));
-    const Outcome flown = run({"render", "ball.vdt", "--path", "orbit:0:30", "--lights", "lights.json", "--fps", "60", "-o", "f%02d.png",
-                               "--size", "96x96", "--json", "-"});
+    const Outcome flown = run({"render", "ball.vdt", "--path", "orbit:0:30", "--lights", "lights.json", "--fps", "60",
+                               "-o", "f%02d.png", "--size", "96x96", "--json", "-"});
     ASSERT_EQ(flown.status, 0) << flown.err;
     EXPECT_GT(flown.json()["node_tests"]["largest"].get<double>(), 0);
     const auto first = read_image(path("f00.png")), last = read_image(path("f29.png"));
@@ -468,12 +494,14 @@ TEST_F(RenderCommandTest, NamesFileAndFieldOfBadLights) {
     EXPECT_THAT(complaint("{\"lights\": [{\"type\": \"directional\", \"intensity\": 1, \"direction\": [0, 0, 0]}]}"),
                 HasSubstr("lights[0].direction"));
     write_text(path("good.json"), point_at("[9, 9, 9]"));
-    for (const std::vector<std::string>& more : std::vector<std::vector<std::string>>{{"--light", "0", "0", "1"}, {"--ambient", "0.5"}}) {
+    for (const std::vector<std::string>& more :
+         std::vector<std::vector<std::string>>{{"--light", "0", "0", "1"}, {"--ambient", "0.5"}}) {
         std::vector<std::string> words = {"render", "ball.vdt", "-o", "o.png", "--lights", "good.json"};
         words.insert(words.end(), more.begin(), more.end());
         EXPECT_EQ(run(words).status, 2);
     }
-    const Outcome by_errors = run({"render", "ball.vdt", "-o", "o.png", "--lights", "good.json", "--fold-test", "error"});
+    const Outcome by_errors =
+        run({"render", "ball.vdt", "-o", "o.png", "--lights", "good.json", "--fold-test", "error"});
     EXPECT_EQ(by_errors.status, 1);
     EXPECT_THAT(by_errors.err, HasSubstr("--fold-test luebke-hallen"));
 }
@@ -497,14 +525,19 @@ TEST_F(RenderCommandTest, FailuresLeaveNoFile) {
         EXPECT_THAT(outcome.err, IsAnErrorForPeople());
         EXPECT_EQ(files(), before);
     }
-    EXPECT_EQ(run({"render", "ball.vdt", "--path", "orbit:0:2", "--no-draw", "--csv", "ball.vdt"}).status, 1) << "the model";
-    EXPECT_EQ(run({"render", "ball.vdt", "--path", "orbit:0:2", "--no-draw", "--csv", "o.csv", "--plot", "missing/o.png"}).status, 1);
+    EXPECT_EQ(run({"render", "ball.vdt", "--path", "orbit:0:2", "--no-draw", "--csv", "ball.vdt"}).status, 1)
+        << "the model";
+    EXPECT_EQ(
+        run({"render", "ball.vdt", "--path", "orbit:0:2", "--no-draw", "--csv", "o.csv", "--plot", "missing/o.png"})
+            .status,
+        1);
     EXPECT_EQ(files(), before);
     // A light that comes into the model in the third frame.
     write_text(path("l.json"), R"({"lights": [{"type": "point", "intensity": 1, "distance": 1, "position": [0, 0, 9],
                              "keyframes": [{"time_s": 0, "position": [0, 0, 9]}, {"time_s": 0.04, "position": [0, 0, 0]}]}]})");
     const auto with_light = files();
-    const Outcome hit = run({"render", "ball.vdt", "--path", "orbit:0:4", "--lights", "l.json", "-o", "f%d.png", "--size", "16x16"});
+    const Outcome hit =
+        run({"render", "ball.vdt", "--path", "orbit:0:4", "--lights", "l.json", "-o", "f%d.png", "--size", "16x16"});
     EXPECT_EQ(hit.status, 1);
     EXPECT_THAT(hit.err, HasSubstr("Frame "));
     EXPECT_EQ(files(), with_light);

@@ -32,7 +32,9 @@ protected:
         ADD_FAILURE() << "no row '" << name << "'";
         return {{"value", std::nan("")}};
     }
-    static double value(const Json& report, const std::string& name) { return row_named(report, name)["value"].get<double>(); }
+    static double value(const Json& report, const std::string& name) {
+        return row_named(report, name)["value"].get<double>();
+    }
 };
 
 } // namespace unseen::app::testing

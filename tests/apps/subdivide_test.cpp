@@ -7,9 +7,9 @@
 
 #include <glm/geometric.hpp>
 
+#include "build/surface.h"
 #include "shapes.h"
 #include "subdivide.h"
-#include "build/surface.h"
 
 namespace {
 
@@ -47,7 +47,8 @@ double area(const Mesh& mesh, std::uint64_t first, std::uint64_t count) {
     double sum = 0;
     for (std::uint64_t t = first; t < first + count; ++t) {
         const auto& [a, b, c] = mesh.triangles[t];
-        sum += glm::length(glm::cross(mesh.positions[b] - mesh.positions[a], mesh.positions[c] - mesh.positions[a])) / 2;
+        sum +=
+            glm::length(glm::cross(mesh.positions[b] - mesh.positions[a], mesh.positions[c] - mesh.positions[a])) / 2;
     }
     return sum;
 }
@@ -55,7 +56,9 @@ double area(const Mesh& mesh, std::uint64_t first, std::uint64_t count) {
 double area(const Mesh& mesh) { return area(mesh, 0, mesh.triangles.size()); }
 
 TEST(Subdivide, ClosedMeshesStayClosed) {
-    const std::vector<Mesh> closed = {shapes::icosphere(2), shapes::torus(24, 10), shapes::cube(3),
+    const std::vector<Mesh> closed = {shapes::icosphere(2),
+                                      shapes::torus(24, 10),
+                                      shapes::cube(3),
                                       shapes::unwelded(shapes::bumpy_sphere(2)),
                                       shapes::in_floats(shapes::bumpy_sphere(2)),
                                       shapes::placed(shapes::bumpy_sphere(2), 30, {5.0e5, 5.0e6, 120})};
@@ -105,7 +108,9 @@ TEST(Subdivide, NoiseMovesNewVerticesByItsShareOfTheEdge) {
     double largest = 0;
     for (std::size_t v = 0; v < 6; ++v) {
         const double moved = glm::length(rough.positions[v] - flat.positions[v]);
-        if (v < 3) { EXPECT_EQ(moved, 0) << "the mesh's own vertices stay"; }
+        if (v < 3) {
+            EXPECT_EQ(moved, 0) << "the mesh's own vertices stay";
+        }
         EXPECT_LE(moved, 0.5 * std::sqrt(2.0) + 1e-12);
         largest = std::max(largest, moved);
     }
@@ -123,7 +128,8 @@ TEST(Subdivide, InterpolatesAttributes) {
     ASSERT_EQ(finer.uvs.size(), 6u);
     // The corner triangle at the first vertex: itself and the middles of its edges.
     const auto& corner = finer.triangles[0];
-    EXPECT_EQ(finer.colours[corner[1]], (mesh.colours[mesh.triangles[0][0]] + mesh.colours[mesh.triangles[0][1]]) * 0.5f);
+    EXPECT_EQ(finer.colours[corner[1]],
+              (mesh.colours[mesh.triangles[0][0]] + mesh.colours[mesh.triangles[0][1]]) * 0.5f);
     EXPECT_EQ(finer.uvs[corner[2]], (mesh.uvs[mesh.triangles[0][0]] + mesh.uvs[mesh.triangles[0][2]]) * 0.5f);
 }
 

@@ -240,7 +240,8 @@ bool is_blue(float r, float g, float b) { return b > 0.9f && g < 0.1f && r < 0.1
 
 TEST(PanelPlot, PutsCurvesInTheirPanels) {
     PanelPlot plot;
-    plot.panels = {{"steady", {1, 0, 0}, {5, 5, 5, 5}}, {"gone", {0, 0, 1}, {0, std::nan(""), 3}}, {"empty", {0, 1, 0}, {}}};
+    plot.panels = {
+        {"steady", {1, 0, 0}, {5, 5, 5, 5}}, {"gone", {0, 0, 1}, {0, std::nan(""), 3}}, {"empty", {0, 1, 0}, {}}};
     Drawing canvas = drawing(plot.width, height_of(plot), white);
     draw(plot, canvas);
     const Image image = image_of(canvas);

@@ -26,15 +26,16 @@ protected:
         std::ostringstream obj;
         for (int i = 0; i <= n; ++i)
             for (int k = 0; k <= n; ++k)
-                obj << "v " << k / static_cast<double>(n) << ' ' << i / static_cast<double>(n) << " 0\nvt " << k / static_cast<double>(n) << ' '
-                    << i / static_cast<double>(n) << '\n';
+                obj << "v " << k / static_cast<double>(n) << ' ' << i / static_cast<double>(n) << " 0\nvt "
+                    << k / static_cast<double>(n) << ' ' << i / static_cast<double>(n) << '\n';
         obj << more;
         const auto corner = [&](int i, int k) {
             const std::string number = std::to_string(i * (n + 1) + k + 1);
             return ' ' + number + '/' + number;
         };
         for (int i = 0; i < n; ++i)
-            for (int k = 0; k < n; ++k) obj << "f" << corner(i, k) << corner(i, k + 1) << corner(i + 1, k + 1) << corner(i + 1, k) << '\n';
+            for (int k = 0; k < n; ++k)
+                obj << "f" << corner(i, k) << corner(i, k + 1) << corner(i + 1, k + 1) << corner(i + 1, k) << '\n';
         return obj.str();
     }
     void write_square(const std::string& image) const {
@@ -70,7 +71,9 @@ protected:
         while (info.next_scanline < info.image_height) {
             std::vector<JSAMPLE> row;
             for (int i = 0; i < 3 * image.width; ++i)
-                row.push_back(static_cast<JSAMPLE>(255 * image.values[static_cast<std::size_t>(static_cast<int>(info.next_scanline) * 3 * image.width + i)]));
+                row.push_back(
+                    static_cast<JSAMPLE>(255 * image.values[static_cast<std::size_t>(
+                                                   static_cast<int>(info.next_scanline) * 3 * image.width + i)]));
             JSAMPROW rows = row.data();
             jpeg_write_scanlines(&info, &rows, 1);
         }
@@ -90,8 +93,10 @@ protected:
         return outcome.json();
     }
     // The luminance in cd/m2 of the pictures' upper and lower halves; empty where nothing can be drawn.
-    std::optional<std::pair<float, float>> draw(const std::string& model, std::vector<std::string> more = {}, Json* report = nullptr) const {
-        std::vector<std::string> words = {"render", model, "-o", "p.pfm", "--size", "64x64", "--fill", "1.2", "--samples", "4", "--json", "-"};
+    std::optional<std::pair<float, float>> draw(const std::string& model, std::vector<std::string> more = {},
+                                                Json* report = nullptr) const {
+        std::vector<std::string> words = {"render", model, "-o",        "p.pfm", "--size", "64x64",
+                                          "--fill", "1.2", "--samples", "4",     "--json", "-"};
         words.insert(words.end(), more.begin(), more.end());
         const Outcome outcome = run(words);
         if (outcome.err.find("No OpenGL") != std::string::npos) return std::nullopt;
@@ -161,7 +166,8 @@ TEST_F(TextureCommandTest, OfSeveralMaterialsBecomeOne) {
     for (int face = 0; face < 8; ++face) at = obj.find("\nf ", at + 1);
     obj.insert(at + 1, "usemtl plain\n");
     write_text(path("m.obj"), obj);
-    write_text(path("m.mtl"), "newmtl striped\nmap_Kd -clamp on p.png\nnewmtl green\nmap_Kd green.png\nnewmtl plain\nKd 0 0 1\n");
+    write_text(path("m.mtl"),
+               "newmtl striped\nmap_Kd -clamp on p.png\nnewmtl green\nmap_Kd green.png\nnewmtl plain\nKd 0 0 1\n");
     EXPECT_GT(build("m.obj")["texture"]["width"].get<int>(), 16);
     if (const auto seen = draw("t.vdt", {"--full"})) {
         EXPECT_NEAR(seen->first, 0.5 + 99.5 * 0.7152, 1);
@@ -174,7 +180,8 @@ std::string base64(const std::string& bytes) {
     std::string out;
     for (std::size_t i = 0; i < bytes.size(); i += 3) {
         unsigned word = 0;
-        for (std::size_t k = 0; k < 3; ++k) word = word << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
+        for (std::size_t k = 0; k < 3; ++k)
+            word = word << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
         for (std::size_t k = 0; k < 4; ++k) out += i + k > bytes.size() ? '=' : digits[word >> (18 - 6 * k) & 63];
     }
     return out;
@@ -191,23 +198,32 @@ TEST_F(TextureCommandTest, OfGltfAreFoundInTheFileAndBesideIt) {
     const std::size_t image_at = buffer.size();
     buffer += png;
     const auto document = [&](const Json& image, const Json& factor) {
-        return Json{{"asset", {{"version", "2.0"}}},
-                    {"buffers", {{{"byteLength", buffer.size()}, {"uri", "data:application/octet-stream;base64," + base64(buffer)}}}},
-                    {"bufferViews", {{{"buffer", 0}, {"byteLength", 48}}, {{"buffer", 0}, {"byteOffset", 48}, {"byteLength", 32}},
-                                     {{"buffer", 0}, {"byteOffset", 80}, {"byteLength", 12}},
-                                     {{"buffer", 0}, {"byteOffset", image_at}, {"byteLength", png.size()}}}},
-                    {"accessors", {{{"bufferView", 0}, {"componentType", 5126}, {"count", 4}, {"type", "VEC3"}},
-                                   {{"bufferView", 1}, {"componentType", 5126}, {"count", 4}, {"type", "VEC2"}},
-                                   {{"bufferView", 2}, {"componentType", 5123}, {"count", 6}, {"type", "SCALAR"}}}},
-                    {"images", {image}},
-                    {"textures", {{{"source", 0}}}},
-                    {"materials", {{{"pbrMetallicRoughness", {{"baseColorFactor", factor}, {"baseColorTexture", {{"index", 0}}}}}}}},
-                    {"meshes", {{{"primitives", {{{"attributes", {{"POSITION", 0}, {"TEXCOORD_0", 1}}}, {"indices", 2}, {"material", 0}}}}}}},
-                    {"nodes", {{{"mesh", 0}}}},
-                    {"scenes", {{{"nodes", {0}}}}}};
+        return Json{
+            {"asset", {{"version", "2.0"}}},
+            {"buffers",
+             {{{"byteLength", buffer.size()}, {"uri", "data:application/octet-stream;base64," + base64(buffer)}}}},
+            {"bufferViews",
+             {{{"buffer", 0}, {"byteLength", 48}},
+              {{"buffer", 0}, {"byteOffset", 48}, {"byteLength", 32}},
+              {{"buffer", 0}, {"byteOffset", 80}, {"byteLength", 12}},
+              {{"buffer", 0}, {"byteOffset", image_at}, {"byteLength", png.size()}}}},
+            {"accessors",
+             {{{"bufferView", 0}, {"componentType", 5126}, {"count", 4}, {"type", "VEC3"}},
+              {{"bufferView", 1}, {"componentType", 5126}, {"count", 4}, {"type", "VEC2"}},
+              {{"bufferView", 2}, {"componentType", 5123}, {"count", 6}, {"type", "SCALAR"}}}},
+            {"images", {image}},
+            {"textures", {{{"source", 0}}}},
+            {"materials",
+             {{{"pbrMetallicRoughness", {{"baseColorFactor", factor}, {"baseColorTexture", {{"index", 0}}}}}}}},
+            {"meshes",
+             {{{"primitives",
+                {{{"attributes", {{"POSITION", 0}, {"TEXCOORD_0", 1}}}, {"indices", 2}, {"material", 0}}}}}}},
+            {"nodes", {{{"mesh", 0}}}},
+            {"scenes", {{{"nodes", {0}}}}}};
     };
     const Json white = {1, 1, 1, 1}, half = {0.5, 0.5, 0.5, 1};
-    for (const Json& image : {Json{{"uri", "p.png"}}, Json{{"bufferView", 3}, {"mimeType", "image/png"}}, Json{{"uri", "data:image/png;base64," + base64(png)}}}) {
+    for (const Json& image : {Json{{"uri", "p.png"}}, Json{{"bufferView", 3}, {"mimeType", "image/png"}},
+                              Json{{"uri", "data:image/png;base64," + base64(png)}}}) {
         for (const bool is_dark : {false, true}) {
             write_text(path("q.gltf"), document(image, is_dark ? half : white).dump());
             EXPECT_EQ(build("q.gltf")["texture"]["height"], 16);
@@ -221,7 +237,8 @@ TEST_F(TextureCommandTest, OfGltfAreFoundInTheFileAndBesideIt) {
         write_text(path("bad.gltf"), changed.dump());
         return complaint({"build", "bad.gltf", "-o", "x.vdt"});
     };
-    EXPECT_THAT(complaint_about(document({{"uri", "nowhere.png"}}, white)), AllOf(HasSubstr("nowhere.png"), HasSubstr("--no-texture")));
+    EXPECT_THAT(complaint_about(document({{"uri", "nowhere.png"}}, white)),
+                AllOf(HasSubstr("nowhere.png"), HasSubstr("--no-texture")));
     EXPECT_THAT(complaint_about(document({{"uri", "../p.png"}}, white)), HasSubstr("only files beside the mesh"));
     EXPECT_THAT(complaint_about(document({{"bufferView", 9}}, white)), HasSubstr("there are 4 bufferViews"));
     EXPECT_THAT(complaint_about(document({{"bufferView", 2}}, white)), HasSubstr("image of material"));
@@ -236,7 +253,8 @@ TEST_F(TextureCommandTest, BadImagesAreNamed) {
         write_square(image);
         return complaint({"build", "square.obj", "-o", "x.vdt"});
     };
-    EXPECT_THAT(complaint_about("missing.png"), AllOf(HasSubstr("missing.png"), HasSubstr("no such image"), HasSubstr("--no-texture")));
+    EXPECT_THAT(complaint_about("missing.png"),
+                AllOf(HasSubstr("missing.png"), HasSubstr("no such image"), HasSubstr("--no-texture")));
     write_text(path("empty.png"), "");
     EXPECT_THAT(complaint_about("empty.png"), HasSubstr("is empty"));
     write_text(path("text.png"), "hello");
@@ -268,7 +286,8 @@ TEST_F(TextureCommandTest, BadImagesAreNamed) {
     EXPECT_THAT(complaint_about("../p.png"), HasSubstr("only files beside the mesh"));
     EXPECT_THAT(complaint_about(""), AllOf(HasSubstr("line 3"), HasSubstr("names no image")));
     write_text(path("square.mtl"), "newmtl paint\nKd 1 nan 1\n");
-    EXPECT_THAT(complaint({"build", "square.obj", "-o", "x.vdt"}), AllOf(HasSubstr("square.mtl: line 2"), HasSubstr("from 0 to 1")));
+    EXPECT_THAT(complaint({"build", "square.obj", "-o", "x.vdt"}),
+                AllOf(HasSubstr("square.mtl: line 2"), HasSubstr("from 0 to 1")));
     EXPECT_EQ(run({"build", "square.obj", "-o", "x.vdt", "--no-texture"}).status, 0);
     EXPECT_FALSE(fs::exists(path("y.vdt")));
 }
@@ -276,7 +295,8 @@ TEST_F(TextureCommandTest, BadImagesAreNamed) {
 TEST_F(TextureCommandTest, BadCoordinatesAreNamed) {
     write_png("p.png", halves());
     write_text(path("none.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-    EXPECT_THAT(complaint({"build", "none.obj", "-o", "x.vdt", "--texture", "p.png"}), HasSubstr("no texture coordinates"));
+    EXPECT_THAT(complaint({"build", "none.obj", "-o", "x.vdt", "--texture", "p.png"}),
+                HasSubstr("no texture coordinates"));
     write_text(path("nan.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt nan 0\nvt 1 1\nf 1/1 2/2 3/3\n");
     const Outcome outcome = run({"build", "nan.obj", "-o", "x.vdt", "--texture", "p.png"});
     EXPECT_EQ(outcome.status, 1);
@@ -295,14 +315,16 @@ TEST_F(TextureCommandTest, WhatCannotFollowThemSaysSo) {
     write_square("p.png");
     build("square.obj");
     EXPECT_THAT(complaint({"build", "square.obj", "-o", "x.vdt", "--fold-errors"}), HasSubstr("--no-texture"));
-    EXPECT_THAT(complaint({"simplify", "t.vdt", "-o", "x.obj", "--fold-test", "error"}), HasSubstr("luebke-hallen-safe"));
+    EXPECT_THAT(complaint({"simplify", "t.vdt", "-o", "x.obj", "--fold-test", "error"}),
+                HasSubstr("luebke-hallen-safe"));
     EXPECT_THAT(complaint({"simplify", "t.vdt", "-o", "x.obj", "--chroma"}), HasSubstr("--no-texture"));
     write_text(path("l.json"), R"({"ambient": 0.1, "lights": [{"type": "headlight", "intensity": 0.5}]})");
     if (const auto seen = draw("t.vdt", {"--lights", "l.json", "--full"})) {
         EXPECT_NEAR(seen->first, 0.5 + 99.5 * 0.6, 1);
         EXPECT_LT(seen->second, 2);
     }
-    EXPECT_EQ(run({"simplify", "t.vdt", "-o", "lit.obj", "--lights", "l.json"}).status, 0) << "a test that knows both is found";
+    EXPECT_EQ(run({"simplify", "t.vdt", "-o", "lit.obj", "--lights", "l.json"}).status, 0)
+        << "a test that knows both is found";
     // Half black and half white: only folds within a half are free.
     const Outcome cut = run({"simplify", "t.vdt", "-o", "x.obj", "--fold-test", "luebke-hallen-safe", "--json", "-"});
     EXPECT_EQ(cut.status, 0) << cut.err;

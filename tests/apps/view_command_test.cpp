@@ -15,7 +15,9 @@ protected:
         if (IsSkipped()) return;
         build_ball();
     }
-    bool open(const std::vector<std::string>& more) { return WindowTest::open({"view", "ball.vdt", "--size", "200x160"}, more); }
+    bool open(const std::vector<std::string>& more) {
+        return WindowTest::open({"view", "ball.vdt", "--size", "200x160"}, more);
+    }
     // "... budget of 368: ..." -> 368
     static int budget_in(const std::string& title) {
         const std::size_t at = title.find("budget of ");
@@ -137,7 +139,8 @@ TEST_F(ViewCommandTest, FoldingCanBeginAtTheFullModel) {
     if (!open({"--full"})) GTEST_SKIP() << "no window: " << errors();
     window().title_with("full");
     window().press(XK_2);
-    EXPECT_THAT(window().title_with("imperceptible"), HasSubstr("luebke-hallen")) << "nobody waits for errors to be measured";
+    EXPECT_THAT(window().title_with("imperceptible"), HasSubstr("luebke-hallen"))
+        << "nobody waits for errors to be measured";
     window().press(XK_q);
     EXPECT_EQ(ended(), 0) << errors();
 }

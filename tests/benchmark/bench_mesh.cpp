@@ -5,9 +5,9 @@
 #include <cstdlib>
 #include <numbers>
 
+#include <meshio/mesh_io.h>
 #include <perception/display.h>
 #include <vdtree/builder.h>
-#include <meshio/mesh_io.h>
 
 #include "sample_mesh.h"
 #include "subdivide.h"

@@ -8,7 +8,7 @@
 namespace unseen::bench {
 
 const vdtree::Mesh& mesh();
-const vdtree::VertexTree& tree(); // by the quadric clusterer, one thread
+const vdtree::VertexTree& tree();       // by the quadric clusterer, one thread
 const vdtree::VertexTree& large_tree(); // of 16 times the triangles; by the octree, which is quick to build
 
 // The model filling 90% of a 1024 x 1024 window on the default display, `degrees` around the vertical axis from +Z.

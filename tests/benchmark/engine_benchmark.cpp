@@ -6,8 +6,8 @@
 #include <limits>
 
 #include <perception/criterion.h>
-#include <vdtree/cut.h>
 #include <perception/fold_measurement.h>
+#include <vdtree/cut.h>
 
 #include "bench_mesh.h"
 
@@ -92,10 +92,24 @@ void follow_orbit_of(benchmark::State& state, const Subject& s) {
     state.counters["triangles"] = triangles;
 }
 void follow_orbit(benchmark::State& state, bool gazes, bool large) { follow_orbit_of(state, subject(gazes, large)); }
-BENCHMARK_CAPTURE(follow_orbit, foveal, false, false)->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
-BENCHMARK_CAPTURE(follow_orbit, gaze, true, false)->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(follow_orbit, foveal, false, false)
+    ->ArgName("tenth_degrees")
+    ->Arg(1)
+    ->Arg(10)
+    ->Arg(50)
+    ->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(follow_orbit, gaze, true, false)
+    ->ArgName("tenth_degrees")
+    ->Arg(1)
+    ->Arg(10)
+    ->Arg(50)
+    ->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(follow_orbit, foveal_of_16_times_the_mesh, false, true)
-    ->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
+    ->ArgName("tenth_degrees")
+    ->Arg(1)
+    ->Arg(10)
+    ->Arg(50)
+    ->Unit(benchmark::kMicrosecond);
 
 // All of the model is in the window.
 void follow_orbit_in_frustum(benchmark::State& state) {
@@ -167,7 +181,8 @@ void budget(benchmark::State& state, bool cold, float hysteresis) {
     const Subject& s = subject(false, false);
     Cut cut(s.tree);
     vdtree::FollowOptions following;
-    following.triangle_budget = static_cast<vdtree::Index>(std::min(wanted_active, most_of_mesh * s.tree.triangle_count()));
+    following.triangle_budget =
+        static_cast<vdtree::Index>(std::min(wanted_active, most_of_mesh * s.tree.triangle_count()));
     following.hysteresis = hysteresis;
     double degrees = 0;
     for (auto _ : state) {

@@ -21,7 +21,8 @@ using vdtree::Cut;
 
 struct Subject {
     explicit Subject(TurningLight kind_)
-        : kind(kind_), bounds(std::make_shared<vdtree::LightBounds>(*vdtree::LightBounds::measure(tree()))), criterion(make()) {
+        : kind(kind_), bounds(std::make_shared<vdtree::LightBounds>(*vdtree::LightBounds::measure(tree()))),
+          criterion(make()) {
         const double wanted = std::min(1e5, 0.5 * tree().triangle_count());
         Cut cut(tree());
         double low = -20, high = 20; // log2 of the threshold
@@ -53,7 +54,8 @@ private:
 };
 
 const Subject& subject(TurningLight kind) {
-    static const Subject directional(TurningLight::directional), point(TurningLight::point), highlights(TurningLight::highlights);
+    static const Subject directional(TurningLight::directional), point(TurningLight::point),
+        highlights(TurningLight::highlights);
     return kind == TurningLight::directional ? directional : kind == TurningLight::point ? point : highlights;
 }
 
@@ -76,9 +78,24 @@ void moving_light(benchmark::State& state, TurningLight kind) {
     state.counters["tests"] = benchmark::Counter(tests, benchmark::Counter::kAvgIterations);
     state.counters["triangles"] = triangles;
 }
-BENCHMARK_CAPTURE(moving_light, directional, TurningLight::directional)->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
-BENCHMARK_CAPTURE(moving_light, point, TurningLight::point)->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
-BENCHMARK_CAPTURE(moving_light, highlights, TurningLight::highlights)->ArgName("tenth_degrees")->Arg(1)->Arg(10)->Arg(50)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(moving_light, directional, TurningLight::directional)
+    ->ArgName("tenth_degrees")
+    ->Arg(1)
+    ->Arg(10)
+    ->Arg(50)
+    ->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(moving_light, point, TurningLight::point)
+    ->ArgName("tenth_degrees")
+    ->Arg(1)
+    ->Arg(10)
+    ->Arg(50)
+    ->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(moving_light, highlights, TurningLight::highlights)
+    ->ArgName("tenth_degrees")
+    ->Arg(1)
+    ->Arg(10)
+    ->Arg(50)
+    ->Unit(benchmark::kMicrosecond);
 
 void light_bounds(benchmark::State& state) {
     for (auto _ : state) benchmark::DoNotOptimize(vdtree::LightBounds::measure(tree()));

@@ -34,8 +34,9 @@ std::size_t wanted_triangles() { return mesh().triangles.size() / one_in; }
 
 void report(benchmark::State& state, std::size_t left) {
     state.counters["triangles"] = static_cast<double>(left);
-    state.counters["input/s"] = benchmark::Counter(
-        static_cast<double>(mesh().triangles.size()) * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
+    state.counters["input/s"] =
+        benchmark::Counter(static_cast<double>(mesh().triangles.size()) * static_cast<double>(state.iterations()),
+                           benchmark::Counter::kIsRate);
 }
 
 void to_a_tenth_unseen(benchmark::State& state) {
@@ -62,8 +63,8 @@ void to_a_tenth_meshoptimizer(benchmark::State& state, bool sloppy) {
     const std::size_t wanted = 3 * wanted_triangles();
     std::size_t left = 0;
     for (auto _ : state) {
-        left = sloppy ? meshopt_simplifySloppy(out.data(), indices.data(), indices.size(), &positions[0].x, positions.size(),
-                                               sizeof(glm::vec3), wanted, 1.0f)
+        left = sloppy ? meshopt_simplifySloppy(out.data(), indices.data(), indices.size(), &positions[0].x,
+                                               positions.size(), sizeof(glm::vec3), wanted, 1.0f)
                       : meshopt_simplify(out.data(), indices.data(), indices.size(), &positions[0].x, positions.size(),
                                          sizeof(glm::vec3), wanted, 1.0f);
         benchmark::DoNotOptimize(out.data());
@@ -88,7 +89,8 @@ void to_a_tenth_openmesh(benchmark::State& state) {
         HalfedgeMesh half;
         std::vector<HalfedgeMesh::VertexHandle> vertices;
         for (const glm::dvec3& p : mesh().positions) vertices.push_back(half.add_vertex({p.x, p.y, p.z}));
-        for (const vdtree::Triangle& t : mesh().triangles) half.add_face(vertices[t[0]], vertices[t[1]], vertices[t[2]]);
+        for (const vdtree::Triangle& t : mesh().triangles)
+            half.add_face(vertices[t[0]], vertices[t[1]], vertices[t[2]]);
         state.ResumeTiming();
         OpenMesh::Decimater::DecimaterT<HalfedgeMesh> decimater(half);
         OpenMesh::Decimater::ModQuadricT<HalfedgeMesh>::Handle quadric;
@@ -114,7 +116,8 @@ void to_a_tenth_cgal(benchmark::State& state) {
         SurfaceMesh surface;
         std::vector<SurfaceMesh::Vertex_index> vertices;
         for (const glm::dvec3& p : mesh().positions) vertices.push_back(surface.add_vertex({p.x, p.y, p.z}));
-        for (const vdtree::Triangle& t : mesh().triangles) surface.add_face(vertices[t[0]], vertices[t[1]], vertices[t[2]]);
+        for (const vdtree::Triangle& t : mesh().triangles)
+            surface.add_face(vertices[t[0]], vertices[t[1]], vertices[t[2]]);
         state.ResumeTiming();
         // Of the edges, which go as the triangles do.
         sms::edge_collapse(surface, sms::Count_ratio_stop_predicate<SurfaceMesh>(1.0 / one_in));

@@ -18,23 +18,28 @@ class DisplayFit : public ProfileFiles {};
 TEST_F(DisplayFit, MatchesGiveTheGamma) {
     for (const double gamma : {1.8, 2.2, 2.6}) {
         std::vector<BrightnessMatch> matches;
-        for (const double white : {0.25, 0.5, 0.75}) matches.push_back({white, std::round(255 * std::pow(white, 1 / gamma)) / 255});
+        for (const double white : {0.25, 0.5, 0.75})
+            matches.push_back({white, std::round(255 * std::pow(white, 1 / gamma)) / 255});
         const auto fitted = fit_gamma(matches);
         ASSERT_TRUE(fitted) << fitted.error().message;
         EXPECT_NEAR(*fitted, gamma, 0.02); // codes are whole
     }
     EXPECT_FALSE(fit_gamma({}));
-    for (const BrightnessMatch bad : {BrightnessMatch{0, 0.5}, {0.5, 1}, {0.5, 0}, {0.5, std::nan("")}, {0.5, 0.99}, {0.5, 0.1}})
+    for (const BrightnessMatch bad :
+         {BrightnessMatch{0, 0.5}, {0.5, 1}, {0.5, 0}, {0.5, std::nan("")}, {0.5, 0.99}, {0.5, 0.1}})
         EXPECT_FALSE(fit_gamma(std::vector{bad})) << bad.white << " " << bad.code;
 }
 
 TEST_F(DisplayFit, APhotometersTableBecomesTheDisplay) {
     std::string text = "# dark room\ncode,cdm2\n";
     const auto luminance = [](double code) { return 0.3 + 179.7 * std::pow(code, 2.3); };
-    for (int code = 0; code <= 255; code += 15) text += std::to_string(code) + "," + std::to_string(luminance(code / 255.0)) + "\n";
+    for (int code = 0; code <= 255; code += 15)
+        text += std::to_string(code) + "," + std::to_string(luminance(code / 255.0)) + "\n";
     const auto table = read_photometer(write(text, "p.csv"));
     ASSERT_TRUE(table) << table.error().message;
-    const auto from_spreadsheet = read_photometer(write("\xef\xbb\xbf" "code,cdm2\r\n0,0.5\r\n128,20\r\n255,80\r\n", "bom.csv"));
+    const auto from_spreadsheet = read_photometer(write("\xef\xbb\xbf"
+                                                        "code,cdm2\r\n0,0.5\r\n128,20\r\n255,80\r\n",
+                                                        "bom.csv"));
     ASSERT_TRUE(from_spreadsheet) << from_spreadsheet.error().message;
     EXPECT_EQ(from_spreadsheet->luminance, std::vector<double>({0.5, 20, 80}));
     const auto display = with_photometer(perception::Display(), *table);

@@ -208,8 +208,20 @@ TEST_F(DisplayProfile, ErrorsNameTheFileAndTheKey) {
 
 TEST_F(DisplayProfile, RefusesWhatIsNoProfile) {
     const std::string deep(200000, '[');
-    const std::string texts[] = {"", " ", "{", "[]", "7", "\"text\"", "null", "\xff\xfe", "{}{}", minimal + "x", deep,
-                                 std::string(3, '\0'), "{\"name\": \"\xc3\x28\"}", "{\"a\":" + deep};
+    const std::string texts[] = {"",
+                                 " ",
+                                 "{",
+                                 "[]",
+                                 "7",
+                                 "\"text\"",
+                                 "null",
+                                 "\xff\xfe",
+                                 "{}{}",
+                                 minimal + "x",
+                                 deep,
+                                 std::string(3, '\0'),
+                                 "{\"name\": \"\xc3\x28\"}",
+                                 "{\"a\":" + deep};
     for (const std::string& text : texts) {
         const auto display = read_display(write(text));
         ASSERT_FALSE(display);

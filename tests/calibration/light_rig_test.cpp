@@ -31,7 +31,9 @@ protected:
         const auto rig = LightRig::read(write(text, "lights.json"));
         return rig ? std::string() : rig.error().message;
     }
-    static void expect_near(glm::dvec3 a, glm::dvec3 b) { EXPECT_LT(glm::length(a - b), 1e-6) << a.x << " " << a.y << " " << a.z; }
+    static void expect_near(glm::dvec3 a, glm::dvec3 b) {
+        EXPECT_LT(glm::length(a - b), 1e-6) << a.x << " " << a.y << " " << a.z;
+    }
 
     vdtree::VertexTree tree_;
     vdtree::View view_{.eye = {0, 0, 8}};
@@ -77,31 +79,34 @@ TEST_F(LightRigTest, NamesTheFileAndTheKeyOfWhatIsWrong) {
     struct Case {
         std::string text, key;
     };
-    for (const Case& bad : {Case{with("[0, 0, 2]", "[0, 0, 0]"), "lights[0].direction"},
-                            Case{with("[0, 0, 2]", "[0, 0]"), "lights[0].direction"},
-                            Case{with("[0, 0, 2]", "[0, 0, 1e999]"), ""},
-                            Case{with("\"intensity\": 0.7", "\"intensity\": -1"), "lights[0].intensity"},
-                            Case{with("\"intensity\": 0.7", "\"intensity\": \"much\""), "lights[0].intensity"},
-                            Case{with("\"intensity\": 0.7", "\"intensity\": 1e300"), "lights[0].intensity"},
-                            Case{with("\"distance\": 3,", "\"distance\": 1e300,"), "lights[1].distance"},
-                            Case{with("[0, 4, 0]", "[0, 1e300, 0]"), "lights[1].keyframes[1].position"},
-                            Case{with("\"intensity\": 0.7, ", ""), "lights[0].intensity"},
-                            Case{with("\"intensity\": 0.7", "\"intensty\": 0.7"), "lights[0].intensty"},
-                            Case{with("\"type\": \"spot\"", "\"type\": \"lava\""), "lights[2].type"},
-                            Case{with("\"distance\": 3,", "\"distance\": 0,"), "lights[1].distance"},
-                            Case{with("\"inner_degrees\": 20", "\"inner_degrees\": 35"), "lights[2].inner_degrees"},
-                            Case{with("\"axis\": [0, 1, 0]", "\"axis\": [0, 0, 0]"), "lights[0].orbit.axis"},
-                            Case{with("\"time_s\": 2", "\"time_s\": 0"), "lights[1].keyframes[1].time_s"},
-                            Case{with("\"position\": [0, 4, 0], \"intensity\": 1}", "\"position\": [0, 4, 0]}"), "lights[1].keyframes[1].intensity"},
-                            Case{with("\"ambient\": 0.1", "\"ambient\": 1.5"), "ambient"},
-                            Case{with("\"shininess\": 40", "\"shininess\": 0"), "material.shininess"},
-                            Case{with("\"specular\": 0.05, ", ""), "material.specular"},
-                            Case{"{\"ambient\": 1}", "lights"},
-                            Case{"[1]", "must hold a JSON object"},
-                            Case{"{\"lights\": []}", "black"},
-                            Case{"{\"lights\": [{\"type\": \"headlight\", \"intensity\": 0}]}", "black"},
-                            Case{R"({"lights": [{"type": "directional", "direction": [0, 0, 1], "intensity": 1, "keyframes": [
-                                     {"time_s": 0, "intensity": 0}, {"time_s": 1, "intensity": 0}]}]})", "black"}}) {
+    for (const Case& bad :
+         {Case{with("[0, 0, 2]", "[0, 0, 0]"), "lights[0].direction"},
+          Case{with("[0, 0, 2]", "[0, 0]"), "lights[0].direction"},
+          Case{with("[0, 0, 2]", "[0, 0, 1e999]"), ""},
+          Case{with("\"intensity\": 0.7", "\"intensity\": -1"), "lights[0].intensity"},
+          Case{with("\"intensity\": 0.7", "\"intensity\": \"much\""), "lights[0].intensity"},
+          Case{with("\"intensity\": 0.7", "\"intensity\": 1e300"), "lights[0].intensity"},
+          Case{with("\"distance\": 3,", "\"distance\": 1e300,"), "lights[1].distance"},
+          Case{with("[0, 4, 0]", "[0, 1e300, 0]"), "lights[1].keyframes[1].position"},
+          Case{with("\"intensity\": 0.7, ", ""), "lights[0].intensity"},
+          Case{with("\"intensity\": 0.7", "\"intensty\": 0.7"), "lights[0].intensty"},
+          Case{with("\"type\": \"spot\"", "\"type\": \"lava\""), "lights[2].type"},
+          Case{with("\"distance\": 3,", "\"distance\": 0,"), "lights[1].distance"},
+          Case{with("\"inner_degrees\": 20", "\"inner_degrees\": 35"), "lights[2].inner_degrees"},
+          Case{with("\"axis\": [0, 1, 0]", "\"axis\": [0, 0, 0]"), "lights[0].orbit.axis"},
+          Case{with("\"time_s\": 2", "\"time_s\": 0"), "lights[1].keyframes[1].time_s"},
+          Case{with("\"position\": [0, 4, 0], \"intensity\": 1}", "\"position\": [0, 4, 0]}"),
+               "lights[1].keyframes[1].intensity"},
+          Case{with("\"ambient\": 0.1", "\"ambient\": 1.5"), "ambient"},
+          Case{with("\"shininess\": 40", "\"shininess\": 0"), "material.shininess"},
+          Case{with("\"specular\": 0.05, ", ""), "material.specular"},
+          Case{"{\"ambient\": 1}", "lights"},
+          Case{"[1]", "must hold a JSON object"},
+          Case{"{\"lights\": []}", "black"},
+          Case{"{\"lights\": [{\"type\": \"headlight\", \"intensity\": 0}]}", "black"},
+          Case{R"({"lights": [{"type": "directional", "direction": [0, 0, 1], "intensity": 1, "keyframes": [
+                                     {"time_s": 0, "intensity": 0}, {"time_s": 1, "intensity": 0}]}]})",
+               "black"}}) {
         const std::string found = complaint(bad.text);
         EXPECT_NE(found.find("lights.json"), std::string::npos) << bad.text;
         EXPECT_NE(found.find(bad.key), std::string::npos) << found;

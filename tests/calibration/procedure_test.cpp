@@ -74,7 +74,8 @@ TEST_F(ProcedureTest, ThePlanFitsTheDisplay) {
     // A headset's patches are drawn as a flat picture and seen through a lens: the coarser of both counts.
     perception::Display headset = display;
     headset.lens = {{0, 40}, {50, 20}};
-    for (const GratingPlace& place : plan_for(headset, CsfTable::standard()).places) EXPECT_GE(20 / place.frequency_cpd, pixels_per_cycle - 0.01);
+    for (const GratingPlace& place : plan_for(headset, CsfTable::standard()).places)
+        EXPECT_GE(20 / place.frequency_cpd, pixels_per_cycle - 0.01);
     perception::Display small = display;
     small.width_px = small.height_px = 200; // 5.8 degrees
     for (const GratingPlace& place : plan_for(small, CsfTable::standard()).places) {
@@ -85,7 +86,8 @@ TEST_F(ProcedureTest, ThePlanFitsTheDisplay) {
 
 // Some near the expected castleCSF, some of other gains, scales, slopes and lapse rates; and of other shapes: Barten's models fall faster towards
 // coarse gratings, Daly's declines aside by another law.
-constexpr const char* other_shapes[] = {"barten-1999:gain=0.5,frequency=0.8", "barten-2004", "daly:gain=0.6", "daly:frequency=1.3,slope=3"};
+constexpr const char* other_shapes[] = {"barten-1999:gain=0.5,frequency=0.8", "barten-2004", "daly:gain=0.6",
+                                        "daly:frequency=1.3,slope=3"};
 constexpr const char* observers[] = {"castle",
                                      "stela:gain=0.7",
                                      "castle:gain=1.6,frequency=1.3,eccentricity=0.7",
@@ -109,7 +111,8 @@ TEST_F(ProcedureTest, FindsTheSensitivityOfSimulatedObservers) {
             Procedure procedure = begin(plan);
             const SimulatedObserver observer = observer_of(description, 100 + seed);
             while (!procedure.is_done()) {
-                if (procedure.answers().size() == 200) mean_at_200 += rms_error_db(procedure, observer) / (runs * std::size(observers));
+                if (procedure.answers().size() == 200)
+                    mean_at_200 += rms_error_db(procedure, observer) / (runs * std::size(observers));
                 answer(procedure, observer);
             }
             EXPECT_LT(rms_error_db(procedure, observer), 1.5) << description << ", seed " << seed;
@@ -129,7 +132,8 @@ TEST_F(ProcedureTest, AdjustmentFindsItToo) {
             const Trial trial = procedure.next();
             ascending += trial.is_ascending;
             const double threshold = std::pow(10, -procedure.estimates()[trial.place].log10_sensitivity.mean);
-            EXPECT_EQ(trial.contrast < threshold, trial.is_ascending || threshold > plan.highest_contrast) << trial.number;
+            EXPECT_EQ(trial.contrast < threshold, trial.is_ascending || threshold > plan.highest_contrast)
+                << trial.number;
             answer(procedure, observer);
         }
         EXPECT_NEAR(ascending, procedure.trials() / 2, static_cast<double>(plan.places.size()));
@@ -170,7 +174,8 @@ CalibrationPlan one_place(Method method, int settings = 7) {
 // Settings below the lowest contrast count as it; that they all agree makes no place infinitely certain.
 TEST_F(ProcedureTest, ABeliefIsAtLeastAsWideAsTheGrid) {
     const CalibrationPlan plan = one_place(Method::adjustment, 300);
-    for (const double setting : {7.6e-5, 1e-3, 0.031}) { // the first below the lowest contrast, the others off and on the grid
+    for (const double setting :
+         {7.6e-5, 1e-3, 0.031}) { // the first below the lowest contrast, the others off and on the grid
         Procedure procedure = begin(plan);
         while (!procedure.is_done()) procedure.set(setting);
         const PlaceEstimate e = procedure.estimates().front();
@@ -182,7 +187,8 @@ TEST_F(ProcedureTest, ABeliefIsAtLeastAsWideAsTheGrid) {
         EXPECT_GE(procedure.answers().back().log10_contrast, lowest_log10_contrast);
         const auto table = procedure.table("agreed");
         ASSERT_TRUE(table) << table.error().message;
-        EXPECT_NEAR(std::log10(table->sensitivity(CyclesPerDegree(2), Degrees(0), plan.luminance)), e.log10_sensitivity.mean, half_a_step);
+        EXPECT_NEAR(std::log10(table->sensitivity(CyclesPerDegree(2), Degrees(0), plan.luminance)),
+                    e.log10_sensitivity.mean, half_a_step);
     }
 }
 
@@ -200,7 +206,8 @@ TEST_F(ProcedureTest, WhatIsFarFromVisibleIsNotPutAtTheGridsEnd) {
         for (const PlaceEstimate& e : procedure.estimates()) {
             const double truth = observer.sensitivity(e.place, plan.luminance);
             if (truth < 0.01) {
-                EXPECT_LT(e.sensitivity(), 0.3) << e.place.frequency_cpd << " cpd " << e.place.eccentricity_deg << " deg";
+                EXPECT_LT(e.sensitivity(), 0.3)
+                    << e.place.frequency_cpd << " cpd " << e.place.eccentricity_deg << " deg";
             }
         }
         EXPECT_LT(rms_error_db(procedure, observer), 1.2);
@@ -259,7 +266,9 @@ TEST_F(ProcedureTest, WhatDoesNotFitTheShapeComesThrough) {
     plan.trials = 400;
     Procedure procedure = begin(plan);
     const SimulatedObserver observer = observer_of("castle", 5);
-    const auto notch = [](const GratingPlace& place) { return std::pow(0.5, std::exp(-std::pow(std::log2(place.frequency_cpd / 2), 2))); };
+    const auto notch = [](const GratingPlace& place) {
+        return std::pow(0.5, std::exp(-std::pow(std::log2(place.frequency_cpd / 2), 2)));
+    };
     while (!procedure.is_done()) {
         const Trial trial = procedure.next();
         Trial seen = trial;
@@ -268,7 +277,8 @@ TEST_F(ProcedureTest, WhatDoesNotFitTheShapeComesThrough) {
     }
     double squares = 0;
     for (const PlaceEstimate& e : procedure.estimates()) {
-        const double error_db = 20 * std::log10(e.sensitivity() / (observer.sensitivity(e.place, plan.luminance) * notch(e.place)));
+        const double error_db =
+            20 * std::log10(e.sensitivity() / (observer.sensitivity(e.place, plan.luminance) * notch(e.place)));
         squares += error_db * error_db / static_cast<double>(plan.places.size());
         EXPECT_GE(e.answers, 4);
         if (e.place == GratingPlace{2, 0}) {
@@ -288,14 +298,16 @@ TEST_F(ProcedureTest, TheTableAgreesWithTheEstimates) {
     EXPECT_EQ(table.samples().source, "me");
     constexpr double between_samples = 0.01; // of a quarter octave, a few degrees, a quarter of a decade
     for (const PlaceEstimate& e : procedure.estimates()) {
-        const double value = table.sensitivity(CyclesPerDegree(e.place.frequency_cpd), Degrees(e.place.eccentricity_deg),
-                                               procedure.plan().luminance);
-        EXPECT_NEAR(value / e.sensitivity(), 1, between_samples) << e.place.frequency_cpd << " " << e.place.eccentricity_deg;
+        const double value = table.sensitivity(CyclesPerDegree(e.place.frequency_cpd),
+                                               Degrees(e.place.eccentricity_deg), procedure.plan().luminance);
+        EXPECT_NEAR(value / e.sensitivity(), 1, between_samples)
+            << e.place.frequency_cpd << " " << e.place.eccentricity_deg;
     }
     // Without any answers it is the expected one.
     const CsfTable blank = *begin(default_plan()).table("");
     EXPECT_NEAR(blank.sensitivity(CyclesPerDegree(4), Degrees(10), Luminance(10)) /
-                    CsfTable::standard().sensitivity(CyclesPerDegree(4), Degrees(10), Luminance(10)), 1, between_samples);
+                    CsfTable::standard().sensitivity(CyclesPerDegree(4), Degrees(10), Luminance(10)),
+                1, between_samples);
 }
 
 TEST_F(ProcedureTest, RunsRepeatAndResume) {
@@ -349,10 +361,14 @@ TEST_F(ProcedureTest, RefusesPlansThatAreNone) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     EXPECT_THAT(error_of([](CalibrationPlan& p) { p.places.clear(); }), HasSubstr("places"));
     EXPECT_THAT(error_of([](CalibrationPlan& p) { p.places[1] = p.places[0]; }), HasSubstr("places[1] is there twice"));
-    EXPECT_THAT(error_of([=](CalibrationPlan& p) { p.places[2].frequency_cpd = nan; }), HasSubstr("places[2]: the frequency"));
-    EXPECT_THAT(error_of([](CalibrationPlan& p) { p.places[2].eccentricity_deg = -1; }), HasSubstr("places[2]: the eccentricity"));
-    EXPECT_THAT(error_of([](CalibrationPlan& p) { p.places[2].frequency_cpd = 65; }), HasSubstr("places[2]: the frequency"));
-    EXPECT_THAT(error_of([](CalibrationPlan& p) { p.places[2].eccentricity_deg = 91; }), HasSubstr("places[2]: the eccentricity"));
+    EXPECT_THAT(error_of([=](CalibrationPlan& p) { p.places[2].frequency_cpd = nan; }),
+                HasSubstr("places[2]: the frequency"));
+    EXPECT_THAT(error_of([](CalibrationPlan& p) { p.places[2].eccentricity_deg = -1; }),
+                HasSubstr("places[2]: the eccentricity"));
+    EXPECT_THAT(error_of([](CalibrationPlan& p) { p.places[2].frequency_cpd = 65; }),
+                HasSubstr("places[2]: the frequency"));
+    EXPECT_THAT(error_of([](CalibrationPlan& p) { p.places[2].eccentricity_deg = 91; }),
+                HasSubstr("places[2]: the eccentricity"));
     EXPECT_THAT(error_of([](CalibrationPlan& p) { p.seed = (std::uint64_t{1} << 53) + 1; }), HasSubstr("seed"));
     EXPECT_THAT(error_of([](CalibrationPlan& p) { p.luminance = Luminance(2e6); }), HasSubstr("luminance"));
     EXPECT_THAT(error_of([](CalibrationPlan& p) { p.trials = 0; }), HasSubstr("trials"));
@@ -374,16 +390,17 @@ TEST_F(ProcedureTest, BadStatesNameTheFileAndThePlace) {
         const char *from, *to, *expected;
     };
     const BadCase cases[] = {{"unseen-calibration", "unseen-csf", "\"format\""},
-                          {"\"version\": 1", "\"version\": 2", "version"},
-                          {"\"2ifc\"", "\"3ifc\"", "\"method\" must be"},
-                          {"\"seed\": 1", "\"seed\": -1", "seed"},
-                          {"\"trials\": 5", "\"trials\": 2", "\"answers\" has more"},
-                          {"\"places\": [[", "\"places\": [[1], [", "places[0]"},
-                          {"\"places\": [[0.5", "\"places\": [[0", "places[0]: the frequency"},
-                          {"\"answers\": [\n[", "\"answers\": [\n[99", "\"answers[0]\" has no place"},
-                          {"\"luminance_cdm2\": ", "\"luminance_cdm2\": -", "luminance_cdm2"}};
+                             {"\"version\": 1", "\"version\": 2", "version"},
+                             {"\"2ifc\"", "\"3ifc\"", "\"method\" must be"},
+                             {"\"seed\": 1", "\"seed\": -1", "seed"},
+                             {"\"trials\": 5", "\"trials\": 2", "\"answers\" has more"},
+                             {"\"places\": [[", "\"places\": [[1], [", "places[0]"},
+                             {"\"places\": [[0.5", "\"places\": [[0", "places[0]: the frequency"},
+                             {"\"answers\": [\n[", "\"answers\": [\n[99", "\"answers[0]\" has no place"},
+                             {"\"luminance_cdm2\": ", "\"luminance_cdm2\": -", "luminance_cdm2"}};
     for (const BadCase& bad : cases) {
-        const auto resumed = Procedure::resume(write(replaced(good, bad.from, bad.to), "bad.json"), CsfTable::standard());
+        const auto resumed =
+            Procedure::resume(write(replaced(good, bad.from, bad.to), "bad.json"), CsfTable::standard());
         ASSERT_FALSE(resumed) << bad.expected;
         EXPECT_THAT(resumed.error().message, AllOf(HasSubstr("bad.json"), HasSubstr(bad.expected)));
     }
@@ -398,9 +415,15 @@ TEST_F(ProcedureTest, BadStatesNameTheFileAndThePlace) {
 TEST_F(ProcedureTest, ObserversAreDescribedByNameAndKeys) {
     const SimulatedObserver plain = observer_of("castle", 1), dim = observer_of("castle:gain=0.7,frequency=0.5", 1);
     EXPECT_NEAR(dim.sensitivity({2, 0}, Luminance(50)), 0.7 * plain.sensitivity({4, 0}, Luminance(50)), 1e-9);
-    for (const auto& [text, expected] : {std::pair{"nobody", "neither"}, {"castle:gain", "none of"}, {"castle-red-green", "colour"}, {"castle:gain=0", "gain"},
-                                         {"castle:gain=nan", "gain"}, {"castle:gain=1x", "gain"}, {"castle:lapse=0.9", "lapse"},
-                                         {"castle:age=40", "'age=40' is none of"}, {"missing.json", "missing.json"}}) {
+    for (const auto& [text, expected] : {std::pair{"nobody", "neither"},
+                                         {"castle:gain", "none of"},
+                                         {"castle-red-green", "colour"},
+                                         {"castle:gain=0", "gain"},
+                                         {"castle:gain=nan", "gain"},
+                                         {"castle:gain=1x", "gain"},
+                                         {"castle:lapse=0.9", "lapse"},
+                                         {"castle:age=40", "'age=40' is none of"},
+                                         {"missing.json", "missing.json"}}) {
         const auto observer = simulated_observer(text, 1);
         ASSERT_FALSE(observer) << text;
         EXPECT_THAT(observer.error().message, HasSubstr(expected));

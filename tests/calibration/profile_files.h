@@ -18,8 +18,7 @@ namespace unseen::calibration {
 class ProfileFiles : public testing::Test {
 protected:
     ProfileFiles()
-        : folder_(std::filesystem::path(testing::TempDir()) /
-                  ("unseen-profile-" + std::to_string(::getpid()))) {
+        : folder_(std::filesystem::path(testing::TempDir()) / ("unseen-profile-" + std::to_string(::getpid()))) {
         std::filesystem::remove_all(folder_);
         std::filesystem::create_directories(folder_);
     }

@@ -25,8 +25,9 @@ TEST(Psychometric, FollowsTheReference) {
     struct Row {
         double x, p;
     };
-    const Row rows[] = {{-1, 0.500156508},   {-0.7, 0.501753214}, {-0.5, 0.508724679}, {-0.3, 0.542208086}, {-0.2, 0.589536227},
-                        {-0.1, 0.678325583}, {0, 0.812899677},    {0.1, 0.942235605},  {0.2, 0.99170408},   {0.5, 0.995}};
+    const Row rows[] = {{-1, 0.500156508},   {-0.7, 0.501753214}, {-0.5, 0.508724679}, {-0.3, 0.542208086},
+                        {-0.2, 0.589536227}, {-0.1, 0.678325583}, {0, 0.812899677},    {0.1, 0.942235605},
+                        {0.2, 0.99170408},   {0.5, 0.995}};
     for (const Row& row : rows) EXPECT_NEAR(unshifted(row.x), row.p, 1e-9) << row.x;
     EXPECT_NEAR(Psychometric().shift(), reference_shift, 5e-6);
 }
@@ -38,8 +39,9 @@ TEST(Psychometric, TheThresholdIsWhereItSaysForEverySlope) {
 
 TEST(Psychometric, RefusesWhatIsNone) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
-    const Psychometric bad[] = {{.slope = 0}, {.slope = nan}, {.lapse = 1}, {.lapse = nan}, {.guess = -0.1}, {.at_threshold = 0.5},
-                                {.at_threshold = 0.999}, {.at_threshold = nan}};
+    const Psychometric bad[] = {
+        {.slope = 0},          {.slope = nan},          {.lapse = 1},         {.lapse = nan}, {.guess = -0.1},
+        {.at_threshold = 0.5}, {.at_threshold = 0.999}, {.at_threshold = nan}};
     for (const Psychometric& f : bad) EXPECT_FALSE(validate(f)) << f.slope << f.lapse << f.guess << f.at_threshold;
     EXPECT_TRUE(validate(Psychometric()));
 }
@@ -61,12 +63,13 @@ TEST(QuestPlus, PosteriorsFollowTheReferenceTrace) {
         bool is_right;
         double mean, deviation, mode;
     };
-    const Row rows[] = {{-1, true, -1.2469275, 0.913353054, -1.18},     {-1.2, true, -1.46704839, 0.850136725, -1.36},
-                        {-1.5, false, -0.781722084, 0.65568675, -1.26}, {-1.3, true, -0.909132036, 0.63681189, -1.32},
-                        {-1.4, true, -1.01841223, 0.615875876, -1.37},  {-1.6, false, -0.932582993, 0.602396681, -1.35},
-                        {-1.45, true, -1.01468251, 0.576894024, -1.38}, {-1.5, true, -1.08535286, 0.549662993, -1.41},
-                        {-1.55, false, -0.998869746, 0.575249714, -1.37}, {-1.5, true, -1.06348899, 0.549910952, -1.4},
-                        {-1.52, false, -0.972329696, 0.578733191, -1.36}, {-1.48, true, -1.03741959, 0.553571819, -1.38}};
+    const Row rows[] = {
+        {-1, true, -1.2469275, 0.913353054, -1.18},       {-1.2, true, -1.46704839, 0.850136725, -1.36},
+        {-1.5, false, -0.781722084, 0.65568675, -1.26},   {-1.3, true, -0.909132036, 0.63681189, -1.32},
+        {-1.4, true, -1.01841223, 0.615875876, -1.37},    {-1.6, false, -0.932582993, 0.602396681, -1.35},
+        {-1.45, true, -1.01468251, 0.576894024, -1.38},   {-1.5, true, -1.08535286, 0.549662993, -1.41},
+        {-1.55, false, -0.998869746, 0.575249714, -1.37}, {-1.5, true, -1.06348899, 0.549910952, -1.4},
+        {-1.52, false, -0.972329696, 0.578733191, -1.36}, {-1.48, true, -1.03741959, 0.553571819, -1.38}};
     for (const Row& row : rows) {
         quest->update(row.contrast + (reference_shift - Psychometric().shift()), row.is_right);
         const QuestPlus::Belief belief = quest->log10_threshold();
@@ -85,8 +88,11 @@ TEST(QuestPlus, TheNextStimulusLeavesTheLeastExpectedVariance) {
     for (int i = 0; i <= 20; ++i) grid.log10_contrast.push_back(-3 + 0.1 * i);
     auto quest = QuestPlus::create(grid);
     ASSERT_TRUE(quest);
-    const auto variance = [](const QuestPlus& q) { return q.log10_threshold().deviation * q.log10_threshold().deviation; };
-    const std::pair<double, bool> answers[] = {{-1.5, true}, {-2, true}, {-2.5, false}, {-2.2, true}, {-2.4, false}, {-1.9, true}};
+    const auto variance = [](const QuestPlus& q) {
+        return q.log10_threshold().deviation * q.log10_threshold().deviation;
+    };
+    const std::pair<double, bool> answers[] = {{-1.5, true}, {-2, true},    {-2.5, false},
+                                               {-2.2, true}, {-2.4, false}, {-1.9, true}};
     for (const auto& [contrast, is_right] : answers) {
         const auto choice = quest->next();
         const double now = variance(*quest);
@@ -97,7 +103,8 @@ TEST(QuestPlus, TheNextStimulusLeavesTheLeastExpectedVariance) {
             for (const double lapse : grid.lapse)
                 for (const double slope : grid.slope)
                     for (const double threshold : grid.log10_threshold)
-                        right += quest->posterior()[i++] * Psychometric{slope, lapse, 0.5, 0.82}.probability(stimulus - threshold);
+                        right += quest->posterior()[i++] *
+                                 Psychometric{slope, lapse, 0.5, 0.82}.probability(stimulus - threshold);
             double expected = 0;
             for (const bool answer : {true, false}) {
                 QuestPlus after = *quest;
@@ -121,7 +128,8 @@ TEST(QuestPlus, RefusesGridsThatAreNone) {
         return made ? std::string("none") : made.error().message;
     };
     EXPECT_THAT(error_of([](QuestGrid& g) { g.slope.clear(); }), HasSubstr("slope has no values"));
-    EXPECT_THAT(error_of([](QuestGrid& g) { g.log10_threshold[3] = g.log10_threshold[2]; }), HasSubstr("log10_threshold[3]"));
+    EXPECT_THAT(error_of([](QuestGrid& g) { g.log10_threshold[3] = g.log10_threshold[2]; }),
+                HasSubstr("log10_threshold[3]"));
     EXPECT_THAT(error_of([](QuestGrid& g) { g.log10_contrast[0] = std::nan(""); }), HasSubstr("log10_contrast[0]"));
     EXPECT_THAT(error_of([](QuestGrid& g) { g.lapse = {1}; }), HasSubstr("lapse"));
     EXPECT_THAT(error_of([](QuestGrid& g) { g.at_threshold = 0.4; }), HasSubstr("threshold"));

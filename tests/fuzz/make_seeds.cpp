@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <string>
 
-#include <vdtree/builder.h>
 #include <meshio/mesh_io.h>
+#include <vdtree/builder.h>
 #include <vdtree/tree_io.h>
 
 #include "built.h"
@@ -44,25 +44,33 @@ void make_meshes(const fs::path& folder) {
         write_for_reader(folder / ("mesh" + std::string(ending)), reader, plain);
         fs::remove(plain);
     }
-    const std::string text_ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
+    const std::string text_ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float "
+                                 "y\nproperty float z\nelement face 1\n"
                                  "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
     write(folder / "text.ply", std::string(1, '\0') + text_ply);
     write(folder / "mesh.off", "\2OFF\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n3 0 1 2\n3 1 3 2\n");
-    write(folder / "mesh.stl", "\3solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid s\n");
-    write(folder / "mesh.gltf", "\4{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":36,\"uri\":\"data:application/octet-stream;base64,"
-                                "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":36}],"
-                                "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}],"
-                                "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],\"nodes\":[{\"mesh\":0}],\"scenes\":[{\"nodes\":[0]}]}");
+    write(folder / "mesh.stl", "\3solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 "
+                               "0\nendloop\nendfacet\nendsolid s\n");
+    write(folder / "mesh.gltf",
+          "\4{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":36,\"uri\":\"data:application/"
+          "octet-stream;base64,"
+          "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":36}],"
+          "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}],"
+          "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],\"nodes\":[{\"mesh\":0}],\"scenes\":[{"
+          "\"nodes\":[0]}]}");
 }
 
 void make_trees(const fs::path& folder) {
-    const std::pair<const char*, Mesh> meshes[] = {{"ball", shapes::bumpy_sphere(1)}, {"open", shapes::grid(4)}, {"triangle", shapes::single_triangle()},
+    const std::pair<const char*, Mesh> meshes[] = {{"ball", shapes::bumpy_sphere(1)},
+                                                   {"open", shapes::grid(4)},
+                                                   {"triangle", shapes::single_triangle()},
                                                    {"attributes", shapes::with_attributes(shapes::icosphere(1))}};
     for (const auto& [name, mesh] : meshes) {
         const auto tree = build_tree(mesh.view());
         if (!tree) throw std::runtime_error(tree.error().message);
         expect(write_tree(folder / (std::string(name) + ".vdt"), *tree));
-        const auto marked = tree->with_attribute("mark", AttributeDomain::interior_node, std::vector<float>(tree->interior_count(), 0.5f));
+        const auto marked = tree->with_attribute("mark", AttributeDomain::interior_node,
+                                                 std::vector<float>(tree->interior_count(), 0.5f));
         if (!marked) throw std::runtime_error(marked.error().message);
         expect(write_tree(folder / (std::string(name) + "_marked.vdt"), *marked));
     }

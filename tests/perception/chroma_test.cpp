@@ -109,11 +109,14 @@ int inner_triangles(const Cut& cut) {
 TEST(Chroma, IsNoneOfGreysAndThatOfTheConesOtherwise) {
     for (const double grey : {0.0, 0.1, 1.0}) EXPECT_LT(glm::length(opponent_chroma(glm::dvec3(grey))), 1e-15);
     // By way of XYZ and the cones, in their own terms.
-    const glm::dmat3 xyz_of_rgb = glm::transpose(glm::dmat3(0.41239, 0.35758, 0.18048, 0.21264, 0.71517, 0.07219, 0.01933, 0.11919, 0.95053));
-    const glm::dmat3 lms_of_xyz = glm::transpose(glm::dmat3(0.187596268556126, 0.585168649077728, -0.026384263306304, -0.133397430663221, 0.405505777260049,
-                                                            0.034502127690364, 0.000244379021663, -0.000542995890619, 0.019406849066323));
+    const glm::dmat3 xyz_of_rgb =
+        glm::transpose(glm::dmat3(0.41239, 0.35758, 0.18048, 0.21264, 0.71517, 0.07219, 0.01933, 0.11919, 0.95053));
+    const glm::dmat3 lms_of_xyz = glm::transpose(glm::dmat3(0.187596268556126, 0.585168649077728, -0.026384263306304,
+                                                            -0.133397430663221, 0.405505777260049, 0.034502127690364,
+                                                            0.000244379021663, -0.000542995890619, 0.019406849066323));
     const glm::dvec3 white = lms_of_xyz * (xyz_of_rgb * glm::dvec3(1));
-    for (const glm::dvec3 rgb : {glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1), glm::dvec3(0.3, 0.5, 0.1)}) {
+    for (const glm::dvec3 rgb :
+         {glm::dvec3(1, 0, 0), glm::dvec3(0, 1, 0), glm::dvec3(0, 0, 1), glm::dvec3(0.3, 0.5, 0.1)}) {
         const glm::dvec3 delta = lms_of_xyz * (xyz_of_rgb * rgb) - white * glm::dot(rgb, rec709);
         const OpponentContrast contrast = opponent_contrast(white, delta);
         const glm::dvec2 chroma = opponent_chroma(rgb);
@@ -156,7 +159,8 @@ TEST(Chroma, IsRefusedOfRingsBoundedWithoutIt) {
 
 // Rings hold their corners and proxies, and those of the nodes below.
 TEST(Chroma, OfRingsNests) {
-    const VertexTree tree = checkerboard([](bool is_one) { return is_one ? glm::vec4(0.6f, 0.2f, 0.1f, 1) : glm::vec4(0.1f, 0.2f, 0.9f, 1); });
+    const VertexTree tree = checkerboard(
+        [](bool is_one) { return is_one ? glm::vec4(0.6f, 0.2f, 0.1f, 1) : glm::vec4(0.1f, 0.2f, 0.9f, 1); });
     const auto sound = vdtree::SoundTree::of(tree);
     ASSERT_TRUE(sound);
     const auto rings = ring_chroma(tree);
@@ -173,9 +177,11 @@ TEST(Chroma, OfRingsNests) {
         for (const Index corner : t) {
             const NodeId leaf = tree.interior_count() + corner;
             const glm::dvec3 rgb(tree.colours()[leaf]);
-            const glm::vec2 chroma(opponent_chroma(rgb) * (static_cast<double>(tree.luminance()[leaf]) / glm::dot(rgb, rec709)));
+            const glm::vec2 chroma(opponent_chroma(rgb) *
+                                   (static_cast<double>(tree.luminance()[leaf]) / glm::dot(rgb, rec709)));
             for (const Index other : t)
-                EXPECT_TRUE(includes((*rings)[sound->parents()[tree.interior_count() + other]], chroma + 1e-6f, chroma - 1e-6f));
+                EXPECT_TRUE(includes((*rings)[sound->parents()[tree.interior_count() + other]], chroma + 1e-6f,
+                                     chroma - 1e-6f));
         }
     }
 }
@@ -183,25 +189,30 @@ TEST(Chroma, OfRingsNests) {
 TEST(Chroma, LetsGoWhatNobodySees) {
     const VertexTree tree = red_green_checkerboard(0.002);
     ASSERT_FALSE(ring_chroma(tree)->empty());
-    for (const bool safe : {false, true}) EXPECT_LT(inner_triangles(cut_of(tree, near, {safe, true})), 2 * 27 * 27 / 20);
+    for (const bool safe : {false, true})
+        EXPECT_LT(inner_triangles(cut_of(tree, near, {safe, true})), 2 * 27 * 27 / 20);
 }
 
 TEST(Chroma, FoldsNothingThatLuminanceKeeps) {
-    const VertexTree tree = checkerboard([](bool is_one) { return is_one ? glm::vec4(0.5f, 0.3f, 0.3f, 1) : glm::vec4(0.2f, 0.33f, 0.4f, 1); });
+    const VertexTree tree = checkerboard(
+        [](bool is_one) { return is_one ? glm::vec4(0.5f, 0.3f, 0.3f, 1) : glm::vec4(0.2f, 0.33f, 0.4f, 1); });
     for (const bool safe : {false, true}) {
         for (const double distance : {near / 4, near, 4 * near, 20 * near}) {
             const Cut grey = cut_of(tree, distance, {safe, false}), coloured = cut_of(tree, distance, {safe, true});
-            for (NodeId node = 0; node < tree.interior_count(); ++node) EXPECT_TRUE(coloured.is_unfolded(node) || !grey.is_unfolded(node));
+            for (NodeId node = 0; node < tree.interior_count(); ++node)
+                EXPECT_TRUE(coloured.is_unfolded(node) || !grey.is_unfolded(node));
         }
     }
 }
 
 TEST(Chroma, OfGreyMeshesCostsNothing) {
-    const VertexTree tree = checkerboard([](bool is_light) { return glm::vec4(glm::vec3(is_light ? 0.35f : 0.25f), 1); });
+    const VertexTree tree =
+        checkerboard([](bool is_light) { return glm::vec4(glm::vec3(is_light ? 0.35f : 0.25f), 1); });
     EXPECT_TRUE(ring_chroma(tree)->empty());
     for (const bool safe : {false, true}) {
         for (const bool gazes : {false, true}) {
-            const auto with = criterion_of(tree, view_from(near), {safe, true}, gazes), without = criterion_of(tree, view_from(near), {safe, false}, gazes);
+            const auto with = criterion_of(tree, view_from(near), {safe, true}, gazes),
+                       without = criterion_of(tree, view_from(near), {safe, false}, gazes);
             ASSERT_TRUE(with && without);
             EXPECT_EQ(with->parts().reach, without->parts().reach);
             EXPECT_EQ(with->parts().least_cost, without->parts().least_cost);
@@ -210,7 +221,8 @@ TEST(Chroma, OfGreyMeshesCostsNothing) {
 }
 
 TEST(Chroma, GrowsUpTheTreeWithAGazeToo) {
-    const VertexTree tree = checkerboard([](bool is_one) { return is_one ? glm::vec4(0.6f, 0.2f, 0.1f, 1) : glm::vec4(0.1f, 0.2f, 0.9f, 1); });
+    const VertexTree tree = checkerboard(
+        [](bool is_one) { return is_one ? glm::vec4(0.6f, 0.2f, 0.1f, 1) : glm::vec4(0.1f, 0.2f, 0.9f, 1); });
     for (const bool safe : {false, true}) {
         const auto criterion = criterion_of(tree, view_from(near), {safe, true}, true);
         ASSERT_TRUE(criterion);
@@ -221,7 +233,8 @@ TEST(Chroma, GrowsUpTheTreeWithAGazeToo) {
 // Colours are drawn at the luminance that the light gives them, and their chroma is that of what is drawn.
 TEST(Chroma, FollowsTheLight) {
     const VertexTree tree = red_green_checkerboard(0.3);
-    const VertexTree dim = *tree.relit({.direction = {0, 0, 1}, .ambient = 0.5f}), dark = *tree.relit({.direction = {0, 0, -1}, .ambient = 0.25f});
+    const VertexTree dim = *tree.relit({.direction = {0, 0, 1}, .ambient = 0.5f}),
+                     dark = *tree.relit({.direction = {0, 0, -1}, .ambient = 0.25f});
     ASSERT_TRUE(vdtree::verify(dark));
     const auto red = [](const VertexTree& t) { return (*ring_chroma(t))[0].hi.x; };
     EXPECT_NEAR(red(dim), red(tree), 1e-4f);

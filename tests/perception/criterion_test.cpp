@@ -10,14 +10,14 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include <meshio/mesh_io.h>
 #include <vdtree/builder.h>
 #include <vdtree/cut.h>
-#include <meshio/mesh_io.h>
 #include <vdtree/tree_io.h>
 
-#include "measured.h"
 #include "extra_meshes.h"
 #include "luebke_hallen_oracle.h"
+#include "measured.h"
 #include "sound.h"
 #include "temp_folder.h"
 #include "textures.h"
@@ -193,7 +193,8 @@ TEST_F(LuebkeHallen, ErrorsAreSeenUpToTheFinestPixels) {
         const vdtree::DistanceCriterion::Parts& parts = made->parts();
         std::vector<std::pair<float, float>> distances;
         for (NodeId n = 0; n < tree().interior_count(); ++n)
-            distances.emplace_back(parts.lengths[n] * parts.reach[parts.classes[n].interior], parts.silhouette_lengths[n] * parts.reach[parts.classes[n].silhouette]);
+            distances.emplace_back(parts.lengths[n] * parts.reach[parts.classes[n].interior],
+                                   parts.silhouette_lengths[n] * parts.reach[parts.classes[n].silhouette]);
         return distances;
     };
     const auto flat = seen_from({}), coarse = seen_from({{0, 8}, {50, 4}}), fine = seen_from({{0, 32}, {50, 4}});
@@ -217,7 +218,8 @@ TEST_F(LuebkeHallen, DistanceFormsRefuseWhatIsNoDisplayViewGazeOrScene) {
         FoldTestOptions options;
         options.display = display_;
         change(view, options);
-        return int(luebke_hallen_distances(measured, view, options).has_value()) + int(error_distances(measured, view, options).has_value()) +
+        return int(luebke_hallen_distances(measured, view, options).has_value()) +
+               int(error_distances(measured, view, options).has_value()) +
                int(luebke_hallen_safe_distances(measured, rings, view, options).has_value()) +
                int(lit_distances(measured, bounds, view, options).has_value());
     };
@@ -334,8 +336,8 @@ TEST(LuebkeHallenHoles, NodesBesideTheContourAreSilhouettes) {
             const auto s = tree.bounds()[parent].ring;
             const glm::dvec3 to_eye = eye - tree.origin() - glm::dvec3(s.centre);
             const double d = glm::length(to_eye);
-            EXPECT_EQ(facing(tree.bounds()[parent].slabs, tree.mask(parent), glm::vec3(to_eye / d), static_cast<float>(d),
-                             s.radius),
+            EXPECT_EQ(facing(tree.bounds()[parent].slabs, tree.mask(parent), glm::vec3(to_eye / d),
+                             static_cast<float>(d), s.radius),
                       vdtree::Facing::mixed);
             ++contour_rings;
         }
@@ -356,7 +358,8 @@ std::pair<int, int> survive_random_lies(const VertexTree& tree, std::uint64_t se
         support::TreeFile lying = support::TreeFile::parse(honest);
         for (std::uint64_t lie = 0; lie <= random() % 3; ++lie) {
             support::TreeFile::Section& s = lying.sections[random() % lying.sections.size()];
-            const std::uint32_t values[] = {0, 1, 0x7f800000, 0x7fc00000, 0x7f7fffff, 0x80000000, 0xffffffff, static_cast<std::uint32_t>(random())};
+            const std::uint32_t values[] = {0,          1,          0x7f800000, 0x7fc00000,
+                                            0x7f7fffff, 0x80000000, 0xffffffff, static_cast<std::uint32_t>(random())};
             if (s.data.size() >= 4) s.set(random() % (s.data.size() / 4), values[random() % std::size(values)]);
         }
         support::write_bytes(file, lying.bytes());

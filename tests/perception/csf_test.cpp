@@ -44,7 +44,8 @@ std::vector<GoldenRow> golden_rows() {
                          .temporal = Hertz(v[3]),
                          .area = SquareDegrees(v[4]),
                          .field = v[5] == 0 ? VisualField::temporal : VisualField::nasal},
-                        v[6], v[7]});
+                        v[6],
+                        v[7]});
     }
     return rows;
 }
@@ -97,9 +98,7 @@ TEST(Csf, SurvivesDimLight) {
 
 TEST(Csf, KeepsItsDigitsInBrightLight) {
     // 1 - (1 + p4/L)^-p5, written like that, has lost 4 of 16 digits here and its slope all of them.
-    const auto at = [](double luminance) {
-        return sensitivity(CsfModel::castle, {.luminance = Luminance(luminance)});
-    };
+    const auto at = [](double luminance) { return sensitivity(CsfModel::castle, {.luminance = Luminance(luminance)}); };
     EXPECT_GT(at(1e3), at(1e4));
     EXPECT_GT(at(1e4), 0);
     // The fall towards 1/L is smooth: the second difference of log S is small against the first.

@@ -39,14 +39,17 @@ Looked expect_within_rings(const Cut& cut, const CutRings& rings) {
     for (std::size_t i = 0; i < indices.size(); i += 3) {
         NodeId largest = no_node;
         for (std::size_t k = 0; k < 3; ++k)
-            if (!tree.is_leaf(indices[i + k]) && (largest == no_node || is_larger(tree, indices[i + k], largest))) largest = indices[i + k];
+            if (!tree.is_leaf(indices[i + k]) && (largest == no_node || is_larger(tree, indices[i + k], largest)))
+                largest = indices[i + k];
         if (largest == no_node || tree.support_spheres()[largest].radius == 0) continue;
         ++looked.at;
         bool is_outside = false;
         for (std::size_t k = 0; k < 3; ++k) {
             const NodeId corner = indices[i + k];
-            const double distance = glm::length(glm::dvec3(tree.positions()[corner]) - glm::dvec3(tree.bounds()[largest].ring.centre));
-            is_outside |= distance > tree.bounds()[largest].ring.radius || tree.luminance()[corner] < tree.ring_luminance()[largest].lo ||
+            const double distance =
+                glm::length(glm::dvec3(tree.positions()[corner]) - glm::dvec3(tree.bounds()[largest].ring.centre));
+            is_outside |= distance > tree.bounds()[largest].ring.radius ||
+                          tree.luminance()[corner] < tree.ring_luminance()[largest].lo ||
                           tree.luminance()[corner] > tree.ring_luminance()[largest].hi;
             EXPECT_LE(distance, rings.radius[largest] * (1 + 1e-12)) << largest;
             EXPECT_LE(rings.luminance[largest].lo, tree.luminance()[corner]) << largest;
@@ -77,8 +80,13 @@ Cut random_cut(const VertexTree& tree, std::mt19937& random) {
 TEST(CutRings, HoldEveryTriangleOfEveryCut) {
     std::mt19937 random(11);
     Looked looked;
-    const Mesh meshes[] = {shapes::bumpy_sphere(4, 0.03), shapes::with_attributes(shapes::torus(40, 20)), shapes::grid(20), shapes::two_parts(),
-                           shapes::random_soup(200, 400, 3), shapes::unwelded(shapes::icosphere(2)), shapes::non_manifold_fan(7)};
+    const Mesh meshes[] = {shapes::bumpy_sphere(4, 0.03),
+                           shapes::with_attributes(shapes::torus(40, 20)),
+                           shapes::grid(20),
+                           shapes::two_parts(),
+                           shapes::random_soup(200, 400, 3),
+                           shapes::unwelded(shapes::icosphere(2)),
+                           shapes::non_manifold_fan(7)};
     for (const Mesh& mesh : meshes) {
         for (const ClustererKind clusterer : {ClustererKind::quadric, ClustererKind::octree}) {
             const VertexTree tree = built(mesh, {.clusterer = clusterer});
@@ -149,7 +157,8 @@ TEST(CutRings, FindShiftsOfTheMean) {
         clustering.positions = {{1, 1, 0}, {1, 0.5, 0}}; // of the edge and of the root
         return clustering;
     };
-    auto even = build_tree(strip(0.5f, 0.5f).view(), merge_middle), bright = build_tree(strip(1, 0.25f).view(), merge_middle);
+    auto even = build_tree(strip(0.5f, 0.5f).view(), merge_middle),
+         bright = build_tree(strip(1, 0.25f).view(), merge_middle);
     ASSERT_TRUE(even && bright);
     ASSERT_EQ(even->interior_count(), 2u); // the root and the edge
     constexpr NodeId node = 1;

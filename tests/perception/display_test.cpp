@@ -1,6 +1,6 @@
 // The display model: geometry, photometry, transfer functions and what it refuses.
-#include <vdtree/colour.h>
 #include <perception/display.h>
+#include <vdtree/colour.h>
 
 #include <cmath>
 #include <limits>
@@ -25,7 +25,7 @@ constexpr double rounding = 1e-14;
 TEST(Display, DefaultHasTheFieldOfThePaper) {
     const Display display;
     EXPECT_TRUE(validate(display));
-    EXPECT_NEAR(pixels_per_degree(display).value(), 34.3569, 5e-5); // published to 4 decimals
+    EXPECT_NEAR(pixels_per_degree(display).value(), 34.3569, 5e-5);   // published to 4 decimals
     EXPECT_NEAR(physical_field(display, 512).value(), 14.8192, 5e-5); // 2 atan(256 * 0.254 / 500)
     EXPECT_NEAR(physical_field(display, 1024).value(), 29.16, 5e-3);
 }
@@ -146,7 +146,8 @@ TEST(Display, TablesAreInterpolated) {
     EXPECT_TRUE(std::isnan(decode(display, not_a_number)));
     EXPECT_TRUE(std::isnan(encode(display, not_a_number)));
     for (double code = 0; code <= 1; code += 1.0 / 64) EXPECT_NEAR(encode(display, decode(display, code)), code, 1e-12);
-    const std::vector<double> bad[] = {{}, {0, 1}, {0, 0.5, 0.5, 1}, {0, 0.6, 0.4, 1}, {0.1, 0.5, 1}, {0, 0.5, 0.9}, {0, not_a_number, 1}};
+    const std::vector<double> bad[] = {
+        {}, {0, 1}, {0, 0.5, 0.5, 1}, {0, 0.6, 0.4, 1}, {0.1, 0.5, 1}, {0, 0.5, 0.9}, {0, not_a_number, 1}};
     for (const auto& table : bad) {
         display.table = table;
         const auto result = validate(display);
@@ -197,15 +198,18 @@ TEST(Display, HeadsetsHaveThePixelsOfTheirLens) {
     EXPECT_EQ(finest_pixels_per_degree(display).value(), 20);
     Display coarse = display;
     coarse.pixel_pitch = coarse.pixel_pitch * 4;
-    EXPECT_NEAR(coarsest_pixels_per_degree(coarse).value(), 34.3569 / 4, 1e-3) << "the picture is coarser than the panel";
+    EXPECT_NEAR(coarsest_pixels_per_degree(coarse).value(), 34.3569 / 4, 1e-3)
+        << "the picture is coarser than the panel";
     EXPECT_EQ(finest_pixels_per_degree(coarse).value(), 20);
     EXPECT_DOUBLE_EQ(pixels_per_degree_at(display, Degrees(10)).value(), 19);
     EXPECT_DOUBLE_EQ(pixels_per_degree_at(display, Degrees(35)).value(), 15);
     EXPECT_DOUBLE_EQ(pixels_per_degree_at(display, Degrees(80)).value(), 12);
     EXPECT_EQ(display_field(display).value(), 100);
     EXPECT_NEAR(display_field(Display()).value(), 44.24, 0.01);
-    const std::vector<PixelsPerDegreeAt> bad[] = {{{0, 20}}, {{1, 20}, {2, 20}}, {{0, 20}, {0, 20}}, {{0, 20}, {10, 0}}, {{0, 20}, {10, -1}},
-                                                  {{0, not_a_number}, {10, 1}}, {{0, 20}, {not_a_number, 1}}, {{0, 20}, {200, 1}}, {{0, 1e9}, {1, 1}}};
+    const std::vector<PixelsPerDegreeAt> bad[] = {
+        {{0, 20}},           {{1, 20}, {2, 20}},           {{0, 20}, {0, 20}},           {{0, 20}, {10, 0}},
+        {{0, 20}, {10, -1}}, {{0, not_a_number}, {10, 1}}, {{0, 20}, {not_a_number, 1}}, {{0, 20}, {200, 1}},
+        {{0, 1e9}, {1, 1}}};
     for (const auto& lens : bad) {
         display.lens = lens;
         const auto result = validate(display);
@@ -233,10 +237,14 @@ TEST(Display, ValidationNamesTheField) {
         {"pixel_pitch_m",
          [](Display& d, double v) { d.pixel_pitch = Metres(v); },
          {0, -1, 2, infinity, not_a_number, 1e-300, 1e-320}},
-        {"viewing_distance_m", [](Display& d, double v) { d.distance = Metres(v); }, {0, -1, 1e-300, 1e-4, 1e5, infinity, not_a_number}},
+        {"viewing_distance_m",
+         [](Display& d, double v) { d.distance = Metres(v); },
+         {0, -1, 1e-300, 1e-4, 1e5, infinity, not_a_number}},
         {"peak_cdm2", [](Display& d, double v) { d.peak = Luminance(v); }, {0, -1, 1e7, infinity, not_a_number}},
         {"below the peak of", [](Display& d, double v) { d.peak = Luminance(v); }, {0.5, 0.1}},
-        {"black_cdm2", [](Display& d, double v) { d.black = Luminance(v); }, {0, -1, 1e-300, 1e-8, 100, 101, infinity, not_a_number}},
+        {"black_cdm2",
+         [](Display& d, double v) { d.black = Luminance(v); },
+         {0, -1, 1e-300, 1e-8, 100, 101, infinity, not_a_number}},
         {"ambient_lux", [](Display& d, double v) { d.ambient = Lux(v); }, {-1, 1e7, infinity, not_a_number}},
         {"reflectivity", [](Display& d, double v) { d.reflectivity = v; }, {-0.1, 1.1, infinity, not_a_number}},
         {"field_deg", [](Display& d, double v) { d.field_deg = v; }, {-1, 1e-9, 360, infinity, not_a_number}},

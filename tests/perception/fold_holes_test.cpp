@@ -57,7 +57,8 @@ struct Scene {
 
     void build() {
         const auto merge = [&](const vdtree::ClusterInput&) -> Result<vdtree::Clustering> {
-            const Index vertices = static_cast<Index>(mesh.positions.size()), root = vertices + static_cast<Index>(groups.size());
+            const Index vertices = static_cast<Index>(mesh.positions.size()),
+                        root = vertices + static_cast<Index>(groups.size());
             vdtree::Clustering clustering;
             clustering.parents.assign(root + 1, root);
             for (std::size_t g = 0; g < groups.size(); ++g) {
@@ -123,7 +124,8 @@ double literal_cost(const VertexTree& tree, NodeId node, const View& view, const
     for (const auto& t : support::sound(tree).triangles()) {
         const bool is_own = std::any_of(t.begin(), t.end(), [&](Index leaf) { return first <= leaf && leaf < end; });
         if (!is_own) continue;
-        const glm::dvec3 a = tree.positions()[interior + t[0]], b = tree.positions()[interior + t[1]], c = tree.positions()[interior + t[2]];
+        const glm::dvec3 a = tree.positions()[interior + t[0]], b = tree.positions()[interior + t[1]],
+                         c = tree.positions()[interior + t[2]];
         (glm::dot(glm::cross(b - a, c - a), eye - a) > 0 ? has_front : has_back) = true;
     }
     if (has_front && has_back) {
@@ -134,9 +136,11 @@ double literal_cost(const VertexTree& tree, NodeId node, const View& view, const
                  hi = to_luminance(options.display, static_cast<double>(brightest)).value();
     if (lo == hi) return 0;
     const double pixel = 1 / pixels_per_degree(options.display).value();
-    const double extent = 2 * std::asin(glm::length(high - low) / 2 / glm::length(eye - (low + high) * 0.5)) * 180 / M_PI;
-    const double frequency =
-        CsfTable::standard().highest_visible_frequency((hi - lo) / (hi + lo), Degrees(0), Luminance((lo + hi) / 2)).value();
+    const double extent =
+        2 * std::asin(glm::length(high - low) / 2 / glm::length(eye - (low + high) * 0.5)) * 180 / M_PI;
+    const double frequency = CsfTable::standard()
+                                 .highest_visible_frequency((hi - lo) / (hi + lo), Degrees(0), Luminance((lo + hi) / 2))
+                                 .value();
     return 2 * std::max(extent, pixel) * frequency;
 }
 
@@ -150,7 +154,8 @@ Image picture(const Cut& cut, const View& view) {
     std::vector<float> nearness(count, 0), luminance(count, background);
     std::array<glm::dvec2, samples> offsets; // the R2 sequence (Roberts 2018): even in two dimensions at any length
     for (int s = 0; s < samples; ++s)
-        offsets[static_cast<std::size_t>(s)] = {std::fmod(0.5 + 0.7548776662466927 * s, 1), std::fmod(0.5 + 0.5698402909980532 * s, 1)};
+        offsets[static_cast<std::size_t>(s)] = {std::fmod(0.5 + 0.7548776662466927 * s, 1),
+                                                std::fmod(0.5 + 0.5698402909980532 * s, 1)};
     const auto indices = cut.indices();
     for (std::size_t i = 0; i < indices.size(); i += 3) {
         std::array<glm::dvec3, 3> on_screen; // x, y in pixels, 1 / depth
@@ -179,7 +184,8 @@ Image picture(const Cut& cut, const View& view) {
                     const auto at = static_cast<std::size_t>((y * window_px + x) * samples + s);
                     if (!(near > static_cast<double>(nearness[at]))) continue;
                     nearness[at] = static_cast<float>(near);
-                    luminance[at] = static_cast<float>(((1 - v - w) * a.z * shade[0] + v * b.z * shade[1] + w * c.z * shade[2]) / near);
+                    luminance[at] = static_cast<float>(
+                        ((1 - v - w) * a.z * shade[0] + v * b.z * shade[1] + w * c.z * shade[2]) / near);
                 }
             }
         }
@@ -203,8 +209,8 @@ std::uint64_t visible_pixels(const Cut& cut, const View& view) {
 
 // What the safe test makes of the scene.
 Cut safe_cut(const Scene& scene, const View& view) {
-    const auto criterion =
-        luebke_hallen_safe_distances(*scene.tree, *perception::bound_cut_rings(*scene.tree), view, fold_test(*scene.tree));
+    const auto criterion = luebke_hallen_safe_distances(*scene.tree, *perception::bound_cut_rings(*scene.tree), view,
+                                                        fold_test(*scene.tree));
     if (!criterion) throw std::runtime_error(criterion.error().message);
     EXPECT_TRUE(criterion->is_monotone());
     Cut cut(*scene.tree);
@@ -237,7 +243,8 @@ Mesh flat_grid(std::vector<double> lines, Luminance&& luminance_at) {
     const int n = static_cast<int>(lines.size());
     for (int row = 0; row < n; ++row)
         for (int column = 0; column < n; ++column)
-            add_vertex(mesh, {lines[static_cast<std::size_t>(column)], lines[static_cast<std::size_t>(row)], 0}, luminance_at(row - 1, column - 1));
+            add_vertex(mesh, {lines[static_cast<std::size_t>(column)], lines[static_cast<std::size_t>(row)], 0},
+                       luminance_at(row - 1, column - 1));
     const auto at = [&](int row, int column) { return static_cast<Index>(row * n + column); };
     for (int row = 0; row + 1 < n; ++row) {
         for (int column = 0; column + 1 < n; ++column) {
@@ -306,10 +313,13 @@ TEST(FoldHoles, ThreeTheNeighboursMayHaveFolded) {
         return outward == (lines - 1) / 2 - first + line;
     };
     Scene scene;
-    scene.mesh = flat_grid(even_lines(lines, step), [&](int row, int column) { return static_cast<float>(lies_on(row, column, 2) ? 1.19 * grey : grey); });
+    scene.mesh = flat_grid(even_lines(lines, step), [&](int row, int column) {
+        return static_cast<float>(lies_on(row, column, 2) ? 1.19 * grey : grey);
+    });
     scene.groups.resize(1);
     for (int row = first; row <= last; ++row)
-        for (int column = first; column <= last; ++column) scene.groups[0].vertices.push_back(grid_vertex(row, column, lines));
+        for (int column = first; column <= last; ++column)
+            scene.groups[0].vertices.push_back(grid_vertex(row, column, lines));
     scene.groups[0].proxy = {0, 0, 0};
     const auto pair_up = [&](int row, int column, int up, int aside) {
         const Index inner = grid_vertex(row, column, lines), outer = grid_vertex(row + up, column + aside, lines);
@@ -345,13 +355,30 @@ TEST(FoldHoles, FourFacesChangeWhereVerticesDoNot) {
                 top_right = add_vertex(mesh, {2 * step, step, 0}, grey);
     const Index low_left = add_vertex(mesh, {-2 * step, -step, 0}, grey), low = add_vertex(mesh, {0, -step, 0}, bright),
                 low_right = add_vertex(mesh, {2 * step, -step, 0}, grey);
-    const Index frame[] = {add_vertex(mesh, {-far, far, 0}, grey), add_vertex(mesh, {far, far, 0}, grey), add_vertex(mesh, {far, -far, 0}, grey),
-                           add_vertex(mesh, {-far, -far, 0}, grey)};
-    mesh.triangles = {{a, b, top},           {a, top, top_left},       {a, top_left, left},     {b, top_right, top},   {b, right, top_right},
-                      {b, a, low},           {a, low_left, low},       {a, left, low_left},     {b, low, low_right},   {b, low_right, right},
-                      {frame[0], top_left, top}, {frame[0], top, frame[1]}, {frame[1], top, top_right}, {frame[1], top_right, right}, {frame[1], right, frame[2]},
-                      {frame[2], right, low_right}, {frame[2], low_right, low}, {frame[2], low, frame[3]}, {frame[3], low, low_left}, {frame[3], low_left, left},
-                      {frame[3], left, frame[0]}, {frame[0], left, top_left}};
+    const Index frame[] = {add_vertex(mesh, {-far, far, 0}, grey), add_vertex(mesh, {far, far, 0}, grey),
+                           add_vertex(mesh, {far, -far, 0}, grey), add_vertex(mesh, {-far, -far, 0}, grey)};
+    mesh.triangles = {{a, b, top},
+                      {a, top, top_left},
+                      {a, top_left, left},
+                      {b, top_right, top},
+                      {b, right, top_right},
+                      {b, a, low},
+                      {a, low_left, low},
+                      {a, left, low_left},
+                      {b, low, low_right},
+                      {b, low_right, right},
+                      {frame[0], top_left, top},
+                      {frame[0], top, frame[1]},
+                      {frame[1], top, top_right},
+                      {frame[1], top_right, right},
+                      {frame[1], right, frame[2]},
+                      {frame[2], right, low_right},
+                      {frame[2], low_right, low},
+                      {frame[2], low, frame[3]},
+                      {frame[3], low, low_left},
+                      {frame[3], low_left, left},
+                      {frame[3], left, frame[0]},
+                      {frame[0], left, top_left}};
     scene.groups = {{{a, b}, {0, 0, 0}}};
     expect_hole(scene);
 
@@ -374,7 +401,8 @@ Scene rows(float bright, float dark) {
     for (int row = 1; row + 1 < lines; row += 3) {
         for (int column = 0; column < lines; ++column) {
             const Index first = grid_vertex(row, column, lines), second = grid_vertex(row + 1, column, lines);
-            scene.groups.push_back({{first, second}, (scene.mesh.positions[first] + scene.mesh.positions[second]) * 0.5});
+            scene.groups.push_back(
+                {{first, second}, (scene.mesh.positions[first] + scene.mesh.positions[second]) * 0.5});
         }
     }
     return scene;
@@ -404,7 +432,9 @@ TEST(FoldHoles, AShiftThatNobodySeesFolds) {
 TEST(LuebkeHallenSafe, FoldsNothingThatLuebkeHallenKeeps) {
     Mesh mesh;
     constexpr int lines = 40;
-    mesh = flat_grid(even_lines(lines, 1), [](int row, int column) { return 0.5f + 0.1f * static_cast<float>(std::sin(0.7 * row) * std::cos(1.3 * column)); });
+    mesh = flat_grid(even_lines(lines, 1), [](int row, int column) {
+        return 0.5f + 0.1f * static_cast<float>(std::sin(0.7 * row) * std::cos(1.3 * column));
+    });
     for (glm::dvec3& p : mesh.positions) p.z = 3 * std::sin(0.2 * p.x) * std::cos(0.3 * p.y);
     const VertexTree tree = std::move(*vdtree::build_tree(mesh.view()));
     const perception::CutRings rings = *perception::bound_cut_rings(tree);

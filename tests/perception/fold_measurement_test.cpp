@@ -153,7 +153,8 @@ TEST(FoldErrors, NestWhateverWasMeasured) {
 // Two spheres that pass through each other, and two that do not: where they meet, a fold moves a line like an outline.
 TEST(FoldErrors, CountAsOutlinesWherePartsMeet) {
     const auto meeting = [](double apart) {
-        const VertexTree tree = built(shapes::together(shapes::icosphere(4), shapes::placed(shapes::icosphere(4), 1, {apart, 0, 0})));
+        const VertexTree tree =
+            built(shapes::together(shapes::icosphere(4), shapes::placed(shapes::icosphere(4), 1, {apart, 0, 0})));
         const auto errors = errors_of(tree);
         std::size_t everywhere = 0, near = 0;
         for (NodeId node = 1; node < tree.interior_count(); ++node) {
@@ -184,7 +185,8 @@ TEST(FoldErrors, CountFarMoreWherePartsMeetFlat) {
         const auto errors = errors_of(tree);
         float most = 0;
         for (NodeId node = 1; node < tree.interior_count(); ++node)
-            if (const float radius = tree.bounds()[node].ring.radius; radius < 0.2f) most = std::max(most, errors[node].distance / radius);
+            if (const float radius = tree.bounds()[node].ring.radius; radius < 0.2f)
+                most = std::max(most, errors[node].distance / radius);
         return most;
     };
     EXPECT_GT(most_of(both), 7 * most_of(alone));
@@ -201,9 +203,12 @@ TEST(FoldErrors, CountWhatNeighboursAddUpTo) {
     }
     const VertexTree tree = built(mesh);
     const auto corner = [&](NodeId node) { return LitPoint{tree.positions()[node], tree.luminance()[node]}; };
-    const auto span = [&](NodeId node) { return tree.support_luminance()[node].hi - tree.support_luminance()[node].lo; };
+    const auto span = [&](NodeId node) {
+        return tree.support_luminance()[node].hi - tree.support_luminance()[node].lo;
+    };
     const auto is_folded = [&](NodeId node, NodeId with) {
-        return tree.support_spheres()[node].radius <= tree.support_spheres()[with].radius && span(node) <= 2 * span(with);
+        return tree.support_spheres()[node].radius <= tree.support_spheres()[with].radius &&
+               span(node) <= 2 * span(with);
     };
     const auto errors = errors_of(tree);
     std::size_t compared = 0, within = 0;
@@ -214,7 +219,8 @@ TEST(FoldErrors, CountWhatNeighboursAddUpTo) {
         const float width = std::max(tree.support_spheres()[node].radius, error.extent);
         float counted = 0; // by the nodes that are folded there
         FoldPicture picture;
-        picture.look(tree.positions()[node], glm::normalize(tree.positions()[node] + glm::vec3(tree.origin())), 1.5f * width);
+        picture.look(tree.positions()[node], glm::normalize(tree.positions()[node] + glm::vec3(tree.origin())),
+                     1.5f * width);
         for (const Triangle& t : support::sound(tree).triangles()) {
             std::array<NodeId, 3> whole{}, drawn{};
             bool is_near = false;
@@ -265,7 +271,8 @@ TEST(FoldErrors, LeaveTheLuminancesAsTheyAre) {
 
 // Lengths in any unit: the same errors, but for the unit.
 TEST(FoldErrors, DoNotDependOnTheUnit) {
-    const Mesh mesh = shapes::in_floats(shapes::together(shapes::bumpy_sphere(3, 0.03), shapes::placed(shapes::cube(4), 0.5, {0.9, 0.1, 0})));
+    const Mesh mesh = shapes::in_floats(
+        shapes::together(shapes::bumpy_sphere(3, 0.03), shapes::placed(shapes::cube(4), 0.5, {0.9, 0.1, 0})));
     const VertexTree tree = built(mesh);
     const auto errors = errors_of(tree);
     const std::span<const FoldRecord> records = records_of(tree);
@@ -276,17 +283,21 @@ TEST(FoldErrors, DoNotDependOnTheUnit) {
         ASSERT_EQ(scaled.interior_count(), tree.interior_count()) << power;
         ASSERT_TRUE(std::ranges::equal(support::sound(scaled).parents(), support::sound(tree).parents())) << power;
         EXPECT_TRUE(std::ranges::equal(scaled.luminance(), tree.luminance())) << power;
-        EXPECT_TRUE(std::ranges::equal(scaled.attribute<FoldStage>(stages_name), tree.attribute<FoldStage>(stages_name))) << power;
+        EXPECT_TRUE(
+            std::ranges::equal(scaled.attribute<FoldStage>(stages_name), tree.attribute<FoldStage>(stages_name)))
+            << power;
         const auto scaled_errors = errors_of(scaled);
         const std::span<const FoldRecord> scaled_records = records_of(scaled);
-        const bool has_few_digits = power < -100; // lengths near the least numbers: what is multiplied with them is rounded
+        const bool has_few_digits =
+            power < -100; // lengths near the least numbers: what is multiplied with them is rounded
         for (NodeId node = 0; node < tree.interior_count(); ++node) {
             FoldRecord record = records[node];
             for (float* length : {&record.shift, &record.farthest, &record.mean_distance, &record.extent, &record.gap})
                 *length = std::ldexp(*length, power);
             ASSERT_EQ(scaled_records[node], record) << "2^" << power << ", node " << node;
             FoldError expected = errors[node];
-            for (float* length : {&expected.distance, &expected.mean_distance, &expected.extent}) *length = std::ldexp(*length, power);
+            for (float* length : {&expected.distance, &expected.mean_distance, &expected.extent})
+                *length = std::ldexp(*length, power);
             if (has_few_digits) {
                 EXPECT_NEAR(scaled_errors[node].distance, expected.distance, 1e-3f * expected.distance) << node;
                 expected.distance = scaled_errors[node].distance;
@@ -312,32 +323,41 @@ TEST(FoldErrors, AreRefusedWhereTheyAreNone) {
     constexpr float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
     EXPECT_EQ(with([](FoldRecord& r) { r.gap = infinity; }), "");
     for (const float wrong : {nan, -1.0f, infinity}) {
-        for (float FoldRecord::*const value : {&FoldRecord::shift, &FoldRecord::farthest, &FoldRecord::mean_distance, &FoldRecord::largest_luminance,
-                                               &FoldRecord::mean_luminance, &FoldRecord::extent, &FoldRecord::sine, &FoldRecord::drift})
+        for (float FoldRecord::*const value :
+             {&FoldRecord::shift, &FoldRecord::farthest, &FoldRecord::mean_distance, &FoldRecord::largest_luminance,
+              &FoldRecord::mean_luminance, &FoldRecord::extent, &FoldRecord::sine, &FoldRecord::drift})
             EXPECT_NE(with([&](FoldRecord& r) { r.*value = wrong; }).find("node 1"), std::string::npos);
         EXPECT_NE(with([&](FoldRecord& r) { r.amplitudes[1][2] = wrong; }), "");
     }
     EXPECT_NE(with([](FoldRecord& r) { r.gap = nan; }), "");
-    EXPECT_NE(with([](FoldRecord& r) { r.farthest = std::numeric_limits<float>::max(), r.largest_luminance = 1; }), "") << "times a factor";
+    EXPECT_NE(with([](FoldRecord& r) { r.farthest = std::numeric_limits<float>::max(), r.largest_luminance = 1; }), "")
+        << "times a factor";
 
     std::vector<std::uint8_t> stage_of(tree.interior_count(), 255);
-    EXPECT_NE(message(*tree.with_attribute(stage_of_name, AttributeDomain::interior_node, stage_of)).find("stage that is not there"), std::string::npos);
+    EXPECT_NE(message(*tree.with_attribute(stage_of_name, AttributeDomain::interior_node, stage_of))
+                  .find("stage that is not there"),
+              std::string::npos);
     std::vector<FoldFacing> facing(tree.interior_count());
     facing[3].fading = 4;
     EXPECT_NE(message(*tree.with_attribute(facing_name, AttributeDomain::interior_node, facing)), "");
-    std::vector<FoldStage> stages(tree.attribute<FoldStage>(stages_name).begin(), tree.attribute<FoldStage>(stages_name).end());
+    std::vector<FoldStage> stages(tree.attribute<FoldStage>(stages_name).begin(),
+                                  tree.attribute<FoldStage>(stages_name).end());
     stages[0].contrast[1][2][3] = nan;
-    EXPECT_NE(message(*tree.with_attribute(stages_name, AttributeDomain::tree, stages)).find("contrast"), std::string::npos);
+    EXPECT_NE(message(*tree.with_attribute(stages_name, AttributeDomain::tree, stages)).find("contrast"),
+              std::string::npos);
     std::vector<float> settings(measurement::settings.begin(), measurement::settings.end());
     settings.back() *= 2;
-    EXPECT_NE(message(*tree.with_attribute(settings_name, AttributeDomain::tree, settings)).find("measure them again"), std::string::npos);
-    EXPECT_NE(message(*tree.with_attribute(facing_name, AttributeDomain::tree, std::vector<FoldFacing>(3))).find("missing"), std::string::npos);
+    EXPECT_NE(message(*tree.with_attribute(settings_name, AttributeDomain::tree, settings)).find("measure them again"),
+              std::string::npos);
+    EXPECT_NE(
+        message(*tree.with_attribute(facing_name, AttributeDomain::tree, std::vector<FoldFacing>(3))).find("missing"),
+        std::string::npos);
     EXPECT_NE(message(support::built(shapes::bumpy_sphere(2, 0.03))).find("measure_folds"), std::string::npos);
 }
 
 TEST(FoldErrors, AreFiniteForHardMeshes) {
-    for (const Mesh& mesh : {shapes::single_triangle(), shapes::all_coincident(200), shapes::with_zero_areas(), shapes::non_manifold_fan(5),
-                             shapes::moebius_strip(20)}) {
+    for (const Mesh& mesh : {shapes::single_triangle(), shapes::all_coincident(200), shapes::with_zero_areas(),
+                             shapes::non_manifold_fan(5), shapes::moebius_strip(20)}) {
         const VertexTree tree = built(mesh);
         for (const FoldError& e : errors_of(tree))
             for (const float value : {e.distance, e.mean_distance, e.luminance, e.wide_luminance, e.extent, e.drift})

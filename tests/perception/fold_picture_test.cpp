@@ -60,13 +60,15 @@ TEST(FoldPicture, MeasuresGratings) {
             FoldPicture picture = looking();
             const float frequency = 2 * std::numbers::pi_v<float> / picture.wavelength(band);
             draw_plane(picture, Layer::mesh, 0, even);
-            draw_plane(picture, Layer::folded, 0, [&](const glm::vec3& p) { return 0.5f + 0.1f * std::cos(frequency * p.x + phase); });
+            draw_plane(picture, Layer::folded, 0,
+                       [&](const glm::vec3& p) { return 0.5f + 0.1f * std::cos(frequency * p.x + phase); });
             const auto amplitudes = picture.amplitudes();
             // The finest has two cells a wave: what it sees depends on the phase. The coarser ones have a wave and a half or more in the picture.
             if (band > 0) {
                 EXPECT_NEAR(amplitudes[band], 0.1f, 0.025f) << band << ", phase " << phase;
             }
-            for (std::size_t other = band + 2; other < FoldPicture::bands; ++other) EXPECT_LT(amplitudes[other], 0.06f) << other << " of " << band;
+            for (std::size_t other = band + 2; other < FoldPicture::bands; ++other)
+                EXPECT_LT(amplitudes[other], 0.06f) << other << " of " << band;
         }
     }
 }
@@ -75,7 +77,9 @@ TEST(FoldPicture, SeesASpotInTheBandOfItsSize) {
     const auto of_spot = [](float radius) {
         FoldPicture picture = looking();
         draw_plane(picture, Layer::mesh, 0, even);
-        draw_plane(picture, Layer::folded, 0, [&](const glm::vec3& p) { return 0.5f + 0.2f * std::exp(-(p.x * p.x + p.y * p.y) / (radius * radius)); });
+        draw_plane(picture, Layer::folded, 0, [&](const glm::vec3& p) {
+            return 0.5f + 0.2f * std::exp(-(p.x * p.x + p.y * p.y) / (radius * radius));
+        });
         return picture.amplitudes();
     };
     const auto narrow = of_spot(0.15f), wide = of_spot(0.6f);
@@ -105,7 +109,8 @@ TEST(FoldPicture, ShowsWhatLiesHighest) {
 
 TEST(FoldPicture, KnowsWhetherASurfaceIsFolded) {
     FoldPicture picture = looking();
-    const LitPoint a{{-1, -1, 0}, 0.5f}, b{{1, -1, 0}, 0.5f}, c{{0, 1, 0}, 0.5f}, d{{0, -3, 1}, 0.5f}, under{{0, 1, -1}, 0.5f};
+    const LitPoint a{{-1, -1, 0}, 0.5f}, b{{1, -1, 0}, 0.5f}, c{{0, 1, 0}, 0.5f}, d{{0, -3, 1}, 0.5f},
+        under{{0, 1, -1}, 0.5f};
     picture.draw(Layer::mesh, a, b, c);
     picture.draw(Layer::mesh, b, a, d);
     EXPECT_TRUE(picture.is_height_field());

@@ -69,14 +69,17 @@ TEST(Pyramid, BandsHaveTheirGainAtTheirFrequency) {
         Raster plane(side);
         const double omega = 2 * std::numbers::pi * nominal_frequency(level);
         for (std::size_t y = 0; y < side; ++y)
-            for (std::size_t x = 0; x < side; ++x) plane.row(y)[x] = static_cast<float>(std::sin(omega * static_cast<double>(x)));
+            for (std::size_t x = 0; x < side; ++x)
+                plane.row(y)[x] = static_cast<float>(std::sin(omega * static_cast<double>(x)));
         for (std::size_t i = 0; i < level; ++i) plane = reduce(plane);
         const Raster mean = expand(reduce(plane), plane.side);
         float amplitude = 0;
         const std::size_t middle = plane.side / 2;
         for (std::size_t y = middle - 2; y < middle + 2; ++y)
-            for (std::size_t x = middle - 20; x < middle + 20; ++x) amplitude = std::max(amplitude, std::abs(plane.row(y)[x] - mean.row(y)[x]));
-        EXPECT_NEAR(static_cast<double>(amplitude) / band_gain(level), 1, 0.1) << level; // some of the expanded mean is an image of the grating
+            for (std::size_t x = middle - 20; x < middle + 20; ++x)
+                amplitude = std::max(amplitude, std::abs(plane.row(y)[x] - mean.row(y)[x]));
+        EXPECT_NEAR(static_cast<double>(amplitude) / band_gain(level), 1, 0.1)
+            << level; // some of the expanded mean is an image of the grating
     }
 }
 
@@ -87,14 +90,19 @@ TEST(Pyramid, MeansAreThoseUnderAGaussian) {
     Raster plane(side);
     for (std::size_t y = 0; y < side; ++y)
         for (std::size_t x = 0; x < side; ++x)
-            plane.row(y)[x] = std::hypot(static_cast<double>(x) - side / 2.0 + 0.5, static_cast<double>(y) - side / 2.0 + 0.5) < radius ? 1.0f : 0.0f;
+            plane.row(y)[x] = std::hypot(static_cast<double>(x) - side / 2.0 + 0.5,
+                                         static_cast<double>(y) - side / 2.0 + 0.5) < radius
+                                  ? 1.0f
+                                  : 0.0f;
     for (std::size_t band = 0; band < FoldStage::band_count; ++band) {
         const Raster next = reduce(plane);
         const Raster mean = expand(next, plane.side);
         const double most = static_cast<double>(*std::max_element(mean.values.begin(), mean.values.end()));
         const double frequency = FoldStage::frequency(band), gaussian = 1 - std::exp(-frequency * frequency);
         EXPECT_LT(most, 1.1 * gaussian) << band;
-        if (band >= 5) { EXPECT_GT(most, 0.5 * gaussian) << band; }
+        if (band >= 5) {
+            EXPECT_GT(most, 0.5 * gaussian) << band;
+        }
         plane = next;
     }
 }
@@ -132,7 +140,9 @@ TEST(FoldStages, EndInTheBackground) {
     constexpr float luminance = 0.8f, behind = 0.2f;
     const VertexTree tree = built(grey(shapes::torus(32, 16), luminance));
     const auto& last = stages_of(tree).back().contrast[background(behind)];
-    const auto over_masks = [&](std::size_t band) { return *std::max_element(std::begin(last[band]), std::end(last[band])); };
+    const auto over_masks = [&](std::size_t band) {
+        return *std::max_element(std::begin(last[band]), std::end(last[band]));
+    };
     constexpr std::size_t coarsest = FoldStage::band_count - 1;
     // Half the frequency: four times the area.
     EXPECT_NEAR(over_masks(coarsest - 1) / over_masks(coarsest), 4, 0.5);

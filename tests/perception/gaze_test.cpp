@@ -19,7 +19,8 @@ using testing::HasSubstr;
 
 class GazeTest : public testing::Test {
 protected:
-    GazeTest() : file_(std::filesystem::path(testing::TempDir()) / ("unseen-gaze-" + std::to_string(::getpid()) + ".csv")) {}
+    GazeTest()
+        : file_(std::filesystem::path(testing::TempDir()) / ("unseen-gaze-" + std::to_string(::getpid()) + ".csv")) {}
     ~GazeTest() override { std::filesystem::remove(file_); }
 
     Result<GazeTrace> read(const std::string& text) const {
@@ -82,7 +83,8 @@ TEST_F(GazeTest, WritesWhatItReads) {
 }
 
 TEST_F(GazeTest, SimulatedGazesRepeatWithTheirSeed) {
-    const auto a = simulate_gaze({.seed = 5}, Display()), b = simulate_gaze({.seed = 5}, Display()), c = simulate_gaze({.seed = 6}, Display());
+    const auto a = simulate_gaze({.seed = 5}, Display()), b = simulate_gaze({.seed = 5}, Display()),
+               c = simulate_gaze({.seed = 6}, Display());
     ASSERT_TRUE(a && b && c);
     EXPECT_EQ(a->samples(), b->samples());
     EXPECT_NE(a->samples(), c->samples());
@@ -124,13 +126,15 @@ TEST_F(GazeTest, SimulatedGazesHaveThePublishedStatistics) {
         i = landed;
     }
     ASSERT_GT(amplitudes.size(), 1500u);
-    std::nth_element(fixations.begin(), fixations.begin() + static_cast<std::ptrdiff_t>(fixations.size() / 2), fixations.end());
+    std::nth_element(fixations.begin(), fixations.begin() + static_cast<std::ptrdiff_t>(fixations.size() / 2),
+                     fixations.end());
     EXPECT_NEAR(fixations[fixations.size() / 2], 0.25, 0.015);
     double mean = 0;
     for (const double a : amplitudes) mean += a / static_cast<double>(amplitudes.size());
     EXPECT_GT(mean, 4);
     EXPECT_LT(mean, 7);
-    EXPECT_LT(std::count_if(amplitudes.begin(), amplitudes.end(), [](double a) { return a > 15; }), static_cast<std::ptrdiff_t>(amplitudes.size() / 20));
+    EXPECT_LT(std::count_if(amplitudes.begin(), amplitudes.end(), [](double a) { return a > 15; }),
+              static_cast<std::ptrdiff_t>(amplitudes.size() / 20));
     for (std::size_t i = 0; i < amplitudes.size(); ++i) {
         constexpr double two_samples = 0.002;
         EXPECT_NEAR(durations[i], 0.0022 * amplitudes[i] + 0.021, two_samples) << i;
@@ -209,8 +213,10 @@ TEST_F(GazeTest, WidenedTablesSeeAsTheGazeMightBe) {
     for (const double f : {0.5, 2.0, 8.0, 20.0})
         for (const double e : {0.0, 1.0, 3.9, 4.0, 5.0, 9.0, 24.0, 60.0})
             for (const double l : {0.1, 50.0}) {
-                const double expected = table.sensitivity(CyclesPerDegree(f), Degrees(std::max(0.0, e - 4)), Luminance(l));
-                EXPECT_NEAR(wide.sensitivity(CyclesPerDegree(f), Degrees(e), Luminance(l)) / expected, 1, 1e-9) << f << " " << e;
+                const double expected =
+                    table.sensitivity(CyclesPerDegree(f), Degrees(std::max(0.0, e - 4)), Luminance(l));
+                EXPECT_NEAR(wide.sensitivity(CyclesPerDegree(f), Degrees(e), Luminance(l)) / expected, 1, 1e-9)
+                    << f << " " << e;
                 EXPECT_GE(wide.highest_visible_frequency(0.1, Degrees(e), Luminance(l)).value() * (1 + 1e-6),
                           table.highest_visible_frequency(0.1, Degrees(e), Luminance(l)).value());
             }
@@ -231,13 +237,16 @@ CsfTable table_over(std::vector<double> eccentricities, const std::vector<double
     EXPECT_TRUE(table) << table.error().message;
     return std::move(*table);
 }
-double seen(const CsfTable& table, double eccentricity) { return table.sensitivity(CyclesPerDegree(1), Degrees(eccentricity), Luminance(50)); }
+double seen(const CsfTable& table, double eccentricity) {
+    return table.sensitivity(CyclesPerDegree(1), Degrees(eccentricity), Luminance(50));
+}
 
 TEST_F(GazeTest, WidenedTablesEndWhereNothingIsFartherAside) {
     const CsfTable falling = table_over({0, 20, 60, 170}, {200, 100, 10, 1});
     const CsfTable wide = widened(falling, head_only_margin); // 170 + 15 degrees are none
     EXPECT_EQ(wide.samples().eccentricity_deg, (std::vector<double>{0, 15, 35, 75}));
-    for (const double e : {0.0, 15.0, 35.0, 75.0}) EXPECT_NEAR(seen(wide, e), seen(falling, std::max(0.0, e - 15)), 1e-9) << e;
+    for (const double e : {0.0, 15.0, 35.0, 75.0})
+        EXPECT_NEAR(seen(wide, e), seen(falling, std::max(0.0, e - 15)), 1e-9) << e;
     EXPECT_NEAR(seen(wide, 180), 10, 1e-9) << "sees more than it would at 165 degrees";
     // A viewer who sees better far aside must not lose that.
     EXPECT_NEAR(seen(widened(table_over({0, 20, 60, 170}, {200, 100, 10, 50}), Degrees(15)), 180), 50, 1e-9);

@@ -1,7 +1,7 @@
 // Image files: what is written is read again, every variant of the formats that we promise is understood, and nothing
 // that a file can contain crashes a reader or makes it allocate out of proportion.
-#include <vdtree/colour.h>
 #include <perception/image.h>
+#include <vdtree/colour.h>
 
 #include <algorithm>
 #include <array>
@@ -21,13 +21,13 @@
 
 #include <unistd.h>
 
-#include <half.h>
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfOutputFile.h>
 #include <ImfTiledOutputFile.h>
 #include <gtest/gtest.h>
+#include <half.h>
 #include <png.h>
 
 // The largest single request to operator new, so that a test can see an allocation that a lying header asked for.
@@ -35,7 +35,8 @@ namespace {
 std::atomic<std::size_t> largest_allocation{0};
 void* counted(std::size_t size) {
     std::size_t seen = largest_allocation.load();
-    while (size > seen && !largest_allocation.compare_exchange_weak(seen, size)) {}
+    while (size > seen && !largest_allocation.compare_exchange_weak(seen, size)) {
+    }
     if (void* p = std::malloc(size == 0 ? 1 : size)) return p;
     throw std::bad_alloc();
 }

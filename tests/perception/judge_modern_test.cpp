@@ -263,7 +263,9 @@ TEST(ThresholdMapModern, IsOfTheDisplaysDistance) {
         double best = 0;
         for (int k = 0; k < 8; ++k) {
             const double cpd = (k == 0 ? 1 : 0.3228 * std::exp2(1 - k)) * default_ppd() / 2;
-            best = std::max(best, sensitivity(CsfModel::daly, stimulus_of({.distance = Metres(metres)}, CyclesPerDegree(cpd), Degrees(28), Luminance(20))));
+            best = std::max(best,
+                            sensitivity(CsfModel::daly, stimulus_of({.distance = Metres(metres)}, CyclesPerDegree(cpd),
+                                                                    Degrees(28), Luminance(20))));
         }
         constexpr double base_band = 0.02; // which may know a better frequency
         EXPECT_NEAR(map->at(side / 2, side / 2) * best / 20, 1, base_band) << metres;

@@ -13,9 +13,9 @@
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
 
+#include <perception/cut_rings.h>
 #include <vdtree/builder.h>
 #include <vdtree/cut.h>
-#include <perception/cut_rings.h>
 #include <vdtree/normal_mask.h>
 
 #include "shapes.h"
@@ -33,19 +33,21 @@ int wanted_folds() {
     return text ? std::max(1, std::atoi(text)) : 1000;
 }
 
-constexpr double luminance_rounding = 2e-5;  // of luminances in steps of 1/65535, and of what is interpolated in float
-constexpr double place_rounding = 1e-5;      // of the sphere's distance: trees keep floats
+constexpr double luminance_rounding = 2e-5; // of luminances in steps of 1/65535, and of what is interpolated in float
+constexpr double place_rounding = 1e-5;     // of the sphere's distance: trees keep floats
 // A known limit: masks hold the normals of each fold as it was first made. In other cuts triangles may turn over nevertheless, and lie on
 // others for which they are then seen. So many of a mesh's folds did, at most.
 constexpr double folds_turned_over = 0.02;
-constexpr int rows = 48;                     // and as many columns of points
+constexpr int rows = 48; // and as many columns of points
 
-double luminance_of(const VertexTree& tree, NodeId node) { return static_cast<double>(static_cast<float>(tree.luminance()[node])); }
+double luminance_of(const VertexTree& tree, NodeId node) {
+    return static_cast<double>(static_cast<float>(tree.luminance()[node]));
+}
 
 // ---- what is seen at a point
 
 struct Seen {
-    double nearness = 0;          // 1 / depth; 0: the background
+    double nearness = 0; // 1 / depth; 0: the background
     double luminance = 0;
     std::array<NodeId, 3> corners = {no_node, no_node, no_node};
     bool operator==(const Seen& other) const { return nearness == other.nearness && luminance == other.luminance; }
@@ -69,7 +71,8 @@ public:
     // The points at which anything is nearer than what was seen before are filled in.
     void draw(const VertexTree& tree, std::span<const NodeId> indices, std::vector<Seen>& seen) const {
         seen.assign(std::size_t{rows} * rows, Seen());
-        for (std::size_t i = 0; i + 2 < indices.size(); i += 3) draw(tree, {indices[i], indices[i + 1], indices[i + 2]}, seen);
+        for (std::size_t i = 0; i + 2 < indices.size(); i += 3)
+            draw(tree, {indices[i], indices[i + 1], indices[i + 2]}, seen);
     }
     // The direction of a point from the eye.
     glm::dvec3 direction(std::size_t point) const {
@@ -80,7 +83,8 @@ public:
 private:
     // Each row is shifted by its own share of a column, each column by its own share of a row.
     glm::dvec2 place(int column, int row) const {
-        const double x = column + offsets_[static_cast<std::size_t>(row)], y = row + offsets_[static_cast<std::size_t>(column)];
+        const double x = column + offsets_[static_cast<std::size_t>(row)],
+                     y = row + offsets_[static_cast<std::size_t>(column)];
         return {half_ * (2 * x / rows - 1), half_ * (2 * y / rows - 1)};
     }
 
@@ -94,8 +98,12 @@ private:
         }
         const double area = (p[1].x - p[0].x) * (p[2].y - p[0].y) - (p[2].x - p[0].x) * (p[1].y - p[0].y);
         if (!(std::abs(area) > 0)) return;
-        const auto first = [&](double low) { return std::max(0, static_cast<int>(std::floor((low / half_ + 1) / 2 * rows)) - 1); };
-        const auto last = [&](double high) { return std::min(rows - 1, static_cast<int>(std::floor((high / half_ + 1) / 2 * rows)) + 1); };
+        const auto first = [&](double low) {
+            return std::max(0, static_cast<int>(std::floor((low / half_ + 1) / 2 * rows)) - 1);
+        };
+        const auto last = [&](double high) {
+            return std::min(rows - 1, static_cast<int>(std::floor((high / half_ + 1) / 2 * rows)) + 1);
+        };
         const auto [left, right] = std::minmax({p[0].x, p[1].x, p[2].x});
         const auto [bottom, top] = std::minmax({p[0].y, p[1].y, p[2].y});
         if (!(left < half_ && right > -half_ && bottom < half_ && top > -half_)) return;
@@ -113,7 +121,8 @@ private:
                 if (!(nearness > point.nearness)) continue;
                 point.nearness = nearness;
                 point.luminance = 0; // perspective: shares of the corners go by their nearness
-                for (std::size_t i = 0; i < 3; ++i) point.luminance += w[i] * p[i].z / nearness * luminance_of(tree, corners[i]);
+                for (std::size_t i = 0; i < 3; ++i)
+                    point.luminance += w[i] * p[i].z / nearness * luminance_of(tree, corners[i]);
                 point.corners = corners;
             }
         }
@@ -127,8 +136,8 @@ private:
 // ---- what is said of a fold
 
 struct Bound {
-    Sphere sphere;         // nothing changes beyond
-    LuminanceRange range;  // what changes has luminances of this, before and after
+    Sphere sphere;           // nothing changes beyond
+    LuminanceRange range;    // what changes has luminances of this, before and after
     bool is_outline = false; // may uncover anything
 };
 
@@ -137,24 +146,27 @@ bool may_be_outline(const VertexTree& tree, NodeId node, glm::dvec3 eye) {
     const glm::dvec3 to_eye = eye - glm::dvec3(around.ring.centre);
     const double distance = glm::length(to_eye);
     return (around.flags & irregular_ring) || !(static_cast<double>(around.ring.radius) < distance) ||
-           facing(around.slabs, [&] { return tree.mask(node); }, glm::vec3(to_eye / distance), static_cast<float>(distance), around.ring.radius) ==
-               Facing::mixed;
+           facing(
+               around.slabs, [&] { return tree.mask(node); }, glm::vec3(to_eye / distance),
+               static_cast<float>(distance), around.ring.radius) == Facing::mixed;
 }
 
 // What a fold did, and how it broke its bound.
 struct Found {
     std::size_t changed = 0; // points
     double largest = 0;      // change of luminance
-    int outside = 0, beyond = 0, uncovered = 0; // points: of another place, of more than the range allows, of something else than the ring
-    int turned = 0; // the same as uncovered, where triangles have turned over that the mask knows nothing of
+    int outside = 0, beyond = 0,
+        uncovered = 0; // points: of another place, of more than the range allows, of something else than the ring
+    int turned = 0;    // the same as uncovered, where triangles have turned over that the mask knows nothing of
 };
 
-Found compare(const Window& window, const std::vector<Seen>& before, const std::vector<Seen>& after, const Bound& bound, glm::dvec3 eye,
-              const std::function<bool(const Seen&)>& touches) {
+Found compare(const Window& window, const std::vector<Seen>& before, const std::vector<Seen>& after, const Bound& bound,
+              glm::dvec3 eye, const std::function<bool(const Seen&)>& touches) {
     Found found;
     const glm::dvec3 to_centre = glm::dvec3(bound.sphere.centre) - eye;
     const double distance = glm::length(to_centre);
-    const double allowed = static_cast<double>(bound.range.hi) - static_cast<double>(bound.range.lo) + luminance_rounding;
+    const double allowed =
+        static_cast<double>(bound.range.hi) - static_cast<double>(bound.range.lo) + luminance_rounding;
     for (std::size_t i = 0; i < before.size(); ++i) {
         if (before[i] == after[i]) continue;
         const double change = std::abs(before[i].luminance - after[i].luminance);
@@ -173,7 +185,9 @@ Found compare(const Window& window, const std::vector<Seen>& before, const std::
 // ---- cuts around a fold
 
 // The nodes whose fold shall be looked at: any, but seldom the largest, of which there are few.
-NodeId random_node(const VertexTree& tree, std::mt19937_64& random) { return static_cast<NodeId>(random() % tree.interior_count()); }
+NodeId random_node(const VertexTree& tree, std::mt19937_64& random) {
+    return static_cast<NodeId>(random() % tree.interior_count());
+}
 
 // Everything unfolded but the node's own subtree, down to its children or, half of the times, as it may come.
 void unfold_around(Cut& cut, NodeId node, std::mt19937_64& random, const std::function<bool(NodeId)>& may_fold) {
@@ -214,7 +228,10 @@ double checks_at(glm::dvec3 p) { return std::sin(12 * p.x) * std::sin(12 * p.y) 
 
 const Case cases[] = {
     {"organic", [] { return shapes::bumpy_sphere(3, 0.02); }},
-    {"cad", [] { return shapes::together(shapes::cube(8), shapes::placed(shapes::torus(30, 12), 0.5, {4, 0.5, 0})); }},
+    {"cad",
+     [] {
+         return shapes::together(shapes::cube(8), shapes::placed(shapes::torus(30, 12), 0.5, {4, 0.5, 0}));
+     }},
     {"checkerboard", [] { return painted(shapes::icosphere(3), checks_at); }},
     {"noise", [] { return painted(shapes::icosphere(3), noise_at); }},
     {"star", [] { return shapes::spiky_star(3); }},
@@ -242,23 +259,30 @@ protected:
             const double away = static_cast<double>(whole.radius) * (1.2 + 4 * shapes::random_unit(random));
             const glm::dvec3 eye = glm::dvec3(whole.centre) + away * shapes::random_direction(random);
             const Bound bound = bound_of(node, eye);
-            if (!(glm::length(glm::dvec3(bound.sphere.centre) - eye) > 1.05 * static_cast<double>(bound.sphere.radius))) continue; // never folds
+            if (!(glm::length(glm::dvec3(bound.sphere.centre) - eye) > 1.05 * static_cast<double>(bound.sphere.radius)))
+                continue; // never folds
             unfold_around(cut_, node, random, [&](NodeId other) { return may_fold(node, other); });
             // Now and then the whole mesh is in the window: nothing changes far away, either.
             const bool is_wide = i % 16 == 0;
             const Window window(eye, is_wide ? glm::dvec3(whole.centre) : glm::dvec3(bound.sphere.centre),
-                                static_cast<double>(is_wide ? whole.radius : bound.sphere.radius), is_wide ? 1.0 : 1.25, random);
+                                static_cast<double>(is_wide ? whole.radius : bound.sphere.radius), is_wide ? 1.0 : 1.25,
+                                random);
             indices.assign(cut_.indices().begin(), cut_.indices().end());
             window.draw(tree_, indices, before);
             fold_whole(cut_, node);
             window.draw(tree_, cut_.indices(), after);
             const auto is_below = [&](NodeId corner) { return is_in_subtree(corner, node); };
-            const auto touches = [&](const Seen& seen) { return std::any_of(seen.corners.begin(), seen.corners.end(), is_below); };
+            const auto touches = [&](const Seen& seen) {
+                return std::any_of(seen.corners.begin(), seen.corners.end(), is_below);
+            };
             Found found = compare(window, before, after, bound, eye, touches);
-            if (found.uncovered > 0 && turns_over({indices, cut_.indices()}, node, eye)) std::swap(found.uncovered, found.turned);
+            if (found.uncovered > 0 && turns_over({indices, cut_.indices()}, node, eye))
+                std::swap(found.uncovered, found.turned);
             if (found.outside + found.beyond + found.uncovered > 0 && ++reported_ <= 5)
-                std::printf("%s: fold %d of node %u: %d outside, %d beyond %g (largest %g), %d uncovered\n", GetParam().name, i, node, found.outside,
-                            found.beyond, static_cast<double>(bound.range.hi) - static_cast<double>(bound.range.lo), found.largest, found.uncovered);
+                std::printf("%s: fold %d of node %u: %d outside, %d beyond %g (largest %g), %d uncovered\n",
+                            GetParam().name, i, node, found.outside, found.beyond,
+                            static_cast<double>(bound.range.hi) - static_cast<double>(bound.range.lo), found.largest,
+                            found.uncovered);
             all.changed += found.changed;
             all.outside += found.outside > 0;
             all.beyond += found.beyond > 0;
@@ -266,8 +290,10 @@ protected:
             all.turned += found.turned > 0;
             all.largest = std::max(all.largest, found.largest);
         }
-        std::printf("%s: %d folds, %zu changed points, largest change %g; folds that break: place %d, luminance %d, uncover %d, turn over %d\n",
-                    GetParam().name, folds, all.changed, all.largest, all.outside, all.beyond, all.uncovered, all.turned);
+        std::printf("%s: %d folds, %zu changed points, largest change %g; folds that break: place %d, luminance %d, "
+                    "uncover %d, turn over %d\n",
+                    GetParam().name, folds, all.changed, all.largest, all.outside, all.beyond, all.uncovered,
+                    all.turned);
         return all;
     }
 
@@ -282,8 +308,11 @@ protected:
         bool has_front = false, has_back = false;
         for (const std::span<const NodeId> indices : surfaces) {
             for (std::size_t i = 0; i + 2 < indices.size(); i += 3) {
-                if (!is_in_subtree(indices[i], node) && !is_in_subtree(indices[i + 1], node) && !is_in_subtree(indices[i + 2], node)) continue;
-                const glm::dvec3 a = tree_.positions()[indices[i]], b = tree_.positions()[indices[i + 1]], c = tree_.positions()[indices[i + 2]];
+                if (!is_in_subtree(indices[i], node) && !is_in_subtree(indices[i + 1], node) &&
+                    !is_in_subtree(indices[i + 2], node))
+                    continue;
+                const glm::dvec3 a = tree_.positions()[indices[i]], b = tree_.positions()[indices[i + 1]],
+                                 c = tree_.positions()[indices[i + 2]];
                 (glm::dot(glm::cross(b - a, c - a), eye - a) > 0 ? has_front : has_back) = true;
             }
         }
@@ -295,13 +324,16 @@ protected:
     Cut cut_;
     int reported_ = 0;
 };
-INSTANTIATE_TEST_SUITE_P(Meshes, SingleFolds, testing::ValuesIn(cases), [](const auto& test) { return std::string(test.param.name); });
+INSTANTIATE_TEST_SUITE_P(Meshes, SingleFolds, testing::ValuesIn(cases),
+                         [](const auto& test) { return std::string(test.param.name); });
 
 // What `luebke-hallen` counts on, beside neighbours that are unfolded: the mesh's own ring.
 TEST_P(SingleFolds, StayWithinTheMeshsRing) {
     const Found found = run(
         1, [](NodeId, NodeId) { return false; },
-        [&](NodeId node, glm::dvec3 eye) { return Bound{tree_.bounds()[node].ring, tree_.ring_luminance()[node], may_be_outline(tree_, node, eye)}; });
+        [&](NodeId node, glm::dvec3 eye) {
+            return Bound{tree_.bounds()[node].ring, tree_.ring_luminance()[node], may_be_outline(tree_, node, eye)};
+        });
     EXPECT_GT(found.changed, 0u);
     EXPECT_EQ(found.outside, 0);
     EXPECT_EQ(found.beyond, 0);
@@ -316,7 +348,9 @@ TEST_P(SingleFolds, StayWithinTheCutsRing) {
         return a < b || (a == b && other > node);
     };
     const Found found = run(2, is_smaller, [&](NodeId node, glm::dvec3 eye) {
-        return Bound{{tree_.bounds()[node].ring.centre, rings_.radius[node]}, rings_.luminance[node], may_be_outline(tree_, node, eye)};
+        return Bound{{tree_.bounds()[node].ring.centre, rings_.radius[node]},
+                     rings_.luminance[node],
+                     may_be_outline(tree_, node, eye)};
     });
     EXPECT_GT(found.changed, 0u);
     EXPECT_EQ(found.outside, 0);

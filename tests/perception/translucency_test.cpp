@@ -65,7 +65,8 @@ Halves inner_triangles(const Cut& cut) {
 
 enum class Form { in_distances, safe, by_errors };
 
-Result<vdtree::DistanceCriterion> criterion_of(const VertexTree& tree, const View& view, const FoldTestOptions& options, Form form) {
+Result<vdtree::DistanceCriterion> criterion_of(const VertexTree& tree, const View& view, const FoldTestOptions& options,
+                                               Form form) {
     if (form == Form::by_errors) return error_distances(tree, view, options);
     if (form == Form::safe) return luebke_hallen_safe_distances(tree, *bound_cut_rings(tree), view, options);
     return luebke_hallen_distances(tree, view, options);
@@ -101,7 +102,8 @@ TEST_P(Translucency, KeepsWhatTheSceneMayShowThrough) {
 
 TEST_P(Translucency, OfOpaqueMeshesIsNone) {
     const VertexTree tree = square(1);
-    for (NodeId node = 0; node < tree.interior_count(); ++node) EXPECT_EQ(tree.bounds()[node].flags & vdtree::translucent_ring, 0);
+    for (NodeId node = 0; node < tree.interior_count(); ++node)
+        EXPECT_EQ(tree.bounds()[node].flags & vdtree::translucent_ring, 0);
     const Halves halves = halves_of(tree, GetParam());
     EXPECT_LT(halves.left, 100);
     EXPECT_LT(halves.right, 100);

@@ -35,8 +35,7 @@ TEST_F(ContextTest, ReportsErrorsOnceAndInWords) {
 }
 
 TEST_F(ContextTest, KeepsABoundedNumberOfErrors) {
-    for (int i = 0; i < 10000; ++i)
-        raise_error();
+    for (int i = 0; i < 10000; ++i) raise_error();
     const std::string errors = context().take_errors();
     EXPECT_THAT(errors, ::testing::HasSubstr("more"));
     EXPECT_LT(errors.size(), 20000u);
@@ -91,8 +90,7 @@ TEST_F(ContextTest, CanBeMadeOnSeveralThreads) {
             auto made = Context::headless();
             failure = made ? made->take_errors() : made.error().message;
         });
-    for (std::thread& thread : threads)
-        thread.join();
+    for (std::thread& thread : threads) thread.join();
     EXPECT_THAT(failures, ::testing::Each(""));
 }
 
@@ -102,8 +100,7 @@ TEST_F(ContextTest, CannotBeStolenByAnotherThread) {
     std::thread([&] {
         const auto current = context().make_current();
         stolen = current.has_value();
-        if (!current)
-            why = current.error().message;
+        if (!current) why = current.error().message;
     }).join();
     EXPECT_FALSE(stolen);
     EXPECT_THAT(why, ::testing::HasSubstr("thread"));

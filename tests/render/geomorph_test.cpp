@@ -73,7 +73,8 @@ protected:
 
     static float largest_change(const Frame& a, const Frame& b) {
         float most = 0;
-        for (std::size_t i = 0; i < a.luminance.size(); ++i) most = std::max(most, std::abs(a.luminance[i] - b.luminance[i]));
+        for (std::size_t i = 0; i < a.luminance.size(); ++i)
+            most = std::max(most, std::abs(a.luminance[i] - b.luminance[i]));
         return most;
     }
 
@@ -163,7 +164,8 @@ TEST_F(GeomorphTest, AVertexInTheMiddleIsDrawnThere) {
         ASSERT_TRUE(made->step(cut, 0.25));
         const auto frame = renderer->draw(*made, view, {.samples = 1, .background = 0});
         ASSERT_TRUE(frame) << frame.error().message;
-        const auto bright = std::count_if(frame->luminance.begin(), frame->luminance.end(), [](float l) { return l > 0.1f; });
+        const auto bright =
+            std::count_if(frame->luminance.begin(), frame->luminance.end(), [](float l) { return l > 0.1f; });
         const double side = 32 * share; // of the quad in pixels: half of the window when it is whole
         EXPECT_NEAR(static_cast<double>(bright), side * side, 2 * side + 4) << share;
     }

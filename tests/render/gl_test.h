@@ -14,8 +14,7 @@ class GlTest : public ::testing::Test {
 protected:
     void SetUp() override {
         auto made = Context::headless();
-        if (!made)
-            GTEST_SKIP() << made.error().message;
+        if (!made) GTEST_SKIP() << made.error().message;
         context_ = std::move(*made);
         EXPECT_EQ(context_->take_errors(), "") << "after making the context";
     }

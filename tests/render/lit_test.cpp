@@ -97,10 +97,12 @@ TEST_P(Lit, VerticesAreAsBrightAsTheFormulaSays) {
         options.lighting = lighting;
         const auto frame = renderer->draw(cut, view, options);
         ASSERT_TRUE(frame) << frame.error().message;
-        const double expected = vdtree::lit_luminance(lighting, position, normal, static_cast<double>(vdtree::albedo_of(tree, node)), view.eye - tree.origin());
+        const double expected = vdtree::lit_luminance(
+            lighting, position, normal, static_cast<double>(vdtree::albedo_of(tree, node)), view.eye - tree.origin());
         EXPECT_NEAR(frame->luminance[0], expected, 1e-4) << lights().name << ", leaf " << leaf;
         const glm::dvec3 rgb(frame->colour[0], frame->colour[1], frame->colour[2]);
-        EXPECT_NEAR(glm::dot(rgb, glm::dvec3(0.2126, 0.7152, 0.0722)), expected, 1e-4) << "the colour is scaled to the luminance";
+        EXPECT_NEAR(glm::dot(rgb, glm::dvec3(0.2126, 0.7152, 0.0722)), expected, 1e-4)
+            << "the colour is scaled to the luminance";
         ++compared;
     }
     EXPECT_GT(compared, 20);
@@ -126,9 +128,10 @@ TEST_P(Lit, SimplificationsCannotBeToldFromTheWhole) {
             kept += cut.triangle_count();
             all += whole.triangle_count();
             const auto draw = [&](const Cut& of) { return oracle::draw(*renderer, of, look.view, 36, lighting); };
-            const perception::Judgement judged = oracle::judge(draw(whole), draw(cut), look, perception::CsfModel::castle);
-            EXPECT_EQ(judged.visible_pixels, 0) << lights().name << ", from " << oracle::words(look) << ", " << cut.triangle_count() << " of "
-                                                << whole.triangle_count();
+            const perception::Judgement judged =
+                oracle::judge(draw(whole), draw(cut), look, perception::CsfModel::castle);
+            EXPECT_EQ(judged.visible_pixels, 0) << lights().name << ", from " << oracle::words(look) << ", "
+                                                << cut.triangle_count() << " of " << whole.triangle_count();
         }
         EXPECT_LT(kept, 0.9 * all);
     }

@@ -22,10 +22,10 @@ using unseen::vdtree::Cut;
 using unseen::vdtree::Similarity;
 using unseen::vdtree::View;
 
-constexpr float value_tolerance = 1e-5f;              // relative luminance inside of a triangle; see above
+constexpr float value_tolerance = 1e-5f;                 // relative luminance inside of a triangle; see above
 constexpr float stored_tolerance = 0.5f / 65535 + 1e-6f; // luminance is stored in 16 bits
-constexpr double snapping_px = 1.0 / 256;             // of edges; see above
-constexpr double sample_share = 1.0 / 16;             // one of 16 samples a pixel
+constexpr double snapping_px = 1.0 / 256;                // of edges; see above
+constexpr double sample_share = 1.0 / 16;                // one of 16 samples a pixel
 
 class RendererTest : public GlTest {
 protected:
@@ -83,8 +83,10 @@ TEST_F(RendererTest, FillsTheScreenWithTheQuadsLuminance) {
         const Frame frame = draw(scene, frontal_view(width, height));
         ASSERT_EQ(frame.width, width);
         ASSERT_EQ(frame.height, height);
-        EXPECT_THAT(frame.luminance, ::testing::Each(::testing::FloatNear(0.5f, stored_tolerance))) << width << "x" << height;
-        EXPECT_THAT(frame.colour, ::testing::Each(::testing::FloatNear(0.5f, stored_tolerance))) << width << "x" << height;
+        EXPECT_THAT(frame.luminance, ::testing::Each(::testing::FloatNear(0.5f, stored_tolerance)))
+            << width << "x" << height;
+        EXPECT_THAT(frame.colour, ::testing::Each(::testing::FloatNear(0.5f, stored_tolerance)))
+            << width << "x" << height;
     }
 }
 
@@ -194,8 +196,7 @@ TEST_F(RendererTest, InterpolatesLuminanceInSpaceNotOnTheScreen) {
     for (int row = n / 2; row < n; ++row) {
         const double down = (2 * row + 1.0) / n - 1; // of the ray (x, -down, -1) from the eye at z = 1
         const double z = 1 - 1 / down;
-        if (z < -19)
-            continue;
+        if (z < -19) continue;
         for (int column = 0; column < n; ++column, ++seen)
             EXPECT_NEAR(at(frame, column, row), truth(z), value_tolerance) << column << ", " << row;
     }
@@ -240,11 +241,9 @@ TEST_F(RendererTest, ShowsWhatIsNearer) {
     for (bool near_first : {true, false})
         for (double gap : {1.0, 1e-2, 1e-4}) { // of a distance of 1
             Mesh mesh;
-            if (near_first)
-                add_rectangle(mesh, {-9, -9}, {9, 9}, 0, grey(0.25f));
+            if (near_first) add_rectangle(mesh, {-9, -9}, {9, 9}, 0, grey(0.25f));
             add_rectangle(mesh, {-9, -9}, {9, 9}, -gap, grey(0.75f));
-            if (!near_first)
-                add_rectangle(mesh, {-9, -9}, {9, 9}, 0, grey(0.25f));
+            if (!near_first) add_rectangle(mesh, {-9, -9}, {9, 9}, 0, grey(0.25f));
             const Scene scene(mesh);
             const Frame front = draw(scene, frontal_view(32, 32));
             EXPECT_THAT(front.luminance, ::testing::Each(::testing::FloatNear(0.25f, value_tolerance))) << gap;
@@ -464,8 +463,7 @@ TEST_F(RendererTest, HidesLinesBehindSurfaces) {
     Mesh mesh;
     add_rectangle(mesh, {-30, -5}, {10, 35}, 0, grey(0.5f)); // its diagonal passes the window by
     const Frame alone = draw(Scene(mesh), frontal_view(32, 32));
-    for (int i = 0; i < 40; ++i)
-        add_rectangle(mesh, {-1 + 0.05 * i, -1}, {-0.96 + 0.05 * i, 1}, -0.1, grey(0.9f));
+    for (int i = 0; i < 40; ++i) add_rectangle(mesh, {-1 + 0.05 * i, -1}, {-0.96 + 0.05 * i, 1}, -0.1, grey(0.9f));
     DrawOptions options;
     options.wireframe = true;
     const Frame frame = draw(Scene(mesh), frontal_view(32, 32), options);
@@ -512,10 +510,8 @@ TEST_F(RendererTest, FollowsTheCutAsItChanges) {
     for (int level = 0; level < 3; ++level) {
         std::vector<unseen::vdtree::NodeId> folded;
         for (unseen::vdtree::NodeId node = 0; node < scene.tree.interior_count(); ++node)
-            if (!scene.cut.is_unfolded(node) && scene.cut.is_active(node))
-                folded.push_back(node);
-        for (unseen::vdtree::NodeId node : folded)
-            scene.cut.unfold(node);
+            if (!scene.cut.is_unfolded(node) && scene.cut.is_active(node)) folded.push_back(node);
+        for (unseen::vdtree::NodeId node : folded) scene.cut.unfold(node);
     }
     ASSERT_GT(scene.cut.triangle_count(), 0u);
     const auto coarse = renderer->draw(scene.cut, view);
@@ -623,8 +619,7 @@ TEST_F(RendererTest, RefusesWhatCannotBeDrawn) {
 
 TEST_F(RendererTest, RefusesAFrameLargerThanTheDriverDraws) {
     const int side = largest_target_side() + 1;
-    if (side > 32768)
-        GTEST_SKIP() << "this driver draws every window that a view may ask for";
+    if (side > 32768) GTEST_SKIP() << "this driver draws every window that a view may ask for";
     const Scene scene(rectangle({-1, -1}, {1, 1}, 0, grey(0.5f)));
     auto renderer = Renderer::create(context(), scene.tree);
     ASSERT_TRUE(renderer) << renderer.error().message;

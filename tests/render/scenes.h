@@ -35,9 +35,10 @@ inline void add_quad(Mesh& mesh, const std::array<glm::dvec3, 4>& corners, const
 //   |   / |
 //   0 --- 1
 inline void add_rectangle(Mesh& mesh, glm::dvec2 lo, glm::dvec2 hi, double z, glm::vec4 colour) {
-    add_quad(mesh, {glm::dvec3(lo.x, lo.y, z), glm::dvec3(hi.x, lo.y, z), glm::dvec3(hi.x, hi.y, z),
-                    glm::dvec3(lo.x, hi.y, z)},
-             {colour, colour, colour, colour});
+    add_quad(
+        mesh,
+        {glm::dvec3(lo.x, lo.y, z), glm::dvec3(hi.x, lo.y, z), glm::dvec3(hi.x, hi.y, z), glm::dvec3(lo.x, hi.y, z)},
+        {colour, colour, colour, colour});
 }
 
 inline Mesh rectangle(glm::dvec2 lo, glm::dvec2 hi, double z, glm::vec4 colour) {
@@ -67,8 +68,7 @@ inline Mesh cube(bool outward = true) {
                 corners[i][(axis + 1) % 3] = square[i].x;
                 corners[i][(axis + 2) % 3] = square[i].y;
             }
-            if ((side < 0) == outward)
-                std::swap(corners[1], corners[3]);
+            if ((side < 0) == outward) std::swap(corners[1], corners[3]);
             const float luminance = 0.2f + 0.1f * static_cast<float>(2 * axis + (side > 0 ? 1 : 0));
             add_quad(mesh, corners, {grey(luminance), grey(luminance), grey(luminance), grey(luminance)});
         }
@@ -97,8 +97,7 @@ inline Mesh bumpy_sphere(Index n) {
 }
 
 inline Mesh transformed(Mesh mesh, const std::function<glm::dvec3(glm::dvec3)>& f) {
-    for (glm::dvec3& p : mesh.positions)
-        p = f(p);
+    for (glm::dvec3& p : mesh.positions) p = f(p);
     return mesh;
 }
 
@@ -115,8 +114,7 @@ private:
         vdtree::BuildOptions options;
         options.clusterer = vdtree::ClustererKind::octree;
         auto built = vdtree::build_tree(mesh.view(), options);
-        if (!built)
-            throw std::runtime_error("the test's mesh does not build: " + built.error().message);
+        if (!built) throw std::runtime_error("the test's mesh does not build: " + built.error().message);
         return std::move(*built);
     }
 };

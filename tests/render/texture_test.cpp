@@ -62,7 +62,9 @@ protected:
         const std::size_t i = 3 * static_cast<std::size_t>(y * frame.width + x);
         return {frame.colour[i], frame.colour[i + 1], frame.colour[i + 2]};
     }
-    static double luminance(const render::Frame& frame, int x, int y) { return static_cast<double>(frame.luminance[static_cast<std::size_t>(y * frame.width + x)]); }
+    static double luminance(const render::Frame& frame, int x, int y) {
+        return static_cast<double>(frame.luminance[static_cast<std::size_t>(y * frame.width + x)]);
+    }
     static void expect_near(glm::dvec3 a, glm::dvec3 b, double tolerance) {
         for (int k = 0; k < 3; ++k) EXPECT_NEAR(a[k], b[k], tolerance) << k;
     }
@@ -98,13 +100,16 @@ TEST_F(Textured, TexelsAreDecodedExactly) {
     }
     const render::Frame frame = draw(built(textures::textured_grid(1, ramp)), 1, 256, {.samples = 1});
     for (int code = 1; code < 255; ++code)
-        EXPECT_NEAR(luminance(frame, code, 128), vdtree::linear_luminance(ramp.texels[static_cast<std::size_t>(code)]), code_step) << code;
+        EXPECT_NEAR(luminance(frame, code, 128), vdtree::linear_luminance(ramp.texels[static_cast<std::size_t>(code)]),
+                    code_step)
+            << code;
 }
 
 TEST_F(Textured, AreMultipliedWithTheColoursOfVertices) {
     Mesh mesh = textures::textured_grid(4, four_colours());
     mesh.colours.assign(mesh.positions.size(), {0.5f, 0.25f, 1.0f, 1});
-    const render::Frame plain = draw(built(textures::textured_grid(4, four_colours())), 4, 64), tinted = draw(built(mesh), 4, 64);
+    const render::Frame plain = draw(built(textures::textured_grid(4, four_colours())), 4, 64),
+                        tinted = draw(built(mesh), 4, 64);
     for (const auto& [x, y] : {std::pair(10, 12), std::pair(48, 16), std::pair(33, 40)}) {
         const glm::dvec3 expected = colour(plain, x, y) * glm::dvec3(0.5, 0.25, 1);
         expect_near(colour(tinted, x, y), expected, 1e-4);
@@ -113,9 +118,11 @@ TEST_F(Textured, AreMultipliedWithTheColoursOfVertices) {
 }
 
 TEST_F(Textured, AreLitByTheTreesLight) {
-    const auto relit = built(textures::textured_grid(4, four_colours())).relit({.direction = {0, 0, 1}, .ambient = 0.5f});
+    const auto relit =
+        built(textures::textured_grid(4, four_colours())).relit({.direction = {0, 0, 1}, .ambient = 0.5f});
     ASSERT_TRUE(relit);
-    const auto aside = built(textures::textured_grid(4, four_colours())).relit({.direction = {1, 0, 0}, .ambient = 0.5f});
+    const auto aside =
+        built(textures::textured_grid(4, four_colours())).relit({.direction = {1, 0, 0}, .ambient = 0.5f});
     ASSERT_TRUE(aside);
     const render::Frame bright = draw(*relit, 4, 64), dark = draw(*aside, 4, 64);
     expect_near(colour(dark, 16, 48), colour(bright, 16, 48) * 0.5, 1e-4);
@@ -124,7 +131,8 @@ TEST_F(Textured, AreLitByTheTreesLight) {
 // Fields of a tenth of a pixel: half of them white is half the light, an sRGB code of 188 and not of 128.
 TEST_F(Textured, KeepTheirLightWhereTheyAreSmall) {
     for (const int samples : {1, 16}) {
-        const render::Frame frame = draw(built(textures::textured_grid(4, textures::checkerboard(512, 512, 1, 0, 255))), 4, 50, {.samples = samples});
+        const render::Frame frame = draw(built(textures::textured_grid(4, textures::checkerboard(512, 512, 1, 0, 255))),
+                                         4, 50, {.samples = samples});
         for (int x = 5; x < 45; x += 7) EXPECT_NEAR(luminance(frame, x, 25), 0.5, 0.02) << samples;
     }
     // Sides that no two divides, too.
@@ -143,9 +151,12 @@ TEST_F(Textured, RepeatOrEndWhereTheySaySo) {
         mesh.texture.wrap_u = mesh.texture.wrap_v = wrap;
         for (glm::vec2& uv : mesh.uvs) uv = uv * 2.0f;
         const render::Frame frame = draw(built(mesh), 4, 64);
-        const auto texel = [&](int i) { return glm::dvec3(vdtree::linear_colour(mesh.texture.texels[static_cast<std::size_t>(i)])); };
+        const auto texel = [&](int i) {
+            return glm::dvec3(vdtree::linear_colour(mesh.texture.texels[static_cast<std::size_t>(i)]));
+        };
         expect_near(colour(frame, 8, 56), texel(0), 0.08);
-        expect_near(colour(frame, 40, 24), texel(wrap == vdtree::Wrap::repeat ? 0 : 3), wrap == vdtree::Wrap::repeat ? 0.08 : code_step);
+        expect_near(colour(frame, 40, 24), texel(wrap == vdtree::Wrap::repeat ? 0 : 3),
+                    wrap == vdtree::Wrap::repeat ? 0.08 : code_step);
     }
 }
 
@@ -202,7 +213,8 @@ TEST_F(Textured, AreLitByLights) {
 // Any vertex under any texel, in the range of its node.
 TEST_F(Textured, AreBoundedUnderLights) {
     Mesh mesh = textures::textured_sphere(3, textures::noise(40, 40, 6));
-    for (std::size_t v = 0; v < mesh.positions.size(); ++v) mesh.colours.push_back({0.3f + 0.7f * static_cast<float>(v % 2), 0.8f, v % 3 ? 0.2f : 1.0f, 1});
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v)
+        mesh.colours.push_back({0.3f + 0.7f * static_cast<float>(v % 2), 0.8f, v % 3 ? 0.2f : 1.0f, 1});
     const VertexTree tree = built(mesh);
     const auto bounds = vdtree::LightBounds::measure(tree);
     ASSERT_TRUE(bounds);
@@ -218,12 +230,15 @@ TEST_F(Textured, AreBoundedUnderLights) {
     vdtree::Lighting dull = lighting;
     dull.specular = 0;
     for (vdtree::NodeId node = 0; node < tree.interior_count(); ++node) {
-        const vdtree::LuminanceRange range = vdtree::lit_range(lighting, bounds->cones()[node], tree.bounds()[node].ring, eye);
+        const vdtree::LuminanceRange range =
+            vdtree::lit_range(lighting, bounds->cones()[node], tree.bounds()[node].ring, eye);
         for (vdtree::Index leaf = support::sound(tree).first_leaf()[node]; leaf < support::sound(tree).leaf_end()[node];
              ++leaf) {
             const vdtree::NodeId vertex = tree.interior_count() + leaf;
-            const glm::dvec3 p(tree.positions()[vertex]), n(glm::vec3(tree.normals()[vertex])), rgb(tree.colours()[vertex]);
-            const double light = vdtree::lit_luminance(dull, p, n, 1, eye), both = vdtree::lit_luminance(lighting, p, n, 1, eye);
+            const glm::dvec3 p(tree.positions()[vertex]), n(glm::vec3(tree.normals()[vertex])),
+                rgb(tree.colours()[vertex]);
+            const double light = vdtree::lit_luminance(dull, p, n, 1, eye),
+                         both = vdtree::lit_luminance(lighting, p, n, 1, eye);
             const auto at = [&](float u) { return static_cast<std::size_t>((u - std::floor(u)) * 40) % 40; };
             const glm::vec2 uv = tree.uvs()[vertex];
             const glm::dvec3 texel(vdtree::linear_colour(mesh.texture.texels[at(uv.y) * 40 + at(uv.x)]));

@@ -36,7 +36,8 @@ Texture hills() {
         for (int x = 0; x < 128; ++x) {
             const double waves = std::sin(2 * 3.14159265 * x / 128) * std::sin(2 * 3.14159265 * y / 128);
             const auto code = static_cast<std::uint8_t>(140 + 50 * waves);
-            texture.texels.push_back({code, static_cast<std::uint8_t>(code / 2), static_cast<std::uint8_t>(255 - code), 255});
+            texture.texels.push_back(
+                {code, static_cast<std::uint8_t>(code / 2), static_cast<std::uint8_t>(255 - code), 255});
         }
     return texture;
 }
@@ -52,16 +53,20 @@ struct Case {
     Mesh (*make)();
 };
 const Case cases[] = {
-    {"checkerboard_on_a_sphere", [] { return textures::textured_sphere(5, textures::checkerboard(128, 128, 16, 40, 220), 0.9); }},
+    {"checkerboard_on_a_sphere",
+     [] { return textures::textured_sphere(5, textures::checkerboard(128, 128, 16, 40, 220), 0.9); }},
     {"noise_on_a_sphere", [] { return textures::textured_sphere(5, textures::noise(256, 256, 3, 100, 150)); }},
     {"hills_on_a_bumpy_sphere", [] { return textures::with_uvs(shapes::bumpy_sphere(5, 0.01), hills()); }},
-    {"checkerboard_on_a_plane", [] { return textures::textured_grid(40, textures::checkerboard(128, 128, 16, 40, 220)); }},
-    {"noise_squeezed_on_a_plane", [] { return squeezed(textures::textured_grid(40, textures::noise(128, 128, 5, 90, 160))); }},
+    {"checkerboard_on_a_plane",
+     [] { return textures::textured_grid(40, textures::checkerboard(128, 128, 16, 40, 220)); }},
+    {"noise_squeezed_on_a_plane",
+     [] { return squeezed(textures::textured_grid(40, textures::noise(128, 128, 5, 90, 160))); }},
     {"seams", [] { return textures::with_seams(textures::textured_sphere(4, hills())); }},
 };
 
 class TexturedOracle : public testing::TestWithParam<Case> {};
-INSTANTIATE_TEST_SUITE_P(Meshes, TexturedOracle, testing::ValuesIn(cases), [](const auto& test) { return std::string(test.param.name); });
+INSTANTIATE_TEST_SUITE_P(Meshes, TexturedOracle, testing::ValuesIn(cases),
+                         [](const auto& test) { return std::string(test.param.name); });
 
 TEST_P(TexturedOracle, SeesNothingOfWhatTheSafeTestFolds) {
     const VertexTree tree = built(GetParam().make());
@@ -75,18 +80,21 @@ TEST_P(TexturedOracle, SeesNothingOfWhatTheSafeTestFolds) {
         whole.unfold_all();
         const perception::Image before = oracle::draw(*renderer, whole, look.view);
         for (const bool is_safe : {false, true}) {
-            const auto criterion = is_safe ? perception::luebke_hallen_safe_distances(tree, rings, look.view, look.options)
-                                           : perception::luebke_hallen_distances(tree, look.view, look.options);
+            const auto criterion = is_safe
+                                       ? perception::luebke_hallen_safe_distances(tree, rings, look.view, look.options)
+                                       : perception::luebke_hallen_distances(tree, look.view, look.options);
             ASSERT_TRUE(criterion) << criterion.error().message;
             EXPECT_TRUE(criterion->is_monotone());
             Cut cut(tree);
             const bool is_closed = tree.closedness() == vdtree::Closedness::closed_outward;
-            ASSERT_TRUE(cut.follow(*criterion, perception::viewpoint_of(tree, look.view, look.options), {.cull_back_faces = is_closed}));
+            ASSERT_TRUE(cut.follow(*criterion, perception::viewpoint_of(tree, look.view, look.options),
+                                   {.cull_back_faces = is_closed}));
             const perception::Image after = oracle::draw(*renderer, cut, look.view);
             for (const perception::CsfModel model : oracle::judges) {
                 const perception::Judgement judged = oracle::judge(before, after, look, model);
-                EXPECT_EQ(judged.visible_pixels, 0u) << "from " << oracle::words(look) << (is_safe ? ", safe, " : ", ") << cut.triangle_count() << " of "
-                                                     << tree.triangle_count() << " triangles, largest V " << judged.max_ratio;
+                EXPECT_EQ(judged.visible_pixels, 0u)
+                    << "from " << oracle::words(look) << (is_safe ? ", safe, " : ", ") << cut.triangle_count() << " of "
+                    << tree.triangle_count() << " triangles, largest V " << judged.max_ratio;
             }
         }
     }

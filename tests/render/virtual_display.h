@@ -18,8 +18,7 @@ namespace unseen::render::testing {
 class VirtualDisplay {
 public:
     VirtualDisplay() {
-        if (std::getenv("DISPLAY"))
-            return;
+        if (std::getenv("DISPLAY")) return;
         int ends[2];
         if (pipe(ends) != 0) {
             reason_ = "no pipe to Xvfb";
@@ -27,13 +26,14 @@ public:
         }
         fcntl(ends[0], F_SETFD, FD_CLOEXEC);
         std::string descriptor = std::to_string(ends[1]);
-        char program[] = "Xvfb", displayfd[] = "-displayfd", screen[] = "-screen", zero[] = "0",
-             size[] = "640x480x24", nolisten[] = "-nolisten", tcp[] = "tcp";
+        char program[] = "Xvfb", displayfd[] = "-displayfd", screen[] = "-screen", zero[] = "0", size[] = "640x480x24",
+             nolisten[] = "-nolisten", tcp[] = "tcp";
         char* arguments[] = {program, displayfd, descriptor.data(), screen, zero, size, nolisten, tcp, nullptr};
         posix_spawn_file_actions_t quiet;
         posix_spawn_file_actions_init(&quiet);
         // Not the test's own: who reads them would wait for the server, too, where a test dies without stopping it.
-        for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) posix_spawn_file_actions_addopen(&quiet, stream, "/dev/null", O_WRONLY, 0);
+        for (const int stream : {STDOUT_FILENO, STDERR_FILENO})
+            posix_spawn_file_actions_addopen(&quiet, stream, "/dev/null", O_WRONLY, 0);
         const int failed = posix_spawnp(&process_, program, &quiet, nullptr, arguments, environ);
         posix_spawn_file_actions_destroy(&quiet);
         close(ends[1]);
@@ -50,8 +50,7 @@ public:
     VirtualDisplay& operator=(const VirtualDisplay&) = delete;
 
     ~VirtualDisplay() {
-        if (process_ <= 0)
-            return;
+        if (process_ <= 0) return;
         kill(process_, SIGTERM);
         waitpid(process_, nullptr, 0);
     }

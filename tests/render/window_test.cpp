@@ -44,11 +44,9 @@ const ::testing::Environment* const display = ::testing::AddGlobalTestEnvironmen
 class WindowTest : public ::testing::Test {
 protected:
     void SetUp() override {
-        if (!Display::reason().empty())
-            GTEST_SKIP() << "no display: " << Display::reason();
+        if (!Display::reason().empty()) GTEST_SKIP() << "no display: " << Display::reason();
         auto made = Context::window({.width = 80, .height = 60, .title = "Unseen's test", .visible = true});
-        if (!made)
-            GTEST_SKIP() << made.error().message;
+        if (!made) GTEST_SKIP() << made.error().message;
         window_ = std::move(*made);
         EXPECT_EQ(window_->take_errors(), "") << "after opening the window";
     }
@@ -86,9 +84,7 @@ int srgb_byte(double linear) {
 }
 
 // One step of 8 bits: drivers encode by tables, and round in either direction.
-::testing::Matcher<int> about(int byte) {
-    return ::testing::AllOf(::testing::Ge(byte - 1), ::testing::Le(byte + 1));
-}
+::testing::Matcher<int> about(int byte) { return ::testing::AllOf(::testing::Ge(byte - 1), ::testing::Le(byte + 1)); }
 
 TEST_F(WindowTest, GivesAWindowWithAContext) {
     ASSERT_NE(window().glfw_window(), nullptr);
@@ -165,8 +161,7 @@ TEST_F(WindowTest, DrawsOffScreenToo) {
 
 TEST_F(WindowTest, TakesTurnsWithAHeadlessContext) {
     auto headless = Context::headless();
-    if (!headless)
-        GTEST_SKIP() << headless.error().message;
+    if (!headless) GTEST_SKIP() << headless.error().message;
     const Scene scene(rectangle({-9, -9}, {9, 9}, 0, grey(0.5f)));
     auto off_screen = Renderer::create(*headless, scene.tree);
     ASSERT_TRUE(off_screen) << off_screen.error().message;

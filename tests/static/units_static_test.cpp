@@ -9,19 +9,33 @@ namespace unseen::perception {
 namespace {
 
 template <class A, class B>
-concept can_add = requires(A a, B b) { a + b; };
+concept can_add = requires(A a, B b) {
+    a + b;
+};
 template <class A, class B>
-concept can_subtract = requires(A a, B b) { a - b; };
+concept can_subtract = requires(A a, B b) {
+    a - b;
+};
 template <class A, class B>
-concept can_multiply = requires(A a, B b) { a * b; };
+concept can_multiply = requires(A a, B b) {
+    a* b;
+};
 template <class A, class B>
-concept can_divide = requires(A a, B b) { a / b; };
+concept can_divide = requires(A a, B b) {
+    a / b;
+};
 template <class A, class B>
-concept can_compare = requires(A a, B b) { a < b; };
+concept can_compare = requires(A a, B b) {
+    a < b;
+};
 template <class A, class B>
-concept can_equate = requires(A a, B b) { a == b; };
+concept can_equate = requires(A a, B b) {
+    a == b;
+};
 template <class A, class B>
-concept can_assign = requires(A a, B b) { a = b; };
+concept can_assign = requires(A a, B b) {
+    a = b;
+};
 
 // Degrees and radians, the mix-up that costs most.
 static_assert(!std::convertible_to<Degrees, Radians> && !std::convertible_to<Radians, Degrees>);

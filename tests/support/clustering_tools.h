@@ -18,7 +18,8 @@ struct ClusteringTask {
           surface(vdtree::analyse_surface(view, coincident)) {
         const bool prelit = !view.colours.empty();
         for (std::size_t v = 0; v < view.positions.size(); ++v)
-            luminance.push_back(vdtree::vertex_luminance(surface.normals[v], prelit ? &view.colours[v] : nullptr, {}, prelit));
+            luminance.push_back(
+                vdtree::vertex_luminance(surface.normals[v], prelit ? &view.colours[v] : nullptr, {}, prelit));
     }
     vdtree::ClusterInput input() const { return {view, luminance, surface.normals, surface.areas, coincident}; }
 

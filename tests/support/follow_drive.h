@@ -55,7 +55,9 @@ public:
 
     // The first fault, or nothing.
     std::string run() {
-        auto tree = build_tree(make_mesh().view(), {.clusterer = in_.below(2) ? ClustererKind::octree : ClustererKind::quadric, .threads = 1});
+        auto tree =
+            build_tree(make_mesh().view(),
+                       {.clusterer = in_.below(2) ? ClustererKind::octree : ClustererKind::quadric, .threads = 1});
         if (!tree) return "no tree: " + tree.error().message;
         tree_.emplace(std::move(*tree));
         cut_.emplace(*tree_);
@@ -63,7 +65,8 @@ public:
         for (int step = 0; step < most_steps && !in_.empty(); ++step) {
             std::string fault = take_step();
             if (fault.empty()) fault = fault_in_cut(*cut_);
-            if (fault.empty() && in_.below(2) && triangles_of(cut_->indices()) != gathered(*cut_)) fault = "the index buffer is not the cut's";
+            if (fault.empty() && in_.below(2) && triangles_of(cut_->indices()) != gathered(*cut_))
+                fault = "the index buffer is not the cut's";
             if (!fault.empty()) return "step " + std::to_string(step) + ": " + fault;
         }
         return {};
@@ -96,13 +99,16 @@ private:
         parts.eccentricity_bins = in_.below(2) ? 1 : 8;
         parts.bin_degrees = in_.between(0.5, 20);
         std::vector<float> row_reach;
-        for (std::size_t row = 0; row < rows; ++row) row_reach.push_back(static_cast<float>(static_cast<double>(row) * in_.between(0.2, 6)));
+        for (std::size_t row = 0; row < rows; ++row)
+            row_reach.push_back(static_cast<float>(static_cast<double>(row) * in_.between(0.2, 6)));
         std::sort(row_reach.begin(), row_reach.end());
         if (in_.below(2)) row_reach.front() = DistanceCriterion::never_visible;
         if (in_.one_in(4)) row_reach.back() = DistanceCriterion::always_visible;
         for (const float reach : row_reach)
             for (std::size_t bin = 0; bin < parts.eccentricity_bins; ++bin)
-                parts.reach.push_back(reach > 0 && reach < DistanceCriterion::always_visible ? reach / static_cast<float>(1 + bin) : reach);
+                parts.reach.push_back(reach > 0 && reach < DistanceCriterion::always_visible
+                                          ? reach / static_cast<float>(1 + bin)
+                                          : reach);
         if (in_.below(3) == 0) parts.least_cost.assign(parts.reach.size(), static_cast<float>(in_.between(0, 2)));
         if (in_.below(4)) parts.classes = random_classes(rows, is_wild);
         if (in_.below(3) == 0) parts.lengths = random_lengths(is_wild);
@@ -117,7 +123,8 @@ private:
         for (NodeId node = tree_->interior_count(); node-- > 0;) {
             FoldClass& own = classes[node];
             own.interior = std::max(own.interior, static_cast<std::uint16_t>(in_.below(static_cast<unsigned>(rows))));
-            own.silhouette = std::max({own.silhouette, own.interior, static_cast<std::uint16_t>(in_.below(static_cast<unsigned>(rows)))});
+            own.silhouette = std::max(
+                {own.silhouette, own.interior, static_cast<std::uint16_t>(in_.below(static_cast<unsigned>(rows)))});
             if (node == 0 || is_wild) continue;
             FoldClass& parent = classes[support::sound(*tree_).parents()[node]];
             parent.interior = std::max(parent.interior, own.interior);
@@ -129,7 +136,8 @@ private:
     std::vector<float> random_lengths(bool is_wild) {
         std::vector<float> lengths(tree_->interior_count());
         for (NodeId node = tree_->interior_count(); node-- > 0;) {
-            lengths[node] = std::max(lengths[node], static_cast<float>(in_.share() * tree_->bounds()[node].ring.radius));
+            lengths[node] =
+                std::max(lengths[node], static_cast<float>(in_.share() * tree_->bounds()[node].ring.radius));
             if (node == 0 || is_wild) continue;
             float& parent = lengths[support::sound(*tree_).parents()[node]];
             parent = std::max(parent, lengths[node]);
@@ -159,7 +167,8 @@ private:
     struct SteadyCosts {
         explicit SteadyCosts(unsigned seed) : seed_(seed) {}
         void operator()(const VertexTree&, std::span<const NodeId> nodes, std::span<float> costs) const {
-            for (std::size_t i = 0; i < nodes.size(); ++i) costs[i] = static_cast<float>((nodes[i] * 7 + seed_) % 5) * 0.5f;
+            for (std::size_t i = 0; i < nodes.size(); ++i)
+                costs[i] = static_cast<float>((nodes[i] * 7 + seed_) % 5) * 0.5f;
         }
         unsigned seed_;
     };
@@ -168,8 +177,12 @@ private:
         const Sphere sphere = tree_->bounding_sphere();
         const double radius = std::max(1e-6, static_cast<double>(sphere.radius));
         switch (in_.below(8)) {
-        case 0: viewpoint_.eye = glm::dvec3(sphere.centre) + radius * std::pow(10.0, in_.between(-2, 6)) * in_.direction(); break;
-        case 1: viewpoint_.eye = glm::dvec3(tree_->positions()[in_.below(tree_->node_count())]); break; // where a vertex is
+        case 0:
+            viewpoint_.eye = glm::dvec3(sphere.centre) + radius * std::pow(10.0, in_.between(-2, 6)) * in_.direction();
+            break;
+        case 1:
+            viewpoint_.eye = glm::dvec3(tree_->positions()[in_.below(tree_->node_count())]);
+            break; // where a vertex is
         case 2: viewpoint_.eye = {1e18 * in_.share() * 0.5, 0, 0}; break;
         case 3: break; // stands still
         default: viewpoint_.eye += radius * std::pow(10.0, in_.between(-4, 0)) * in_.direction(); break;
@@ -180,7 +193,8 @@ private:
         if (in_.below(6) == 0) {
             viewpoint_.frusta.assign(in_.below(3), {});
             for (Frustum& frustum : viewpoint_.frusta)
-                for (unsigned planes = in_.below(4); planes > 0; --planes) frustum.planes.push_back({in_.direction(), radius * in_.between(-2, 3)});
+                for (unsigned planes = in_.below(4); planes > 0; --planes)
+                    frustum.planes.push_back({in_.direction(), radius * in_.between(-2, 3)});
         }
         if (in_.below(2) == 0) {
             const double step = std::pow(10.0, in_.between(-4, 0));
@@ -194,7 +208,8 @@ private:
         if (in_.below(6) == 0) {
             viewpoint_.occluders.clear();
             for (unsigned count = in_.below(4); count > 0; --count)
-                viewpoint_.occluders.push_back({sphere.centre + glm::vec3(radius * in_.share() * in_.direction()), static_cast<float>(radius * in_.share())});
+                viewpoint_.occluders.push_back({sphere.centre + glm::vec3(radius * in_.share() * in_.direction()),
+                                                static_cast<float>(radius * in_.share())});
         }
         // An occluder that the eye is in, or one at all with other spheres, is no good viewpoint.
         if (criterion_->parts().spheres != DistanceCriterion::Spheres::ring) viewpoint_.occluders.clear();
@@ -214,23 +229,29 @@ private:
     std::string follow() {
         const Viewpoint viewpoint = next_viewpoint();
         const FollowOptions options = next_options();
-        if (const auto stats = cut_->follow(*criterion_, viewpoint, options); !stats) return "refused: " + stats.error().message;
-        if (state_of(*cut_) != from_scratch(*tree_, *criterion_, viewpoint, options)) return "the cut is not the one from scratch";
+        if (const auto stats = cut_->follow(*criterion_, viewpoint, options); !stats)
+            return "refused: " + stats.error().message;
+        if (state_of(*cut_) != from_scratch(*tree_, *criterion_, viewpoint, options))
+            return "the cut is not the one from scratch";
         return {};
     }
 
     std::string follow_within_a_budget() {
         const Viewpoint viewpoint = next_viewpoint();
         FollowOptions options = next_options();
-        options.triangle_budget = in_.below(3) ? in_.below(static_cast<unsigned>(tree_->triangle_count()) + 3) : in_.below(2) ? 0 : ~Index{0};
+        options.triangle_budget = in_.below(3)   ? in_.below(static_cast<unsigned>(tree_->triangle_count()) + 3)
+                                  : in_.below(2) ? 0
+                                                 : ~Index{0};
         options.fill_budget = in_.below(2);
         if (in_.below(3) == 0) options.hysteresis = static_cast<float>(in_.between(1, 2));
         const auto stats = cut_->follow(*criterion_, viewpoint, options);
         if (!stats) return "refused: " + stats.error().message;
-        if (stats->triangles > *options.triangle_budget || stats->triangles != cut_->triangle_count()) return "the budget was exceeded";
+        if (stats->triangles > *options.triangle_budget || stats->triangles != cut_->triangle_count())
+            return "the budget was exceeded";
         if (options.hysteresis > 1) return {};
         Cut fresh(*tree_);
-        if (!fresh.follow(*criterion_, viewpoint, options) || state_of(fresh) != state_of(*cut_)) return "within a budget, the cut depends on the one before";
+        if (!fresh.follow(*criterion_, viewpoint, options) || state_of(fresh) != state_of(*cut_))
+            return "within a budget, the cut depends on the one before";
         return {};
     }
 
@@ -244,12 +265,14 @@ private:
         for (int calls = 0; calls < most_calls; ++calls) {
             const auto stats = cut_->follow(*criterion_, viewpoint, options);
             if (!stats) return "refused: " + stats.error().message;
-            if (const std::string fault = fault_in_cut(*cut_); !fault.empty()) return "between two time limits: " + fault;
+            if (const std::string fault = fault_in_cut(*cut_); !fault.empty())
+                return "between two time limits: " + fault;
             if (!stats->is_complete) {
                 options.milliseconds = 1.0;
                 continue;
             }
-            if (state_of(*cut_) != from_scratch(*tree_, *criterion_, viewpoint, options)) return "when its time is over, the cut is not the one from scratch";
+            if (state_of(*cut_) != from_scratch(*tree_, *criterion_, viewpoint, options))
+                return "when its time is over, the cut is not the one from scratch";
             return {};
         }
         return "never done";
@@ -257,13 +280,17 @@ private:
 
     // One number that cannot be: refused, and nothing is changed.
     std::string follow_bad() {
-        constexpr double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+        constexpr double nan = std::numeric_limits<double>::quiet_NaN(),
+                         infinity = std::numeric_limits<double>::infinity();
         const double bad = in_.below(3) == 0 ? nan : in_.below(2) ? infinity : -infinity;
         Viewpoint viewpoint = viewpoint_;
         FollowOptions options;
         switch (in_.below(11)) {
         case 8: viewpoint.occluders = {{glm::vec3(9, 9, 9), static_cast<float>(bad)}}; break;
-        case 9: viewpoint.occluders = {{glm::vec3(viewpoint.eye), static_cast<float>(1 + 0.01 * glm::length(viewpoint.eye))}}; break;
+        case 9:
+            viewpoint.occluders = {
+                {glm::vec3(viewpoint.eye), static_cast<float>(1 + 0.01 * glm::length(viewpoint.eye))}};
+            break;
         case 0: viewpoint.eye[static_cast<int>(in_.below(3))] = bad; break;
         case 1: viewpoint.eye = {0, 3e18, 0}; break;
         case 2: viewpoint.gaze = glm::dvec3(bad, 0, 0); break;

@@ -17,8 +17,8 @@ namespace unseen::support {
 using namespace vdtree;
 
 // Independent of the follower: top-down by single tests.
-inline std::vector<bool> from_scratch(const VertexTree& tree, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
-                                      const FollowOptions& options) {
+inline std::vector<bool> from_scratch(const VertexTree& tree, const DistanceCriterion& criterion,
+                                      const Viewpoint& viewpoint, const FollowOptions& options) {
     FoldTester tester(tree, criterion, options.cull_back_faces, options.threshold);
     tester.look_from(viewpoint, 1);
     std::vector<bool> unfolded(tree.interior_count(), false);

@@ -18,7 +18,8 @@ using vdtree::Mesh;
 using vdtree::Texture;
 
 // Fields of `cell` texels of the two codes, grey.
-inline Texture checkerboard(std::uint32_t width, std::uint32_t height, std::uint32_t cell, std::uint8_t dark, std::uint8_t bright) {
+inline Texture checkerboard(std::uint32_t width, std::uint32_t height, std::uint32_t cell, std::uint8_t dark,
+                            std::uint8_t bright) {
     Texture texture{width, height, {}, {}, {}};
     for (std::uint32_t y = 0; y < height; ++y)
         for (std::uint32_t x = 0; x < width; ++x) {
@@ -43,7 +44,8 @@ inline Texture noise(std::uint32_t width, std::uint32_t height, std::uint64_t se
 // Coordinates by place, whatever the shape.
 inline Mesh with_uvs(Mesh mesh, const Texture& texture, double scale = 0.5) {
     mesh.uvs.clear();
-    for (const glm::dvec3& p : mesh.positions) mesh.uvs.push_back(glm::vec2(glm::dvec2(scale * (p.x + 0.3 * p.z), scale * (p.y - 0.2 * p.z))));
+    for (const glm::dvec3& p : mesh.positions)
+        mesh.uvs.push_back(glm::vec2(glm::dvec2(scale * (p.x + 0.3 * p.z), scale * (p.y - 0.2 * p.z))));
     mesh.texture = texture;
     return mesh;
 }
@@ -64,7 +66,8 @@ inline Mesh textured_grid(int n, const Texture& texture) {
 // Closed; the texture is pressed onto it from both sides, mirrored behind, so that there is no seam.
 inline Mesh textured_sphere(int level, const Texture& texture, double scale = 0.5) {
     Mesh mesh = shapes::icosphere(level);
-    for (const glm::dvec3& p : mesh.positions) mesh.uvs.push_back(glm::vec2(glm::dvec2(0.5 + scale * p.x, 0.5 + scale * p.y)));
+    for (const glm::dvec3& p : mesh.positions)
+        mesh.uvs.push_back(glm::vec2(glm::dvec2(0.5 + scale * p.x, 0.5 + scale * p.y)));
     mesh.texture = texture;
     return mesh;
 }

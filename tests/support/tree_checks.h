@@ -189,7 +189,8 @@ inline std::string fault_when_unfolded(const VertexTree& tree, const MeshView& m
 inline std::vector<Triangle> sorted_triangles(const Cut& cut) {
     const auto indices = cut.indices();
     std::vector<Triangle> triangles;
-    for (std::size_t i = 0; i + 2 < indices.size(); i += 3) triangles.push_back({indices[i], indices[i + 1], indices[i + 2]});
+    for (std::size_t i = 0; i + 2 < indices.size(); i += 3)
+        triangles.push_back({indices[i], indices[i + 1], indices[i + 2]});
     std::sort(triangles.begin(), triangles.end());
     return triangles;
 }

@@ -37,7 +37,8 @@ struct TreeFile {
     // Offsets in the header and in an entry of the section table.
     static constexpr std::size_t version_at = 8, section_count_at = 12, file_bytes_at = 16, page_count_at = 24,
                                  table_checksum_at = 32, header_checksum_at = 40;
-    static constexpr std::size_t domain_at = 20, element_bytes_at = 24, component_bytes_at = 28, count_at = 32, offset_at = 40;
+    static constexpr std::size_t domain_at = 20, element_bytes_at = 24, component_bytes_at = 28, count_at = 32,
+                                 offset_at = 40;
 
     struct Section {
         std::string name;

@@ -145,9 +145,10 @@ TEST(SmallestSphere, ContainsItsPointsAndIsTheSmallest) {
                 const DSphere sphere = smallest_sphere(points);
                 expect_contains(sphere, points);
                 const DSphere asked = smallest_sphere(points[0], [&](glm::dvec3 from) {
-                    return *std::max_element(points.begin(), points.end(), [&](const glm::dvec3& a, const glm::dvec3& b) {
-                        return glm::distance(a, from) < glm::distance(b, from);
-                    });
+                    return *std::max_element(points.begin(), points.end(),
+                                             [&](const glm::dvec3& a, const glm::dvec3& b) {
+                                                 return glm::distance(a, from) < glm::distance(b, from);
+                                             });
                 });
                 expect_contains(asked, points);
                 ASSERT_NEAR(asked.radius, sphere.radius, radius_tolerance * sphere.radius);
@@ -235,7 +236,8 @@ struct Lane {
         for (const DSphere& s : wide_spheres) ASSERT_TRUE(support::contains(sphere, s.centre, s.radius));
         constexpr double float_rounding = 2e-7; // of the centre's coordinates, and of the radius
         const DSphere about = enclosing_sphere(wide_points, wide_spheres);
-        ASSERT_LE(sphere.radius, about.radius * (1 + slack + float_rounding) + float_rounding * glm::length(about.centre))
+        ASSERT_LE(sphere.radius,
+                  about.radius * (1 + slack + float_rounding) + float_rounding * glm::length(about.centre))
             << points.size() << " points, " << spheres.size() << " spheres";
     }
 };
@@ -253,7 +255,9 @@ TEST(BallLanes, EncloseEachLaneOnItsOwn) {
                 for (const glm::dvec3& p : sets[random() % sets.size()].make(random)) {
                     const glm::vec3 at = glm::vec3(p) * scale;
                     if (lanes[i].points.empty() || random() % 3 > 0) lanes[i].points.push_back(at);
-                    else lanes[i].spheres.push_back({at, scale * static_cast<float>(std::pow(10.0, random_between(random, -3, 0.5)))});
+                    else
+                        lanes[i].spheres.push_back(
+                            {at, scale * static_cast<float>(std::pow(10.0, random_between(random, -3, 0.5)))});
                 }
                 balls.begin(i, lanes[i].points[0]);
                 for (std::size_t k = 1; k < lanes[i].points.size(); ++k) balls.add(i, lanes[i].points[k]);

@@ -312,7 +312,8 @@ TEST_P(BuiltTree, FlagsRingsWithIrregularEdges) {
     const Regions regions(*tree, mesh());
     for (NodeId node = 0; node < tree->interior_count(); ++node) {
         if (regions.is_coincident(node)) continue;
-        ASSERT_EQ((tree->bounds()[node].flags & irregular_ring) != 0, regions.ring_is_irregular(node)) << "node " << node;
+        ASSERT_EQ((tree->bounds()[node].flags & irregular_ring) != 0, regions.ring_is_irregular(node))
+            << "node " << node;
     }
 }
 
@@ -524,8 +525,7 @@ TEST(LiteralTree, Fan) {
     EXPECT_THAT(copy(support::sound(*tree).leaf_end()), ElementsAre(6, 6, 6, 6));
     EXPECT_THAT(copy(support::sound(*tree).parents()), ElementsAre(no_node, 0, 1, 2, 0, 0, 1, 2, 3, 3));
     EXPECT_THAT(copy(support::sound(*tree).first_triangle()), ElementsAre(0, 1, 2, 3, 4));
-    EXPECT_THAT(corners_of(*tree),
-                ElementsAre(fan.triangles[0], fan.triangles[3], fan.triangles[2], fan.triangles[1]));
+    EXPECT_THAT(corners_of(*tree), ElementsAre(fan.triangles[0], fan.triangles[3], fan.triangles[2], fan.triangles[1]));
 
     Cut cut(*tree);
     cut.unfold_all();

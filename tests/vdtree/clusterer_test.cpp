@@ -19,11 +19,11 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "clustering_tools.h"
 #include "build/help_cluster.h"
 #include "build/quadric_contraction.h"
-#include "shapes.h"
 #include "build/surface.h"
+#include "clustering_tools.h"
+#include "shapes.h"
 
 namespace unseen::vdtree {
 namespace {
@@ -38,17 +38,21 @@ std::string fault(const Clustering& c, std::size_t vertices) {
     if (c.parents[root] != root) return "the last cluster is not the root";
     std::vector<Index> children(c.parents.size(), 0);
     for (std::size_t i = 0; i < root; ++i) {
-        if (c.parents[i] <= i || c.parents[i] > root || c.parents[i] < vertices) return "parent of " + std::to_string(i);
+        if (c.parents[i] <= i || c.parents[i] > root || c.parents[i] < vertices)
+            return "parent of " + std::to_string(i);
         ++children[c.parents[i]];
     }
     for (std::size_t i = vertices; i <= root; ++i)
-        if (children[i] < 2) return "cluster " + std::to_string(i) + " has " + std::to_string(children[i]) + " children";
+        if (children[i] < 2)
+            return "cluster " + std::to_string(i) + " has " + std::to_string(children[i]) + " children";
     for (const glm::dvec3& p : c.positions)
         if (!std::isfinite(p.x + p.y + p.z)) return "a position is not finite";
     for (std::size_t i = 0; i < c.deviations.size(); ++i) {
-        if (!(c.deviations[i] >= 0) || std::isinf(c.deviations[i])) return "deviation of " + std::to_string(vertices + i);
+        if (!(c.deviations[i] >= 0) || std::isinf(c.deviations[i]))
+            return "deviation of " + std::to_string(vertices + i);
         const std::size_t parent = c.parents[vertices + i];
-        if (c.deviations[parent - vertices] < c.deviations[i]) return "deviation falls above " + std::to_string(vertices + i);
+        if (c.deviations[parent - vertices] < c.deviations[i])
+            return "deviation falls above " + std::to_string(vertices + i);
     }
     return "";
 }
@@ -60,8 +64,8 @@ std::size_t depth(const Clustering& c) {
 }
 
 Clustering clustered(const ClusteringTask& task, ClustererKind kind, const Progress& progress = {}) {
-    Result<Clustering> made =
-        kind == ClustererKind::octree ? cluster_octree(task.input(), progress) : cluster_quadric(task.input(), progress);
+    Result<Clustering> made = kind == ClustererKind::octree ? cluster_octree(task.input(), progress)
+                                                            : cluster_quadric(task.input(), progress);
     EXPECT_TRUE(made);
     return made ? std::move(*made) : Clustering{};
 }
@@ -97,20 +101,24 @@ const Hard hard_meshes[] = {
     {"loose triangles", [] { return shapes::unwelded(shapes::bumpy_sphere(5)); }},
     {"star", [] { return star(large / 2); }},
     {"one position", [] { return shapes::all_coincident(large); }},
-    {"one far vertex", [] {
+    {"one far vertex",
+     [] {
          Mesh m = shapes::bumpy_sphere(6);
          m.positions[0] = {1e15, 0, 0};
          return m;
      }},
-    {"scales over forty powers of ten", [] {
+    {"scales over forty powers of ten",
+     [] {
          std::mt19937_64 random(11);
          Mesh m;
          for (Index i = 0; i < large; ++i)
-             m.positions.push_back(std::pow(10, shapes::random_between(random, -30, 10)) * shapes::random_direction(random));
+             m.positions.push_back(std::pow(10, shapes::random_between(random, -30, 10)) *
+                                   shapes::random_direction(random));
          for (Index i = 0; i + 2 < large; i += 3) m.triangles.push_back({i, i + 1, i + 2});
          return m;
      }},
-    {"no areas", [] {
+    {"no areas",
+     [] {
          Mesh m;
          for (Index i = 0; i < large; ++i) m.positions.emplace_back(i, 0, 0);
          for (Index i = 0; i + 2 < large; ++i) m.triangles.push_back({i, i + 1, i + 2});
@@ -197,7 +205,9 @@ private:
 TEST(Clusterers, OfOnesOwnAreCheckedAndHaveNoTeam) {
     const Mesh mesh = shapes::single_triangle();
     const auto with_root = [&](Index root) {
-        return build_tree(mesh.view(), [&](const ClusterInput&) -> Result<Clustering> { return Clustering{{3, 3, 3, root}, {}}; });
+        return build_tree(mesh.view(), [&](const ClusterInput&) -> Result<Clustering> {
+            return Clustering{{3, 3, 3, root}, {}};
+        });
     };
     EXPECT_TRUE(with_root(3));
     EXPECT_FALSE(with_root(0));
@@ -417,14 +427,16 @@ Strip strip(Index columns) {
     Strip s;
     for (const bool is_right : {false, true}) {
         PartMesh& part = is_right ? s.right : s.left;
-        const Index own = columns, ghosts = 2; // columns / 2 columns of two slots each, and the next one of the other side
+        const Index own = columns,
+                    ghosts = 2; // columns / 2 columns of two slots each, and the next one of the other side
         part.first_slot = is_right ? columns : 0;
         part.own_slots = own;
         part.channels = 1;
         const Index other = is_right ? columns - 2 : columns;
         part.ghost_slots = {other, other + 1};
         const auto push = [&](Index slot) {
-            part.positions.push_back(glm::dvec3(slot / 2, slot % 2, 0.1 * std::sin(slot / 2)) / static_cast<double>(columns));
+            part.positions.push_back(glm::dvec3(slot / 2, slot % 2, 0.1 * std::sin(slot / 2)) /
+                                     static_cast<double>(columns));
             part.slot_of_vertex.push_back(static_cast<Index>(part.positions.size() - 1));
             part.channel_values.push_back(0);
         };

@@ -42,7 +42,8 @@ std::vector<NodeId> all_nodes(const VertexTree& tree) {
 
 using MakeCriterion = Result<DistanceCriterion> (*)(const VertexTree&, const View&, double tolerance_pixels);
 
-std::vector<float> costs_of(MakeCriterion make, const VertexTree& tree, const View& view, double tolerance, const Similarity& placement = {}) {
+std::vector<float> costs_of(MakeCriterion make, const VertexTree& tree, const View& view, double tolerance,
+                            const Similarity& placement = {}) {
     const auto criterion = make(tree, view, tolerance);
     if (!criterion) throw std::runtime_error(criterion.error().message);
     EXPECT_TRUE(criterion->is_monotone());
@@ -53,7 +54,8 @@ std::vector<float> costs_of(MakeCriterion make, const VertexTree& tree, const Vi
 
 // Costs are ratios of distances. The pixels that they stand for, by the formulas of both criteria:
 double extent_pixels(float cost, const View& view, double tolerance) {
-    const double reach = 1 / std::sin(tolerance / pixels_per_radian(view) / 2) - 1, radius_over_gap = static_cast<double>(cost) / reach;
+    const double reach = 1 / std::sin(tolerance / pixels_per_radian(view) / 2) - 1,
+                 radius_over_gap = static_cast<double>(cost) / reach;
     return 2 * std::asin(radius_over_gap / (1 + radius_over_gap)) * pixels_per_radian(view);
 }
 double displacement_pixels(float cost, const View& view, double tolerance) {
@@ -173,7 +175,8 @@ TEST(Extent, IsTheSizeOfTheProjectedSphere) {
                 widest = std::max(widest, std::atan2(glm::length(glm::cross(p, back)), -glm::dot(p, back)));
             }
             const double pixels = 2 * widest * pixels_per_radian(view);
-            const double distance = glm::length(to_centre), near = distance / (distance - s.radius); // rounding of distances
+            const double distance = glm::length(to_centre),
+                         near = distance / (distance - s.radius); // rounding of distances
             ASSERT_NEAR(extent_pixels(costs[node], view, tolerance), pixels, 1e-4 * near * pixels);
         }
     }
@@ -215,8 +218,10 @@ TEST(Displacement, IsNotExceededByAnyVertex) {
                 }
                 const double pixels = widest * pixels_per_radian(view);
                 const Sphere s = tree.support_spheres()[node];
-                const double distance = glm::length(glm::dvec3(s.centre) - eye), near = distance / std::max(distance - s.radius, 1e-6 * distance);
-                ASSERT_GE(displacement_pixels(costs[node], view, tolerance) * (1 + cost_rounding * near) + 1e-9, pixels) << "node " << node;
+                const double distance = glm::length(glm::dvec3(s.centre) - eye),
+                             near = distance / std::max(distance - s.radius, 1e-6 * distance);
+                ASSERT_GE(displacement_pixels(costs[node], view, tolerance) * (1 + cost_rounding * near) + 1e-9, pixels)
+                    << "node " << node;
             }
         }
     }
@@ -293,7 +298,8 @@ TEST(Criteria, DoNotFallFromANodeToItsParent) {
                         const Sphere s = tree.support_spheres()[node];
                         const double distance = glm::length(glm::dvec3(s.centre) - eye);
                         if (std::abs(distance - s.radius) < 1e-3 * distance) continue; // on the sphere but for rounding
-                        ASSERT_GE(costs[parents[node]] * (1 + 2e-3f), costs[node]) << "node " << node << ", round " << round;
+                        ASSERT_GE(costs[parents[node]] * (1 + 2e-3f), costs[node])
+                            << "node " << node << ", round " << round;
                     }
                 }
             }
@@ -331,7 +337,8 @@ TEST(Criteria, StayTheSameWhenEyeAndTreeMoveTogether) {
                 for (std::size_t i = 0; i < a.size(); ++i) {
                     const Sphere sphere = tree.support_spheres()[i];
                     const double distance = glm::length(glm::dvec3(sphere.centre) - eye_in_tree(tree, view, {}));
-                    if (std::abs(distance - sphere.radius) < 1e-2 * distance) continue; // an eye on a sphere may fall to either side
+                    if (std::abs(distance - sphere.radius) < 1e-2 * distance)
+                        continue; // an eye on a sphere may fall to either side
                     if (is_unbounded(a[i])) ASSERT_TRUE(is_unbounded(b[i])) << "node " << i;
                     else ASSERT_NEAR(a[i], b[i], 1e-4 * a[i] + 1e-6) << "node " << i;
                 }
@@ -352,7 +359,8 @@ TEST(Criteria, FoldFromHalfAsFarWithTwiceTheTolerance) {
     const View view{.eye = {0, 2, 5}};
     for (const MakeCriterion make : {&extent_criterion, &displacement_criterion}) {
         const auto one = costs_of(make, tree, view, 1), two = costs_of(make, tree, view, 2);
-        for (std::size_t i = 0; i < one.size(); ++i) EXPECT_NEAR(one[i], 2 * two[i], 2e-3 * one[i]); // but for the spheres' own radii
+        for (std::size_t i = 0; i < one.size(); ++i)
+            EXPECT_NEAR(one[i], 2 * two[i], 2e-3 * one[i]); // but for the spheres' own radii
     }
 }
 
@@ -454,7 +462,9 @@ TEST(Frustum, FoldsWhatIsBehindTheEye) {
     const VertexTree tree = built(shapes::bumpy_sphere(3));
     const View view{.eye = {0, 0, 5}, .target = {0, 0, 9}};
     Cut cut(tree);
-    const auto everything = [](const VertexTree&, std::span<const NodeId> nodes, std::span<float> costs) { std::fill_n(costs.begin(), nodes.size(), 2.0f); };
+    const auto everything = [](const VertexTree&, std::span<const NodeId> nodes, std::span<float> costs) {
+        std::fill_n(costs.begin(), nodes.size(), 2.0f);
+    };
     const FrustumVisibility frustum(tree, view);
     cut.unfold_all();
     EXPECT_EQ(cut.adjust(everything, {.visibility = frustum}).triangles, 0u);

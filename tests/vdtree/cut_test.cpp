@@ -424,8 +424,7 @@ TEST(Visibility, FoldsWhatIsOutAtNoCost) {
     const auto criterion = look_up(costs);
     std::uint64_t asked = 0;
     const auto counting = [&](const VertexTree& t, std::span<const NodeId> nodes, std::span<float> out) {
-        for (const NodeId node : nodes)
-            EXPECT_LE(t.bounds()[node].ring.centre.x - t.bounds()[node].ring.radius, 0.1f);
+        for (const NodeId node : nodes) EXPECT_LE(t.bounds()[node].ring.centre.x - t.bounds()[node].ring.radius, 0.1f);
         asked += nodes.size();
         criterion(t, nodes, out);
     };

@@ -46,7 +46,8 @@ struct Kind {
 
 VertexTree marked() {
     const VertexTree tree = built(shapes::bumpy_sphere(2));
-    return *tree.with_attribute("mark", AttributeDomain::interior_node, std::vector<float>(tree.interior_count(), 0.5f));
+    return *tree.with_attribute("mark", AttributeDomain::interior_node,
+                                std::vector<float>(tree.interior_count(), 0.5f));
 }
 VertexTree plain() { return built(shapes::bumpy_sphere(3)); }
 VertexTree coloured() { return built(shapes::with_attributes(shapes::bumpy_sphere(3))); }

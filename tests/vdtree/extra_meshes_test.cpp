@@ -11,9 +11,9 @@
 
 #include <gtest/gtest.h>
 
+#include <meshio/mesh_io.h>
 #include <vdtree/criteria.h>
 #include <vdtree/cut.h>
-#include <meshio/mesh_io.h>
 #include <vdtree/tree_io.h>
 
 #include "exact.h"

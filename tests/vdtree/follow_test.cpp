@@ -17,9 +17,9 @@
 
 #include <vdtree/builder.h>
 
+#include "cut/index_buffer.h"
 #include "cut/kernel/fold_tester.h"
 #include "follow_tools.h"
-#include "cut/index_buffer.h"
 #include "shapes.h"
 #include "sound.h"
 #include "tree_checks.h"
@@ -51,11 +51,15 @@ Mesh leaves(int count) {
     std::mt19937_64 random(5);
     Mesh mesh;
     for (int i = 0; i < count; ++i) {
-        const auto direction = [&] { return glm::normalize(glm::dvec3(random_unit(random), random_unit(random), random_unit(random)) - 0.5 + 1e-3); };
+        const auto direction = [&] {
+            return glm::normalize(glm::dvec3(random_unit(random), random_unit(random), random_unit(random)) - 0.5 +
+                                  1e-3);
+        };
         const glm::dvec3 centre(4 * random_unit(random), 4 * random_unit(random), 4 * random_unit(random));
         const glm::dvec3 a = 0.1 * direction(), b = 0.1 * glm::normalize(glm::cross(a, direction()));
         const Index first = static_cast<Index>(mesh.positions.size());
-        for (const glm::dvec3 corner : {centre - a - b, centre + a - b, centre + a + b, centre - a + b}) mesh.positions.push_back(corner);
+        for (const glm::dvec3 corner : {centre - a - b, centre + a - b, centre + a + b, centre - a + b})
+            mesh.positions.push_back(corner);
         mesh.triangles.push_back({first, first + 1, first + 2});
         mesh.triangles.push_back({first, first + 2, first + 3});
     }
@@ -70,7 +74,10 @@ struct MeshClass {
 const MeshClass mesh_classes[] = {
     {"organic", [] { return shapes::bumpy_sphere(4, 0.03); }},
     {"foliage", [] { return leaves(600); }},
-    {"cad", [] { return shapes::together(shapes::cube(12), shapes::placed(shapes::torus(40, 16), 0.6, {1, 0.5, 0})); }},
+    {"cad",
+     [] {
+         return shapes::together(shapes::cube(12), shapes::placed(shapes::torus(40, 16), 0.6, {1, 0.5, 0}));
+     }},
     {"soup", [] { return shapes::random_soup(500, 1500, 7); }, false},
 };
 
@@ -96,7 +103,8 @@ DistanceCriterion rich_criterion(const VertexTree& tree, std::uint64_t seed, boo
     for (NodeId node = tree.interior_count(); node-- > 0;) {
         FoldClass& own = parts.classes[node];
         own.interior = std::max(own.interior, static_cast<std::uint16_t>(random() % 8));
-        own.silhouette = std::max<std::uint16_t>({own.silhouette, own.interior, static_cast<std::uint16_t>(8 + random() % 15)});
+        own.silhouette =
+            std::max<std::uint16_t>({own.silhouette, own.interior, static_cast<std::uint16_t>(8 + random() % 15)});
         if (node == 0) break;
         FoldClass& parent = parts.classes[support::sound(tree).parents()[node]];
         parent.interior = std::max(parent.interior, own.interior);
@@ -104,9 +112,10 @@ DistanceCriterion rich_criterion(const VertexTree& tree, std::uint64_t seed, boo
     }
     for (std::size_t row = 0; row < rows; ++row)
         for (std::size_t bin = 0; bin < parts.eccentricity_bins; ++bin)
-            parts.reach.push_back(row == 0 ? DistanceCriterion::never_visible
+            parts.reach.push_back(row == 0          ? DistanceCriterion::never_visible
                                   : row == rows - 1 ? DistanceCriterion::always_visible
-                                                    : static_cast<float>(2.0 * static_cast<double>(row) * std::exp(-0.06 * static_cast<double>(bin))));
+                                                    : static_cast<float>(2.0 * static_cast<double>(row) *
+                                                                         std::exp(-0.06 * static_cast<double>(bin))));
     Result<DistanceCriterion> criterion = DistanceCriterion::create(tree, std::move(parts));
     if (!criterion) throw std::runtime_error(criterion.error().message);
     return std::move(*criterion);
@@ -114,7 +123,8 @@ DistanceCriterion rich_criterion(const VertexTree& tree, std::uint64_t seed, boo
 
 // Costs of a fold from the definition, in doubles: nothing for what is out of sight or faces away, else the distance within which its interior, or
 // its silhouette, unfolds at the threshold 1, over its gap; least costs counted in for `seen_cost`. Without a gaze or away from the bins' edges.
-void expect_cost_by_definition(const DistanceCriterion& criterion, const FoldCandidate& of, const Viewpoint& viewpoint, float cost, float seen_cost) {
+void expect_cost_by_definition(const DistanceCriterion& criterion, const FoldCandidate& of, const Viewpoint& viewpoint,
+                               float cost, float seen_cost) {
     const DistanceCriterion::Parts& parts = criterion.parts();
     const glm::dvec3 to_eye = viewpoint.eye - glm::dvec3(of.sphere.centre);
     const double distance = glm::length(to_eye), radius = of.sphere.radius, gap = distance - radius;
@@ -131,17 +141,23 @@ void expect_cost_by_definition(const DistanceCriterion& criterion, const FoldCan
         const double reach = parts.reach[row * parts.eccentricity_bins + bin];
         if (reach < 0 || (length * reach <= 0 && gap > 0)) return {0, 0};
         const double infinite = std::numeric_limits<double>::infinity();
-        const double own = reach >= double{DistanceCriterion::always_visible} || gap <= 0 ? infinite : length * reach / gap;
-        return {own, parts.least_cost.empty() ? own : std::max<double>(own, parts.least_cost[row * parts.eccentricity_bins + bin])};
+        const double own =
+            reach >= double{DistanceCriterion::always_visible} || gap <= 0 ? infinite : length * reach / gap;
+        return {own, parts.least_cost.empty()
+                         ? own
+                         : std::max<double>(own, parts.least_cost[row * parts.eccentricity_bins + bin])};
     };
-    const auto interior = costs(of.rows.interior, of.length), silhouette = costs(of.rows.silhouette, of.silhouette_length);
+    const auto interior = costs(of.rows.interior, of.length),
+               silhouette = costs(of.rows.silhouette, of.silhouette_length);
     const auto is_about = [](double expected, float found) {
         return expected == double{found} || std::abs(expected - double{found}) <= 1e-3 * expected;
     };
     const bool is_nothing = cost == 0 && seen_cost == 0;
     const bool as_interior = is_about(interior[0], cost) && is_about(interior[1], seen_cost);
-    const bool as_silhouette = is_about(std::max(interior[0], silhouette[0]), cost) && is_about(std::max(interior[1], silhouette[1]), seen_cost);
-    ASSERT_TRUE(is_nothing || as_interior || as_silhouette) << "node " << of.node << " costs " << cost << " and " << seen_cost;
+    const bool as_silhouette = is_about(std::max(interior[0], silhouette[0]), cost) &&
+                               is_about(std::max(interior[1], silhouette[1]), seen_cost);
+    ASSERT_TRUE(is_nothing || as_interior || as_silhouette)
+        << "node " << of.node << " costs " << cost << " and " << seen_cost;
 }
 
 glm::dvec3 random_direction(std::mt19937_64& random) {
@@ -164,7 +180,8 @@ std::vector<Sphere> occluders_in(const VertexTree& tree) {
 std::vector<Sphere> occluders_seen_from(glm::dvec3 eye, std::span<const Sphere> occluders) {
     std::vector<Sphere> seen;
     for (const Sphere& occluder : occluders)
-        if (glm::length(glm::dvec3(occluder.centre) - eye) > static_cast<double>(occluder.radius)) seen.push_back(occluder);
+        if (glm::length(glm::dvec3(occluder.centre) - eye) > static_cast<double>(occluder.radius))
+            seen.push_back(occluder);
     return seen;
 }
 
@@ -185,7 +202,10 @@ public:
         case 1: gaze_ = random_direction(random_); break;
         case 2: break; // stands still
         case 3: velocity_ = random_direction(random_) * radius_ * std::pow(10.0, -1 - 3 * random_unit(random_)); break;
-        default: eye_ += velocity_; turn_ = glm::normalize(turn_ + 0.01 * velocity_ / radius_); break;
+        default:
+            eye_ += velocity_;
+            turn_ = glm::normalize(turn_ + 0.01 * velocity_ / radius_);
+            break;
         }
         Viewpoint viewpoint{.eye = eye_};
         if (with_gaze_) viewpoint.gaze = glm::normalize(gaze_ + 0.02 * turn_);
@@ -266,9 +286,12 @@ TEST_P(Follow, EqualsTheCutFromScratchOnStraightWays) {
         const DistanceCriterion criterion = rich_criterion(tree, 4, with_gaze);
         Cut cut(tree);
         for (int way = 0; way < frame_count() / 13; ++way) {
-            glm::dvec3 eye = glm::dvec3(sphere.centre) + (1.5 + 6 * random_unit(random)) * sphere.radius * random_direction(random);
-            const glm::dvec3 target = glm::dvec3(sphere.centre) + sphere.radius * random_unit(random) * random_direction(random);
-            const glm::dvec3 step = (target - eye) * std::pow(10.0, -1 - 2 * random_unit(random)) * (way % 3 == 0 ? -1.0 : 1.0);
+            glm::dvec3 eye =
+                glm::dvec3(sphere.centre) + (1.5 + 6 * random_unit(random)) * sphere.radius * random_direction(random);
+            const glm::dvec3 target =
+                glm::dvec3(sphere.centre) + sphere.radius * random_unit(random) * random_direction(random);
+            const glm::dvec3 step =
+                (target - eye) * std::pow(10.0, -1 - 2 * random_unit(random)) * (way % 3 == 0 ? -1.0 : 1.0);
             glm::dvec3 gaze = glm::normalize(target - eye);
             const glm::dvec3 turn = 1e-3 * random_unit(random) * random_direction(random);
             for (int frame = 0; frame < 30; ++frame) {
@@ -276,7 +299,8 @@ TEST_P(Follow, EqualsTheCutFromScratchOnStraightWays) {
                 if (with_gaze) viewpoint.gaze = gaze;
                 if (way % 2 == 1) viewpoint.occluders = occluders_seen_from(eye, occluders);
                 ASSERT_TRUE(cut.follow(criterion, viewpoint));
-                ASSERT_EQ(state_of(cut), from_scratch(tree, criterion, viewpoint, {})) << "way " << way << ", frame " << frame;
+                ASSERT_EQ(state_of(cut), from_scratch(tree, criterion, viewpoint, {}))
+                    << "way " << way << ", frame " << frame;
                 eye += step;
                 gaze = glm::normalize(gaze + turn);
             }
@@ -339,7 +363,8 @@ TEST_P(Follow, EqualsTheCutFromScratchUnderACriterionThatIsNotMonotone) {
     const VertexTree tree = built(GetParam().make());
     DistanceCriterion::Parts parts = rich_criterion(tree, 3, false).parts();
     std::mt19937_64 random(17);
-    for (FoldClass& rows : parts.classes) rows = {static_cast<std::uint16_t>(random() % 8), static_cast<std::uint16_t>(random() % 20)};
+    for (FoldClass& rows : parts.classes)
+        rows = {static_cast<std::uint16_t>(random() % 8), static_cast<std::uint16_t>(random() % 20)};
     const auto criterion = DistanceCriterion::create(tree, std::move(parts));
     ASSERT_TRUE(criterion);
     EXPECT_FALSE(criterion->is_monotone());
@@ -364,10 +389,13 @@ TEST_P(Follow, DecidesAndWeighsManyNodesAsOneByOne) {
     shuffled = nodes;
     std::mt19937_64 random(23);
     std::shuffle(shuffled.begin(), shuffled.end(), random);
-    const auto bit = [](const std::vector<std::uint64_t>& bits, std::size_t i) { return ((bits[i / 64] >> (i % 64)) & 1) != 0; };
+    const auto bit = [](const std::vector<std::uint64_t>& bits, std::size_t i) {
+        return ((bits[i / 64] >> (i % 64)) & 1) != 0;
+    };
     for (int variant = 0; variant < 24; ++variant) {
         const bool with_gaze = variant & 1, with_frustum = variant & 2, cull = variant & 4;
-        DistanceCriterion::Parts parts = rich_criterion(tree, 3 + static_cast<std::uint64_t>(variant & 8 ? 1 : 0), with_gaze).parts();
+        DistanceCriterion::Parts parts =
+            rich_criterion(tree, 3 + static_cast<std::uint64_t>(variant & 8 ? 1 : 0), with_gaze).parts();
         if (variant >= 12) { // other spheres, directions of its own, least costs
             parts.spheres = DistanceCriterion::Spheres::support;
             for (const NodeBounds& bounds : tree.bounds()) parts.facing.push_back(bounds.slabs);
@@ -378,7 +406,8 @@ TEST_P(Follow, DecidesAndWeighsManyNodesAsOneByOne) {
         Path path(tree, 31 + static_cast<std::uint64_t>(variant), with_gaze, with_frustum);
         for (int frame = 0; frame < 12; ++frame) {
             Viewpoint viewpoint = path.next();
-            if (frame % 3 == 0) viewpoint.eye = glm::dvec3(tree.positions()[random() % tree.node_count()]); // inside of many rings
+            if (frame % 3 == 0)
+                viewpoint.eye = glm::dvec3(tree.positions()[random() % tree.node_count()]); // inside of many rings
             const FollowOptions options{.threshold = 0.7f, .cull_back_faces = cull};
             const auto every = test_every_node(tree, *criterion, viewpoint, options);
             ASSERT_TRUE(every);
@@ -394,12 +423,14 @@ TEST_P(Follow, DecidesAndWeighsManyNodesAsOneByOne) {
             tester.find_costs(shuffled, {cost.data(), seen_cost.data(), unfolded.data()});
             for (std::size_t i = 0; i < shuffled.size(); ++i) {
                 ASSERT_EQ(bit(decided, i), verdicts[i].unfolded) << "variant " << variant << ", node " << shuffled[i];
-                ASSERT_EQ(bit(*every, shuffled[i]), verdicts[i].unfolded) << "variant " << variant << ", node " << shuffled[i];
+                ASSERT_EQ(bit(*every, shuffled[i]), verdicts[i].unfolded)
+                    << "variant " << variant << ", node " << shuffled[i];
                 ASSERT_EQ(bit(unfolded, i), verdicts[i].unfolded) << "variant " << variant << ", node " << shuffled[i];
                 expect_cost_by_definition(*criterion, candidates[i], viewpoint, cost[i], seen_cost[i]);
                 // A cost that is not just the threshold tells the verdict.
                 if (std::abs(seen_cost[i] - options.threshold) > 1e-4f * options.threshold) {
-                    ASSERT_EQ(seen_cost[i] > options.threshold, verdicts[i].unfolded) << "variant " << variant << ", node " << shuffled[i];
+                    ASSERT_EQ(seen_cost[i] > options.threshold, verdicts[i].unfolded)
+                        << "variant " << variant << ", node " << shuffled[i];
                 }
             }
             if (HasFatalFailure()) return;
@@ -416,7 +447,8 @@ TEST_P(Follow, PatchesTheIndexBufferThatACopyKeepsUpWith) {
     int patched = 0, gathered_anew = 0;
     for (int frame = 0; frame < 120; ++frame) {
         const double angle = frame * 0.002, distance = sphere.radius * (6 + std::sin(frame * 0.05));
-        ASSERT_TRUE(cut.follow(criterion, {.eye = glm::dvec3(sphere.centre) + distance * glm::dvec3(std::sin(angle), 0.2, std::cos(angle))}));
+        ASSERT_TRUE(cut.follow(criterion, {.eye = glm::dvec3(sphere.centre) +
+                                                  distance * glm::dvec3(std::sin(angle), 0.2, std::cos(angle))}));
         const auto indices = cut.indices();
         if (const auto writes = cut.index_writes()) {
             ++patched;
@@ -486,7 +518,8 @@ TEST(FollowChanges, ReplayToTheSameCut) {
     Cut cut(tree), replica(tree);
     for (int frame = 0; frame < 200; ++frame) {
         ASSERT_TRUE(cut.follow(criterion, path.next()));
-        for (const FoldChange& change : cut.changes()) ASSERT_TRUE(change.folded ? replica.fold(change.node) : replica.unfold(change.node));
+        for (const FoldChange& change : cut.changes())
+            ASSERT_TRUE(change.folded ? replica.fold(change.node) : replica.unfold(change.node));
         ASSERT_EQ(state_of(cut), state_of(replica)) << "frame " << frame;
     }
 }
@@ -573,7 +606,8 @@ TEST(FollowBudget, HasTheLeastLargestCostOfAllCuts) {
             const auto [triangles, largest] = triangles_and_cost([&](NodeId node) { return cut.is_unfolded(node); });
             EXPECT_LE(triangles, budget);
             for (const std::uint32_t bits : cuts) {
-                const auto [others, others_largest] = triangles_and_cost([&](NodeId node) { return (bits >> node) & 1; });
+                const auto [others, others_largest] =
+                    triangles_and_cost([&](NodeId node) { return (bits >> node) & 1; });
                 if (others > budget) continue;
                 ASSERT_LE(largest, others_largest) << "budget " << budget << ", seed " << seed;
             }
@@ -624,7 +658,8 @@ TEST(FollowBudget, WithHysteresisStaysWithinItsFactorAndDoesNotFlicker) {
     int flickers = 0, folds = 0;
     for (int frame = 0; frame < 240; ++frame) {
         const double angle = frame * 0.01;
-        const Viewpoint viewpoint{.eye = glm::dvec3(sphere.centre) + 4.0 * sphere.radius * glm::dvec3(std::sin(angle), 0.3, std::cos(angle))};
+        const Viewpoint viewpoint{.eye = glm::dvec3(sphere.centre) +
+                                         4.0 * sphere.radius * glm::dvec3(std::sin(angle), 0.3, std::cos(angle))};
         const auto with = steady.follow(criterion, viewpoint, {.triangle_budget = budget, .hysteresis = hysteresis});
         const auto without = exact.follow(criterion, viewpoint, {.triangle_budget = budget});
         ASSERT_TRUE(with && without);
@@ -731,7 +766,8 @@ TEST(FollowInTime, TellsTheLargestCostOfWhatItLeaves) {
         for (int moves = 0; moves < 4; ++moves) {
             bool is_complete = false;
             for (; !is_complete && calls < 10000; ++calls) {
-                const FollowOptions options{.triangle_budget = budget, .hysteresis = budget ? 1.1f : 1, .milliseconds = 0.0};
+                const FollowOptions options{
+                    .triangle_budget = budget, .hysteresis = budget ? 1.1f : 1, .milliseconds = 0.0};
                 const auto stats = cut.follow(criterion, viewpoint, options);
                 ASSERT_TRUE(stats);
                 const float largest = largest_cost_of(cut, criterion, viewpoint);
@@ -778,9 +814,11 @@ TEST(FollowBudget, WithHysteresisComesBackFromInfiniteCosts) {
 
 TEST(FollowScene, SharesABudgetAmongObjects) {
     const VertexTree near_tree = built(shapes::bumpy_sphere(4, 0.03)), far_tree = built(shapes::torus(40, 20));
-    const DistanceCriterion near_criterion = rich_criterion(near_tree, 1, false), far_criterion = rich_criterion(far_tree, 2, false);
+    const DistanceCriterion near_criterion = rich_criterion(near_tree, 1, false),
+                            far_criterion = rich_criterion(far_tree, 2, false);
     Cut near_cut(near_tree), far_cut(far_tree);
-    const SceneObject objects[] = {{near_cut, near_criterion, {.eye = {3, 0, 0}}}, {far_cut, far_criterion, {.eye = {0, 40, 9}}}};
+    const SceneObject objects[] = {{near_cut, near_criterion, {.eye = {3, 0, 0}}},
+                                   {far_cut, far_criterion, {.eye = {0, 40, 9}}}};
     const auto stats = follow_scene(objects, 2000);
     ASSERT_TRUE(stats);
     EXPECT_LE(near_cut.triangle_count() + far_cut.triangle_count(), 2000u);
@@ -806,11 +844,13 @@ bool is_seen(const VertexTree& tree, const Triangle& t, glm::dvec3 eye) {
 // Back-face folding goes by the side that is seen: the same nodes fold as on the same surface turned right.
 TEST(FollowBackFaces, OfInsideOutSurfacesAreThoseOfTheSurfaceTurnedRight) {
     const Mesh outward = shapes::bumpy_sphere(5, 0);
-    const VertexTree right = built(outward, ClustererKind::octree), wrong = built(shapes::inside_out(outward), ClustererKind::octree);
+    const VertexTree right = built(outward, ClustererKind::octree),
+                     wrong = built(shapes::inside_out(outward), ClustererKind::octree);
     ASSERT_EQ(right.closedness(), Closedness::closed_outward);
     ASSERT_EQ(wrong.closedness(), Closedness::closed_inward);
     ASSERT_EQ(right.interior_count(), wrong.interior_count());
-    const auto for_right = DistanceCriterion::create(right, {.reach = {1000}}), for_wrong = DistanceCriterion::create(wrong, {.reach = {1000}});
+    const auto for_right = DistanceCriterion::create(right, {.reach = {1000}}),
+               for_wrong = DistanceCriterion::create(wrong, {.reach = {1000}});
     ASSERT_TRUE(for_right && for_wrong);
     const FollowOptions culling{.cull_back_faces = true};
     Cut of_right(right), of_wrong(wrong), with_back(wrong);
@@ -831,7 +871,8 @@ TEST(FollowBackFaces, OfInsideOutSurfacesAreThoseOfTheSurfaceTurnedRight) {
                 return with_back.is_unfolded(parent) && !of_wrong.is_unfolded(parent);
             });
             hidden += is_hidden;
-            ASSERT_FALSE(is_hidden && is_seen(wrong, corners, viewpoint.eye)) << "frame " << frame << ", triangle " << t;
+            ASSERT_FALSE(is_hidden && is_seen(wrong, corners, viewpoint.eye))
+                << "frame " << frame << ", triangle " << t;
         }
         EXPECT_GT(hidden, wrong.triangle_count() / 8) << "frame " << frame;
     }
@@ -940,8 +981,10 @@ TEST(FollowBadInput, CriteriaThatDoNotFitAreRefused) {
     EXPECT_FALSE(DistanceCriterion::create(tree, Parts{}));
     EXPECT_FALSE(DistanceCriterion::create(tree, Parts{.reach = {std::nanf("")}}));
     EXPECT_FALSE(DistanceCriterion::create(tree, Parts{.lengths = {1, 2}, .reach = {1}}));
-    EXPECT_FALSE(DistanceCriterion::create(tree, Parts{.classes = std::vector<FoldClass>(tree.interior_count(), {7, 7}), .reach = {1}}));
-    EXPECT_FALSE(DistanceCriterion::create(tree, Parts{.lengths = std::vector<float>(tree.interior_count(), -1), .reach = {1}}));
+    EXPECT_FALSE(DistanceCriterion::create(
+        tree, Parts{.classes = std::vector<FoldClass>(tree.interior_count(), {7, 7}), .reach = {1}}));
+    EXPECT_FALSE(
+        DistanceCriterion::create(tree, Parts{.lengths = std::vector<float>(tree.interior_count(), -1), .reach = {1}}));
     EXPECT_FALSE(DistanceCriterion::create(tree, Parts{.reach = {1, 2}, .eccentricity_bins = 2}));
     EXPECT_FALSE(extent_criterion(tree, View{}, 0));
     EXPECT_FALSE(displacement_criterion(tree, View{}, std::nan("")));

@@ -88,8 +88,9 @@ std::vector<MovedVertex> drawn_by_leaf(const Geomorph& geomorph) {
     for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf) {
         const NodeId node = geomorph.drawn().proxy_of_leaf(leaf);
         const auto found = moved.find(node);
-        out.push_back(found != moved.end() ? found->second
-                                           : MovedVertex{node, tree.positions()[node], tree.luminance()[node], tree.colours()[node]});
+        out.push_back(found != moved.end()
+                          ? found->second
+                          : MovedVertex{node, tree.positions()[node], tree.luminance()[node], tree.colours()[node]});
     }
     for (const auto& [node, vertex] : moved) EXPECT_TRUE(geomorph.drawn().is_active(node));
     return out;
@@ -151,7 +152,8 @@ bool is_same_cut(const Cut& a, const Cut& b) {
 
 std::string fault(const Geomorph& geomorph, const Cut& cut) {
     for (NodeId node = 0; node < cut.tree().interior_count(); ++node)
-        if (cut.is_unfolded(node) && !geomorph.drawn().is_unfolded(node)) return "a node is unfolded in the followed cut only";
+        if (cut.is_unfolded(node) && !geomorph.drawn().is_unfolded(node))
+            return "a node is unfolded in the followed cut only";
     return support::fault_in_cut(geomorph.drawn());
 }
 
@@ -188,7 +190,8 @@ TEST_P(Geomorphs, NothingPopsWhateverTheFollowedCutDoes) {
                 const float share = static_cast<float>(glides * std::min(1.0, seconds / glide_seconds));
                 const float moved = glm::distance(now[leaf].position, before[leaf].position);
                 ASSERT_LE(moved, longest[leaf].position * share + rounding) << "leaf " << leaf << ", frame " << frame;
-                ASSERT_LE(std::abs(now[leaf].luminance - before[leaf].luminance), longest[leaf].luminance * share + rounding);
+                ASSERT_LE(std::abs(now[leaf].luminance - before[leaf].luminance),
+                          longest[leaf].luminance * share + rounding);
                 most_moved = std::max(most_moved, static_cast<double>(moved));
             }
             clock += seconds;
@@ -200,7 +203,8 @@ TEST_P(Geomorphs, NothingPopsWhateverTheFollowedCutDoes) {
         EXPECT_TRUE(had_more) << "folds wait for their vertices";
 
         // It stands still: everything comes to rest, bit for bit.
-        for (double passed = 0; passed < glide_seconds + frame_seconds; passed += frame_seconds) ASSERT_TRUE(geomorph.step(cut, frame_seconds));
+        for (double passed = 0; passed < glide_seconds + frame_seconds; passed += frame_seconds)
+            ASSERT_TRUE(geomorph.step(cut, frame_seconds));
         EXPECT_FALSE(geomorph.is_gliding());
         EXPECT_TRUE(geomorph.moved().empty());
         EXPECT_TRUE(is_same_cut(geomorph.drawn(), cut));
@@ -248,15 +252,18 @@ TEST_P(Geomorphs, FollowsACutThatFollowsAnEye) {
     Changed changed(tree);
     for (int frame = 0; frame < 240; ++frame) {
         const double distance = sphere.radius * (5 - 0.015 * frame);
-        const auto stats = cut.follow(*criterion, {.eye = glm::dvec3(sphere.centre) + glm::dvec3(0.2 * distance, 0, distance)});
+        const auto stats =
+            cut.follow(*criterion, {.eye = glm::dvec3(sphere.centre) + glm::dvec3(0.2 * distance, 0, distance)});
         ASSERT_TRUE(stats);
         changes += frame > 0 ? stats->folds + stats->unfolds : 0;
         ASSERT_TRUE(geomorph.step(cut, frame_seconds));
         ASSERT_EQ(fault(geomorph, cut), "") << "frame " << frame;
         const std::vector<MovedVertex> now = drawn_by_leaf(geomorph);
         for (Index leaf = 0; frame > 0 && leaf < tree.leaf_count(); ++leaf) {
-            const float share = static_cast<float>(changed.count(tree, leaf, (frame - 1) * frame_seconds) * frame_seconds / glide_seconds);
-            ASSERT_LE(glm::distance(now[leaf].position, before[leaf].position), longest[leaf].position * share + rounding);
+            const float share = static_cast<float>(changed.count(tree, leaf, (frame - 1) * frame_seconds) *
+                                                   frame_seconds / glide_seconds);
+            ASSERT_LE(glm::distance(now[leaf].position, before[leaf].position),
+                      longest[leaf].position * share + rounding);
         }
         changed.look_at(cut, frame * frame_seconds);
         before = now;
@@ -298,9 +305,12 @@ protected:
     void expect_between(NodeId from, NodeId to, float share) const {
         tree_.for_each_child(node_, [&](NodeId child) {
             const NodeId a = from == no_node ? child : from, b = to == no_node ? child : to;
-            EXPECT_LT(glm::distance(drawn(child).position, glm::mix(tree_.positions()[a], tree_.positions()[b], share)), rounding);
-            EXPECT_NEAR(drawn(child).luminance, glm::mix(float(tree_.luminance()[a]), float(tree_.luminance()[b]), share), rounding);
-            EXPECT_LT(glm::distance(drawn(child).colour, glm::mix(tree_.colours()[a], tree_.colours()[b], share)), rounding);
+            EXPECT_LT(glm::distance(drawn(child).position, glm::mix(tree_.positions()[a], tree_.positions()[b], share)),
+                      rounding);
+            EXPECT_NEAR(drawn(child).luminance,
+                        glm::mix(float(tree_.luminance()[a]), float(tree_.luminance()[b]), share), rounding);
+            EXPECT_LT(glm::distance(drawn(child).colour, glm::mix(tree_.colours()[a], tree_.colours()[b], share)),
+                      rounding);
         });
     }
 
@@ -370,7 +380,8 @@ TEST_F(OneNode, WhatUnfoldsUnderAGlidingVertexBeginsWhereThatIs) {
     pass(0);
     pass(0.125);
     const MovedVertex at = drawn(node_);
-    EXPECT_LT(glm::distance(at.position, glm::mix(tree_.positions()[parent], tree_.positions()[node_], 0.25f)), rounding);
+    EXPECT_LT(glm::distance(at.position, glm::mix(tree_.positions()[parent], tree_.positions()[node_], 0.25f)),
+              rounding);
     cut_.unfold(node_);
     pass(0);
     tree_.for_each_child(node_, [&](NodeId child) { EXPECT_EQ(drawn(child).position, at.position); });
@@ -467,7 +478,8 @@ TEST(Geomorph, TheSameStepsDrawTheSame) {
         ASSERT_TRUE(one.step(cut, frame_seconds));
         ASSERT_TRUE(other.step(cut, frame_seconds));
         ASSERT_EQ(one.moved().size(), other.moved().size());
-        ASSERT_TRUE(one.moved().empty() || std::memcmp(one.moved().data(), other.moved().data(), one.moved().size_bytes()) == 0);
+        ASSERT_TRUE(one.moved().empty() ||
+                    std::memcmp(one.moved().data(), other.moved().data(), one.moved().size_bytes()) == 0);
         ASSERT_TRUE(is_same_cut(one.drawn(), other.drawn()));
         moved += one.moved().size();
     }

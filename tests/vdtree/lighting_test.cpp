@@ -97,7 +97,9 @@ TEST(Shading, HasItsHighlightWhereTheHalfVectorIsTheNormal) {
 }
 
 TEST(Lights, ThatCannotBeAreRefusedByTheNameOfTheirField) {
-    const auto complaint = [](const Lighting& lighting) { return validate(lighting) ? std::string() : validate(lighting).error().message; };
+    const auto complaint = [](const Lighting& lighting) {
+        return validate(lighting) ? std::string() : validate(lighting).error().message;
+    };
     const LightSource good = directional({0, 0, 1});
     EXPECT_EQ(complaint(lit_by(good)), "");
     EXPECT_NE(complaint({}).find("The scene is black: ambient and lights[].intensity"), std::string::npos);
@@ -139,14 +141,17 @@ TEST(Lights, AtTheEndsOfWhatIsTakenMakeNumbers) {
         for (const double distance : {1e-18, 1.0, farthest})
             for (const double intensity : {0.0, 1.0, brightest})
                 for (const bool is_spot : {false, true}) {
-                    LightSource light = is_spot ? spot({0, 0, height}, {0, 0, -1}, 20, 40) : point({0, 0, height}, 1, 1);
+                    LightSource light =
+                        is_spot ? spot({0, 0, height}, {0, 0, -1}, 20, 40) : point({0, 0, height}, 1, 1);
                     light.intensity = intensity, light.distance = distance;
                     Lighting lighting = lit_by(light, 0.1);
                     lighting.specular = 0.2;
                     ASSERT_TRUE(validate(lighting));
                     const LuminanceRange range = lit_range(lighting, cone, sphere, eye);
-                    const double least = lit_luminance(lighting, {}, normal, 0.5, eye), most = lit_luminance(lighting, {}, normal, 0.8, eye);
-                    ASSERT_TRUE(range.lo <= least && most <= range.hi) << height << " " << distance << " " << intensity << ": " << range.lo << " " << range.hi;
+                    const double least = lit_luminance(lighting, {}, normal, 0.5, eye),
+                                 most = lit_luminance(lighting, {}, normal, 0.8, eye);
+                    ASSERT_TRUE(range.lo <= least && most <= range.hi)
+                        << height << " " << distance << " " << intensity << ": " << range.lo << " " << range.hi;
                 }
 }
 
@@ -171,7 +176,10 @@ Lighting random_lighting(std::mt19937_64& random, const VertexTree& tree, bool s
     const Sphere around = tree.bounds()[0].ring;
     Lighting lighting;
     lighting.ambient = 0.3 * random_unit(random);
-    const auto place = [&] { return glm::dvec3(around.centre) + random_between(random, 0.2, 4) * static_cast<double>(around.radius) * random_direction(random); };
+    const auto place = [&] {
+        return glm::dvec3(around.centre) +
+               random_between(random, 0.2, 4) * static_cast<double>(around.radius) * random_direction(random);
+    };
     for (std::size_t i = 0; i < 1 + random() % 3; ++i) {
         LightSource light;
         switch (random() % 3) {
@@ -180,8 +188,10 @@ Lighting random_lighting(std::mt19937_64& random, const VertexTree& tree, bool s
         default: {
             const glm::dvec3 at = place();
             const double inner = random_between(random, 0, 60);
-            light = spot(at, glm::dvec3(around.centre) - at + 0.5 * static_cast<double>(around.radius) * random_direction(random), inner,
-                         inner + random_between(random, 2, 40));
+            light = spot(at,
+                         glm::dvec3(around.centre) - at +
+                             0.5 * static_cast<double>(around.radius) * random_direction(random),
+                         inner, inner + random_between(random, 2, 40));
             light.distance = around.radius;
         }
         }
@@ -197,7 +207,8 @@ Lighting random_lighting(std::mt19937_64& random, const VertexTree& tree, bool s
 
 glm::dvec3 random_eye(std::mt19937_64& random, const VertexTree& tree) {
     const Sphere around = tree.bounds()[0].ring;
-    return glm::dvec3(around.centre) + random_between(random, 0.5, 6) * static_cast<double>(around.radius) * random_direction(random);
+    return glm::dvec3(around.centre) +
+           random_between(random, 0.5, 6) * static_cast<double>(around.radius) * random_direction(random);
 }
 
 struct Subject {
@@ -250,9 +261,10 @@ TEST(LightBounds, HoldEveryVertexOfRandomNodes) {
             const NodeId node = static_cast<NodeId>(random() % s.tree.interior_count());
             const LuminanceRange range = lit_range(lighting, s.bounds.cones()[node], s.tree.bounds()[node].ring, eye);
             for (const NodeId v : vertices_of(s, node)) {
-                if (s.tree.is_leaf(v) && s.neighbours[v - s.tree.interior_count()].empty()) continue; // drawn by no triangle
-                const double y = lit_luminance(lighting, glm::dvec3(s.tree.positions()[v]), glm::dvec3(glm::vec3(s.tree.normals()[v])),
-                                               albedo_of(s.tree, v), eye);
+                if (s.tree.is_leaf(v) && s.neighbours[v - s.tree.interior_count()].empty())
+                    continue; // drawn by no triangle
+                const double y = lit_luminance(lighting, glm::dvec3(s.tree.positions()[v]),
+                                               glm::dvec3(glm::vec3(s.tree.normals()[v])), albedo_of(s.tree, v), eye);
                 ASSERT_GE(y, range.lo) << s.name << ", trial " << trial << ", node " << node;
                 ASSERT_LE(y, range.hi) << s.name << ", trial " << trial << ", node " << node;
             }
@@ -281,10 +293,12 @@ TEST(LightBounds, HoldEverythingInTheirConesAndSpheres) {
         double least = 1, most = 0;
         for (int sample = 0; sample < 60; ++sample) {
             const double share = sample % 2 ? 1 : random_unit(random), tilt = share * angle;
-            const glm::dvec3 axis = glm::normalize(glm::dvec3(cone.axis)), side = glm::normalize(glm::cross(axis, random_direction(random)));
+            const glm::dvec3 axis = glm::normalize(glm::dvec3(cone.axis)),
+                             side = glm::normalize(glm::cross(axis, random_direction(random)));
             const glm::dvec3 normal = std::cos(tilt) * axis + std::sin(tilt) * side;
             const double out = sample % 3 ? 0.999999 : random_unit(random);
-            const glm::dvec3 position = glm::dvec3(sphere.centre) + out * static_cast<double>(sphere.radius) * random_direction(random);
+            const glm::dvec3 position =
+                glm::dvec3(sphere.centre) + out * static_cast<double>(sphere.radius) * random_direction(random);
             const double albedo = sample % 4 ? (sample % 4 == 1 ? cone.albedo.lo : cone.albedo.hi) : 0.6;
             const double y = lit_luminance(lighting, position, normal, albedo, eye);
             ASSERT_GE(y, range.lo) << "trial " << trial;
@@ -312,13 +326,16 @@ TEST(LightBounds, AreWiderForWiderConesAndSpheres) {
             made.albedo = {0.3f, 0.7f};
             return made;
         };
-        const glm::dvec3 axis = random_direction(random), tilted = glm::normalize(axis + random_unit(random) * random_direction(random));
-        const double angle = random_unit(random), wider = angle + std::acos(std::min(glm::dot(axis, tilted), 1.0)) + 1e-4;
+        const glm::dvec3 axis = random_direction(random),
+                         tilted = glm::normalize(axis + random_unit(random) * random_direction(random));
+        const double angle = random_unit(random),
+                     wider = angle + std::acos(std::min(glm::dot(axis, tilted), 1.0)) + 1e-4;
         Sphere large = s.tree.bounds()[0].ring, small = large;
         large.radius *= static_cast<float>(random_unit(random));
         small.radius = 0.999f * large.radius * static_cast<float>(random_unit(random));
         small.centre += glm::vec3(0.999 * static_cast<double>(large.radius - small.radius) * random_direction(random));
-        const LuminanceRange inner = lit_range(lighting, cone(axis, angle), small, eye), outer = lit_range(lighting, cone(tilted, wider), large, eye);
+        const LuminanceRange inner = lit_range(lighting, cone(axis, angle), small, eye),
+                             outer = lit_range(lighting, cone(tilted, wider), large, eye);
         ASSERT_LE(outer.lo, inner.lo + 2e-5f) << "trial " << trial;
         ASSERT_GE(outer.hi, inner.hi - 2e-5f) << "trial " << trial;
     }
@@ -336,7 +353,8 @@ TEST(LightBounds, ChangeNoFasterThanTheySay) {
             const double size = std::pow(random_unit(random), 3) * 0.6;
             Lighting to = from;
             for (LightSource& light : to.lights) {
-                light.direction = glm::normalize(light.direction + size * random_unit(random) * random_direction(random));
+                light.direction =
+                    glm::normalize(light.direction + size * random_unit(random) * random_direction(random));
                 light.position += size * random_unit(random) * radius * random_direction(random);
                 light.intensity *= std::exp(size / 8 * random_between(random, -0.3, 0.3));
                 if (light.kind == Kind::point) light.direction = glm::dvec3(0, 0, 1);
@@ -355,19 +373,23 @@ TEST(LightBounds, ChangeNoFasterThanTheySay) {
             for (std::size_t i = 0; i < kernel_lanes; ++i) {
                 if (!(motion <= static_cast<double>(before.cap[i]))) continue;
                 ++moved;
-                const double fine = std::min(motion, static_cast<double>(before.fine_cap[i])), full_rate = before.full_rate[i],
-                             rough_rate = before.rough_rate[i];
-                const double allowed = before.jump[i] + static_cast<double>(before.fine_rate[i]) * fine + rough_rate * (motion - fine) + 4e-6;
+                const double fine = std::min(motion, static_cast<double>(before.fine_cap[i])),
+                             full_rate = before.full_rate[i], rough_rate = before.rough_rate[i];
+                const double allowed = before.jump[i] + static_cast<double>(before.fine_rate[i]) * fine +
+                                       rough_rate * (motion - fine) + 4e-6;
                 const double d0 = static_cast<double>(before.hi[i]) - static_cast<double>(before.lo[i]),
                              d1 = static_cast<double>(after.hi[i]) - static_cast<double>(after.lo[i]);
-                ASSERT_LE(std::abs(d1 - d0), allowed) << s.name << ", trial " << trial << ", node " << nodes[i] << ", motion " << motion;
+                ASSERT_LE(std::abs(d1 - d0), allowed)
+                    << s.name << ", trial " << trial << ", node " << nodes[i] << ", motion " << motion;
                 const double s0 = static_cast<double>(before.hi[i]) + static_cast<double>(before.lo[i]),
                              s1 = static_cast<double>(after.hi[i]) + static_cast<double>(after.lo[i]);
-                ASSERT_LE(std::abs(s1 - s0), 2 * static_cast<double>(before.jump[i]) + static_cast<double>(before.fine_sum_rate[i]) * fine +
+                ASSERT_LE(std::abs(s1 - s0), 2 * static_cast<double>(before.jump[i]) +
+                                                 static_cast<double>(before.fine_sum_rate[i]) * fine +
                                                  full_rate * (motion - fine) + 4e-6)
                     << s.name << ", trial " << trial;
                 ASSERT_LE(std::abs(static_cast<double>(after.hi[i]) - static_cast<double>(before.hi[i])),
-                          static_cast<double>(before.jump[i]) + static_cast<double>(before.rise_rate[i]) * motion + 4e-6)
+                          static_cast<double>(before.jump[i]) + static_cast<double>(before.rise_rate[i]) * motion +
+                              4e-6)
                     << s.name << ", trial " << trial;
             }
         }
@@ -388,7 +410,9 @@ DistanceCriterion lit_criterion(const Subject& s, bool with_gaze) {
     for (std::size_t row = 1; row < ContrastClasses::row_count; ++row)
         for (std::size_t bin = 0; bin < parts.eccentricity_bins; ++bin) {
             const double seen = 60 * ContrastClasses::contrast(row) * std::pow(levels.luminance(row) / 100, 0.3);
-            if (seen > 1) parts.reach[row * parts.eccentricity_bins + bin] = static_cast<float>(40 * std::log(seen) / (1 + 0.3 * static_cast<double>(bin)));
+            if (seen > 1)
+                parts.reach[row * parts.eccentricity_bins + bin] =
+                    static_cast<float>(40 * std::log(seen) / (1 + 0.3 * static_cast<double>(bin)));
         }
     Result<DistanceCriterion> made = DistanceCriterion::create(s.tree, std::move(parts));
     EXPECT_TRUE(made) << made.error().message;
@@ -398,7 +422,8 @@ DistanceCriterion lit_criterion(const Subject& s, bool with_gaze) {
 // A step of each light, and sometimes a jump.
 void move_lights(std::mt19937_64& random, Lighting& lighting, double radius, double step) {
     for (LightSource& light : lighting.lights) {
-        if (light.kind != Kind::point) light.direction = glm::normalize(light.direction + step * random_direction(random));
+        if (light.kind != Kind::point)
+            light.direction = glm::normalize(light.direction + step * random_direction(random));
         if (light.kind != Kind::directional) light.position += step * radius * random_direction(random);
         if (random() % 4 == 0) light.intensity *= std::exp(random_between(random, -0.2, 0.2) * step);
     }
@@ -422,7 +447,8 @@ void expect_cuts_without_history(const Subject& s, bool with_gaze, bool eye_move
         Cut fresh(s.tree);
         ASSERT_TRUE(fresh.follow(criterion, viewpoint, options));
         for (NodeId node = 0; node < s.tree.interior_count(); ++node)
-            ASSERT_EQ(cut.is_unfolded(node), fresh.is_unfolded(node)) << s.name << ", seed " << seed << ", frame " << frame << ", node " << node;
+            ASSERT_EQ(cut.is_unfolded(node), fresh.is_unfolded(node))
+                << s.name << ", seed " << seed << ", frame " << frame << ", node " << node;
         if (frame % 10 == 9) {
             ASSERT_EQ(support::fault_in_cut(cut), "");
         }
@@ -444,7 +470,8 @@ TEST(FollowLights, TestsOnlyWhatTheLightMayChange) {
     const Subject& s = subjects()[0];
     const DistanceCriterion criterion = lit_criterion(s, false);
     Viewpoint viewpoint;
-    viewpoint.eye = glm::dvec3(s.tree.bounds()[0].ring.centre) + glm::dvec3(0, 0, 60 * static_cast<double>(s.tree.bounds()[0].ring.radius));
+    viewpoint.eye = glm::dvec3(s.tree.bounds()[0].ring.centre) +
+                    glm::dvec3(0, 0, 60 * static_cast<double>(s.tree.bounds()[0].ring.radius));
     viewpoint.lighting = lit_by(directional({1, 1, 1}, 0.8), 0.1);
     Cut cut(s.tree);
     const std::uint64_t at_first = cut.follow(criterion, viewpoint)->node_tests;

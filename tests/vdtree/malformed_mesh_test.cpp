@@ -105,7 +105,8 @@ TEST(MalformedMesh, CutShortAtAnyByteIsAnError) {
             const bool is_read = is_read_or_refused(bytes.substr(0, size), name);
             // An OBJ that ends after any line is an OBJ.
             if (name == "quad.obj") continue;
-            EXPECT_EQ(is_read, size >= bytes.size() - dispensable_bytes(name)) << name << " cut to " << size << " bytes";
+            EXPECT_EQ(is_read, size >= bytes.size() - dispensable_bytes(name))
+                << name << " cut to " << size << " bytes";
         }
     }
 }
@@ -140,8 +141,11 @@ TEST(MalformedMesh, DamagedAnywhereIsNoCrash) {
 }
 
 TEST(MalformedMesh, WordsInWrongPlacesAreNoCrash) {
-    const std::string words[] = {"-1", "0", "4294967296", "99999999999999999999", "1e999", "nan", "", "\n", "{", "]",
-                                 "2147483648", "-2147483648", "f", "v", "\\\n", "\"", "#", "1.5", "list", "\0"s};
+    const std::string words[] = {"-1",    "0",   "4294967296", "99999999999999999999",
+                                 "1e999", "nan", "",           "\n",
+                                 "{",     "]",   "2147483648", "-2147483648",
+                                 "f",     "v",   "\\\n",       "\"",
+                                 "#",     "1.5", "list",       "\0"s};
     for (const auto& [name, original] : mesh_files::samples()) {
         std::mt19937 random(99);
         for (int round = 0; round < 3000; ++round) {
@@ -155,8 +159,15 @@ TEST(MalformedMesh, WordsInWrongPlacesAreNoCrash) {
 
 // ---- PLY that lies ----
 
-const std::string huge_counts[] = {"2147483648", "4294967295", "4294967296", "9223372036854775807",
-                                   "9223372036854775808", "18446744073709551615", "18446744073709551616", "-1", "1e3"};
+const std::string huge_counts[] = {"2147483648",
+                                   "4294967295",
+                                   "4294967296",
+                                   "9223372036854775807",
+                                   "9223372036854775808",
+                                   "18446744073709551615",
+                                   "18446744073709551616",
+                                   "-1",
+                                   "1e3"};
 
 TEST(MalformedMesh, PlyCountsAreCheckedAgainstTheBytes) {
     for (const std::string& file : {mesh_files::ascii_ply_quad(), mesh_files::binary_ply_quad(std::endian::little),
@@ -183,7 +194,8 @@ TEST(MalformedMesh, PlyListsAreCheckedAgainstTheBytes) {
 
 TEST(MalformedMesh, PlyIndicesAreChecked) {
     const std::string file = mesh_files::binary_ply_quad(std::endian::little);
-    for (const std::int32_t index : {4, -1, std::numeric_limits<std::int32_t>::max(), std::numeric_limits<std::int32_t>::min()}) {
+    for (const std::int32_t index :
+         {4, -1, std::numeric_limits<std::int32_t>::max(), std::numeric_limits<std::int32_t>::min()}) {
         const std::string changed = file.substr(0, file.size() - 4) + mesh_files::little(index);
         EXPECT_THAT(error_of(changed, "a.ply"), HasSubstr("face 0 uses vertex " + std::to_string(index)));
     }
@@ -192,8 +204,8 @@ TEST(MalformedMesh, PlyIndicesAreChecked) {
                     HasSubstr("a.ply: line 15: "));
     }
     // Signs count for strips as well: only -1 starts a new one.
-    const std::string strips = replaced(replaced(mesh_files::ascii_ply_quad(), "element face", "element tristrips"),
-                                        "1 2 3\n", "1 2 -2\n");
+    const std::string strips =
+        replaced(replaced(mesh_files::ascii_ply_quad(), "element face", "element tristrips"), "1 2 3\n", "1 2 -2\n");
     EXPECT_THAT(error_of(strips, "a.ply"), HasSubstr("strip 0 uses vertex -2"));
 }
 
@@ -207,7 +219,8 @@ TEST(MalformedMesh, PlyHeadersAreChecked) {
     EXPECT_THAT(error_of(replaced(file, "property float y", "property real y"), "a.ply"), HasSubstr("line 6: 'real'"));
     EXPECT_THAT(error_of(replaced(file, "property float y", "property float q"), "a.ply"), HasSubstr("no x, y and z"));
     EXPECT_THAT(error_of(replaced(file, "list uchar", "list float"), "a.ply"), HasSubstr("'float'"));
-    EXPECT_THAT(error_of(replaced(file, "vertex_index", "vertices"), "a.ply"), HasSubstr("no list named vertex_indices"));
+    EXPECT_THAT(error_of(replaced(file, "vertex_index", "vertices"), "a.ply"),
+                HasSubstr("no list named vertex_indices"));
     EXPECT_THAT(error_of(replaced(file, "element vertex 4\n", ""), "a.ply"), HasSubstr("before the first element"));
     EXPECT_THAT(error_of(replaced(file, "element face 1", "element face 0"), "a.ply"), HasSubstr("no faces"));
     EXPECT_THAT(error_of(replaced(file, "elem", "e\0em"s), "a.ply"), HasSubstr("line 4"));
@@ -217,10 +230,19 @@ TEST(MalformedMesh, PlyHeadersAreChecked) {
 TEST(MalformedMesh, NumbersBeyondDoublesAreInfiniteOrZero) {
     constexpr double infinity = std::numeric_limits<double>::infinity();
     const std::string zeros(400, '0');
-    const std::pair<std::string, double> cases[] = {{"1e400", infinity}, {"-1.5E+400", -infinity}, {"0.001e400", infinity}, {"1" + zeros, infinity},
-                                                    {"-1" + zeros + ".5", -infinity}, {"1e-400", 0}, {"-2.5e-400", 0}, {"1000e-400", 0},
-                                                    {"0." + zeros + "1", 0}, {"1e99999999999999999999", infinity}, {"1e-99999999999999999999", 0},
-                                                    {"0." + zeros + "1e-5", 0}, {"+1e400", infinity}};
+    const std::pair<std::string, double> cases[] = {{"1e400", infinity},
+                                                    {"-1.5E+400", -infinity},
+                                                    {"0.001e400", infinity},
+                                                    {"1" + zeros, infinity},
+                                                    {"-1" + zeros + ".5", -infinity},
+                                                    {"1e-400", 0},
+                                                    {"-2.5e-400", 0},
+                                                    {"1000e-400", 0},
+                                                    {"0." + zeros + "1", 0},
+                                                    {"1e99999999999999999999", infinity},
+                                                    {"1e-99999999999999999999", 0},
+                                                    {"0." + zeros + "1e-5", 0},
+                                                    {"+1e400", infinity}};
     for (const auto& [text, expected] : cases) {
         double value = 1;
         EXPECT_TRUE(meshio::to_number(text, value)) << text;
@@ -234,7 +256,8 @@ TEST(MalformedMesh, CoordinatesMustBeFinite) {
                     HasSubstr("Vertex 2"));
         EXPECT_THAT(error_of(replaced(mesh_files::obj_quad(), "v 1 1 0", "v 1 " + value + " 0"), "a.obj"),
                     HasSubstr("line 4: vertex 3"));
-        EXPECT_THAT(error_of(replaced(mesh_files::off_quad(), "1 1 0", "1 " + value + " 0"), "a.off"), HasSubstr("Vertex 2"));
+        EXPECT_THAT(error_of(replaced(mesh_files::off_quad(), "1 1 0", "1 " + value + " 0"), "a.off"),
+                    HasSubstr("Vertex 2"));
         EXPECT_THAT(error_of(replaced(mesh_files::ascii_stl_facet(), "1 0 0", "1 " + value + " 0"), "a.stl"),
                     HasSubstr("Vertex 1"));
     }
@@ -248,12 +271,12 @@ TEST(MalformedMesh, CoordinatesMustBeFinite) {
 }
 
 TEST(MalformedMesh, AMeshWithoutTrianglesIsAnError) {
-    for (const auto& [bytes, name] : {std::pair(""s, "a.ply"), std::pair(""s, "a.obj"), std::pair(" \n\n"s, "a.obj"),
-                                      std::pair("v 0 0 0\nl 1 1\n"s, "a.obj"), std::pair("v 0 0 0\nf 1\nf 1 1\n"s, "a.obj"),
-                                      std::pair("v 0 0 0\nf 1 1 1\n"s, "a.obj"), std::pair("OFF 1 0 0\n0 0 0\n"s, "a.off"),
-                                      std::pair("OFF 0 0 0\n"s, "a.off"), std::pair("solid\nendsolid\n"s, "a.stl"),
-                                      std::pair(std::string(84, '\0'), "a.stl"),
-                                      std::pair("{\"asset\":{\"version\":\"2.0\"}}"s, "a.gltf")}) {
+    for (const auto& [bytes, name] :
+         {std::pair(""s, "a.ply"), std::pair(""s, "a.obj"), std::pair(" \n\n"s, "a.obj"),
+          std::pair("v 0 0 0\nl 1 1\n"s, "a.obj"), std::pair("v 0 0 0\nf 1\nf 1 1\n"s, "a.obj"),
+          std::pair("v 0 0 0\nf 1 1 1\n"s, "a.obj"), std::pair("OFF 1 0 0\n0 0 0\n"s, "a.off"),
+          std::pair("OFF 0 0 0\n"s, "a.off"), std::pair("solid\nendsolid\n"s, "a.stl"),
+          std::pair(std::string(84, '\0'), "a.stl"), std::pair("{\"asset\":{\"version\":\"2.0\"}}"s, "a.gltf")}) {
         EXPECT_THAT(error_of(bytes, name), HasSubstr(name));
     }
 }
@@ -262,15 +285,34 @@ TEST(MalformedMesh, AMeshWithoutTrianglesIsAnError) {
 
 TEST(MalformedMesh, ObjIndicesAreChecked) {
     const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\n";
-    for (const std::string corner : {"0", "4", "-4", "4294967297", "-4294967295", "9223372036854775808",
-                                     "-9223372036854775808", "-99999999999999999999", "3/2", "3/0", "3/-2", "3//2",
-                                     "3/1/2", "3/1/1/1", "/1", "3.5", "x", "3x", "--1", "+-1", "3/x"}) {
+    for (const std::string corner : {"0",
+                                     "4",
+                                     "-4",
+                                     "4294967297",
+                                     "-4294967295",
+                                     "9223372036854775808",
+                                     "-9223372036854775808",
+                                     "-99999999999999999999",
+                                     "3/2",
+                                     "3/0",
+                                     "3/-2",
+                                     "3//2",
+                                     "3/1/2",
+                                     "3/1/1/1",
+                                     "/1",
+                                     "3.5",
+                                     "x",
+                                     "3x",
+                                     "--1",
+                                     "+-1",
+                                     "3/x"}) {
         EXPECT_THAT(error_of(vertices + "f 1 2 " + corner + "\n", "a.obj"), HasSubstr("a.obj: line 6: ")) << corner;
     }
 }
 
 TEST(MalformedMesh, ObjNumbersAreChecked) {
-    for (const std::string numbers : {"1 2", "", "1 2 3 4 5", "1 2 3 4 5 6 7 8", "1 2 x", "1 2 3.1+e2", "1 2 1.#IND", "1 2 0x10"}) {
+    for (const std::string numbers :
+         {"1 2", "", "1 2 3 4 5", "1 2 3 4 5 6 7 8", "1 2 x", "1 2 3.1+e2", "1 2 1.#IND", "1 2 0x10"}) {
         EXPECT_THAT(error_of("v " + numbers + "\nf 1 1 1\n", "a.obj"), HasSubstr("a.obj: line 1: vertex 1")) << numbers;
     }
     EXPECT_THAT(error_of("v 0 0 0\nvt\nvn 0 0\n", "a.obj"), HasSubstr("line 2"));
@@ -381,14 +423,16 @@ TEST(MalformedMesh, GltfNodesMustFormTreesOfReasonableDepth) {
                 HasSubstr("node 2 is reached twice"));
     std::string chain;
     for (int i = 1; i < 5000; ++i) chain += R"({"children":[)" + std::to_string(i) + "]},";
-    EXPECT_THAT(error_of(glb_with(R"([{"mesh":0}])", "[" + chain + R"({"mesh":0}])"), "a.glb"), HasSubstr("nested too deeply"));
+    EXPECT_THAT(error_of(glb_with(R"([{"mesh":0}])", "[" + chain + R"({"mesh":0}])"), "a.glb"),
+                HasSubstr("nested too deeply"));
 }
 
 TEST(MalformedMesh, GltfJsonMayNotBeNestedDeeply) {
     for (const std::string open : {"[", "{\"a\":"}) {
         std::string nested;
         for (int i = 0; i < 200000; ++i) nested += open;
-        EXPECT_THAT(error_of(glb_with(R"("scene":0)", R"("scene":0,"extras":)" + nested), "a.glb"), HasSubstr("nested too deeply"));
+        EXPECT_THAT(error_of(glb_with(R"("scene":0)", R"("scene":0,"extras":)" + nested), "a.glb"),
+                    HasSubstr("nested too deeply"));
         EXPECT_THAT(error_of("{\"asset\":" + nested, "a.gltf"), HasSubstr("nested too deeply"));
     }
 }
@@ -404,7 +448,8 @@ TEST(MalformedMesh, GltfInstancesMayNotMultiplyWithoutLimit) {
     }
     std::string json = mesh_files::gltf_triangle_json("[" + nodes + R"({"mesh":0}])");
     json = replaced(json, R"("nodes":[0])", R"("nodes":[)" + list + std::to_string(count) + "]");
-    json = replaced(json, R"("componentType":5123,"count":3)", R"("componentType":5123,"count":)" + std::to_string(3 * count));
+    json = replaced(json, R"("componentType":5123,"count":3)",
+                    R"("componentType":5123,"count":)" + std::to_string(3 * count));
     json = replaced(json, R"("byteLength":6)", R"("byteLength":)" + std::to_string(6 * count));
     json = replaced(json, R"("byteLength":42)", R"("byteLength":)" + std::to_string(36 + 6 * count));
     const std::string file = mesh_files::glb(json, mesh_files::gltf_triangle_data().substr(0, 36) + data);
@@ -447,7 +492,8 @@ TEST(MalformedMesh, GlbChunksAreChecked) {
     for (const std::size_t at : {4u, 8u, 12u, 16u}) {
         for (const std::uint32_t value : {0u, 1u, 3u, 0x7FFFFFFFu, 0xFFFFFFFFu, 0xFFFFFFF0u}) {
             std::string changed = file;
-            EXPECT_FALSE(is_read_or_refused(changed.replace(at, 4, mesh_files::little(value)), "a.glb")) << at << " " << value;
+            EXPECT_FALSE(is_read_or_refused(changed.replace(at, 4, mesh_files::little(value)), "a.glb"))
+                << at << " " << value;
         }
     }
 }
@@ -518,7 +564,8 @@ const std::map<std::string, Expected> expectations{
 
 bool is_mesh_name(const fs::path& name) {
     const std::string ending = name.extension().string();
-    return ending == ".ply" || ending == ".obj" || ending == ".off" || ending == ".stl" || ending == ".gltf" || ending == ".glb";
+    return ending == ".ply" || ending == ".obj" || ending == ".off" || ending == ".stl" || ending == ".gltf" ||
+           ending == ".glb";
 }
 
 // The bytes of a file, or what `zstd` makes of them.

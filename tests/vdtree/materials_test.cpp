@@ -13,8 +13,11 @@ namespace {
 
 class Materials : public testing::Test {
 protected:
-    void write(const std::string& name, const std::string& text) const { std::ofstream(folder_ / name, std::ios::binary) << text; }
-    Result<meshio::ReadResult> read(const std::string& mtl, const std::string& library = "m.mtl", meshio::ReadOptions options = {}) const {
+    void write(const std::string& name, const std::string& text) const {
+        std::ofstream(folder_ / name, std::ios::binary) << text;
+    }
+    Result<meshio::ReadResult> read(const std::string& mtl, const std::string& library = "m.mtl",
+                                    meshio::ReadOptions options = {}) const {
         write("m.mtl", mtl);
         write("m.obj", "mtllib " + library + "\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n");
         return meshio::read_mesh(folder_ / "m.obj", options);
@@ -69,7 +72,9 @@ TEST_F(Materials, ThatCannotBeReadAreNotedAndBadOnesAreNot) {
     EXPECT_NE(complaint("newmtl a\nd inf\n").find("opacity of material 'a'"), std::string::npos);
     EXPECT_NE(complaint("newmtl a\nmap_Kd -clamp on\n").find("names no image"), std::string::npos);
     for (const char* image : {"../p.png", "/etc/p.png", "C:\\p.png", "http://a/p.png", "x/../../p.png"})
-        EXPECT_NE(complaint(std::string("newmtl a\nmap_Kd ") + image + "\n").find("only files beside the mesh"), std::string::npos) << image;
+        EXPECT_NE(complaint(std::string("newmtl a\nmap_Kd ") + image + "\n").find("only files beside the mesh"),
+                  std::string::npos)
+            << image;
     EXPECT_NE(complaint(std::string("newmtl a\nKd 1 1 1\0\n", 20)).find("NUL byte"), std::string::npos);
     for (const char* library : {"nowhere.mtl", "../m.mtl", ""}) {
         const auto result = read("newmtl a\n", library);
@@ -80,7 +85,8 @@ TEST_F(Materials, ThatCannotBeReadAreNotedAndBadOnesAreNot) {
     const auto other = read("newmtl other\n");
     ASSERT_TRUE(other);
     ASSERT_EQ(other->warnings.size(), 1u);
-    EXPECT_NE(other->warnings[0].find("1 material is in no library that was read, the first 'a'"), std::string::npos) << other->warnings[0];
+    EXPECT_NE(other->warnings[0].find("1 material is in no library that was read, the first 'a'"), std::string::npos)
+        << other->warnings[0];
     meshio::ReadOptions without;
     without.materials = false;
     const auto result = read("newmtl a\nKd nan\n", "m.mtl", without);
@@ -97,16 +103,19 @@ TEST_F(Materials, OfGltfShareTheirImage) {
         for (int i = 0; i < count; ++i) {
             const std::string comma = i > 0 ? "," : "", number = std::to_string(i);
             primitives += comma + R"({"attributes":{"POSITION":0},"indices":1,"material":)" + number + "}";
-            materials += comma + R"({"name":"same","pbrMetallicRoughness":{"baseColorTexture":{"index":)" + number + "}}}";
+            materials +=
+                comma + R"({"name":"same","pbrMetallicRoughness":{"baseColorTexture":{"index":)" + number + "}}}";
             textures += comma + R"({"source":)" + (has_one_image ? "0" : number) + "}";
             if (i == 0 || !has_one_image) images += comma + R"({"bufferView":2,"mimeType":"image/png"})";
         }
-        return mesh_files::glb(R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],"meshes":[{"primitives":[)" +
-                                   primitives + R"(]}],"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},)" +
-                                   R"({"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}],"bufferViews":[{"buffer":0,"byteLength":36},)" +
-                                   R"({"buffer":0,"byteOffset":36,"byteLength":6},{"buffer":0,"byteOffset":44,"byteLength":1048576}],"buffers":[)" +
-                                   R"({"byteLength":1048620}],"materials":[)" + materials + R"(],"textures":[)" + textures + R"(],"images":[)" + images + "]}",
-                               mesh_files::gltf_triangle_data() + "  " + picture);
+        return mesh_files::glb(
+            R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],"meshes":[{"primitives":[)" +
+                primitives + R"(]}],"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},)" +
+                R"({"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}],"bufferViews":[{"buffer":0,"byteLength":36},)" +
+                R"({"buffer":0,"byteOffset":36,"byteLength":6},{"buffer":0,"byteOffset":44,"byteLength":1048576}],"buffers":[)" +
+                R"({"byteLength":1048620}],"materials":[)" + materials + R"(],"textures":[)" + textures +
+                R"(],"images":[)" + images + "]}",
+            mesh_files::gltf_triangle_data() + "  " + picture);
     };
     write("one.glb", glb(true));
     const auto one = meshio::read_mesh(folder_ / "one.glb");
@@ -114,7 +123,8 @@ TEST_F(Materials, OfGltfShareTheirImage) {
     ASSERT_EQ(one->materials.size(), std::size_t{count});
     ASSERT_TRUE(one->materials[0].image_bytes);
     EXPECT_EQ(*one->materials[0].image_bytes, picture);
-    for (const meshio::Material& material : one->materials) EXPECT_EQ(material.image_bytes, one->materials[0].image_bytes);
+    for (const meshio::Material& material : one->materials)
+        EXPECT_EQ(material.image_bytes, one->materials[0].image_bytes);
     write("many.glb", glb(false));
     const auto many = meshio::read_mesh(folder_ / "many.glb");
     EXPECT_TRUE(!many && many.error().message.find("far more than the file holds") != std::string::npos);

@@ -120,16 +120,18 @@ TEST(Ply, ReadsFacesThatStandBeforeTheVertices) {
     const Mesh mesh = read("ply\nformat ascii 1.0\nelement face 1\nproperty list uchar uint vertex_indices\n"
                            "element vertex 4\nproperty double x\nproperty double y\nproperty double z\nend_header\n"
                            "4 0 1 2 3\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n",
-                           "a.ply").mesh;
+                           "a.ply")
+                          .mesh;
     expect_unit_quad(mesh);
 }
 
 TEST(Ply, SkipsElementsAndListsItDoesNotKnow) {
-    const std::string header = "ply\nformat binary_big_endian 1.0\nelement camera 2\nproperty list ushort double knots\n"
-                               "property char c\nelement vertex 3\nproperty list uchar short tags\nproperty float z\n"
-                               "property float y\nproperty float x\nelement face 1\nproperty uchar flag\n"
-                               "property list uint uchar vertex_indices\nproperty list uchar float texcoord\n"
-                               "element tail 1\nproperty int i\nend_header\n";
+    const std::string header =
+        "ply\nformat binary_big_endian 1.0\nelement camera 2\nproperty list ushort double knots\n"
+        "property char c\nelement vertex 3\nproperty list uchar short tags\nproperty float z\n"
+        "property float y\nproperty float x\nelement face 1\nproperty uchar flag\n"
+        "property list uint uchar vertex_indices\nproperty list uchar float texcoord\n"
+        "element tail 1\nproperty int i\nend_header\n";
     const auto big = [](auto value) { return mesh_files::bytes(value, std::endian::big); };
     std::string body = big(std::uint16_t{2}) + big(1.5) + big(2.5) + "c" + big(std::uint16_t{0}) + "d";
     for (int i = 0; i < 3; ++i) {
@@ -138,8 +140,7 @@ TEST(Ply, SkipsElementsAndListsItDoesNotKnow) {
     }
     body += "\7"s + big(std::uint32_t{3}) + "\0\1\2"s + "\2"s + big(0.5f) + big(0.5f) + big(std::int32_t{-1});
     const meshio::ReadResult result = read(header + body, "a.ply");
-    EXPECT_THAT(result.mesh.positions,
-                ElementsAre(glm::dvec3(0, 0, 0), glm::dvec3(1, 0, 0.25), glm::dvec3(0, 1, 0.5)));
+    EXPECT_THAT(result.mesh.positions, ElementsAre(glm::dvec3(0, 0, 0), glm::dvec3(1, 0, 0.25), glm::dvec3(0, 1, 0.5)));
     EXPECT_THAT(result.mesh.triangles, ElementsAre(Triangle{0, 1, 2}));
     EXPECT_TRUE(result.warnings.empty());
 }
@@ -148,7 +149,8 @@ TEST(Ply, UnrollsStripsWithTheirOrientation) {
     const Mesh mesh = read("ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
                            "property float z\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n"
                            "0 0 0\n0 1 0\n1 0 0\n1 1 0\n2 0 0\n9 0 1 2 3 -1 2 3 4 -1\n",
-                           "a.ply").mesh;
+                           "a.ply")
+                          .mesh;
     EXPECT_THAT(mesh.triangles, ElementsAre(Triangle{0, 1, 2}, Triangle{2, 1, 3}, Triangle{2, 3, 4}));
 }
 
@@ -156,7 +158,8 @@ TEST(Ply, DropsTheSwapsOfStripsAndCountsThem) {
     const meshio::ReadResult result =
         read("ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
              "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
-             "0 0 0\n0 1 0\n1 0 0\n1 1 0\n6 0 1 2 2 1 3\n", "a.ply");
+             "0 0 0\n0 1 0\n1 0 0\n1 1 0\n6 0 1 2 2 1 3\n",
+             "a.ply");
     EXPECT_THAT(result.mesh.triangles, ElementsAre(Triangle{0, 1, 2}, Triangle{1, 2, 3}));
     EXPECT_EQ(result.dropped_triangles, 2u); // 1 2 2 and 2 2 1
     EXPECT_EQ(result.source_faces, 4u);
@@ -199,8 +202,8 @@ TEST(Ply, ScalesColoursByTheirTypeAndDecodesThem) {
 }
 
 TEST(Ply, RepairsColoursAndUvsThatWouldSpreadNan) {
-    const meshio::ReadResult colours = read(ply_with("property float red\nproperty float green\nproperty float blue\n", "nan 2 -1"),
-                                    "a.ply");
+    const meshio::ReadResult colours =
+        read(ply_with("property float red\nproperty float green\nproperty float blue\n", "nan 2 -1"), "a.ply");
     EXPECT_EQ(colours.mesh.colours[0], glm::vec4(0.0f, 1.0f, 0.0f, 1.0f));
     ASSERT_EQ(colours.warnings.size(), 1u);
     EXPECT_THAT(colours.warnings[0], HasSubstr("3 vertex colours were"));
@@ -221,7 +224,8 @@ TEST(Ply, DropsTrianglesThatUseAVertexTwiceAndKeepsCoincidentOnes) {
     const meshio::ReadResult result =
         read("ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
              "element face 3\nproperty list uchar int vertex_indices\nend_header\n"
-             "0 0 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 2 3 2\n4 0 2 3 3\n", "a.ply");
+             "0 0 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 2 3 2\n4 0 2 3 3\n",
+             "a.ply");
     EXPECT_THAT(result.mesh.triangles, ElementsAre(Triangle{0, 1, 2}, Triangle{0, 2, 3}));
     EXPECT_EQ(result.dropped_triangles, 2u);
     EXPECT_EQ(result.mesh.positions.size(), 4u);
@@ -246,9 +250,9 @@ TEST(Obj, KeepsTheNumberingOfPositionsOnly) {
 
 TEST(Obj, ReadsEveryFormOfCorner) {
     const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.5 0.25\nvn 0 0 2\n";
-    for (const std::string face : {"f 1 2 3", "f 1/1 2/1 3/1", "f 1//1 2//1 3//1", "f 1/1/1 2/1/1 3/1/1", "f 1// 2/ 3",
-                                   "f -3 -2 -1", "f -3/-1/-1 -2/-1/-1 -1/-1/-1", "f 1 2 3 # corners", "fo 1 2 3",
-                                   "f\t1  2\t3 ", "f +1 +2 +3"}) {
+    for (const std::string face :
+         {"f 1 2 3", "f 1/1 2/1 3/1", "f 1//1 2//1 3//1", "f 1/1/1 2/1/1 3/1/1", "f 1// 2/ 3", "f -3 -2 -1",
+          "f -3/-1/-1 -2/-1/-1 -1/-1/-1", "f 1 2 3 # corners", "fo 1 2 3", "f\t1  2\t3 ", "f +1 +2 +3"}) {
         const Mesh mesh = read(vertices + face + "\n", "a.obj").mesh;
         EXPECT_THAT(mesh.triangles, ElementsAre(Triangle{0, 1, 2})) << face;
         EXPECT_EQ(mesh.positions.size(), 3u) << face;
@@ -285,7 +289,8 @@ TEST(Obj, SplitsVerticesOnlyWhereAttributesDiffer) {
 }
 
 TEST(Obj, TakesEveryNewlineAndJoinsContinuedLines) {
-    const std::string lines[] = {"v 0 0 0", "v 1 0 \\", "0", "# a comment that ends in \\", "v 0 1 0", "f 1 2 \\", "  3"};
+    const std::string lines[] = {"v 0 0 0", "v 1 0 \\", "0",  "# a comment that ends in \\",
+                                 "v 0 1 0", "f 1 2 \\", "  3"};
     for (const std::string newline : {"\n", "\r\n", "\r"}) {
         std::string file;
         for (const std::string& line : lines) file += line + newline;
@@ -297,13 +302,15 @@ TEST(Obj, TakesEveryNewlineAndJoinsContinuedLines) {
 }
 
 TEST(Obj, NamesTheRightLineAfterMixedNewlines) {
-    EXPECT_THAT(error_of("v 0 0 0\rv 1 0 0\r\nv 0 1 0\n\r\nf 1 2 4\r", "a.obj"), HasSubstr("a.obj: line 5: face 1 uses vertex 4"));
+    EXPECT_THAT(error_of("v 0 0 0\rv 1 0 0\r\nv 0 1 0\n\r\nf 1 2 4\r", "a.obj"),
+                HasSubstr("a.obj: line 5: face 1 uses vertex 4"));
 }
 
 TEST(Obj, ReadsWeightsAndColoursOfVertices) {
     meshio::ReadOptions linear;
     linear.colours = meshio::ColourEncoding::linear;
-    const Mesh mesh = read("v 2 0 0 0.5\nv 1 0 0 1 0.5 0\nv 0 1 0 0 0 1 0.25\nv 3 3 3\nf 1 2 3\n", "a.obj", linear).mesh;
+    const Mesh mesh =
+        read("v 2 0 0 0.5\nv 1 0 0 1 0.5 0\nv 0 1 0 0 0 1 0.25\nv 3 3 3\nf 1 2 3\n", "a.obj", linear).mesh;
     EXPECT_EQ(mesh.positions[0], glm::dvec3(2, 0, 0)); // a weight divides nothing
     EXPECT_THAT(mesh.colours, ElementsAre(glm::vec4(1.0f), glm::vec4(1.0f, 0.5f, 0.0f, 1.0f),
                                           glm::vec4(0.0f, 0.0f, 1.0f, 0.25f), glm::vec4(1.0f)));
@@ -318,14 +325,14 @@ TEST(Obj, KeepsGroupsAndMaterialsAsRanges) {
         shown.push_back((range.kind == MeshRange::Kind::group ? "g " : "m ") + range.name + " " +
                         std::to_string(range.first_triangle) + "+" + std::to_string(range.triangle_count));
     }
-    EXPECT_THAT(shown, testing::UnorderedElementsAre("g left wing 1+2", "m red 1+2", "g body 3+2", "m blue 3+1",
-                                                     "m red 4+1"));
+    EXPECT_THAT(shown,
+                testing::UnorderedElementsAre("g left wing 1+2", "m red 1+2", "g body 3+2", "m blue 3+1", "m red 4+1"));
     EXPECT_TRUE(validate(mesh.view()));
 }
 
 TEST(Obj, ShrinksRangesWithTheTrianglesTheyLose) {
-    const Mesh mesh = read("v 0 0 0\nv 1 0 0\nv 1 1 0\ng a\nf 1 1 2\nf 1 2 3\nf 2 2 3\ng b\nf 3 3 1\ng c\nf 3 2 1\n",
-                           "a.obj").mesh;
+    const Mesh mesh =
+        read("v 0 0 0\nv 1 0 0\nv 1 1 0\ng a\nf 1 1 2\nf 1 2 3\nf 2 2 3\ng b\nf 3 3 1\ng c\nf 3 2 1\n", "a.obj").mesh;
     ASSERT_EQ(mesh.ranges.size(), 2u);
     EXPECT_EQ(mesh.ranges[0].first_triangle, 0u);
     EXPECT_EQ(mesh.ranges[0].triangle_count, 1u);
@@ -336,7 +343,8 @@ TEST(Obj, ShrinksRangesWithTheTrianglesTheyLose) {
 
 TEST(Obj, SaysWhichKeywordItDidNotKnow) {
     const meshio::ReadResult result = read("v 0 0 0\nv 1 0 0\nv 1 1 0\ns off\nwobble 3\nf 1 2 3\n", "a.obj");
-    EXPECT_THAT(result.warnings, ElementsAre("1 line was skipped for an unknown keyword, the first 'wobble' in line 5."));
+    EXPECT_THAT(result.warnings,
+                ElementsAre("1 line was skipped for an unknown keyword, the first 'wobble' in line 5."));
 }
 
 TEST(Obj, ReadsAFaceThatStandsBeforeItsVertices) {
@@ -366,8 +374,8 @@ TEST(Polygons, KeepTheAreaOfConcaveOnes) {
 }
 
 TEST(Polygons, KeepTheirOrientationInEveryPlane) {
-    const std::vector<glm::dvec2> star{{0, 3}, {-1, 1}, {-3, 1}, {-1.5, -0.5}, {-2, -3}, {0, -1.5},
-                                       {2, -3}, {1.5, -0.5}, {3, 1}, {1, 1}};
+    const std::vector<glm::dvec2> star{{0, 3},    {-1, 1}, {-3, 1},     {-1.5, -0.5}, {-2, -3},
+                                       {0, -1.5}, {2, -3}, {1.5, -0.5}, {3, 1},       {1, 1}};
     double expected = 0.0;
     for (std::size_t i = 0; i < star.size(); ++i) {
         const glm::dvec2 a = star[i], b = star[(i + 1) % star.size()];
@@ -405,8 +413,16 @@ TEST(Polygons, KeepTheirAreaAtExtremeScales) {
 
 TEST(Polygons, BridgeHolesThatComeAsOneRing) {
     // A 4 x 4 square with a 2 x 2 hole, joined by a doubled edge.
-    EXPECT_NEAR(cut_area({{0, 0, 0}, {4, 0, 0}, {4, 4, 0}, {0, 4, 0}, {0, 0, 0}, {1, 1, 0}, {1, 3, 0}, {3, 3, 0},
-                          {3, 1, 0}, {1, 1, 0}}),
+    EXPECT_NEAR(cut_area({{0, 0, 0},
+                          {4, 0, 0},
+                          {4, 4, 0},
+                          {0, 4, 0},
+                          {0, 0, 0},
+                          {1, 1, 0},
+                          {1, 3, 0},
+                          {3, 3, 0},
+                          {3, 1, 0},
+                          {1, 1, 0}}),
                 12.0, 1e-12);
 }
 
@@ -504,7 +520,8 @@ TEST(Stl, KeepsThreeVerticesAFacet) {
 
 TEST(Stl, KeepsSolidsAsGroups) {
     const std::string solid = mesh_files::ascii_stl_facet();
-    const Mesh mesh = read(solid + "solid\n" + solid.substr(15, solid.find("endsolid") - 15) + "endsolid\n", "a.stl").mesh;
+    const Mesh mesh =
+        read(solid + "solid\n" + solid.substr(15, solid.find("endsolid") - 15) + "endsolid\n", "a.stl").mesh;
     ASSERT_EQ(mesh.ranges.size(), 2u);
     EXPECT_EQ(mesh.ranges[0].name, "part one");
     EXPECT_EQ(mesh.ranges[1].first_triangle, 1u);
@@ -528,7 +545,8 @@ TEST(Stl, TellsOfFacetsWithoutANormalAmongOthers) {
     const meshio::ReadResult result = read(one + other.replace(other.find("0 0 1"), 5, "0 0 0"), "a.stl");
     ASSERT_EQ(result.mesh.normals.size(), 6u);
     EXPECT_EQ(result.mesh.normals[3], glm::vec3(0.0f));
-    EXPECT_THAT(result.warnings, ElementsAre("3 normals were zero or missing and computed from the faces, the first that of vertex 3."));
+    EXPECT_THAT(result.warnings,
+                ElementsAre("3 normals were zero or missing and computed from the faces, the first that of vertex 3."));
 }
 
 // Whatever the format: zero is told, what is not finite is refused, and what no triangle uses does not matter.
@@ -550,9 +568,15 @@ TEST(Normals, AreNeverReplacedInSilence) {
     for (const auto& good : {read(ply("0 1 0"), "a.ply"), read(off("1 1 1"), "a.off"), read(obj("0 0 1e-30"), "a.obj")})
         EXPECT_TRUE(good.warnings.empty());
     for (const std::string bad : {"nan 0 0", "0 inf 0", "0 0 -inf", "1e300 0 0"}) {
-        EXPECT_EQ(error_of(ply(bad), "a.ply"), "a.ply: the normal of vertex 0 is NaN or infinite; correct it, or leave the normals out.") << bad;
-        EXPECT_EQ(error_of(off(bad), "a.off"), "a.off: the normal of vertex 1 is NaN or infinite; correct it, or leave the normals out.") << bad;
-        EXPECT_EQ(error_of(obj(bad), "a.obj"), "a.obj: line 7: face 1 uses normal 2, which is NaN or infinite; correct it.") << bad;
+        EXPECT_EQ(error_of(ply(bad), "a.ply"),
+                  "a.ply: the normal of vertex 0 is NaN or infinite; correct it, or leave the normals out.")
+            << bad;
+        EXPECT_EQ(error_of(off(bad), "a.off"),
+                  "a.off: the normal of vertex 1 is NaN or infinite; correct it, or leave the normals out.")
+            << bad;
+        EXPECT_EQ(error_of(obj(bad), "a.obj"),
+                  "a.obj: line 7: face 1 uses normal 2, which is NaN or infinite; correct it.")
+            << bad;
     }
 }
 
@@ -596,7 +620,8 @@ TEST_F(MeshFiles, GltfReadsBuffersBesideTheFileOnly) {
     EXPECT_TRUE(meshio::read_mesh(folder_ / "a.gltf"));
     save("inner/a.gltf", with_uri("../my%20data.bin"));
     EXPECT_FALSE(meshio::read_mesh(folder_ / "inner/a.gltf"));
-    for (const std::string uri : {"%2e%2e/x.bin", "/etc/passwd", "file:///etc/passwd", "http://a/b.bin", "missing.bin", "", "."}) {
+    for (const std::string uri :
+         {"%2e%2e/x.bin", "/etc/passwd", "file:///etc/passwd", "http://a/b.bin", "missing.bin", "", "."}) {
         save("b.gltf", with_uri(uri));
         const Result<meshio::ReadResult> result = meshio::read_mesh(folder_ / "b.gltf");
         ASSERT_FALSE(result) << uri;
@@ -616,10 +641,12 @@ TEST(Gltf, AppliesTheTransformsOfNodes) {
 }
 
 TEST(Gltf, TurnsTheTrianglesOfMirroredNodes) {
-    const Mesh mesh = read(glb(gltf_triangle_json(R"([{"mesh":0,"scale":[-1,1,1]}])"), gltf_triangle_data()), "a.glb").mesh;
+    const Mesh mesh =
+        read(glb(gltf_triangle_json(R"([{"mesh":0,"scale":[-1,1,1]}])"), gltf_triangle_data()), "a.glb").mesh;
     EXPECT_EQ(mesh.positions[1], glm::dvec3(-1, 0, 0));
     const glm::dvec3 a = mesh.positions[mesh.triangles[0][0]];
-    const glm::dvec3 normal = glm::cross(mesh.positions[mesh.triangles[0][1]] - a, mesh.positions[mesh.triangles[0][2]] - a);
+    const glm::dvec3 normal =
+        glm::cross(mesh.positions[mesh.triangles[0][1]] - a, mesh.positions[mesh.triangles[0][2]] - a);
     EXPECT_EQ(normal, glm::dvec3(0, 0, 1)); // it looks the way it did
 }
 
@@ -636,18 +663,19 @@ std::string gltf_with_attributes(int mode, const std::string& node = R"({"mesh":
     for (int i = 0; i < 6; ++i) data += mesh_files::floats(i / 2, i % 2, 0);
     for (int i = 0; i < 6; ++i) data += mesh_files::floats(0.6, 0, 0.8);
     for (int i = 0; i < 6; ++i) data += "\xFF\x33"s + std::string(2, '\0');
-    for (int i = 0; i < 6; ++i) data += mesh_files::little(std::uint16_t{65535}) + mesh_files::little(std::uint16_t{13107});
-    return glb(R"({"asset":{"version":"2.0"},"nodes":[)" + node +
-                   R"(],"materials":[{"name":"stone"}],"meshes":[{"name":"m","primitives":[{"mode":)" +
-                   std::to_string(mode) +
-                   R"(,"material":0,"attributes":{"POSITION":0,"NORMAL":1,"COLOR_0":2,"TEXCOORD_0":3}}]}],"accessors":[)"
-                   R"({"bufferView":0,"componentType":5126,"count":6,"type":"VEC3"},)"
-                   R"({"bufferView":0,"byteOffset":72,"componentType":5126,"count":6,"type":"VEC3"},)"
-                   R"({"bufferView":1,"componentType":5121,"normalized":true,"count":6,"type":"VEC3"},)"
-                   R"({"bufferView":2,"componentType":5123,"normalized":true,"count":6,"type":"VEC2"}],"bufferViews":[)"
-                   R"({"buffer":0,"byteLength":144},{"buffer":0,"byteOffset":144,"byteLength":24,"byteStride":4},)"
-                   R"({"buffer":0,"byteOffset":168,"byteLength":24}],"buffers":[{"byteLength":192}]})",
-               data);
+    for (int i = 0; i < 6; ++i)
+        data += mesh_files::little(std::uint16_t{65535}) + mesh_files::little(std::uint16_t{13107});
+    return glb(
+        R"({"asset":{"version":"2.0"},"nodes":[)" + node +
+            R"(],"materials":[{"name":"stone"}],"meshes":[{"name":"m","primitives":[{"mode":)" + std::to_string(mode) +
+            R"(,"material":0,"attributes":{"POSITION":0,"NORMAL":1,"COLOR_0":2,"TEXCOORD_0":3}}]}],"accessors":[)"
+            R"({"bufferView":0,"componentType":5126,"count":6,"type":"VEC3"},)"
+            R"({"bufferView":0,"byteOffset":72,"componentType":5126,"count":6,"type":"VEC3"},)"
+            R"({"bufferView":1,"componentType":5121,"normalized":true,"count":6,"type":"VEC3"},)"
+            R"({"bufferView":2,"componentType":5123,"normalized":true,"count":6,"type":"VEC2"}],"bufferViews":[)"
+            R"({"buffer":0,"byteLength":144},{"buffer":0,"byteOffset":144,"byteLength":24,"byteStride":4},)"
+            R"({"buffer":0,"byteOffset":168,"byteLength":24}],"buffers":[{"byteLength":192}]})",
+        data);
 }
 
 TEST(Gltf, RefusesNormalsThatAreNotFinite) {
@@ -663,7 +691,8 @@ TEST(Gltf, RefusesNormalsThatAreNotFinite) {
 }
 
 TEST(Gltf, ReadsEveryModeOfTriangles) {
-    EXPECT_THAT(read(gltf_with_attributes(4), "a.glb").mesh.triangles, ElementsAre(Triangle{0, 1, 2}, Triangle{3, 4, 5}));
+    EXPECT_THAT(read(gltf_with_attributes(4), "a.glb").mesh.triangles,
+                ElementsAre(Triangle{0, 1, 2}, Triangle{3, 4, 5}));
     EXPECT_THAT(read(gltf_with_attributes(5), "a.glb").mesh.triangles,
                 ElementsAre(Triangle{0, 1, 2}, Triangle{2, 1, 3}, Triangle{2, 3, 4}, Triangle{4, 3, 5}));
     EXPECT_THAT(read(gltf_with_attributes(6), "a.glb").mesh.triangles,
@@ -825,7 +854,8 @@ TEST_F(MeshFiles, KeepDoublesInPlyAndObj) {
 TEST_F(MeshFiles, KeepOffsetsAndScalesInGlb) {
     for (const auto& [offset, size] : {std::pair(1e9, 1.0), std::pair(0.0, 1e-42), std::pair(0.0, 1e200)}) {
         Mesh mesh;
-        mesh.positions = {{offset, offset, 0.1 * size}, {offset + 0.3 * size, offset, 0}, {offset, offset + 0.7 * size, 0}};
+        mesh.positions = {
+            {offset, offset, 0.1 * size}, {offset + 0.3 * size, offset, 0}, {offset, offset + 0.7 * size, 0}};
         mesh.triangles = {{0, 1, 2}};
         ASSERT_TRUE(meshio::write_mesh(folder_ / "a.glb", mesh.view()));
         const Result<meshio::ReadResult> again = meshio::read_mesh(folder_ / "a.glb");
@@ -833,7 +863,8 @@ TEST_F(MeshFiles, KeepOffsetsAndScalesInGlb) {
         // Half an ulp of a float relative to the size, and of the double at the offset.
         const double tolerance = size * 0x1p-23 + offset * 0x1p-52;
         for (std::size_t i = 0; i < 3; ++i) {
-            EXPECT_LE(glm::length((again->mesh.positions[i] - mesh.positions[i]) / tolerance), 2.0) << offset << " " << size;
+            EXPECT_LE(glm::length((again->mesh.positions[i] - mesh.positions[i]) / tolerance), 2.0)
+                << offset << " " << size;
         }
     }
 }
@@ -860,7 +891,8 @@ TEST_F(MeshFiles, KeepMaterialsAndGroups) {
     EXPECT_EQ(glb_file->mesh.triangles, mesh.triangles);
     std::vector<std::string> materials;
     for (const MeshRange& range : glb_file->mesh.ranges) {
-        if (range.kind == MeshRange::Kind::material) materials.push_back(range.name + std::to_string(range.first_triangle));
+        if (range.kind == MeshRange::Kind::material)
+            materials.push_back(range.name + std::to_string(range.first_triangle));
     }
     EXPECT_THAT(materials, ElementsAre("stone \"grey\"10", "glass100", "stone \"grey\"200"));
 }

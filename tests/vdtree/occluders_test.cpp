@@ -30,15 +30,18 @@ double winding_number(const VertexTree& tree, glm::dvec3 at) {
         glm::dvec3 p[3];
         for (std::size_t k = 0; k < 3; ++k) p[k] = glm::dvec3(tree.positions()[tree.interior_count() + t[k]]) - at;
         const double a = glm::length(p[0]), b = glm::length(p[1]), c = glm::length(p[2]);
-        sum += 2 * std::atan2(glm::dot(p[0], glm::cross(p[1], p[2])),
-                              a * b * c + glm::dot(p[0], p[1]) * c + glm::dot(p[1], p[2]) * a + glm::dot(p[2], p[0]) * b);
+        sum +=
+            2 * std::atan2(glm::dot(p[0], glm::cross(p[1], p[2])),
+                           a * b * c + glm::dot(p[0], p[1]) * c + glm::dot(p[1], p[2]) * a + glm::dot(p[2], p[0]) * b);
     }
     return sum / (4 * 3.14159265358979324);
 }
 
 double distance_from_surface(const VertexTree& tree, glm::dvec3 at) {
     double least = std::numeric_limits<double>::infinity();
-    const auto corner = [&](const Triangle& t, std::size_t k) { return glm::dvec3(tree.positions()[tree.interior_count() + t[k]]); };
+    const auto corner = [&](const Triangle& t, std::size_t k) {
+        return glm::dvec3(tree.positions()[tree.interior_count() + t[k]]);
+    };
     for (const Triangle& t : support::sound(tree).triangles())
         least = std::min(least, support::distance_to_triangle(at, corner(t, 0), corner(t, 1), corner(t, 2)));
     return least;
@@ -55,11 +58,13 @@ const Solid solids[] = {
     {"torus", [] { return shapes::torus(48, 20); }, 0.2},
     {"inside_out", [] { return shapes::inside_out(shapes::bumpy_sphere(4)); }, 0.6},
     {"two_parts", [] { return shapes::two_parts(); }, 0.2},
-    {"one_in_the_other", [] { return shapes::together(shapes::icosphere(3), shapes::placed(shapes::icosphere(3), 0.5)); }, 0.2},
+    {"one_in_the_other",
+     [] { return shapes::together(shapes::icosphere(3), shapes::placed(shapes::icosphere(3), 0.5)); }, 0.2},
 };
 
 class InnerSpheres : public testing::TestWithParam<Solid> {};
-INSTANTIATE_TEST_SUITE_P(Solids, InnerSpheres, testing::ValuesIn(solids), [](const auto& test) { return std::string(test.param.name); });
+INSTANTIATE_TEST_SUITE_P(Solids, InnerSpheres, testing::ValuesIn(solids),
+                         [](const auto& test) { return std::string(test.param.name); });
 
 TEST_P(InnerSpheres, AreEnclosedAndTouchNothing) {
     const VertexTree tree = built(GetParam().make());
@@ -108,10 +113,13 @@ TEST(Occluders, FoldOnlyWhatNoLineOfSightReaches) {
             ++hidden;
             const Sphere ring = tree.bounds()[node].ring;
             for (int k = 0; k < 20; ++k) {
-                const glm::dvec3 at = glm::dvec3(ring.centre) + static_cast<double>(ring.radius) * glm::dvec3(unit(random), unit(random), unit(random)) / std::sqrt(3.0);
+                const glm::dvec3 at =
+                    glm::dvec3(ring.centre) + static_cast<double>(ring.radius) *
+                                                  glm::dvec3(unit(random), unit(random), unit(random)) / std::sqrt(3.0);
                 bool is_hidden = false;
                 for (const Sphere& sphere : spheres)
-                    is_hidden |= support::distance_to_segment(glm::dvec3(sphere.centre), eye, at) < static_cast<double>(sphere.radius) * (1 + 1e-5);
+                    is_hidden |= support::distance_to_segment(glm::dvec3(sphere.centre), eye, at) <
+                                 static_cast<double>(sphere.radius) * (1 + 1e-5);
                 EXPECT_TRUE(is_hidden) << "node " << node << " from " << distance;
             }
         }
@@ -124,7 +132,9 @@ TEST(Occluders, RefuseWhatHidesNothing) {
     const DistanceCriterion criterion = all_of(tree);
     Cut cut(tree);
     const float nan = std::numeric_limits<float>::quiet_NaN();
-    const auto follows = [&](const Sphere& occluder) { return cut.follow(criterion, {.eye = {0, 0, 5}, .occluders = {occluder}}) ? true : false; };
+    const auto follows = [&](const Sphere& occluder) {
+        return cut.follow(criterion, {.eye = {0, 0, 5}, .occluders = {occluder}}) ? true : false;
+    };
     EXPECT_TRUE(follows({{0, 0, 0}, 0.5f}));
     EXPECT_FALSE(follows({{0, 0, 4.9f}, 0.5f})); // the eye is inside
     EXPECT_FALSE(follows({{nan, 0, 0}, 0.5f}));

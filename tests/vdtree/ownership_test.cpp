@@ -8,9 +8,9 @@
 
 #include <gtest/gtest.h>
 
+#include <meshio/mesh_io.h>
 #include <vdtree/builder.h>
 #include <vdtree/cut.h>
-#include <meshio/mesh_io.h>
 
 #include "shapes.h"
 

@@ -9,8 +9,8 @@
 
 #include <vdtree/packed.h>
 
-#include "tree/mask_pool.h"
 #include "shapes.h"
+#include "tree/mask_pool.h"
 
 namespace unseen::vdtree {
 namespace {
@@ -111,7 +111,8 @@ TEST(MaskPool, GivesBackEveryMask) {
     const PooledMasks pool = pool_masks(nodes, std::vector<NodeId>(nodes.size(), 0));
     ASSERT_EQ(pool.at.size(), nodes.size());
     for (std::size_t i = 0; i < nodes.size(); ++i) ASSERT_EQ(unpack_mask(pool.records, pool.at[i]), nodes[i].mask);
-    for (std::size_t i = different; i < nodes.size(); ++i) ASSERT_EQ(pool.at[i], pool.at[(i - different) * 3]) << "equal masks share";
+    for (std::size_t i = different; i < nodes.size(); ++i)
+        ASSERT_EQ(pool.at[i], pool.at[(i - different) * 3]) << "equal masks share";
 }
 
 TEST(MaskPool, ReadsAnyBytes) {

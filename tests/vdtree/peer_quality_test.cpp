@@ -77,10 +77,13 @@ private:
     glm::ivec3 cell_of(glm::dvec3 p) const {
         return glm::clamp(glm::ivec3(glm::floor((p - low_) / cell_)), glm::ivec3(0), glm::ivec3(cells - 1));
     }
-    std::vector<Index>& list(int x, int y, int z) { return lists_[static_cast<std::size_t>((z * cells + y) * cells + x)]; }
+    std::vector<Index>& list(int x, int y, int z) {
+        return lists_[static_cast<std::size_t>((z * cells + y) * cells + x)];
+    }
     double distance_to(glm::dvec3 p, Index t) const {
         const Triangle& tri = mesh_.triangles[t];
-        return support::distance_to_triangle(p, mesh_.positions[tri[0]], mesh_.positions[tri[1]], mesh_.positions[tri[2]]);
+        return support::distance_to_triangle(p, mesh_.positions[tri[0]], mesh_.positions[tri[1]],
+                                             mesh_.positions[tri[2]]);
     }
 
     const Mesh& mesh_;
@@ -101,7 +104,8 @@ double mean_distance(const Mesh& original, const Mesh& simple) {
     constexpr std::size_t sample = 50000;
     const std::size_t step = original.positions.size() / sample | 1; // odd: not the same corner of every quad
     double sum = 0, count = 0;
-    for (std::size_t v = 0; v < original.positions.size(); v += step, ++count) sum += grid.distance(original.positions[v]);
+    for (std::size_t v = 0; v < original.positions.size(); v += step, ++count)
+        sum += grid.distance(original.positions[v]);
     return sum / count / std::max({size.x, size.y, size.z});
 }
 
@@ -113,11 +117,10 @@ Mesh simplified_by_meshoptimizer(const Mesh& mesh, std::size_t triangles, bool s
     const unsigned* indices = mesh.triangles[0].data();
     std::vector<unsigned> out(corners);
     constexpr float any_error = 1e9f;
-    const std::size_t left =
-        sloppy ? meshopt_simplifySloppy(out.data(), indices, corners, positions.data(), vertices, 3 * sizeof(float),
-                                        triangles * 3, any_error, nullptr)
-               : meshopt_simplify(out.data(), indices, corners, positions.data(), vertices, 3 * sizeof(float),
-                                  triangles * 3, any_error, 0, nullptr);
+    const std::size_t left = sloppy ? meshopt_simplifySloppy(out.data(), indices, corners, positions.data(), vertices,
+                                                             3 * sizeof(float), triangles * 3, any_error, nullptr)
+                                    : meshopt_simplify(out.data(), indices, corners, positions.data(), vertices,
+                                                       3 * sizeof(float), triangles * 3, any_error, 0, nullptr);
     Mesh simple;
     simple.positions = mesh.positions;
     for (std::size_t i = 0; i < left; i += 3) simple.triangles.push_back({out[i], out[i + 1], out[i + 2]});
@@ -133,9 +136,9 @@ void compare(const char* what, const Mesh& mesh, std::size_t triangles, bool slo
     const Mesh ours = support::simplified_by_deviation(mesh, *clustering, theirs.triangles.size());
     ASSERT_FALSE(ours.triangles.empty());
     const double their_distance = mean_distance(mesh, theirs), our_distance = mean_distance(mesh, ours);
-    std::cout << what << ": " << mesh.triangles.size() << " triangles to " << ours.triangles.size() << ", mean distance "
-              << our_distance << " of the extent, meshoptimizer " << their_distance << " (" << theirs.triangles.size()
-              << " triangles), ratio " << our_distance / their_distance << '\n';
+    std::cout << what << ": " << mesh.triangles.size() << " triangles to " << ours.triangles.size()
+              << ", mean distance " << our_distance << " of the extent, meshoptimizer " << their_distance << " ("
+              << theirs.triangles.size() << " triangles), ratio " << our_distance / their_distance << '\n';
     EXPECT_LE(our_distance, their_distance);
 }
 

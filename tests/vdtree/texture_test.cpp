@@ -30,10 +30,12 @@ double bilinear(const Texture& texture, double u, double v) {
     const double x = u * texture.width - 0.5, y = v * texture.height - 0.5;
     const auto wrapped = [](double i, std::uint32_t n, Wrap wrap) {
         const double size = n;
-        return static_cast<std::size_t>(wrap == Wrap::clamp ? std::clamp(i, 0.0, size - 1) : i - size * std::floor(i / size));
+        return static_cast<std::size_t>(wrap == Wrap::clamp ? std::clamp(i, 0.0, size - 1)
+                                                            : i - size * std::floor(i / size));
     };
     const auto at = [&](double i, double j) {
-        return linear_luminance(texture.texels[wrapped(j, texture.height, texture.wrap_v) * texture.width + wrapped(i, texture.width, texture.wrap_u)]);
+        return linear_luminance(texture.texels[wrapped(j, texture.height, texture.wrap_v) * texture.width +
+                                               wrapped(i, texture.width, texture.wrap_u)]);
     };
     const double i = std::floor(x), j = std::floor(y), s = x - i, t = y - j;
     return (1 - t) * ((1 - s) * at(i, j) + s * at(i + 1, j)) + t * ((1 - s) * at(i, j + 1) + s * at(i + 1, j + 1));
@@ -42,7 +44,8 @@ double bilinear(const Texture& texture, double u, double v) {
 TEST(TexturePyramid, HoldsWhatFilteringReturns) {
     std::mt19937_64 random(3);
     int tight = 0, looked = 0;
-    for (const auto& [width, height] : {std::pair(64u, 64u), std::pair(37u, 19u), std::pair(1u, 1u), std::pair(100u, 3u)}) {
+    for (const auto& [width, height] :
+         {std::pair(64u, 64u), std::pair(37u, 19u), std::pair(1u, 1u), std::pair(100u, 3u)}) {
         for (const Wrap wrap : {Wrap::repeat, Wrap::clamp}) {
             Texture texture = textures::noise(width, height, 7);
             texture.wrap_u = wrap;
@@ -50,11 +53,13 @@ TEST(TexturePyramid, HoldsWhatFilteringReturns) {
             for (int trial = 0; trial < 300; ++trial) {
                 const double size = std::exp2(shapes::random_between(random, -8, 1));
                 const glm::vec2 lo(shapes::random_between(random, -2, 2), shapes::random_between(random, -2, 2));
-                const glm::vec2 hi = lo + glm::vec2(size * shapes::random_unit(random), size * shapes::random_unit(random));
+                const glm::vec2 hi =
+                    lo + glm::vec2(size * shapes::random_unit(random), size * shapes::random_unit(random));
                 const TexturePyramid::Range range = pyramid.range({lo, hi});
                 double least = 1, most = 0;
                 for (int k = 0; k < 40; ++k) {
-                    const double u = shapes::random_between(random, lo.x, hi.x), v = shapes::random_between(random, lo.y, hi.y);
+                    const double u = shapes::random_between(random, lo.x, hi.x),
+                                 v = shapes::random_between(random, lo.y, hi.y);
                     const double y = bilinear(texture, u, v);
                     EXPECT_LE(range.lo, y);
                     EXPECT_GE(range.hi, y);
@@ -62,13 +67,17 @@ TEST(TexturePyramid, HoldsWhatFilteringReturns) {
                 }
                 // Nothing that is not near: a seventh of the longer side, and the texel that filters reach for.
                 if (wrap == Wrap::repeat) {
-                    const float w = static_cast<float>(width), h = static_cast<float>(height), longer = std::max((hi.x - lo.x) * w, (hi.y - lo.y) * h);
+                    const float w = static_cast<float>(width), h = static_cast<float>(height),
+                                longer = std::max((hi.x - lo.x) * w, (hi.y - lo.y) * h);
                     const glm::vec2 around((longer / 7 + 2) / w, (longer / 7 + 2) / h);
-                    const auto lies_near = [](double at, float first, float last) { return at - std::floor(at - static_cast<double>(first)) <= static_cast<double>(last); };
+                    const auto lies_near = [](double at, float first, float last) {
+                        return at - std::floor(at - static_cast<double>(first)) <= static_cast<double>(last);
+                    };
                     double least_near = 1, most_near = 0;
                     for (std::uint32_t y = 0; y < height; ++y)
                         for (std::uint32_t x = 0; x < width; ++x) {
-                            if (!lies_near((x + 0.5) / width, lo.x - around.x, hi.x + around.x) || !lies_near((y + 0.5) / height, lo.y - around.y, hi.y + around.y))
+                            if (!lies_near((x + 0.5) / width, lo.x - around.x, hi.x + around.x) ||
+                                !lies_near((y + 0.5) / height, lo.y - around.y, hi.y + around.y))
                                 continue;
                             const double luminance = linear_luminance(texture.texels[y * width + x]);
                             least_near = std::min(least_near, luminance), most_near = std::max(most_near, luminance);
@@ -92,8 +101,10 @@ TEST(TexturePyramid, OfABoxWithinAnotherLiesWithinTheOthers) {
         UvBox inner, outer;
         for (int k = 0; k < 2; ++k) {
             const double size = std::exp2(shapes::random_between(random, -7, 1));
-            inner.include(glm::vec2(size * shapes::random_between(random, -2, 2), size * shapes::random_between(random, -2, 2)));
-            outer.include(glm::vec2(size * shapes::random_between(random, -2, 2), size * shapes::random_between(random, -2, 2)));
+            inner.include(
+                glm::vec2(size * shapes::random_between(random, -2, 2), size * shapes::random_between(random, -2, 2)));
+            outer.include(
+                glm::vec2(size * shapes::random_between(random, -2, 2), size * shapes::random_between(random, -2, 2)));
         }
         outer.include(inner);
         const auto a = pyramid.range(inner), b = pyramid.range(outer);
@@ -146,7 +157,8 @@ TEST(Textures, AreCheckedBeforeTheyAreLaid) {
 Mesh with_colours(Mesh mesh) {
     std::mt19937_64 random(9);
     for (std::size_t v = 0; v < mesh.positions.size(); ++v)
-        mesh.colours.push_back({shapes::random_unit(random), shapes::random_unit(random), shapes::random_unit(random), 1});
+        mesh.colours.push_back(
+            {shapes::random_unit(random), shapes::random_unit(random), shapes::random_unit(random), 1});
     return mesh;
 }
 
@@ -191,8 +203,10 @@ TEST(Textures, AreKeptInFiles) {
         EXPECT_EQ(texture.height, 20u);
         EXPECT_EQ(texture.wrap_u, Wrap::repeat);
         EXPECT_EQ(texture.wrap_v, Wrap::clamp);
-        EXPECT_TRUE(std::equal(texture.texels.begin(), texture.texels.end(), mesh.texture.texels.begin(), mesh.texture.texels.end()));
-        EXPECT_TRUE(std::equal(again->ring_texture().begin(), again->ring_texture().end(), tree.ring_texture().begin(), tree.ring_texture().end()));
+        EXPECT_TRUE(std::equal(texture.texels.begin(), texture.texels.end(), mesh.texture.texels.begin(),
+                               mesh.texture.texels.end()));
+        EXPECT_TRUE(std::equal(again->ring_texture().begin(), again->ring_texture().end(), tree.ring_texture().begin(),
+                               tree.ring_texture().end()));
         EXPECT_TRUE(verify(*again));
     }
     // Without it, the file is that of a mesh without texture.
@@ -231,18 +245,21 @@ TEST(Textures, OfDamagedFilesAreRefused) {
         for (std::size_t at = found.find(words); at != std::string::npos; at = found.find(words, at + 1)) ++count;
         EXPECT_EQ(count, times) << found;
     };
-    for (const std::uint32_t width : {0u, 7u, 9u, 0xffffffffu}) expect("texture", 2, [&](Parts& p) { p["texture"].set<std::uint32_t>(0, width); });
+    for (const std::uint32_t width : {0u, 7u, 9u, 0xffffffffu})
+        expect("texture", 2, [&](Parts& p) { p["texture"].set<std::uint32_t>(0, width); });
     expect("repeats", 2, [](Parts& p) { p["texture"].set<std::uint32_t>(2, 5u); });
     expect("texels", 2, [](Parts& p) { p["texels"].data.resize(4 * 63); });
     expect("texture", 2, [](Parts& p) { p["texture"].data += p["texture"].data; });
     expect("texture", 2, [](Parts& p) { p["uvs"].data.clear(); });
     expect("ring_texture", 2, [](Parts& p) { p["ring_texture"].data.resize(4); });
-    expect("ends before it begins", 1, [](Parts& p) { // not looked at where it is mapped: it can only draw another picture
-        p["ring_texture"].set<std::uint16_t>(0, 60000);
-        p["ring_texture"].set<std::uint16_t>(1, 1);
-    });
+    expect("ends before it begins", 1,
+           [](Parts& p) { // not looked at where it is mapped: it can only draw another picture
+               p["ring_texture"].set<std::uint16_t>(0, 60000);
+               p["ring_texture"].set<std::uint16_t>(1, 1);
+           });
     for (const char* name : {"texture", "texels", "ring_texture"})
-        expect("Section", 2, [&](Parts& p) { std::erase_if(p.sections, [&](const auto& s) { return s.name == name; }); });
+        expect("Section", 2,
+               [&](Parts& p) { std::erase_if(p.sections, [&](const auto& s) { return s.name == name; }); });
 }
 
 // Coincident vertices with the same texture coordinates merge for free; those of a seam do not.
@@ -254,7 +271,8 @@ TEST(Textures, StayAtTheirSeams) {
     const auto contrast_of_coincident = [](const VertexTree& tree) {
         float most = 0;
         for (NodeId node = 0; node < tree.interior_count(); ++node)
-            if (tree.support_spheres()[node].radius == 0) most = std::max(most, tree.ring_luminance()[node].hi - tree.ring_luminance()[node].lo);
+            if (tree.support_spheres()[node].radius == 0)
+                most = std::max(most, tree.ring_luminance()[node].hi - tree.ring_luminance()[node].lo);
         return most;
     };
     EXPECT_EQ(contrast_of_coincident(split), 0);

@@ -54,9 +54,11 @@ TEST(ByteOrder, IsThatOfWholeElementsWhateverThePieces) {
             for (std::size_t i = 0; i < 4; ++i) expected[number + i] = given[number + 3 - i];
     for (const std::size_t piece : {4, 16, 64, 1024, 4000}) {
         std::vector<std::byte> swapped = given;
-        for (std::size_t at = 0; at < swapped.size(); at += piece) swap_elements(&swapped[at], std::min(piece, swapped.size() - at), at, layout);
+        for (std::size_t at = 0; at < swapped.size(); at += piece)
+            swap_elements(&swapped[at], std::min(piece, swapped.size() - at), at, layout);
         EXPECT_EQ(swapped, expected) << piece;
-        for (std::size_t at = 0; at < swapped.size(); at += piece) swap_elements(&swapped[at], std::min(piece, swapped.size() - at), at, layout);
+        for (std::size_t at = 0; at < swapped.size(); at += piece)
+            swap_elements(&swapped[at], std::min(piece, swapped.size() - at), at, layout);
         EXPECT_EQ(swapped, given) << piece;
     }
 }
@@ -217,7 +219,8 @@ TEST_F(TreeIo, SaysWhatIsWrongWithTheHeader) {
     for (const std::uint32_t version : {0u, 2u, 3u}) {
         support::store(bad, TreeFile::version_at, version);
         TreeFile::seal(bad);
-        expect_refused(bad, "tree.vdt was written by an earlier version; build it again with: unseen build MESH -o FILE");
+        expect_refused(bad,
+                       "tree.vdt was written by an earlier version; build it again with: unseen build MESH -o FILE");
         EXPECT_EQ(read_bytes(bad).error().code, ErrorCode::unsupported);
     }
 
@@ -284,7 +287,8 @@ TEST_F(TreeIo, KeepsAttributesOfAnyName) {
         EXPECT_TRUE(open->check());
         ASSERT_TRUE(write_tree(other, *open));
         EXPECT_EQ(support::read_bytes(other), bytes);
-        const auto more = open->with_attribute("more", AttributeDomain::node, std::vector<double>(tree.node_count(), 7));
+        const auto more =
+            open->with_attribute("more", AttributeDomain::node, std::vector<double>(tree.node_count(), 7));
         ASSERT_TRUE(more) << more.error().message;
         ASSERT_TRUE(write_tree(other, *more));
         const auto again = read_tree(other);
@@ -413,9 +417,8 @@ std::vector<Lie> lies() {
         {"no triangle", [](TreeFile& f) { f["triangles"].data.clear(), f["source_triangles"].data.clear(); }},
         {"no interior node",
          [](TreeFile& f) {
-             for (const char* name :
-                  {"first_leaf", "leaf_end", "subtree_end", "bounds", "support_spheres", "mask_at", "displacement",
-                   "support_range", "ring_range", "adaptation"})
+             for (const char* name : {"first_leaf", "leaf_end", "subtree_end", "bounds", "support_spheres", "mask_at",
+                                      "displacement", "support_range", "ring_range", "adaptation"})
                  f[name].data.clear();
              f["first_triangle"].data.resize(4);
          }},
@@ -444,11 +447,11 @@ std::vector<Lie> lies() {
         {"texels without a texture", [](TreeFile& f) { f["texture"].data.clear(); }},
         {"a range of a texture in reverse", set("ring_texture", 0, 0x00010002u)},
     };
-    for (const char* section : {"parents",          "positions",      "normals",    "colours",     "uvs",
-                                "luminance",        "first_leaf",     "leaf_end",   "subtree_end", "first_triangle",
-                                "bounds",           "support_spheres", "mask_at",
-                                "displacement",     "support_range",  "ring_range", "adaptation",  "triangles",
-                                "source_triangles", "source_vertices", "mark", "texels",     "ring_texture"})
+    for (const char* section :
+         {"parents",          "positions",       "normals",       "colours",        "uvs",         "luminance",
+          "first_leaf",       "leaf_end",        "subtree_end",   "first_triangle", "bounds",      "support_spheres",
+          "mask_at",          "displacement",    "support_range", "ring_range",     "adaptation",  "triangles",
+          "source_triangles", "source_vertices", "mark",          "texels",         "ring_texture"})
         all.push_back({section, drop_last(section)});
     return all;
 }
@@ -509,7 +512,7 @@ TEST_F(TreeIo, SurvivesRandomLies) {
     }
     EXPECT_GT(taken_mapped, accepted);
     EXPECT_GT(found_later, 100); // by the checks of nodes
-    EXPECT_GT(accepted, 100); // normals, masks, slabs and small changes of values
+    EXPECT_GT(accepted, 100);    // normals, masks, slabs and small changes of values
 }
 
 TEST_F(TreeIo, UsesNoMoreMemoryThanTheFileIsWorth) {

@@ -1,8 +1,8 @@
 #include <session/model_file.h>
 
-#include <vdtree/conserve_light.h>
 #include <perception/fold_measurement.h>
 #include <vdtree/builder.h>
+#include <vdtree/conserve_light.h>
 #include <vdtree/tree_io.h>
 
 #include "textures.h"

@@ -6,10 +6,10 @@
 #include <vector>
 
 #include <perception/criterion.h>
+#include <perception/cut_rings.h>
 #include <session/observer.h>
 #include <session/scene.h>
 #include <session/session.h>
-#include <perception/cut_rings.h>
 
 namespace unseen::session {
 

@@ -27,9 +27,12 @@ struct Tile {
 };
 
 Error too_large(const AtlasPart& part) {
-    return {ErrorCode::unsupported, "The texture of " + part.name + " is repeated from " + std::to_string(part.used.lo.x) + ", " + std::to_string(part.used.lo.y) +
-                                        " to " + std::to_string(part.used.hi.x) + ", " + std::to_string(part.used.hi.y) +
-                                        ": laid beside the others that takes too many texels; scale the images down, or give the mesh one image for all."};
+    return {ErrorCode::unsupported, "The texture of " + part.name + " is repeated from " +
+                                        std::to_string(part.used.lo.x) + ", " + std::to_string(part.used.lo.y) +
+                                        " to " + std::to_string(part.used.hi.x) + ", " +
+                                        std::to_string(part.used.hi.y) +
+                                        ": laid beside the others that takes too many texels; scale the images down, "
+                                        "or give the mesh one image for all."};
 }
 
 Result<Tile> tile_of(const AtlasPart& part, std::size_t number) {
@@ -39,7 +42,9 @@ Result<Tile> tile_of(const AtlasPart& part, std::size_t number) {
     for (int k = 0; k < 2; ++k) {
         const double lo = part.used.is_empty() ? 0 : std::floor(static_cast<double>(part.used.lo[k]));
         const double hi = part.used.is_empty() ? 1 : std::max(std::ceil(static_cast<double>(part.used.hi[k])), lo + 1);
-        if (!((hi - lo) * static_cast<double>(sizes[k]) + 2 * border <= vdtree::largest_texture_side) || !(std::abs(lo) < 1e9)) return too_large(part);
+        if (!((hi - lo) * static_cast<double>(sizes[k]) + 2 * border <= vdtree::largest_texture_side) ||
+            !(std::abs(lo) < 1e9))
+            return too_large(part);
         (k == 0 ? tile.first_u : tile.first_v) = static_cast<std::int64_t>(lo);
         (k == 0 ? tile.copies_u : tile.copies_v) = static_cast<std::int64_t>(hi - lo);
     }
@@ -62,12 +67,15 @@ std::int64_t place_in_rows(std::vector<Tile>& tiles, std::int64_t width) {
 }
 
 void lay(const Tile& tile, const Texture& from, Texture& to) {
-    const auto source = [](std::int64_t i, std::int64_t n, Wrap wrap) { return wrap == Wrap::clamp ? std::clamp<std::int64_t>(i, 0, n - 1) : ((i % n) + n) % n; };
+    const auto source = [](std::int64_t i, std::int64_t n, Wrap wrap) {
+        return wrap == Wrap::clamp ? std::clamp<std::int64_t>(i, 0, n - 1) : ((i % n) + n) % n;
+    };
     for (std::int64_t y = -border; y < tile.height + border; ++y) {
         const std::int64_t row = source(y + tile.first_v * from.height, from.height, from.wrap_v);
         for (std::int64_t x = -border; x < tile.width + border; ++x) {
             const std::int64_t column = source(x + tile.first_u * from.width, from.width, from.wrap_u);
-            to.texels[static_cast<std::size_t>((tile.y + y) * to.width + tile.x + x)] = from.texels[static_cast<std::size_t>(row * from.width + column)];
+            to.texels[static_cast<std::size_t>((tile.y + y) * to.width + tile.x + x)] =
+                from.texels[static_cast<std::size_t>(row * from.width + column)];
         }
     }
 }
@@ -105,7 +113,8 @@ Result<Atlas> make_atlas(std::span<const AtlasPart> parts) {
         const Texture& from = *parts[tile.part].texture;
         lay(tile, from, atlas.texture);
         const glm::dvec2 size(static_cast<double>(width), static_cast<double>(height)), texels(from.width, from.height);
-        const glm::dvec2 first(static_cast<double>(tile.first_u), static_cast<double>(tile.first_v)), at(static_cast<double>(tile.x), static_cast<double>(tile.y));
+        const glm::dvec2 first(static_cast<double>(tile.first_u), static_cast<double>(tile.first_v)),
+            at(static_cast<double>(tile.x), static_cast<double>(tile.y));
         atlas.places[tile.part] = {texels / size, (at - first * texels) / size};
     }
     return atlas;

@@ -11,7 +11,7 @@ namespace unseen::session {
 
 // One of the textures, and the coordinates at which it is looked up.
 struct AtlasPart {
-    std::string name; // for messages
+    std::string name;               // for messages
     const vdtree::Texture* texture; // the caller's; must outlive the call of make_atlas()
     vdtree::UvBox used;
 };

@@ -14,8 +14,8 @@
 #include <system_error>
 #include <vector>
 
-#include <jpeglib.h>
 #include <jerror.h>
+#include <jpeglib.h>
 
 #include <perception/image.h>
 #include <vdtree/colour.h>
@@ -31,13 +31,16 @@ constexpr std::uint64_t most_pixels_a_byte = 1024;
 constexpr std::uint64_t small_image = std::uint64_t{1} << 24; // pixels that any file may ask for
 constexpr int most_scans = 100;                               // of a progressive JPEG: more only take time
 
-Error malformed(const std::filesystem::path& name, const std::string& what) { return {ErrorCode::malformed_data, name.string() + ": " + what}; }
+Error malformed(const std::filesystem::path& name, const std::string& what) {
+    return {ErrorCode::malformed_data, name.string() + ": " + what};
+}
 
 Result<void> check_size(const std::filesystem::path& name, std::uint64_t width, std::uint64_t height) {
     const std::string size = std::to_string(width) + " x " + std::to_string(height);
     if (width == 0 || height == 0) return malformed(name, "the header gives an empty image (" + size + ").");
     if (width > vdtree::largest_texture_side || height > vdtree::largest_texture_side)
-        return malformed(name, "the image has " + size + " pixels, and a texture at most " + std::to_string(vdtree::largest_texture_side) + " a side; scale it down.");
+        return malformed(name, "the image has " + size + " pixels, and a texture at most " +
+                                   std::to_string(vdtree::largest_texture_side) + " a side; scale it down.");
     return {};
 }
 
@@ -69,7 +72,8 @@ JpegReader& reader_of(j_common_ptr info) { return *static_cast<JpegReader*>(info
 }
 void on_jpeg_message(j_common_ptr info, int level) {
     JpegReader& reader = reader_of(info);
-    const bool is_harmless = level >= 0 || info->err->msg_code == JWRN_EXTRANEOUS_DATA; // bytes between parts, as cameras leave them
+    const bool is_harmless =
+        level >= 0 || info->err->msg_code == JWRN_EXTRANEOUS_DATA; // bytes between parts, as cameras leave them
     if (is_harmless || reader.is_damaged) return;
     reader.is_damaged = true;
     info->err->format_message(info, reader.message.data());
@@ -95,7 +99,8 @@ void begin(JpegReader& r) {
     jpeg_create_decompress(&r.info);
     r.progress.progress_monitor = on_jpeg_progress;
     r.info.progress = &r.progress;
-    jpeg_mem_src(&r.info, reinterpret_cast<const unsigned char*>(r.bytes.data()), static_cast<unsigned long>(r.bytes.size()));
+    jpeg_mem_src(&r.info, reinterpret_cast<const unsigned char*>(r.bytes.data()),
+                 static_cast<unsigned long>(r.bytes.size()));
     jpeg_read_header(&r.info, TRUE);
 }
 void start(JpegReader& r) {
@@ -113,8 +118,8 @@ Result<Texture> decode_jpeg(std::string_view bytes, const std::filesystem::path&
     const std::uint64_t width = reader.info.image_width, height = reader.info.image_height;
     if (const auto ok = check_size(name, width, height); !ok) return ok.error();
     if (width * height > std::max(small_image, most_pixels_a_byte * bytes.size()))
-        return malformed(name, "the header gives " + std::to_string(width) + " x " + std::to_string(height) + " pixels, which " +
-                                   std::to_string(bytes.size()) + " bytes cannot hold.");
+        return malformed(name, "the header gives " + std::to_string(width) + " x " + std::to_string(height) +
+                                   " pixels, which " + std::to_string(bytes.size()) + " bytes cannot hold.");
     if (reader.info.jpeg_color_space == JCS_CMYK || reader.info.jpeg_color_space == JCS_YCCK)
         return malformed(name, "its colours are those of four inks; convert it to RGB.");
     if (!guarded(reader, start)) return complain();
@@ -127,7 +132,9 @@ Result<Texture> decode_jpeg(std::string_view bytes, const std::filesystem::path&
     while (reader.info.output_scanline < reader.info.output_height) {
         const JDIMENSION before = reader.info.output_scanline;
         if (!guarded(reader, read_row) || reader.info.output_scanline == before) return complain();
-        if (reader.is_damaged) return malformed(name, "damaged JPEG at row " + std::to_string(before) + ": " + reader.message.data() + ".");
+        if (reader.is_damaged)
+            return malformed(name,
+                             "damaged JPEG at row " + std::to_string(before) + ": " + reader.message.data() + ".");
         for (std::size_t i = 0; i < row.size(); i += 3) texture.texels.push_back({row[i], row[i + 1], row[i + 2], 255});
     }
     if (!guarded(reader, finish) || reader.is_damaged) return complain();
@@ -140,7 +147,10 @@ std::uint8_t code_of(double encoded) { return static_cast<std::uint8_t>(std::cla
 
 Result<Texture> to_texture(const perception::ImageFile& file, const std::filesystem::path& name) {
     const perception::Image& image = file.image;
-    if (const auto ok = check_size(name, static_cast<std::uint64_t>(image.width), static_cast<std::uint64_t>(image.height)); !ok) return ok.error();
+    if (const auto ok =
+            check_size(name, static_cast<std::uint64_t>(image.width), static_cast<std::uint64_t>(image.height));
+        !ok)
+        return ok.error();
     Texture texture;
     texture.width = static_cast<std::uint32_t>(image.width);
     texture.height = static_cast<std::uint32_t>(image.height);
@@ -151,9 +161,11 @@ Result<Texture> to_texture(const perception::ImageFile& file, const std::filesys
             for (int c = 0; c < 3; ++c) {
                 const float value = image.at(x, y, image.channels == 1 ? 0 : c);
                 if (!(value >= 0 && value <= 1))
-                    return malformed(name, "the value of pixel (" + std::to_string(x) + ", " + std::to_string(y) + ") is " + std::to_string(value) +
+                    return malformed(name, "the value of pixel (" + std::to_string(x) + ", " + std::to_string(y) +
+                                               ") is " + std::to_string(value) +
                                                ", and a texture has values from 0 to 1; scale them.");
-                texel[static_cast<std::size_t>(c)] = code_of(file.is_absolute ? linear_to_srgb(static_cast<double>(value)) : static_cast<double>(value));
+                texel[static_cast<std::size_t>(c)] =
+                    code_of(file.is_absolute ? linear_to_srgb(static_cast<double>(value)) : static_cast<double>(value));
             }
             texture.texels.push_back(texel);
         }
@@ -164,7 +176,8 @@ Result<Texture> to_texture(const perception::ImageFile& file, const std::filesys
 void turn_upside_down(Texture& texture) {
     for (std::uint32_t y = 0; y < texture.height / 2; ++y) {
         const auto row = texture.texels.begin() + static_cast<std::ptrdiff_t>(std::size_t{y} * texture.width);
-        std::swap_ranges(row, row + texture.width, texture.texels.end() - static_cast<std::ptrdiff_t>((std::size_t{y} + 1) * texture.width));
+        std::swap_ranges(row, row + texture.width,
+                         texture.texels.end() - static_cast<std::ptrdiff_t>((std::size_t{y} + 1) * texture.width));
     }
 }
 
@@ -183,12 +196,15 @@ Result<Texture> decode_texture(std::string_view bytes, const std::filesystem::pa
         if (texture && !from_top) turn_upside_down(*texture);
         return texture;
     } catch (const std::bad_alloc&) {
-        return Error{ErrorCode::unsupported, name.string() + ": needs more memory than this machine has; scale the image down."};
+        return Error{ErrorCode::unsupported,
+                     name.string() + ": needs more memory than this machine has; scale the image down."};
     }
 }
 
 Result<Texture> read_texture(const std::filesystem::path& file, bool from_top) {
-    const auto failure = [&](const std::string& why) { return Error{ErrorCode::io_failure, file.string() + ": " + why}; };
+    const auto failure = [&](const std::string& why) {
+        return Error{ErrorCode::io_failure, file.string() + ": " + why};
+    };
     std::error_code error;
     const auto status = std::filesystem::status(file, error);
     if (!std::filesystem::exists(status)) return failure("there is no such image; check the name.");

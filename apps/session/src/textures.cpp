@@ -14,8 +14,8 @@
 namespace unseen::session {
 namespace {
 
-using vdtree::Index;
 using meshio::Material;
+using vdtree::Index;
 using vdtree::Mesh;
 using vdtree::MeshRange;
 using vdtree::Texture;
@@ -30,19 +30,22 @@ constexpr std::size_t no_material = std::numeric_limits<std::size_t>::max(), unu
 
 // By triangle: the number of its material, or of the first one that looks the same.
 std::vector<std::size_t> materials_of_triangles(const meshio::ReadResult& read) {
-    using Look = std::tuple<std::filesystem::path, const std::string*, vdtree::Wrap, vdtree::Wrap, std::array<float, 4>>;
+    using Look =
+        std::tuple<std::filesystem::path, const std::string*, vdtree::Wrap, vdtree::Wrap, std::array<float, 4>>;
     std::map<Look, std::size_t> first;
     std::map<std::string, std::size_t> numbers;
     for (std::size_t i = 0; i < read.materials.size(); ++i) {
         const meshio::Material& m = read.materials[i];
-        const Look look{m.image, m.image_bytes.get(), m.wrap_u, m.wrap_v, {m.colour.r, m.colour.g, m.colour.b, m.colour.a}};
+        const Look look{
+            m.image, m.image_bytes.get(), m.wrap_u, m.wrap_v, {m.colour.r, m.colour.g, m.colour.b, m.colour.a}};
         numbers.emplace(m.name, first.try_emplace(look, i).first->second);
     }
     std::vector<std::size_t> of(read.mesh.triangles.size(), no_material);
     for (const MeshRange& range : read.mesh.ranges) {
         const auto found = numbers.find(range.name);
         if (range.kind != MeshRange::Kind::material || found == numbers.end()) continue;
-        std::fill_n(of.begin() + static_cast<std::ptrdiff_t>(range.first_triangle), range.triangle_count, found->second);
+        std::fill_n(of.begin() + static_cast<std::ptrdiff_t>(range.first_triangle), range.triangle_count,
+                    found->second);
     }
     return of;
 }
@@ -55,7 +58,8 @@ std::vector<std::size_t> part_vertices(Mesh& mesh, const std::vector<std::size_t
         for (Index& v : mesh.triangles[t]) {
             if (of_vertex[v] == unused) of_vertex[v] = of_triangle[t];
             if (of_vertex[v] == of_triangle[t]) continue;
-            const auto [entry, is_new] = doubled.try_emplace({v, of_triangle[t]}, static_cast<Index>(mesh.positions.size()));
+            const auto [entry, is_new] =
+                doubled.try_emplace({v, of_triangle[t]}, static_cast<Index>(mesh.positions.size()));
             if (is_new) {
                 of_vertex.push_back(of_triangle[t]);
                 mesh.positions.push_back(glm::dvec3(mesh.positions[v]));
@@ -77,10 +81,13 @@ public:
     Result<const Texture*> of(const meshio::Material& material) {
         const bool is_embedded = material.image.empty();
         const std::filesystem::path file =
-            is_embedded ? std::filesystem::path(mesh_file_.string() + ": the image of material '" + material.name + "'") : mesh_file_.parent_path() / material.image;
-        auto [entry, is_new] = images_.try_emplace({material.image, material.image_bytes.get(), material.wrap_u, material.wrap_v});
+            is_embedded ? std::filesystem::path(mesh_file_.string() + ": the image of material '" + material.name + "'")
+                        : mesh_file_.parent_path() / material.image;
+        auto [entry, is_new] =
+            images_.try_emplace({material.image, material.image_bytes.get(), material.wrap_u, material.wrap_v});
         if (is_new) {
-            auto texture = is_embedded ? decode_texture(*material.image_bytes, file, from_top_) : read_texture(file, from_top_);
+            auto texture =
+                is_embedded ? decode_texture(*material.image_bytes, file, from_top_) : read_texture(file, from_top_);
             if (!texture) return Error{texture.error().code, with_advice(texture.error().message)};
             entry->second = std::move(*texture);
             entry->second.wrap_u = material.wrap_u;
@@ -109,20 +116,25 @@ void thin_vertices(Mesh& mesh, const std::vector<Material>& materials, const std
     if (mesh.colours.empty()) return;
     for (std::size_t t = 0; t < of_triangle.size(); ++t) {
         if (of_triangle[t] == no_material) continue;
-        for (const Index v : mesh.triangles[t]) mesh.colours[v].a = std::min(mesh.colours[v].a, materials[of_triangle[t]].colour.a);
+        for (const Index v : mesh.triangles[t])
+            mesh.colours[v].a = std::min(mesh.colours[v].a, materials[of_triangle[t]].colour.a);
     }
 }
 
 Result<void> check_uvs(const std::filesystem::path& mesh_file, const meshio::ReadResult& read) {
     if (read.mesh.uvs.empty())
-        return Error{ErrorCode::malformed_data, with_advice(mesh_file.string() + ": it has a texture but no texture coordinates, which say where it lies")};
+        return Error{
+            ErrorCode::malformed_data,
+            with_advice(mesh_file.string() + ": it has a texture but no texture coordinates, which say where it lies")};
     if (read.bad_uv)
-        return Error{ErrorCode::malformed_data, with_advice(mesh_file.string() + ": the texture coordinates of vertex " + std::to_string(*read.bad_uv) +
-                                                            " are not finite; correct them")};
+        return Error{ErrorCode::malformed_data,
+                     with_advice(mesh_file.string() + ": the texture coordinates of vertex " +
+                                 std::to_string(*read.bad_uv) + " are not finite; correct them")};
     return {};
 }
 
-Result<void> lay_one(const std::filesystem::path& mesh_file, meshio::ReadResult& read, const std::filesystem::path& image) {
+Result<void> lay_one(const std::filesystem::path& mesh_file, meshio::ReadResult& read,
+                     const std::filesystem::path& image) {
     if (const auto ok = check_uvs(mesh_file, read); !ok) return ok;
     auto texture = read_texture(image, read.uvs_from_top);
     if (!texture) return texture.error();
@@ -158,7 +170,10 @@ Result<void> lay_materials(const std::filesystem::path& mesh_file, meshio::ReadR
         if (of_vertex[v] == unused) continue;
         const std::size_t m = std::min(of_vertex[v], read.materials.size());
         const auto [entry, is_new] = part_of.try_emplace(of_material[m], parts.size());
-        if (is_new) parts.push_back({m < read.materials.size() ? "material '" + read.materials[m].name + "'" : "no material", of_material[m], {}});
+        if (is_new)
+            parts.push_back({m < read.materials.size() ? "material '" + read.materials[m].name + "'" : "no material",
+                             of_material[m],
+                             {}});
         part_of_vertex[v] = entry->second;
         if (of_material[m] == &white) mesh.uvs[v] = glm::vec2(0.5f);
         parts[entry->second].used.include(mesh.uvs[v]);

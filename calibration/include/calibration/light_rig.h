@@ -32,11 +32,12 @@ public:
     static Result<LightRig> read(const std::filesystem::path& file);
 
     // Where the lights are, in the frame of a tree.
-    vdtree::Lighting at(double seconds, const vdtree::VertexTree& tree, const vdtree::View& view, const vdtree::Similarity& placement) const;
+    vdtree::Lighting at(double seconds, const vdtree::VertexTree& tree, const vdtree::View& view,
+                        const vdtree::Similarity& placement) const;
 
-    bool moves() const noexcept { return moves_; }             // with time
+    bool moves() const noexcept { return moves_; } // with time
     bool follows_camera() const noexcept { return follows_camera_; }
-    std::string description() const;                           // for people: "1 directional and 2 point lights, ambient 0.1"
+    std::string description() const; // for people: "1 directional and 2 point lights, ambient 0.1"
     const std::filesystem::path& file() const noexcept { return file_; }
 
 private:
@@ -48,7 +49,7 @@ private:
     struct Light {
         vdtree::LightSource at_rest; // in the world
         bool is_headlight = false;
-        std::vector<Key> keys;       // empty, or at least one
+        std::vector<Key> keys; // empty, or at least one
         double degrees_per_second = 0;
         glm::dvec3 axis = glm::dvec3(0, 1, 0), centre = glm::dvec3(0); // of an orbit
         bool has_centre = false;

@@ -24,12 +24,12 @@ std::string_view name(Method method); // "2ifc", "adjustment"
 
 struct CalibrationPlan {
     Method method = Method::two_interval;
-    std::vector<GratingPlace> places;          // what is measured
-    int trials = 200;                          // of two_interval
-    int settings = 7;                          // of adjustment, at each place; the first is practice and does not count
-    perception::Luminance luminance{50};       // mean luminance of the gratings, at most 1e6 cd/m2
-    double highest_contrast = 1;               // Michelson, that the display can show
-    std::uint64_t seed = 1;                    // at most 2^53, which JSON keeps
+    std::vector<GratingPlace> places;    // what is measured
+    int trials = 200;                    // of two_interval
+    int settings = 7;                    // of adjustment, at each place; the first is practice and does not count
+    perception::Luminance luminance{50}; // mean luminance of the gratings, at most 1e6 cd/m2
+    double highest_contrast = 1;         // Michelson, that the display can show
+    std::uint64_t seed = 1;              // at most 2^53, which JSON keeps
 };
 
 // The lowest contrast that is shown, 10^-3.5: nobody sees a fainter grating. Thresholds below it cannot be measured.
@@ -116,11 +116,14 @@ private:
     void weigh_settings();
     // What is believed of the places, as far as the next trial goes by it.
     struct Prospect {
-        std::vector<double> visible; // by place: the chance that the display can show its threshold; others need not be known well
-        std::vector<double> shifts;  // by place and slope: where its log10 threshold would be with that, relative to where it is believed
+        std::vector<double>
+            visible; // by place: the chance that the display can show its threshold; others need not be known well
+        std::vector<double>
+            shifts; // by place and slope: where its log10 threshold would be with that, relative to where it is believed
     };
     Prospect look_ahead() const;
-    static double gain_of(const QuestPlus::Forecast& answer, const std::vector<double>& pulled, const Prospect& prospect);
+    static double gain_of(const QuestPlus::Forecast& answer, const std::vector<double>& pulled,
+                          const Prospect& prospect);
     Trial next_adjustment(Trial trial) const;
 
     CalibrationPlan plan_;

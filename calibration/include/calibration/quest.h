@@ -16,8 +16,8 @@ namespace unseen::calibration {
 // shifted so that p(0) = at_threshold: the threshold is the contrast of that many right answers, whatever the slope.
 struct Psychometric {
     double slope = 3.5;
-    double lapse = 0.01;        // share of answers given blindly
-    double guess = 0.5;         // right by chance: one of two intervals
+    double lapse = 0.01; // share of answers given blindly
+    double guess = 0.5;  // right by chance: one of two intervals
     double at_threshold = 0.82;
 
     double shift() const; // in log10 contrast
@@ -89,7 +89,7 @@ private:
     void refresh();
 
     std::shared_ptr<const Tables> tables_;
-    std::vector<double> log_prior_;      // by threshold
+    std::vector<double> log_prior_; // by threshold
     std::vector<double> log_prior_of_functions_;
     std::vector<double> log_likelihood_; // by combination
     std::vector<double> posterior_;      // by combination

@@ -32,7 +32,8 @@ public:
     };
 
     // `expected` gives the mean at `luminance`.
-    SensitivityField(const std::vector<GratingPlace>& places, perception::CsfTable expected, perception::Luminance luminance);
+    SensitivityField(const std::vector<GratingPlace>& places, perception::CsfTable expected,
+                     perception::Luminance luminance);
 
     std::size_t size() const noexcept { return sites_.size(); }
     double expected(std::size_t i) const noexcept { return expected_[i]; } // log10 sensitivity
@@ -66,9 +67,9 @@ private:
     perception::Luminance luminance_;
     std::vector<Site> sites_;
     std::vector<double> expected_;
-    std::vector<double> prior_;     // covariance of the deviations, square
-    std::vector<double> precision_; // of the places' own factors
-    std::vector<double> shift_;     // precision times mean of the deviation
+    std::vector<double> prior_;             // covariance of the deviations, square
+    std::vector<double> precision_;         // of the places' own factors
+    std::vector<double> shift_;             // precision times mean of the deviation
     std::vector<double> covariance_, mean_; // posterior, of the deviations
     int changes_ = 0;                       // since all was computed
 };

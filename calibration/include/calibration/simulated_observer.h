@@ -23,8 +23,8 @@ struct SimulatedObserver {
 
     double sensitivity(const GratingPlace& place, perception::Luminance luminance) const;
     // Answers depend on the seed, the trial's number and the grating alone.
-    int choose(const Trial& trial, perception::Luminance luminance) const;   // an interval
-    double set(const Trial& trial, const CalibrationPlan& plan) const; // a contrast, at most the highest
+    int choose(const Trial& trial, perception::Luminance luminance) const; // an interval
+    double set(const Trial& trial, const CalibrationPlan& plan) const;     // a contrast, at most the highest
 };
 
 // Fails where the observer sees more at one of the plan's places than can be measured: contrasts below the lowest.

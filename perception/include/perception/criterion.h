@@ -20,14 +20,16 @@ namespace unseen::perception {
 struct SceneLuminance {
     float darkest = 0;
     float brightest = 1;
-    std::optional<vdtree::LuminanceRange> behind = {}; // the model as a whole: its background; default: anything of the scene
+    std::optional<vdtree::LuminanceRange> behind =
+        {}; // the model as a whole: its background; default: anything of the scene
     bool operator==(const SceneLuminance&) const = default;
 };
 
 struct FoldTestOptions {
     Display display = {};
     SceneLuminance scene = {};
-    std::optional<glm::dvec2> gaze_px = {}; // in the window, from the top left; may lie outside. Default: foveal everywhere
+    std::optional<glm::dvec2> gaze_px =
+        {}; // in the window, from the top left; may lie outside. Default: foveal everywhere
     std::shared_ptr<const CsfTable> csf = {}; // shared with the criteria that look it up; default: CsfTable::standard()
     // Look at colour, too, where the tree has any: the Luebke-Hallen tests in distance form then fold where sqrt((c S)^2 + (c_rg S_rg)^2 +
     // (c_yv S_yv)^2) <= 1, with the contrasts of the ring's range in both opponent directions and castleCSF's sensitivities to them. The ranges are found anew for each criterion (ring_chroma(): one pass over the tree).
@@ -63,18 +65,20 @@ Result<vdtree::DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTr
 //   folds where  c S(1 / (2 theta')) <= 1  and  m / L S_peak <= 1, L the middle of hat R
 // Costs at least what the above does for every node. Cost: as the above.
 Result<vdtree::DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree& tree, const CutRings& rings,
-                                                               const vdtree::View& view, const FoldTestOptions& options);
+                                                               const vdtree::View& view,
+                                                               const FoldTestOptions& options);
 
 // luebke_hallen_distances() under lights that may move: ranges are what they can make of the normals, albedos and places in a ring, and follow the
 // lighting of the viewpoint; silhouettes are those of `options.scene`, which must hold for all of it (see lit_scene()). Adaptation is to
 // the brightest luminance of a range. `bounds`: of the tree. Cost: some 20 ms with a gaze, less without; not by node.
-Result<vdtree::DistanceCriterion> lit_distances(const vdtree::VertexTree& tree, std::shared_ptr<const vdtree::LightBounds> bounds,
+Result<vdtree::DistanceCriterion> lit_distances(const vdtree::VertexTree& tree,
+                                                std::shared_ptr<const vdtree::LightBounds> bounds,
                                                 const vdtree::View& view, const FoldTestOptions& options);
 
 // Between which luminances everything under the lights is, and the background; rounded outward to steps of 1/32, so that it mostly
 // stays while lights move. `eye`: in the tree's frame.
-SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBounds& bounds, const vdtree::Lighting& lighting,
-                         glm::dvec3 eye, float background);
+SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBounds& bounds,
+                         const vdtree::Lighting& lighting, glm::dvec3 eye, float background);
 
 // The test by errors: what a fold changes in fact, not what could change within its ring. In distance form, like the above. Fails, too,
 // where the tree's folds have not been measured (measure_folds()), and where what files say of it is no measurement.
@@ -91,15 +95,17 @@ SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBoun
 // Where the mesh was measured in stages, too, a node folds as well from where nobody can tell the whole mesh from the mesh in the node's stage, by
 // pictures of both: seldom near, but most of it far away.
 // rho goes up to the display's limit: below a pixel a fold counts by the share of the pixel that it covers, so from far enough away
-// everything folds, and drawing must be antialiased. Measured, not proven: see docs/perception.md for where it fails. Open and
+// everything folds, and drawing must be antialiased. Measured, not proven: see docs/evidence.md for where it fails. Open and
 // irregular rings are silhouettes. Cost: as luebke_hallen_distances().
-Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options);
+Result<vdtree::DistanceCriterion> error_distances(const vdtree::VertexTree& tree, const vdtree::View& view,
+                                                  const FoldTestOptions& options);
 
 // Where the eye and the gaze are in the tree's frame. With the view's frustum if `window_only`: what lies outside folds.
 vdtree::Viewpoint viewpoint_of(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options,
                                const vdtree::Similarity& placement = {}, bool window_only = true);
 
 // The names that --fold-test takes.
-inline constexpr std::string_view fold_test_names[] = {"luebke-hallen", "luebke-hallen-safe", "error", "extent", "displacement"};
+inline constexpr std::string_view fold_test_names[] = {"luebke-hallen", "luebke-hallen-safe", "error", "extent",
+                                                       "displacement"};
 
 } // namespace unseen::perception

@@ -32,7 +32,7 @@ struct Stimulus {
     Metres distance{0.5};         // from the eye; only Daly's model depends on it
 };
 
-// The formulas, their sources, and what each model does not know: docs/perception.md.
+// The formulas, their sources, and what each model does not know: docs/model.md.
 enum class CsfModel {
     castle,           // castleCSF, achromatic branch (Ashraf, Mantiuk, Chapiro, Wuerger 2024): the default
     stela,            // stelaCSF (Mantiuk, Ashraf, Chapiro 2022)

@@ -18,7 +18,7 @@ namespace unseen::perception {
 // lie at one point its luminance is the tree's ring_luminance(): nothing moves, and no more than that changes.)
 struct CutRings {
     std::vector<vdtree::PackedRange> luminance; // at least the children's
-    std::vector<float> radius;          // mesh units; at least the children's
+    std::vector<float> radius;                  // mesh units; at least the children's
 
     // Relative luminance, 0..1: what the fold, with unfolded neighbours, adds to the light of the triangles around or takes from it, besides
     // what their area changes, over the area that belongs to the support: a third of each triangle for each corner. The areas of

@@ -31,19 +31,20 @@ struct Display {
     std::string name = "20-inch 1600x1200 at 0.5 m";
     int width_px = 1600;
     int height_px = 1200;
-    Metres pixel_pitch{0.000254};   // distance between pixel centres
-    Metres distance{0.5};           // from the eye to the screen
+    Metres pixel_pitch{0.000254}; // distance between pixel centres
+    Metres distance{0.5};         // from the eye to the screen
     Luminance peak{100};
-    Luminance black{0.5};           // of the screen itself, without ambient light; above 0 (Weber contrast needs a floor)
+    Luminance black{0.5}; // of the screen itself, without ambient light; above 0 (Weber contrast needs a floor)
     TransferFunction transfer = TransferFunction::srgb;
-    double gamma = 2.2;             // used by TransferFunction::gamma
-    std::vector<double> table;      // used by TransferFunction::table: linear light of equidistant codes from 0 to 1, both
-                                    // included; from 0 to 1, strictly ascending, interpolated
+    double gamma = 2.2;        // used by TransferFunction::gamma
+    std::vector<double> table; // used by TransferFunction::table: linear light of equidistant codes from 0 to 1, both
+                               // included; from 0 to 1, strictly ascending, interpolated
     Lux ambient{0};
-    double reflectivity = 0.005;    // share of the ambient light that the screen scatters back, 0..1
+    double reflectivity = 0.005; // share of the ambient light that the screen scatters back, 0..1
     // Of headsets: angles strictly ascending from 0, at least two; interpolated, and constant beyond the last. Empty: flat.
     std::vector<PixelsPerDegreeAt> lens;
-    double field_deg = 0;           // of headsets: the whole field of view across; 0: that of the screen. Nothing is computed from it
+    double field_deg =
+        0; // of headsets: the whole field of view across; 0: that of the screen. Nothing is computed from it
 };
 
 // Finite and positive sizes within what a display can be, 0 < black < peak, reflectivity in 0..1, tables as above. The error names
@@ -76,8 +77,5 @@ double to_relative(const Display& display, Luminance luminance);
 // A code value 0..1 to relative linear light, and back.
 double decode(const Display& display, double code);
 double encode(const Display& display, double linear);
-
-
-
 
 } // namespace unseen::perception

@@ -76,7 +76,8 @@ struct TrackedGaze {
     bool is_suppressed = false;
 };
 
-inline constexpr double saccade_speed_deg_s = 50; // faster than any pursuit of a slow object, slower than any saccade of a degree
+inline constexpr double saccade_speed_deg_s =
+    50; // faster than any pursuit of a slow object, slower than any saccade of a degree
 
 // The same trace and options give the same run.
 class GazeTracker {

@@ -20,7 +20,8 @@ struct Image {
     float at(int x, int y, int c = 0) const { return values[index(x, y, c)]; }
     std::size_t index(int x, int y, int c) const {
         return (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)) *
-                   static_cast<std::size_t>(channels) + static_cast<std::size_t>(c);
+                   static_cast<std::size_t>(channels) +
+               static_cast<std::size_t>(c);
     }
 };
 

@@ -13,18 +13,18 @@
 namespace unseen::perception {
 
 struct JudgeOptions {
-    Display display = {};                     // of headsets: the images are the flat picture, not the panel's
-    std::optional<glm::dvec2> gaze_px = {};   // pixels from the top left, may lie outside; none: all foveal
-    CsfModel csf = CsfModel::castle;          // an achromatic one, from the display's distance
+    Display display = {};                           // of headsets: the images are the flat picture, not the panel's
+    std::optional<glm::dvec2> gaze_px = {};         // pixels from the top left, may lie outside; none: all foveal
+    CsfModel csf = CsfModel::castle;                // an achromatic one, from the display's distance
     std::shared_ptr<const CsfTable> csf_table = {}; // a viewer's own sensitivity in the model's place; null: the model
-    double beta = 3.5;                        // Minkowski exponent over the bands; V = 1 is 75% detection
+    double beta = 3.5;                              // Minkowski exponent over the bands; V = 1 is 75% detection
 };
 
 struct Judgement {
-    Image visibility;                  // V by pixel: at or above 1 is visible
+    Image visibility; // V by pixel: at or above 1 is visible
     std::uint64_t visible_pixels = 0;
     std::uint64_t pixels = 0;
-    double max_ratio = 0;              // the largest V
+    double max_ratio = 0; // the largest V
 };
 
 // The modern map, in double. Both images are luminance in cd/m2 and of one size. A decimated Laplacian pyramid with its

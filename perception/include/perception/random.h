@@ -37,6 +37,8 @@ private:
 };
 
 // A generator of its own for the `index`-th item of a run, so that a run can be taken up anywhere.
-inline Random random_for(std::uint64_t seed, std::uint64_t index) { return Random(Random(seed ^ Random(index).bits()).bits()); }
+inline Random random_for(std::uint64_t seed, std::uint64_t index) {
+    return Random(Random(seed ^ Random(index).bits()).bits());
+}
 
 } // namespace unseen::perception

@@ -26,7 +26,9 @@ private:
     double value_ = 0;
 };
 template <class Unit>
-constexpr Quantity<Unit> operator*(double s, Quantity<Unit> q) { return q * s; }
+constexpr Quantity<Unit> operator*(double s, Quantity<Unit> q) {
+    return q * s;
+}
 
 using Degrees = Quantity<struct DegreesUnit>;
 using Radians = Quantity<struct RadiansUnit>;

@@ -103,7 +103,8 @@ double barten_1999(double cpd, double cdm2, double area_deg2) {
 
 } // namespace
 
-Barten1989::Barten1989(double cdm2) : amplitude_(440 * std::pow(1 + 0.7 / cdm2, -0.2)), width_(0.3 * std::pow(1 + 100 / cdm2, 0.15)) {}
+Barten1989::Barten1989(double cdm2)
+    : amplitude_(440 * std::pow(1 + 0.7 / cdm2, -0.2)), width_(0.3 * std::pow(1 + 100 / cdm2, 0.15)) {}
 double Barten1989::operator()(double cpd) const { return amplitude_ * cpd * damping(width_ * cpd); }
 
 double daly_ceiling(const Stimulus& s) { return daly_branch(s.frequency.value(), s.luminance.value(), s.area.value()); }

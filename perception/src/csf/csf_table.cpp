@@ -67,19 +67,23 @@ std::vector<double> log2_of(std::span<const double> values) {
 }
 
 // What no table of an eye has, by orders of magnitude: values beyond are a slip.
-constexpr double most_cpd = 1e4, most_degrees = CsfTable::highest_eccentricity.value(), most_cdm2 = 1e10, most_sensitive = 1e6;
+constexpr double most_cpd = 1e4, most_degrees = CsfTable::highest_eccentricity.value(), most_cdm2 = 1e10,
+                 most_sensitive = 1e6;
 
 // `positions` are the values as interpolation sees them: their logarithms, or themselves.
-Result<void> check_axis(std::string_view field, std::span<const double> values, std::span<const double> positions, double highest) {
+Result<void> check_axis(std::string_view field, std::span<const double> values, std::span<const double> positions,
+                        double highest) {
     for (std::size_t i = 0; i < values.size(); ++i) {
         const std::string place = indexed(field, {i});
         if (!std::isfinite(values[i]) || !std::isfinite(positions[i])) {
             return bad(place + " must be a finite number in its range, but is " + number_text(values[i]));
         }
-        if (values[i] > highest) return bad(place + " must be at most " + number_text(highest) + ", but is " + number_text(values[i]));
+        if (values[i] > highest)
+            return bad(place + " must be at most " + number_text(highest) + ", but is " + number_text(values[i]));
         if (i > 0 && !(positions[i] - positions[i - 1] >= CsfTable::smallest_spacing)) {
             return bad(place + " is " + number_text(values[i]) + " after " + number_text(values[i - 1]) +
-                       ": the values must rise from sample to sample, by at least " + number_text(CsfTable::smallest_spacing) +
+                       ": the values must rise from sample to sample, by at least " +
+                       number_text(CsfTable::smallest_spacing) +
                        (values.data() == positions.data() ? " degrees" : " octaves"));
         }
     }
@@ -248,7 +252,8 @@ Result<CsfTable> CsfTable::create(CsfSamples samples, Branches branches) {
     // The logarithm of a value that is not above 0 is not finite, which the check finds.
     std::vector<double> log2_frequency = log2_of(s.frequency_cpd), log2_luminance = log2_of(s.luminance_cdm2);
     if (auto ok = check_axis("frequency_cpd", s.frequency_cpd, log2_frequency, most_cpd); !ok) return ok.error();
-    if (auto ok = check_axis("eccentricity_deg", s.eccentricity_deg, s.eccentricity_deg, most_degrees); !ok) return ok.error();
+    if (auto ok = check_axis("eccentricity_deg", s.eccentricity_deg, s.eccentricity_deg, most_degrees); !ok)
+        return ok.error();
     if (auto ok = check_axis("luminance_cdm2", s.luminance_cdm2, log2_luminance, most_cdm2); !ok) return ok.error();
     if (s.eccentricity_deg.front() != 0) {
         return bad("eccentricity_deg[0] must be 0 (the fovea), but is " + number_text(s.eccentricity_deg.front()));

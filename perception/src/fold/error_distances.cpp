@@ -57,9 +57,9 @@ private:
 // What a node's fold shows, as far as that decides from where it can be seen: levels of contrast at widths relative to the node's.
 struct Pattern {
     int luminance = 0;
-    int typical = no_contrast; // over the whole width
-    int largest = no_contrast; // in a small part of it
-    int drift = no_contrast;   // of what many such nodes shift together
+    int typical = no_contrast;    // over the whole width
+    int largest = no_contrast;    // in a small part of it
+    int drift = no_contrast;      // of what many such nodes shift together
     int fading = 0, quarters = 0; // of octaves, from the node's width to the mesh's
     bool is_strip = false;
 
@@ -71,8 +71,13 @@ struct Pattern {
 Pattern above(const Pattern& a, const Pattern& b) {
     if (a.is_nothing()) return b;
     if (b.is_nothing()) return a;
-    Pattern all{std::max(a.luminance, b.luminance), std::max(a.typical, b.typical), std::max(a.largest, b.largest),
-                std::max(a.drift, b.drift), 0, std::max(a.quarters, b.quarters), a.is_strip};
+    Pattern all{std::max(a.luminance, b.luminance),
+                std::max(a.typical, b.typical),
+                std::max(a.largest, b.largest),
+                std::max(a.drift, b.drift),
+                0,
+                std::max(a.quarters, b.quarters),
+                a.is_strip};
     all.fading = a.drift == no_contrast ? b.fading : b.drift == no_contrast ? a.fading : std::min(a.fading, b.fading);
     return all;
 }
@@ -105,8 +110,9 @@ public:
         const double highest_cpd = screen.highest_cpd;
         std::vector<Band> bands;
         for (double low = lowest_table_cpd; low < highest_cpd; low *= frequency_step)
-            bands.push_back({std::min(low * frequency_step, highest_cpd),
-                             csf.monotone_sensitivity(CyclesPerDegree(low), Degrees(eccentricity_deg), Luminance(luminance_cdm2))});
+            bands.push_back(
+                {std::min(low * frequency_step, highest_cpd),
+                 csf.monotone_sensitivity(CyclesPerDegree(low), Degrees(eccentricity_deg), Luminance(luminance_cdm2))});
         for (std::size_t i = 0; i < width_count; ++i) {
             patches_[i] = 1 / visibility(bands, width(i), share_of_patches<double>);
             areas_[i] = 1 / visibility(bands, width(i), share_of_area<double>);
@@ -132,7 +138,8 @@ private:
     };
     static constexpr std::size_t bands_per_octave = 8;
     // Widths from far below any that can be seen up to the lowest frequency's.
-    static constexpr double widest_deg = 1 / lowest_table_cpd, width_step = 0.91700404320467122; // an eighth of an octave
+    static constexpr double widest_deg = 1 / lowest_table_cpd,
+                            width_step = 0.91700404320467122; // an eighth of an octave
     static constexpr std::size_t width_count = 160;
     static double width(std::size_t i) { return widest_deg * std::pow(width_step, static_cast<double>(i)); }
     using Thresholds = std::array<double, width_count>; // contrasts, by width
@@ -183,8 +190,8 @@ class Reaches {
 public:
     // `added`: rows that add() will ask for.
     Reaches(const Levels& levels, const Screen& screen, const CsfTable& csf, std::size_t bins, std::size_t added)
-        : levels_(levels), screen_(screen), csf_(csf), bins_(bins), most_patterns_(last_row - added), discs_(luminance_count),
-          eyes_(luminance_count) {
+        : levels_(levels), screen_(screen), csf_(csf), bins_(bins), most_patterns_(last_row - added),
+          discs_(luminance_count), eyes_(luminance_count) {
         begin();
     }
 
@@ -224,7 +231,8 @@ public:
     }
     // A row of distances, in lengths of its own.
     std::uint16_t add(std::span<const float> distances, float length) {
-        for (const float distance : distances) reach_.push_back(std::min(distance / length, DistanceCriterion::always_visible));
+        for (const float distance : distances)
+            reach_.push_back(std::min(distance / length, DistanceCriterion::always_visible));
         return static_cast<std::uint16_t>(reach_.size() / bins_ - 1);
     }
     std::span<const float> reach(std::uint16_t row) const { return std::span(reach_).subspan(row * bins_, bins_); }
@@ -243,7 +251,8 @@ private:
         auto& eyes = eyes_[static_cast<std::size_t>(luminance)];
         if (eyes.empty())
             for (std::size_t b = 0; b < bins_; ++b)
-                eyes.emplace_back(csf_, static_cast<double>(b) * degrees_per_bin, levels_.luminance(luminance), screen_);
+                eyes.emplace_back(csf_, static_cast<double>(b) * degrees_per_bin, levels_.luminance(luminance),
+                                  screen_);
         return eyes[bin];
     }
 
@@ -255,8 +264,10 @@ private:
         if (tables.patches.empty()) {
             for (int contrast = 0; contrast < contrast_count; ++contrast) {
                 for (std::size_t bin = 0; bin < bins_; ++bin) {
-                    tables.patches.push_back(static_cast<float>(eye(luminance, bin).patch_reach(Levels::contrast(contrast))));
-                    tables.areas.push_back(static_cast<float>(eye(luminance, bin).area_reach(Levels::contrast(contrast))));
+                    tables.patches.push_back(
+                        static_cast<float>(eye(luminance, bin).patch_reach(Levels::contrast(contrast))));
+                    tables.areas.push_back(
+                        static_cast<float>(eye(luminance, bin).area_reach(Levels::contrast(contrast))));
                 }
             }
         }
@@ -269,13 +280,15 @@ private:
         const Discs& tables = discs(p.luminance);
         const auto include = [&](const std::vector<float>& one, int contrast, float width) {
             const float* const from = &one[static_cast<std::size_t>(contrast) * bins_];
-            for (std::size_t bin = 0; bin < bins_; ++bin) reach_[first + bin] = std::max(reach_[first + bin], width * from[bin]);
+            for (std::size_t bin = 0; bin < bins_; ++bin)
+                reach_[first + bin] = std::max(reach_[first + bin], width * from[bin]);
         };
         if (p.typical != no_contrast) {
             // The same light in a part half as wide has four times the contrast; but nowhere more than the largest.
             constexpr int per_halving = 2 * contrasts_per_octave;
             float width = 1;
-            for (int contrast = std::min(p.typical, p.largest);; contrast = std::min(contrast + per_halving, p.largest), width /= 2) {
+            for (int contrast = std::min(p.typical, p.largest);;
+                 contrast = std::min(contrast + per_halving, p.largest), width /= 2) {
                 include(tables.patches, contrast, width);
                 if (contrast == p.largest) break;
             }
@@ -345,7 +358,8 @@ float shortfall(const Reaches& reaches, const Shown& a, const Shown& b) {
 float weight(const Reaches& reaches, const Shown& shown) {
     float sum = 0;
     const std::span<const float> reach = reaches.reach(shown.row);
-    for (std::size_t bin = 0; bin < reach.size(); bin += 8) sum += std::log2(1 + std::max(reach[bin], 0.0f) * shown.length);
+    for (std::size_t bin = 0; bin < reach.size(); bin += 8)
+        sum += std::log2(1 + std::max(reach[bin], 0.0f) * shown.length);
     return sum;
 }
 
@@ -375,8 +389,9 @@ void cover(Reaches& reaches, Shown& a, const Shown& b) {
 }
 
 // What nodes show, no less than their children: patches, and strips where they are outlines. False where the rows do not suffice.
-bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors, const SceneLuminance& scene, const Levels& levels, const CsfTable& csf, Reaches& reaches,
-                std::vector<Shown>& patches, std::vector<Shown>& strips) {
+bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors, const SceneLuminance& scene,
+                const Levels& levels, const CsfTable& csf, Reaches& reaches, std::vector<Shown>& patches,
+                std::vector<Shown>& strips) {
     const double darkest = levels.in_cdm2(scene.darkest), brightest = levels.in_cdm2(scene.brightest);
     const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
     const vdtree::LuminanceRange all = tree.ring_luminance()[vdtree::VertexTree::root()];
@@ -389,21 +404,25 @@ bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors
         const double lo = levels.in_cdm2(range.lo), hi = levels.in_cdm2(range.hi), middle = (lo + hi) / 2;
         const double r1 = tree.bounds()[node].ring.radius;
         const auto change = [&](float luminance, double distance) {
-            if (tree.bounds()[node].flags & vdtree::translucent_ring) return brightest - darkest; // anything may show through
+            if (tree.bounds()[node].flags & vdtree::translucent_ring)
+                return brightest - darkest; // anything may show through
             return levels.difference_in_cdm2(luminance) + (hi - lo) * (r1 > 0 ? std::min(1.0, distance / r1) : 1.0);
         };
         Shown patch;
         patch.pattern.luminance = levels.luminance_level(middle);
         patch.pattern.largest = levels.contrast_level(change(errors[node].luminance, errors[node].distance), middle);
-        const int typical = levels.contrast_level(change(errors[node].wide_luminance, amplitude_of_shift_mean * errors[node].mean_distance), middle);
+        const int typical = levels.contrast_level(
+            change(errors[node].wide_luminance, amplitude_of_shift_mean * errors[node].mean_distance), middle);
         if (patch.pattern.largest != no_contrast)
-            patch.pattern.typical = std::clamp(typical, std::max(patch.pattern.largest - steepest_spike, 0), patch.pattern.largest);
+            patch.pattern.typical =
+                std::clamp(typical, std::max(patch.pattern.largest - steepest_spike, 0), patch.pattern.largest);
         patch.length = std::max(tree.support_spheres()[node].radius, errors[node].extent);
         const int drift = levels.contrast_level(static_cast<double>(errors[node].drift), 1);
         if (drift != no_contrast && Levels::contrast(drift) * whole_peak > 1) {
             patch.pattern.luminance = std::max(patch.pattern.luminance, whole);
             patch.pattern.drift = drift, patch.pattern.fading = errors[node].fading;
-            patch.pattern.quarters = static_cast<int>(std::ceil(4 * std::log2(std::max(std::min(widest, object_radius / patch.length), 1.0f))));
+            patch.pattern.quarters = static_cast<int>(
+                std::ceil(4 * std::log2(std::max(std::min(widest, object_radius / patch.length), 1.0f))));
         }
         patch.pattern = reaches.simplified(patch.pattern);
         patch.row = reaches.row(patch.pattern);
@@ -413,7 +432,9 @@ bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors
         Shown strip;
         for (const auto& [bright, dark] : {std::pair(brightest, lo), std::pair(hi, darkest)}) {
             const double mean = (bright + dark) / 2;
-            const Pattern own{.luminance = levels.luminance_level(mean), .largest = levels.contrast_level(bright - dark, mean), .is_strip = true};
+            const Pattern own{.luminance = levels.luminance_level(mean),
+                              .largest = levels.contrast_level(bright - dark, mean),
+                              .is_strip = true};
             strip.pattern = above(strip.pattern, own);
         }
         strip.length = errors[node].distance;
@@ -432,8 +453,8 @@ bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors
 
 // A node folds as well where the whole mesh does, as far as the node's stage: takes the stage where that is nowhere seen from farther, unless a
 // child would then be. Children before parents.
-void fold_in_stages(const vdtree::SoundTree& tree, std::span<const FoldError> errors, const Reaches& reaches, std::span<const Shown> stages,
-                    std::span<Shown> shown) {
+void fold_in_stages(const vdtree::SoundTree& tree, std::span<const FoldError> errors, const Reaches& reaches,
+                    std::span<const Shown> stages, std::span<Shown> shown) {
     std::vector<bool> may_take(shown.size(), true);
     for (std::size_t node = shown.size(); node-- > 0;) {
         const std::size_t number = errors[node].stage;
@@ -450,8 +471,8 @@ void fold_in_stages(const vdtree::SoundTree& tree, std::span<const FoldError> er
 
 } // namespace
 
-Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const FoldErrors& measured, const vdtree::View& view,
-                                       const FoldTestOptions& options) {
+Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const FoldErrors& measured,
+                                       const vdtree::View& view, const FoldTestOptions& options) {
     const std::span<const FoldError> errors = measured.of_nodes;
     const NodeId nodes = tree.interior_count();
     const Screen screen(view, options);
@@ -470,11 +491,13 @@ Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const Fold
     Reaches reaches(levels, screen, csf, parts.eccentricity_bins, measured.stages.size());
     std::vector<Shown> patches, strips;
     while (!find_shown(tree, errors, options.scene, levels, csf, reaches, patches, strips)) reaches.coarsen();
-    const std::vector<float> distances = stage_distances(tree, measured.stages, screen, options, parts.eccentricity_bins);
+    const std::vector<float> distances =
+        stage_distances(tree, measured.stages, screen, options, parts.eccentricity_bins);
     if (!distances.empty() && object_radius > 0) {
         std::vector<Shown> stages;
         for (std::size_t first = 0; first < distances.size(); first += parts.eccentricity_bins) {
-            const std::uint16_t row = reaches.add(std::span(distances).subspan(first, parts.eccentricity_bins), object_radius);
+            const std::uint16_t row =
+                reaches.add(std::span(distances).subspan(first, parts.eccentricity_bins), object_radius);
             stages.push_back({.pattern = {}, .length = object_radius, .row = row});
         }
         fold_in_stages(tree, errors, reaches, stages, patches);
@@ -490,7 +513,8 @@ Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const Fold
     return DistanceCriterion::create(tree, std::move(parts));
 }
 
-Result<DistanceCriterion> error_distances(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options) {
+Result<DistanceCriterion> error_distances(const vdtree::VertexTree& tree, const vdtree::View& view,
+                                          const FoldTestOptions& options) {
     if (const auto valid = check_arguments(view, options); !valid) return valid.error();
     const auto sound = vdtree::SoundTree::of(tree);
     if (!sound) return sound.error();

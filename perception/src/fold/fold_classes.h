@@ -10,8 +10,8 @@
 
 #include <glm/common.hpp>
 
-#include <perception/display.h>
 #include <perception/chroma.h>
+#include <perception/display.h>
 #include <vdtree/vertex_tree.h>
 
 #include "fold/luminance_classes.h"
@@ -20,7 +20,7 @@ namespace unseen::perception {
 
 // Michelson's: the finer classes where few other things tell rows apart.
 inline constexpr ClassSeries coarse_contrasts{12, -9, 9}, fine_contrasts{48, -9, 9};
-inline constexpr ClassSeries shifts{3, -9, 10};    // of the mean over the middle of the range
+inline constexpr ClassSeries shifts{3, -9, 10}; // of the mean over the middle of the range
 // Of colour, in both directions.
 inline constexpr ClassSeries chroma_contrasts{3, -13, 18};
 inline constexpr ClassSeries chroma_shifts{1, -13, 18};
@@ -29,7 +29,7 @@ inline constexpr ClassSeries texture_contrasts{4, -9, 9};
 inline constexpr ClassSeries texture_motions{1, -16, 16};
 
 struct Level {
-    std::size_t contrast = 0, luminance = 0, shift = 0; // classes
+    std::size_t contrast = 0, luminance = 0, shift = 0;  // classes
     std::array<std::size_t, 2> chroma{}, chroma_shift{}; // red-green and yellow-violet
     std::size_t texture = 0, texture_motion = 0;         // both, or neither
 
@@ -53,7 +53,7 @@ struct RingLooks {
     double shift = 0;      // contrast, and so on
     glm::dvec2 chroma = glm::dvec2(0), chroma_shift = glm::dvec2(0);
     double texture = 0, texture_motion = 0; // contrast; share of the fold's extent
-    double least_contrast = 0; // the range counts as one of this contrast at least
+    double least_contrast = 0;              // the range counts as one of this contrast at least
 };
 
 // What rings look like on a display, in classes.

@@ -72,22 +72,28 @@ struct Row {
         const CyclesPerDegree frequency(frequency_cpd);
         const Degrees eccentricity(eccentricity_deg);
         const Luminance luminance(luminance_cdm2);
-        const double sensitivity = contrast > 0 || has_texture() ? see.luminance.monotone_sensitivity(frequency, eccentricity, luminance) : 0;
+        const double sensitivity =
+            contrast > 0 || has_texture() ? see.luminance.monotone_sensitivity(frequency, eccentricity, luminance) : 0;
         double grey = contrast * sensitivity;
-        if (has_texture()) grey = std::min(grey + texture * moved_sensitivity(see, frequency_cpd, eccentricity, luminance), sensitivity);
+        if (has_texture())
+            grey =
+                std::min(grey + texture * moved_sensitivity(see, frequency_cpd, eccentricity, luminance), sensitivity);
         if (!has_chroma()) return grey;
         return std::hypot(grey, chroma.x * see.red_green->monotone_sensitivity(frequency, eccentricity, luminance),
                           chroma.y * see.yellow_violet->monotone_sensitivity(frequency, eccentricity, luminance));
     }
     // To a pattern that moves by a share of half a wave of this frequency, within a patch that holds no lower ones: the bands of higher
     // frequencies see the share of it that lies in their own half waves.
-    double moved_sensitivity(const Sensitivities& see, double lowest_cpd, Degrees eccentricity, Luminance luminance) const {
+    double moved_sensitivity(const Sensitivities& see, double lowest_cpd, Degrees eccentricity,
+                             Luminance luminance) const {
         constexpr double steps_per_octave = 2;
         double largest = 0;
-        for (double multiple = 1;; ) { // sensitivity falls and shares grow: up to the next step both are no more than this
+        for (double multiple = 1;
+             ;) { // sensitivity falls and shares grow: up to the next step both are no more than this
             const double next = multiple * std::exp2(1 / steps_per_octave);
             const double share = std::min(1.0, next * texture_motion);
-            largest = std::max(largest, share * see.luminance.monotone_sensitivity(CyclesPerDegree(lowest_cpd * multiple), eccentricity, luminance));
+            largest = std::max(largest, share * see.luminance.monotone_sensitivity(
+                                                    CyclesPerDegree(lowest_cpd * multiple), eccentricity, luminance));
             if (share >= 1) return largest;
             multiple = next;
         }
@@ -110,7 +116,8 @@ public:
     // Extents around the spheres are larger than these, from whose nearest points eccentricity is counted: they reach nearer to the gaze, by
     // half of their width at most.
     LargestExtents(const Row& row, const Sensitivities& see, const Screen& screen, bool is_around_spheres)
-        : row_(row), see_(see), is_around_spheres_(is_around_spheres), step_(step_of(screen.pixel_deg / smallest_of_a_pixel)) {}
+        : row_(row), see_(see), is_around_spheres_(is_around_spheres),
+          step_(step_of(screen.pixel_deg / smallest_of_a_pixel)) {}
 
     double at(double eccentricity_deg) {
         // Of a fixed series of extents, so that more contrast never makes them larger.
@@ -136,9 +143,12 @@ private:
     static constexpr double smallest_of_a_pixel = 1024; // far below what any fold costs 1 at
 
     static double extent(int step) { return std::exp2(step / steps_per_octave); }
-    static int step_of(double extent_deg) { return static_cast<int>(std::floor(steps_per_octave * std::log2(extent_deg))); }
+    static int step_of(double extent_deg) {
+        return static_cast<int>(std::floor(steps_per_octave * std::log2(extent_deg)));
+    }
     bool is_unseen(int step, double eccentricity_deg) const {
-        const double nearest = is_around_spheres_ ? std::max(0.0, eccentricity_deg - extent(step) / 2) : eccentricity_deg;
+        const double nearest =
+            is_around_spheres_ ? std::max(0.0, eccentricity_deg - extent(step) / 2) : eccentricity_deg;
         return row_.visibility(see_, 1 / (2 * extent(step)), nearest) <= 1;
     }
 
@@ -154,10 +164,12 @@ void find_largest_extents(const Row& row, const CsfTable& csf, const Bins& bins,
     for (std::size_t bin = 0; bin < extents.size(); ++bin) eccentricity[bin] = static_cast<float>(bins.at(bin));
     contrast.fill(static_cast<float>(row.contrast));
     luminance.fill(static_cast<float>(row.luminance_cdm2));
-    csf.highest_visible_log2_frequency(std::span(contrast).first(extents.size()), std::span(eccentricity).first(extents.size()),
-                                       std::span(luminance).first(extents.size()), std::span(log2_frequency).first(extents.size()));
+    csf.highest_visible_log2_frequency(
+        std::span(contrast).first(extents.size()), std::span(eccentricity).first(extents.size()),
+        std::span(luminance).first(extents.size()), std::span(log2_frequency).first(extents.size()));
     // Infinite where not even the peak is seen.
-    for (std::size_t bin = 0; bin < extents.size(); ++bin) extents[bin] = 1 / (2 * std::exp2(static_cast<double>(log2_frequency[bin])));
+    for (std::size_t bin = 0; bin < extents.size(); ++bin)
+        extents[bin] = 1 / (2 * std::exp2(static_cast<double>(log2_frequency[bin])));
 }
 
 // The distance, in lengths, from which an extent is no larger than this on the screen.
@@ -193,7 +205,8 @@ void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes
             // No fold is drawn smaller than a pixel, and a shift of the mean shows from whatever distance.
             const double eccentricity_deg = eccentricities.at(bin);
             reach[bin] = reach_of(extents[bin], screen, is_around_spheres);
-            least_cost[bin] = static_cast<float>(std::max(screen.pixel_deg / extents[bin], row.shift_visibility(see, eccentricity_deg)));
+            least_cost[bin] = static_cast<float>(
+                std::max(screen.pixel_deg / extents[bin], row.shift_visibility(see, eccentricity_deg)));
             // The table's own rounding must not make anything grow with the eccentricity.
             if (bin == 0) continue;
             reach[bin] = std::min(reach[bin], reach[bin - 1]);
@@ -207,7 +220,9 @@ vdtree::LuminanceRange outline_of(vdtree::LuminanceRange range, const SceneLumin
     return {std::min(range.lo, scene.darkest), std::max(range.hi, scene.brightest)};
 }
 
-double middle_of(vdtree::LuminanceRange range) { return 0.5 * (static_cast<double>(range.lo) + static_cast<double>(range.hi)); }
+double middle_of(vdtree::LuminanceRange range) {
+    return 0.5 * (static_cast<double>(range.lo) + static_cast<double>(range.hi));
+}
 
 glm::dvec2 half_of(const ChromaRange& range) { return (glm::dvec2(range.hi) - glm::dvec2(range.lo)) * 0.5; }
 
@@ -220,12 +235,13 @@ ChromaRange scene_chroma(std::span<const ChromaRange> rings) {
 // What a test takes of the tree.
 struct Rings {
     std::span<const vdtree::PackedRange> luminance;
-    std::span<const ChromaRange> chroma;             // none: not looked at
-    std::span<const float> mean_shift = {};          // likewise
+    std::span<const ChromaRange> chroma;    // none: not looked at
+    std::span<const float> mean_shift = {}; // likewise
     std::span<const glm::vec2> mean_chroma_shift = {};
-    std::span<const vdtree::PackedRange> vertices = {}, texture = {}; // where the texture is counted by how far it moves; then, too:
-    std::span<const float> texture_deviation = {}, lengths = {};      // mesh units
-    std::vector<vdtree::NormalSlabs> facing = {};                     // empty: the tree's
+    std::span<const vdtree::PackedRange> vertices = {},
+                                         texture = {}; // where the texture is counted by how far it moves; then, too:
+    std::span<const float> texture_deviation = {}, lengths = {}; // mesh units
+    std::vector<vdtree::NormalSlabs> facing = {};                // empty: the tree's
 };
 
 // All that grows up the tree stays so: contrasts against a middle would not.
@@ -239,7 +255,8 @@ void saturate(RingLooks& parent, const RingLooks& child) {
 
 // Of a surface that faces the eye: its vertices' contrast where the texture is brightest, the texture's where the vertices are, and how far
 // that moves: no less than in the children, whose shares of their extents are rounded up.
-void add_texture(RingLooks& inside, const Rings& rings, NodeId node, const Classes& classes, std::vector<double>& motions) {
+void add_texture(RingLooks& inside, const Rings& rings, NodeId node, const Classes& classes,
+                 std::vector<double>& motions) {
     const vdtree::LuminanceRange vertices = rings.vertices[node], texture = rings.texture[node];
     inside.range = {vertices.lo * texture.hi, vertices.hi * texture.hi};
     inside.texture = classes.contrast({vertices.hi * texture.lo, vertices.hi * texture.hi});
@@ -265,18 +282,25 @@ bool classify(const vdtree::SoundTree& tree, const Rings& rings, const FoldTestO
         // Anything in the scene may show through.
         const bool is_translucent = tree.bounds()[node].flags & vdtree::translucent_ring;
         inside.range = is_translucent ? outline.range : vdtree::LuminanceRange(rings.luminance[node]);
-        inside.adaptation = std::max({inside.adaptation, static_cast<double>(tree.adaptation_luminance()[node]), middle_of(inside.range)});
+        inside.adaptation = std::max(
+            {inside.adaptation, static_cast<double>(tree.adaptation_luminance()[node]), middle_of(inside.range)});
         if (!rings.vertices.empty() && !is_translucent) add_texture(inside, rings, node, classes, motions);
         outline.least_contrast = std::max(outline.least_contrast, classes.sum_of_contrasts(inside));
         if (!rings.mean_shift.empty())
-            inside.shift = std::max(inside.shift, classes.contrast(static_cast<double>(rings.mean_shift[node]), rings.luminance[node]));
+            inside.shift = std::max(
+                inside.shift, classes.contrast(static_cast<double>(rings.mean_shift[node]), rings.luminance[node]));
         if (has_chroma) {
-            inside.chroma = glm::max(inside.chroma, classes.chroma_contrast(is_translucent ? of_scene : half_of(rings.chroma[node]), inside.range));
-            outline.chroma = glm::max(glm::max(outline.chroma, inside.chroma), classes.chroma_contrast(of_scene, outline.range));
+            inside.chroma =
+                glm::max(inside.chroma, classes.chroma_contrast(is_translucent ? of_scene : half_of(rings.chroma[node]),
+                                                                inside.range));
+            outline.chroma =
+                glm::max(glm::max(outline.chroma, inside.chroma), classes.chroma_contrast(of_scene, outline.range));
             if (!rings.mean_chroma_shift.empty())
-                inside.chroma_shift = glm::max(inside.chroma_shift, classes.chroma_contrast(rings.mean_chroma_shift[node], rings.luminance[node]));
+                inside.chroma_shift = glm::max(
+                    inside.chroma_shift, classes.chroma_contrast(rings.mean_chroma_shift[node], rings.luminance[node]));
         }
-        saturate(outline, {outline.range, std::max(inside.adaptation, middle_of(outline.range)), inside.shift, glm::dvec2(0), inside.chroma_shift});
+        saturate(outline, {outline.range, std::max(inside.adaptation, middle_of(outline.range)), inside.shift,
+                           glm::dvec2(0), inside.chroma_shift});
         fold_classes[node] = {rows.of(classes.level(inside)), rows.of(classes.level(outline))};
         if (rows.is_full()) return false;
         if (node == 0) break;
@@ -297,7 +321,8 @@ Result<DistanceCriterion> make_criterion(const vdtree::SoundTree& tree, const Ri
     const Classes classes(options.display, is_fine ? fine_contrasts : coarse_contrasts);
     const Bins& bins = is_fine ? fine_bins : coarse_bins;
     if (!tree.texture().empty() && options.chroma)
-        return Error{ErrorCode::invalid_argument, "The colours of textures are not looked at: leave the chroma out, or the texture."};
+        return Error{ErrorCode::invalid_argument,
+                     "The colours of textures are not looked at: leave the chroma out, or the texture."};
     DistanceCriterion::Parts parts;
     parts.spheres = DistanceCriterion::Spheres::ring;
     parts.eccentricity_bins = options.gaze_px ? bins.count : 1;
@@ -336,24 +361,28 @@ Result<DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree&
     Rings rings{cut_rings.luminance, {}, cut_rings.mean_shift};
     if (options.chroma) {
         if (cut_rings.chroma.empty() && tree.texture().empty() && has_chroma(tree))
-            return Error{ErrorCode::invalid_argument, "The rings were bounded without their colours, which are to be looked at."};
+            return Error{ErrorCode::invalid_argument,
+                         "The rings were bounded without their colours, which are to be looked at."};
         rings.chroma = cut_rings.chroma;
         rings.mean_chroma_shift = cut_rings.mean_chroma_shift;
     }
     std::vector<float> lengths(tree.interior_count(), 0.0f);
     for (NodeId node = tree.interior_count(); node-- > 0;) {
         // The change is largest within the support and fades to nothing at the ring's border.
-        const float around = 0.5f * (tree.support_spheres()[node].radius + cut_rings.radius[node]) * (1 + length_rounding);
+        const float around =
+            0.5f * (tree.support_spheres()[node].radius + cut_rings.radius[node]) * (1 + length_rounding);
         lengths[node] = std::max({lengths[node], tree.bounds()[node].ring.radius, around});
         if (node > 0) lengths[sound->parents()[node]] = std::max(lengths[sound->parents()[node]], lengths[node]);
     }
     if (!cut_rings.meets_another.empty())
         for (NodeId node = 0; node < tree.interior_count(); ++node) // an outline, whatever it faces
-            rings.facing.push_back(cut_rings.meets_another[node] ? vdtree::NormalSlabs::everything() : tree.bounds()[node].slabs);
+            rings.facing.push_back(cut_rings.meets_another[node] ? vdtree::NormalSlabs::everything()
+                                                                 : tree.bounds()[node].slabs);
     rings.vertices = cut_rings.vertices;
     rings.texture = cut_rings.texture;
     rings.texture_deviation = cut_rings.texture_deviation;
-    const std::vector<float> own_lengths = rings.vertices.empty() ? std::vector<float>() : lengths; // which the criterion takes
+    const std::vector<float> own_lengths =
+        rings.vertices.empty() ? std::vector<float>() : lengths; // which the criterion takes
     rings.lengths = own_lengths;
     return make_criterion(*sound, rings, std::move(lengths), view, options);
 }

@@ -2,7 +2,7 @@
 //
 // Each constant says where it comes from. "Paper" and "derived" mean what they say. "By trial" means: chosen by
 // comparing pictures of whole views, so that a judge of <perception/judge.h> saw no difference; not fitted, and no
-// script finds the number again. Which meshes were used was not recorded; those in the tables of docs/perception.md
+// script finds the number again. Which meshes were used was not recorded; those in the tables of docs/evidence.md
 // (bunny, horse, armadillo, gargoyle) may have been among them: these tables are no independent evidence.
 #pragma once
 

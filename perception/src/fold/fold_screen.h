@@ -10,8 +10,8 @@
 
 namespace unseen::perception {
 
-inline constexpr double degrees_per_bin = 0.5;  // of eccentricity on the screen
-inline constexpr std::size_t bin_count = 128;   // up to 64 degrees; beyond, sensitivity is taken as there
+inline constexpr double degrees_per_bin = 0.5; // of eccentricity on the screen
+inline constexpr std::size_t bin_count = 128;  // up to 64 degrees; beyond, sensitivity is taken as there
 
 // The lowest frequency that a sensitivity table must know.
 inline constexpr double lowest_table_cpd = 0.5;
@@ -27,13 +27,14 @@ inline Result<void> check_arguments(const vdtree::View& view, const FoldTestOpti
         return Error{ErrorCode::invalid_argument, "fold test: the gaze must be a finite position in pixels"};
     const vdtree::LuminanceRange behind = options.scene.behind.value_or(vdtree::LuminanceRange{});
     for (const float relative : {options.scene.darkest, options.scene.brightest, behind.lo, behind.hi})
-        if (!std::isfinite(relative)) return Error{ErrorCode::invalid_argument, "fold test: the scene's luminances must be finite"};
+        if (!std::isfinite(relative))
+            return Error{ErrorCode::invalid_argument, "fold test: the scene's luminances must be finite"};
     return {};
 }
 
 // The camera's and the display's geometry, as far as the test needs it.
 struct Screen {
-    double scale = 1;     // tangent on the screen over tangent in the camera
+    double scale = 1;       // tangent on the screen over tangent in the camera
     double pixel_deg = 0;   // the largest: what a change fills at least
     double highest_cpd = 0; // of the finest pixels
     double pitch_over_distance = 0;
@@ -52,10 +53,12 @@ struct Screen {
         const double aspect = static_cast<double>(view.width) / view.height;
         double farthest = tan_camera * std::hypot(aspect, 1);
         if (options.gaze_px)
-            farthest = std::max(farthest, std::hypot(options.gaze_px->x - view.width * 0.5, options.gaze_px->y - view.height * 0.5) *
-                                              pitch_over_distance / scale);
+            farthest = std::max(
+                farthest, std::hypot(options.gaze_px->x - view.width * 0.5, options.gaze_px->y - view.height * 0.5) *
+                              pitch_over_distance / scale);
         const double t2 = farthest * farthest;
-        const double at_edge = scale * (1 + t2) / (1 + scale * scale * t2); // along the radius; across it, its root in between
+        const double at_edge =
+            scale * (1 + t2) / (1 + scale * scale * t2); // along the radius; across it, its root in between
         largest_magnification = std::max(scale, at_edge);
         least_magnification = std::min(scale, at_edge);
     }

@@ -34,15 +34,18 @@ Visibility visibility_of(float log2_frequency, const Screen& screen) {
     const double largest_extent_deg = 1 / (2 * std::exp2(static_cast<double>(log2_frequency)));
     const double half = largest_extent_deg / screen.largest_magnification / degrees_per_radian / 2;
     const double reach = half < std::numbers::pi / 2 ? 1 / std::sin(half) - 1 : 0;
-    return {static_cast<float>(reach * (1 + reach_rounding)), static_cast<float>(screen.pixel_deg / largest_extent_deg)};
+    return {static_cast<float>(reach * (1 + reach_rounding)),
+            static_cast<float>(screen.pixel_deg / largest_extent_deg)};
 }
 
-void fill_table(DistanceCriterion::Parts& parts, const ContrastClasses& levels, const Screen& screen, const CsfTable& csf) {
+void fill_table(DistanceCriterion::Parts& parts, const ContrastClasses& levels, const Screen& screen,
+                const CsfTable& csf) {
     const std::size_t bins = parts.eccentricity_bins;
     parts.reach.assign(ContrastClasses::row_count * bins, DistanceCriterion::never_visible);
     parts.least_cost.assign(ContrastClasses::row_count * bins, 0);
     std::array<float, bin_count> contrast, eccentricity, luminance, log2_frequency;
-    for (std::size_t bin = 0; bin < bins; ++bin) eccentricity[bin] = static_cast<float>(static_cast<double>(bin) * degrees_per_bin);
+    for (std::size_t bin = 0; bin < bins; ++bin)
+        eccentricity[bin] = static_cast<float>(static_cast<double>(bin) * degrees_per_bin);
     for (std::size_t row = 1; row < ContrastClasses::row_count; ++row) {
         contrast.fill(static_cast<float>(ContrastClasses::contrast(row)));
         luminance.fill(static_cast<float>(levels.luminance(row)));
@@ -77,7 +80,8 @@ void make_growing(DistanceCriterion::Parts& parts) {
 
 } // namespace
 
-Result<vdtree::DistanceCriterion> lit_distances(const vdtree::VertexTree& tree, std::shared_ptr<const vdtree::LightBounds> bounds,
+Result<vdtree::DistanceCriterion> lit_distances(const vdtree::VertexTree& tree,
+                                                std::shared_ptr<const vdtree::LightBounds> bounds,
                                                 const vdtree::View& view, const FoldTestOptions& options) {
     if (const auto sound = check_arguments(view, options); !sound) return sound.error();
     const Screen screen(view, options);
@@ -94,12 +98,14 @@ Result<vdtree::DistanceCriterion> lit_distances(const vdtree::VertexTree& tree, 
     return DistanceCriterion::create(tree, std::move(parts));
 }
 
-SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBounds& bounds, const vdtree::Lighting& lighting,
-                         glm::dvec3 eye, float background) {
+SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBounds& bounds,
+                         const vdtree::Lighting& lighting, glm::dvec3 eye, float background) {
     const vdtree::NodeId root = vdtree::VertexTree::root();
-    const vdtree::LuminanceRange range = vdtree::lit_range(lighting, bounds.cones()[root], tree.bounds()[root].ring, eye);
+    const vdtree::LuminanceRange range =
+        vdtree::lit_range(lighting, bounds.cones()[root], tree.bounds()[root].ring, eye);
     constexpr float steps = 32;
-    return {std::floor(steps * std::min(range.lo, background)) / steps, std::ceil(steps * std::max(range.hi, background)) / steps};
+    return {std::floor(steps * std::min(range.lo, background)) / steps,
+            std::ceil(steps * std::max(range.hi, background)) / steps};
 }
 
 } // namespace unseen::perception

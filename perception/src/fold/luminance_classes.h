@@ -49,7 +49,9 @@ public:
         return static_cast<std::size_t>(std::clamp(steps, 0.0, static_cast<double>(count - 1)));
     }
     // The largest of a class, in cd/m2.
-    double value(std::size_t index) const { return lowest() * std::exp2(log2_step_ * static_cast<double>(index)) * (1 + 2 * ClassSeries::edge); }
+    double value(std::size_t index) const {
+        return lowest() * std::exp2(log2_step_ * static_cast<double>(index)) * (1 + 2 * ClassSeries::edge);
+    }
 
 private:
     double black_, span_, log2_step_;

@@ -17,7 +17,7 @@ namespace {
 
 // The angles, in degrees, that the mesh's sphere is seen under, from far to near.
 constexpr double least_angle = 0.01, angle_step = 1.0905077326652577; // an eighth of an octave
-constexpr std::size_t angle_count = 96;                              // up to 38 degrees
+constexpr std::size_t angle_count = 96;                               // up to 38 degrees
 double angle(std::size_t i) { return least_angle * std::pow(angle_step, static_cast<double>(i)); }
 
 // Finer than the pictures' cells: at most what grows as fast as a line gets narrower, and unmasked.
@@ -34,12 +34,15 @@ public:
         for (std::size_t i = 0; i < angle_count; ++i) {
             for (std::size_t b = 0; b < bands_[i].size(); ++b) {
                 const double octaves_finer = b < finer_bands ? static_cast<double>(finer_bands - b) : 0;
-                const double cycles = FoldStage::frequency(b < finer_bands ? 0 : b - finer_bands) * std::exp2(octaves_finer);
-                const double luminance = behind.value() + share_of_mesh(cycles) * std::max(mesh.value() - behind.value(), 0.0);
+                const double cycles =
+                    FoldStage::frequency(b < finer_bands ? 0 : b - finer_bands) * std::exp2(octaves_finer);
+                const double luminance =
+                    behind.value() + share_of_mesh(cycles) * std::max(mesh.value() - behind.value(), 0.0);
                 const double cpd = cycles / angle(i);
                 const double at = std::max(std::min(cpd, highest_cpd), lowest_table_cpd);
-                const double sensitivity = share_on_display(cpd / highest_cpd) *
-                                           csf.monotone_sensitivity(CyclesPerDegree(at), Degrees(eccentricity_deg), Luminance(luminance));
+                const double sensitivity =
+                    share_on_display(cpd / highest_cpd) *
+                    csf.monotone_sensitivity(CyclesPerDegree(at), Degrees(eccentricity_deg), Luminance(luminance));
                 for (std::size_t row = 0; row < FoldStage::masks.size(); ++row) {
                     const double mask = b < finer_bands ? 0 : static_cast<double>(FoldStage::masks[row]);
                     bands_[i][b][row] = std::exp2(octaves_finer) * sensitivity / daly_elevation(mask * sensitivity);
@@ -49,10 +52,12 @@ public:
     }
 
     // The largest angle up to which the contrasts are invisible; 0 where they never are.
-    double largest_angle(const FoldStage& stage, std::size_t first_background, std::size_t last_background, double contrast_factor) const {
+    double largest_angle(const FoldStage& stage, std::size_t first_background, std::size_t last_background,
+                         double contrast_factor) const {
         for (std::size_t i = 0; i < angle_count; ++i)
             for (std::size_t k = first_background; k <= last_background; ++k)
-                if (!(visibility(stage.contrast[k], bands_[i]) * contrast_factor * between_directions <= 1)) return i > 0 ? angle(i - 1) : 0;
+                if (!(visibility(stage.contrast[k], bands_[i]) * contrast_factor * between_directions <= 1))
+                    return i > 0 ? angle(i - 1) : 0;
         return angle(angle_count - 1);
     }
 
@@ -69,12 +74,14 @@ private:
     // pyramid's kernel is about a Gaussian of the deviation 1 / (sqrt(8) cycles) in diameters of the sphere.
     static double share_of_mesh(double cycles) { return 1 - std::exp(-cycles * cycles); }
 
-    static double visibility(const float (&contrast)[FoldStage::band_count][FoldStage::masks.size()], const Bands& bands) {
+    static double visibility(const float (&contrast)[FoldStage::band_count][FoldStage::masks.size()],
+                             const Bands& bands) {
         double sum = 0;
         for (std::size_t b = 0; b < bands.size(); ++b) {
             const auto& rows = contrast[b < finer_bands ? 0 : b - finer_bands];
             double most = 0;
-            for (std::size_t row = 0; row < FoldStage::masks.size(); ++row) most = std::max(most, static_cast<double>(rows[row]) * bands[b][row]);
+            for (std::size_t row = 0; row < FoldStage::masks.size(); ++row)
+                most = std::max(most, static_cast<double>(rows[row]) * bands[b][row]);
             sum += to_power_of_pooling(most);
         }
         return std::pow(sum, 1 / pooling);
@@ -85,9 +92,12 @@ private:
 
 } // namespace
 
-std::vector<float> stage_distances(const vdtree::VertexTree& tree, std::span<const FoldStage> stages, const Screen& screen, const FoldTestOptions& options, std::size_t bins) {
-    const vdtree::LuminanceRange behind = options.scene.behind.value_or(vdtree::LuminanceRange{options.scene.darkest, options.scene.brightest});
-    std::size_t first = 0, last = FoldStage::backgrounds.size() - 1; // the nearest ones that are not brighter, and not darker
+std::vector<float> stage_distances(const vdtree::VertexTree& tree, std::span<const FoldStage> stages,
+                                   const Screen& screen, const FoldTestOptions& options, std::size_t bins) {
+    const vdtree::LuminanceRange behind =
+        options.scene.behind.value_or(vdtree::LuminanceRange{options.scene.darkest, options.scene.brightest});
+    std::size_t first = 0,
+                last = FoldStage::backgrounds.size() - 1; // the nearest ones that are not brighter, and not darker
     while (first < last && FoldStage::backgrounds[first + 1] <= behind.lo) ++first;
     while (last > first && FoldStage::backgrounds[last - 1] >= behind.hi) --last;
     const Luminance brightest = to_luminance(options.display, static_cast<double>(tree.luminance_range().hi));
@@ -106,8 +116,9 @@ std::vector<float> stage_distances(const vdtree::VertexTree& tree, std::span<con
             const double on_screen = eye.largest_angle(stages[stage], first, last, contrast_factor);
             const double seen = on_screen / screen.largest_magnification / degrees_per_radian;
             float& distance = distances[stage * bins + bin];
-            distance = seen > 0 ? static_cast<float>(std::max(diameter, (1 + reach_rounding) * diameter / std::sin(seen)))
-                                : std::numeric_limits<float>::infinity();
+            distance = seen > 0
+                           ? static_cast<float>(std::max(diameter, (1 + reach_rounding) * diameter / std::sin(seen)))
+                           : std::numeric_limits<float>::infinity();
             if (bin > 0) distance = std::min(distance, distances[stage * bins + bin - 1]);
             if (stage > 0) distance = std::max(distance, distances[(stage - 1) * bins + bin]);
         }

@@ -19,7 +19,8 @@ inline Result<void> check_luminance(const std::string& judge, const Image& image
     const auto width = static_cast<std::size_t>(std::max(image.width, 0));
     const auto pixels = width * static_cast<std::size_t>(std::max(image.height, 0));
     if (pixels == 0 || image.channels != 1 || image.values.size() != pixels) {
-        return judge_argument_error(judge, "the " + which + " is not a luminance image (one channel, one pixel or more)");
+        return judge_argument_error(judge,
+                                    "the " + which + " is not a luminance image (one channel, one pixel or more)");
     }
     for (std::size_t i = 0; i < pixels; ++i) {
         if (image.values[i] >= 0 && std::isfinite(image.values[i])) continue;

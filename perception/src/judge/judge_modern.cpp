@@ -36,8 +36,8 @@ constexpr double luminance_floor = 0.01;      // cd/m2, where the display's blac
 constexpr double sensitivity_floor = 1e-60;   // keeps logarithms and squares finite; 1e-57 times below visibility
 // Steps of the sensitivity tables. log S is linear in eccentricity, so only luminance errs: by less than 5e-4 of S,
 // most where castleCSF's peak frequency crosses the band's.
-constexpr double eccentricity_step = 1.0;          // degrees
-constexpr double luminance_step = 1.0 / 128;       // decades
+constexpr double eccentricity_step = 1.0;    // degrees
+constexpr double luminance_step = 1.0 / 128; // decades
 // Where the tilt is fitted, in units of the band's nominal frequency: half an octave to either side. Band 0 has no band
 // above it; it is fitted on the way down to band 1, where it answers alone.
 constexpr double fit_ratios[2] = {std::numbers::sqrt2, 1 / std::numbers::sqrt2};
@@ -151,7 +151,7 @@ struct Range {
 struct Conditions {
     CsfModel model = CsfModel::castle;
     std::shared_ptr<const CsfTable> table; // in the model's place; or null
-    Metres distance;                 // of the screen
+    Metres distance;                       // of the screen
     double ppd = 0;
     double beta = 0;
     Range log10_luminance;
@@ -247,8 +247,7 @@ private:
             const double f = ratio * nominal;
             const double wanted = share * static_sensitivity(c, f, luminance, eccentricity) / nominal_s;
             const double answer = band_response(f, c.ppd, level_) / gain_ / wanted;
-            const double slope =
-                answer * (smooth_response(angular_frequency(f, c.ppd, level_)) - smooth_at_nominal_);
+            const double slope = answer * (smooth_response(angular_frequency(f, c.ppd, level_)) - smooth_at_nominal_);
             numerator += slope * (1 - answer);
             denominator += slope * slope;
         }
@@ -313,9 +312,9 @@ int base_level(const Image& image, double ppd) {
 struct Band {
     int level = 0;
     bool is_base = false;
-    Plane luminance;     // cd/m2, floored
-    Plane reference;     // contrast
-    Plane difference;    // contrast
+    Plane luminance;  // cd/m2, floored
+    Plane reference;  // contrast
+    Plane difference; // contrast
 };
 
 // The luminance and the two contrasts of one band; leaves the next levels in `reference` and `difference`.
@@ -413,7 +412,8 @@ void spread(const Plane& band, int level, Plane& full, Merge merge) {
 Result<void> check(const JudgeOptions& options) {
     if (auto ok = validate(options.display); !ok) return ok;
     if (!options.csf_table && !is_achromatic(options.csf))
-        return judge_argument_error("judge", std::string(name(options.csf)) + " is sensitivity to colour, not to luminance contrast");
+        return judge_argument_error("judge", std::string(name(options.csf)) +
+                                                 " is sensitivity to colour, not to luminance contrast");
     if (!(options.beta >= 1 && options.beta <= 20))
         return judge_argument_error("judge", "beta must lie between 1 and 20");
     if (options.gaze_px && !(std::isfinite(options.gaze_px->x) && std::isfinite(options.gaze_px->y))) {
@@ -428,7 +428,11 @@ double contrast_floor(const Display& display) { return std::max(black_level(disp
 Conditions conditions_for(const Image& reference, const JudgeOptions& options, const Eccentricity& eccentricity) {
     const auto [low, high] = std::minmax_element(reference.values.begin(), reference.values.end());
     const double floor_cdm2 = contrast_floor(options.display);
-    return {options.csf, options.csf_table, options.display.distance, pixels_per_degree(options.display).value(), options.beta,
+    return {options.csf,
+            options.csf_table,
+            options.display.distance,
+            pixels_per_degree(options.display).value(),
+            options.beta,
             {std::log10(std::max(static_cast<double>(*low), floor_cdm2)),
              std::log10(std::max(static_cast<double>(*high), floor_cdm2))},
             eccentricity.largest()};

@@ -18,10 +18,10 @@ namespace unseen::perception {
 namespace {
 
 constexpr std::size_t level_count = 8;
-constexpr std::size_t band_count = level_count - 2;        // a band needs its level and the two below
-constexpr double contrast_floor = 1e-5;                    // of denominators: cd/m2 or contrast
-constexpr double csf_peak_frequency = 3.248;               // cpd, of the CSF below at 100 cd/m2
-constexpr double csf_reference_luminance = 100;            // cd/m2
+constexpr std::size_t band_count = level_count - 2; // a band needs its level and the two below
+constexpr double contrast_floor = 1e-5;             // of denominators: cd/m2 or contrast
+constexpr double csf_peak_frequency = 3.248;        // cpd, of the CSF below at 100 cd/m2
+constexpr double csf_reference_luminance = 100;     // cd/m2
 constexpr double largest_elevation = 10;
 constexpr std::array<double, 5> kernel = {0.05, 0.25, 0.4, 0.25, 0.05};
 constexpr double adobe_weights[3] = {0.297361, 0.627355, 0.0752847};
@@ -83,7 +83,7 @@ std::vector<Plane> blur_levels(const Image& image) {
 
 // Everything that depends on the field and the image's width alone.
 struct Bands {
-    std::array<double, band_count> frequency{};       // cpd
+    std::array<double, band_count> frequency{};        // cpd
     std::array<double, band_count> frequency_factor{}; // CSF at its peak over CSF at the band
     std::size_t adaptation_level = 0;
 };

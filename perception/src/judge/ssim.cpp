@@ -9,10 +9,10 @@
 namespace unseen::perception {
 namespace {
 
-constexpr int window_radius = 5;           // int(3.5 sigma + 0.5) pixels
+constexpr int window_radius = 5; // int(3.5 sigma + 0.5) pixels
 constexpr int window_size = 2 * window_radius + 1;
-constexpr double window_sigma = 1.5;       // pixels
-constexpr double data_range = 255;         // 8-bit codes
+constexpr double window_sigma = 1.5; // pixels
+constexpr double data_range = 255;   // 8-bit codes
 constexpr double c1 = (0.01 * data_range) * (0.01 * data_range);
 constexpr double c2 = (0.03 * data_range) * (0.03 * data_range);
 constexpr double luma_weights[3] = {0.299, 0.587, 0.114}; // ITU-R BT.601
@@ -71,13 +71,14 @@ Result<void> check(const Image& a, const Image& b) {
     }
     if (a.width < window_size || a.height < window_size || (a.channels != 1 && a.channels != 3)) {
         return Error{ErrorCode::invalid_argument, "SSIM needs grey or RGB images of at least 11 x 11 pixels, not " +
-                     std::to_string(a.width) + "x" + std::to_string(a.height) + "x" + std::to_string(a.channels)};
+                                                      std::to_string(a.width) + "x" + std::to_string(a.height) + "x" +
+                                                      std::to_string(a.channels)};
     }
-    const auto values = static_cast<std::size_t>(a.width) * static_cast<std::size_t>(a.height) *
-                        static_cast<std::size_t>(a.channels);
+    const auto values =
+        static_cast<std::size_t>(a.width) * static_cast<std::size_t>(a.height) * static_cast<std::size_t>(a.channels);
     if (a.values.size() != values) {
         return Error{ErrorCode::invalid_argument, "SSIM: an image of " + std::to_string(values) + " values holds " +
-                     std::to_string(a.values.size())};
+                                                      std::to_string(a.values.size())};
     }
     for (std::size_t i = 0; i < values; ++i) {
         if (!std::isfinite(a.values[i]) || !std::isfinite(b.values[i])) {

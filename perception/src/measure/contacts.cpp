@@ -21,11 +21,13 @@ namespace {
 
 using Corners = std::array<glm::vec3, 3>;
 
-constexpr float near_share = 0.25f; // of a triangle's size: no triangles of a smooth surface come so near but neighbours
+constexpr float near_share =
+    0.25f; // of a triangle's size: no triangles of a smooth surface come so near but neighbours
 // Looked at for one triangle: amid more than these, it counts as touching one.
 constexpr int most_nodes = 4000;
 constexpr std::size_t most_triangles = 16000; // around corners: no vertex of very many triangles costs their square
-constexpr std::size_t most_boxes = std::size_t{1} << 32; // of all triangles together, in trees so flat that nodes have very many: some seconds
+constexpr std::size_t most_boxes =
+    std::size_t{1} << 32; // of all triangles together, in trees so flat that nodes have very many: some seconds
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
 float unit(float part, float whole) { return whole > 0 ? std::clamp(part / whole, 0.0f, 1.0f) : 0.0f; }
@@ -72,7 +74,8 @@ glm::vec3 way_between(const Corners& a, const Corners& b) {
     for (std::size_t i = 0; i < 3; ++i) {
         if (passes_through(a[i], a[(i + 1) % 3], b) || passes_through(b[i], b[(i + 1) % 3], a)) return glm::vec3(0);
         least = shorter(shorter(least, way_to_point(b, a[i])), way_to_point(a, b[i]));
-        for (std::size_t k = 0; k < 3; ++k) least = shorter(least, way_between_edges(a[i], a[(i + 1) % 3] - a[i], b[k], b[(k + 1) % 3] - b[k]));
+        for (std::size_t k = 0; k < 3; ++k)
+            least = shorter(least, way_between_edges(a[i], a[(i + 1) % 3] - a[i], b[k], b[(k + 1) % 3] - b[k]));
     }
     return least;
 }
@@ -107,7 +110,8 @@ struct Box {
     void include(const Box& other) { lo = glm::min(lo, other.lo), hi = glm::max(hi, other.hi); }
     Box wider(float by) const { return {lo - by, hi + by}; }
     bool meets(const Box& other) const {
-        return lo.x <= other.hi.x && lo.y <= other.hi.y && lo.z <= other.hi.z && hi.x >= other.lo.x && hi.y >= other.lo.y && hi.z >= other.lo.z;
+        return lo.x <= other.hi.x && lo.y <= other.hi.y && lo.z <= other.hi.z && hi.x >= other.lo.x &&
+               hi.y >= other.lo.y && hi.z >= other.lo.z;
     }
 };
 
@@ -123,7 +127,8 @@ public:
         positions_.assign(leaves.begin(), leaves.end());
         for (glm::vec3& p : positions_) p *= scale_;
         for (NodeId node = interior_; node-- > 0;) {
-            for (Index t = first_triangle_[node]; t < first_triangle_[node + 1]; ++t) boxes_[node].include(box_of(corners(t)));
+            for (Index t = first_triangle_[node]; t < first_triangle_[node + 1]; ++t)
+                boxes_[node].include(box_of(corners(t)));
             if (node > 0) boxes_[tree.parents()[node]].include(boxes_[node]);
         }
     }
@@ -133,7 +138,8 @@ public:
         std::vector<Contact> all(interior_);
         const std::span<const NodeId> parents = tree_.parents();
         for (Index t = 0; t < contacts.size(); ++t)
-            for (const Index leaf : triangles_[t]) all[parents[interior_ + leaf]].include({contacts[t].gap / scale_, contacts[t].sine});
+            for (const Index leaf : triangles_[t])
+                all[parents[interior_ + leaf]].include({contacts[t].gap / scale_, contacts[t].sine});
         for (NodeId node = interior_; node-- > 1;) all[parents[node]].include(all[node]);
         return all;
     }
@@ -144,7 +150,8 @@ private:
         constexpr Index piece = 1024;
         tbb::parallel_for(Index{0}, static_cast<Index>((triangles_.size() + piece - 1) / piece), [&](Index i) {
             std::vector<NodeId> waiting;
-            for (Index t = i * piece; t < std::min<std::size_t>(triangles_.size(), std::size_t{i + 1} * piece); ++t) contacts[t] = find(t, waiting);
+            for (Index t = i * piece; t < std::min<std::size_t>(triangles_.size(), std::size_t{i + 1} * piece); ++t)
+                contacts[t] = find(t, waiting);
         });
         return contacts;
     }
@@ -157,7 +164,9 @@ private:
         const Triangle& t = triangles_[triangle];
         return (luminance_[t[0]] + luminance_[t[1]] + luminance_[t[2]]) / 3;
     }
-    static Box box_of(const Corners& c) { return {glm::min(c[0], glm::min(c[1], c[2])), glm::max(c[0], glm::max(c[1], c[2]))}; }
+    static Box box_of(const Corners& c) {
+        return {glm::min(c[0], glm::min(c[1], c[2])), glm::max(c[0], glm::max(c[1], c[2]))};
+    }
 
     // Whether a corner of the one is a corner of the other, or shares a triangle with one. Adds what it looked at.
     bool are_neighbours(const Triangle& a, const Triangle& b, std::size_t& looked_at) const {
@@ -169,7 +178,8 @@ private:
                 const Index wanted = is_less ? other : leaf;
                 for (const Index t : of_leaf_.around(is_less ? leaf : other)) {
                     ++looked_at;
-                    if (const Triangle& at = triangles_[t]; at[0] == wanted || at[1] == wanted || at[2] == wanted) return true;
+                    if (const Triangle& at = triangles_[t]; at[0] == wanted || at[1] == wanted || at[2] == wanted)
+                        return true;
                     if (looked_at > most_triangles) return false;
                 }
             }
@@ -180,7 +190,8 @@ private:
     Contact find(Index triangle, std::vector<NodeId>& waiting) const {
         const Corners own = corners(triangle);
         const glm::vec3 centre = (own[0] + own[1] + own[2]) / 3.0f;
-        const float near = near_share * std::max({glm::length(own[0] - centre), glm::length(own[1] - centre), glm::length(own[2] - centre)});
+        const float near = near_share * std::max({glm::length(own[0] - centre), glm::length(own[1] - centre),
+                                                  glm::length(own[2] - centre)});
         Contact contact;
         if (!(near > 0)) return contact;
         const Box around = box_of(own).wider(near);
@@ -200,7 +211,8 @@ private:
                 const glm::vec3 way = way_between(own, its);
                 const float gap = glm::length(way);
                 if (!(gap < near) || is_beside(own, its, way)) continue;
-                const bool is_alike = face_alike(own, its) && std::abs(luminance(triangle) - luminance(other)) <= alike_luminance;
+                const bool is_alike =
+                    face_alike(own, its) && std::abs(luminance(triangle) - luminance(other)) <= alike_luminance;
                 if (!is_alike) contact.include({gap, sine_between(own, its)});
             }
             tree_.for_each_child(node, [&](NodeId child) {
@@ -213,9 +225,9 @@ private:
     const SoundTree& tree_;
     NodeId interior_;
     std::span<const Triangle> triangles_;
-    float scale_;                          // in which they are measured
-    std::vector<glm::vec3> positions_;     // of leaves
-    std::span<const Unorm16> luminance_;   // likewise
+    float scale_;                        // in which they are measured
+    std::vector<glm::vec3> positions_;   // of leaves
+    std::span<const Unorm16> luminance_; // likewise
     std::span<const Index> first_triangle_;
     std::vector<Box> boxes_; // by interior node
     LeafTriangles of_leaf_;

@@ -13,8 +13,9 @@ namespace unseen::perception {
 // in one sheet; unless they face and look alike, so that it makes no difference which of them is seen. Near is, as triangles go, nearer than a
 // quarter of the circle around the first.
 struct Contact {
-    float gap = std::numeric_limits<float>::infinity(); // mesh units: the least distance; 0 where they intersect; infinite where none is near
-    float sine = 1;                                     // of the least angle between the planes of such triangles
+    float gap = std::numeric_limits<
+        float>::infinity(); // mesh units: the least distance; 0 where they intersect; infinite where none is near
+    float sine = 1;         // of the least angle between the planes of such triangles
 
     bool is_any() const { return gap < std::numeric_limits<float>::infinity(); }
     void include(const Contact& other) { gap = std::min(gap, other.gap), sine = std::min(sine, other.sine); }

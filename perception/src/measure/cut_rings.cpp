@@ -70,7 +70,8 @@ struct GreyVertices {
 // Of textured trees: the vertices' luminance alone, and times the texture's.
 struct TexturedVertices {
     using Light = glm::dvec2;
-    explicit TexturedVertices(const VertexTree& tree) : luminance(tree.luminance()), uvs(tree.uvs()), pyramid(tree.texture()) {}
+    explicit TexturedVertices(const VertexTree& tree)
+        : luminance(tree.luminance()), uvs(tree.uvs()), pyramid(tree.texture()) {}
 
     glm::dvec2 mean(NodeId a, NodeId b, NodeId c) const {
         const glm::dvec3 y(luminance[a].value, luminance[b].value, luminance[c].value);
@@ -98,8 +99,9 @@ struct TexturedVertices {
 struct ColouredVertices {
     using Light = glm::dvec3;
     explicit ColouredVertices(const VertexTree& tree) : luminance(tree.luminance()), chroma(luminance.size()) {
-        tbb::parallel_for(std::size_t{0}, chroma.size(),
-                          [&](std::size_t node) { chroma[node] = drawn_chroma(tree.colours()[node], luminance[node]); });
+        tbb::parallel_for(std::size_t{0}, chroma.size(), [&](std::size_t node) {
+            chroma[node] = drawn_chroma(tree.colours()[node], luminance[node]);
+        });
     }
     glm::dvec3 operator[](NodeId node) const {
         return {static_cast<double>(luminance[node].value) / Unorm16::largest, chroma[node].x, chroma[node].y};
@@ -118,8 +120,9 @@ class RingBounder {
 
 public:
     RingBounder(const SoundTree& tree, std::vector<ChromaRange> ring_chroma)
-        : tree_(tree), ring_chroma_(std::move(ring_chroma)), g_(*tree.data().geometry), l_(*tree.data().light), interior_(tree.interior_count()),
-          vertices_(tree), parts_(links_of(g_)), around_(interior_), left_(interior_) {
+        : tree_(tree), ring_chroma_(std::move(ring_chroma)), g_(*tree.data().geometry), l_(*tree.data().light),
+          interior_(tree.interior_count()), vertices_(tree), parts_(links_of(g_)), around_(interior_),
+          left_(interior_) {
         parts_.assign_triangles(g_.first_triangle, g_.triangles);
     }
 
@@ -173,7 +176,8 @@ private:
         thread_local std::vector<NodeId> others; // with a texture: those seen so far
         if constexpr (is_textured) others.assign(1, interior_ + neighbour);
         int steps = 0;
-        for (NodeId node = parent_of_leaf(here); node != no_node && !supports(node, neighbour); node = g_.parents[node]) {
+        for (NodeId node = parent_of_leaf(here); node != no_node && !supports(node, neighbour);
+             node = g_.parents[node]) {
             for (; !supports(other, here) && !is_larger(other, node); other = g_.parents[other]) {
                 places.include(g_.positions[other]);
                 if constexpr (is_textured) {
@@ -189,7 +193,8 @@ private:
             if (++steps > most_steps) return reach_everywhere(part, node);
             if (!parts_.owns(part, node)) continue;
             if constexpr (is_textured) {
-                for (const NodeId vertex : others) residuals_[node] = std::max(residuals_[node], fits_.residual(node, vertex));
+                for (const NodeId vertex : others)
+                    residuals_[node] = std::max(residuals_[node], fits_.residual(node, vertex));
                 footprints_[node].include(uvs);
             }
             if (places.is_empty()) continue;
@@ -240,7 +245,8 @@ private:
 
     Lit light_of(NodeId a, NodeId b, NodeId c) const {
         const glm::dvec3 at = g_.positions[a];
-        const double area = glm::length(glm::cross(glm::dvec3(g_.positions[b]) - at, glm::dvec3(g_.positions[c]) - at)) / 2;
+        const double area =
+            glm::length(glm::cross(glm::dvec3(g_.positions[b]) - at, glm::dvec3(g_.positions[c]) - at)) / 2;
         return {area, vertices_.mean(a, b, c) * area};
     }
 
@@ -263,16 +269,16 @@ private:
                 PackedRange range{{Unorm16::largest}, {0}};
                 for (const Index leaf : t) range = unite(range, shade_of(interior_ + leaf));
                 for (const Index leaf : t)
-                    if (const NodeId parent = parent_of_leaf(leaf); parts_.owns(part, parent)) rings_.vertices[parent] = unite(rings_.vertices[parent], range);
+                    if (const NodeId parent = parent_of_leaf(leaf); parts_.owns(part, parent))
+                        rings_.vertices[parent] = unite(rings_.vertices[parent], range);
             };
         });
         for (NodeId node = interior_; node-- > 0;) {
             rings_.vertices[node] = unite(rings_.vertices[node], shade_of(node));
-            if (node > 0) rings_.vertices[g_.parents[node]] = unite(rings_.vertices[g_.parents[node]], rings_.vertices[node]);
+            if (node > 0)
+                rings_.vertices[g_.parents[node]] = unite(rings_.vertices[g_.parents[node]], rings_.vertices[node]);
         }
-        parts_.bottom_up([&] {
-            return [&](NodeId node) { residuals_[node] = fits_.residual_of_subtree(node); };
-        });
+        parts_.bottom_up([&] { return [&](NodeId node) { residuals_[node] = fits_.residual_of_subtree(node); }; });
     }
 
     // When all that the rings can show is known.
@@ -287,13 +293,16 @@ private:
         tbb::parallel_for(NodeId{0}, interior_, [&](NodeId node) {
             const TexturePyramid::Range texture = vertices_.pyramid.range(footprints_[node]);
             rings_.texture[node] = {texture.lo, texture.hi};
-            if (!is_still(node)) rings_.luminance[node] = unite(rings_.luminance[node], product(rings_.vertices[node], rings_.texture[node]));
+            if (!is_still(node))
+                rings_.luminance[node] =
+                    unite(rings_.luminance[node], product(rings_.vertices[node], rings_.texture[node]));
             float deviation = 0;
             include(deviation, 2 * residuals_[node]);
             rings_.texture_deviation[node] = deviation;
         });
         for (NodeId node = interior_; node-- > 1;)
-            rings_.texture_deviation[g_.parents[node]] = std::max(rings_.texture_deviation[g_.parents[node]], rings_.texture_deviation[node]);
+            rings_.texture_deviation[g_.parents[node]] =
+                std::max(rings_.texture_deviation[g_.parents[node]], rings_.texture_deviation[node]);
     }
 
     // When it folds nothing moves, not even the texture.
@@ -307,7 +316,8 @@ private:
             if (!is_still(node)) continue;
             PackedRange spread = shade_of(node);
             for (NodeId below = node; below < g_.subtree_end[node]; ++below) spread = unite(spread, shade_of(below));
-            for (Index leaf = g_.first_leaf[node]; leaf < g_.leaf_end[node]; ++leaf) spread = unite(spread, shade_of(interior_ + leaf));
+            for (Index leaf = g_.first_leaf[node]; leaf < g_.leaf_end[node]; ++leaf)
+                spread = unite(spread, shade_of(interior_ + leaf));
             PackedRange& vertices = rings_.vertices[node];
             const int hi = vertices.lo.value + (spread.hi.value - spread.lo.value);
             vertices.hi.value = static_cast<std::uint16_t>(std::min<int>(vertices.hi.value, hi));
@@ -319,7 +329,8 @@ private:
     // What the light shifts by, of vertices alone and of all that is drawn. The latter is measured, by means over parts of triangles; where
     // the texture hardly moves, what it can add to the former is less than what such means are wrong by.
     double shift_of_both(NodeId node, glm::dvec2 shift) const {
-        const double texture_lo = rings_.texture[node].lo, texture_hi = rings_.texture[node].hi, vertices_hi = rings_.vertices[node].hi;
+        const double texture_lo = rings_.texture[node].lo, texture_hi = rings_.texture[node].hi,
+                     vertices_hi = rings_.vertices[node].hi;
         const double radius = g_.support_spheres[node].radius, deviation = rings_.texture_deviation[node];
         // Triangles whose points move by the deviation, against corners that do not, are stretched by it over their heights, about.
         constexpr double heights_in_radius = 2;
@@ -339,7 +350,8 @@ private:
             for (const Index leaf : corners) of_leaf[leaf] += light.area / 3;
         }
         before_leaf_.assign(of_leaf.size() + 1, 0.0);
-        for (std::size_t leaf = 0; leaf < of_leaf.size(); ++leaf) before_leaf_[leaf + 1] = before_leaf_[leaf] + of_leaf[leaf];
+        for (std::size_t leaf = 0; leaf < of_leaf.size(); ++leaf)
+            before_leaf_[leaf + 1] = before_leaf_[leaf] + of_leaf[leaf];
     }
 
     void find_mean_shifts() {
@@ -348,7 +360,8 @@ private:
         const double whole = before_leaf_.back();
         for (NodeId node = 0; node < interior_; ++node) {
             // With two corners or more in the support they vanish somewhere under the node.
-            const Lit &first = before_triangle_[g_.first_triangle[node]], &end = before_triangle_[g_.first_triangle[g_.subtree_end[node]]];
+            const Lit &first = before_triangle_[g_.first_triangle[node]],
+                      &end = before_triangle_[g_.first_triangle[g_.subtree_end[node]]];
             const double area = around_[node].area + end.area - first.area;
             const Light light = around_[node].light + end.light - first.light;
             const double own = before_leaf_[g_.leaf_end[node]] - before_leaf_[g_.first_leaf[node]];
@@ -373,7 +386,8 @@ private:
             rings_.texture_deviation[child] = std::min(rings_.texture_deviation[child], 2 * rings_.radius[child]);
         if constexpr (has_chroma) {
             rings_.chroma[parent] = unite(rings_.chroma[parent], rings_.chroma[child]);
-            rings_.mean_chroma_shift[parent] = glm::max(rings_.mean_chroma_shift[parent], rings_.mean_chroma_shift[child]);
+            rings_.mean_chroma_shift[parent] =
+                glm::max(rings_.mean_chroma_shift[parent], rings_.mean_chroma_shift[child]);
         }
     }
 
@@ -385,7 +399,8 @@ private:
     Vertices vertices_;
     TreeParts parts_;
     CutRings rings_;
-    std::vector<Lit> around_, left_; // by node: of the triangles with one corner in the support, before and after its fold
+    std::vector<Lit> around_,
+        left_; // by node: of the triangles with one corner in the support, before and after its fold
     std::vector<Lit> before_triangle_;
     std::vector<double> before_leaf_;
 

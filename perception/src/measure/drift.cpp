@@ -35,7 +35,8 @@ public:
         float finest = first;
         for (const float o : order_)
             if (o > 0) finest = std::min(finest, o);
-        const int levels = std::min(most_levels, static_cast<int>(std::ceil(levels_per_octave * std::log2(first / finest))));
+        const int levels =
+            std::min(most_levels, static_cast<int>(std::ceil(levels_per_octave * std::log2(first / finest))));
         nodes_.resize(interior_);
         for (NodeId n = 0; n < interior_; ++n) nodes_[n] = n;
         float below = -1;
@@ -53,13 +54,16 @@ private:
     void order() {
         order_.resize(interior_);
         for (NodeId node = interior_; node-- > 0;) {
-            const float own = changed_radius(tree_, errors_, node) * std::sqrt(errors_[node].wide_luminance + least_contrast);
+            const float own =
+                changed_radius(tree_, errors_, node) * std::sqrt(errors_[node].wide_luminance + least_contrast);
             order_[node] = std::max(order_[node], own);
             if (node > 0) order_[parents_[node]] = std::max(order_[parents_[node]], order_[node]);
         }
     }
 
-    float mean_luminance(const Triangle& t) const { return (luminance_[t[0]] + luminance_[t[1]] + luminance_[t[2]]) / 3; }
+    float mean_luminance(const Triangle& t) const {
+        return (luminance_[t[0]] + luminance_[t[1]] + luminance_[t[2]]) / 3;
+    }
 
     // A third of each triangle belongs to each corner.
     void collect_surfaces() {
@@ -76,7 +80,8 @@ private:
     void fold_all() {
         std::vector<NodeId> sequence(interior_);
         for (NodeId n = 0; n < interior_; ++n) sequence[n] = n;
-        std::sort(sequence.begin(), sequence.end(), [&](NodeId a, NodeId b) { return order_[a] != order_[b] ? order_[a] < order_[b] : a > b; });
+        std::sort(sequence.begin(), sequence.end(),
+                  [&](NodeId a, NodeId b) { return order_[a] != order_[b] ? order_[a] < order_[b] : a > b; });
         for (const NodeId node : sequence) {
             glm::vec3 light(0);
             mesh_.fold(node, [&](const Triangle& t) { light -= light_of(t); });
@@ -109,7 +114,8 @@ private:
             // As luminance towards where it faces.
             const float error = glm::length(own.light);
             own.sides = {};
-            own.sides[side_of(surface.vector_area)] = {glm::dot(own.light, surface.vector_area) > 0 ? error : -error, size};
+            own.sides[side_of(surface.vector_area)] = {glm::dot(own.light, surface.vector_area) > 0 ? error : -error,
+                                                       size};
         }
         own.shift = own.seen_shift();
     }
@@ -140,7 +146,8 @@ private:
             if (order_[up] <= up_to || !(octaves >= 1)) continue;
             const float shift = found_[up].shift / std::max(surfaces_[up].luminance(), darkest);
             for (std::size_t fading = 0; fading <= most_fading; ++fading)
-                amounts[fading] = std::max(amounts[fading], shift * std::exp2(octaves * static_cast<float>(fading) / 2));
+                amounts[fading] =
+                    std::max(amounts[fading], shift * std::exp2(octaves * static_cast<float>(fading) / 2));
             sum += octaves, count += 1;
         }
         if (!(amounts[0] > 0)) return;
@@ -148,7 +155,9 @@ private:
         float least = std::numeric_limits<float>::infinity();
         for (std::size_t fading = 0; fading <= most_fading; ++fading) {
             const float excess = count * std::log2(amounts[fading]) - sum * static_cast<float>(fading) / 2;
-            if (excess < least) least = excess, errors_[node].drift = amounts[fading], errors_[node].fading = static_cast<std::uint8_t>(fading);
+            if (excess < least)
+                least = excess, errors_[node].drift = amounts[fading],
+                errors_[node].fading = static_cast<std::uint8_t>(fading);
         }
     }
 
@@ -173,7 +182,8 @@ private:
         float shift = 0;    // of the mean luminance, from where it is largest
 
         void take_up(const Found& part) {
-            for (std::size_t i = 0; i < sides.size(); ++i) sides[i].light += part.sides[i].light, sides[i].area += part.sides[i].area;
+            for (std::size_t i = 0; i < sides.size(); ++i)
+                sides[i].light += part.sides[i].light, sides[i].area += part.sides[i].area;
             light += part.light;
             variance += part.variance;
         }
@@ -203,7 +213,7 @@ private:
     FoldSequence mesh_;
     std::vector<float> order_;
     std::vector<Surface> surfaces_; // the mesh's
-    std::vector<glm::vec3> light_; // luminance times vector area that the folds of the subtree add
+    std::vector<glm::vec3> light_;  // luminance times vector area that the folds of the subtree add
     std::vector<Found> found_;
     std::vector<NodeId> nodes_; // not below what has been folded, parents before children
 };

@@ -47,7 +47,8 @@ Camera camera(const Sphere& sphere, std::size_t number) {
     Camera c;
     c.centre = sphere.centre;
     c.towards = {s * std::cos(angle), s * std::sin(angle), z};
-    c.right = glm::normalize(glm::cross(std::abs(c.towards.y) < 0.9f ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0), c.towards));
+    c.right =
+        glm::normalize(glm::cross(std::abs(c.towards.y) < 0.9f ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0), c.towards));
     c.up = glm::cross(c.towards, c.right);
     c.samples_per_length = samples / (2 * margin * sphere.radius);
     return c;
@@ -75,7 +76,8 @@ class Painter {
 public:
     // The surfaces' memory is used again.
     Painter(const VertexTree& tree, const Camera& camera, std::vector<Surface>& surfaces)
-        : camera_(camera), positions_(tree.positions()), luminance_(tree.luminance()), closedness_(tree.closedness()), surfaces_(surfaces) {
+        : camera_(camera), positions_(tree.positions()), luminance_(tree.luminance()), closedness_(tree.closedness()),
+          surfaces_(surfaces) {
         surfaces_.assign(samples * samples, {});
     }
 
@@ -86,7 +88,8 @@ public:
         Picture picture;
         constexpr float share = 1.0f / (cell_samples * cell_samples);
         for (std::size_t cell = 0; cell < side * side; ++cell) {
-            const Surface* const first = surfaces_.data() + cell / side * cell_samples * samples + cell % side * cell_samples;
+            const Surface* const first =
+                surfaces_.data() + cell / side * cell_samples * samples + cell % side * cell_samples;
             float light = 0, covered = 0;
             for (std::size_t y = 0; y < cell_samples; ++y) {
                 for (std::size_t x = 0; x < cell_samples; ++x) {
@@ -117,7 +120,8 @@ private:
     }
 
     void draw(const Triangle& t, const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {
-        const std::size_t first = count_before(std::min({a.y, b.y, c.y}) - 0.5f), end = count_before(std::max({a.y, b.y, c.y}) - 0.5f);
+        const std::size_t first = count_before(std::min({a.y, b.y, c.y}) - 0.5f),
+                          end = count_before(std::max({a.y, b.y, c.y}) - 0.5f);
         if (first >= end) return; // many, of fine meshes
         const float left = std::min({a.x, b.x, c.x}), right = std::max({a.x, b.x, c.x});
         const float inverse = 1 / ((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x));
@@ -125,12 +129,14 @@ private:
             (closedness_ == Closedness::closed_inward && inverse > 0)) // as renderers do
             return;
         const float of_a = luminance_[t[0]], of_b = luminance_[t[1]], of_c = luminance_[t[2]];
-        const glm::vec2 v_by = inverse * glm::vec2(c.y - a.y, a.x - c.x), w_by = inverse * glm::vec2(a.y - b.y, b.x - a.x);
+        const glm::vec2 v_by = inverse * glm::vec2(c.y - a.y, a.x - c.x),
+                        w_by = inverse * glm::vec2(a.y - b.y, b.x - a.x);
         for (std::size_t y = first; y < end; ++y) {
             // Of a corner's weight, as it grows along the row: where it is no longer, or not yet, negative.
             const float offset = offset_of_row(y), py = static_cast<float>(y) + 0.5f - a.y;
             float low = left - a.x, high = right - a.x;
-            for (const auto& [at_start, by] : {std::pair(py * v_by.y, v_by.x), std::pair(py * w_by.y, w_by.x), std::pair(1 - py * (v_by.y + w_by.y), -v_by.x - w_by.x)}) {
+            for (const auto& [at_start, by] : {std::pair(py * v_by.y, v_by.x), std::pair(py * w_by.y, w_by.x),
+                                               std::pair(1 - py * (v_by.y + w_by.y), -v_by.x - w_by.x)}) {
                 if (by > 0) low = std::max(low, -at_start / by);
                 else if (by < 0) high = std::min(high, -at_start / by);
                 else if (at_start < 0) high = low;
@@ -184,7 +190,9 @@ private:
 };
 
 // Of a grating's amplitude, in cycles a cell: cells show the mean over their area.
-double share_in_cells(double frequency) { return std::sin(std::numbers::pi * frequency) / (std::numbers::pi * frequency); }
+double share_in_cells(double frequency) {
+    return std::sin(std::numbers::pi * frequency) / (std::numbers::pi * frequency);
+}
 
 using Floats = Float4; // four numbers at a time
 constexpr std::size_t width = sizeof(Floats) / sizeof(float);
@@ -252,7 +260,8 @@ FoldStage contrasts(const Bands& mesh, const Bands& difference) {
         BandContrasts band(1 / static_cast<float>(band_gain(b) * share_in_cells(nominal_frequency(b))));
         band.include(mesh[b], difference[b]);
         for (std::size_t k = 0; k < FoldStage::backgrounds.size(); ++k)
-            for (std::size_t row = 0; row < FoldStage::masks.size(); ++row) stage.contrast[k][b][row] = band.largest(k, row);
+            for (std::size_t row = 0; row < FoldStage::masks.size(); ++row)
+                stage.contrast[k][b][row] = band.largest(k, row);
     }
     return stage;
 }
@@ -294,24 +303,29 @@ private:
         std::vector<float> light(interior_); // that the fold changes, as the side of a square of it
         for (NodeId node = interior_; node-- > 0;) {
             const FoldError& e = errors_[node];
-            const float own = outline_contrast * e.mean_distance + changed_radius(tree_, errors_, node) * e.wide_luminance;
+            const float own =
+                outline_contrast * e.mean_distance + changed_radius(tree_, errors_, node) * e.wide_luminance;
             light[node] = std::max(light[node], own);
             if (node > 0) light[parents_[node]] = std::max(light[parents_[node]], light[node]);
         }
         std::vector<NodeId> sequence(interior_);
         std::iota(sequence.begin(), sequence.end(), NodeId{0});
-        std::sort(sequence.begin(), sequence.end(), [&](NodeId a, NodeId b) { return light[a] != light[b] ? light[a] < light[b] : a > b; });
+        std::sort(sequence.begin(), sequence.end(),
+                  [&](NodeId a, NodeId b) { return light[a] != light[b] ? light[a] < light[b] : a > b; });
         double left = first_share * interior_;
         std::uint8_t stage = 0;
         for (NodeId folded = 0; folded < interior_; ++folded) {
-            while (left >= fewest_left && interior_ - folded <= left) left /= std::exp2(1 / stages_per_halving), ++stage;
+            while (left >= fewest_left && interior_ - folded <= left)
+                left /= std::exp2(1 / stages_per_halving), ++stage;
             errors_[sequence[folded]].stage = stage;
         }
         return std::size_t{stage} + 1;
     }
 
     void fold(std::size_t stage) {
-        const auto goes_on = [&](NodeId node) { return parents_[node] != no_node && errors_[parents_[node]].stage <= stage; };
+        const auto goes_on = [&](NodeId node) {
+            return parents_[node] != no_node && errors_[parents_[node]].stage <= stage;
+        };
         folded_.resize(interior_);
         for (NodeId node = 0; node < interior_; ++node) folded_[node] = goes_on(node) ? folded_[parents_[node]] : node;
         for (Triangle& t : triangles_)

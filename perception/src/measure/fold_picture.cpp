@@ -6,8 +6,8 @@
 
 #include <glm/geometric.hpp>
 
-#include "pyramid_kernel.h"
 #include "measure/pyramid.h"
+#include "pyramid_kernel.h"
 
 namespace unseen::perception {
 namespace {
@@ -15,8 +15,10 @@ namespace {
 constexpr float nothing = -std::numeric_limits<float>::infinity(); // seen in a cell
 
 // Of the pyramid, of which no cell is left out; by distance in steps.
-constexpr std::array<float, 3> kernel = {static_cast<float>(kernel_middle), static_cast<float>(kernel_near), static_cast<float>(kernel_far)};
-constexpr std::size_t longest_step = std::size_t{1} << (FoldPicture::bands - 1), margin = (kernel.size() - 1) * longest_step;
+constexpr std::array<float, 3> kernel = {static_cast<float>(kernel_middle), static_cast<float>(kernel_near),
+                                         static_cast<float>(kernel_far)};
+constexpr std::size_t longest_step = std::size_t{1} << (FoldPicture::bands - 1),
+                      margin = (kernel.size() - 1) * longest_step;
 
 // Outside of the picture all is 0.
 #if defined(__x86_64__) && defined(__GNUC__)
@@ -31,13 +33,16 @@ void smooth(const float* in, std::size_t step, float* out) {
         const float* const at = line + margin;
         float* const row = rows + (y + margin) * side;
         for (std::size_t x = 0; x < side; ++x)
-            row[x] = kernel[0] * at[x] + kernel[1] * (*(at + x - step) + at[x + step]) + kernel[2] * (*(at + x - 2 * step) + at[x + 2 * step]);
+            row[x] = kernel[0] * at[x] + kernel[1] * (*(at + x - step) + at[x + step]) +
+                     kernel[2] * (*(at + x - 2 * step) + at[x + 2 * step]);
     }
     for (std::size_t y = 0; y < side; ++y) {
         const float* const at = rows + (y + margin) * side;
-        const float *const above = at - step * side, *const below = at + step * side, *const far_above = above - step * side, *const far_below = below + step * side;
+        const float *const above = at - step * side, *const below = at + step * side,
+                           *const far_above = above - step * side, *const far_below = below + step * side;
         for (std::size_t x = 0; x < side; ++x)
-            out[y * side + x] = kernel[0] * at[x] + kernel[1] * (above[x] + below[x]) + kernel[2] * (far_above[x] + far_below[x]);
+            out[y * side + x] =
+                kernel[0] * at[x] + kernel[1] * (above[x] + below[x]) + kernel[2] * (far_above[x] + far_below[x]);
     }
 }
 
@@ -63,19 +68,23 @@ void FoldPicture::draw(Layer layer, const LitPoint& a, const LitPoint& b, const 
     };
     const auto seen = [&](const LitPoint& p) {
         const glm::vec3 d = p.position - centre_;
-        return Corner{glm::dot(d, right_) / cell_ + half, glm::dot(d, up_) / cell_ + half, glm::dot(d, normal_), p.luminance};
+        return Corner{glm::dot(d, right_) / cell_ + half, glm::dot(d, up_) / cell_ + half, glm::dot(d, normal_),
+                      p.luminance};
     };
     const Corner p = seen(a), q = seen(b), r = seen(c);
     const float area = (q.x - p.x) * (r.y - p.y) - (q.y - p.y) * (r.x - p.x);
     if (!(std::abs(area) > 0)) return;
     (area > 0 ? has_front_ : has_back_) = true;
     // The cells whose middles lie between.
-    const auto first = [](float low) { return static_cast<std::size_t>(std::ceil(std::clamp(low - 0.5f, 0.0f, static_cast<float>(side)))); };
+    const auto first = [](float low) {
+        return static_cast<std::size_t>(std::ceil(std::clamp(low - 0.5f, 0.0f, static_cast<float>(side))));
+    };
     const std::size_t x0 = first(std::min({p.x, q.x, r.x})), x1 = first(std::max({p.x, q.x, r.x}));
     const std::size_t y0 = first(std::min({p.y, q.y, r.y})), y1 = first(std::max({p.y, q.y, r.y}));
     // The shares of q and r grow linearly over the picture.
     const float inverse = 1 / area;
-    const float vx = (r.y - p.y) * inverse, vy = -(r.x - p.x) * inverse, wx = -(q.y - p.y) * inverse, wy = (q.x - p.x) * inverse;
+    const float vx = (r.y - p.y) * inverse, vy = -(r.x - p.x) * inverse, wx = -(q.y - p.y) * inverse,
+                wy = (q.x - p.x) * inverse;
     Picture& picture = pictures_[static_cast<std::size_t>(layer)];
     for (std::size_t y = y0; y < y1; ++y) {
         const float dy = static_cast<float>(y) + 0.5f - p.y;
@@ -92,7 +101,9 @@ void FoldPicture::draw(Layer layer, const LitPoint& a, const LitPoint& b, const 
     }
 }
 
-bool FoldPicture::is_seen(std::size_t cell) const { return pictures_[0].height[cell] > nothing && pictures_[1].height[cell] > nothing; }
+bool FoldPicture::is_seen(std::size_t cell) const {
+    return pictures_[0].height[cell] > nothing && pictures_[1].height[cell] > nothing;
+}
 
 float FoldPicture::wavelength(std::size_t band) const { return cell_ / static_cast<float>(nominal_frequency(band)); }
 
@@ -103,7 +114,8 @@ std::array<float, FoldPicture::bands> FoldPicture::amplitudes() const {
         return all;
     }();
     Cells low, lower, back;
-    for (std::size_t i = 0; i < low.size(); ++i) low[i] = is_seen(i) ? pictures_[1].luminance[i] - pictures_[0].luminance[i] : 0;
+    for (std::size_t i = 0; i < low.size(); ++i)
+        low[i] = is_seen(i) ? pictures_[1].luminance[i] - pictures_[0].luminance[i] : 0;
     std::array<float, bands> largest{};
     for (std::size_t band = 0; band < bands; ++band) {
         const std::size_t step = std::size_t{1} << band;

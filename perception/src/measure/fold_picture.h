@@ -18,7 +18,7 @@ struct LitPoint {
 
 class FoldPicture {
 public:
-    static constexpr std::size_t side = measurement::picture_side; // cells
+    static constexpr std::size_t side = measurement::picture_side;   // cells
     static constexpr std::size_t bands = measurement::picture_bands; // an octave each, the finest first
 
     // Looks against the normal, a unit vector, at a square of `half_width`, mesh units, to each side of the centre. Nothing is seen yet.

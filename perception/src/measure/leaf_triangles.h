@@ -21,7 +21,9 @@ public:
             for (const vdtree::Index leaf : triangles[t]) triangles_[next[leaf]++] = t;
     }
 
-    std::span<const vdtree::Index> around(vdtree::Index leaf) const { return std::span(triangles_).subspan(first_[leaf], first_[leaf + 1] - first_[leaf]); }
+    std::span<const vdtree::Index> around(vdtree::Index leaf) const {
+        return std::span(triangles_).subspan(first_[leaf], first_[leaf + 1] - first_[leaf]);
+    }
 
 private:
     std::vector<vdtree::Index> first_, triangles_;

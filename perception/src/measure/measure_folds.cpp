@@ -15,6 +15,7 @@
 #include <vdtree/internal/scaled_geometry.h>
 #include <vdtree/internal/vertex_tree_data.h>
 
+#include "fold/fold_errors.h"
 #include "measure/contacts.h"
 #include "measure/drift.h"
 #include "measure/find_stages.h"
@@ -22,7 +23,6 @@
 #include "measure/fold_record.h"
 #include "measure/leaf_triangles.h"
 #include "measure/measurement.h"
-#include "fold/fold_errors.h"
 
 namespace unseen::perception {
 
@@ -94,7 +94,8 @@ class Surface {
 public:
     void assign(std::span<const RingTriangle> rings) {
         size_ = rings.size();
-        for (auto* column : {&a_x_, &a_y_, &a_z_, &b_x_, &b_y_, &b_z_, &c_x_, &c_y_, &c_z_, &a_l_, &b_l_, &c_l_, &bb_, &bc_, &cc_, &inverse_, &squared_, &luminance_})
+        for (auto* column : {&a_x_, &a_y_, &a_z_, &b_x_, &b_y_, &b_z_, &c_x_, &c_y_, &c_z_, &a_l_, &b_l_, &c_l_, &bb_,
+                             &bc_, &cc_, &inverse_, &squared_, &luminance_})
             column->resize(size_);
         for (std::size_t i = 0; i < size_; ++i) {
             const auto& [a, b, c] = rings[i].corner;
@@ -104,7 +105,8 @@ public:
             c_x_[i] = ac.x, c_y_[i] = ac.y, c_z_[i] = ac.z, c_l_[i] = c.luminance - a.luminance;
             bb_[i] = glm::dot(ab, ab), bc_[i] = glm::dot(ab, ac), cc_[i] = glm::dot(ac, ac);
             const float determinant = bb_[i] * cc_[i] - bc_[i] * bc_[i];
-            inverse_[i] = determinant > least_determinant * bb_[i] * cc_[i] ? 1 / determinant : 0; // 0: only its edges count
+            inverse_[i] =
+                determinant > least_determinant * bb_[i] * cc_[i] ? 1 / determinant : 0; // 0: only its edges count
         }
     }
     bool empty() const { return size_ == 0; }
@@ -112,7 +114,8 @@ public:
     // From the nearest of its points.
     Difference compare(const Point& p) {
         measure(p.position.x, p.position.y, p.position.z);
-        const auto nearest = static_cast<std::size_t>(std::min_element(squared_.begin(), squared_.end()) - squared_.begin());
+        const auto nearest =
+            static_cast<std::size_t>(std::min_element(squared_.begin(), squared_.end()) - squared_.begin());
         return {std::sqrt(squared_[nearest]), std::abs(p.luminance - luminance_[nearest])};
     }
 
@@ -124,9 +127,12 @@ private:
 #if defined(__x86_64__) && defined(__GNUC__)
     [[gnu::target_clones("avx2", "default")]]
 #endif
-    void measure(float x, float y, float z) {
-        const float *ax = a_x_.data(), *ay = a_y_.data(), *az = a_z_.data(), *bx = b_x_.data(), *by = b_y_.data(), *bz = b_z_.data();
-        const float *cx = c_x_.data(), *cy = c_y_.data(), *cz = c_z_.data(), *al = a_l_.data(), *bl = b_l_.data(), *cl = c_l_.data();
+    void
+    measure(float x, float y, float z) {
+        const float *ax = a_x_.data(), *ay = a_y_.data(), *az = a_z_.data(), *bx = b_x_.data(), *by = b_y_.data(),
+                    *bz = b_z_.data();
+        const float *cx = c_x_.data(), *cy = c_y_.data(), *cz = c_z_.data(), *al = a_l_.data(), *bl = b_l_.data(),
+                    *cl = c_l_.data();
         const float *bb = bb_.data(), *bc = bc_.data(), *cc = cc_.data(), *inverse = inverse_.data();
         float *squared = squared_.data(), *luminance = luminance_.data();
         const std::size_t count = size_;
@@ -138,7 +144,9 @@ private:
         for (std::size_t i = 0; i < count; ++i) {
             const float px = x - ax[i], py = y - ay[i], pz = z - az[i];
             const float pb = px * bx[i] + py * by[i] + pz * bz[i], pc = px * cx[i] + py * cy[i] + pz * cz[i];
-            const auto cost = [&](float v, float w) { return v * (v * bb[i] + 2 * w * bc[i] - 2 * pb) + w * (w * cc[i] - 2 * pc); };
+            const auto cost = [&](float v, float w) {
+                return v * (v * bb[i] + 2 * w * bc[i] - 2 * pb) + w * (w * cc[i] - 2 * pc);
+            };
             const float v0 = (cc[i] * pb - bc[i] * pc) * inverse[i], w0 = (bb[i] * pc - bc[i] * pb) * inverse[i];
             const float on_ab = share(pb, bb[i]), on_ac = share(pc, cc[i]);
             const float on_bc = share(pc - pb - bc[i] + bb[i], bb[i] - 2 * bc[i] + cc[i]);
@@ -150,7 +158,8 @@ private:
             const bool is_inside = (inverse[i] > 0) & (v0 >= 0) & (w0 >= 0) & (v0 + w0 <= 1);
             v = is_inside ? v0 : v;
             w = is_inside ? w0 : w;
-            const float dx = px - v * bx[i] - w * cx[i], dy = py - v * by[i] - w * cy[i], dz = pz - v * bz[i] - w * cz[i];
+            const float dx = px - v * bx[i] - w * cx[i], dy = py - v * by[i] - w * cy[i],
+                        dz = pz - v * bz[i] - w * cz[i];
             squared[i] = dx * dx + dy * dy + dz * dz;
             luminance[i] = al[i] + v * bl[i] + w * cl[i];
         }
@@ -202,7 +211,7 @@ private:
     };
     struct Sample {
         Point point;
-        Index leaf; // none for points that are no leaves
+        Index leaf;      // none for points that are no leaves
         bool is_typical; // not chosen for its error
         Difference error;
     };
@@ -257,10 +266,15 @@ private:
         NodeId at = interior_ + leaf;
         const int most = much_more * luminance_span(node);
         int steps = 0;
-        for (NodeId up = parents_[at]; up != no_node && is_larger(node, up) && luminance_span(up) <= most && ++steps <= most_steps; up = parents_[at]) at = up;
+        for (NodeId up = parents_[at];
+             up != no_node && is_larger(node, up) && luminance_span(up) <= most && ++steps <= most_steps;
+             up = parents_[at])
+            at = up;
         return at;
     }
-    int luminance_span(NodeId node) const { return support_luminance_[node].hi.value - support_luminance_[node].lo.value; }
+    int luminance_span(NodeId node) const {
+        return support_luminance_[node].hi.value - support_luminance_[node].lo.value;
+    }
 
     void measure(NodeId node, Scratch& scratch) {
         crossing_[node] = crossing(node);
@@ -375,7 +389,8 @@ private:
         for (std::size_t size = 0; size < picture_sizes.size(); ++size) {
             const auto compare = [&](std::span<const RingTriangle> folded) {
                 picture.clear(FoldPicture::Layer::folded);
-                for (const RingTriangle& t : folded) picture.draw(FoldPicture::Layer::folded, t.corner[0], t.corner[1], t.corner[2]);
+                for (const RingTriangle& t : folded)
+                    picture.draw(FoldPicture::Layer::folded, t.corner[0], t.corner[1], t.corner[2]);
                 record.shift = std::max(record.shift, picture.shift());
                 const std::array<float, picture_bands> amplitudes = picture.amplitudes();
                 for (std::size_t band = 0; band < picture_bands; ++band)
@@ -394,11 +409,14 @@ private:
     void draw_mesh(NodeId node, const Scratch& scratch, FoldPicture& picture) const {
         const auto draw = [&](Index t) {
             const Triangle& corners = triangles_[t];
-            picture.draw(FoldPicture::Layer::mesh, leaf_point(corners[0]), leaf_point(corners[1]), leaf_point(corners[2]));
+            picture.draw(FoldPicture::Layer::mesh, leaf_point(corners[0]), leaf_point(corners[1]),
+                         leaf_point(corners[2]));
         };
-        const Index first = first_triangle_[node], end = first_triangle_[tree_.subtree_end()[node]]; // those that vanish in the support
+        const Index first = first_triangle_[node],
+                    end = first_triangle_[tree_.subtree_end()[node]]; // those that vanish in the support
         if (end - first > most_triangles_drawn) {
-            for (const RingTriangle& t : scratch.before) picture.draw(FoldPicture::Layer::mesh, t.corner[0], t.corner[1], t.corner[2]);
+            for (const RingTriangle& t : scratch.before)
+                picture.draw(FoldPicture::Layer::mesh, t.corner[0], t.corner[1], t.corner[2]);
             return;
         }
         for (Index t = first; t < end; ++t) draw(t);
@@ -448,7 +466,9 @@ private:
     }
 
     void add_samples(NodeId node, Scratch& scratch) const {
-        const auto add_leaf = [&](Index leaf, bool is_typical) { scratch.samples.push_back({leaf_point(leaf), leaf, is_typical, {}}); };
+        const auto add_leaf = [&](Index leaf, bool is_typical) {
+            scratch.samples.push_back({leaf_point(leaf), leaf, is_typical, {}});
+        };
         tree_.for_each_child(node, [&](NodeId child) {
             if (tree_.is_leaf(child)) {
                 add_leaf(child - interior_, false);
@@ -471,7 +491,8 @@ private:
             for (std::size_t k = first; k < first + witness_count / 2; ++k) {
                 const Sample* best = nullptr;
                 for (const Sample& s : samples)
-                    if (s.leaf != none && std::find(worst.begin(), worst.end(), s.leaf) == worst.end() && (!best || error(s) > error(*best)))
+                    if (s.leaf != none && std::find(worst.begin(), worst.end(), s.leaf) == worst.end() &&
+                        (!best || error(s) > error(*best)))
                         best = &s;
                 if (best) worst[k] = best->leaf;
             }
@@ -501,7 +522,8 @@ private:
 // Lengths in the tree's own units again. False where they are beyond all numbers.
 bool scale_back(FoldRecord& record, float scale) {
     if (record.gap < infinity && !std::isfinite(record.gap / scale)) return false;
-    for (float* length : {&record.shift, &record.farthest, &record.mean_distance, &record.extent, &record.gap}) *length /= scale;
+    for (float* length : {&record.shift, &record.farthest, &record.mean_distance, &record.extent, &record.gap})
+        *length /= scale;
     return is_sound(record);
 }
 
@@ -528,7 +550,9 @@ Result<VertexTree> measure_folds(const VertexTree& tree, int threads) {
     const auto sound = SoundTree::of(tree);
     if (!sound) return sound.error();
     if (!tree.texture().empty())
-        return Error{ErrorCode::unsupported, "What folds change of a texture is not measured: take another fold test, or the tree without its texture."};
+        return Error{
+            ErrorCode::unsupported,
+            "What folds change of a texture is not measured: take another fold test, or the tree without its texture."};
     // Measured is in units in which no product of lengths overflows or vanishes.
     const float scale = unit_scale(tree.bounding_sphere().radius);
     const auto scaled = std::make_shared<VertexTree::Data>(tree.data());
@@ -554,7 +578,8 @@ Result<VertexTree> measure_folds(const VertexTree& tree, int threads) {
         facing[node].fading = errors[node].fading;
         stage_of[node] = errors[node].stage;
         if (!scale_back(records[node], scale))
-            return Error{ErrorCode::unsupported, "What folding node " + std::to_string(node) + " changes is beyond all numbers: the mesh is too large."};
+            return Error{ErrorCode::unsupported, "What folding node " + std::to_string(node) +
+                                                     " changes is beyond all numbers: the mesh is too large."};
     }
     Attributes with(tree.share());
     with.add(settings_name, AttributeDomain::tree, std::vector<float>(settings.begin(), settings.end()));

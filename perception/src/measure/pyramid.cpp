@@ -9,7 +9,8 @@ namespace unseen::perception {
 
 namespace {
 
-constexpr auto tap0 = static_cast<float>(kernel_middle), tap1 = static_cast<float>(kernel_near), tap2 = static_cast<float>(kernel_far);
+constexpr auto tap0 = static_cast<float>(kernel_middle), tap1 = static_cast<float>(kernel_near),
+               tap2 = static_cast<float>(kernel_far);
 
 // Calls f(i, c) for the samples i of the next level and their places c here, in [-4, side + 3].
 template <class F>
@@ -40,7 +41,8 @@ Raster reduce(const Raster& plane) {
     for_each_next(side, [&](std::size_t i, std::ptrdiff_t c) {
         const float *a = row(c - 2), *b = row(c - 1), *middle = row(c), *d = row(c + 1), *e = row(c + 2);
         float* const out = next.row(i);
-        for (std::size_t x = 0; x < next_side; ++x) out[x] = tap0 * middle[x] + tap1 * (b[x] + d[x]) + tap2 * (a[x] + e[x]);
+        for (std::size_t x = 0; x < next_side; ++x)
+            out[x] = tap0 * middle[x] + tap1 * (b[x] + d[x]) + tap2 * (a[x] + e[x]);
     });
     return next;
 }
@@ -65,7 +67,9 @@ Raster expand(const Raster& next, std::size_t side) {
     return plane;
 }
 
-double nominal_frequency(std::size_t level) { return level == 0 ? 0.5 : second_band_ratio / 2 * std::exp2(1 - static_cast<double>(level)); }
+double nominal_frequency(std::size_t level) {
+    return level == 0 ? 0.5 : second_band_ratio / 2 * std::exp2(1 - static_cast<double>(level));
+}
 
 double band_gain(std::size_t level) {
     double omega = 2 * std::numbers::pi * nominal_frequency(level), gain = 1;

@@ -30,7 +30,9 @@ glm::vec2 drawn_chroma(const glm::vec4& colour, float luminance) {
     const double own = rec709_luminance(rgb);
     if (!(own > 0)) return glm::vec2(0); // drawn grey
     const glm::dvec2 chroma = opponent_chroma(rgb) * (static_cast<double>(luminance) / own);
-    const auto bounded = [](double c) { return static_cast<float>(c > -most_chroma ? std::min(c, most_chroma) : -most_chroma); };
+    const auto bounded = [](double c) {
+        return static_cast<float>(c > -most_chroma ? std::min(c, most_chroma) : -most_chroma);
+    };
     return {bounded(chroma.x), bounded(chroma.y)};
 }
 
@@ -57,7 +59,8 @@ Result<std::vector<ChromaRange>> ring_chroma(const VertexTree& given) {
     std::vector<glm::vec2> chroma(luminance.size());
     constexpr std::size_t grain = 4096;
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, chroma.size(), grain), [&](const auto& range) {
-        for (std::size_t node = range.begin(); node < range.end(); ++node) chroma[node] = drawn_chroma(g.colours[node], luminance[node]);
+        for (std::size_t node = range.begin(); node < range.end(); ++node)
+            chroma[node] = drawn_chroma(g.colours[node], luminance[node]);
     });
 
     const auto of_leaf = [&](Index leaf) { return ChromaRange{chroma[interior + leaf], chroma[interior + leaf]}; };

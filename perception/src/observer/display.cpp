@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numbers>
 
-#include <vdtree/internal/number_text.h>
 #include <vdtree/colour.h>
+#include <vdtree/internal/number_text.h>
 
 namespace unseen::perception {
 namespace {
@@ -33,13 +33,15 @@ double pq_encode(double cdm2) {
 double table_decode(const std::vector<double>& table, double code) {
     const double position = code * static_cast<double>(table.size() - 1);
     // NaN takes the first step, and stays NaN.
-    const std::size_t i = position > 0 ? static_cast<std::size_t>(std::min(position, static_cast<double>(table.size() - 2))) : 0;
+    const std::size_t i =
+        position > 0 ? static_cast<std::size_t>(std::min(position, static_cast<double>(table.size() - 2))) : 0;
     return table[i] + (position - static_cast<double>(i)) * (table[i + 1] - table[i]);
 }
 double table_encode(const std::vector<double>& table, double linear) {
     const auto above = std::upper_bound(table.begin() + 1, table.end() - 1, linear);
     const std::size_t i = static_cast<std::size_t>(above - table.begin()) - 1;
-    return (static_cast<double>(i) + (linear - table[i]) / (table[i + 1] - table[i])) / static_cast<double>(table.size() - 1);
+    return (static_cast<double>(i) + (linear - table[i]) / (table[i + 1] - table[i])) /
+           static_cast<double>(table.size() - 1);
 }
 
 // What no display reaches: values beyond are a slip of the unit.
@@ -48,36 +50,48 @@ constexpr double darkest_cdm2 = 1e-7; // a tenth of what a rested eye sees
 constexpr double brightest_cdm2 = 1e6, brightest_ambient_lux = 1e6;
 constexpr double least_gamma = 0.1, largest_gamma = 10, most_ppd = 1e5, least_field_deg = 0.1;
 
-std::string in_brackets(const char* name, std::size_t i) { return std::string(name).append("[").append(std::to_string(i)).append("]"); }
+std::string in_brackets(const char* name, std::size_t i) {
+    return std::string(name).append("[").append(std::to_string(i)).append("]");
+}
 
 Result<void> check_transfer(const Display& d) {
     if (d.transfer == TransferFunction::gamma && !(d.gamma >= least_gamma && d.gamma <= largest_gamma))
         return bad("transfer must be a gamma from 0.1 to 10, but is " + number_text(d.gamma));
     if (d.transfer == TransferFunction::pq && !(d.peak.value() <= pq_peak_cdm2))
-        return bad("peak_cdm2 must be at most 10000 cd/m2 with the transfer function pq, but is " + number_text(d.peak.value()));
+        return bad("peak_cdm2 must be at most 10000 cd/m2 with the transfer function pq, but is " +
+                   number_text(d.peak.value()));
     if (d.transfer != TransferFunction::table) return {};
     constexpr std::size_t least_size = 3, largest_size = 65536;
     if (d.table.size() < least_size || d.table.size() > largest_size)
         return bad("transfer_table must have 3 to 65536 values, but has " + std::to_string(d.table.size()));
     if (d.table.front() != 0 || d.table.back() != 1)
-        return bad("transfer_table must go from 0 to 1, but goes from " + number_text(d.table.front()) + " to " + number_text(d.table.back()));
+        return bad("transfer_table must go from 0 to 1, but goes from " + number_text(d.table.front()) + " to " +
+                   number_text(d.table.back()));
     for (std::size_t i = 1; i < d.table.size(); ++i)
-        if (!(d.table[i] > d.table[i - 1])) return bad(in_brackets("transfer_table", i) + " must be above the value before it, but is " + number_text(d.table[i]));
+        if (!(d.table[i] > d.table[i - 1]))
+            return bad(in_brackets("transfer_table", i) + " must be above the value before it, but is " +
+                       number_text(d.table[i]));
     return {};
 }
 
 Result<void> check_lens(const Display& d) {
-    if (d.field_deg != 0 && !(d.field_deg >= least_field_deg && d.field_deg < 360)) return bad("field_deg must be from 0.1 to 360, but is " + number_text(d.field_deg));
+    if (d.field_deg != 0 && !(d.field_deg >= least_field_deg && d.field_deg < 360))
+        return bad("field_deg must be from 0.1 to 360, but is " + number_text(d.field_deg));
     if (d.lens.empty()) return {};
     if (d.lens.size() == 1 || d.lens.size() > 10'000)
         return bad("pixels_per_degree_at must have 2 to 10000 angles, but has " + std::to_string(d.lens.size()));
-    if (d.lens.front().angle_deg != 0) return bad("pixels_per_degree_at[0] must be at 0 degrees, but is at " + number_text(d.lens.front().angle_deg));
+    if (d.lens.front().angle_deg != 0)
+        return bad("pixels_per_degree_at[0] must be at 0 degrees, but is at " + number_text(d.lens.front().angle_deg));
     for (std::size_t i = 0; i < d.lens.size(); ++i) {
         const PixelsPerDegreeAt& at = d.lens[i];
         if (i > 0 && !(at.angle_deg > d.lens[i - 1].angle_deg && at.angle_deg <= 180))
-            return bad(in_brackets("pixels_per_degree_at", i) + " must be at a larger angle than the one before it, up to 180 degrees, but is at " + number_text(at.angle_deg));
+            return bad(in_brackets("pixels_per_degree_at", i) +
+                       " must be at a larger angle than the one before it, up to 180 degrees, but is at " +
+                       number_text(at.angle_deg));
         if (!(positive(at.pixels_per_degree) && at.pixels_per_degree <= most_ppd))
-            return bad(in_brackets("pixels_per_degree_at", i) + " must have pixels per degree above 0 and at most 1e5, but has " + number_text(at.pixels_per_degree));
+            return bad(in_brackets("pixels_per_degree_at", i) +
+                       " must have pixels per degree above 0 and at most 1e5, but has " +
+                       number_text(at.pixels_per_degree));
     }
     return {};
 }
@@ -89,22 +103,25 @@ Result<void> validate(const Display& d) {
     if (d.height_px <= 0) return bad("height_px must be above 0, but is " + std::to_string(d.height_px));
     constexpr int most_pixels = 1'000'000; // a side
     if (d.width_px > most_pixels) return bad("width_px must be at most 1000000, but is " + std::to_string(d.width_px));
-    if (d.height_px > most_pixels) return bad("height_px must be at most 1000000, but is " + std::to_string(d.height_px));
+    if (d.height_px > most_pixels)
+        return bad("height_px must be at most 1000000, but is " + std::to_string(d.height_px));
     if (!(d.pixel_pitch.value() >= smallest_pitch_m && d.pixel_pitch.value() <= largest_pitch_m)) {
-        return bad("pixel_pitch_m (or the diagonal_m that it follows from) must be a length from 1e-9 to 1 metre, but is " + number_text(d.pixel_pitch.value()));
+        return bad(
+            "pixel_pitch_m (or the diagonal_m that it follows from) must be a length from 1e-9 to 1 metre, but is " +
+            number_text(d.pixel_pitch.value()));
     }
     if (!(d.distance.value() >= nearest_m && d.distance.value() <= farthest_m)) {
         return bad("viewing_distance_m must be a length from 1 mm to 10 km, but is " + number_text(d.distance.value()));
     }
     if (!positive(pixels_per_degree(d).value())) {
-        return bad("pixel_pitch_m " + number_text(d.pixel_pitch.value()) + " m at viewing_distance_m " + number_text(d.distance.value()) +
-                   " m gives no finite number of pixels per degree");
+        return bad("pixel_pitch_m " + number_text(d.pixel_pitch.value()) + " m at viewing_distance_m " +
+                   number_text(d.distance.value()) + " m gives no finite number of pixels per degree");
     }
     if (!(positive(d.peak.value()) && d.peak.value() <= brightest_cdm2))
         return bad("peak_cdm2 must be above 0 and at most 1e6 cd/m2, but is " + number_text(d.peak.value()));
     if (!(d.black.value() >= darkest_cdm2 && d.black < d.peak)) {
-        return bad("black_cdm2 must be at least 1e-7 and below the peak of " + number_text(d.peak.value()) + " cd/m2, but is " +
-                   number_text(d.black.value()));
+        return bad("black_cdm2 must be at least 1e-7 and below the peak of " + number_text(d.peak.value()) +
+                   " cd/m2, but is " + number_text(d.black.value()));
     }
     if (auto ok = check_transfer(d); !ok) return ok;
     if (auto ok = check_lens(d); !ok) return ok;
@@ -117,7 +134,9 @@ Result<void> validate(const Display& d) {
     return {};
 }
 
-PixelsPerDegree pixels_per_degree(const Display& display) { return PixelsPerDegree(1 / physical_field(display, 1).value()); }
+PixelsPerDegree pixels_per_degree(const Display& display) {
+    return PixelsPerDegree(1 / physical_field(display, 1).value());
+}
 
 PixelsPerDegree coarsest_pixels_per_degree(const Display& display) {
     double least = pixels_per_degree(display).value();
@@ -143,7 +162,8 @@ PixelsPerDegree pixels_per_degree_at(const Display& display, Degrees from_centre
         // tan(a + d) - tan a = sin d / (cos(a + d) cos a), without cancellation.
         return PixelsPerDegree(ppd * std::cos(delta) / (std::cos(a + delta) * std::cos(a)));
     }
-    const auto above = std::find_if(lens.begin(), lens.end(), [&](const PixelsPerDegreeAt& at) { return at.angle_deg > angle_deg; });
+    const auto above =
+        std::find_if(lens.begin(), lens.end(), [&](const PixelsPerDegreeAt& at) { return at.angle_deg > angle_deg; });
     if (above == lens.end()) return PixelsPerDegree(lens.back().pixels_per_degree);
     const PixelsPerDegreeAt &lo = *(above - 1), &hi = *above;
     const double t = (angle_deg - lo.angle_deg) / (hi.angle_deg - lo.angle_deg);

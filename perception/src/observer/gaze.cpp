@@ -40,11 +40,13 @@ std::string complaint_about(const GazeSample& sample, const GazeSample* before) 
     if (!std::isfinite(sample.time_s)) return "has a time_s that is not finite";
     for (const auto& [name, px] : {std::pair("x_px", sample.px.x), std::pair("y_px", sample.px.y)}) {
         if (!std::isfinite(px)) return "has an " + std::string(name) + " that is not finite";
-        if (std::abs(px) > farthest_px) return "has an " + std::string(name) + " of " + number_text(px) + ": at most a million pixels aside can be";
+        if (std::abs(px) > farthest_px)
+            return "has an " + std::string(name) + " of " + number_text(px) + ": at most a million pixels aside can be";
     }
     if (!before) return {};
     if (!(sample.time_s > before->time_s))
-        return "is out of order: time_s " + number_text(sample.time_s) + " s comes after " + number_text(before->time_s) + " s";
+        return "is out of order: time_s " + number_text(sample.time_s) + " s comes after " +
+               number_text(before->time_s) + " s";
     if (!(sample.time_s - before->time_s <= GazeTrace::longest_gap_s))
         return "follows a gap of " + number_text(sample.time_s - before->time_s) + " s: at most 1 s may be missing";
     return {};
@@ -96,7 +98,9 @@ private:
         return {std::atan(t.x) * degrees_per_radian, std::atan(t.y) * degrees_per_radian};
     }
     glm::dvec2 to_pixels(glm::dvec2 degrees) const {
-        return size_ * 0.5 + glm::dvec2(std::tan(degrees.x / degrees_per_radian), std::tan(degrees.y / degrees_per_radian)) / tangent_per_pixel_;
+        return size_ * 0.5 +
+               glm::dvec2(std::tan(degrees.x / degrees_per_radian), std::tan(degrees.y / degrees_per_radian)) /
+                   tangent_per_pixel_;
     }
     bool is_inside(glm::dvec2 px) const { return px.x >= 0 && px.y >= 0 && px.x <= size_.x && px.y <= size_.y; }
 
@@ -106,7 +110,7 @@ private:
         do amplitude = random_.gamma(amplitude_shape, mean_amplitude_deg / amplitude_shape);
         while (!(amplitude >= least_amplitude_deg && amplitude <= largest_amplitude_deg));
         const glm::dvec2 here = to_degrees(at_);
-        for (constexpr double shrink = 0.93; ; amplitude *= shrink) {
+        for (constexpr double shrink = 0.93;; amplitude *= shrink) {
             const double direction = 2 * std::numbers::pi * random_.uniform();
             const glm::dvec2 target = here + amplitude * glm::dvec2(std::cos(direction), std::sin(direction));
             constexpr double steepest_deg = 80;
@@ -139,7 +143,8 @@ Result<GazeTrace> GazeTrace::create(std::vector<GazeSample> samples) {
 }
 
 glm::dvec2 GazeTrace::at(double time_s) const {
-    const auto after = std::upper_bound(samples_.begin(), samples_.end(), time_s, [](double t, const GazeSample& s) { return t < s.time_s; });
+    const auto after = std::upper_bound(samples_.begin(), samples_.end(), time_s,
+                                        [](double t, const GazeSample& s) { return t < s.time_s; });
     if (after == samples_.begin()) return samples_.front().px;
     if (after == samples_.end()) return samples_.back().px;
     const GazeSample &a = *(after - 1), &b = *after;
@@ -153,7 +158,8 @@ Result<GazeTrace> read_gaze_trace(const std::filesystem::path& file) {
     bool has_header = false;
     std::size_t line_number = 0;
     const auto complain = [&](const std::string& what) {
-        return Error{ErrorCode::malformed_data, file.string() + ": line " + std::to_string(line_number) + ": " + what + "."};
+        return Error{ErrorCode::malformed_data,
+                     file.string() + ": line " + std::to_string(line_number) + ": " + what + "."};
     };
     for (std::string line; std::getline(stream, line);) {
         ++line_number;
@@ -178,7 +184,8 @@ Result<GazeTrace> read_gaze_trace(const std::filesystem::path& file) {
 
 Result<void> write_gaze_trace(const std::filesystem::path& file, const GazeTrace& trace) {
     std::string text = "time_s,x_px,y_px\n";
-    for (const GazeSample& s : trace.samples()) text += number_text(s.time_s) + "," + number_text(s.px.x) + "," + number_text(s.px.y) + "\n";
+    for (const GazeSample& s : trace.samples())
+        text += number_text(s.time_s) + "," + number_text(s.px.x) + "," + number_text(s.px.y) + "\n";
     auto whole = vdtree::AtomicFile::create(file);
     if (!whole) return whole.error();
     if (auto written = whole->write(text); !written) return written;
@@ -186,10 +193,12 @@ Result<void> write_gaze_trace(const std::filesystem::path& file, const GazeTrace
 }
 
 Result<GazeTrace> simulate_gaze(const SimulatedGaze& o, const Display& display) {
-    if (!(o.duration_s > 0 && o.samples_per_s > 0 && o.duration_s * o.samples_per_s <= static_cast<double>(most_samples)))
+    if (!(o.duration_s > 0 && o.samples_per_s > 0 &&
+          o.duration_s * o.samples_per_s <= static_cast<double>(most_samples)))
         return invalid("A simulated gaze needs a duration and a rate above 0, and at most ten million samples.");
     if (o.width_px < 1 || o.height_px < 1) return invalid("A simulated gaze needs a window of at least 1x1 pixels.");
-    if (o.samples_per_s < 1 / GazeTrace::longest_gap_s) return invalid("A simulated gaze needs a sample a second at least.");
+    if (o.samples_per_s < 1 / GazeTrace::longest_gap_s)
+        return invalid("A simulated gaze needs a sample a second at least.");
     if (auto valid = validate(display); !valid) return valid.error();
     EyeModel eye(o, display);
     std::vector<GazeSample> samples;
@@ -213,13 +222,17 @@ Result<GazeTrace> simulate_gaze(const SimulatedGaze& o, const Display& display) 
 
 Result<void> validate(const TrackerOptions& o) {
     constexpr double widest_deg = 180, slowest_s = 10;
-    if (!(o.error_deg >= 0 && o.error_deg <= widest_deg)) return invalid("The gaze's error must lie in 0 to 180 degrees, not " + number_text(o.error_deg) + ".");
-    if (!(o.latency_s >= 0 && o.latency_s <= slowest_s)) return invalid("The gaze's latency must lie in 0 to 10 s, not " + number_text(o.latency_s) + ".");
-    if (!(o.suppressed_s >= 0 && o.suppressed_s <= 1)) return invalid("Suppression must last 0 to 1 s, not " + number_text(o.suppressed_s) + ".");
+    if (!(o.error_deg >= 0 && o.error_deg <= widest_deg))
+        return invalid("The gaze's error must lie in 0 to 180 degrees, not " + number_text(o.error_deg) + ".");
+    if (!(o.latency_s >= 0 && o.latency_s <= slowest_s))
+        return invalid("The gaze's latency must lie in 0 to 10 s, not " + number_text(o.latency_s) + ".");
+    if (!(o.suppressed_s >= 0 && o.suppressed_s <= 1))
+        return invalid("Suppression must last 0 to 1 s, not " + number_text(o.suppressed_s) + ".");
     return {};
 }
 
-GazeTracker::GazeTracker(GazeTrace trace, const TrackerOptions& options, const Display& display, int width_px, int height_px)
+GazeTracker::GazeTracker(GazeTrace trace, const TrackerOptions& options, const Display& display, int width_px,
+                         int height_px)
     : trace_(std::move(trace)), options_(options), tangent_per_pixel_(display.pixel_pitch / display.distance),
       centre_px_(glm::dvec2(width_px, height_px) * 0.5) {
     const std::vector<GazeSample>& s = trace_.samples();
@@ -233,18 +246,23 @@ GazeTracker::GazeTracker(GazeTrace trace, const TrackerOptions& options, const D
 
 double GazeTracker::speed_at(double time_s) const {
     const std::vector<GazeSample>& s = trace_.samples();
-    const auto after = std::upper_bound(s.begin(), s.end(), time_s, [](double t, const GazeSample& sample) { return t < sample.time_s; });
+    const auto after = std::upper_bound(s.begin(), s.end(), time_s,
+                                        [](double t, const GazeSample& sample) { return t < sample.time_s; });
     if (after == s.begin() || after == s.end()) return 0;
-    const auto direction = [&](glm::dvec2 px) { return glm::normalize(glm::dvec3((px - centre_px_) * tangent_per_pixel_, 1)); };
+    const auto direction = [&](glm::dvec2 px) {
+        return glm::normalize(glm::dvec3((px - centre_px_) * tangent_per_pixel_, 1));
+    };
     const glm::dvec3 a = direction((after - 1)->px), b = direction(after->px);
-    return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)) * degrees_per_radian / (after->time_s - (after - 1)->time_s);
+    return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b)) * degrees_per_radian /
+           (after->time_s - (after - 1)->time_s);
 }
 
 TrackedGaze GazeTracker::at(double time_s) const {
     double seen_s = time_s - options_.latency_s; // when the eye was where the tracker says
     TrackedGaze tracked;
     if (options_.suppression) {
-        const auto next = std::upper_bound(saccades_.begin(), saccades_.end(), seen_s, [](double t, const auto& s) { return t < s.first; });
+        const auto next = std::upper_bound(saccades_.begin(), saccades_.end(), seen_s,
+                                           [](double t, const auto& s) { return t < s.first; });
         // Saccades may follow each other within the time that the first blinds for.
         for (auto s = next; s != saccades_.begin();) {
             --s;
@@ -272,7 +290,8 @@ CsfTable widened(const CsfTable& table, Degrees margin) {
     for (auto column = samples.sensitivity.begin(); const double e : samples.eccentricity_deg) {
         const double degrees = e + shift;
         // The sum's rounding can bring columns too near to each other.
-        if (degrees <= CsfTable::highest_eccentricity.value() && degrees - wide.eccentricity_deg.back() >= CsfTable::smallest_spacing) {
+        if (degrees <= CsfTable::highest_eccentricity.value() &&
+            degrees - wide.eccentricity_deg.back() >= CsfTable::smallest_spacing) {
             wide.eccentricity_deg.push_back(degrees);
             wide.sensitivity.insert(wide.sensitivity.end(), column, column + plane);
         } else {
@@ -287,7 +306,8 @@ CsfTable widened(const CsfTable& table, Degrees margin) {
 }
 
 std::shared_ptr<const CsfTable> WidenedTables::at(Degrees margin) {
-    const auto rounded = std::find_if(std::begin(margins_deg), std::end(margins_deg), [&](double m) { return m >= margin.value(); });
+    const auto rounded =
+        std::find_if(std::begin(margins_deg), std::end(margins_deg), [&](double m) { return m >= margin.value(); });
     if (rounded == std::end(margins_deg)) return nullptr;
     std::shared_ptr<const CsfTable>& kept = widened_[*rounded];
     if (!kept) kept = std::make_shared<const CsfTable>(widened(table_, Degrees(*rounded)));

@@ -40,8 +40,8 @@ public:
     // itself.
     Result<void> make_current() const;
 
-    std::string renderer_name() const; // GL_RENDERER
-    std::string version() const;       // GL_VERSION
+    std::string renderer_name() const;        // GL_RENDERER
+    std::string version() const;              // GL_VERSION
     GLFWwindow* glfw_window() const noexcept; // null when headless
 
     // The GL errors and debug messages since the last call, empty if all went well.

@@ -17,14 +17,14 @@ namespace unseen::render {
 struct TestPattern {
     enum class Kind {
         grating, // a Gabor patch: mean (1 + contrast exp(-r^2 / 2 sigma^2) cos(2 pi frequency x + phase)), angles about its centre
-        chart,   // Campbell and Robson's: mean (1 + 10^(-decades (1 - y)) cos(phase)), y from 0 at the bottom; frequency from left to right from
-                 // `frequency` to `highest_frequency`, as an exponential, the phase its integral
-        match,   // left half: rows, `white_rows` of each `rows` white, the others black; right half: the code `code`
+        chart, // Campbell and Robson's: mean (1 + 10^(-decades (1 - y)) cos(phase)), y from 0 at the bottom; frequency from left to right from
+               // `frequency` to `highest_frequency`, as an exponential, the phase its integral
+        match, // left half: rows, `white_rows` of each `rows` white, the others black; right half: the code `code`
     };
     Kind kind = Kind::grating;
     double tangent_per_pixel = 0.000508;
-    double mean = 50;           // cd/m2
-    double contrast = 0;        // Michelson, 0..1
+    double mean = 50;    // cd/m2
+    double contrast = 0; // Michelson, 0..1
     double frequency_cpd = 4;
     double highest_frequency_cpd = 16;
     double decades = 3;
@@ -32,11 +32,11 @@ struct TestPattern {
     double phase_deg = 0;
     glm::dvec2 centre = glm::dvec2(0); // of the patch
     int rows = 2, white_rows = 1;
-    double code = 0.5;          // 0..1
+    double code = 0.5; // 0..1
     // Rectangles over it all: left, top, right, bottom in pixels from the top left. At most 8.
     std::vector<glm::dvec4> marks;
-    double mark_code = 0;       // 0..1
-    unsigned frame = 0;         // picks the dither's noise
+    double mark_code = 0; // 0..1
+    unsigned frame = 0;   // picks the dither's noise
 };
 
 // Draws what a display of 256 grey levels is to show. A luminance between those of two codes gets either, at random by pixel and

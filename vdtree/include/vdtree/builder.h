@@ -15,8 +15,8 @@ namespace unseen::vdtree {
 // A hierarchy over n vertices: clusters 0 .. n-1 are the vertices themselves, the others are numbered in the order
 // in which they were made, so a cluster's parent has a higher number. The last cluster is the root.
 struct Clustering {
-    std::vector<Index> parents;          // by cluster; the root's own number stands for "none"
-    std::vector<glm::dvec3> positions;   // by cluster from n on: the proxy's position; empty: the area-weighted mean
+    std::vector<Index> parents;        // by cluster; the root's own number stands for "none"
+    std::vector<glm::dvec3> positions; // by cluster from n on: the proxy's position; empty: the area-weighted mean
     // By cluster from n on: how far the surface that the proxy stands for strays from it, in mesh units, luminance and attributes
     // counted in; at least as much as the children's. Simplifying by this keeps the most shape for the triangles. Empty: not known.
     std::vector<float> deviations = {};
@@ -30,8 +30,8 @@ struct ClusterInput {
     MeshView mesh;
     std::span<const float> luminance;
     std::span<const glm::vec3> normals;
-    std::span<const double> areas;      // a third of the area of the triangles around, mesh units squared; 0: unreferenced
-    std::span<const Index> coincident;  // by vertex: the first vertex at the same position
+    std::span<const double> areas; // a third of the area of the triangles around, mesh units squared; 0: unreferenced
+    std::span<const Index> coincident; // by vertex: the first vertex at the same position
 };
 
 // A user's own clustering. Called once, on the calling thread. Every vertex must reach the root; clusters with one
@@ -56,7 +56,7 @@ std::string_view name(ClustererKind kind);
 struct BuildOptions {
     ClustererKind clusterer = ClustererKind::quadric;
     Light light = {};
-    int threads = 0; // 0: as many as there are cores. The tree does not depend on it.
+    int threads = 0;                  // 0: as many as there are cores. The tree does not depend on it.
     std::uint64_t dropped_before = 0; // triangles that a reader has dropped; counted with the tree's
     Progress progress = {};
     // Other processes that help to analyse the mesh and to cluster it, by help_build_tree() with the same mesh and options; this is

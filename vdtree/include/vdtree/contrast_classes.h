@@ -38,7 +38,9 @@ public:
         return static_cast<std::uint16_t>(1 + luminance * contrast_count + contrast);
     }
     static std::size_t contrast_index(double contrast) {
-        return index(std::ceil(contrast_octaves * contrasts_per_octave + contrasts_per_octave * std::log2(contrast) - edge), contrast_count);
+        return index(
+            std::ceil(contrast_octaves * contrasts_per_octave + contrasts_per_octave * std::log2(contrast) - edge),
+            contrast_count);
     }
     std::size_t luminance_index(double cdm2) const {
         return index(std::ceil(std::log2(std::max(cdm2, lowest()) / lowest()) / log2_step_ - edge), luminance_count);

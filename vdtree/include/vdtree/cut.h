@@ -20,8 +20,8 @@ namespace unseen::vdtree {
 class CutState;
 
 struct AdjustOptions {
-    VisibilityTest visibility = {};                  // default: everything can be seen
-    std::optional<Index> triangle_budget = {};       // best effort: at most so many triangles
+    VisibilityTest visibility = {};            // default: everything can be seen
+    std::optional<Index> triangle_budget = {}; // best effort: at most so many triangles
 };
 
 struct AdjustStats {
@@ -29,9 +29,9 @@ struct AdjustStats {
     std::uint64_t folds = 0;      // nodes that went from unfolded to folded, and the reverse
     std::uint64_t unfolds = 0;
     Index triangles = 0;
-    float max_fold_cost = 0;      // the largest cost among the folded nodes that can be seen; 0 without folds. With
-                                  // hysteresis, and without a budget: not more than this. Infinite where a time limit has left it unknown
-    bool is_complete = true;      // false: the time limit has left something to do
+    float max_fold_cost = 0; // the largest cost among the folded nodes that can be seen; 0 without folds. With
+        // hysteresis, and without a budget: not more than this. Infinite where a time limit has left it unknown
+    bool is_complete = true; // false: the time limit has left something to do
 };
 
 struct FollowOptions {
@@ -84,10 +84,10 @@ public:
     NodeId proxy_of_leaf(Index leaf) const noexcept { return proxies_[leaf]; }
 
     // One fold or unfold; each returns whether anything changed.
-    bool unfold(NodeId node);            // precondition: interior and active
-    bool fold(NodeId node);              // precondition: interior, unfolded, all its interior children folded
-    bool unfold_ancestors(NodeId node);  // makes the node active: unfolds everything above it
-    bool fold_subtree(NodeId node);      // folds the node and everything under it
+    bool unfold(NodeId node);           // precondition: interior and active
+    bool fold(NodeId node);             // precondition: interior, unfolded, all its interior children folded
+    bool unfold_ancestors(NodeId node); // makes the node active: unfolds everything above it
+    bool fold_subtree(NodeId node);     // folds the node and everything under it
     void unfold_all();
     void fold_all();
 
@@ -145,7 +145,7 @@ struct SceneObject {
 
     Cut& cut;
     const DistanceCriterion& criterion;
-    Viewpoint viewpoint;             // in the object's own frame
+    Viewpoint viewpoint; // in the object's own frame
     bool cull_back_faces = false;
 };
 
@@ -157,12 +157,12 @@ Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objec
 // Which interior nodes the criterion unfolds from a viewpoint, each tested by itself, whatever is above it: one bit a node, the first
 // node's lowest. Of the options, the threshold and back faces count. Fails where Cut::follow() does. What it says of damaged nodes
 // (see VertexTree::is_sound) means nothing. Cost: some ten nanoseconds a node.
-Result<std::vector<std::uint64_t>> test_every_node(const VertexTree& tree, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
-                                                   const FollowOptions& options = {});
+Result<std::vector<std::uint64_t>> test_every_node(const VertexTree& tree, const DistanceCriterion& criterion,
+                                                   const Viewpoint& viewpoint, const FollowOptions& options = {});
 // What folding costs, by interior node: the threshold from which on the node folds; 0 where nothing of it shows, infinite where it shows from
 // everywhere. Fails and costs as the above.
-Result<std::vector<float>> find_every_cost(const VertexTree& tree, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
-                                           const FollowOptions& options = {});
+Result<std::vector<float>> find_every_cost(const VertexTree& tree, const DistanceCriterion& criterion,
+                                           const Viewpoint& viewpoint, const FollowOptions& options = {});
 
 // The cut as a mesh of its own: only the vertices in use, in double precision, with the tree's attributes.
 Mesh extract_mesh(const Cut& cut);

@@ -39,7 +39,7 @@ struct FoldClass {
 struct LitClasses {
     std::shared_ptr<const LightBounds> bounds; // of the tree
     ContrastClasses levels;
-    std::uint16_t silhouette = 0;              // the class of all outlines
+    std::uint16_t silhouette = 0; // the class of all outlines
 };
 
 class DistanceCriterion {
@@ -48,16 +48,20 @@ public:
 
     struct Parts {
         Spheres spheres = Spheres::ring;
-        std::vector<FoldClass> classes = {};   // by interior node; empty: class 0 for all, whatever they face
-        std::vector<float> lengths = {};       // by interior node, mesh units, 0 or more; empty: the spheres' radii
+        std::vector<FoldClass> classes = {}; // by interior node; empty: class 0 for all, whatever they face
+        std::vector<float> lengths = {};     // by interior node, mesh units, 0 or more; empty: the spheres' radii
         std::vector<float> silhouette_lengths = {}; // likewise, for the silhouettes' classes; empty: lengths
-        std::vector<NormalSlabs> facing = {};  // by interior node: of the directions that make it a silhouette; empty: the tree's
-        std::vector<float> reach = {};         // [class * eccentricity_bins + bin]: distance in lengths; not growing with the bin
-        std::vector<float> least_cost = {};    // of the same shape: no fold of this class costs less, from however far (drawn, it is at
-                                          // least a pixel); empty: 0 for all
-        std::optional<LitClasses> lit = {};    // with lights, in place of `classes`; reaches are to grow with contrasts and luminances
+        std::vector<NormalSlabs> facing =
+            {}; // by interior node: of the directions that make it a silhouette; empty: the tree's
+        std::vector<float> reach =
+            {}; // [class * eccentricity_bins + bin]: distance in lengths; not growing with the bin
+        std::vector<float> least_cost =
+            {}; // of the same shape: no fold of this class costs less, from however far (drawn, it is at
+                // least a pixel); empty: 0 for all
+        std::optional<LitClasses> lit =
+            {}; // with lights, in place of `classes`; reaches are to grow with contrasts and luminances
         std::size_t eccentricity_bins = 1;
-        double bin_degrees = 1;           // bin b holds b * bin_degrees up to the next; the last one everything beyond
+        double bin_degrees = 1; // bin b holds b * bin_degrees up to the next; the last one everything beyond
     };
     // Reaches of folds that can be seen from nowhere, and from everywhere.
     static constexpr float never_visible = -1;
@@ -75,7 +79,9 @@ public:
     bool is_monotone() const noexcept { return is_monotone_; }
     bool uses_gaze() const noexcept { return parts_.eccentricity_bins > 1; }
     std::uint64_t id() const noexcept { return id_; } // of these values; a copy shares it
-    std::uint64_t object_id() const noexcept { return object_id_.value; } // of this object: a copy has another one, wherever it lies
+    std::uint64_t object_id() const noexcept {
+        return object_id_.value;
+    } // of this object: a copy has another one, wherever it lies
 
 private:
     struct ObjectId {
@@ -119,7 +125,7 @@ struct Viewpoint {
     // Nodes wholly behind one of these fold, also where a frustum shows them: spheres that nothing can be seen through from the eye, as those of
     // inner_spheres(). The eye is outside of all. Not for criteria of support spheres, which do not contain all that a fold changes.
     std::vector<Sphere> occluders = {};
-    Lighting lighting = {};              // for criteria with lit classes; a valid one there
+    Lighting lighting = {}; // for criteria with lit classes; a valid one there
 };
 
 // Node extent, VDSlib's own measure: the support's sphere is seen under an angle of so many pixels at the window's centre at most. Unfolds

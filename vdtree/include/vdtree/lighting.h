@@ -24,7 +24,7 @@ namespace unseen::vdtree {
 struct LightSource {
     enum class Kind : std::uint8_t { directional, point, spot };
     Kind kind = Kind::directional;
-    double intensity = 1;                       // relative luminance of white that faces the light, at `distance` from it
+    double intensity = 1; // relative luminance of white that faces the light, at `distance` from it
     glm::dvec3 direction = glm::dvec3(0, 0, 1); // unit; of a directional light: towards it, of a spot: where it shines
     glm::dvec3 position = glm::dvec3(0);        // of a point or spot light
     double distance = 1;                        // likewise
@@ -34,8 +34,8 @@ struct LightSource {
 
 struct Lighting {
     std::vector<LightSource> lights;
-    double ambient = 0;                // relative luminance of white without any other light
-    double specular = 0;               // 0: no highlights
+    double ambient = 0;  // relative luminance of white without any other light
+    double specular = 0; // 0: no highlights
     double shininess = 32;
     bool operator==(const Lighting&) const = default;
 };
@@ -60,7 +60,7 @@ float albedo_of(const VertexTree& tree, NodeId node);
 struct VertexCone {
     glm::vec3 axis = glm::vec3(0, 0, 1); // unit; all normals are within the angle from it
     float cosine = 1, sine = 0;          // of the angle; -1 and 0 where they point anywhere, or one of them is zero
-    LuminanceRange albedo; // with the texture's share, if there is one
+    LuminanceRange albedo;               // with the texture's share, if there is one
     // Coordinates of the normals along two directions across the axis, across_axis(); of no account where `largest` is not above `least`.
     // Normals differ more along a ridge's curvature than across it, and seldom by as much as the cone allows.
     float least_across[2] = {0, 0}, largest_across[2] = {0, 0};
@@ -93,6 +93,7 @@ LuminanceRange lit_range(const Lighting& lighting, const VertexCone& cone, const
 
 // How far lights have moved, as an angle in radians: of the directions of directional lights and spots; positions count in radii of the
 // tree; intensities by eight times their logarithm; with highlights, the eye like a light. Infinite where anything else differs.
-double light_motion(const VertexTree& tree, const Lighting& from, glm::dvec3 eye_from, const Lighting& to, glm::dvec3 eye_to);
+double light_motion(const VertexTree& tree, const Lighting& from, glm::dvec3 eye_from, const Lighting& to,
+                    glm::dvec3 eye_to);
 
 } // namespace unseen::vdtree

@@ -33,11 +33,11 @@ struct MeshRange {
 struct MeshView {
     std::span<const glm::dvec3> positions;
     std::span<const Triangle> triangles;
-    std::span<const glm::vec3> normals = {};  // any length; zero or non-finite: computed from the faces
-    std::span<const glm::vec4> colours = {};  // linear RGB and alpha, 0..1
+    std::span<const glm::vec3> normals = {}; // any length; zero or non-finite: computed from the faces
+    std::span<const glm::vec4> colours = {}; // linear RGB and alpha, 0..1
     std::span<const glm::vec2> uvs = {};
-    std::span<const MeshRange> ranges = {};   // ordered by first_triangle; may overlap between kinds
-    TextureView texture = {};                 // over the whole mesh by its UVs, multiplied with the colours; empty: none
+    std::span<const MeshRange> ranges = {}; // ordered by first_triangle; may overlap between kinds
+    TextureView texture = {};               // over the whole mesh by its UVs, multiplied with the colours; empty: none
 };
 
 // A triangle soup that owns its arrays.
@@ -63,9 +63,9 @@ std::uint64_t drop_degenerate_triangles(Mesh& mesh);
 
 // What the surface is, found out and not assumed, after welding equal positions. Cost: a sort of the edges.
 enum class Closedness : std::uint8_t {
-    open,            // a boundary, a non-manifold or an inconsistently oriented edge, or no volume
-    closed_outward,  // every edge has two faces that run it in opposite ways, and the volume is positive
-    closed_inward,   // the same with a negative volume: inside out
+    open,           // a boundary, a non-manifold or an inconsistently oriented edge, or no volume
+    closed_outward, // every edge has two faces that run it in opposite ways, and the volume is positive
+    closed_inward,  // the same with a negative volume: inside out
 };
 
 } // namespace unseen::vdtree

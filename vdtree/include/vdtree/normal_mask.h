@@ -18,9 +18,7 @@ struct NormalMask {
 
     void insert(int cell) noexcept { faces[static_cast<unsigned>(cell) >> 6] |= std::uint64_t{1} << (cell & 63); }
     bool contains(int cell) const noexcept { return (faces[static_cast<unsigned>(cell) >> 6] >> (cell & 63)) & 1; }
-    bool empty() const noexcept {
-        return (faces[0] | faces[1] | faces[2] | faces[3] | faces[4] | faces[5]) == 0;
-    }
+    bool empty() const noexcept { return (faces[0] | faces[1] | faces[2] | faces[3] | faces[4] | faces[5]) == 0; }
     NormalMask& operator|=(const NormalMask& other) noexcept {
         for (std::size_t i = 0; i < 6; ++i) faces[i] |= other.faces[i];
         return *this;

@@ -8,8 +8,9 @@
 namespace unseen::vdtree {
 
 struct InnerSphereOptions {
-    int count = 8;  // at most so many, the largest; each costs a nanosecond or less in every test
-    int cells = 96; // of a grid along the tree's longest side, 8 to 512: spheres stay out of all cells that the surface touches
+    int count = 8; // at most so many, the largest; each costs a nanosecond or less in every test
+    int cells =
+        96; // of a grid along the tree's longest side, 8 to 512: spheres stay out of all cells that the surface touches
 };
 
 // Spheres that a closed surface encloses and nowhere touches: every line from outside to a point in one crosses the surface before.

@@ -59,7 +59,8 @@ public:
 
 private:
     T& checked() {
-        if (!has_value()) [[unlikely]] end_without_value(*std::get_if<1>(&state_));
+        if (!has_value()) [[unlikely]]
+            end_without_value(*std::get_if<1>(&state_));
         return *std::get_if<0>(&state_);
     }
     std::variant<T, Error> state_;

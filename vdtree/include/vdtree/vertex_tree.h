@@ -78,8 +78,8 @@ enum NodeFlags : std::uint8_t {
 
 // What a fold test reads of an interior node, in one piece.
 struct alignas(32) NodeBounds {
-    Sphere ring;       // the ring, and the proxies of the subtree
-    NormalSlabs slabs; // of the same directions as the node's mask
+    Sphere ring;            // the ring, and the proxies of the subtree
+    NormalSlabs slabs;      // of the same directions as the node's mask
     std::uint8_t flags = 0; // NodeFlags
     std::uint8_t spare = 0;
 };
@@ -133,7 +133,7 @@ public:
     std::span<const Sphere> support_spheres() const noexcept; // leaves and proxies of the subtree
     std::span<const PackedRange> support_luminance() const noexcept; // of vertices, without the texture
     std::span<const PackedRange> ring_luminance() const noexcept;    // as drawn: with the texture
-    std::span<const PackedRange> ring_texture() const noexcept;      // the texture's own luminance there; empty without one
+    std::span<const PackedRange> ring_texture() const noexcept; // the texture's own luminance there; empty without one
     std::span<const Unorm16> adaptation_luminance() const noexcept; // middle of ring_luminance, saturated up the tree
     std::span<const float> displacement() const noexcept; // largest distance of a supported leaf from the proxy
 
@@ -142,9 +142,9 @@ public:
     std::span<const Index> source_vertices() const noexcept;
     std::span<const Index> source_triangles() const noexcept;
     std::span<const MeshRange> ranges() const noexcept;
-    std::uint64_t dropped_triangles() const noexcept;         // input triangles that used a vertex twice
+    std::uint64_t dropped_triangles() const noexcept; // input triangles that used a vertex twice
     Closedness closedness() const noexcept;
-    Sphere bounding_sphere() const noexcept; // of the triangles' corners
+    Sphere bounding_sphere() const noexcept;         // of the triangles' corners
     LuminanceRange luminance_range() const noexcept; // of all that is drawn
 
     // Luminance and its bounds under another light, without attributes; everything else is shared with this tree. Cost: one pass
@@ -177,11 +177,14 @@ public:
     Result<VertexTree> with_attribute(std::string_view name, AttributeDomain domain, std::vector<T> values) const {
         static_assert(is_attribute_value<T>());
         const auto kept = std::make_shared<const std::vector<T>>(std::move(values));
-        return with_attribute(Attribute{{std::string(name), domain, sizeof(T), attribute_component_bytes<T>(), kept->size()},
-                                        kept, std::as_bytes(std::span(*kept))});
+        return with_attribute(
+            Attribute{{std::string(name), domain, sizeof(T), attribute_component_bytes<T>(), kept->size()},
+                      kept,
+                      std::as_bytes(std::span(*kept))});
     }
 
-    std::uint64_t byte_size() const noexcept; // of all arrays; those of a mapped tree are resident only where they were used
+    std::uint64_t
+    byte_size() const noexcept; // of all arrays; those of a mapped tree are resident only where they were used
 
     // Another handle to the same data, which lives as long as one of them.
     VertexTree share() const { return VertexTree(data_); }
@@ -194,7 +197,8 @@ private:
     friend class SoundTree;
     friend struct UncheckedLinks; // for what asks is_sound() node by node
     bool looks_sound(NodeId node) const;
-    std::span<const std::byte> attribute_bytes(std::string_view name, std::size_t element, std::uint32_t component) const noexcept;
+    std::span<const std::byte> attribute_bytes(std::string_view name, std::size_t element,
+                                               std::uint32_t component) const noexcept;
     Result<VertexTree> with_attribute(Attribute attribute) const;
 
     std::shared_ptr<const Data> data_;

@@ -65,7 +65,8 @@ std::string decode_percent(std::string_view text) {
 
 } // namespace
 
-Buffers::Buffers(const MeshSource& source, const json& document, std::optional<std::string_view> bin) : source_(source) {
+Buffers::Buffers(const MeshSource& source, const json& document, std::optional<std::string_view> bin)
+    : source_(source) {
     const json& array = array_of(document, "buffers");
     for (std::size_t i = 0; i < array.size(); ++i) {
         const std::string where = numbered("buffer", i);
@@ -192,7 +193,8 @@ const tinygltf::Accessor& Accessors::accessor(int index) const {
     return model_.accessors[static_cast<std::size_t>(index)];
 }
 
-Accessors::Rows Accessors::rows_of(int view_index, std::size_t offset, std::size_t count, std::size_t size, const std::string& where) const {
+Accessors::Rows Accessors::rows_of(int view_index, std::size_t offset, std::size_t count, std::size_t size,
+                                   const std::string& where) const {
     if (static_cast<std::size_t>(view_index) >= model_.bufferViews.size()) {
         fail(where + " uses buffer view " + std::to_string(view_index) + ", but there are " +
              std::to_string(model_.bufferViews.size()) + "; correct the JSON.");
@@ -218,15 +220,16 @@ Accessors::Rows Accessors::rows_of(int view_index, std::size_t offset, std::size
 }
 
 template <class Put>
-void Accessors::for_each_sparse(const tinygltf::Accessor& a, std::size_t size, const std::string& where, Put&& put) const {
+void Accessors::for_each_sparse(const tinygltf::Accessor& a, std::size_t size, const std::string& where,
+                                Put&& put) const {
     const int index_type = a.sparse.indices.componentType;
     if (!is_index_type(index_type)) fail(where + " has sparse indices of a wrong type; correct the JSON.");
     const auto count = static_cast<std::size_t>(a.sparse.count);
     if (count > a.count) fail(where + " replaces more elements than it has; correct its sparse count.");
     const Rows at = rows_of(a.sparse.indices.bufferView, static_cast<std::size_t>(a.sparse.indices.byteOffset), count,
                             component_bytes(index_type), where);
-    const Rows values = rows_of(a.sparse.values.bufferView, static_cast<std::size_t>(a.sparse.values.byteOffset),
-                                count, size, where);
+    const Rows values =
+        rows_of(a.sparse.values.bufferView, static_cast<std::size_t>(a.sparse.values.byteOffset), count, size, where);
     for (std::size_t i = 0; i < count; ++i) {
         const Index target = index_at(at[i], index_type);
         if (target >= a.count) {

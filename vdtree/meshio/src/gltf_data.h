@@ -52,7 +52,8 @@ public:
 private:
     struct Rows;
     const tinygltf::Accessor& accessor(int index) const;
-    Rows rows_of(int view_index, std::size_t offset, std::size_t count, std::size_t size, const std::string& where) const;
+    Rows rows_of(int view_index, std::size_t offset, std::size_t count, std::size_t size,
+                 const std::string& where) const;
     template <class Put>
     void for_each_sparse(const tinygltf::Accessor& a, std::size_t size, const std::string& where, Put&& put) const;
 

@@ -50,7 +50,8 @@ void check_structure(std::string_view text) {
         } else if (c == '"') {
             in_string = true;
         } else if (c == '{' || c == '[') {
-            if (++depth > max_json_depth) fail("byte " + std::to_string(i) + ": the JSON is nested too deeply; simplify it.");
+            if (++depth > max_json_depth)
+                fail("byte " + std::to_string(i) + ": the JSON is nested too deeply; simplify it.");
         } else if (c == '}' || c == ']') {
             --depth;
         }
@@ -82,7 +83,8 @@ Container split_glb(std::string_view bytes) {
         const std::size_t size = word_at(bytes, at);
         const std::uint32_t type = word_at(bytes, at + 4);
         at += chunk_header_bytes;
-        if (size > bytes.size() - at) fail("byte " + std::to_string(at) + ": a chunk ends behind the file; it is cut short.");
+        if (size > bytes.size() - at)
+            fail("byte " + std::to_string(at) + ": a chunk ends behind the file; it is cut short.");
         const std::string_view chunk = bytes.substr(at, size);
         if (type == chunk_json && container.json_text.empty()) container.json_text = chunk;
         else if (type == chunk_bin && !container.bin) container.bin = chunk;
@@ -164,7 +166,8 @@ private:
         const json* version = asset != nullptr && asset->is_object() ? member(*asset, "version") : nullptr;
         if (version == nullptr || !version->is_string()) fail("it has no asset version; it is no glTF file.");
         if (!version->get_ref<const std::string&>().starts_with("2.")) {
-            fail("its version is " + in_quotes(version->get_ref<const std::string&>()) + ", and only 2 is read; convert it.");
+            fail("its version is " + in_quotes(version->get_ref<const std::string&>()) +
+                 ", and only 2 is read; convert it.");
         }
         reduced_["asset"]["version"] = "2.0";
     }
@@ -304,7 +307,8 @@ tinygltf::Model to_model(const json& reduced) {
     std::string error, warning;
     bool is_loaded = false;
     try {
-        is_loaded = loader.LoadASCIIFromString(&model, &error, &warning, text.data(), static_cast<unsigned>(text.size()), "");
+        is_loaded =
+            loader.LoadASCIIFromString(&model, &error, &warning, text.data(), static_cast<unsigned>(text.size()), "");
     } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& exception) {

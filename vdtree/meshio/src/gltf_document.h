@@ -32,8 +32,8 @@ Container split_glb(std::string_view bytes);
 // Not deeper and not of more values than scenes are.
 json parse_json(std::string_view text);
 
-const json* member(const json& object, const char* key);         // null: it has none
-const json& array_of(const json& object, const char* key);       // empty: it has none
+const json* member(const json& object, const char* key);   // null: it has none
+const json& array_of(const json& object, const char* key); // empty: it has none
 std::int64_t to_integer_in_range(const json& value, std::int64_t largest, const std::string& where); // from 0 on
 inline constexpr std::int64_t max_size = std::int64_t{1} << 53; // integers above are not exact in JSON
 inline constexpr std::int64_t max_int = std::numeric_limits<int>::max();

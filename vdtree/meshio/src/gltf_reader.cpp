@@ -32,8 +32,9 @@ constexpr std::size_t max_node_depth = 512; // deeper trees are found in attacks
 // Instancing multiplies a file, so what may come out is bounded: bytes for each byte read, and bytes in any case.
 constexpr std::uint64_t max_bytes_out_per_byte_in = 64;
 constexpr std::uint64_t min_bytes_out = std::uint64_t{16} << 20;
-constexpr std::uint64_t bytes_per_vertex = sizeof(glm::dvec3) + sizeof(glm::vec3) + sizeof(glm::vec4) + sizeof(glm::vec2);
-constexpr std::uint64_t bytes_per_visit = 64; // of a primitive: takes time even where it is empty
+constexpr std::uint64_t bytes_per_vertex =
+    sizeof(glm::dvec3) + sizeof(glm::vec3) + sizeof(glm::vec4) + sizeof(glm::vec2);
+constexpr std::uint64_t bytes_per_visit = 64;                // of a primitive: takes time even where it is empty
 constexpr std::uint64_t bytes_per_index = sizeof(Index) * 3; // in a strip an index makes a triangle
 
 // ---- materials ----
@@ -42,7 +43,8 @@ constexpr std::uint64_t bytes_per_index = sizeof(Index) * 3; // in a strip an in
 class MaterialReader {
 public:
     // `spend` is told of all bytes of images, and fails where they are too many.
-    MaterialReader(const json& document, const Buffers& buffers, std::vector<std::string>& warnings, Callback<void(std::uint64_t)> spend)
+    MaterialReader(const json& document, const Buffers& buffers, std::vector<std::string>& warnings,
+                   Callback<void(std::uint64_t)> spend)
         : document_(document), buffers_(buffers), warnings_(warnings), spend_(std::move(spend)) {}
 
     // Alpha counts where it is not said to be ignored.
@@ -83,7 +85,8 @@ private:
         if (value == nullptr) fail(where_ + " has no " + of + "; correct the JSON.");
         const auto index = static_cast<std::size_t>(to_integer_in_range(*value, max_int, where_ + ": " + of));
         if (index >= array.size() || !array[index].is_object()) {
-            fail(where_ + ": its " + of + " is " + std::to_string(index) + ", but there are " + std::to_string(array.size()) + " " + key + "; correct the JSON.");
+            fail(where_ + ": its " + of + " is " + std::to_string(index) + ", but there are " +
+                 std::to_string(array.size()) + " " + key + "; correct the JSON.");
         }
         where_ = numbered(key, index);
         return array[index];
@@ -91,9 +94,11 @@ private:
 
     void add_texture(const json& info, Material& material) {
         if (const json* set = member(info, "texCoord"); set != nullptr && *set != 0) {
-            fail(where_ + ": its texture lies by the texture coordinates " + set->dump() + ", and only 0 is read; export it without, or leave the textures out.");
+            fail(where_ + ": its texture lies by the texture coordinates " + set->dump() +
+                 ", and only 0 is read; export it without, or leave the textures out.");
         }
-        if (member(info, "extensions") != nullptr) warnings_.push_back(where_ + ": the transform of its texture was ignored.");
+        if (member(info, "extensions") != nullptr)
+            warnings_.push_back(where_ + ": the transform of its texture was ignored.");
         const json& texture = element("textures", info, "index");
         if (member(texture, "sampler") != nullptr) {
             const std::string of_texture = where_;
@@ -109,7 +114,9 @@ private:
         constexpr int clamps = 33071, mirrors = 33648;
         const json* value = member(sampler, key);
         if (value == nullptr) return Wrap::repeat;
-        if (*value == mirrors) fail(where_ + ": a texture that is repeated in a mirror is not read; export it otherwise, or leave the textures out.");
+        if (*value == mirrors)
+            fail(where_ + ": a texture that is repeated in a mirror is not read; export it otherwise, or leave the "
+                          "textures out.");
         return *value == clamps ? Wrap::clamp : Wrap::repeat;
     }
 
@@ -117,7 +124,8 @@ private:
         if (const json* uri = member(image, "uri")) {
             if (!uri->is_string()) fail(where_ + ": its uri is no text; correct the JSON.");
             const auto& text = uri->get_ref<const std::string&>();
-            if (text.starts_with("data:")) material.image_bytes = shared(image, [&] { return Buffers::decode_data(text, where_); });
+            if (text.starts_with("data:"))
+                material.image_bytes = shared(image, [&] { return Buffers::decode_data(text, where_); });
             else material.image = Buffers::below_folder(text, where_);
             return;
         }
@@ -129,8 +137,10 @@ private:
             if (value == nullptr) fail(where_ + " has no " + key + "; correct the JSON.");
             return static_cast<std::size_t>(to_integer_in_range(*value, max_size, where_ + ": " + key));
         };
-        const std::size_t buffer = number("buffer", -1), offset = number("byteOffset", 0), length = number("byteLength", -1);
-        if (buffer >= buffers_.count() || offset > buffers_[buffer].size() || length > buffers_[buffer].size() - offset) {
+        const std::size_t buffer = number("buffer", -1), offset = number("byteOffset", 0),
+                          length = number("byteLength", -1);
+        if (buffer >= buffers_.count() || offset > buffers_[buffer].size() ||
+            length > buffers_[buffer].size() - offset) {
             fail(of_image + " ends behind its buffer; the data are cut short or the JSON is wrong.");
         }
         if (length == 0) fail(of_image + " is empty; correct the JSON.");
@@ -219,8 +229,8 @@ class SceneReader {
 public:
     SceneReader(const MeshSource& source, const tinygltf::Model& model, const Buffers& buffers)
         : source_(source), model_(model), accessors_(model, buffers),
-          bytes_left_(std::max(min_bytes_out,
-                               max_bytes_out_per_byte_in * (source.bytes.size() + buffers.external_bytes()))) {
+          bytes_left_(
+              std::max(min_bytes_out, max_bytes_out_per_byte_in * (source.bytes.size() + buffers.external_bytes()))) {
         for (std::size_t i = 0; i < model.materials.size(); ++i) first_of_name_.try_emplace(model.materials[i].name, i);
     }
 

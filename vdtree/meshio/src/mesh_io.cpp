@@ -1,9 +1,9 @@
 // Finds out what a file is, has it read, and does what all formats share.
 #include <meshio/mesh_io.h>
 
-#include <vdtree/internal/finite.h>
 #include "mesh_readers.h"
 #include "text_scanner.h"
+#include <vdtree/internal/finite.h>
 
 #include <algorithm>
 #include <cctype>
@@ -72,7 +72,9 @@ const char* compression_of(std::string_view bytes) {
     if (bytes.starts_with("\x28\xB5\x2F\xFD")) return "zstd";
     if (bytes.starts_with("\x1F\x8B")) return "gzip";
     if (bytes.starts_with("PK\x03\x04")) return "zip";
-    if (bytes.starts_with("\xFD" "7zXZ")) return "xz";
+    if (bytes.starts_with("\xFD"
+                          "7zXZ"))
+        return "xz";
     return nullptr;
 }
 
@@ -108,7 +110,8 @@ Result<void> check_normals(const MeshSource& source, ReadResult& result) {
         if (zero++ == 0) first_zero = v;
     }
     if (zero > 0) {
-        result.warnings.push_back(counted_were(zero, "normal") + " zero or missing and computed from the faces, the first that of vertex " +
+        result.warnings.push_back(counted_were(zero, "normal") +
+                                  " zero or missing and computed from the faces, the first that of vertex " +
                                   std::to_string(first_zero) + ".");
     }
     return {};
@@ -178,9 +181,7 @@ Error malformed_line(const MeshSource& source, std::uint64_t line, const std::st
 Error malformed_byte(const MeshSource& source, std::uint64_t byte, const std::string& what) {
     return malformed(source, "byte " + std::to_string(byte) + ": " + what);
 }
-Error cancelled(const MeshSource& source) {
-    return {ErrorCode::cancelled, source.name + ": reading was cancelled."};
-}
+Error cancelled(const MeshSource& source) { return {ErrorCode::cancelled, source.name + ": reading was cancelled."}; }
 
 std::string in_quotes(std::string_view text) {
     std::string result = "'";

@@ -20,8 +20,8 @@ using namespace vdtree; // the types that are read and written
 // What a reader reads. The bytes must outlive the call.
 struct MeshSource {
     std::string_view bytes;
-    std::string name;                    // for messages
-    std::filesystem::path folder = {};   // where glTF buffers lie; empty where there is no folder
+    std::string name;                  // for messages
+    std::filesystem::path folder = {}; // where glTF buffers lie; empty where there is no folder
     const ReadOptions& options;
 
     // False where the caller wants to stop.
@@ -49,7 +49,8 @@ bool starts_with_off_keyword(std::string_view bytes);
 std::optional<std::filesystem::path> path_beside(std::string_view name);
 
 // Materials of a Wavefront MTL file, added to those there are. `name` is that of the file, for messages.
-Result<void> read_mtl(std::string_view bytes, const std::string& name, std::vector<Material>& materials, std::vector<std::string>& warnings);
+Result<void> read_mtl(std::string_view bytes, const std::string& name, std::vector<Material>& materials,
+                      std::vector<std::string>& warnings);
 
 // Reads a regular file whole; pipes and devices are refused.
 Result<std::string> read_whole_file(const std::filesystem::path& file);

@@ -67,9 +67,8 @@ private:
 bool is_float(double value) { return static_cast<double>(static_cast<float>(value)) == value; }
 
 bool are_floats(const MeshView& mesh) {
-    return std::all_of(mesh.positions.begin(), mesh.positions.end(), [](const glm::dvec3& p) {
-        return is_float(p.x) && is_float(p.y) && is_float(p.z);
-    });
+    return std::all_of(mesh.positions.begin(), mesh.positions.end(),
+                       [](const glm::dvec3& p) { return is_float(p.x) && is_float(p.y) && is_float(p.z); });
 }
 
 // ---- PLY ----
@@ -85,12 +84,14 @@ Error cancelled() { return {ErrorCode::cancelled, "Writing was cancelled."}; }
 void write_ply_header(Output& out, const MeshView& mesh, bool has_floats) {
     const std::string real = has_floats ? "float" : "double";
     // Few programs read unsigned indices, so they are used only where needed.
-    const bool needs_unsigned = mesh.positions.size() > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max());
+    const bool needs_unsigned =
+        mesh.positions.size() > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max());
     out.text("ply\nformat binary_little_endian 1.0\nelement vertex " + std::to_string(mesh.positions.size()) + "\n");
     for (const char* name : {"x", "y", "z"}) out.text("property " + real + " " + name + "\n");
     if (!mesh.normals.empty()) out.text("property float nx\nproperty float ny\nproperty float nz\n");
     if (!mesh.colours.empty()) {
-        for (const char* name : {"red", "green", "blue", "alpha"}) out.text(std::string("property uchar ") + name + "\n");
+        for (const char* name : {"red", "green", "blue", "alpha"})
+            out.text(std::string("property uchar ") + name + "\n");
     }
     if (!mesh.uvs.empty()) out.text("property float s\nproperty float t\n");
     out.text("element face " + std::to_string(mesh.triangles.size()) + "\nproperty list uchar " +

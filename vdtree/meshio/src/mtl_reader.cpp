@@ -11,14 +11,16 @@ namespace {
 
 class MtlReader {
 public:
-    MtlReader(std::string_view bytes, const std::string& name, std::vector<Material>& materials, std::vector<std::string>& warnings)
+    MtlReader(std::string_view bytes, const std::string& name, std::vector<Material>& materials,
+              std::vector<std::string>& warnings)
         : bytes_(bytes), name_(name), materials_(materials), warnings_(warnings) {
         for (const Material& m : materials) names_.insert(m.name);
     }
 
     Result<void> read() {
         if (const std::size_t nul = bytes_.find('\0'); nul != std::string_view::npos)
-            return bad(line_number(bytes_, nul), "a NUL byte, which no MTL text contains; the file is damaged or no MTL file.");
+            return bad(line_number(bytes_, nul),
+                       "a NUL byte, which no MTL text contains; the file is damaged or no MTL file.");
         LineScanner lines(bytes_);
         std::string_view rest;
         while (lines.next(rest)) {
@@ -51,7 +53,9 @@ private:
     }
 
     // A number from 0 to 1, with which a line begins.
-    bool take_share(std::string_view& rest, double& value) const { return to_number(take_word(rest), value) && value >= 0 && value <= 1; }
+    bool take_share(std::string_view& rest, double& value) const {
+        return to_number(take_word(rest), value) && value >= 0 && value <= 1;
+    }
 
     // Kd R G B; one number means grey. Spectra and CIE XYZ are left alone.
     Result<void> read_colour(std::string_view rest, std::uint64_t line) {
@@ -61,9 +65,12 @@ private:
         bool is_valid = take_share(rest, r);
         const bool is_grey = trimmed(rest).empty();
         is_valid = is_valid && (is_grey || (take_share(rest, g) && take_share(rest, b)));
-        if (!is_valid) return bad(line, "the colour of material " + in_quotes(material().name) + " should be 3 numbers from 0 to 1, not " + in_quotes(all) + "; correct it.");
+        if (!is_valid)
+            return bad(line, "the colour of material " + in_quotes(material().name) +
+                                 " should be 3 numbers from 0 to 1, not " + in_quotes(all) + "; correct it.");
         if (is_grey) g = b = r;
-        const glm::vec4 decoded = decode_colour(glm::vec4(r, g, b, 1), ColourEncoding::srgb); // as painting programs mean it
+        const glm::vec4 decoded =
+            decode_colour(glm::vec4(r, g, b, 1), ColourEncoding::srgb); // as painting programs mean it
         material().colour = {decoded.r, decoded.g, decoded.b, material().colour.a};
         return {};
     }
@@ -73,7 +80,8 @@ private:
         double value = 0;
         if (all.starts_with("-halo")) take_word(rest);
         if (!take_share(rest, value))
-            return bad(line, "the opacity of material " + in_quotes(material().name) + " should be a number from 0 to 1, not " + in_quotes(all) + "; correct it.");
+            return bad(line, "the opacity of material " + in_quotes(material().name) +
+                                 " should be a number from 0 to 1, not " + in_quotes(all) + "; correct it.");
         material().colour.a = static_cast<float>(is_transparency ? 1 - value : value);
         return {};
     }
@@ -89,16 +97,20 @@ private:
             } else if (option == "-s" || option == "-o" || option == "-t") {
                 double value = 0;
                 for (std::string_view next = rest; to_number(take_word(next), value);) rest = next; // one to three
-                warnings_.push_back(name_ + ": line " + std::to_string(line) + ": " + in_quotes(option) + " of an image was ignored.");
+                warnings_.push_back(name_ + ": line " + std::to_string(line) + ": " + in_quotes(option) +
+                                    " of an image was ignored.");
             } else if (option == "-mm") {
                 take_word(rest), take_word(rest);
             } else {
                 take_word(rest); // -blendu, -blendv, -cc, -boost, -imfchan, -texres, -type: one value
             }
         }
-        if (rest.empty()) return bad(line, "material " + in_quotes(m.name) + " names no image; add it or remove the line.");
+        if (rest.empty())
+            return bad(line, "material " + in_quotes(m.name) + " names no image; add it or remove the line.");
         const auto path = path_beside(rest);
-        if (!path) return bad(line, "the image of material " + in_quotes(m.name) + " is " + in_quotes(rest) + ", and only files beside the mesh are read; move it there.");
+        if (!path)
+            return bad(line, "the image of material " + in_quotes(m.name) + " is " + in_quotes(rest) +
+                                 ", and only files beside the mesh are read; move it there.");
         m.image = *path;
         return {};
     }
@@ -113,7 +125,8 @@ private:
 
 } // namespace
 
-Result<void> read_mtl(std::string_view bytes, const std::string& name, std::vector<Material>& materials, std::vector<std::string>& warnings) {
+Result<void> read_mtl(std::string_view bytes, const std::string& name, std::vector<Material>& materials,
+                      std::vector<std::string>& warnings) {
     return MtlReader(bytes, name, materials, warnings).read();
 }
 

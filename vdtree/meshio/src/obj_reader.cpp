@@ -1,9 +1,9 @@
 // Wavefront OBJ: polygons with positions, UVs, normals, groups and material names. Two passes over the text: vertices
 // first, so that polygons can be cut by their positions, then faces.
-#include <vdtree/internal/finite.h>
 #include "mesh_readers.h"
 #include "polygon_triangulator.h"
 #include "text_scanner.h"
+#include <vdtree/internal/finite.h>
 
 #include <algorithm>
 #include <array>
@@ -25,9 +25,10 @@ namespace {
 constexpr Index none = std::numeric_limits<Index>::max(); // a corner without UV or normal
 // Statements of surfaces, curves, display and grouping that change no triangle.
 constexpr std::string_view ignored_keywords[] = {
-    "s",    "l",     "p",    "vp",  "mg",   "lod",  "bevel", "c_interp", "d_interp", "shadow_obj",
-    "trace_obj", "maplib", "usemap", "cstype", "deg", "bmat", "step", "curv", "curv2", "surf", "parm",
-    "trim", "hole",   "scrv",  "sp",   "end", "con",  "ctech", "stech", "call", "csh", "cdc", "cdp", "bzp", "bsp", "res"};
+    "s",          "l",         "p",      "vp",     "mg",     "lod",  "bevel", "c_interp", "d_interp",
+    "shadow_obj", "trace_obj", "maplib", "usemap", "cstype", "deg",  "bmat",  "step",     "curv",
+    "curv2",      "surf",      "parm",   "trim",   "hole",   "scrv", "sp",    "end",      "con",
+    "ctech",      "stech",     "call",   "csh",    "cdc",    "cdp",  "bzp",   "bsp",      "res"};
 
 struct Corner {
     Index position = none;
@@ -196,7 +197,8 @@ private:
             else if (keyword == "vt") done = add_uv(rest, statements.line());
             else if (keyword == "vn") done = add_normal(rest, statements.line());
             if (!done) return done;
-            if (++statements_ % rows_per_progress == 0 && !source_.keep_going(statements.position() / 2, "reading OBJ")) {
+            if (++statements_ % rows_per_progress == 0 &&
+                !source_.keep_going(statements.position() / 2, "reading OBJ")) {
                 return cancelled(source_);
             }
         }
@@ -219,8 +221,8 @@ private:
         positions().emplace_back(n[0], n[1], n[2]);
         if (count >= 6) {
             colours_.resize(positions().size() - 1, missing_colour);
-            colours_.push_back(decode_colour(glm::vec4(n[3], n[4], n[5], count == 7 ? n[6] : 1.0),
-                                             source_.options.colours));
+            colours_.push_back(
+                decode_colour(glm::vec4(n[3], n[4], n[5], count == 7 ? n[6] : 1.0), source_.options.colours));
         }
         return {};
     }
@@ -274,9 +276,8 @@ private:
         }
         end_range(group_);
         end_range(material_);
-        std::stable_sort(ranges().begin(), ranges().end(), [](const MeshRange& a, const MeshRange& b) {
-            return a.first_triangle < b.first_triangle;
-        });
+        std::stable_sort(ranges().begin(), ranges().end(),
+                         [](const MeshRange& a, const MeshRange& b) { return a.first_triangle < b.first_triangle; });
         return {};
     }
 
@@ -326,15 +327,15 @@ private:
             if (at == word_end || *at == '/') continue;
             at = parse_integer(at, word_end, number);
             if (at == nullptr) return bad_corner();
-            Result<void> done =
-                slash == 0 ? resolve(number, uvs_seen_, uvs_.size(), "texture coordinate", line, corner.uv)
-                           : resolve(number, normals_seen_, normals_.size(), "normal", line, corner.normal);
+            Result<void> done = slash == 0
+                                    ? resolve(number, uvs_seen_, uvs_.size(), "texture coordinate", line, corner.uv)
+                                    : resolve(number, normals_seen_, normals_.size(), "normal", line, corner.normal);
             if (!done) return done;
         }
         if (at != word_end) return bad_corner();
         if (corner.normal != none && !is_finite(normals_[corner.normal])) {
-            return bad(line, "face " + std::to_string(result_.source_faces + 1) + " uses normal " + std::to_string(corner.normal + 1) +
-                                 ", which is NaN or infinite; correct it.");
+            return bad(line, "face " + std::to_string(result_.source_faces + 1) + " uses normal " +
+                                 std::to_string(corner.normal + 1) + ", which is NaN or infinite; correct it.");
         }
         has_uvs_ = has_uvs_ || corner.uv != none;
         has_normals_ = has_normals_ || corner.normal != none;
@@ -350,7 +351,9 @@ private:
             return bad(line, "face " + std::to_string(result_.source_faces + 1) + " uses " + what + " " +
                                  std::to_string(number) + ", but there are " +
                                  std::to_string(number < 0 ? seen : total) +
-                                 (number == 0 ? ", numbered from 1" : number < 0 ? " before it" : "") +
+                                 (number == 0  ? ", numbered from 1"
+                                  : number < 0 ? " before it"
+                                               : "") +
                                  "; correct or remove it.");
         }
         index = static_cast<Index>(number > 0 ? number - 1 : static_cast<std::int64_t>(seen) + number);
@@ -374,7 +377,8 @@ private:
         const std::string where = "line " + std::to_string(line) + ": the materials in " + in_quotes(library);
         const auto path = path_beside(library);
         if (!path || source_.folder.empty()) {
-            warn(where + " were left out: only files beside the mesh are read" + (path ? ", and a mesh in memory has none." : "."));
+            warn(where + " were left out: only files beside the mesh are read" +
+                 (path ? ", and a mesh in memory has none." : "."));
             return {};
         }
         if (!libraries_.insert(*path).second) return {}; // it is often named again and again
@@ -406,7 +410,8 @@ private:
     }
 
     void note_unknown(std::string_view keyword, std::uint64_t line) {
-        if (std::find(std::begin(ignored_keywords), std::end(ignored_keywords), keyword) != std::end(ignored_keywords)) {
+        if (std::find(std::begin(ignored_keywords), std::end(ignored_keywords), keyword) !=
+            std::end(ignored_keywords)) {
             return;
         }
         if (unknown_++ == 0) {
@@ -434,7 +439,8 @@ private:
         Mesh& mesh = result_.mesh;
         VertexTable table(mesh.positions.size(), uvs_, normals_);
         for (std::size_t i = 0; i < triangle_corners_.size(); ++i) {
-            has_index_overflow_ = !table.find(triangle_corners_[i], mesh.triangles[i / 3][i % 3]) || has_index_overflow_;
+            has_index_overflow_ =
+                !table.find(triangle_corners_[i], mesh.triangles[i / 3][i % 3]) || has_index_overflow_;
         }
         const std::size_t vertices = mesh.positions.size() + table.added().size();
         if (has_uvs_) mesh.uvs.reserve(vertices);
@@ -475,8 +481,9 @@ private:
         for (const MeshRange& range : ranges())
             if (range.kind == MeshRange::Kind::material && !known.contains(range.name)) unknown.insert(range.name);
         if (!unknown.empty())
-            warn(std::to_string(unknown.size()) + (unknown.size() == 1 ? " material is" : " materials are") + " in no library that was read, the first " +
-                 in_quotes(*unknown.begin()) + "; its faces are left as they are.");
+            warn(std::to_string(unknown.size()) + (unknown.size() == 1 ? " material is" : " materials are") +
+                 " in no library that was read, the first " + in_quotes(*unknown.begin()) +
+                 "; its faces are left as they are.");
     }
 
     Error too_many_vertices() const {

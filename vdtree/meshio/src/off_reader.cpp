@@ -52,7 +52,8 @@ public:
         if (Result<void> vertices = read_vertices(); !vertices) return vertices.error();
         if (Result<void> faces = read_faces(); !faces) return faces.error();
         if (small_faces_ > 0) {
-            result_.warnings.push_back(counted_were(small_faces_, "face") + " left out for having fewer than 3 corners.");
+            result_.warnings.push_back(counted_were(small_faces_, "face") +
+                                       " left out for having fewer than 3 corners.");
         }
         if (const auto fanned = polygons_.fanned_concave(); fanned > 0) {
             result_.warnings.push_back(counted_were(fanned, "intricate concave polygon") + " cut into a fan.");
@@ -68,7 +69,8 @@ private:
             word = words_.next();
         }
         if (word == "BINARY") return unsupported("binary OFF is not read; convert it to ASCII OFF or PLY.");
-        if (keyword_.is_other_dimension) return unsupported("4OFF and nOFF are not read; project it to three dimensions.");
+        if (keyword_.is_other_dimension)
+            return unsupported("4OFF and nOFF are not read; project it to three dimensions.");
         if (Result<void> done = to_count(word, "vertices", vertex_count_); !done) return done;
         if (Result<void> done = to_count(words_.next(), "faces", face_count_); !done) return done;
         // The number of edges is there in most files, and nobody needs it.
@@ -119,14 +121,13 @@ private:
         const std::size_t normal_size = keyword_.has_normals ? 3 : 0;
         const std::size_t uv_size = keyword_.has_uvs ? 2 : 0;
         const std::size_t colour_size = count - std::min(count, normal_size + uv_size);
-        const bool has_right_count =
-            count >= normal_size + uv_size &&
-            (keyword_.has_colours ? colour_size == 3 || colour_size == 4 : colour_size == 0);
+        const bool has_right_count = count >= normal_size + uv_size &&
+                                     (keyword_.has_colours ? colour_size == 3 || colour_size == 4 : colour_size == 0);
         if (!has_right_count) {
-            return malformed_line(source_, words_.line(), "vertex " + std::to_string(vertex) + " has " +
-                                                              std::to_string(count) +
-                                                              " numbers behind its coordinates, which is not what the "
-                                                              "first line of the file announces; correct one of them.");
+            return malformed_line(source_, words_.line(),
+                                  "vertex " + std::to_string(vertex) + " has " + std::to_string(count) +
+                                      " numbers behind its coordinates, which is not what the "
+                                      "first line of the file announces; correct one of them.");
         }
         Mesh& mesh = result_.mesh;
         if (keyword_.has_normals) mesh.normals.emplace_back(extra[0], extra[1], extra[2]);
@@ -157,9 +158,9 @@ private:
             std::int64_t size = 0;
             if (Result<void> done = to_index(words_.next(), i, size); !done) return done;
             if (size < 0 || static_cast<std::uint64_t>(size) > words_.remaining() / 2) {
-                return malformed_line(source_, words_.line(), "face " + std::to_string(i) + " claims " +
-                                                                  std::to_string(size) +
-                                                                  " corners, more than the file can hold; correct it.");
+                return malformed_line(source_, words_.line(),
+                                      "face " + std::to_string(i) + " claims " + std::to_string(size) +
+                                          " corners, more than the file can hold; correct it.");
             }
             corners_.resize(static_cast<std::size_t>(size));
             for (Index& corner : corners_) {
@@ -175,10 +176,10 @@ private:
         std::int64_t index = 0;
         if (Result<void> done = to_index(words_.next(), face, index); !done) return done;
         if (index < 0 || static_cast<std::uint64_t>(index) >= vertex_count_) {
-            return malformed_line(source_, words_.line(), "face " + std::to_string(face) + " uses vertex " +
-                                                              std::to_string(index) + ", but there are " +
-                                                              std::to_string(vertex_count_) +
-                                                              ", numbered from 0; correct or remove it.");
+            return malformed_line(source_, words_.line(),
+                                  "face " + std::to_string(face) + " uses vertex " + std::to_string(index) +
+                                      ", but there are " + std::to_string(vertex_count_) +
+                                      ", numbered from 0; correct or remove it.");
         }
         corner = static_cast<Index>(index);
         return {};
@@ -200,8 +201,9 @@ private:
     Result<void> to_count(std::string_view word, const char* what, std::uint64_t& count) {
         std::int64_t value = 0;
         if (!to_integer(word, value) || value < 0) {
-            return malformed_line(source_, words_.line(), std::string("the number of ") + what +
-                                                              " should stand here, not " + in_quotes(word) + ".");
+            return malformed_line(source_, words_.line(),
+                                  std::string("the number of ") + what + " should stand here, not " + in_quotes(word) +
+                                      ".");
         }
         count = static_cast<std::uint64_t>(value);
         return {};
@@ -219,8 +221,8 @@ private:
 
     Error not_a_number(const std::string& where, std::string_view word) const {
         if (word.empty()) return malformed(source_, "it ends within " + where + "; the file is cut short.");
-        return malformed_line(source_, words_.line(), where + " has " + in_quotes(word) +
-                                                          " where a number should be; correct it.");
+        return malformed_line(source_, words_.line(),
+                              where + " has " + in_quotes(word) + " where a number should be; correct it.");
     }
 
     Error unsupported(const std::string& what) const { return {ErrorCode::unsupported, source_.name + ": " + what}; }
@@ -243,9 +245,7 @@ private:
 
 } // namespace
 
-bool starts_with_off_keyword(std::string_view bytes) {
-    return parse_keyword(WordScanner(bytes, true).next()).is_off;
-}
+bool starts_with_off_keyword(std::string_view bytes) { return parse_keyword(WordScanner(bytes, true).next()).is_off; }
 
 Result<ReadResult> read_off(const MeshSource& source) { return OffReader(source).read(); }
 

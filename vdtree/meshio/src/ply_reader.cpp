@@ -75,8 +75,9 @@ Result<Property> parse_property(const MeshSource& source, std::uint64_t line_num
         word = take_word(line);
         const auto count_type = to_type(word);
         if (!count_type || !is_integer(*count_type)) {
-            return malformed_line(source, line_number, "a list is counted by an integer type, not by " + in_quotes(word) +
-                                                           "; correct the header.");
+            return malformed_line(source, line_number,
+                                  "a list is counted by an integer type, not by " + in_quotes(word) +
+                                      "; correct the header.");
         }
         property.count_type = *count_type;
         word = take_word(line);
@@ -108,13 +109,16 @@ Result<Encoding> parse_format(const MeshSource& source, std::uint64_t line_numbe
     const std::string_view name = take_word(line);
     const std::string_view version = take_word(line);
     if (version != "1.0") {
-        return malformed_line(source, line_number, "version " + in_quotes(version) + " of PLY is unknown; expected 1.0.");
+        return malformed_line(source, line_number,
+                              "version " + in_quotes(version) + " of PLY is unknown; expected 1.0.");
     }
     if (name == "ascii") return Encoding::ascii;
     if (name == "binary_little_endian") return Encoding::little_endian;
     if (name == "binary_big_endian") return Encoding::big_endian;
-    return malformed_line(source, line_number, "the format " + in_quotes(name) + " is unknown; expected ascii, "
-                                               "binary_little_endian or binary_big_endian.");
+    return malformed_line(source, line_number,
+                          "the format " + in_quotes(name) +
+                              " is unknown; expected ascii, "
+                              "binary_little_endian or binary_big_endian.");
 }
 
 // The byte after end_header's newline. A CR before an LF belongs to it unless the header's lines end in a lone CR: then
@@ -302,12 +306,30 @@ Slot slot_of(const Property& property) {
         std::string_view name;
         Slot slot;
     };
-    static constexpr Name names[] = {
-        {"x", x},         {"y", y},           {"z", z},         {"nx", nx},           {"ny", ny},
-        {"nz", nz},       {"red", red},       {"green", green}, {"blue", blue},       {"alpha", alpha},
-        {"r", red},       {"g", green},       {"b", blue},      {"diffuse_red", red}, {"diffuse_green", green},
-        {"diffuse_blue", blue},               {"s", u},         {"t", v},             {"u", u},
-        {"v", v},         {"texture_u", u},   {"texture_v", v}, {"texture_s", u},     {"texture_t", v}};
+    static constexpr Name names[] = {{"x", x},
+                                     {"y", y},
+                                     {"z", z},
+                                     {"nx", nx},
+                                     {"ny", ny},
+                                     {"nz", nz},
+                                     {"red", red},
+                                     {"green", green},
+                                     {"blue", blue},
+                                     {"alpha", alpha},
+                                     {"r", red},
+                                     {"g", green},
+                                     {"b", blue},
+                                     {"diffuse_red", red},
+                                     {"diffuse_green", green},
+                                     {"diffuse_blue", blue},
+                                     {"s", u},
+                                     {"t", v},
+                                     {"u", u},
+                                     {"v", v},
+                                     {"texture_u", u},
+                                     {"texture_v", v},
+                                     {"texture_s", u},
+                                     {"texture_t", v}};
     for (const Name& candidate : names) {
         if (property.name == candidate.name) return candidate.slot;
     }
@@ -352,7 +374,8 @@ VertexLayout vertex_layout(const Element& element) {
 
 const Property* index_list(const Element& element) {
     for (const Property& property : element.properties) {
-        if (property.is_list && (property.name == "vertex_indices" || property.name == "vertex_index")) return &property;
+        if (property.is_list && (property.name == "vertex_indices" || property.name == "vertex_index"))
+            return &property;
     }
     return nullptr;
 }
@@ -431,7 +454,8 @@ private:
     Result<void> check_count(const Body& body, const Element& element) {
         if (element.count == 0) return {};
         if (element.properties.empty()) {
-            return malformed(source_, "its element " + in_quotes(element.name) + " has no properties; correct the header.");
+            return malformed(source_,
+                             "its element " + in_quotes(element.name) + " has no properties; correct the header.");
         }
         std::size_t row = 0;
         for (const Property& property : element.properties) {
@@ -483,8 +507,8 @@ private:
             if (!pulse(body, row)) return cancelled(source_);
             for (std::size_t i = 0; i < layout.slots.size(); ++i) {
                 const Property& property = element.properties[i];
-                const bool read = property.is_list ? skip_property(body, property)
-                                                   : body.real(property.type, value[layout.slots[i]]);
+                const bool read =
+                    property.is_list ? skip_property(body, property) : body.real(property.type, value[layout.slots[i]]);
                 if (!read) return broken(body, element, row);
             }
             mesh.positions.emplace_back(value[x], value[y], value[z]);

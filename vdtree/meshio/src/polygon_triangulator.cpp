@@ -142,8 +142,8 @@ bool PolygonTriangulator::is_ear(std::size_t at, int strictness) {
         const double ab = cross(a, b, p);
         const double bc = cross(b, c, p);
         const double ca = cross(c, a, p);
-        const bool is_inside = strictness == proper_ear ? ab >= 0.0 && bc >= 0.0 && ca >= 0.0
-                                                        : ab > 0.0 && bc > 0.0 && ca > 0.0;
+        const bool is_inside =
+            strictness == proper_ear ? ab >= 0.0 && bc >= 0.0 && ca >= 0.0 : ab > 0.0 && bc > 0.0 && ca > 0.0;
         if (is_inside) return false;
     }
     return true;

@@ -44,8 +44,8 @@ private:
 
     std::int64_t tests_left_ = 100'000'000; // point-in-triangle tests, less than a second
     std::uint64_t fanned_concave_ = 0;
-    std::vector<glm::dvec2> points_;        // projected, largest coordinate 1, counter-clockwise
-    std::vector<Index> ring_;               // corners not yet cut off
+    std::vector<glm::dvec2> points_; // projected, largest coordinate 1, counter-clockwise
+    std::vector<Index> ring_;        // corners not yet cut off
     std::vector<Triangle> triangles_;
 };
 

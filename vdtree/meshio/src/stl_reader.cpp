@@ -1,7 +1,7 @@
 // STL, ASCII and binary. Facets keep their own three vertices: nothing is welded.
-#include <vdtree/internal/finite.h>
 #include "mesh_readers.h"
 #include "text_scanner.h"
+#include <vdtree/internal/finite.h>
 
 #include <algorithm>
 #include <array>
@@ -33,9 +33,8 @@ std::uint64_t claimed_facets(std::string_view bytes) {
 }
 
 bool equals_ignoring_case(std::string_view word, std::string_view lower) {
-    return std::equal(word.begin(), word.end(), lower.begin(), lower.end(), [](char a, char b) {
-        return std::tolower(static_cast<unsigned char>(a)) == b;
-    });
+    return std::equal(word.begin(), word.end(), lower.begin(), lower.end(),
+                      [](char a, char b) { return std::tolower(static_cast<unsigned char>(a)) == b; });
 }
 
 // "solid" and a name, then a facet or the end: some binary files start with "solid" too.
@@ -70,13 +69,15 @@ void settle_normals(ReadResult& result) {
         ++not_finite;
     }
     if (not_finite > 0) {
-        result.warnings.push_back(counted_were(not_finite / 3, "facet normal") + " not finite and computed from the corners.");
+        result.warnings.push_back(counted_were(not_finite / 3, "facet normal") +
+                                  " not finite and computed from the corners.");
     }
     if (!any) mesh.normals = {};
 }
 
 Error too_many_facets(const MeshSource& source) {
-    return {ErrorCode::unsupported, source.name + ": it has more facets than 32-bit indices can number; split the mesh."};
+    return {ErrorCode::unsupported,
+            source.name + ": it has more facets than 32-bit indices can number; split the mesh."};
 }
 
 glm::vec3 vector_at(const char* bytes) {
@@ -105,9 +106,9 @@ Result<ReadResult> read_binary(const MeshSource& source) {
         if (i % rows_per_progress == 0 && !source.keep_going(preamble_bytes + i * facet_bytes, "reading STL")) {
             return cancelled(source);
         }
-        add_facet(result, vector_at(facet),
-                  {glm::dvec3(vector_at(facet + 12)), glm::dvec3(vector_at(facet + 24)),
-                   glm::dvec3(vector_at(facet + 36))});
+        add_facet(
+            result, vector_at(facet),
+            {glm::dvec3(vector_at(facet + 12)), glm::dvec3(vector_at(facet + 24)), glm::dvec3(vector_at(facet + 36))});
     }
     if (bytes.size() > preamble_bytes + count * facet_bytes) {
         result.warnings.push_back("data behind the last facet were ignored.");
@@ -189,7 +190,8 @@ private:
 
     Error unexpected(const std::string& wanted, std::string_view word) const {
         const std::string where = "facet " + std::to_string(result_.source_faces);
-        if (word.empty()) return malformed(source_, "it ends at " + where + " without " + wanted + "; it is cut short.");
+        if (word.empty())
+            return malformed(source_, "it ends at " + where + " without " + wanted + "; it is cut short.");
         return malformed_line(source_, words_.line(),
                               where + " has " + in_quotes(word) + " where " + wanted + " should be; correct it.");
     }
@@ -202,8 +204,7 @@ private:
 } // namespace
 
 bool is_binary_stl(std::string_view bytes) {
-    return bytes.size() >= preamble_bytes &&
-           bytes.size() - preamble_bytes == claimed_facets(bytes) * facet_bytes;
+    return bytes.size() >= preamble_bytes && bytes.size() - preamble_bytes == claimed_facets(bytes) * facet_bytes;
 }
 
 Result<ReadResult> read_stl(const MeshSource& source) {

@@ -32,7 +32,8 @@ inline double out_of_range_number(std::string_view digits) {
         if (is_down) exponent = -exponent;
     }
     // The place of the first digit that is not 0.
-    const std::size_t point = std::min(mantissa.find('.'), mantissa.size()), first = mantissa.find_first_of("123456789");
+    const std::size_t point = std::min(mantissa.find('.'), mantissa.size()),
+                      first = mantissa.find_first_of("123456789");
     if (first == std::string_view::npos) return is_negative ? -0.0 : 0.0;
     exponent += static_cast<std::int64_t>(point) - static_cast<std::int64_t>(first);
     const double value = exponent > 0 ? std::numeric_limits<double>::infinity() : 0.0;

@@ -69,19 +69,22 @@ private:
 class Folds {
 public:
     // Adds the directions that nodes see to `facing`, by node, and those around leaves to `around`, by their numbers among the part's.
-    Folds(const BoundInput& input, const Ancestors& ancestors, const TreePart& part, std::span<Directions> facing, std::span<Directions> around)
-        : in_(input), ancestors_(ancestors), part_(part), is_top_(input.parts.is_top(part)), border_(part.end - part.begin, 0), by_node_(facing),
-          by_leaf_(around) {
+    Folds(const BoundInput& input, const Ancestors& ancestors, const TreePart& part, std::span<Directions> facing,
+          std::span<Directions> around)
+        : in_(input), ancestors_(ancestors), part_(part), is_top_(input.parts.is_top(part)),
+          border_(part.end - part.begin, 0), by_node_(facing), by_leaf_(around) {
         if (is_top_) return; // it owns few of the nodes between its ends
         steps_.resize(part.end - part.begin + part.leaf_end - part.first_leaf);
         Step* step = steps_.data();
         for (NodeId node = part.begin; node < part.end; ++node) step_from(node, *step++);
-        for (Index leaf = part.first_leaf; leaf < part.leaf_end; ++leaf) step_from(input.shape.node_of_leaf(leaf), *step++);
+        for (Index leaf = part.first_leaf; leaf < part.leaf_end; ++leaf)
+            step_from(input.shape.node_of_leaf(leaf), *step++);
     }
 
     // `leaves`: the numbers of the triangle's corners among the part's leaves; none: elsewhere.
     void add(const Triangle& triangle, const Triangle& leaves) {
-        if (is_top_ || leaves[0] == none || leaves[1] == none || leaves[2] == none) return follow_from_elsewhere(triangle, leaves);
+        if (is_top_ || leaves[0] == none || leaves[1] == none || leaves[2] == none)
+            return follow_from_elsewhere(triangle, leaves);
         const Step* const leaf_steps = steps_.data() + (part_.end - part_.begin);
         Followed& f = followed_[count_];
         for (std::size_t k = 0; k < 3; ++k) f.put(k, leaf_steps[leaves[k]]);
@@ -179,8 +182,8 @@ private:
     struct Scattered {
         Corner at[3];
         NodeId nodes[3], above[3];
-        Index next[3];                // when the corner moves to the node above; never: it is not followed
-        bool current[3];              // whether the corner is where `nodes` says until then
+        Index next[3];   // when the corner moves to the node above; never: it is not followed
+        bool current[3]; // whether the corner is where `nodes` says until then
 
         void put(std::size_t k, NodeId node, const Step& step) {
             at[k] = step.corner();
@@ -263,22 +266,25 @@ private:
 
 class FacingBounder {
 public:
-    FacingBounder(const BoundInput& input, std::span<const Triangle> triangles, const LeafPlaces& places, std::span<const Sphere> support,
-                  const Ancestors& ancestors)
-        : in_(input), triangles_(triangles), places_(places), support_(support), ancestors_(ancestors), facing_(input.shape.interior(), Unfilled()),
-          welded_number_(input.shape.leaves()) {
+    FacingBounder(const BoundInput& input, std::span<const Triangle> triangles, const LeafPlaces& places,
+                  std::span<const Sphere> support, const Ancestors& ancestors)
+        : in_(input), triangles_(triangles), places_(places), support_(support), ancestors_(ancestors),
+          facing_(input.shape.interior(), Unfilled()), welded_number_(input.shape.leaves()) {
         Index welded = 0;
-        for (Index leaf = 0; leaf < input.shape.leaves(); ++leaf) welded_number_[leaf] = places.alone[leaf] ? welded : welded++;
+        for (Index leaf = 0; leaf < input.shape.leaves(); ++leaf)
+            welded_number_[leaf] = places.alone[leaf] ? welded : welded++;
         welded_.resize(welded);
     }
 
     ParallelArray<Directions> run() {
         std::vector<Outcome> outcomes(in_.parts.count());
-        tbb::parallel_for(std::size_t{0}, outcomes.size(), [&](std::size_t i) { look_around(in_.parts[i], outcomes[i]); });
+        tbb::parallel_for(std::size_t{0}, outcomes.size(),
+                          [&](std::size_t i) { look_around(in_.parts[i], outcomes[i]); });
         // The dilation runs over places: an unwelded crease is no end of the surface.
         for (Index leaf = 0; leaf < in_.shape.leaves(); ++leaf)
             if (places_.weld[leaf] != leaf) welded(places_.weld[leaf]) |= welded(leaf);
-        tbb::parallel_for(std::size_t{0}, outcomes.size(), [&](std::size_t i) { look_across_welds(in_.parts[i], outcomes[i]); });
+        tbb::parallel_for(std::size_t{0}, outcomes.size(),
+                          [&](std::size_t i) { look_across_welds(in_.parts[i], outcomes[i]); });
         for (const Outcome& outcome : outcomes)
             for (const Letter& letter : outcome.letters) facing_[letter.to] |= letter.content;
         in_.parts.bottom_up([&] { return [&](NodeId node) { add_children(node); }; });
@@ -323,7 +329,8 @@ private:
     class OwnLeaves {
     public:
         OwnLeaves(const BoundInput& input, const TreePart& part)
-            : parts_(input.parts), part_(part), first_(part.first_leaf), end_(part.leaf_end), is_top_(input.parts.is_top(part)) {
+            : parts_(input.parts), part_(part), first_(part.first_leaf), end_(part.leaf_end),
+              is_top_(input.parts.is_top(part)) {
             for (Index leaf = first_; is_top_ && leaf < end_; ++leaf)
                 if (input.parts.owns_leaf(part, leaf)) scattered_.push_back(leaf);
         }
@@ -333,7 +340,8 @@ private:
         Index number(Index leaf) const {
             if (!is_top_) return leaf - first_ < end_ - first_ ? leaf - first_ : Folds::none;
             if (!parts_.owns_leaf(part_, leaf)) return Folds::none;
-            return static_cast<Index>(std::lower_bound(scattered_.begin(), scattered_.end(), leaf) - scattered_.begin());
+            return static_cast<Index>(std::lower_bound(scattered_.begin(), scattered_.end(), leaf) -
+                                      scattered_.begin());
         }
 
     private:
@@ -349,7 +357,7 @@ private:
         const bool is_top = in_.parts.is_top(part);
         for (Index i = 0; i < leaves.size(); ++i) {
             const auto ring = in_.rings.around(leaves[i]);
-            if (ring.empty()) continue; // no triangle uses it
+            if (ring.empty()) continue;                                         // no triangle uses it
             if (!is_top && is_inside(part, ring) && places_.alone[leaves[i]]) { // most
                 Directions seen = around[i];
                 for (const Index neighbour : ring) seen |= around[neighbour - part.first_leaf];
@@ -376,7 +384,8 @@ private:
     // Whether all of these are leaves of the part, which is not the top, and alone at their places.
     bool is_inside(const TreePart& part, std::span<const Index> leaves) const {
         bool inside = true;
-        for (const Index leaf : leaves) inside &= leaf - part.first_leaf < part.leaf_end - part.first_leaf && places_.alone[leaf];
+        for (const Index leaf : leaves)
+            inside &= leaf - part.first_leaf < part.leaf_end - part.first_leaf && places_.alone[leaf];
         return inside;
     }
 
@@ -410,7 +419,8 @@ private:
             return;
         }
         Directions seen = facing_[node];
-        in_.shape.for_each_child(node, [&](NodeId child) { seen |= facing_[child]; }, [](Index) {});
+        in_.shape.for_each_child(
+            node, [&](NodeId child) { seen |= facing_[child]; }, [](Index) {});
         facing_[node] = seen;
     }
 
@@ -428,8 +438,9 @@ private:
 
 } // namespace
 
-ParallelArray<Directions> bound_facing(const BoundInput& input, std::span<const Triangle> triangles, const LeafPlaces& places,
-                                       std::span<const Sphere> support, const Ancestors& ancestors) {
+ParallelArray<Directions> bound_facing(const BoundInput& input, std::span<const Triangle> triangles,
+                                       const LeafPlaces& places, std::span<const Sphere> support,
+                                       const Ancestors& ancestors) {
     return FacingBounder(input, triangles, places, support, ancestors).run();
 }
 

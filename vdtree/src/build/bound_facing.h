@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "build/bound_spheres.h"
-#include "tree/directions.h"
 #include "build/parallel_array.h"
+#include "tree/directions.h"
 
 namespace unseen::vdtree {
 
@@ -16,7 +16,8 @@ namespace unseen::vdtree {
 // and the same of all nodes below. Nothing for nodes whose leaves are at one point: when they fold nothing moves.
 //
 // Marked where the ring has an irregular edge.
-ParallelArray<Directions> bound_facing(const BoundInput& input, std::span<const Triangle> triangles, const LeafPlaces& places,
-                                       std::span<const Sphere> support, const Ancestors& ancestors);
+ParallelArray<Directions> bound_facing(const BoundInput& input, std::span<const Triangle> triangles,
+                                       const LeafPlaces& places, std::span<const Sphere> support,
+                                       const Ancestors& ancestors);
 
 } // namespace unseen::vdtree

@@ -8,8 +8,8 @@
 #include <glm/geometric.hpp>
 
 #include "build/bounding_sphere.h"
-#include "cut/kernel/prefetch.h"
 #include "build/spatial_order.h"
+#include "cut/kernel/prefetch.h"
 
 namespace unseen::vdtree {
 
@@ -29,14 +29,16 @@ constexpr double node_slack = 1e-3;
 class SphereWorker {
 public:
     // `heights`: by interior node; how many there are below each other, itself the first.
-    SphereWorker(const BoundInput& input, std::span<Index> heights, NodeSpheres& out) : in_(input), heights_(heights), out_(out) {}
+    SphereWorker(const BoundInput& input, std::span<Index> heights, NodeSpheres& out)
+        : in_(input), heights_(heights), out_(out) {}
 
     void operator()(std::span<const NodeId> nodes) {
         sort(nodes);
         for (std::size_t i = 0; i < sorted_.size();) {
             lanes_ = 0;
             do nodes_[lanes_++] = sorted_[i++].index;
-            while (lanes_ < BallLanes::lanes && i < sorted_.size() && heights_[sorted_[i].index] == heights_[nodes_[0]]);
+            while (lanes_ < BallLanes::lanes && i < sorted_.size() &&
+                   heights_[sorted_[i].index] == heights_[nodes_[0]]);
             bound();
         }
     }
@@ -61,7 +63,9 @@ private:
                 });
             heights_[nodes[i]] = below + 1;
             constexpr std::uint64_t most_children = 3, most_points = 63; // a byte for both
-            sorted_.push_back({std::uint64_t{below} << 8 | std::min(children, most_children) << 6 | std::min(points, most_points), nodes[i]});
+            sorted_.push_back(
+                {std::uint64_t{below} << 8 | std::min(children, most_children) << 6 | std::min(points, most_points),
+                 nodes[i]});
         }
         scratch_.resize(sorted_.size());
         sort_by_code(sorted_, scratch_);
@@ -199,14 +203,17 @@ public:
                 [&](Index leaf) {
                     const glm::dvec3 away = in_.leaf_position(leaf) - from;
                     const double squared = glm::dot(away, away);
-                    if (squared < most_squared || (squared == most_squared && leaf > farthest) || in_.rings.around(leaf).empty()) return;
+                    if (squared < most_squared || (squared == most_squared && leaf > farthest) ||
+                        in_.rings.around(leaf).empty())
+                        return;
                     farthest = leaf;
                     most_squared = squared;
                     most = std::sqrt(squared);
                 });
             const auto children = open_.begin() + static_cast<std::ptrdiff_t>(siblings);
             if (children == open_.end()) continue;
-            std::iter_swap(std::max_element(children, open_.end(), [](const OpenNode& a, const OpenNode& b) { return a.reach < b.reach; }),
+            std::iter_swap(std::max_element(children, open_.end(),
+                                            [](const OpenNode& a, const OpenNode& b) { return a.reach < b.reach; }),
                            std::prev(open_.end()));
         }
         return in_.leaf_position(farthest);

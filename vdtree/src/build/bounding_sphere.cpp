@@ -56,7 +56,8 @@ public:
     }
 
     // Of what is on the sphere, which is the smallest around it; with no points, a single ball.
-    Basis(std::span<const glm::dvec3> points, const DSphere& sphere) : count_(static_cast<int>(points.size())), sphere_(sphere) {
+    Basis(std::span<const glm::dvec3> points, const DSphere& sphere)
+        : count_(static_cast<int>(points.size())), sphere_(sphere) {
         std::copy(points.begin(), points.end(), points_.begin());
     }
 
@@ -127,7 +128,8 @@ private:
     glm::dvec3 at(int i) const { return points_[static_cast<std::size_t>(i)]; }
 
     void consider(Best& best, const Candidate& sphere, const Subset& subset) const {
-        if (!(sphere.squared_radius >= 0) || (best.found && sphere.squared_radius >= best.sphere.squared_radius)) return;
+        if (!(sphere.squared_radius >= 0) || (best.found && sphere.squared_radius >= best.sphere.squared_radius))
+            return;
         const double limit = sphere.squared_radius * (1 + 2 * containment_slack);
         for (int i = 0; i < count_; ++i) {
             if (i == subset.with[0] || i == subset.with[1] || i == subset.with[2]) continue;
@@ -199,7 +201,8 @@ private:
 // Points that somebody else keeps, relative to one of them; for the time of one call.
 class FarPoints {
 public:
-    FarPoints(glm::dvec3 origin, const FunctionRef<glm::dvec3(glm::dvec3)>& farthest) : origin_(origin), farthest_(farthest) {}
+    FarPoints(glm::dvec3 origin, const FunctionRef<glm::dvec3(glm::dvec3)>& farthest)
+        : origin_(origin), farthest_(farthest) {}
 
     DSphere first() const { return {glm::dvec3(0), 0}; }
     Farthest farthest(glm::dvec3 from) const {
@@ -273,19 +276,21 @@ struct Sets {
 
 // Of each lane, what reaches farthest from somewhere.
 struct FarthestOfLanes {
-    BallRow ball;       // the first point of those that are farthest, or a sphere that reaches farther
-    Lane squared;       // the distance of that point
-    Lane sphere_reach;  // to the farthest far side of a sphere; negative: there is none
+    BallRow ball;      // the first point of those that are farthest, or a sphere that reaches farther
+    Lane squared;      // the distance of that point
+    Lane sphere_reach; // to the farthest far side of a sphere; negative: there is none
     Lane reach;
 
-    bool sticks_out(std::size_t lane, double radius) const { return squared[lane] > radius * radius || sphere_reach[lane] > radius; }
+    bool sticks_out(std::size_t lane, double radius) const {
+        return squared[lane] > radius * radius || sphere_reach[lane] > radius;
+    }
 };
 
 // A basis of each lane while it has up to three points.
 struct Bases {
     Row points[3];
     BallRow sphere;
-    std::array<std::int64_t, lanes> count;  // 0: a single ball
+    std::array<std::int64_t, lanes> count;   // 0: a single ball
     std::array<std::int64_t, lanes> growing; // whether something stuck out
     std::array<std::int64_t, lanes> added;   // and is in the basis now
 
@@ -333,10 +338,18 @@ struct Kernel {
         UNSEEN_INLINE friend Points operator/(Points a, Doubles b) { return {a.x / b, a.y / b, a.z / b}; }
     };
     UNSEEN_INLINE static Doubles squared(Points v) { return v.x * v.x + v.y * v.y + v.z * v.z; }
-    UNSEEN_INLINE static Points cross(Points a, Points b) { return {a.y * b.z - b.y * a.z, a.z * b.x - b.z * a.x, a.x * b.y - b.x * a.y}; }
-    UNSEEN_INLINE static Points choose(Masks which, Points a, Points b) { return {which ? a.x : b.x, which ? a.y : b.y, which ? a.z : b.z}; }
-    UNSEEN_INLINE static Points load(const Row& row, std::size_t first) { return {load(row.x, first), load(row.y, first), load(row.z, first)}; }
-    UNSEEN_INLINE static void store(Points v, Row& to, std::size_t first) { store(v.x, to.x, first), store(v.y, to.y, first), store(v.z, to.z, first); }
+    UNSEEN_INLINE static Points cross(Points a, Points b) {
+        return {a.y * b.z - b.y * a.z, a.z * b.x - b.z * a.x, a.x * b.y - b.x * a.y};
+    }
+    UNSEEN_INLINE static Points choose(Masks which, Points a, Points b) {
+        return {which ? a.x : b.x, which ? a.y : b.y, which ? a.z : b.z};
+    }
+    UNSEEN_INLINE static Points load(const Row& row, std::size_t first) {
+        return {load(row.x, first), load(row.y, first), load(row.z, first)};
+    }
+    UNSEEN_INLINE static void store(Points v, Row& to, std::size_t first) {
+        store(v.x, to.x, first), store(v.y, to.y, first), store(v.z, to.z, first);
+    }
 
     // Balls, and how far they reach from somewhere.
     struct FarBalls {
@@ -396,7 +409,8 @@ struct Kernel {
     }
 
     // As Basis::add() of what sticks out by more than a share of the radius.
-    UNSEEN_INLINE static void add_to_pairs(const PairBases& pair, const FarBalls& far, double slack, Bases& bases, std::size_t first) {
+    UNSEEN_INLINE static void add_to_pairs(const PairBases& pair, const FarBalls& far, double slack, Bases& bases,
+                                           std::size_t first) {
         const Doubles limit = pair.radius * (1 + slack);
         const Masks grows = (far.squared > limit * limit) | (far.sphere_reach > limit);
         // The point: of a sphere, the one on the far side.
@@ -407,7 +421,8 @@ struct Kernel {
         const Points a = pair.p - p, b = pair.q - p, half_a = a * (Doubles{} + 0.5), half_b = b * (Doubles{} + 0.5);
         const Doubles aa = squared(half_a), bb = squared(half_b);
         const double tight = 1 + 2 * containment_slack;
-        const Masks with_a = squared(pair.q - (p + half_a)) <= aa * tight, with_b = (squared(pair.p - (p + half_b)) <= bb * tight) & ~with_a;
+        const Masks with_a = squared(pair.q - (p + half_a)) <= aa * tight,
+                    with_b = (squared(pair.p - (p + half_b)) <= bb * tight) & ~with_a;
         // Around all three.
         const Points normal = cross(a, b);
         const Doubles length_a = squared(a), length_b = squared(b), flat = squared(normal);
@@ -428,7 +443,8 @@ struct Kernel {
     }
 
     UNSEEN_INLINE static void find_farthest(const Sets& sets, const Row& from, FarthestOfLanes& out) {
-        for (std::size_t first = 0; first < lanes; first += width) store(farthest_in(sets, load(from, first), first), out, first);
+        for (std::size_t first = 0; first < lanes; first += width)
+            store(farthest_in(sets, load(from, first), first), out, first);
     }
 
     // What most lanes need, as grow_basis() does it: a pair far apart, and what sticks out farthest from the sphere around it. `far`: from its centre.
@@ -445,12 +461,20 @@ struct Kernel {
 
 using FindFarthest = void(const Sets& sets, const Row& from, FarthestOfLanes& out);
 using Begin = void(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far);
-void find_with_any(const Sets& sets, const Row& from, FarthestOfLanes& out) { Kernel<2>::find_farthest(sets, from, out); }
-void begin_with_any(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far) { Kernel<2>::begin(sets, slack, bases, far); }
+void find_with_any(const Sets& sets, const Row& from, FarthestOfLanes& out) {
+    Kernel<2>::find_farthest(sets, from, out);
+}
+void begin_with_any(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far) {
+    Kernel<2>::begin(sets, slack, bases, far);
+}
 
 // Neither has fused operations, so both give the same bits.
-UNSEEN_AVX2 void find_with_avx2(const Sets& sets, const Row& from, FarthestOfLanes& out) { Kernel<4>::find_farthest(sets, from, out); }
-UNSEEN_AVX2 void begin_with_avx2(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far) { Kernel<4>::begin(sets, slack, bases, far); }
+UNSEEN_AVX2 void find_with_avx2(const Sets& sets, const Row& from, FarthestOfLanes& out) {
+    Kernel<4>::find_farthest(sets, from, out);
+}
+UNSEEN_AVX2 void begin_with_avx2(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& far) {
+    Kernel<4>::begin(sets, slack, bases, far);
+}
 FindFarthest* const find = has_avx2() ? find_with_avx2 : find_with_any;
 Begin* const begin_bases = has_avx2() ? begin_with_avx2 : begin_with_any;
 

@@ -17,11 +17,11 @@
 #include "build/bound_facing.h"
 #include "build/bound_spheres.h"
 #include "build/help_cluster.h"
-#include "tree/mask_pool.h"
 #include "build/order_nodes.h"
 #include "build/parallel_array.h"
 #include "build/place_proxies.h"
 #include "build/surface.h"
+#include "tree/mask_pool.h"
 #include <vdtree/internal/texture_bounds.h>
 #include <vdtree/internal/texture_fit.h>
 #include <vdtree/internal/vertex_tree_data.h>
@@ -71,7 +71,7 @@ Error cancelled_error() { return {ErrorCode::cancelled, "Building the tree was c
 // The input less what cannot be built on: triangles that use a vertex twice, and vertices that no triangle uses
 // (these come back as leaves of a subtree of their own).
 struct CleanMesh {
-    Mesh storage; // used where something had to go, like the next
+    Mesh storage;                        // used where something had to go, like the next
     std::vector<Index> source_vertices;  // by clean vertex
     std::vector<Index> source_triangles; // by clean triangle
     std::vector<Index> unreferenced;     // source vertices
@@ -173,7 +173,8 @@ Result<void> check(const Clustering& c, std::size_t vertices) {
                        std::to_string(c.parents.size() - vertices) + " clusters.");
     const std::size_t root = c.parents.size() - 1;
     if (c.parents[root] != root)
-        return invalid("The last cluster, " + std::to_string(root) + ", is the root and has the parent " + std::to_string(c.parents[root]) + "; the root's is its own number.");
+        return invalid("The last cluster, " + std::to_string(root) + ", is the root and has the parent " +
+                       std::to_string(c.parents[root]) + "; the root's is its own number.");
     for (std::size_t i = 0; i < root; ++i) {
         if (!(c.parents[i] > i && c.parents[i] <= root) || c.parents[i] < vertices)
             return invalid("Cluster " + std::to_string(i) + " has the parent " + std::to_string(c.parents[i]) +
@@ -216,7 +217,8 @@ Result<void> check_attributes(const MeshView& mesh) {
     if (mesh.texture.empty()) return {};
     for (std::size_t v = 0; v < mesh.colours.size(); ++v) // what textures are multiplied with
         for (int k = 0; k < 3; ++k)
-            if (!(mesh.colours[v][k] >= 0 && mesh.colours[v][k] <= 1)) return invalid("A mesh with a texture needs colours from 0 to 1; correct that", v);
+            if (!(mesh.colours[v][k] >= 0 && mesh.colours[v][k] <= 1))
+                return invalid("A mesh with a texture needs colours from 0 to 1; correct that", v);
     return {};
 }
 
@@ -279,7 +281,8 @@ Result<VertexTree> TreeBuilder::build(const Clusterer& clusterer) {
     g_->dropped_triangles = clean_.dropped + options_.dropped_before;
     g_->ranges.assign(source_.ranges.begin(), source_.ranges.end());
     auto data = std::make_shared<VertexTree::Data>();
-    data->light = std::make_shared<TreeLuminance>(derive_luminance(*g_, *parts_, options_.light, prelit_, is_textured()));
+    data->light =
+        std::make_shared<TreeLuminance>(derive_luminance(*g_, *parts_, options_.light, prelit_, is_textured()));
     data->geometry = std::move(g_);
     if (reporter_.cancelled(1.0, "done")) return cancelled_error();
     return VertexTree(std::move(data));
@@ -307,8 +310,8 @@ Result<void> TreeBuilder::analyse() {
 std::vector<float> TreeBuilder::find_luminance() const {
     std::vector<float> luminance(mesh_.positions.size());
     tbb::parallel_for(std::size_t{0}, luminance.size(), [&](std::size_t v) {
-        luminance[v] = vertex_luminance(surface_.normals[v], mesh_.colours.empty() ? nullptr : &mesh_.colours[v], options_.light, prelit_,
-                                        is_textured());
+        luminance[v] = vertex_luminance(surface_.normals[v], mesh_.colours.empty() ? nullptr : &mesh_.colours[v],
+                                        options_.light, prelit_, is_textured());
     });
     return luminance;
 }
@@ -326,7 +329,8 @@ void TreeBuilder::order(const Clustering& clustering) {
     nodes_ = order_nodes(clustering, vertices, static_cast<Index>(clean_.unreferenced.size()));
     std::vector<Index> source_vertices(nodes_.leaf_of_vertex.size());
     tbb::parallel_for(Index{0}, static_cast<Index>(source_vertices.size()), [&](Index v) {
-        source_vertices[nodes_.leaf_of_vertex[v]] = v < vertices ? clean_.source_vertex(v) : clean_.unreferenced[v - vertices];
+        source_vertices[nodes_.leaf_of_vertex[v]] =
+            v < vertices ? clean_.source_vertex(v) : clean_.unreferenced[v - vertices];
     });
     g_->source_vertices = std::move(source_vertices);
     parts_.emplace(nodes_.shape.links());
@@ -422,14 +426,16 @@ void TreeBuilder::bound() {
     NodeSpheres spheres = bound_spheres(input);
     g_->bounding_sphere = bound_corners(input, spheres.support);
     g_->displacement = bound_displacements(input, spheres.support);
-    const ParallelArray<Directions> facing = bound_facing(input, triangles.triangles, places, spheres.support, ancestors);
+    const ParallelArray<Directions> facing =
+        bound_facing(input, triangles.triangles, places, spheres.support, ancestors);
     g_->support_spheres = std::move(spheres.support);
     const std::vector<std::uint8_t> is_translucent = find_translucent(triangles.triangles);
     std::vector<NodeBounds> bounds(shape.interior());
     tbb::parallel_for(NodeId{0}, shape.interior(), [&](NodeId node) {
         const int irregular = facing[node].marked() ? irregular_ring : 0;
         const int translucent = is_translucent.empty() || !is_translucent[node] ? 0 : translucent_ring;
-        bounds[node] = {spheres.ring[node], facing[node].slabs(), static_cast<std::uint8_t>(irregular | translucent), 0};
+        bounds[node] = {spheres.ring[node], facing[node].slabs(), static_cast<std::uint8_t>(irregular | translucent),
+                        0};
     });
     PooledMasks masks = pool_masks(facing, shape.parents);
     g_->bounds = std::move(bounds);
@@ -476,7 +482,8 @@ Result<void> check_buildable(const MeshView& mesh, const BuildOptions& options) 
 
 Result<VertexTree> build_tree(const MeshView& mesh, const Clusterer& clusterer, const BuildOptions& options) {
     if (options.team)
-        return Error{ErrorCode::invalid_argument, "A team helps with quadric clustering only: leave it out where the clustering is your own."};
+        return Error{ErrorCode::invalid_argument,
+                     "A team helps with quadric clustering only: leave it out where the clustering is your own."};
     return build_with(mesh, clusterer, options);
 }
 

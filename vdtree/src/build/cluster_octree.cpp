@@ -32,7 +32,8 @@ using ClusterRef = Index;
 class Subtree {
 public:
     // `parents`: of the clusters that are there already; those that are joined here get the number of the one made from them.
-    Subtree(std::span<const glm::dvec3> positions, std::span<Index> parents) : positions_(positions), parents_(parents) {}
+    Subtree(std::span<const glm::dvec3> positions, std::span<Index> parents)
+        : positions_(positions), parents_(parents) {}
 
     // Items of distinct vertices, with their codes in a grid over all of them. Leaves the same vertices in another order.
     ClusterRef build(std::span<CodedIndex> items, std::span<CodedIndex> scratch) {
@@ -105,7 +106,8 @@ private:
     ClusterRef join(std::span<const ClusterRef> children) {
         const Index there = static_cast<Index>(parents_.size()), number = static_cast<Index>(parents_made.size());
         parents_made.push_back(number);
-        for (const ClusterRef child : children) (child < there ? parents_[child] : parents_made[child - there]) = number;
+        for (const ClusterRef child : children)
+            (child < there ? parents_[child] : parents_made[child - there]) = number;
         return there + number;
     }
 
@@ -211,7 +213,8 @@ private:
     void number() {
         const Index vertices = static_cast<Index>(positions_.size());
         std::vector<Index> first(bucket_count() + 1, vertices);
-        for (std::size_t b = 0; b < bucket_count(); ++b) first[b + 1] = first[b] + static_cast<Index>(subtrees_[b].parents_made.size());
+        for (std::size_t b = 0; b < bucket_count(); ++b)
+            first[b + 1] = first[b] + static_cast<Index>(subtrees_[b].parents_made.size());
         std::vector<Index>& parents = result_.parents;
         parents.reserve(first.back() + bucket_count());
         parents.resize(first.back());
@@ -233,9 +236,9 @@ private:
     Clustering result_;
     int bucket_shift_ = 0;
     ParallelArray<CodedIndex> items_, scratch_; // by bucket
-    std::vector<Index> bucket_begin_;         // of buckets that are not empty; one longer
+    std::vector<Index> bucket_begin_;           // of buckets that are not empty; one longer
     std::vector<Subtree> subtrees_;
-    std::vector<CodedIndex> roots_;           // by bucket
+    std::vector<CodedIndex> roots_; // by bucket
 };
 
 } // namespace

@@ -21,11 +21,11 @@
 #include <tbb/parallel_invoke.h>
 
 #include "build/help_cluster.h"
-#include "tree/message.h"
 #include "build/progress_counter.h"
 #include "build/quadric.h"
 #include "build/quadric_contraction.h"
 #include "build/spatial_order.h"
+#include "tree/message.h"
 
 namespace unseen::vdtree {
 
@@ -71,7 +71,9 @@ class KdPartition {
 public:
     KdPartition(std::span<const glm::dvec3> positions, std::span<Index> slots, std::size_t parts)
         : slots_(slots), items_(slots.size()), other_items_(slots.size()), parts_(parts) {
-        tbb::parallel_for(std::size_t{0}, slots.size(), [&](std::size_t i) { items_[i] = {positions[slots[i]], slots[i]}; });
+        tbb::parallel_for(std::size_t{0}, slots.size(), [&](std::size_t i) {
+            items_[i] = {positions[slots[i]], slots[i]};
+        });
     }
 
     // Puts the slots of parts `first` .. `end` - 1 in order; the others may be anywhere.
@@ -105,7 +107,8 @@ private:
     void split(std::size_t first_part, std::size_t parts, std::vector<Item>& from, std::vector<Item>& to) {
         if (first_part >= wanted_end_ || first_part + parts <= wanted_first_) return;
         const auto begin_of = [&](std::size_t part) { return part_begin(part, parts_, slots_.size()); };
-        const Index begin = begin_of(first_part), middle = begin_of(first_part + parts / 2), end = begin_of(first_part + parts);
+        const Index begin = begin_of(first_part), middle = begin_of(first_part + parts / 2),
+                    end = begin_of(first_part + parts);
         const std::span<Item> items = std::span(from).subspan(begin, end - begin);
         if (parts == 1) return sort_along_curve(items, slots_.subspan(begin, end - begin));
         halve(items, std::span(to).subspan(begin, end - begin), middle - begin);
@@ -122,7 +125,9 @@ private:
         const double low = bounds.low[axis], slices_per_length = slices / size[axis];
         const double scale = std::isfinite(slices_per_length) ? slices_per_length : 0;
         const auto offset = [&](const Item& item) { return item.at[axis] - low; };
-        const auto slice_of = [&](const Item& item) { return std::min(slices - 1, static_cast<std::size_t>(offset(item) * scale)); };
+        const auto slice_of = [&](const Item& item) {
+            return std::min(slices - 1, static_cast<std::size_t>(offset(item) * scale));
+        };
         std::array<Index, slices> counts{};
         for (const Item& item : from) ++counts[slice_of(item)];
         std::size_t below = 0, mixed = 0;
@@ -135,7 +140,9 @@ private:
         }
         const auto of_slice = to.subspan(below, counts[mixed]);
         std::nth_element(of_slice.begin(), of_slice.begin() + static_cast<std::ptrdiff_t>(left - below), of_slice.end(),
-                         [&](const Item& a, const Item& b) { return offset(a) != offset(b) ? offset(a) < offset(b) : a.slot < b.slot; });
+                         [&](const Item& a, const Item& b) {
+                             return offset(a) != offset(b) ? offset(a) < offset(b) : a.slot < b.slot;
+                         });
     }
 
     // Equal codes by vertex number.
@@ -146,7 +153,8 @@ private:
         for (std::size_t i = 0; i < items.size(); ++i) keys[i] = {grid.code(items[i].at), items[i].slot};
         sort_by_code(keys, scratch);
         for (auto run = keys.begin(); run != keys.end();) {
-            const auto end = std::find_if(run, keys.end(), [&](const CodedIndex& key) { return key.code != run->code; });
+            const auto end =
+                std::find_if(run, keys.end(), [&](const CodedIndex& key) { return key.code != run->code; });
             std::sort(run, end, [](const CodedIndex& a, const CodedIndex& b) { return a.index < b.index; });
             run = end;
         }
@@ -163,12 +171,16 @@ struct Members {
     Team* team = nullptr; // none: the only member
     std::size_t parts = 1;
 
-    std::size_t count() const { return team ? std::min<std::size_t>(static_cast<std::size_t>(team->size()), parts) : 1; }
+    std::size_t count() const {
+        return team ? std::min<std::size_t>(static_cast<std::size_t>(team->size()), parts) : 1;
+    }
     std::size_t rank() const { return team ? static_cast<std::size_t>(team->rank()) : 0; }
     bool has_part() const { return rank() < count(); } // there may be more members than parts
     std::size_t first_part(std::size_t member) const { return member * parts / count(); }
     // Of node `i` of the level of so many of the kd-tree: the member that has its first part.
-    std::size_t owner(std::size_t i, std::size_t level) const { return ((i * (parts / level) + 1) * count() - 1) / parts; }
+    std::size_t owner(std::size_t i, std::size_t level) const {
+        return ((i * (parts / level) + 1) * count() - 1) / parts;
+    }
 };
 
 Error strange_message() {
@@ -180,7 +192,8 @@ Error strange_message() {
 Result<void> share_slots(std::vector<Index>& slots, const Members& members) {
     const auto own_slots = [&](std::size_t member) {
         const Index begin = part_begin(members.first_part(member), members.parts, slots.size());
-        return std::span(slots).subspan(begin, part_begin(members.first_part(member + 1), members.parts, slots.size()) - begin);
+        return std::span(slots).subspan(begin, part_begin(members.first_part(member + 1), members.parts, slots.size()) -
+                                                   begin);
     };
     const auto receive = [&](std::size_t member, std::span<Index> to) {
         const std::vector<std::byte> bytes = members.team->receive(static_cast<int>(member));
@@ -221,14 +234,15 @@ Result<SpatialNumbering> number_by_space(std::span<const glm::dvec3> positions, 
     for (Index v = 0; v < vertices; ++v)
         if (coincident[v] == v) n.vertex_of_slot.push_back(v);
     const std::size_t slots = n.vertex_of_slot.size();
-    KdPartition(positions, n.vertex_of_slot, n.parts).run(members.first_part(members.rank()), members.first_part(members.rank() + 1));
+    KdPartition(positions, n.vertex_of_slot, n.parts)
+        .run(members.first_part(members.rank()), members.first_part(members.rank() + 1));
     if (members.count() > 1)
         if (const auto shared = share_slots(n.vertex_of_slot, members); !shared) return shared.error();
 
     n.first_member.assign(slots + 1, 0);
     n.place.resize(vertices);
     for (Index s = 0; s < slots; ++s) n.place[n.vertex_of_slot[s]] = s; // for now
-    if (slots == vertices) { // nothing coincides
+    if (slots == vertices) {                                            // nothing coincides
         n.members = n.vertex_of_slot;
         std::iota(n.first_member.begin(), n.first_member.end(), Index{0});
         return n;
@@ -321,7 +335,8 @@ void PartMaker::list_triangles() {
     }
     std::vector<Index> part_of(input_.mesh.positions.size());
     tbb::parallel_for(std::size_t{0}, parts, [&](std::size_t part) {
-        for (Index i = first_place(part); i < first_place(part + 1); ++i) part_of[numbering_.members[i]] = static_cast<Index>(part);
+        for (Index i = first_place(part); i < first_place(part + 1); ++i)
+            part_of[numbering_.members[i]] = static_cast<Index>(part);
     });
     // Chunk by chunk, so that each thread knows where its triangles go and their order is the mesh's.
     constexpr std::size_t chunk_size = 1 << 16;
@@ -372,10 +387,12 @@ void PartMaker::push_channels(Index v, std::vector<float>& to) const {
 
 PartMesh PartMaker::make(std::size_t part) const {
     PartMesh out;
-    const Index first_slot = part_begin(part, numbering_.parts, slots()), end_slot = part_begin(part + 1, numbering_.parts, slots());
+    const Index first_slot = part_begin(part, numbering_.parts, slots()),
+                end_slot = part_begin(part + 1, numbering_.parts, slots());
     const Index first = numbering_.first_member[first_slot], end = numbering_.first_member[end_slot];
     const auto is_own = [&](Index place) { return place >= first && place < end; };
-    const auto triangles = std::span(triangles_).subspan(first_triangle_[part], first_triangle_[part + 1] - first_triangle_[part]);
+    const auto triangles =
+        std::span(triangles_).subspan(first_triangle_[part], first_triangle_[part + 1] - first_triangle_[part]);
 
     std::vector<Index> ghosts; // places of other parts' vertices, by slot
     for (const Index t : triangles)
@@ -403,8 +420,9 @@ PartMesh PartMaker::make(std::size_t part) const {
         }
     }
     for (const Index place : ghosts) {
-        const Index slot = static_cast<Index>(std::upper_bound(numbering_.first_member.begin(), numbering_.first_member.end(), place) -
-                                              numbering_.first_member.begin() - 1);
+        const Index slot =
+            static_cast<Index>(std::upper_bound(numbering_.first_member.begin(), numbering_.first_member.end(), place) -
+                               numbering_.first_member.begin() - 1);
         if (out.ghost_slots.empty() || out.ghost_slots.back() != slot) {
             out.ghost_slots.push_back(slot);
             push_position(slot);
@@ -417,8 +435,10 @@ PartMesh PartMaker::make(std::size_t part) const {
         Triangle local = input_.mesh.triangles[t];
         for (Index& v : local) {
             const Index place = numbering_.place[v];
-            v = is_own(place) ? place - first
-                              : end - first + static_cast<Index>(std::lower_bound(ghosts.begin(), ghosts.end(), place) - ghosts.begin());
+            v = is_own(place)
+                    ? place - first
+                    : end - first +
+                          static_cast<Index>(std::lower_bound(ghosts.begin(), ghosts.end(), place) - ghosts.begin());
         }
         out.triangles.push_back(local);
     }
@@ -582,7 +602,8 @@ public:
             });
         }
         result_.parents.back() = static_cast<Index>(clusters - 1);
-        for (Index c = 0; c < result_.deviations.size(); ++c) raise(result_.parents[vertices() + c], result_.deviations[c]);
+        for (Index c = 0; c < result_.deviations.size(); ++c)
+            raise(result_.parents[vertices() + c], result_.deviations[c]);
         return std::move(result_);
     }
 
@@ -635,7 +656,8 @@ private:
             const Index parent = static_cast<Index>(result_.parents.size());
             result_.positions.push_back(input_.mesh.positions[cluster_[s]]);
             result_.parents.push_back(parent);
-            for (Index i = first_member[s]; i < first_member[s + 1]; ++i) result_.parents[numbering_.members[i]] = parent;
+            for (Index i = first_member[s]; i < first_member[s + 1]; ++i)
+                result_.parents[numbering_.members[i]] = parent;
             cluster_[s] = parent;
         }
         end_ = static_cast<Index>(result_.parents.size());
@@ -651,9 +673,10 @@ private:
     const SpatialNumbering& numbering_;
     const PartMaker& maker_;
     Clustering result_;
-    std::vector<Index> cluster_;         // by slot: the cluster that is known under its name
-    std::vector<Index> made_by_joining_; // by slot: the cluster that was made when the one of this name was joined to another
-    Index end_ = 0;                      // of the clusters that have a number
+    std::vector<Index> cluster_; // by slot: the cluster that is known under its name
+    std::vector<Index>
+        made_by_joining_; // by slot: the cluster that was made when the one of this name was joined to another
+    Index end_ = 0;       // of the clusters that have a number
     std::vector<std::vector<Index>> first_of_round_; // by record of a level, by round: the first cluster made
 };
 

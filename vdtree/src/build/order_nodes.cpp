@@ -52,7 +52,8 @@ namespace {
 class NodeOrderer {
 public:
     NodeOrderer(const Clustering& clustering, Index vertices, Index lone)
-        : parents_(clustering.parents), vertices_(vertices), lone_(lone), root_(static_cast<Index>(parents_.size()) - 1), places_(parents_.size() - vertices) {}
+        : parents_(clustering.parents), vertices_(vertices), lone_(lone),
+          root_(static_cast<Index>(parents_.size()) - 1), places_(parents_.size() - vertices) {}
 
     NodeOrder run() {
         count_up();
@@ -152,14 +153,16 @@ private:
 
     std::span<const Index> parents_; // by cluster
     Index vertices_, lone_, root_;
-    std::vector<ClusterPlace> places_; // by cluster that is no vertex
+    std::vector<ClusterPlace> places_;    // by cluster that is no vertex
     NodeId interior_ = 0, top_ = no_node; // how many nodes; the root where there are lone vertices
     NodeOrder order_;
 };
 
 } // namespace
 
-NodeOrder order_nodes(const Clustering& clustering, Index vertices, Index lone) { return NodeOrderer(clustering, vertices, lone).run(); }
+NodeOrder order_nodes(const Clustering& clustering, Index vertices, Index lone) {
+    return NodeOrderer(clustering, vertices, lone).run();
+}
 
 namespace {
 
@@ -167,11 +170,14 @@ namespace {
 //
 // When that is found is as good as random, and the processor is not to guess: all of them go up the tree in turns, a step each.
 template <std::size_t most>
-void find_vanishing(std::span<const Triangle> triangles, const NodeOrder& nodes, const Ancestors& ancestors, NodeId* out) {
+void find_vanishing(std::span<const Triangle> triangles, const NodeOrder& nodes, const Ancestors& ancestors,
+                    NodeId* out) {
     const TreeShape& shape = nodes.shape;
     std::array<NodeId, most> at;
     std::array<Index, most> low, high;
-    const auto found = [&](std::size_t i, NodeId node) { return (shape.first_leaf[node] <= low[i]) + (high[i] < shape.leaf_end[node]) > 0; };
+    const auto found = [&](std::size_t i, NodeId node) {
+        return (shape.first_leaf[node] <= low[i]) + (high[i] < shape.leaf_end[node]) > 0;
+    };
     std::array<std::uint8_t, most> left;
     std::size_t count = triangles.size();
     for (std::size_t i = 0; i < count; ++i) {
@@ -197,7 +203,8 @@ void find_vanishing(std::span<const Triangle> triangles, const NodeOrder& nodes,
         }
         count = kept;
     }
-    for (std::size_t j = 0; j < count; ++j) out[left[j]] = ancestors.lowest(at[left[j]], [&](NodeId node) { return found(left[j], node); });
+    for (std::size_t j = 0; j < count; ++j)
+        out[left[j]] = ancestors.lowest(at[left[j]], [&](NodeId node) { return found(left[j], node); });
 }
 
 } // namespace
@@ -209,7 +216,8 @@ TriangleOrder order_triangles(std::span<const Triangle> triangles, const NodeOrd
     constexpr std::size_t together = 64;
     tbb::parallel_for(std::size_t{0}, (triangles.size() + together - 1) / together, [&](std::size_t i) {
         const std::size_t begin = i * together;
-        find_vanishing<together>(triangles.subspan(begin, std::min(together, triangles.size() - begin)), nodes, ancestors, &vanishing[begin]);
+        find_vanishing<together>(triangles.subspan(begin, std::min(together, triangles.size() - begin)), nodes,
+                                 ancestors, &vanishing[begin]);
     });
     order.first_triangle.assign(shape.interior() + 1, 0);
     // Each thread looks at all triangles, for a range of the nodes: looking is cheap.

@@ -123,6 +123,8 @@ void keep_coincident_proxies(const TreeShape& shape, const TreeParts& parts, std
     keep_equal(shape, parts, positions);
 }
 
-void keep_equal_uvs(const TreeShape& shape, const TreeParts& parts, std::span<glm::vec2> uvs) { keep_equal(shape, parts, uvs); }
+void keep_equal_uvs(const TreeShape& shape, const TreeParts& parts, std::span<glm::vec2> uvs) {
+    keep_equal(shape, parts, uvs);
+}
 
 } // namespace unseen::vdtree

@@ -29,7 +29,8 @@ enum : std::size_t { gx, gy, gz, d, w, channel_size };
 } // namespace quadric
 
 inline constexpr std::size_t most_channels = 9; // luminance, normal, texture coordinates, colour
-inline constexpr std::size_t most_quadric_floats = (quadric::first_channel + most_channels * quadric::channel_size + 3) / 4 * 4;
+inline constexpr std::size_t most_quadric_floats =
+    (quadric::first_channel + most_channels * quadric::channel_size + 3) / 4 * 4;
 
 // Floats from one quadric to the next.
 constexpr std::size_t quadric_stride(std::size_t channels) {
@@ -39,7 +40,8 @@ constexpr std::size_t quadric_stride(std::size_t channels) {
 // sum = a + b, where b's place lies at (dx, dy, dz) from a's and b's references exceed a's by `difference`. F is float or
 // one of the vectors.
 template <class F>
-UNSEEN_INLINE void add_from(const F* a, const F* b, F dx, F dy, F dz, const F* difference, std::size_t channels, F* sum) {
+UNSEEN_INLINE void add_from(const F* a, const F* b, F dx, F dy, F dz, const F* difference, std::size_t channels,
+                            F* sum) {
     using namespace quadric;
     const F mdx = b[xx] * dx + b[xy] * dy + b[xz] * dz;
     const F mdy = b[xy] * dx + b[yy] * dy + b[yz] * dz;

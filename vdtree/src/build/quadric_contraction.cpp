@@ -16,6 +16,9 @@
 #include "build/quadric.h"
 #include "build/spatial_order.h"
 
+// Vectors wider than the target's are only handed to functions that are inlined.
+#pragma GCC diagnostic ignored "-Wpsabi"
+
 namespace unseen::vdtree {
 
 namespace {
@@ -50,15 +53,8 @@ template <class F, std::size_t lanes>
 UNSEEN_INLINE void gather(const float* quadrics, const Index (&clusters)[lanes], std::size_t floats, F* out) {
     const std::size_t stride = floats;
     for (std::size_t i = 0; i < floats; i += 4) {
-        const auto numbers_of = [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return quadrics + clusters[lane] * stride + i; };
-        if constexpr (lanes == 4) {
-            FourWide::load_columns(numbers_of, out + i);
-        } else {
-            Float4 low[4], high[4];
-            FourWide::load_columns(numbers_of, low);
-            FourWide::load_columns([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return numbers_of(lane + 4); }, high);
-            for (std::size_t k = 0; k < 4; ++k) out[i + k] = __builtin_shufflevector(low[k], high[k], 0, 1, 2, 3, 4, 5, 6, 7);
-        }
+        load_columns([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return quadrics + clusters[lane] * stride + i; },
+                     out + i);
     }
 }
 
@@ -105,8 +101,9 @@ private:
             for (std::size_t c = 0; c < channels_; ++c) reference[c] /= static_cast<float>(end - v);
             v = end;
         }
-        own_vertices_ = static_cast<Index>(
-            std::lower_bound(part_.slot_of_vertex.begin(), part_.slot_of_vertex.end(), own_) - part_.slot_of_vertex.begin());
+        own_vertices_ =
+            static_cast<Index>(std::lower_bound(part_.slot_of_vertex.begin(), part_.slot_of_vertex.end(), own_) -
+                               part_.slot_of_vertex.begin());
         vertex_weights_.assign(own_vertices_, static_cast<float>(least_weight));
     }
 
@@ -237,7 +234,8 @@ private:
     void add_boundary(Index low, Index high, Index side, double edge_weight) {
         using namespace quadric;
         const Triangle& t = part_.triangles[side / 3];
-        const glm::dvec3 p = corner(t[side % 3]), edge = corner(t[(side + 1) % 3]) - p, inner = corner(t[(side + 2) % 3]) - p;
+        const glm::dvec3 p = corner(t[side % 3]), edge = corner(t[(side + 1) % 3]) - p,
+                         inner = corner(t[(side + 2) % 3]) - p;
         const double squared = glm::dot(edge, edge);
         const glm::dvec3 normal = inner - edge * (glm::dot(inner, edge) / squared);
         const double length = glm::length(normal);
@@ -328,12 +326,12 @@ private:
     // are not contracted until the component is released. Then it vanishes, and its one vertex that is left becomes
     // part of what stays near it, which so grows to cover both.
     struct Component {
-        Index parent;            // itself, or the one that it was joined to across a gap
+        Index parent; // itself, or the one that it was joined to across a gap
         Index clusters = 0;
-        bool open = false;       // has edges out of the range
+        bool open = false; // has edges out of the range
         bool released = false;
-        float gap = 0;           // how far it strays when it vanishes
-        glm::dvec3 middle{0};    // while some are to be released
+        float gap = 0;        // how far it strays when it vanishes
+        glm::dvec3 middle{0}; // while some are to be released
     };
 
     Index component_of(Index cluster) {
@@ -384,7 +382,8 @@ private:
             // Ties go to the lower pair of numbers, for both.
             Nearest& best = nearest_[from];
             const auto key = [&](Index other) { return std::pair(std::min(from, other), std::max(from, other)); };
-            if (distance < best.distance || (distance == best.distance && best.component != none && key(to) < key(best.component)))
+            if (distance < best.distance ||
+                (distance == best.distance && best.component != none && key(to) < key(best.component)))
                 best = {to, distance};
         };
         for (std::size_t i = 0; i < curve_.size(); ++i) {
@@ -459,7 +458,6 @@ private:
     };
     static constexpr float unknown_error = -1;
 
-
     // Errors of as many pairs as F has lanes. `channels` is channels_, as a constant where the compiler is to unroll.
     template <class F>
     UNSEEN_INLINE void errors_of(const ClusterPair* pairs, std::size_t channels, float* errors) const {
@@ -497,8 +495,12 @@ private:
             std::copy_n(found, count, errors + i);
         }
     }
-    void errors_by_fours(std::span<const ClusterPair> pairs, float* errors) const { errors_of_all<Float4>(pairs, errors); }
-    UNSEEN_AVX2 void errors_by_eights(std::span<const ClusterPair> pairs, float* errors) const { errors_of_all<Float8>(pairs, errors); }
+    void errors_by_fours(std::span<const ClusterPair> pairs, float* errors) const {
+        errors_of_all<Float4>(pairs, errors);
+    }
+    UNSEEN_AVX2 void errors_by_eights(std::span<const ClusterPair> pairs, float* errors) const {
+        errors_of_all<Float8>(pairs, errors);
+    }
     // Neither has fused operations, so both give the same bits.
     void find_errors(std::span<const ClusterPair> pairs, float* errors) const {
         if (has_avx2()) errors_by_eights(pairs, errors);
@@ -625,7 +627,8 @@ private:
         for (Index s = 0; s < best_.size(); ++s) {
             if (best_[s].is_none()) continue;
             const ClusterPair p = c_.pairs[best_[s].pair()];
-            if (p.a == s && best_[p.b] == best_[s] && is_allowed(p)) contract(p, best_[s].error(), best_[s].pair() >= edges_);
+            if (p.a == s && best_[p.b] == best_[s] && is_allowed(p))
+                contract(p, best_[s].error(), best_[s].pair() >= edges_);
         }
     }
 
@@ -668,7 +671,8 @@ private:
             if (a == no_merge) a = b;
         } else {
             const Index made_a = live_.made_by[p.a], made_b = live_.made_by[p.b];
-            const bool a_later = made_b == no_merge || (made_a != no_merge && live_.deviations[p.a] > live_.deviations[p.b]);
+            const bool a_later =
+                made_b == no_merge || (made_a != no_merge && live_.deviations[p.a] > live_.deviations[p.b]);
             a = a_later ? made_a : made_b;
         }
         live_.made_by[p.a] = live_.names[p.b];
@@ -713,7 +717,8 @@ private:
                 live_.made_by[kept] = live_.made_by[s];
                 live_.vanishing[kept] = live_.vanishing[s];
                 std::copy_n(quadric_of(s), stride_, quadric_of(kept));
-                std::copy_n(live_.references.data() + s * channels_, channels_, live_.references.data() + kept * channels_);
+                std::copy_n(live_.references.data() + s * channels_, channels_,
+                            live_.references.data() + kept * channels_);
             }
             ++kept;
         }
@@ -771,16 +776,16 @@ private:
         float distance;
     };
     bool impatient_ = false;
-    std::vector<Index> component_;     // by cluster
+    std::vector<Index> component_; // by cluster
     std::vector<Component> components_;
-    std::vector<Nearest> nearest_;     // by component
-    std::size_t edges_ = 0;            // of the pairs; what follows are this round's pairs across gaps
-    std::vector<float> pair_errors_;   // by pair
-    std::vector<Index> unknown_;       // pairs whose errors are to be found; likewise the next
+    std::vector<Nearest> nearest_;   // by component
+    std::size_t edges_ = 0;          // of the pairs; what follows are this round's pairs across gaps
+    std::vector<float> pair_errors_; // by pair
+    std::vector<Index> unknown_;     // pairs whose errors are to be found; likewise the next
     std::vector<ClusterPair> unknown_pairs_;
     std::vector<float> found_errors_;
-    std::vector<Rank> best_;           // by cluster: its best pair
-    std::vector<Index> into_;          // by cluster: the one that it was joined to in this round, or itself
+    std::vector<Rank> best_;  // by cluster: its best pair
+    std::vector<Index> into_; // by cluster: the one that it was joined to in this round, or itself
     std::vector<std::uint8_t> taken_, lone_, held_;
     struct Partner {
         Index cluster;

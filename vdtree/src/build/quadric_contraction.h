@@ -24,37 +24,38 @@ namespace unseen::vdtree {
 struct PartMesh {
     Index first_slot = 0;
     Index own_slots = 0;
-    std::vector<Index> ghost_slots;      // numbers in the mesh, ascending
-    std::vector<glm::dvec3> positions;   // by local slot
-    std::vector<Index> slot_of_vertex;   // by local vertex: local slot, ascending
-    std::size_t channels = 0;            // attribute values per vertex, at most most_channels
-    std::vector<float> channel_values;   // by local vertex; as long in the unit box as a displacement that matters as much
-    std::vector<Triangle> triangles;     // over local vertices: every triangle that touches an own vertex
-    double area_scale = 1;               // from areas in the unit box to weights
+    std::vector<Index> ghost_slots;    // numbers in the mesh, ascending
+    std::vector<glm::dvec3> positions; // by local slot
+    std::vector<Index> slot_of_vertex; // by local vertex: local slot, ascending
+    std::size_t channels = 0;          // attribute values per vertex, at most most_channels
+    std::vector<float>
+        channel_values;              // by local vertex; as long in the unit box as a displacement that matters as much
+    std::vector<Triangle> triangles; // over local vertices: every triangle that touches an own vertex
+    double area_scale = 1;           // from areas in the unit box to weights
 };
 
 inline constexpr Index no_merge = 0xffffffffu;
 
 // Clusters that are still to be contracted. They lie in spatial order.
 struct LiveClusters {
-    std::vector<Index> names;            // a slot in the cluster, under which merges know it
+    std::vector<Index> names; // a slot in the cluster, under which merges know it
     std::vector<glm::dvec3> places;
-    std::vector<float> references;       // by cluster and channel: what the quadric's channel values are relative to
-    std::vector<float> deviations;       // by cluster, see Contraction
+    std::vector<float> references; // by cluster and channel: what the quadric's channel values are relative to
+    std::vector<float> deviations; // by cluster, see Contraction
     // Merges, known by the cluster that they joined; no_merge where there is none. `made_by`: the one that made the cluster.
     // `vanishing`: the one at which the last triangles of its connected part go, or, of several parts that were joined across
     // gaps, of the part that is to stay longest.
     std::vector<Index> made_by, vanishing;
-    std::vector<float> quadrics;         // quadric_stride(channels) each, see quadric.h
+    std::vector<float> quadrics; // quadric_stride(channels) each, see quadric.h
     std::size_t size() const { return names.size(); }
 };
 
 struct Merge {
-    Index kept, joined;                  // names of the two clusters; the new one is known as `kept`
+    Index kept, joined; // names of the two clusters; the new one is known as `kept`
 };
 
 struct ClusterPair {
-    Index a, b;                          // live clusters, a < b
+    Index a, b; // live clusters, a < b
     bool operator==(const ClusterPair&) const = default;
 };
 
@@ -66,20 +67,20 @@ struct Contraction {
     // The merges made here (not those of the parts that were joined), round by round, and in a round by ascending
     // error; two merges of one round do not touch the same cluster.
     std::vector<Merge> merges;
-    std::vector<glm::dvec3> places;      // by merge
-    std::vector<float> errors;           // by merge: quadric error of the new cluster, weight times unit-box length squared
-    std::vector<float> deviations;       // by merge: its square root over the weight, unit-box length; at least the parts'
-    std::vector<Index> round_ends;       // by round: the number of merges up to its end
+    std::vector<glm::dvec3> places; // by merge
+    std::vector<float> errors;      // by merge: quadric error of the new cluster, weight times unit-box length squared
+    std::vector<float> deviations;  // by merge: its square root over the weight, unit-box length; at least the parts'
+    std::vector<Index> round_ends;  // by round: the number of merges up to its end
     // Where two parts of the surface were joined across a gap, the lighter one goes first: what it then strays is the width of
     // the gap. So of many loose parts those that stay are spread out.
     struct Vanishing {
-        Index joined;                    // the merge, here or in a part that was joined, known by the cluster that it joined
-        float deviation;                 // that the merge has at least; unit-box length
+        Index joined;    // the merge, here or in a part that was joined, known by the cluster that it joined
+        float deviation; // that the merge has at least; unit-box length
     };
     std::vector<Vanishing> vanishings;
 
     LiveClusters live;
-    std::vector<ClusterPair> pairs;      // edges between live clusters, by a
+    std::vector<ClusterPair> pairs; // edges between live clusters, by a
     // Edges that leave the range: from a live cluster to a slot outside, and, for the other side, which cluster each of
     // our slots with such an edge is in, by slot.
     struct OuterEdge {

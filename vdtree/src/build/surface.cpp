@@ -15,8 +15,8 @@
 #include <tbb/parallel_reduce.h>
 #include <tbb/task_arena.h>
 
-#include "tree/message.h"
 #include "build/parallel_array.h"
+#include "tree/message.h"
 #include "tree/unit_vector.h"
 
 namespace unseen::vdtree {
@@ -135,7 +135,9 @@ public:
         for (Index v = 0; v < coincident.size() && !any_; ++v) any_ = coincident[v] != v;
     }
     Index of(Index vertex) const { return any_ ? coincident_[vertex] : vertex; }
-    Triangle of(const Triangle& t) const { return any_ ? Triangle{coincident_[t[0]], coincident_[t[1]], coincident_[t[2]]} : t; }
+    Triangle of(const Triangle& t) const {
+        return any_ ? Triangle{coincident_[t[0]], coincident_[t[1]], coincident_[t[2]]} : t;
+    }
     // Of triangles that use no vertex twice.
     bool degenerates(const Triangle& t) const {
         if (!any_) return false;
@@ -173,7 +175,8 @@ struct Wedges {
 
 // Triangles that the welding degenerates have neither edges nor an area. `vertex_areas`: by vertex, of which only those at the range's
 // places grow.
-Wedges collect_wedges(const MeshView& mesh, const Places& places, VertexRange vertices, std::span<double> vertex_areas) {
+Wedges collect_wedges(const MeshView& mesh, const Places& places, VertexRange vertices,
+                      std::span<double> vertex_areas) {
     Wedges out;
     out.start.assign(vertices.size() + 1, 0);
     out.sums.assign(vertices.size(), glm::dvec3(0));
@@ -326,8 +329,10 @@ SurveyPiece cut_out(const Surface& surface, std::span<const Index> coincident, V
 
 bool put_in(Surface& surface, std::span<const Index> coincident, VertexRange range, const SurveyPiece& piece) {
     if (piece.irregular.size() != range.size() || piece.normals.size() != range.size()) return false;
-    std::copy(piece.irregular.begin(), piece.irregular.end(), surface.irregular.begin() + static_cast<std::ptrdiff_t>(range.begin));
-    std::copy(piece.normals.begin(), piece.normals.end(), surface.normals.begin() + static_cast<std::ptrdiff_t>(range.begin));
+    std::copy(piece.irregular.begin(), piece.irregular.end(),
+              surface.irregular.begin() + static_cast<std::ptrdiff_t>(range.begin));
+    std::copy(piece.normals.begin(), piece.normals.end(),
+              surface.normals.begin() + static_cast<std::ptrdiff_t>(range.begin));
     std::size_t next = 0;
     for (std::size_t v = 0; v < coincident.size(); ++v) {
         if (!range.has(coincident[v])) continue;
@@ -356,8 +361,9 @@ Result<Surface> survey_together(const MeshView& mesh, std::span<const Index> coi
         piece.exchange(message);
         return message.complete() && put_in(surface, coincident, range, piece);
     };
-    const Error strange{ErrorCode::malformed_data,
-                        "A process of the team sent something else than its part: all must run the same program on the same mesh."};
+    const Error strange{
+        ErrorCode::malformed_data,
+        "A process of the team sent something else than its part: all must run the same program on the same mesh."};
     if (rank != 0) {
         send(0, range_of(rank));
         for (std::size_t other = 0; other < members; ++other)

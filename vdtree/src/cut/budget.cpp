@@ -50,12 +50,14 @@ public:
              const BudgetLimits& limits)
         : trees_(trees), sources_(sources), limits_(limits), asked_(trees.size()), above_(trees.size()),
           has_bounds_(!limits.only_unfolding && std::ranges::all_of(sources, &CostSource::has_bounds)) {
-        for (const VertexTree* tree : trees) decision_.unfolded.emplace_back((std::size_t{tree->interior_count()} + 63) / 64);
+        for (const VertexTree* tree : trees)
+            decision_.unfolded.emplace_back((std::size_t{tree->interior_count()} + 63) / 64);
     }
 
     // From the roots down; the result of all ways.
     BudgetDecision run() {
-        for (std::uint32_t tree = 0; tree < trees_.size(); ++tree) ask(tree, VertexTree::root(), std::numeric_limits<float>::infinity());
+        for (std::uint32_t tree = 0; tree < trees_.size(); ++tree)
+            ask(tree, VertexTree::root(), std::numeric_limits<float>::infinity());
         answer([&](const Entry& entry) { buckets_[bucket_of(entry.cost)].push_back(entry); });
         return run_buckets();
     }
@@ -99,10 +101,12 @@ private:
         std::vector<NodeId> sample;
         for (std::uint32_t tree = 0; tree < trees_.size(); ++tree) {
             sample.clear();
-            for (std::size_t node = stride / 2; node < trees_[tree]->interior_count(); node += stride) sample.push_back(static_cast<NodeId>(node));
+            for (std::size_t node = stride / 2; node < trees_[tree]->interior_count(); node += stride)
+                sample.push_back(static_cast<NodeId>(node));
             find_costs(tree, sample);
             for (std::size_t i = 0; i < sample.size(); ++i)
-                if (costs_[i] > 0) found.emplace_back(costs_[i], static_cast<double>(stride * triangles_of(tree, sample[i])));
+                if (costs_[i] > 0)
+                    found.emplace_back(costs_[i], static_cast<double>(stride * triangles_of(tree, sample[i])));
         }
         std::make_heap(found.begin(), found.end()); // only the first of them are asked for
         double triangles = 0, variance = 0;
@@ -111,7 +115,8 @@ private:
             const auto& [cost, more] = *--end;
             triangles += more;
             variance += more * more;
-            if (triangles + guess_deviations * std::sqrt(variance) > (1 - guess_share) * static_cast<double>(limits_.triangles))
+            if (triangles + guess_deviations * std::sqrt(variance) >
+                (1 - guess_share) * static_cast<double>(limits_.triangles))
                 return std::isfinite(cost) ? cost : 0;
         }
         return 0; // everything may fit
@@ -160,8 +165,9 @@ private:
             while (end < entries.size() && entries[end].tree == entries[first].tree) ++end;
             const auto of_tree = entries.subspan(first, end - first);
             const std::uint32_t tree = of_tree.front().tree;
-            walk_children(*trees_[tree], of_tree.size(), [&](std::size_t i) { return of_tree[i].node; },
-                          [&](std::size_t i, NodeId child) { ask(tree, child, of_tree[i].cost); });
+            walk_children(
+                *trees_[tree], of_tree.size(), [&](std::size_t i) { return of_tree[i].node; },
+                [&](std::size_t i, NodeId child) { ask(tree, child, of_tree[i].cost); });
             first = end;
         }
     }
@@ -188,7 +194,8 @@ private:
             find_costs(tree, asked_[tree]);
             for (std::size_t i = 0; i < asked_[tree].size(); ++i) {
                 const Entry entry = entry_of(tree, i);
-                const bool wanted = limits_.only_unfolding ? (unfolded_[i / 64] >> (i % 64)) & 1 : entry.cost > 0 || limits_.fill;
+                const bool wanted =
+                    limits_.only_unfolding ? (unfolded_[i / 64] >> (i % 64)) & 1 : entry.cost > 0 || limits_.fill;
                 if (wanted && trees_[tree]->is_sound(entry.node)) f(entry);
                 else leave(entry);
             }
@@ -259,8 +266,12 @@ private:
     void leave_bounded() {
         constexpr std::size_t at_once = 256;
         for (bool by_seen_cost = false;; by_seen_cost = true) {
-            const auto larger = [&](const Entry& a, const Entry& b) { return by_seen_cost ? a.seen_cost > b.seen_cost : a.cost > b.cost; };
-            std::erase_if(left_, [&](const Entry& e) { return e.cost <= decision_.threshold && e.seen_cost <= decision_.max_seen_cost; });
+            const auto larger = [&](const Entry& a, const Entry& b) {
+                return by_seen_cost ? a.seen_cost > b.seen_cost : a.cost > b.cost;
+            };
+            std::erase_if(left_, [&](const Entry& e) {
+                return e.cost <= decision_.threshold && e.seen_cost <= decision_.max_seen_cost;
+            });
             if (left_.empty()) return;
             const std::size_t count = std::min(at_once, left_.size());
             const auto end = left_.begin() + static_cast<std::ptrdiff_t>(count);
@@ -293,8 +304,9 @@ private:
             }
             ask_children(fresh);
             fresh.clear();
-            answer(bucket, [&](const Entry& entry) { (bucket_of(entry.cost) == bucket ? fresh : below).push_back(entry); },
-                   [&](const Entry& entry) { bounded_below.push_back(entry); });
+            answer(
+                bucket, [&](const Entry& entry) { (bucket_of(entry.cost) == bucket ? fresh : below).push_back(entry); },
+                [&](const Entry& entry) { bounded_below.push_back(entry); });
         }
         if (sum > limits_.triangles) {
             finish(std::move(all), below, bounded_below);

@@ -14,14 +14,14 @@ namespace unseen::vdtree {
 
 struct BudgetLimits {
     std::uint64_t triangles = std::numeric_limits<std::uint64_t>::max(); // of all trees together
-    bool fill = false;            // also unfold nodes of cost 0
-    bool only_unfolding = false;  // leave nodes folded that their source does not unfold
+    bool fill = false;                                                   // also unfold nodes of cost 0
+    bool only_unfolding = false;          // leave nodes folded that their source does not unfold
     Callback<bool()> is_out_of_time = {}; // asked between batches
 };
 
 struct BudgetDecision {
     std::vector<std::vector<std::uint64_t>> unfolded; // by tree, one bit an interior node
-    bool is_complete = true; // false: the time ended it
+    bool is_complete = true;                          // false: the time ended it
     std::uint64_t node_tests = 0;
     float threshold = 0;     // the largest cost among the nodes left folded
     float max_seen_cost = 0; // the largest seen cost among them

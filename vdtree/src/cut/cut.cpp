@@ -7,10 +7,10 @@
 
 #include "cut/budget.h"
 #include "cut/cut_follower.h"
-#include "cut/state.h"
 #include "cut/decide_tree.h"
-#include <vdtree/internal/finite.h>
+#include "cut/state.h"
 #include "tree/unchecked_links.h"
+#include <vdtree/internal/finite.h>
 
 namespace unseen::vdtree {
 
@@ -84,7 +84,8 @@ Decision decide_by_threshold(const VertexTree& tree, const CostSource& source) {
         costs.resize(nodes.size());
         source.find_costs(nodes, {costs.data(), costs.data(), unfolded});
         for (std::size_t i = 0; i < nodes.size(); ++i)
-            if (costs[i] <= 1 || !tree.is_sound(nodes[i])) decision.max_fold_cost = std::max(decision.max_fold_cost, costs[i]);
+            if (costs[i] <= 1 || !tree.is_sound(nodes[i]))
+                decision.max_fold_cost = std::max(decision.max_fold_cost, costs[i]);
     };
     decision.unfolded = TreeDecider().run(tree, decide, [](std::span<const NodeId>) {});
     return decision;
@@ -130,7 +131,8 @@ std::vector<NodeId> corners_by_range(const Cut& cut, std::vector<MeshRange>& ran
 
 } // namespace
 
-Cut::Cut(const VertexTree& tree) : state_(std::make_unique<CutState>(tree)), tree_(&state_->tree()), proxies_(state_->proxies().data()) {}
+Cut::Cut(const VertexTree& tree)
+    : state_(std::make_unique<CutState>(tree)), tree_(&state_->tree()), proxies_(state_->proxies().data()) {}
 Cut::Cut(Cut&&) noexcept = default;
 Cut& Cut::operator=(Cut&&) noexcept = default;
 Cut::~Cut() = default;
@@ -172,8 +174,9 @@ constexpr double farthest_eye = 1e18; // mesh units
 Result<void> check(const VertexTree& tree, const Viewpoint& viewpoint, const DistanceCriterion& criterion) {
     const auto invalid = [](std::string what) { return Error{ErrorCode::invalid_argument, std::move(what)}; };
     if (criterion.interior_count() != tree.interior_count())
-        return invalid("The criterion is for a tree of " + std::to_string(criterion.interior_count()) + " interior nodes, and this one has " +
-                       std::to_string(tree.interior_count()) + "; make one for this tree.");
+        return invalid("The criterion is for a tree of " + std::to_string(criterion.interior_count()) +
+                       " interior nodes, and this one has " + std::to_string(tree.interior_count()) +
+                       "; make one for this tree.");
     if (!is_finite(viewpoint.eye)) return invalid("The eye's position is not finite.");
     if (!(glm::length(viewpoint.eye) <= farthest_eye)) return invalid("The eye is more than 1e18 mesh units away.");
     constexpr double unit_slack = 1e-3; // directions given with three digits
@@ -189,7 +192,8 @@ Result<void> check(const VertexTree& tree, const Viewpoint& viewpoint, const Dis
         const glm::dvec3 centre(occluder.centre);
         if (!is_finite(centre) || !(occluder.radius >= 0) || !std::isfinite(occluder.radius))
             return invalid("An occluder needs a finite centre and a finite radius of 0 or more.");
-        if (!(glm::length(centre - viewpoint.eye) > static_cast<double>(occluder.radius))) return invalid("The eye is inside an occluder.");
+        if (!(glm::length(centre - viewpoint.eye) > static_cast<double>(occluder.radius)))
+            return invalid("The eye is inside an occluder.");
     }
     if (criterion.parts().lit) return validate(viewpoint.lighting);
     return {};
@@ -202,20 +206,22 @@ Result<void> check(const FollowOptions& options) {
         return invalid("The threshold must be more than 0 and finite.");
     if (!(options.hysteresis >= 1 && options.hysteresis <= most_hysteresis))
         return invalid("The hysteresis must be from 1 to 2.");
-    if (options.milliseconds && !(*options.milliseconds >= 0)) return invalid("The time limit must be 0 or more milliseconds.");
+    if (options.milliseconds && !(*options.milliseconds >= 0))
+        return invalid("The time limit must be 0 or more milliseconds.");
     return {};
 }
 
 } // namespace
 
-Result<AdjustStats> Cut::follow(const DistanceCriterion& criterion, const Viewpoint& viewpoint, const FollowOptions& options) {
+Result<AdjustStats> Cut::follow(const DistanceCriterion& criterion, const Viewpoint& viewpoint,
+                                const FollowOptions& options) {
     if (const auto valid = check(*tree_, viewpoint, criterion); !valid) return valid.error();
     if (const auto valid = check(options); !valid) return valid.error();
     return state_->follower().follow(*state_, criterion, viewpoint, options);
 }
 
-Result<std::vector<std::uint64_t>> test_every_node(const VertexTree& tree, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
-                                                   const FollowOptions& options) {
+Result<std::vector<std::uint64_t>> test_every_node(const VertexTree& tree, const DistanceCriterion& criterion,
+                                                   const Viewpoint& viewpoint, const FollowOptions& options) {
     if (const auto valid = check(tree, viewpoint, criterion); !valid) return valid.error();
     if (const auto valid = check(options); !valid) return valid.error();
     FoldTester tester(tree, criterion, options.cull_back_faces, options.threshold);
@@ -225,8 +231,8 @@ Result<std::vector<std::uint64_t>> test_every_node(const VertexTree& tree, const
     return unfolded;
 }
 
-Result<std::vector<float>> find_every_cost(const VertexTree& tree, const DistanceCriterion& criterion, const Viewpoint& viewpoint,
-                                           const FollowOptions& options) {
+Result<std::vector<float>> find_every_cost(const VertexTree& tree, const DistanceCriterion& criterion,
+                                           const Viewpoint& viewpoint, const FollowOptions& options) {
     if (const auto valid = check(tree, viewpoint, criterion); !valid) return valid.error();
     if (const auto valid = check(options); !valid) return valid.error();
     FoldTester tester(tree, criterion, options.cull_back_faces, options.threshold);
@@ -249,10 +255,11 @@ Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objec
             return Error{valid.error().code, "Object " + std::to_string(i) + ": " + valid.error().message};
         for (std::size_t other = 0; other < i; ++other)
             if (&objects[other].cut == &object.cut)
-                return Error{ErrorCode::invalid_argument, "Objects " + std::to_string(other) + " and " + std::to_string(i) +
-                                                              " share one cut; give each its own."};
+                return Error{ErrorCode::invalid_argument, "Objects " + std::to_string(other) + " and " +
+                                                              std::to_string(i) + " share one cut; give each its own."};
         trees.push_back(&object.cut.tree());
-        testers.push_back(std::make_unique<FoldTester>(object.cut.tree(), object.criterion, object.cull_back_faces, 1.0f, false));
+        testers.push_back(
+            std::make_unique<FoldTester>(object.cut.tree(), object.criterion, object.cull_back_faces, 1.0f, false));
         testers.back()->look_from(object.viewpoint, 1);
         tests.push_back(testers.back().get());
     }

@@ -67,7 +67,9 @@ private:
     void add_children(std::span<const NodeId> subtree_end) {
         constexpr std::size_t far = 64, near = 32; // nodes between a prefetch and its use
         const std::size_t count = unfolding_.size();
-        const auto first_child = [&](NodeId node) { return node + 1 < subtree_end[node] ? node + 1 : node; }; // or itself
+        const auto first_child = [&](NodeId node) {
+            return node + 1 < subtree_end[node] ? node + 1 : node;
+        }; // or itself
         for (std::size_t i = 0; i < std::min(far, count); ++i) prefetch(&subtree_end[unfolding_[i]]);
         std::size_t end = waiting_.size();
         waiting_.resize(end + 2 * count);
@@ -77,13 +79,15 @@ private:
                 const NodeId soon = unfolding_[i + near], second = subtree_end[first_child(soon)];
                 prefetch(&subtree_end[second < subtree_end[soon] ? second : soon]);
             }
-            const NodeId node = unfolding_[i], after = subtree_end[node], first = first_child(node), second = subtree_end[first];
+            const NodeId node = unfolding_[i], after = subtree_end[node], first = first_child(node),
+                         second = subtree_end[first];
             waiting_[end] = first;
             end += first != node;
             waiting_[end] = second;
             end += second < after;
             if (second >= after) continue;
-            for (NodeId child = subtree_end[second]; child < after; child = subtree_end[child]) others_.push_back(child);
+            for (NodeId child = subtree_end[second]; child < after; child = subtree_end[child])
+                others_.push_back(child);
         }
         waiting_.resize(end);
         waiting_.insert(waiting_.end(), others_.begin(), others_.end());

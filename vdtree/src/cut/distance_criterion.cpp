@@ -31,7 +31,8 @@ Result<void> check_growth(const DistanceCriterion::Parts& p) {
     const auto grows = [&](std::size_t from, std::size_t to) {
         for (std::size_t bin = 0; bin < bins; ++bin) {
             if (!(p.reach[from * bins + bin] <= p.reach[to * bins + bin])) return false;
-            if (!p.least_cost.empty() && !(p.least_cost[from * bins + bin] <= p.least_cost[to * bins + bin])) return false;
+            if (!p.least_cost.empty() && !(p.least_cost[from * bins + bin] <= p.least_cost[to * bins + bin]))
+                return false;
         }
         return true;
     };
@@ -39,7 +40,8 @@ Result<void> check_growth(const DistanceCriterion::Parts& p) {
         for (std::size_t c = 0; c < ContrastClasses::contrast_count; ++c)
             if ((c > 0 && !grows(ContrastClasses::row_of(l, c - 1), ContrastClasses::row_of(l, c))) ||
                 (l > 0 && !grows(ContrastClasses::row_of(l - 1, c), ContrastClasses::row_of(l, c))))
-                return invalid("The reaches of a criterion with lights must not fall with the contrast or the luminance.");
+                return invalid(
+                    "The reaches of a criterion with lights must not fall with the contrast or the luminance.");
     return {};
 }
 
@@ -51,12 +53,12 @@ Result<void> check(const VertexTree& tree, const DistanceCriterion::Parts& p) {
     if (p.lit && (!p.lit->bounds || p.lit->bounds->cones().size() != nodes || !p.classes.empty()))
         return invalid("A criterion with lights needs bounds of its tree's normals, and no other classes.");
     if (!p.facing.empty() && p.facing.size() != nodes)
-        return invalid("A criterion has " + std::to_string(p.facing.size()) + " sets of directions for " + std::to_string(nodes) +
-                       " interior nodes.");
+        return invalid("A criterion has " + std::to_string(p.facing.size()) + " sets of directions for " +
+                       std::to_string(nodes) + " interior nodes.");
     for (const auto* lengths : {&p.lengths, &p.silhouette_lengths}) {
         if (!lengths->empty() && lengths->size() != nodes)
-            return invalid("A criterion has " + std::to_string(lengths->size()) + " lengths for " + std::to_string(nodes) +
-                           " interior nodes.");
+            return invalid("A criterion has " + std::to_string(lengths->size()) + " lengths for " +
+                           std::to_string(nodes) + " interior nodes.");
         for (std::size_t i = 0; i < lengths->size(); ++i)
             if (!((*lengths)[i] >= 0) || !std::isfinite((*lengths)[i]))
                 return invalid("The length of node " + std::to_string(i) + " must be 0 or more and finite.");
@@ -68,7 +70,8 @@ Result<void> check(const VertexTree& tree, const DistanceCriterion::Parts& p) {
         return invalid("A criterion's table of least costs is not of the size of its reaches.");
     for (std::size_t i = 0; i < p.least_cost.size(); ++i)
         if (!(p.least_cost[i] >= 0) || (i % p.eccentricity_bins != 0 && p.least_cost[i] > p.least_cost[i - 1]))
-            return invalid("Least cost " + std::to_string(i) + " of a criterion is negative, not a number, or grows with the eccentricity.");
+            return invalid("Least cost " + std::to_string(i) +
+                           " of a criterion is negative, not a number, or grows with the eccentricity.");
     if (!(p.bin_degrees > 0) || !std::isfinite(p.bin_degrees))
         return invalid("The bins of eccentricity need a positive width.");
     const std::size_t rows = p.reach.size() / p.eccentricity_bins;
@@ -78,7 +81,8 @@ Result<void> check(const VertexTree& tree, const DistanceCriterion::Parts& p) {
         if (const auto grows = check_growth(p); !grows) return grows.error();
     for (std::size_t i = 0; i < p.classes.size(); ++i)
         if (p.classes[i].interior >= rows || p.classes[i].silhouette >= rows)
-            return invalid("Node " + std::to_string(i) + " has a class beyond the " + std::to_string(rows) + " rows of the table.");
+            return invalid("Node " + std::to_string(i) + " has a class beyond the " + std::to_string(rows) +
+                           " rows of the table.");
     for (std::size_t i = 0; i < p.reach.size(); ++i) {
         if (std::isnan(p.reach[i])) return invalid("Reach " + std::to_string(i) + " of a criterion is not a number.");
         if (i % p.eccentricity_bins != 0 && p.reach[i] > p.reach[i - 1])
@@ -136,14 +140,15 @@ bool is_monotone_in(const VertexTree& tree, const DistanceCriterion::Parts& p) {
     const auto parents = unchecked_links(tree).parents;
     RowRatios ratios(p);
     const auto is_within = [](std::span<const float> lengths, NodeId node, NodeId parent, float ratio) {
-        if (lengths.empty()) return ratio <= 1; // spheres' radii
+        if (lengths.empty()) return ratio <= 1;          // spheres' radii
         return lengths[node] * ratio <= lengths[parent]; // false where the ratio is infinite and the length 0
     };
     for (NodeId node = 1; node < tree.interior_count(); ++node) {
         const NodeId parent = parents[node];
         if (!(parent < node)) return false; // in a damaged file: nobody has looked at all of a mapped tree
         if (!p.facing.empty() && !p.facing[parent].includes(p.facing[node])) return false;
-        const FoldClass a = p.classes.empty() ? FoldClass{} : p.classes[node], b = p.classes.empty() ? FoldClass{} : p.classes[parent];
+        const FoldClass a = p.classes.empty() ? FoldClass{} : p.classes[node],
+                        b = p.classes.empty() ? FoldClass{} : p.classes[parent];
         const auto& outlines = p.silhouette_lengths.empty() ? p.lengths : p.silhouette_lengths;
         if (!is_within(p.lengths, node, parent, ratios.largest(a.interior, b.interior))) return false;
         if (!is_within(outlines, node, parent, ratios.largest(a.silhouette, b.silhouette))) return false;

@@ -11,7 +11,8 @@ namespace unseen::vdtree {
 
 namespace {
 
-constexpr unsigned least_log2_size = 3; // a cache line: the head and the seven corners that nearly every vertex makes do with
+constexpr unsigned least_log2_size =
+    3; // a cache line: the head and the seven corners that nearly every vertex makes do with
 constexpr unsigned most_log2_size = 27;
 // While lists are made, what a node has is a count with this bit, then a block.
 constexpr std::uint32_t is_count = 1u << 31;
@@ -104,7 +105,8 @@ void IndexBuffer::make_lists() {
         std::uint32_t& counted = block_of_node_[indices_[corner]];
         const std::uint32_t count = counted == no_block ? 0 : counted & ~is_count;
         if (count == 0) all_entries += std::uint64_t{1} << least_log2_size;
-        else if (log2_size_for(count + 1) > log2_size_for(count)) all_entries += std::uint64_t{1} << log2_size_for(count);
+        else if (log2_size_for(count + 1) > log2_size_for(count))
+            all_entries += std::uint64_t{1} << log2_size_for(count);
         longest = std::max(longest, count + 1);
         counted = (count + 1) | is_count;
     }
@@ -195,7 +197,8 @@ void IndexBuffer::append(NodeId node, Entry entry) {
 void IndexBuffer::remove(NodeId node, Index corner) {
     const Block block = block_of_node_[node];
     const auto shown = list(block);
-    const auto found = std::find_if(shown.begin(), shown.end(), [&](const Entry& entry) { return entry.corner == corner; });
+    const auto found =
+        std::find_if(shown.begin(), shown.end(), [&](const Entry& entry) { return entry.corner == corner; });
     if (found == shown.end()) return;
     *found = shown.back();
     if (--entries(block)->leaf > 0) return;
@@ -209,7 +212,8 @@ void IndexBuffer::remove_all() {
     for (std::size_t i = 0; i < removals_.size(); ++i) {
         if (i + far < removals_.size()) prefetch(&block_of_node_[removals_[i + far].value]);
         if (i + near < removals_.size())
-            if (const Block block = block_of_node_[removals_[i + near].value]; block != no_block) prefetch(entries(block));
+            if (const Block block = block_of_node_[removals_[i + near].value]; block != no_block)
+                prefetch(entries(block));
         remove(removals_[i].value, removals_[i].place);
     }
     removals_.clear();
@@ -382,9 +386,11 @@ void IndexBuffer::end_patch() {
 }
 
 std::uint64_t IndexBuffer::byte_size() const noexcept {
-    std::uint64_t bytes = sizeof(NodeId) * indices_.capacity() + sizeof(Triangle) * (leaves_.capacity() + next_leaves_.capacity()) +
-                          sizeof(std::uint64_t) * shown_by_.capacity() + sizeof(Index) * (places_.capacity() + coming_.capacity()) + sizeof(Block) * block_of_node_.capacity() +
-                          sizeof(Line) * pool_.capacity() + sizeof(IndexWrite) * writes_.capacity();
+    std::uint64_t bytes =
+        sizeof(NodeId) * indices_.capacity() + sizeof(Triangle) * (leaves_.capacity() + next_leaves_.capacity()) +
+        sizeof(std::uint64_t) * shown_by_.capacity() + sizeof(Index) * (places_.capacity() + coming_.capacity()) +
+        sizeof(Block) * block_of_node_.capacity() + sizeof(Line) * pool_.capacity() +
+        sizeof(IndexWrite) * writes_.capacity();
     for (const auto& blocks : free_blocks_) bytes += sizeof(Block) * blocks.capacity();
     return bytes;
 }

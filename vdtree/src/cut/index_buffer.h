@@ -50,8 +50,9 @@ private:
     using Block = std::uint32_t; // where a list starts in pool_
     static constexpr Block no_block = 0xffffffffu;
     struct Entry {
-        Index corner = 0; // of the buffer; of a block's first entry, its head: log2 of the entries in it, itself included
-        Index leaf = 0;   // whose proxy it shows; of the head: the entries in use
+        Index corner =
+            0;          // of the buffer; of a block's first entry, its head: log2 of the entries in it, itself included
+        Index leaf = 0; // whose proxy it shows; of the head: the entries in use
     };
 
     struct alignas(64) Line {
@@ -83,7 +84,8 @@ private:
     std::vector<Line> pool_;             // of entries; blocks are whole lines
     std::vector<Block> free_blocks_[28]; // by log2 of the size
     std::vector<Index> holes_;           // triangles without corners
-    std::vector<IndexWrite> removals_;   // what such triangles showed, still in its list until all of these are done at once
+    std::vector<IndexWrite>
+        removals_; // what such triangles showed, still in its list until all of these are done at once
     // Of the last gathering: the leaves at the corners, in the buffer's order, the nodes whose triangles these are, a bit each, and where the
     // triangles of each word of them begin.
     std::vector<Triangle> leaves_;

@@ -30,7 +30,8 @@ class Grid {
 public:
     Grid(const SoundTree& tree, int cells) : tree_(tree), side_(cells) {
         glm::dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
-        for (const glm::vec3& p : tree.positions().subspan(tree.interior_count())) low = glm::min(low, glm::dvec3(p)), high = glm::max(high, glm::dvec3(p));
+        for (const glm::vec3& p : tree.positions().subspan(tree.interior_count()))
+            low = glm::min(low, glm::dvec3(p)), high = glm::max(high, glm::dvec3(p));
         const glm::dvec3 size = high - low;
         cell_ = std::max({size.x, size.y, size.z}) / (side_ - 2 * border);
         corner_ = low - border * cell_;
@@ -53,21 +54,27 @@ private:
     };
     enum class Side : std::uint8_t { unknown, outside, inside };
 
-    std::size_t index(int x, int y, int z) const { return (static_cast<std::size_t>(z) * side() + static_cast<std::size_t>(y)) * side() + static_cast<std::size_t>(x); }
+    std::size_t index(int x, int y, int z) const {
+        return (static_cast<std::size_t>(z) * side() + static_cast<std::size_t>(y)) * side() +
+               static_cast<std::size_t>(x);
+    }
     std::size_t side() const { return static_cast<std::size_t>(side_); }
 
     void enter(const Triangle& t, std::vector<std::vector<Crossing>>& columns) {
         glm::dvec3 p[3];
-        for (std::size_t k = 0; k < 3; ++k) p[k] = (glm::dvec3(tree_.positions()[tree_.interior_count() + t[k]]) - corner_) / cell_;
+        for (std::size_t k = 0; k < 3; ++k)
+            p[k] = (glm::dvec3(tree_.positions()[tree_.interior_count() + t[k]]) - corner_) / cell_;
         const glm::dvec3 low = glm::min(p[0], glm::min(p[1], p[2])), high = glm::max(p[0], glm::max(p[1], p[2]));
         const glm::ivec3 first = glm::ivec3(glm::floor(low - rounding)), last = glm::ivec3(glm::floor(high + rounding));
         const glm::dvec3 n = glm::cross(p[1] - p[0], p[2] - p[0]);
         // Cells that the plane does not reach are not touched.
-        const double reach = 0.5 * (std::abs(n.x) + std::abs(n.y) + std::abs(n.z)) * (1 + rounding) + rounding * glm::length(n);
+        const double reach =
+            0.5 * (std::abs(n.x) + std::abs(n.y) + std::abs(n.z)) * (1 + rounding) + rounding * glm::length(n);
         for (int z = first.z; z <= last.z; ++z)
             for (int y = first.y; y <= last.y; ++y)
                 for (int x = first.x; x <= last.x; ++x)
-                    if (!(std::abs(glm::dot(n, glm::dvec3(x, y, z) + 0.5 - p[0])) > reach)) touched_[index(x, y, z)] = 1;
+                    if (!(std::abs(glm::dot(n, glm::dvec3(x, y, z) + 0.5 - p[0])) > reach))
+                        touched_[index(x, y, z)] = 1;
         for (int z = first.z; z <= last.z; ++z)
             for (int y = first.y; y <= last.y; ++y) cross(p, y, z, columns);
     }
@@ -80,7 +87,8 @@ private:
             const glm::dvec3 &a = p[(k + 1) % 3], &b = p[(k + 2) % 3];
             part[k] = (a.y - at_y) * (b.z - at_z) - (a.z - at_z) * (b.y - at_y);
         }
-        const bool is_front = part[0] > 0 && part[1] > 0 && part[2] > 0, is_back = part[0] < 0 && part[1] < 0 && part[2] < 0;
+        const bool is_front = part[0] > 0 && part[1] > 0 && part[2] > 0,
+                   is_back = part[0] < 0 && part[1] < 0 && part[2] < 0;
         if (!is_front && !is_back) return;
         const double x = (part[0] * p[0].x + part[1] * p[1].x + part[2] * p[2].x) / (part[0] + part[1] + part[2]);
         columns[index(y, z, 0)].push_back({x, is_front ? 1 : -1});
@@ -152,7 +160,8 @@ private:
                     squared_[row + at(x)] = std::min(squared_[row + at(x)], way * way);
                 }
             };
-            std::fill_n(squared_.begin() + static_cast<std::ptrdiff_t>(row), side(), std::numeric_limits<float>::infinity());
+            std::fill_n(squared_.begin() + static_cast<std::ptrdiff_t>(row), side(),
+                        std::numeric_limits<float>::infinity());
             sweep([](std::size_t x) { return x; });
             sweep([&](std::size_t x) { return side() - 1 - x; });
         }
@@ -163,11 +172,13 @@ private:
     // Of rows along x that begin at equal steps.
     void join_rows(std::size_t first, std::size_t step) {
         std::vector<float> before(side() * side());
-        for (std::size_t row = 0; row < side(); ++row) std::copy_n(&squared_[first + row * step], side(), &before[row * side()]);
+        for (std::size_t row = 0; row < side(); ++row)
+            std::copy_n(&squared_[first + row * step], side(), &before[row * side()]);
         for (std::size_t to = 0; to < side(); ++to) {
             float* const joined = &squared_[first + to * step];
             for (std::size_t from = 0; from < side(); ++from) {
-                const float between = std::max(std::abs(static_cast<float>(to) - static_cast<float>(from)) - 0.5f, 0.0f);
+                const float between =
+                    std::max(std::abs(static_cast<float>(to) - static_cast<float>(from)) - 0.5f, 0.0f);
                 const float* const row = &before[from * side()];
                 for (std::size_t x = 0; x < side(); ++x) joined[x] = std::min(joined[x], row[x] + between * between);
             }
@@ -194,7 +205,8 @@ private:
     }
 
     glm::vec3 middle_of(std::size_t cell) const {
-        const glm::dvec3 at(static_cast<double>(cell % side()), static_cast<double>(cell / side() % side()), static_cast<double>(cell / side() / side()));
+        const glm::dvec3 at(static_cast<double>(cell % side()), static_cast<double>(cell / side() % side()),
+                            static_cast<double>(cell / side() / side()));
         return glm::vec3(corner_ + (at + 0.5) * cell_);
     }
 

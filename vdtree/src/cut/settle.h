@@ -11,9 +11,9 @@
 #include <vdtree/cut.h>
 
 #include "cut/deadlines.h"
+#include "cut/kernel/fold_tester.h"
 #include "cut/state.h"
 #include "cut/waiting.h"
-#include "cut/kernel/fold_tester.h"
 
 namespace unseen::vdtree {
 

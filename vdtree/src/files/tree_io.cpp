@@ -29,7 +29,7 @@ namespace {
 constexpr std::array<char, 8> magic = {'U', 'N', 'S', 'E', 'E', 'N', 'V', 'T'};
 constexpr std::uint32_t format_version = 4;
 constexpr std::uint64_t page_bytes = 1 << 20;
-constexpr std::uint32_t most_sections = 64; // the tree's own, and most_attributes
+constexpr std::uint32_t most_sections = 64;     // the tree's own, and most_attributes
 constexpr std::uint64_t section_alignment = 64; // bytes; a cache line, and what any mapped element needs
 
 // All integers and floats little-endian.
@@ -71,9 +71,7 @@ static_assert(sizeof(Facts) == 80);
 
 std::uint64_t checksum(const void* data, std::size_t bytes) { return XXH3_64bits(data, bytes); }
 
-std::uint64_t pages_of(const Section& s) {
-    return (s.count * s.element_bytes + page_bytes - 1) / page_bytes;
-}
+std::uint64_t pages_of(const Section& s) { return (s.count * s.element_bytes + page_bytes - 1) / page_bytes; }
 
 // A section's elements, of which bounds begin with floats and end with single bytes.
 ElementLayout layout_of(const Section& s) {
@@ -185,7 +183,9 @@ public:
     void add(std::string_view name, std::span<const T> values, std::uint32_t component) {
         add(name, part_of_tree, sizeof(T), component, std::as_bytes(values));
     }
-    void add(const Attribute& a) { add(a.name, static_cast<std::uint32_t>(a.domain), a.element_bytes, a.component_bytes, a.bytes); }
+    void add(const Attribute& a) {
+        add(a.name, static_cast<std::uint32_t>(a.domain), a.element_bytes, a.component_bytes, a.bytes);
+    }
 
     Result<void> write(const std::filesystem::path& file, const Progress& progress) {
         layout();
@@ -205,7 +205,8 @@ public:
     }
 
 private:
-    void add(std::string_view name, std::uint32_t domain, std::size_t element, std::uint32_t component, std::span<const std::byte> bytes) {
+    void add(std::string_view name, std::uint32_t domain, std::size_t element, std::uint32_t component,
+             std::span<const std::byte> bytes) {
         Section s{};
         std::copy_n(name.begin(), std::min(name.size(), s.name.size()), s.name.begin());
         s.domain = domain;
@@ -311,7 +312,8 @@ private:
     Result<std::span<const std::byte>> mapped_bytes(const Section& section) const;
     template <class T>
     Result<void> map_section(std::string_view name, Array<T>& out);
-    Result<void> read_attributes(std::size_t interior_count, std::size_t node_count, std::vector<Attribute>& attributes);
+    Result<void> read_attributes(std::size_t interior_count, std::size_t node_count,
+                                 std::vector<Attribute>& attributes);
     template <class T>
     Result<void> open_section(std::string_view name, Array<T>& out);
     Result<void> read_facts(TreeGeometry& g, TreeLuminance& l);
@@ -345,11 +347,13 @@ Result<void> Reader::read_table() {
         swap_components(reinterpret_cast<std::byte*>(&h.file_bytes), 32, 8);
     }
     if (h.version != format_version)
-        return Error{ErrorCode::unsupported, file_.string() + (h.version < format_version
-                                                 ? " was written by an earlier version; build it again with: unseen build MESH -o FILE"
-                                                 : ": version " + std::to_string(h.version) +
-                                                       " of the format is not known to this program, which reads version " +
-                                                       std::to_string(format_version) + ". Build the tree again from its mesh.")};
+        return Error{ErrorCode::unsupported,
+                     file_.string() +
+                         (h.version < format_version
+                              ? " was written by an earlier version; build it again with: unseen build MESH -o FILE"
+                              : ": version " + std::to_string(h.version) +
+                                    " of the format is not known to this program, which reads version " +
+                                    std::to_string(format_version) + ". Build the tree again from its mesh.")};
     if (h.header_checksum != sum) return fail("The header is damaged.");
     if (h.file_bytes != file_bytes_)
         return fail("The file has " + std::to_string(file_bytes_) + " bytes instead of " +
@@ -393,7 +397,8 @@ template <class T>
 Result<void> Reader::read_section(std::string_view name, std::vector<T>& out) {
     const Section* section = find(name);
     if (!section) return fail("Section " + std::string(name) + " is missing.");
-    if (section->element_bytes != sizeof(T)) return fail("Section " + std::string(name) + " has elements of another size.");
+    if (section->element_bytes != sizeof(T))
+        return fail("Section " + std::string(name) + " has elements of another size.");
     out.resize(section->count);
     return read_pages(*section, reinterpret_cast<std::byte*>(out.data()));
 }
@@ -418,11 +423,13 @@ Result<void> Reader::read_pages(const Section& section, std::byte* bytes) {
 
 Result<std::span<const std::byte>> Reader::mapped_bytes(const Section& section) const {
     const std::string name(name_of(section));
-    if (section.offset % section_alignment != 0) return fail("Section " + name + " does not begin at a multiple of 64.");
+    if (section.offset % section_alignment != 0)
+        return fail("Section " + name + " does not begin at a multiple of 64.");
     // The mapping was made after the table was read: the file may have been replaced in between.
     const auto bytes = mapping_->bytes();
     const std::uint64_t size = section.count * section.element_bytes;
-    if (section.offset > bytes.size() || size > bytes.size() - section.offset) return fail("Section " + name + " does not fit in the file.");
+    if (section.offset > bytes.size() || size > bytes.size() - section.offset)
+        return fail("Section " + name + " does not fit in the file.");
     return bytes.subspan(section.offset, size);
 }
 
@@ -430,7 +437,8 @@ template <class T>
 Result<void> Reader::map_section(std::string_view name, Array<T>& out) {
     const Section* section = find(name);
     if (!section) return fail("Section " + std::string(name) + " is missing.");
-    if (section->element_bytes != sizeof(T)) return fail("Section " + std::string(name) + " has elements of another size.");
+    if (section->element_bytes != sizeof(T))
+        return fail("Section " + std::string(name) + " has elements of another size.");
     const auto bytes = mapped_bytes(*section);
     if (!bytes) return bytes.error();
     out = Array<T>(std::span(reinterpret_cast<const T*>(bytes->data()), section->count));
@@ -438,11 +446,15 @@ Result<void> Reader::map_section(std::string_view name, Array<T>& out) {
 }
 
 // Attributes of names that nobody here knows, too. Their values are their owners' to check.
-Result<void> Reader::read_attributes(std::size_t interior_count, std::size_t node_count, std::vector<Attribute>& attributes) {
+Result<void> Reader::read_attributes(std::size_t interior_count, std::size_t node_count,
+                                     std::vector<Attribute>& attributes) {
     for (const Section& s : sections_) {
         if (s.domain == part_of_tree) continue;
-        Attribute a{{std::string(name_of(s)), AttributeDomain{s.domain}, s.element_bytes, s.component_bytes, s.count}, nullptr, {}};
-        if (const std::string fault = fault_in_attribute(a, interior_count, node_count); !fault.empty()) return fail(fault);
+        Attribute a{{std::string(name_of(s)), AttributeDomain{s.domain}, s.element_bytes, s.component_bytes, s.count},
+                    nullptr,
+                    {}};
+        if (const std::string fault = fault_in_attribute(a, interior_count, node_count); !fault.empty())
+            return fail(fault);
         for (const Attribute& before : attributes)
             if (before.name == a.name) return fail("Attribute " + a.name + " is there twice.");
         if (attributes.size() == most_attributes) return fail("There are more attributes than a tree can have.");
@@ -511,7 +523,9 @@ Result<void> Reader::check_counts(const TreeGeometry& g, const TreeLuminance& l)
 // That walking the tree stays within it: every interior node's children lie side by side and cover it.
 Result<void> Reader::check_structure(const TreeGeometry& g) const {
     const NodeId interior = static_cast<NodeId>(g.first_leaf.size());
-    const auto broken = [&](NodeId node, const char* fault) { return fail("Node " + std::to_string(node) + " " + fault); };
+    const auto broken = [&](NodeId node, const char* fault) {
+        return fail("Node " + std::to_string(node) + " " + fault);
+    };
     if (const char* fault = fault_in_root(g)) return broken(0, fault);
     for (NodeId node = 0; node < interior; ++node)
         if (const char* fault = fault_in_links(g, node)) return broken(node, fault);
@@ -542,7 +556,8 @@ Result<void> Reader::read_facts(TreeGeometry& g, TreeLuminance& l) {
         swap_components(reinterpret_cast<std::byte*>(&f.closedness), 8, 4);
     }
     if (!unpack_ranges(ranges, g.ranges)) return fail("Section ranges is malformed.");
-    if (f.closedness > static_cast<std::uint32_t>(Closedness::closed_inward)) return fail("Section facts is malformed.");
+    if (f.closedness > static_cast<std::uint32_t>(Closedness::closed_inward))
+        return fail("Section facts is malformed.");
     g.origin = {f.origin[0], f.origin[1], f.origin[2]};
     g.bounding_sphere = {{f.bounding_sphere[0], f.bounding_sphere[1], f.bounding_sphere[2]}, f.bounding_sphere[3]};
     g.dropped_triangles = f.dropped_triangles;

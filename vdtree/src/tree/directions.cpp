@@ -42,7 +42,8 @@ template <std::size_t capacity>
 UNSEEN_INLINE void transpose(const Corner (&triangles)[capacity][3], float (&coordinates)[9][capacity]) {
     for (std::size_t i = 0; i < capacity; i += 4) {
         for (std::size_t corner = 0; corner < 3; ++corner) {
-            const Float4 rows[4] = {triangles[i][corner], triangles[i + 1][corner], triangles[i + 2][corner], triangles[i + 3][corner]};
+            const Float4 rows[4] = {triangles[i][corner], triangles[i + 1][corner], triangles[i + 2][corner],
+                                    triangles[i + 3][corner]};
             Float4 out[4]; // the last one does not matter
             vdtree::transpose(rows, out);
             for (std::size_t axis = 0; axis < 3; ++axis)
@@ -78,7 +79,8 @@ UNSEEN_INLINE void measure_all(const Batch<capacity>& batch) {
     }
     // Now that the largest component is 1, floats do.
     for (std::size_t i = 0; i < capacity; ++i) {
-        const float squared = x[i] * x[i] + y[i] * y[i] + z[i] * z[i], scale = units / std::sqrt(squared > 0 ? squared : 1);
+        const float squared = x[i] * x[i] + y[i] * y[i] + z[i] * z[i],
+                    scale = units / std::sqrt(squared > 0 ? squared : 1);
         x[i] *= scale;
         y[i] *= scale;
         z[i] *= scale;

@@ -40,11 +40,18 @@ using SlabCoordinates = std::array<Float, NormalSlabs::axis_count>;
 template <class Float>
 SlabCoordinates<Float> along_slab_axes(Float x, Float y, Float z) noexcept {
     constexpr auto inverse_sqrt3 = static_cast<Float>(0.57735026918962576451); // the diagonals' coordinates
-    return {x, y, z, (x + y + z) * inverse_sqrt3, (-x + y + z) * inverse_sqrt3, (x - y + z) * inverse_sqrt3, (x + y - z) * inverse_sqrt3};
+    return {x,
+            y,
+            z,
+            (x + y + z) * inverse_sqrt3,
+            (-x + y + z) * inverse_sqrt3,
+            (x - y + z) * inverse_sqrt3,
+            (x + y - z) * inverse_sqrt3};
 }
 // Slabs from one to the other, rounded outward; `margin` (units, 1/127) covers the rounding of the coordinates.
 template <class Float>
-NormalSlabs slabs_between(const SlabCoordinates<Float>& low, const SlabCoordinates<Float>& high, Float margin) noexcept {
+NormalSlabs slabs_between(const SlabCoordinates<Float>& low, const SlabCoordinates<Float>& high,
+                          Float margin) noexcept {
     constexpr Float units = 127;
     NormalSlabs slabs;
     for (std::size_t i = 0; i < low.size(); ++i) {

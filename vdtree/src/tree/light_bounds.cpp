@@ -36,7 +36,8 @@ public:
             albedo_[node] = albedos_of(node);
         });
         find_neighbours();
-        for (Index leaf = 0; leaf < tree_.leaf_count(); ++leaf) sums_[leaf + 1] = sums_[leaf] + glm::dvec3(normals_[interior_ + leaf]);
+        for (Index leaf = 0; leaf < tree_.leaf_count(); ++leaf)
+            sums_[leaf + 1] = sums_[leaf] + glm::dvec3(normals_[interior_ + leaf]);
         constexpr NodeId grain = 1024;
         tbb::parallel_for(tbb::blocked_range<NodeId>(0, interior_, grain), [&](const auto& range) {
             for (NodeId node = range.begin(); node < range.end(); ++node)
@@ -155,11 +156,11 @@ private:
     const SoundTree& tree_;
     NodeId interior_;
     std::vector<VertexCone> cones_;
-    std::vector<float> angles_;      // by interior node
-    std::vector<glm::vec3> normals_; // by node
-    std::vector<LuminanceRange> albedo_; // by node
+    std::vector<float> angles_;             // by interior node
+    std::vector<glm::vec3> normals_;        // by node
+    std::vector<LuminanceRange> albedo_;    // by node
     std::vector<Index> start_, neighbours_; // by leaf: those that it shares triangles with, some more than once
-    std::vector<glm::dvec3> sums_;   // by leaf: of the normals of those before it
+    std::vector<glm::dvec3> sums_;          // by leaf: of the normals of those before it
 };
 
 } // namespace

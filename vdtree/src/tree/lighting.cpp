@@ -28,20 +28,26 @@ constexpr double brightest = 1e12; // relative luminance
 // What a change of intensity counts as, in radians for a change of its logarithm.
 constexpr double radians_per_log_intensity = 8;
 
-Error invalid(const std::string& field, const std::string& must) { return {ErrorCode::invalid_argument, field + " must " + must + "."}; }
+Error invalid(const std::string& field, const std::string& must) {
+    return {ErrorCode::invalid_argument, field + " must " + must + "."};
+}
 
 Result<void> validate(const LightSource& light, const std::string& name) {
     using Kind = LightSource::Kind;
-    if (!(light.intensity >= 0 && light.intensity <= brightest)) return invalid(name + ".intensity", "be a number from 0 to 1e12");
+    if (!(light.intensity >= 0 && light.intensity <= brightest))
+        return invalid(name + ".intensity", "be a number from 0 to 1e12");
     const bool has_direction = light.kind != Kind::point, has_position = light.kind != Kind::directional;
     if (has_direction && !(std::abs(glm::length(light.direction) - 1) <= unit_rounding))
         return invalid(name + ".direction", "have a length, and be finite");
     if (!has_position) return {};
-    if (!(glm::length(light.position) <= farthest)) return invalid(name + ".position", "be finite, and at most 1e18 mesh units away");
-    if (!(light.distance > 0 && light.distance <= farthest)) return invalid(name + ".distance", "be positive, and at most 1e18 mesh units");
+    if (!(glm::length(light.position) <= farthest))
+        return invalid(name + ".position", "be finite, and at most 1e18 mesh units away");
+    if (!(light.distance > 0 && light.distance <= farthest))
+        return invalid(name + ".distance", "be positive, and at most 1e18 mesh units");
     if (light.kind == Kind::point) return {};
     if (!(light.outer_cosine >= -1 && light.inner_cosine <= 1 && light.inner_cosine - light.outer_cosine >= least_edge))
-        return invalid(name + ".inner_degrees", "be less than outer_degrees, by a degree or so, and outer_degrees at most 180");
+        return invalid(name + ".inner_degrees",
+                       "be less than outer_degrees, by a degree or so, and outer_degrees at most 180");
     return {};
 }
 
@@ -61,7 +67,8 @@ double nearest_vertex_distance(const VertexTree& tree, glm::dvec3 point) {
         const Sphere& support = tree.support_spheres()[node];
         if (glm::length(point - glm::dvec3(support.centre)) - static_cast<double>(support.radius) >= nearest) continue;
         tree.for_each_child(node, [&](NodeId child) {
-            if (tree.is_leaf(child)) nearest = std::min(nearest, glm::length(point - glm::dvec3(tree.positions()[child])));
+            if (tree.is_leaf(child))
+                nearest = std::min(nearest, glm::length(point - glm::dvec3(tree.positions()[child])));
             else waiting.push_back(child);
         });
     }
@@ -91,7 +98,8 @@ bool crosses_oddly(const VertexTree& tree, glm::dvec3 origin, glm::dvec3 directi
             const double u = glm::dot(direction, glm::cross(b, c)), v = glm::dot(direction, glm::cross(c, a)),
                          w = glm::dot(direction, glm::cross(a, b));
             if (!((u > 0 && v > 0 && w > 0) || (u < 0 && v < 0 && w < 0))) continue;
-            const double along = (u * glm::dot(a, direction) + v * glm::dot(b, direction) + w * glm::dot(c, direction)) / (u + v + w);
+            const double along =
+                (u * glm::dot(a, direction) + v * glm::dot(b, direction) + w * glm::dot(c, direction)) / (u + v + w);
             if (along > 0) odd = !odd;
         }
         tree.for_each_child(node, [&](NodeId child) {
@@ -113,19 +121,23 @@ bool is_inside(const VertexTree& tree, glm::dvec3 point) {
 
 Result<void> validate(const Lighting& lighting) {
     if (lighting.lights.size() > most_lights)
-        return Error{ErrorCode::invalid_argument,
-                     "lights: there are " + std::to_string(lighting.lights.size()) + ", but at most " + std::to_string(most_lights) + " can be drawn."};
-    for (const auto& [name, value] : {std::pair("ambient", lighting.ambient), std::pair("material.specular", lighting.specular)})
+        return Error{ErrorCode::invalid_argument, "lights: there are " + std::to_string(lighting.lights.size()) +
+                                                      ", but at most " + std::to_string(most_lights) +
+                                                      " can be drawn."};
+    for (const auto& [name, value] :
+         {std::pair("ambient", lighting.ambient), std::pair("material.specular", lighting.specular)})
         if (!(value >= 0 && value <= 1)) return invalid(name, "be from 0 to 1");
-    if (!(lighting.shininess >= 1 && lighting.shininess <= most_shininess)) return invalid("material.shininess", "be from 1 to 1024");
+    if (!(lighting.shininess >= 1 && lighting.shininess <= most_shininess))
+        return invalid("material.shininess", "be from 1 to 1024");
     double sum = lighting.ambient;
     for (std::size_t i = 0; i < lighting.lights.size(); ++i) {
         if (auto valid = validate(lighting.lights[i], "lights[" + std::to_string(i) + "]"); !valid) return valid;
         sum += lighting.lights[i].intensity;
     }
     if (!(sum > 0))
-        return Error{ErrorCode::invalid_argument,
-                     "The scene is black: ambient and lights[].intensity are all 0. Give one of them a positive value."};
+        return Error{
+            ErrorCode::invalid_argument,
+            "The scene is black: ambient and lights[].intensity are all 0. Give one of them a positive value."};
     return {};
 }
 
@@ -139,7 +151,8 @@ Result<void> check_lights(const VertexTree& tree, const Lighting& lighting) {
         const std::string field = "lights[" + std::to_string(i) + "].position";
         if (glm::length(light.position - glm::dvec3(around.centre)) > radius * (1 + 2 * least_light_distance)) continue;
         if (nearest_vertex_distance(tree, light.position) <= radius * least_light_distance)
-            return Error{ErrorCode::invalid_argument, field + " is at a vertex of the model: move the light away from the surface."};
+            return Error{ErrorCode::invalid_argument,
+                         field + " is at a vertex of the model: move the light away from the surface."};
         if (tree.closedness() != Closedness::open && is_inside(tree, light.position))
             return Error{ErrorCode::invalid_argument,
                          field + " is inside of the model, whose surface is closed: move the light out of it."};
@@ -166,7 +179,8 @@ double lit_luminance(const Lighting& lighting, glm::dvec3 position, glm::dvec3 n
         double share = albedo;
         if (lighting.specular > 0) {
             const glm::dvec3 half = unit(towards + unit(eye - position));
-            share += lighting.specular * (lighting.shininess + 8) / 8 * std::pow(std::max(0.0, glm::dot(normal, half)), lighting.shininess);
+            share += lighting.specular * (lighting.shininess + 8) / 8 *
+                     std::pow(std::max(0.0, glm::dot(normal, half)), lighting.shininess);
         }
         sum += intensity * facing * share;
     }
@@ -174,23 +188,29 @@ double lit_luminance(const Lighting& lighting, glm::dvec3 position, glm::dvec3 n
 }
 
 float albedo_of(const VertexTree& tree, NodeId node) {
-    return vertex_luminance(glm::vec3(0), tree.colours().empty() ? nullptr : &tree.colours()[node], {}, true, !tree.texture().empty());
+    return vertex_luminance(glm::vec3(0), tree.colours().empty() ? nullptr : &tree.colours()[node], {}, true,
+                            !tree.texture().empty());
 }
 
-double light_motion(const VertexTree& tree, const Lighting& from, glm::dvec3 eye_from, const Lighting& to, glm::dvec3 eye_to) {
-    if (from.lights.size() != to.lights.size() || from.ambient != to.ambient || from.specular != to.specular || from.shininess != to.shininess)
+double light_motion(const VertexTree& tree, const Lighting& from, glm::dvec3 eye_from, const Lighting& to,
+                    glm::dvec3 eye_to) {
+    if (from.lights.size() != to.lights.size() || from.ambient != to.ambient || from.specular != to.specular ||
+        from.shininess != to.shininess)
         return infinity;
     const double radius = tree.bounds()[VertexTree::root()].ring.radius;
     const auto shift = [&](glm::dvec3 a, glm::dvec3 b) { return a == b ? 0.0 : glm::length(b - a) / radius; };
     double most = from.specular > 0 ? shift(eye_from, eye_to) : 0;
     for (std::size_t i = 0; i < from.lights.size(); ++i) {
         const LightSource &a = from.lights[i], &b = to.lights[i];
-        if (a.kind != b.kind || a.distance != b.distance || a.inner_cosine != b.inner_cosine || a.outer_cosine != b.outer_cosine) return infinity;
+        if (a.kind != b.kind || a.distance != b.distance || a.inner_cosine != b.inner_cosine ||
+            a.outer_cosine != b.outer_cosine)
+            return infinity;
         double motion = 0;
         if (a.kind != LightSource::Kind::point && a.direction != b.direction)
             motion += std::atan2(glm::length(glm::cross(a.direction, b.direction)), glm::dot(a.direction, b.direction));
         if (a.kind != LightSource::Kind::directional) motion += shift(a.position, b.position);
-        if (a.intensity != b.intensity) motion += radians_per_log_intensity * std::abs(std::log(b.intensity / a.intensity));
+        if (a.intensity != b.intensity)
+            motion += radians_per_log_intensity * std::abs(std::log(b.intensity / a.intensity));
         if (!(motion <= infinity)) return infinity;
         most = std::max(most, motion);
     }

@@ -95,7 +95,8 @@ std::vector<NodeId> find_equal(std::span<const Directions> nodes) {
         std::vector<HashedNode> table(wrap + 1, {0, no_node});
         for (const HashedNode& n : group) {
             std::size_t slot = n.hash & wrap;
-            while (table[slot].node != no_node && !(table[slot].hash == n.hash && are_equal(nodes[table[slot].node].mask, nodes[n.node].mask)))
+            while (table[slot].node != no_node &&
+                   !(table[slot].hash == n.hash && are_equal(nodes[table[slot].node].mask, nodes[n.node].mask)))
                 slot = (slot + 1) & wrap;
             if (table[slot].node == no_node) table[slot] = n;
             first[n.node] = table[slot].node;
@@ -125,7 +126,8 @@ PooledMasks pool_masks(std::span<const Directions> nodes, std::span<const NodeId
     PooledMasks pool;
     pool.at = find_equal(nodes);
     std::vector<std::uint8_t> sizes(nodes.size(), 0); // of the records, by first node; 0: none
-    std::vector<std::vector<std::uint8_t>> records(chunks_of(nodes.size())); // of each chunk's first nodes, one after another
+    std::vector<std::vector<std::uint8_t>> records(
+        chunks_of(nodes.size())); // of each chunk's first nodes, one after another
     for_each_node(nodes.size(), [&](std::size_t chunk, std::size_t n) {
         if (pool.at[n] != n) return;
         std::array<std::uint8_t, most_mask_bytes> record;

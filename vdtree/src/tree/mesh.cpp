@@ -24,8 +24,9 @@ Result<void> check_ranges(const MeshView& mesh) {
         const std::uint64_t triangles = mesh.triangles.size();
         // Not first + count: that sum can wrap around.
         if (range.first_triangle > triangles || range.triangle_count > triangles - range.first_triangle) {
-            return invalid("Range " + std::to_string(i) + " ('" + range.name + "') of the mesh ends after the last of " +
-                           std::to_string(triangles) + " triangles; shorten it.");
+            return invalid("Range " + std::to_string(i) + " ('" + range.name +
+                           "') of the mesh ends after the last of " + std::to_string(triangles) +
+                           " triangles; shorten it.");
         }
         if (range.first_triangle < previous_first) {
             return invalid("Range " + std::to_string(i) + " ('" + range.name +
@@ -59,7 +60,8 @@ Result<void> validate(const MeshView& mesh) {
     if (Result<void> checked = check_length("UVs", mesh.uvs.size(), vertices); !checked) return checked;
     if (Result<void> checked = validate(mesh.texture); !checked) return checked;
     if (!mesh.texture.empty() && mesh.uvs.empty()) {
-        return invalid("The mesh has a texture but no UVs, which say where it lies; give one for each vertex or no texture.");
+        return invalid(
+            "The mesh has a texture but no UVs, which say where it lies; give one for each vertex or no texture.");
     }
     return check_ranges(mesh);
 }

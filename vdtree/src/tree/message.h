@@ -21,10 +21,8 @@ public:
         append(values.data(), values.size() * sizeof(T));
     }
     template <class T>
-        requires std::is_arithmetic_v<T>
-    void operator()(const T& value) {
-        append(&value, sizeof(T));
-    }
+    requires std::is_arithmetic_v<T>
+    void operator()(const T& value) { append(&value, sizeof(T)); }
     std::span<const std::byte> bytes() const { return bytes_; }
 
 private:
@@ -51,7 +49,7 @@ public:
         take(values.data(), count * sizeof(T));
     }
     template <class T>
-        requires std::is_arithmetic_v<T>
+    requires std::is_arithmetic_v<T>
     void operator()(T& value) {
         if (rest_.size() < sizeof(T)) return fail();
         take(&value, sizeof(T));

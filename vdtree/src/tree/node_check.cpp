@@ -120,7 +120,8 @@ const char* fault_in_links(const TreeGeometry& g, NodeId node) {
 }
 
 const char* fault_in_values(const TreeGeometry& g, NodeId node) noexcept {
-    const bool drawable = is_finite(&g.positions[node].x, 3) && (g.colours.empty() || is_finite(&g.colours[node].x, 4)) &&
+    const bool drawable = is_finite(&g.positions[node].x, 3) &&
+                          (g.colours.empty() || is_finite(&g.colours[node].x, 4)) &&
                           (g.uvs.empty() || is_finite(&g.uvs[node].x, 2));
     if (!drawable) return "has a value that is not finite.";
     if (node >= g.bounds.size()) return nullptr;

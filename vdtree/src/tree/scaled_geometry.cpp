@@ -40,10 +40,25 @@ std::shared_ptr<const TreeGeometry> scaled_geometry(const std::shared_ptr<const 
     for (NodeBounds& of_node : bounds) of_node.ring = scaled(of_node.ring, scale);
     GeometryFacts facts = g;
     facts.bounding_sphere = scaled(g.bounding_sphere, scale);
-    GeometryArrays<Array> arrays{view_of(g.parents), std::move(positions), view_of(g.normals), view_of(g.colours), view_of(g.uvs),
-                                 view_of(g.first_leaf), view_of(g.leaf_end), view_of(g.subtree_end), view_of(g.first_triangle), std::move(bounds),
-                                 std::move(support), view_of(g.mask_at), view_of(g.displacement), view_of(g.mask_records), view_of(g.triangles),
-                                 view_of(g.source_triangles), view_of(g.source_vertices), view_of(g.texture), view_of(g.texels),
+    GeometryArrays<Array> arrays{view_of(g.parents),
+                                 std::move(positions),
+                                 view_of(g.normals),
+                                 view_of(g.colours),
+                                 view_of(g.uvs),
+                                 view_of(g.first_leaf),
+                                 view_of(g.leaf_end),
+                                 view_of(g.subtree_end),
+                                 view_of(g.first_triangle),
+                                 std::move(bounds),
+                                 std::move(support),
+                                 view_of(g.mask_at),
+                                 view_of(g.displacement),
+                                 view_of(g.mask_records),
+                                 view_of(g.triangles),
+                                 view_of(g.source_triangles),
+                                 view_of(g.source_vertices),
+                                 view_of(g.texture),
+                                 view_of(g.texels),
                                  view_of(g.ring_texture)};
     return std::make_shared<TreeGeometry>(TreeGeometry{std::move(arrays), std::move(facts), given});
 }

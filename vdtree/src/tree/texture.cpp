@@ -24,8 +24,8 @@ const std::array<double, 256>& linear_of_code() {
 }
 
 // Filters on graphics processors place their samples to 1/256 of a texel, and keep light in half floats.
-constexpr double placing_slack = 1.0 / 64;  // texels
-constexpr double float_slack = 4e-7;        // of a coordinate: a few roundings of its float on the way to the texel
+constexpr double placing_slack = 1.0 / 64;    // texels
+constexpr double float_slack = 4e-7;          // of a coordinate: a few roundings of its float on the way to the texel
 constexpr double decoding_slack = 1.0 / 4096; // of a luminance, and of 1/16 at least
 // Ranges are looked up in boxes of up to so many cells a side: less than a seventh of it is looked up too much.
 constexpr std::int64_t most_cells = 16;
@@ -34,14 +34,18 @@ constexpr double farthest_coordinate = 1 << 23; // texels
 
 Unorm16 rounded_down(double y) {
     const double slack = decoding_slack * std::max(y, 1.0 / 16);
-    return {static_cast<std::uint16_t>(std::clamp(std::floor((y - slack) * Unorm16::largest), 0.0, double{Unorm16::largest}))};
+    return {static_cast<std::uint16_t>(
+        std::clamp(std::floor((y - slack) * Unorm16::largest), 0.0, double{Unorm16::largest}))};
 }
 Unorm16 rounded_up(double y) {
     const double slack = decoding_slack * std::max(y, 1.0 / 16);
-    return {static_cast<std::uint16_t>(std::clamp(std::ceil((y + slack) * Unorm16::largest), 0.0, double{Unorm16::largest}))};
+    return {static_cast<std::uint16_t>(
+        std::clamp(std::ceil((y + slack) * Unorm16::largest), 0.0, double{Unorm16::largest}))};
 }
 
-TexturePyramid::Range unite(TexturePyramid::Range a, TexturePyramid::Range b) { return {std::min(a.lo, b.lo), std::max(a.hi, b.hi)}; }
+TexturePyramid::Range unite(TexturePyramid::Range a, TexturePyramid::Range b) {
+    return {std::min(a.lo, b.lo), std::max(a.hi, b.hi)};
+}
 
 constexpr TexturePyramid::Range empty_range{{Unorm16::largest}, {0}};
 
@@ -51,20 +55,24 @@ Result<void> validate(const TextureView& texture) {
     if (texture.texels.empty() && texture.width == 0 && texture.height == 0) return {};
     const auto invalid = [](const std::string& what) { return Error{ErrorCode::malformed_data, what}; };
     const std::string size = std::to_string(texture.width) + " x " + std::to_string(texture.height);
-    if (texture.width == 0 || texture.height == 0) return invalid("The texture of " + size + " texels is empty; give another one.");
+    if (texture.width == 0 || texture.height == 0)
+        return invalid("The texture of " + size + " texels is empty; give another one.");
     if (texture.width > largest_texture_side || texture.height > largest_texture_side)
-        return invalid("The texture has " + size + " texels, and at most " + std::to_string(largest_texture_side) + " a side can be drawn; scale it down.");
+        return invalid("The texture has " + size + " texels, and at most " + std::to_string(largest_texture_side) +
+                       " a side can be drawn; scale it down.");
     if (texture.texels.size() != std::size_t{texture.width} * texture.height)
-        return invalid("The texture of " + size + " texels holds " + std::to_string(texture.texels.size()) + "; give as many as it says.");
+        return invalid("The texture of " + size + " texels holds " + std::to_string(texture.texels.size()) +
+                       "; give as many as it says.");
     for (const Wrap wrap : {texture.wrap_u, texture.wrap_v})
-        if (wrap != Wrap::repeat && wrap != Wrap::clamp) return invalid("The texture repeats in a way that is not known.");
+        if (wrap != Wrap::repeat && wrap != Wrap::clamp)
+            return invalid("The texture repeats in a way that is not known.");
     return {};
 }
 
 glm::vec4 linear_colour(Texel texel) noexcept {
     const auto& linear = linear_of_code();
-    return {static_cast<float>(linear[texel[0]]), static_cast<float>(linear[texel[1]]), static_cast<float>(linear[texel[2]]),
-            static_cast<float>(texel[3]) / 255.0f};
+    return {static_cast<float>(linear[texel[0]]), static_cast<float>(linear[texel[1]]),
+            static_cast<float>(linear[texel[2]]), static_cast<float>(texel[3]) / 255.0f};
 }
 
 double linear_luminance(Texel texel) noexcept {
@@ -118,8 +126,10 @@ TexturePyramid::Cells TexturePyramid::texels_of(double lo, double hi, std::uint3
     const double first = lo * size, last = hi * size;
     const double slack = placing_slack + float_slack * std::max(std::abs(first), std::abs(last));
     if (!(std::abs(first) < farthest_coordinate) || !(std::abs(last) < farthest_coordinate)) return {0, n - 1, -1};
-    const auto begin = static_cast<std::int64_t>(std::floor(first - 0.5 - slack)), end = static_cast<std::int64_t>(std::floor(last + 0.5 + slack));
-    if (wrap == Wrap::clamp) return {std::clamp<std::int64_t>(begin, 0, n - 1), std::clamp<std::int64_t>(end, 0, n - 1), -1};
+    const auto begin = static_cast<std::int64_t>(std::floor(first - 0.5 - slack)),
+               end = static_cast<std::int64_t>(std::floor(last + 0.5 + slack));
+    if (wrap == Wrap::clamp)
+        return {std::clamp<std::int64_t>(begin, 0, n - 1), std::clamp<std::int64_t>(end, 0, n - 1), -1};
     if (end - begin + 1 >= n) return {0, n - 1, -1};
     const std::int64_t wrapped = ((begin % n) + n) % n, wrapped_end = wrapped + (end - begin);
     return wrapped_end < n ? Cells{wrapped, wrapped_end, -1} : Cells{wrapped, n - 1, wrapped_end - n};
@@ -136,7 +146,8 @@ TexturePyramid::Range TexturePyramid::range(const UvBox& box) const {
         Range range = empty_range;
         for (std::int64_t y = y0 >> k; y <= y1 >> k; ++y)
             for (std::int64_t x = x0 >> k; x <= x1 >> k; ++x)
-                range = unite(range, level.ranges[static_cast<std::size_t>(y) * level.width + static_cast<std::size_t>(x)]);
+                range =
+                    unite(range, level.ranges[static_cast<std::size_t>(y) * level.width + static_cast<std::size_t>(x)]);
         return range;
     };
     Range range = look(u.first, u.last, v.first, v.last);
@@ -150,13 +161,15 @@ float TexturePyramid::texel_mean(const Level& level, std::int64_t x, std::int64_
     const auto wrapped = [](std::int64_t i, std::int64_t n, Wrap wrap) {
         return wrap == Wrap::clamp ? std::clamp<std::int64_t>(i, 0, n - 1) : ((i % n) + n) % n;
     };
-    const auto column = static_cast<std::size_t>(wrapped(x, level.width, wrap_u_)), row = static_cast<std::size_t>(wrapped(y, level.height, wrap_v_));
+    const auto column = static_cast<std::size_t>(wrapped(x, level.width, wrap_u_)),
+               row = static_cast<std::size_t>(wrapped(y, level.height, wrap_v_));
     return level.means[row * level.width + column];
 }
 
 double TexturePyramid::bilinear_mean(const Level& level, glm::dvec2 uv) const {
     const double x = uv.x * level.width - 0.5, y = uv.y * level.height - 0.5;
-    if (!(std::abs(x) < farthest_coordinate) || !(std::abs(y) < farthest_coordinate)) return static_cast<double>(levels_.back().means[0]);
+    if (!(std::abs(x) < farthest_coordinate) || !(std::abs(y) < farthest_coordinate))
+        return static_cast<double>(levels_.back().means[0]);
     const double fx = std::floor(x), fy = std::floor(y);
     const auto i = static_cast<std::int64_t>(fx), j = static_cast<std::int64_t>(fy);
     const double s = x - fx, t = y - fy;

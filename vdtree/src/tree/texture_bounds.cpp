@@ -18,7 +18,8 @@ Unorm16 up(double units) { return {static_cast<std::uint16_t>(std::clamp(std::ce
 } // namespace
 
 PackedRange product(PackedRange luminance, PackedRange texture) {
-    return {down(luminance.lo.value * (texture.lo.value / largest)), up(luminance.hi.value * (texture.hi.value / largest))};
+    return {down(luminance.lo.value * (texture.lo.value / largest)),
+            up(luminance.hi.value * (texture.hi.value / largest))};
 }
 
 PackedRange channel_range(const glm::vec4& colour, Unorm16 luminance) {
@@ -47,7 +48,8 @@ std::vector<UvBox> bound_footprints(const TreeGeometry& g, const TreeParts& part
         return [&](NodeId node) {
             UvBox box;
             box.include(g.uvs[node]);
-            tree.for_each_child(node, [&](NodeId child) { box.include(boxes[child]); }, [&](Index leaf) { box.include(around[leaf]); });
+            tree.for_each_child(
+                node, [&](NodeId child) { box.include(boxes[child]); }, [&](Index leaf) { box.include(around[leaf]); });
             boxes[node] = box;
         };
     });
@@ -72,8 +74,9 @@ std::vector<std::uint8_t> find_texture_moves(const TreeGeometry& g, const TreePa
         return [&](NodeId node) {
             const glm::vec2 here = g.uvs[node];
             bool differs = false;
-            tree.for_each_child(node, [&](NodeId child) { differs = differs || moves[child] || g.uvs[child] != here; },
-                                [&](Index leaf) { differs = differs || g.uvs[tree.node_of_leaf(leaf)] != here; });
+            tree.for_each_child(
+                node, [&](NodeId child) { differs = differs || moves[child] || g.uvs[child] != here; },
+                [&](Index leaf) { differs = differs || g.uvs[tree.node_of_leaf(leaf)] != here; });
             moves[node] = differs;
         };
     });

@@ -59,7 +59,8 @@ TextureFits::TextureFits(const TreeGeometry& g, const TreeParts& parts) : g_(&g)
             const Triangle& t = g.triangles[triangle];
             for (const Index leaf : t)
                 if (parts.owns_leaf(part, leaf))
-                    for (const Index corner : t) add(around[leaf], g.uvs[interior + leaf], g.positions[interior + leaf], interior + corner);
+                    for (const Index corner : t)
+                        add(around[leaf], g.uvs[interior + leaf], g.positions[interior + leaf], interior + corner);
         };
     });
     maps_.resize(interior);
@@ -68,11 +69,16 @@ TextureFits::TextureFits(const TreeGeometry& g, const TreeParts& parts) : g_(&g)
             const glm::dvec2 uv0(g.uvs[node]);
             const glm::dvec3 p0(g.positions[node]);
             Moments sum;
-            const auto take = [&](const Moments& m, NodeId vertex) { sum += moved(m, glm::dvec2(g.uvs[vertex]) - uv0, glm::dvec3(g.positions[vertex]) - p0); };
-            tree.for_each_child(node, [&](NodeId child) { take(sums[child], child); }, [&](Index leaf) { take(around[leaf], interior + leaf); });
+            const auto take = [&](const Moments& m, NodeId vertex) {
+                sum += moved(m, glm::dvec2(g.uvs[vertex]) - uv0, glm::dvec3(g.positions[vertex]) - p0);
+            };
+            tree.for_each_child(
+                node, [&](NodeId child) { take(sums[child], child); },
+                [&](Index leaf) { take(around[leaf], interior + leaf); });
             sums[node] = sum;
 
-            const double n = sum.count, uu = sum.uu - sum.u * sum.u / n, uv = sum.uv - sum.u * sum.v / n, vv = sum.vv - sum.v * sum.v / n;
+            const double n = sum.count, uu = sum.uu - sum.u * sum.u / n, uv = sum.uv - sum.u * sum.v / n,
+                         vv = sum.vv - sum.v * sum.v / n;
             const double determinant = uu * vv - uv * uv;
             const glm::dvec3 pu = sum.pu - sum.p * (sum.u / n), pv = sum.pv - sum.p * (sum.v / n);
             Map map{sum.p / n, glm::dvec3(0), glm::dvec3(0)};
@@ -92,14 +98,16 @@ std::vector<glm::vec2> TextureFits::fitted_uvs(const std::vector<UvBox>& footpri
     tbb::parallel_for(std::size_t{0}, maps_.size(), [&](std::size_t node) {
         const Map& map = maps_[node];
         if (!moves_[node]) return;
-        const double uu = glm::dot(map.along_u, map.along_u), uv = glm::dot(map.along_u, map.along_v), vv = glm::dot(map.along_v, map.along_v);
+        const double uu = glm::dot(map.along_u, map.along_u), uv = glm::dot(map.along_u, map.along_v),
+                     vv = glm::dot(map.along_v, map.along_v);
         const double determinant = uu * vv - uv * uv;
         if (!(determinant > least_determinant * uu * vv)) return;
         const glm::dvec3 off = glm::dvec3(g_->positions[node]) - map.at;
         const double u = glm::dot(off, map.along_u), v = glm::dot(off, map.along_v);
         const glm::vec2 fitted((u * vv - v * uv) / determinant, (v * uu - u * uv) / determinant);
         for (int k = 0; k < 2; ++k) // NaN leaves what there is
-            if (fitted[k] >= -std::numeric_limits<float>::max()) uvs[node][k] = std::clamp(fitted[k], footprints[node].lo[k], footprints[node].hi[k]);
+            if (fitted[k] >= -std::numeric_limits<float>::max())
+                uvs[node][k] = std::clamp(fitted[k], footprints[node].lo[k], footprints[node].hi[k]);
     });
     return uvs;
 }
@@ -112,8 +120,10 @@ double TextureFits::residual_of_subtree(NodeId node) const {
         if (++ancestors > most_ancestors) return std::numeric_limits<double>::infinity();
     const NodeId interior = static_cast<NodeId>(g_->first_leaf.size());
     double largest = 0;
-    for (NodeId below = node; below < g_->subtree_end[node]; ++below) largest = std::max(largest, residual(node, below));
-    for (Index leaf = g_->first_leaf[node]; leaf < g_->leaf_end[node]; ++leaf) largest = std::max(largest, residual(node, interior + leaf));
+    for (NodeId below = node; below < g_->subtree_end[node]; ++below)
+        largest = std::max(largest, residual(node, below));
+    for (Index leaf = g_->first_leaf[node]; leaf < g_->leaf_end[node]; ++leaf)
+        largest = std::max(largest, residual(node, interior + leaf));
     return largest;
 }
 

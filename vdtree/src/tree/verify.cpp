@@ -33,13 +33,15 @@ public:
         for (NodeId node = 0; node < tree_.interior_count(); ++node) {
             check_vertices(node);
             check_children(node);
-            if (!fault_.empty()) return Error{ErrorCode::malformed_data, "Node " + std::to_string(node) + ": " + fault_};
+            if (!fault_.empty())
+                return Error{ErrorCode::malformed_data, "Node " + std::to_string(node) + ": " + fault_};
         }
         for (NodeId node = 0; node < tree_.interior_count(); ++node)
             for (Index t = g_.first_triangle[node]; t < g_.first_triangle[node + 1]; ++t)
                 if (vanishing_node(g_.triangles[t]) != node)
-                    return Error{ErrorCode::malformed_data,
-                                 "Triangle " + std::to_string(t) + " does not vanish at node " + std::to_string(node) + "."};
+                    return Error{ErrorCode::malformed_data, "Triangle " + std::to_string(t) +
+                                                                " does not vanish at node " + std::to_string(node) +
+                                                                "."};
         for (std::size_t t = 0; t < g_.triangles.size(); ++t) {
             check_rings(g_.triangles[t]);
             if (!fault_.empty())
@@ -63,7 +65,8 @@ private:
         if (pyramid_) {
             const PackedRange texture = texture_of({node});
             expect(contains(g_.ring_texture[node], texture), "the ring's texture does not contain the proxy's.");
-            expect(g_.support_spheres[node].radius == 0 || contains(l_.ring_range[node], product(shade_of({node}), texture)),
+            expect(g_.support_spheres[node].radius == 0 ||
+                       contains(l_.ring_range[node], product(shade_of({node}), texture)),
                    "the ring's luminance does not contain what its proxy shows.");
         }
         const Index measured = std::min<Index>(g_.leaf_end[node], g_.first_leaf[node] + most_leaves_measured);
@@ -91,9 +94,11 @@ private:
             expect((g_.bounds[child].flags & ~g_.bounds[node].flags) == 0, "a child has other flags.");
             expect(g_.displacement[node] >= g_.displacement[child], "a child's displacement is larger.");
             expect(l_.adaptation[node] >= l_.adaptation[child], "a child's adaptation luminance is higher.");
-            expect(contains(l_.support_range[node], l_.support_range[child]), "a child's support luminance sticks out.");
+            expect(contains(l_.support_range[node], l_.support_range[child]),
+                   "a child's support luminance sticks out.");
             expect(contains(l_.ring_range[node], l_.ring_range[child]), "a child's ring luminance sticks out.");
-            expect(!pyramid_ || contains(g_.ring_texture[node], g_.ring_texture[child]), "a child's texture sticks out.");
+            expect(!pyramid_ || contains(g_.ring_texture[node], g_.ring_texture[child]),
+                   "a child's texture sticks out.");
         });
     }
 
@@ -104,17 +109,23 @@ private:
                          c = g_.positions[interior + t[2]];
         const glm::dvec3 normal = glm::cross(b - a, c - a);
         const int cell = normal_cell(normal);
-        const PackedRange texture = pyramid_ ? texture_of({interior + t[0], interior + t[1], interior + t[2]}) : PackedRange{};
-        const PackedRange shown = pyramid_ ? product(shade_of({interior + t[0], interior + t[1], interior + t[2]}), texture) : PackedRange{};
-        const bool shows_through =
-            !g_.colours.empty() && std::any_of(t.begin(), t.end(), [&](Index leaf) { return !(g_.colours[interior + leaf].a >= 1); });
+        const PackedRange texture =
+            pyramid_ ? texture_of({interior + t[0], interior + t[1], interior + t[2]}) : PackedRange{};
+        const PackedRange shown =
+            pyramid_ ? product(shade_of({interior + t[0], interior + t[1], interior + t[2]}), texture) : PackedRange{};
+        const bool shows_through = !g_.colours.empty() && std::any_of(t.begin(), t.end(), [&](Index leaf) {
+            return !(g_.colours[interior + leaf].a >= 1);
+        });
         for (const Index leaf : t) {
             NodeId node = g_.parents[interior + leaf];
             while (node != no_node && g_.support_spheres[node].radius == 0) node = g_.parents[node];
             if (node == no_node) continue; // everything is at one point
-            expect(!shows_through || (g_.bounds[node].flags & translucent_ring), "a corner's parent does not know of an alpha below 1.");
-            expect(cell < 0 || tree_.mask(node).contains(cell), "a normal is missing in the mask of a corner's parent.");
-            expect(!pyramid_ || contains(g_.ring_texture[node], texture), "a triangle's texture is outside of that of the ring of a corner's parent.");
+            expect(!shows_through || (g_.bounds[node].flags & translucent_ring),
+                   "a corner's parent does not know of an alpha below 1.");
+            expect(cell < 0 || tree_.mask(node).contains(cell),
+                   "a normal is missing in the mask of a corner's parent.");
+            expect(!pyramid_ || contains(g_.ring_texture[node], texture),
+                   "a triangle's texture is outside of that of the ring of a corner's parent.");
             expect(!pyramid_ || contains(l_.ring_range[node], shown),
                    "what a triangle shows is outside of the luminance of the ring of a corner's parent.");
             for (const Index corner : t) {
@@ -164,7 +175,8 @@ private:
     const SoundTree& tree_;
     const TreeGeometry& g_;
     const TreeLuminance& l_;
-    const std::optional<TexturePyramid> pyramid_ = l_.textured ? std::optional<TexturePyramid>(g_.texture_view()) : std::nullopt;
+    const std::optional<TexturePyramid> pyramid_ =
+        l_.textured ? std::optional<TexturePyramid>(g_.texture_view()) : std::nullopt;
     std::string fault_;
 };
 

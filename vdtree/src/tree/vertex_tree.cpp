@@ -52,7 +52,8 @@ public:
         : luminance_(luminance), colours_(textured && !g.colours.empty() ? g.colours.data() : nullptr) {}
 
     PackedRange operator[](NodeId node) const {
-        return colours_ ? channel_range(colours_[node], luminance_[node]) : PackedRange{luminance_[node], luminance_[node]};
+        return colours_ ? channel_range(colours_[node], luminance_[node])
+                        : PackedRange{luminance_[node], luminance_[node]};
     }
 
 private:
@@ -90,8 +91,7 @@ LeafSurroundings survey_leaves(const TreeGeometry& g, const TreeParts& parts, co
 // Area-weighted means over ranges of leaves.
 class RunningSums {
 public:
-    RunningSums(std::span<const double> areas, std::span<const Unorm16> luminance)
-        : before_(areas.size() + 1) {
+    RunningSums(std::span<const double> areas, std::span<const Unorm16> luminance) : before_(areas.size() + 1) {
         double largest = 0;
         for (const double a : areas) largest = std::max(largest, a);
         const double scale = largest > 0 ? 1 / largest : 0;
@@ -124,8 +124,8 @@ void light_leaves(const TreeGeometry& g, const Light& light, bool prelit, bool t
     const NodeId interior = static_cast<NodeId>(g.first_leaf.size()), nodes = static_cast<NodeId>(luminance.size());
     tbb::parallel_for(tbb::blocked_range<NodeId>(interior, nodes, grain), [&](const auto& range) {
         for (NodeId node = range.begin(); node < range.end(); ++node)
-            luminance[node] = Unorm16::nearest(
-                vertex_luminance(g.normals[node], g.colours.empty() ? nullptr : &g.colours[node], light, prelit, textured));
+            luminance[node] = Unorm16::nearest(vertex_luminance(
+                g.normals[node], g.colours.empty() ? nullptr : &g.colours[node], light, prelit, textured));
     });
 }
 
@@ -134,7 +134,8 @@ PackedRange range_below(const TreeGeometry& g, const Shades& shades, NodeId node
     const NodeId interior = static_cast<NodeId>(g.first_leaf.size());
     PackedRange range = empty_range;
     for (NodeId below = node; below < g.subtree_end[node]; ++below) range = unite(range, shades[below]);
-    for (Index leaf = g.first_leaf[node]; leaf < g.leaf_end[node]; ++leaf) range = unite(range, shades[interior + leaf]);
+    for (Index leaf = g.first_leaf[node]; leaf < g.leaf_end[node]; ++leaf)
+        range = unite(range, shades[interior + leaf]);
     return range;
 }
 
@@ -144,16 +145,17 @@ bool is_coincident(const TreeGeometry& g, NodeId node) { return g.support_sphere
 } // namespace
 
 float vertex_luminance(glm::vec3 normal, const glm::vec4* colour, const Light& light, bool prelit, bool textured) {
-    const float albedo =
-        colour ? std::clamp(rec709_luminance(glm::vec3(*colour)), 0.0f, 1.0f)
-               : textured ? 1.0f : default_albedo;
+    const float albedo = colour     ? std::clamp(rec709_luminance(glm::vec3(*colour)), 0.0f, 1.0f)
+                         : textured ? 1.0f
+                                    : default_albedo;
     if (prelit) return albedo;
     const float lit = light.ambient + (1 - light.ambient) * std::max(0.0f, glm::dot(normal, light.direction));
     // Unit vectors in floats may be a little long; an impossible light must not lead out of 0..1 either.
     return std::max(0.0f, std::min(1.0f, albedo * lit));
 }
 
-TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, const Light& light, bool prelit, bool textured) {
+TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, const Light& light, bool prelit,
+                               bool textured) {
     textured = textured && !g.texels.empty();
     const TreeLinks tree = links_of(g);
     const NodeId interior = tree.interior();
@@ -170,7 +172,8 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
     const RunningSums sums(leaf.areas, std::span(out.luminance).subspan(interior));
 
     std::vector<PackedRange> of_vertices(textured ? interior : 0); // the rings, without the texture
-    const std::vector<std::uint8_t> moves_texture = textured ? find_texture_moves(g, parts) : std::vector<std::uint8_t>();
+    const std::vector<std::uint8_t> moves_texture =
+        textured ? find_texture_moves(g, parts) : std::vector<std::uint8_t>();
     parts.bottom_up([&] {
         return [&](NodeId node) {
             PackedRange support = empty_range, ring = empty_range;
@@ -181,7 +184,8 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
                     support = unite(support, out.support_range[child]);
                     ring = unite(ring, textured ? of_vertices[child] : out.ring_range[child]);
                     if (is_coincident(g, child)) // its ring_range is narrower than its ring
-                        for (Index l = g.first_leaf[child]; l < g.leaf_end[child]; ++l) ring = unite(ring, leaf.ring[l]);
+                        for (Index l = g.first_leaf[child]; l < g.leaf_end[child]; ++l)
+                            ring = unite(ring, leaf.ring[l]);
                     adaptation = std::max(adaptation, out.adaptation[child]);
                 },
                 [&](Index l) {
@@ -203,23 +207,30 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
             if (textured) {
                 of_vertices[node] = ring;
                 PackedRange texture = g.ring_texture[node];
-                if (is_coincident(g, node) && !moves_texture[node]) texture.lo = texture.hi; // the brightest shows the spread best
+                if (is_coincident(g, node) && !moves_texture[node])
+                    texture.lo = texture.hi; // the brightest shows the spread best
                 ring = product(ring, texture);
             }
             out.ring_range[node] = ring;
             out.adaptation[node] = std::max(adaptation, middle(ring));
         };
     });
-    TreeLuminance done{{std::move(out.luminance), std::move(out.support_range), std::move(out.ring_range),
-                        std::move(out.adaptation)},
-                       light, prelit, textured, textured ? product(leaf.corners, g.ring_texture[VertexTree::root()]) : leaf.corners};
+    TreeLuminance done{
+        {std::move(out.luminance), std::move(out.support_range), std::move(out.ring_range), std::move(out.adaptation)},
+        light,
+        prelit,
+        textured,
+        textured ? product(leaf.corners, g.ring_texture[VertexTree::root()]) : leaf.corners};
     return done;
 }
 
 TreeLuminance copy_of(const TreeLuminance& light) {
     const auto copy = [](const auto& values) { return std::vector(values.begin(), values.end()); };
     return {{copy(light.luminance), copy(light.support_range), copy(light.ring_range), copy(light.adaptation)},
-            light.light, light.prelit, light.textured, light.range};
+            light.light,
+            light.prelit,
+            light.textured,
+            light.range};
 }
 
 VertexTree::VertexTree(std::shared_ptr<const Data> data) : data_(std::move(data)), checks_(data_->checks.get()) {
@@ -237,7 +248,9 @@ std::span<const PackedNormal> VertexTree::normals() const noexcept { return data
 std::span<const glm::vec4> VertexTree::colours() const noexcept { return data_->geometry->colours; }
 std::span<const glm::vec2> VertexTree::uvs() const noexcept { return data_->geometry->uvs; }
 
-TextureView VertexTree::texture() const noexcept { return data_->light->textured ? data_->geometry->texture_view() : TextureView{}; }
+TextureView VertexTree::texture() const noexcept {
+    return data_->light->textured ? data_->geometry->texture_view() : TextureView{};
+}
 
 std::span<const NodeBounds> VertexTree::bounds() const noexcept { return data_->geometry->bounds; }
 NormalMask VertexTree::mask(NodeId node) const noexcept {
@@ -247,7 +260,8 @@ std::span<const Sphere> VertexTree::support_spheres() const noexcept { return da
 std::span<const PackedRange> VertexTree::support_luminance() const noexcept { return data_->light->support_range; }
 std::span<const PackedRange> VertexTree::ring_luminance() const noexcept { return data_->light->ring_range; }
 std::span<const PackedRange> VertexTree::ring_texture() const noexcept {
-    return data_->light->textured ? std::span<const PackedRange>(data_->geometry->ring_texture) : std::span<const PackedRange>();
+    return data_->light->textured ? std::span<const PackedRange>(data_->geometry->ring_texture)
+                                  : std::span<const PackedRange>();
 }
 std::span<const Unorm16> VertexTree::adaptation_luminance() const noexcept { return data_->light->adaptation; }
 std::span<const float> VertexTree::displacement() const noexcept { return data_->geometry->displacement; }
@@ -277,7 +291,8 @@ Result<SoundTree> SoundTree::of(const VertexTree& tree) {
 namespace {
 
 // The data of a tree whose luminance is found anew. There is nothing left to check.
-Result<std::shared_ptr<const VertexTree::Data>> shaded_anew(const VertexTree& tree, const Light& light, bool prelit, bool textured) {
+Result<std::shared_ptr<const VertexTree::Data>> shaded_anew(const VertexTree& tree, const Light& light, bool prelit,
+                                                            bool textured) {
     const auto sound = SoundTree::of(tree);
     if (!sound) return sound.error();
     auto data = std::make_shared<VertexTree::Data>();
@@ -304,10 +319,12 @@ Result<VertexTree> VertexTree::untextured() const {
 
 std::string fault_in_attribute(const AttributeInfo& a, std::size_t interior_count, std::size_t node_count) {
     const auto is_plain = [](char c) { return c > ' ' && c <= '~'; };
-    if (a.name.empty() || a.name.size() > longest_attribute_name || !std::all_of(a.name.begin(), a.name.end(), is_plain))
+    if (a.name.empty() || a.name.size() > longest_attribute_name ||
+        !std::all_of(a.name.begin(), a.name.end(), is_plain))
         return "An attribute's name must have 1 to 20 printable characters and no spaces.";
     const std::uint32_t component = a.component_bytes;
-    if (!(component == 1 || component == 2 || component == 4 || component == 8) || a.element_bytes == 0 || a.element_bytes % component != 0)
+    if (!(component == 1 || component == 2 || component == 4 || component == 8) || a.element_bytes == 0 ||
+        a.element_bytes % component != 0)
         return "Attribute " + a.name + " has values that are no numbers of 1, 2, 4 or 8 bytes.";
     switch (a.domain) {
     case AttributeDomain::tree: return {};
@@ -322,13 +339,16 @@ std::string fault_in_attribute(const AttributeInfo& a, std::size_t interior_coun
     return "Attribute " + a.name + " has " + std::to_string(a.count) + " values, not one for each node.";
 }
 
-std::span<const std::byte> VertexTree::attribute_bytes(std::string_view name, std::size_t element, std::uint32_t component) const noexcept {
+std::span<const std::byte> VertexTree::attribute_bytes(std::string_view name, std::size_t element,
+                                                       std::uint32_t component) const noexcept {
     for (const Attribute& a : data_->attributes)
         if (a.name == name && a.element_bytes == element && a.component_bytes == component) return a.bytes;
     return {};
 }
 
-std::vector<AttributeInfo> VertexTree::attributes() const { return {data_->attributes.begin(), data_->attributes.end()}; }
+std::vector<AttributeInfo> VertexTree::attributes() const {
+    return {data_->attributes.begin(), data_->attributes.end()};
+}
 
 Result<VertexTree> VertexTree::with_attribute(Attribute attribute) const {
     if (const std::string fault = fault_in_attribute(attribute, interior_count(), node_count()); !fault.empty())
@@ -336,8 +356,8 @@ Result<VertexTree> VertexTree::with_attribute(Attribute attribute) const {
     auto data = std::make_shared<Data>(*data_);
     std::erase_if(data->attributes, [&](const Attribute& a) { return a.name == attribute.name; });
     if (data->attributes.size() == most_attributes)
-        return Error{ErrorCode::invalid_argument,
-                     "A tree has at most " + std::to_string(most_attributes) + " attributes; there is no room for " + attribute.name + "."};
+        return Error{ErrorCode::invalid_argument, "A tree has at most " + std::to_string(most_attributes) +
+                                                      " attributes; there is no room for " + attribute.name + "."};
     data->attributes.push_back(std::move(attribute));
     return VertexTree(std::move(data));
 }
@@ -347,11 +367,12 @@ std::uint64_t VertexTree::byte_size() const noexcept {
     for (const Attribute& a : data_->attributes) attributes += a.bytes.size();
     const TreeGeometry& g = *data_->geometry;
     const TreeLuminance& l = *data_->light;
-    return attributes + bytes_of(g.parents) + bytes_of(g.positions) + bytes_of(g.normals) + bytes_of(g.colours) + bytes_of(g.uvs) +
-           bytes_of(g.first_leaf) + bytes_of(g.leaf_end) + bytes_of(g.subtree_end) + bytes_of(g.first_triangle) +
-           bytes_of(g.bounds) + bytes_of(g.support_spheres) + bytes_of(g.mask_at) + bytes_of(g.mask_records) +
-           bytes_of(g.displacement) + bytes_of(g.triangles) + bytes_of(g.source_triangles) +
-           bytes_of(g.source_vertices) + bytes_of(g.texels) + bytes_of(g.ring_texture) + g.ranges.capacity() * sizeof(MeshRange) + bytes_of(l.luminance) + bytes_of(l.support_range) +
+    return attributes + bytes_of(g.parents) + bytes_of(g.positions) + bytes_of(g.normals) + bytes_of(g.colours) +
+           bytes_of(g.uvs) + bytes_of(g.first_leaf) + bytes_of(g.leaf_end) + bytes_of(g.subtree_end) +
+           bytes_of(g.first_triangle) + bytes_of(g.bounds) + bytes_of(g.support_spheres) + bytes_of(g.mask_at) +
+           bytes_of(g.mask_records) + bytes_of(g.displacement) + bytes_of(g.triangles) + bytes_of(g.source_triangles) +
+           bytes_of(g.source_vertices) + bytes_of(g.texels) + bytes_of(g.ring_texture) +
+           g.ranges.capacity() * sizeof(MeshRange) + bytes_of(l.luminance) + bytes_of(l.support_range) +
            bytes_of(l.ring_range) + bytes_of(l.adaptation);
 }
 

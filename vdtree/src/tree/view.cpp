@@ -5,8 +5,8 @@
 #include <numbers>
 #include <string>
 
-#include <vdtree/internal/finite.h>
 #include "tree/unit_vector.h"
+#include <vdtree/internal/finite.h>
 
 namespace unseen::vdtree {
 

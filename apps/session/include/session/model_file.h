@@ -3,8 +3,8 @@
 
 #include <filesystem>
 
-#include <session/messages.h>
 #include <meshio/mesh_io.h>
+#include <session/messages.h>
 #include <vdtree/vertex_tree.h>
 
 namespace unseen::session {

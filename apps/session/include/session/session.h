@@ -12,11 +12,11 @@
 #include <vector>
 
 #include <perception/criterion.h>
+#include <perception/cut_rings.h>
 #include <session/observer.h>
 #include <session/plan.h>
 #include <session/scene.h>
 #include <session/simplification.h>
-#include <perception/cut_rings.h>
 #include <vdtree/distance_criterion.h>
 
 namespace unseen::session {

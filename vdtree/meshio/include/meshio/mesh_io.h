@@ -36,7 +36,8 @@ struct Material {
     std::string name;                 // of the MeshRange; different for all materials of a file
     glm::vec4 colour = glm::vec4(1);  // linear RGB, 0..1, that vertex colours and texture are multiplied with; alpha
     std::filesystem::path image = {}; // beside the mesh file, or below; empty: none
-    std::shared_ptr<const std::string> image_bytes = {}; // the image file itself, where the mesh file holds it; shared by all materials that have it; or null
+    std::shared_ptr<const std::string> image_bytes =
+        {}; // the image file itself, where the mesh file holds it; shared by all materials that have it; or null
     vdtree::Wrap wrap_u = vdtree::Wrap::repeat, wrap_v = vdtree::Wrap::repeat;
 
     bool has_image() const { return !image.empty() || image_bytes; }
@@ -49,7 +50,8 @@ struct ReadResult {
     std::vector<std::string> warnings;    // repairs that were made, one sentence each
     std::vector<Material> materials = {}; // of OBJ and glTF
     bool uvs_from_top = false;            // v grows downward in images (glTF), not upward (OBJ, PLY)
-    std::optional<std::uint64_t> bad_uv = {}; // the first vertex whose texture coordinates were not finite, and set to 0
+    std::optional<std::uint64_t> bad_uv =
+        {}; // the first vertex whose texture coordinates were not finite, and set to 0
 };
 
 // Polygons are triangulated (ear clipping in the plane of the polygon, so concave ones keep their area),

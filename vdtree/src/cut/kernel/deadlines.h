@@ -5,7 +5,7 @@
 UNSEEN_INLINE Floats error_of(const Floats& before, const Floats& after, const Floats& radius, float path) {
     const Floats between = before + after - 2 * radius, turned = 2 * path * radius / between;
     const Floats most = Floats{} + 2 * path;
-    return (between > 0) & (turned < most) ? turned : most;
+    return ((between > 0) & (turned < most)) ? turned : most;
 }
 
 UNSEEN_INLINE void move_all(const float (&eye_high)[3], const float (&eye_low)[3], float path, BlockSpheres& spheres) {
@@ -44,7 +44,7 @@ UNSEEN_INLINE void defer_inside(const KernelView& view, float margin, const Kern
                                   (view.eye_high[1] - load(y)) + view.eye_low[1],
                                   (view.eye_high[2] - load(z)) + view.eye_low[2]};
         const Floats slack = height(view, to_eye) - load(radius) - margin;
-        store(deadline, (before <= clock.late) & (slack > 0) ? (clock.early + slack) * just_less : before);
+        store(deadline, ((before <= clock.late) & (slack > 0)) ? (clock.early + slack) * just_less : before);
     };
     const std::size_t count = spheres.x.size();
     std::size_t i = 0;

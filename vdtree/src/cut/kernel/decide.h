@@ -9,8 +9,8 @@ UNSEEN_INLINE Mask unfolds(const Mask& is_near, const Mask& is_within_silhouette
 }
 
 // Whether back faces fold, and all of them are.
-UNSEEN_INLINE Ints is_away(const KernelView& view, const Facing& facing) {
-    return view.near_ones_too ? facing.back > 0 : Ints{};
+UNSEEN_INLINE Ints is_away(const KernelView& view, const Sides& sides) {
+    return view.near_ones_too ? sides.back : Ints{};
 }
 
 struct Verdicts {
@@ -30,16 +30,21 @@ UNSEEN_INLINE Verdicts decided(const KernelView& view, const Candidates& of, con
     for (int k = 0; k < 3; ++k) towards[k] = (view.eye_high[k] - of.ring[k]) + view.eye_low[k];
     const Gaps gaps = find_gaps<false>(towards, of.ring_radius, Ints{},
                                        [&](std::size_t axis) UNSEEN_INLINE_LAMBDA { return of.words.slab(axis); });
-    const Facing sides = facing_of(view, gaps, of.words.is_irregular(), of.words.is_empty());
+    // An irregular ring is a silhouette from everywhere; what has no triangle with an area faces everything.
+    const Ints is_irregular = of.words.is_irregular(), is_empty = of.words.is_empty();
+    const Gaps found = turned_out(view, gaps);
+    const Floats front = is_irregular ? -always : is_empty ? always : found.front;
+    const Floats back = (is_irregular | is_empty) ? -always : found.back;
+    const Sides sides{front > 0, back > 0};
     const Ints is_silhouette = sides.is_silhouette(), away = is_away(view, sides);
     v.away = m.is_asked & away;
     v.unfolded = m.is_asked ? unfolds<Ints>(m.is_near, m.gap < m.silhouette, is_silhouette, away) : v.unfolded;
     v.is_silhouette = m.is_asked ? is_silhouette : v.is_silhouette;
     v.by_silhouette = m.is_asked ? is_silhouette & ~m.is_near : v.by_silhouette;
     // Within the interior's distance nothing but facing away folds it.
-    const Floats near = view.near_ones_too ? -sides.back : always;
-    const Floats far = is_silhouette ? min_of(-sides.front, -sides.back) : max_of(sides.front, sides.back);
-    v.facing = m.is_asked ? (v.away ? sides.back : m.is_near ? near : far) : always;
+    const Floats near = view.near_ones_too ? -back : always;
+    const Floats far = is_silhouette ? min_of(-front, -back) : max_of(front, back);
+    v.facing = m.is_asked ? (v.away ? back : m.is_near ? near : far) : always;
     return v;
 }
 
@@ -52,9 +57,9 @@ UNSEEN_INLINE void for_each_asked(const KernelView& view, const NodeArrays& arra
                                   std::size_t count, At at, F f) {
     std::fill_n(asked + count, width, count > 0 ? asked[0] : std::uint16_t{0});
     for (std::size_t first = 0; first < count; first += width) {
-        const Facing facing =
-            facing_signs(view, arrays, [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return at(asked[first + lane]); });
-        const std::uint32_t silhouettes = bits_of(facing.is_silhouette()), away = bits_of(is_away(view, facing));
+        const Sides sides =
+            sides_of(view, arrays, [&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return at(asked[first + lane]); });
+        const std::uint32_t silhouettes = bits_of(sides.is_silhouette()), away = bits_of(is_away(view, sides));
         for (std::size_t lane = 0; lane < std::min(width, count - first); ++lane)
             f(std::size_t{asked[first + lane]}, (silhouettes >> lane) & 1, (away >> lane) & 1);
     }

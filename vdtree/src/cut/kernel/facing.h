@@ -137,23 +137,19 @@ struct Words {
     }
 };
 
-// What is known of the sides that rings show; for surfaces that are inside out, too.
-struct Facing {
-    Floats front, back; // as in Gaps, with what needs no proof: infinite, or minus infinity
-    UNSEEN_INLINE Ints is_silhouette() const { return ~((front > 0) | (back > 0)); }
+// The sides that rings show, as masks: everything faces the eye (front), or faces away (back).
+struct Sides {
+    Ints front, back;
+    UNSEEN_INLINE Ints is_silhouette() const { return ~(front | back); }
 };
-UNSEEN_INLINE Facing facing_of(const KernelView& view, const Gaps& gaps, const Ints& is_irregular,
-                               const Ints& is_empty) {
-    const Floats always = all(std::numeric_limits<float>::infinity());
-    const Floats &shown = view.is_inside_out ? gaps.back : gaps.front,
-                 &hidden = view.is_inside_out ? gaps.front : gaps.back;
-    // An irregular ring is an outline from everywhere; what has no triangle with an area faces everything.
-    return {is_irregular ? -always : is_empty ? always : shown, is_irregular | is_empty ? -always : hidden};
+// The gaps of a surface that may be inside out.
+UNSEEN_INLINE Gaps turned_out(const KernelView& view, const Gaps& gaps) {
+    return view.is_inside_out ? Gaps{gaps.back, gaps.front} : gaps;
 }
 
 // Of nodes by their places in the arrays. Only the signs count.
 template <class At>
-UNSEEN_INLINE Facing facing_signs(const KernelView& view, const NodeArrays& arrays, At at) {
+UNSEEN_INLINE Sides sides_of(const KernelView& view, const NodeArrays& arrays, At at) {
     Floats ring[4], towards[3], columns[4];
     Vectors::load_columns([&](std::size_t lane) UNSEEN_INLINE_LAMBDA { return &arrays.bounds[at(lane)].ring; }, ring);
     for (int k = 0; k < 3; ++k) towards[k] = (view.eye_high[k] - ring[k]) + view.eye_low[k];
@@ -172,5 +168,8 @@ UNSEEN_INLINE Facing facing_signs(const KernelView& view, const NodeArrays& arra
     }
     const Gaps gaps = find_gaps<true>(towards, ring[3], ~is_irregular,
                                       [&](std::size_t axis) UNSEEN_INLINE_LAMBDA { return words.slab(axis); });
-    return facing_of(view, gaps, is_irregular, words.is_empty());
+    // An irregular ring is a silhouette from everywhere; what has no triangle with an area faces everything.
+    const Gaps found = turned_out(view, gaps);
+    const Ints is_empty = words.is_empty();
+    return {~is_irregular & (is_empty | (found.front > 0)), ~is_irregular & ~is_empty & (found.back > 0)};
 }

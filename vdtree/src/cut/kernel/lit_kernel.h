@@ -15,17 +15,17 @@ struct KernelLights {
     struct Light {
         LightSource::Kind kind;
         float direction[3], position[3];
-        float intensity, distance;   // of point lights and spots: at that distance
+        float intensity, distance;              // of point lights and spots: at that distance
         float inner_cosine, outer_cosine, fade; // of a spot; most change of its step in a radian
-        float inexact;               // a bound of the position's rounding, mesh units
+        float inexact;                          // a bound of the position's rounding, mesh units
     };
     std::vector<Light> lights;
     float ambient = 0;
-    float specular = 0;              // with its normalisation
+    float specular = 0; // with its normalisation
     float shininess = 1;
     float eye[3] = {0, 0, 0};
     float eye_inexact = 0;
-    float radius = 1;                // of the tree, mesh units: of what light_motion() counts as 1
+    float radius = 1; // of the tree, mesh units: of what light_motion() counts as 1
 
     KernelLights() = default;
     KernelLights(const VertexTree& tree, const Lighting& lighting, glm::dvec3 eye);
@@ -39,7 +39,8 @@ struct LitBatch {
     alignas(64) float cosine[kernel_lanes], sine[kernel_lanes];
     // Across the axis, from one normal to all others: least and largest coordinates along two directions. Without a box: beyond any normal's.
     alignas(64) float across[2][3][kernel_lanes], least_across[2][kernel_lanes], largest_across[2][kernel_lanes];
-    alignas(64) float steepness[kernel_lanes], spread[kernel_lanes]; // of the box's bounds: most change in a radian; of their difference
+    alignas(64) float steepness[kernel_lanes],
+        spread[kernel_lanes]; // of the box's bounds: most change in a radian; of their difference
     alignas(64) float least_albedo[kernel_lanes], largest_albedo[kernel_lanes];
     alignas(64) float centre[3][kernel_lanes], radius[kernel_lanes];
     void set(std::size_t lane, const VertexCone& cone, const Sphere& sphere) noexcept;
@@ -50,7 +51,8 @@ struct LitBatch {
     // at most rough_rate for each further unit; hi + lo by 2 jump and at the rates fine_sum_rate and full_rate; and hi by
     // jump + rise_rate m.
     alignas(64) float cap[kernel_lanes], fine_cap[kernel_lanes];
-    alignas(64) float fine_rate[kernel_lanes], rough_rate[kernel_lanes], fine_sum_rate[kernel_lanes], full_rate[kernel_lanes];
+    alignas(64) float fine_rate[kernel_lanes], rough_rate[kernel_lanes],
+        fine_sum_rate[kernel_lanes], full_rate[kernel_lanes];
     alignas(64) float rise_rate[kernel_lanes], jump[kernel_lanes];
 };
 void find_ranges(const KernelLights& lights, LitBatch& batch) noexcept;

@@ -20,7 +20,8 @@ UNSEEN_INLINE auto at(const Values& values, std::int32_t i) {
 LitTester::LitTester(const VertexTree& tree, const LitClasses& classes, std::span<const float> reach, std::size_t bins)
     : tree_(tree), cones_(classes.bounds->cones().data()), reach_(reach), bins_(static_cast<std::int32_t>(bins)),
       silhouette_row_(classes.silhouette), black_(static_cast<float>(classes.levels.black() / classes.levels.span())) {
-    for (std::size_t i = 0; i < contrasts_.size(); ++i) contrasts_[i] = static_cast<float>(ContrastClasses::contrast_of_index(i));
+    for (std::size_t i = 0; i < contrasts_.size(); ++i)
+        contrasts_[i] = static_cast<float>(ContrastClasses::contrast_of_index(i));
     for (std::size_t i = 0; i < luminances_.size(); ++i)
         luminances_[i] = static_cast<float>(classes.levels.luminance_of_index(i) / classes.levels.span());
     fill_guesses();
@@ -44,7 +45,9 @@ void LitTester::fill_guesses() {
             std::int32_t first = 0;
             for (std::int32_t i = 0; i < reach_guess_count; ++i) {
                 const float least = bucket_start(i, least_reach_bits, reach_shift) * rounded;
-                while (i > 0 && first + 1 < contrast_count && !(least < at(reach_, row(luminance, first) * bins_ + bin))) ++first;
+                while (i > 0 && first + 1 < contrast_count &&
+                       !(least < at(reach_, row(luminance, first) * bins_ + bin)))
+                    ++first;
                 reach_guesses_.push_back(first);
             }
         }
@@ -63,14 +66,18 @@ UNSEEN_INLINE void LitTester::find_classes(LitFindings& lit) const {
     std::memcpy(contrast_bits, contrast, sizeof contrast);
     std::memcpy(share_bits, share, sizeof share);
     for (std::size_t i = 0; i < kernel_lanes; ++i) {
-        lit.contrast[i] = at(contrast_guesses_, bucket(contrast_bits[i], least_contrast_bits, contrast_shift, contrast_guess_count));
-        lit.luminance[i] = at(luminance_guesses_, bucket(share_bits[i], least_luminance_bits, luminance_shift, luminance_guess_count));
+        lit.contrast[i] =
+            at(contrast_guesses_, bucket(contrast_bits[i], least_contrast_bits, contrast_shift, contrast_guess_count));
+        lit.luminance[i] =
+            at(luminance_guesses_, bucket(share_bits[i], least_luminance_bits, luminance_shift, luminance_guess_count));
     }
     for (std::int32_t moved = 1; moved;) {
         moved = 0;
         for (std::size_t i = 0; i < kernel_lanes; ++i) {
-            const std::int32_t c = (lit.contrast[i] < contrast_count - 1) & !(contrast[i] <= at(contrasts_, lit.contrast[i])); // so is what is no number
-            const std::int32_t l = (lit.luminance[i] < luminance_count - 1) & !(luminance[i] <= at(luminances_, lit.luminance[i]));
+            const std::int32_t c = (lit.contrast[i] < contrast_count - 1) &
+                                   !(contrast[i] <= at(contrasts_, lit.contrast[i])); // so is what is no number
+            const std::int32_t l =
+                (lit.luminance[i] < luminance_count - 1) & !(luminance[i] <= at(luminances_, lit.luminance[i]));
             lit.contrast[i] += c;
             lit.luminance[i] += l;
             moved |= c | l;
@@ -81,14 +88,15 @@ UNSEEN_INLINE void LitTester::find_classes(LitFindings& lit) const {
 
 UNSEEN_INLINE void LitTester::find_room(LitFindings& lit) const {
     const LitBatch& batch = lit.ranges;
-    const auto reach = [&](std::int32_t luminance, std::int32_t contrast, std::int32_t bin) UNSEEN_INLINE_LAMBDA {
-        return at(reach_, row(luminance, contrast) * bins_ + bin);
-    };
+    const auto reach = [&](std::int32_t luminance, std::int32_t contrast, std::int32_t bin)
+                           UNSEEN_INLINE_LAMBDA { return at(reach_, row(luminance, contrast) * bins_ + bin); };
     // Any class of luminance where that changes nothing, else the next one or the same.
     alignas(64) std::int32_t luminance[kernel_lanes], first[kernel_lanes], there[kernel_lanes], gap_bits[kernel_lanes];
     for (std::size_t i = 0; i < kernel_lanes; ++i) {
         const std::int32_t unfolded = lit.is_unfolded[i], own = lit.luminance[i];
-        const std::int32_t last = unfolded ? 0 : luminance_count - 1, next = own + (own < last ? 1 : own > last ? -1 : 0);
+        const std::int32_t last = unfolded ? 0 : luminance_count - 1, next = own + (own < last   ? 1
+                                                                                    : own > last ? -1
+                                                                                                 : 0);
         const std::int32_t at_last = lit.gap[i] < reach(last, lit.contrast[i], lit.bin[i]);
         const std::int32_t at_next = lit.gap[i] < reach(next, lit.contrast[i], lit.bin[i]);
         luminance[i] = at_last == unfolded ? last : at_next == unfolded ? next : own;
@@ -124,14 +132,18 @@ UNSEEN_INLINE void LitTester::find_room(LitFindings& lit) const {
         const bool has_limit = unfolded ? contrast > 0 : contrast + 1 < contrast_count;
         const float edge = at(contrasts_, std::max(contrast - (unfolded ? 1 : 0), 0)), limit = has_limit ? edge : 0.0f;
         const float jump = batch.jump[i], hi = batch.hi[i], lo = batch.lo[i], mean = hi + lo + 2 * black_;
-        float left = unfolded ? hi - lo - jump - limit * (mean + 2 * jump) : limit * (mean - 2 * jump) - (hi - lo) - jump;
+        float left =
+            unfolded ? hi - lo - jump - limit * (mean + 2 * jump) : limit * (mean - 2 * jump) - (hi - lo) - jump;
         left = unfolded || has_limit ? left - estimate_rounding : never;
         // Of the brightest luminance.
         const bool has_room = unfolded ? luminance[i] > 0 : luminance[i] + 1 < luminance_count;
         const float brightest = at(luminances_, std::max(luminance[i] - (unfolded ? 1 : 0), 0));
-        const float room = has_room ? (unfolded ? hi + black_ - brightest : brightest - (hi + black_)) - (jump + estimate_rounding) : never;
+        const float room =
+            has_room ? (unfolded ? hi + black_ - brightest : brightest - (hi + black_)) - (jump + estimate_rounding)
+                     : never;
 
-        const float rough_rate = batch.rough_rate[i] + limit * batch.full_rate[i], fine_rate = batch.fine_rate[i] + limit * batch.fine_sum_rate[i];
+        const float rough_rate = batch.rough_rate[i] + limit * batch.full_rate[i],
+                    fine_rate = batch.fine_rate[i] + limit * batch.fine_sum_rate[i];
         const float fine_cap = std::min(batch.fine_cap[i], batch.cap[i]);
         const float beyond = rough_rate > 0 ? (left - fine_rate * fine_cap) / rough_rate : never;
         float motion = left >= fine_rate * fine_cap ? fine_cap + beyond : left / fine_rate;

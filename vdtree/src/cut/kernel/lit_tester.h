@@ -23,7 +23,8 @@ inline constexpr double light_weight = 0.25;
 // What is known of the lights on the lanes of a batch.
 struct LitFindings {
     LitBatch ranges;
-    alignas(64) std::int32_t row[kernel_lanes], contrast[kernel_lanes], luminance[kernel_lanes]; // and the indices of its classes
+    alignas(64) std::int32_t row[kernel_lanes], contrast[kernel_lanes],
+        luminance[kernel_lanes];   // and the indices of its classes
     std::uint32_t translucent = 0; // a bit a lane: anything may show there, whatever the light
 
     // For leave_room(): nodes unfold where their row's reach is above `gap`, in lengths; whether those of their own rows do, 1 or 0.
@@ -50,25 +51,31 @@ public:
     }
     std::int32_t silhouette_row() const { return silhouette_row_; }
 
-    void set(std::size_t lane, NodeId node, const Sphere& ring, LitFindings& lit) const { lit.ranges.set(lane, cones_[node], ring); }
+    void set(std::size_t lane, NodeId node, const Sphere& ring, LitFindings& lit) const {
+        lit.ranges.set(lane, cones_[node], ring);
+    }
     void find_rows(LitFindings& lit) const;
 
     void leave_room(LitFindings& lit) const;
 
 private:
-    static constexpr std::int32_t contrast_count = ContrastClasses::contrast_count, luminance_count = ContrastClasses::luminance_count;
-    static constexpr std::int32_t contrast_guess_count = 16 * ContrastClasses::contrast_octaves + 1, luminance_guess_count = 64;
+    static constexpr std::int32_t contrast_count = ContrastClasses::contrast_count,
+                                  luminance_count = ContrastClasses::luminance_count;
+    static constexpr std::int32_t contrast_guess_count = 16 * ContrastClasses::contrast_octaves + 1,
+                                  luminance_guess_count = 64;
     static constexpr float never = 1e30f;
     // Relative luminance: what the kernel's results of two frames, and the contrasts from these, differ by for their rounding; as a share,
     // that of the slack itself.
     static constexpr float estimate_rounding = 4e-6f, slack_rounding = 1e-3f;
     // Guesses by the exponent of a float and its next bits. Reaches: from 1/4 to 2^14 lengths.
     static constexpr unsigned contrast_shift = 23 - 4, luminance_shift = 23 - 2, reach_shift = 23 - 3;
-    static constexpr std::int32_t least_contrast_bits = (127 - ContrastClasses::contrast_octaves) << 23, least_luminance_bits = 127 << 23,
-                                  least_reach_bits = (127 - 2) << 23;
+    static constexpr std::int32_t least_contrast_bits = (127 - ContrastClasses::contrast_octaves) << 23,
+                                  least_luminance_bits = 127 << 23, least_reach_bits = (127 - 2) << 23;
     static constexpr std::int32_t reach_guess_count = 16 * 8;
 
-    static std::int32_t row(std::int32_t luminance, std::int32_t contrast) { return 1 + luminance * contrast_count + contrast; } // as ContrastClasses has it
+    static std::int32_t row(std::int32_t luminance, std::int32_t contrast) {
+        return 1 + luminance * contrast_count + contrast;
+    } // as ContrastClasses has it
     static std::int32_t bucket(std::int32_t bits, std::int32_t least_bits, unsigned shift, std::int32_t count) {
         return std::min(std::max(bits - least_bits, 0) >> shift, count - 1);
     }

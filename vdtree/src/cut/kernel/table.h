@@ -86,38 +86,61 @@ UNSEEN_INLINE void costs_of_batch(const KernelView& view, const CostTables& tabl
     }
 }
 
+struct Kernels {
+    static void test(const KernelView& view, std::span<const FoldCandidate* const> lanes, TestBatch& tested) noexcept {
+        test_all(view, lanes, tested);
+    }
+    static void find_verdicts(const KernelView& view, std::span<const FoldCandidate* const> lanes,
+                              FoldBatch& batch) noexcept {
+        verdicts_of(view, lanes, batch);
+    }
+    static void find_slacks(const KernelView& view, const FoldBatch& batch, TestBatch& tested) noexcept {
+        slacks_of_batch(view, batch, tested);
+    }
+    static void find_batch_costs(const KernelView& view, const CostTables& tables, const FoldBatch& batch, float* cost,
+                                 float* seen_cost) noexcept {
+        costs_of_batch(view, tables, batch, cost, seen_cost);
+    }
+    static void decide(const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes,
+                       std::uint64_t* unfolded) noexcept {
+        decide_listed(view, arrays, nodes, unfolded);
+    }
+    static void decide_range(const KernelView& view, const NodeArrays& arrays, NodeId first, std::size_t count,
+                             std::uint64_t* unfolded) noexcept {
+        decide_run(view, arrays, first, count, unfolded);
+    }
+    static void find_costs(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
+                           std::span<const NodeId> nodes, const NodeCosts& costs) noexcept {
+        find_costs_listed(view, arrays, tables, nodes, costs);
+    }
+    static void find_cost_bounds(const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
+                                 std::span<const NodeId> nodes, float no_silhouette_over, float* cost,
+                                 float* seen_cost) noexcept {
+        find_bounds_listed(view, arrays, tables, nodes, no_silhouette_over, cost, seen_cost);
+    }
+    static void move_blocks(const float (&eye_high)[3], const float (&eye_low)[3], float path,
+                            BlockSpheres& spheres) noexcept {
+        move_all(eye_high, eye_low, path, spheres);
+    }
+    static void keep_inside(const KernelView& view, float margin, const KernelClock& clock, const BlockSpheres& spheres,
+                            float* deadlines) noexcept {
+        defer_inside(view, margin, clock, spheres, deadlines);
+    }
+    static std::size_t look_at_blocks(std::span<const std::uint32_t> which, float position_clock, float facing_clock,
+                                      const SlotDeadlines* slots, const std::uint16_t* unfolded,
+                                      const BlockSpheres& spheres, EarliestDeadlines& deadlines,
+                                      std::uint32_t* due) noexcept {
+        return look_at(which, position_clock, facing_clock, slots, unfolded, spheres, deadlines, due);
+    }
+    static void find_deadlines(const TestBatch& tested, DeadlineBatch& batch) noexcept { deadlines_of(tested, batch); }
+    static void find_due_blocks(float position_clock, float facing_clock, const BlockSpheres& spheres,
+                                const EarliestDeadlines& deadlines, std::uint64_t* due) noexcept {
+        due_blocks_of(position_clock, facing_clock, spheres, deadlines, due);
+    }
+};
+
 constexpr Kernel table{
-    .test = [](const KernelView& view, std::span<const FoldCandidate* const> lanes,
-               TestBatch& tested) noexcept { test_all(view, lanes, tested); },
-    .find_verdicts = [](const KernelView& view, std::span<const FoldCandidate* const> lanes,
-                        FoldBatch& batch) noexcept { verdicts_of(view, lanes, batch); },
-    .find_slacks = [](const KernelView& view, const FoldBatch& batch,
-                      TestBatch& tested) noexcept { slacks_of_batch(view, batch, tested); },
-    .find_batch_costs = [](const KernelView& view, const CostTables& tables, const FoldBatch& batch, float* cost,
-                           float* seen_cost) noexcept { costs_of_batch(view, tables, batch, cost, seen_cost); },
-    .decide = [](const KernelView& view, const NodeArrays& arrays, std::span<const NodeId> nodes,
-                 std::uint64_t* unfolded) noexcept { decide_listed(view, arrays, nodes, unfolded); },
-    .decide_range = [](const KernelView& view, const NodeArrays& arrays, NodeId first, std::size_t count,
-                       std::uint64_t* unfolded) noexcept { decide_run(view, arrays, first, count, unfolded); },
-    .find_costs = [](const KernelView& view, const NodeArrays& arrays, const CostTables& tables,
-                     std::span<const NodeId> nodes,
-                     const NodeCosts& costs) noexcept { find_costs_listed(view, arrays, tables, nodes, costs); },
-    .find_cost_bounds =
-        [](const KernelView& view, const NodeArrays& arrays, const CostTables& tables, std::span<const NodeId> nodes,
-           float no_silhouette_over, float* cost, float* seen_cost) noexcept {
-            find_bounds_listed(view, arrays, tables, nodes, no_silhouette_over, cost, seen_cost);
-        },
-    .move_blocks = [](const float (&eye_high)[3], const float (&eye_low)[3], float path,
-                      BlockSpheres& spheres) noexcept { move_all(eye_high, eye_low, path, spheres); },
-    .keep_inside = [](const KernelView& view, float margin, const KernelClock& clock, const BlockSpheres& spheres,
-                      float* deadlines) noexcept { defer_inside(view, margin, clock, spheres, deadlines); },
-    .look_at_blocks =
-        [](std::span<const std::uint32_t> which, float position_clock, float facing_clock, const SlotDeadlines* dues,
-           const std::uint16_t* unfolded, const BlockSpheres& spheres, EarliestDeadlines& deadlines,
-           std::uint32_t* due) noexcept {
-            return look_at(which, position_clock, facing_clock, dues, unfolded, spheres, deadlines, due);
-        },
-    .find_deadlines = [](const TestBatch& tested, DeadlineBatch& dues) noexcept { deadlines_of(tested, dues); },
-    .find_due_blocks =
-        [](float position_clock, float facing_clock, const BlockSpheres& spheres, const EarliestDeadlines& deadlines,
-           std::uint64_t* due) noexcept { due_blocks_of(position_clock, facing_clock, spheres, deadlines, due); }};
+    Kernels::test,           Kernels::find_verdicts, Kernels::find_slacks,    Kernels::find_batch_costs,
+    Kernels::decide,         Kernels::decide_range,  Kernels::find_costs,     Kernels::find_cost_bounds,
+    Kernels::move_blocks,    Kernels::keep_inside,   Kernels::look_at_blocks, Kernels::find_deadlines,
+    Kernels::find_due_blocks};

@@ -63,6 +63,37 @@ UNSEEN_INLINE void transpose(const Float4 (&rows)[4], Float4* columns) {
     columns[2] = __builtin_shufflevector(b, d, 0, 1, 4, 5), columns[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
 
+// The same of eight: each half of the registers as above.
+UNSEEN_INLINE void transpose(const Float8 (&rows)[4], Float8* columns) {
+    const Float8 a = __builtin_shufflevector(rows[0], rows[1], 0, 8, 1, 9, 4, 12, 5, 13);
+    const Float8 b = __builtin_shufflevector(rows[0], rows[1], 2, 10, 3, 11, 6, 14, 7, 15);
+    const Float8 c = __builtin_shufflevector(rows[2], rows[3], 0, 8, 1, 9, 4, 12, 5, 13);
+    const Float8 d = __builtin_shufflevector(rows[2], rows[3], 2, 10, 3, 11, 6, 14, 7, 15);
+    columns[0] = __builtin_shufflevector(a, c, 0, 1, 8, 9, 4, 5, 12, 13);
+    columns[1] = __builtin_shufflevector(a, c, 2, 3, 10, 11, 6, 7, 14, 15);
+    columns[2] = __builtin_shufflevector(b, d, 0, 1, 8, 9, 4, 5, 12, 13);
+    columns[3] = __builtin_shufflevector(b, d, 2, 3, 10, 11, 6, 7, 14, 15);
+}
+
+// The four floats at at(lane) of each lane become four registers: of the lanes' first floats, and so on.
+template <class At>
+UNSEEN_INLINE void load_columns(At at, Float4* columns) {
+    Float4 rows[4];
+    for (std::size_t lane = 0; lane < 4; ++lane) std::memcpy(&rows[lane], at(lane), sizeof(Float4));
+    transpose(rows, columns);
+}
+template <class At>
+UNSEEN_INLINE void load_columns(At at, Float8* columns) {
+    Float8 rows[4];
+    for (std::size_t lane = 0; lane < 4; ++lane) {
+        Float4 low, high;
+        std::memcpy(&low, at(lane), sizeof low);
+        std::memcpy(&high, at(lane + 4), sizeof high);
+        rows[lane] = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
+    }
+    transpose(rows, columns);
+}
+
 // Registers of one kind. Masks have all or no bits of a lane; bits_of() makes one bit a lane of them, the first lane's
 // lowest.
 struct FourWide {
@@ -88,12 +119,9 @@ struct FourWide {
         values = values < half ? values : half;
         return std::min(values[0], values[1]);
     }
-    // The four floats at at(lane) of each lane become four registers: of the lanes' first floats, and so on.
     template <class At>
     static UNSEEN_INLINE void load_columns(At at, Floats* columns) {
-        Floats rows[4];
-        for (std::size_t lane = 0; lane < 4; ++lane) std::memcpy(&rows[lane], at(lane), sizeof(Floats));
-        transpose(rows, columns);
+        vdtree::load_columns(at, columns);
     }
 };
 
@@ -113,6 +141,7 @@ struct EightWide {
                    high = __builtin_shufflevector(values, values, 4, 5, 6, 7);
         return FourWide::least_of(low < high ? low : high);
     }
+    // As above, but that `at` is for these processors, too.
     template <class At>
     static UNSEEN_INLINE void load_columns(At at, Floats* columns) {
         Floats rows[4];
@@ -122,15 +151,7 @@ struct EightWide {
             std::memcpy(&high, at(lane + 4), sizeof high);
             rows[lane] = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
         }
-        // Each half as in transpose().
-        const Floats a = __builtin_shufflevector(rows[0], rows[1], 0, 8, 1, 9, 4, 12, 5, 13);
-        const Floats b = __builtin_shufflevector(rows[0], rows[1], 2, 10, 3, 11, 6, 14, 7, 15);
-        const Floats c = __builtin_shufflevector(rows[2], rows[3], 0, 8, 1, 9, 4, 12, 5, 13);
-        const Floats d = __builtin_shufflevector(rows[2], rows[3], 2, 10, 3, 11, 6, 14, 7, 15);
-        columns[0] = __builtin_shufflevector(a, c, 0, 1, 8, 9, 4, 5, 12, 13);
-        columns[1] = __builtin_shufflevector(a, c, 2, 3, 10, 11, 6, 7, 14, 15);
-        columns[2] = __builtin_shufflevector(b, d, 0, 1, 8, 9, 4, 5, 12, 13);
-        columns[3] = __builtin_shufflevector(b, d, 2, 3, 10, 11, 6, 7, 14, 15);
+        transpose(rows, columns);
     }
 };
 #pragma GCC pop_options

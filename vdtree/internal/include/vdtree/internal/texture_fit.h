@@ -26,7 +26,8 @@ public:
         const Map& map = maps_[node];
         const glm::vec2 uv = g_->uvs[vertex];
         const glm::dvec3 p(g_->positions[vertex]);
-        const glm::dvec3 off = map.at + static_cast<double>(uv.x) * map.along_u + static_cast<double>(uv.y) * map.along_v - p;
+        const glm::dvec3 off =
+            map.at + static_cast<double>(uv.x) * map.along_u + static_cast<double>(uv.y) * map.along_v - p;
         const double squared = off.x * off.x + off.y * off.y + off.z * off.z;
         return squared >= 0 ? std::sqrt(squared) : std::numeric_limits<double>::infinity(); // NaN: no map
     }

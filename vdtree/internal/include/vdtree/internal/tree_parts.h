@@ -36,7 +36,7 @@ public:
     }
     bool owns_leaf(const TreePart& part, Index leaf) const {
         return is_top(part) ? is_top_[tree_.parents[tree_.node_of_leaf(leaf)]]
-                              : leaf - part.first_leaf < part.leaf_end - part.first_leaf;
+                            : leaf - part.first_leaf < part.leaf_end - part.first_leaf;
     }
 
     // Calls one of make_worker()'s workers for each node, children before parents, for several parts at the same time.

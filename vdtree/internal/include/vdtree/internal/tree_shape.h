@@ -49,7 +49,8 @@ struct TreeShape {
     std::vector<Index> first_leaf;
     std::vector<Index> leaf_end;
     std::vector<NodeId> subtree_end;
-    std::vector<Index> made; // by interior node: when the clusterer made it: its cluster's number, higher than its children's
+    std::vector<Index>
+        made; // by interior node: when the clusterer made it: its cluster's number, higher than its children's
 
     TreeLinks links() const { return links_of(*this); }
     NodeId interior() const { return links().interior(); }

@@ -108,9 +108,11 @@ class TreeParts;
 
 // Luminance of every node and the bounds over support and ring, bottom-up. `parts`: of this tree, with its triangles. Cost: one
 // pass over triangles and nodes; parallel.
-TreeLuminance derive_luminance(const TreeGeometry& geometry, const TreeParts& parts, const Light& light, bool prelit, bool textured);
+TreeLuminance derive_luminance(const TreeGeometry& geometry, const TreeParts& parts, const Light& light, bool prelit,
+                               bool textured);
 
 // Relative luminance of one vertex; a texture's is to be multiplied with it.
-float vertex_luminance(glm::vec3 normal, const glm::vec4* colour, const Light& light, bool prelit, bool textured = false);
+float vertex_luminance(glm::vec3 normal, const glm::vec4* colour, const Light& light, bool prelit,
+                       bool textured = false);
 
 } // namespace unseen::vdtree
