@@ -209,7 +209,7 @@ INSTANTIATE_TEST_SUITE_P(
                                  for (auto& of_size : r.amplitudes)
                                      for (float& amplitude : of_size) amplitude = 0;
                              }},
-                    Omission{"half_of_the_errors",
+                    Omission{"a_quarter_of_the_errors",
                              [](perception::FoldRecord& r) {
                                  for (float* value : {&r.shift, &r.farthest, &r.mean_distance, &r.largest_luminance,
                                                       &r.mean_luminance, &r.drift})
