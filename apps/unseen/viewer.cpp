@@ -134,6 +134,8 @@ private:
     void choose(Goal goal) {
         request_.goal = goal;
         request_.goal.fill = goal.kind == Goal::Kind::budget && options_.what.request.goal.fill;
+        // The full model has no time limit; the others get theirs back.
+        request_.milliseconds = goal.kind == Goal::Kind::full ? std::nullopt : options_.what.request.milliseconds;
         // What was asked for may not do for this goal, or would have to be measured.
         if (!session_.plan(view_, request_)) request_.fold_test.reset();
         gaze_px_.reset();
