@@ -24,10 +24,10 @@ UNSEEN_INLINE Costs silhouette_costs(const KernelView& view, const CostTables& t
     return {max_of(inner.cost, own.cost), max_of(inner.seen, own.seen)};
 }
 
-// The one place where it is chosen which of these a node costs, for lanes and for single nodes.
+// The one place where it is chosen which of two findings holds for what a node faces, for lanes and for single nodes.
 template <class Mask, class Cost>
-UNSEEN_INLINE Cost cost_as_seen(const Mask& is_silhouette, const Mask& is_away, const Cost& interior,
-                                const Cost& silhouette) {
+UNSEEN_INLINE Cost as_seen(const Mask& is_silhouette, const Mask& is_away, const Cost& interior,
+                           const Cost& silhouette) {
     return is_away ? Cost{} : is_silhouette ? silhouette : interior;
 }
 
@@ -64,7 +64,7 @@ UNSEEN_INLINE void find_costs_listed(const KernelView& view, const NodeArrays& a
         // Of the interior, and of the silhouette, where it is one.
         alignas(64) float cost[piece + width], seen[piece + width], silhouette_cost[piece + width],
             silhouette_seen[piece + width];
-        std::uint8_t is_near[piece + width], is_within[piece + width], unfolded[piece + width];
+        std::uint8_t unfolded[piece + width], silhouette_unfolded[piece + width];
         std::uint16_t asked[piece + width];
         std::size_t asked_count = 0;
         for (std::size_t i = 0; i < size; i += width) {
@@ -78,11 +78,13 @@ UNSEEN_INLINE void find_costs_listed(const KernelView& view, const NodeArrays& a
             store(seen + i, m.is_inside ? inner.seen : all(0));
             store(silhouette_cost + i, silhouette.cost);
             store(silhouette_seen + i, silhouette.seen);
-            const std::uint32_t near = bits_of(m.is_near & m.is_inside), within = bits_of(m.gap < m.silhouette);
+            const Ints none = {}, within = m.gap < m.silhouette;
+            const std::uint32_t as_interior = bits_of(unfolds<Ints>(m.is_near, within, none, ~m.is_inside));
+            const std::uint32_t as_silhouette = bits_of(unfolds<Ints>(m.is_near, within, ~none, ~m.is_inside));
             const std::uint32_t asked_bits = bits_of(m.is_asked);
             for (std::size_t lane = 0; lane < width; ++lane) {
-                is_near[i + lane] = unfolded[i + lane] = (near >> lane) & 1;
-                is_within[i + lane] = (within >> lane) & 1;
+                unfolded[i + lane] = (as_interior >> lane) & 1;
+                silhouette_unfolded[i + lane] = (as_silhouette >> lane) & 1;
                 asked[asked_count] = static_cast<std::uint16_t>(i + lane);
                 asked_count += (asked_bits >> lane) & 1 & (i + lane < size);
             }
@@ -90,10 +92,10 @@ UNSEEN_INLINE void find_costs_listed(const KernelView& view, const NodeArrays& a
         const auto at = [&](std::size_t i) UNSEEN_INLINE_LAMBDA { return listed(start + i); };
         for_each_asked(view, arrays, asked, asked_count, at,
                        [&](std::size_t i, std::uint32_t silhouette, std::uint32_t away) UNSEEN_INLINE_LAMBDA {
-                           cost[i] = cost_as_seen(silhouette, away, cost[i], silhouette_cost[i]);
-                           seen[i] = cost_as_seen(silhouette, away, seen[i], silhouette_seen[i]);
-                           unfolded[i] = static_cast<std::uint8_t>(
-                               unfolds<std::uint32_t>(is_near[i], is_within[i], silhouette, away) & 1);
+                           if (!(silhouette | away)) return; // as most are
+                           cost[i] = as_seen(silhouette, away, cost[i], silhouette_cost[i]);
+                           seen[i] = as_seen(silhouette, away, seen[i], silhouette_seen[i]);
+                           unfolded[i] = as_seen(silhouette, away, unfolded[i], silhouette_unfolded[i]);
                        });
         std::copy_n(cost, size, out.cost + start);
         std::copy_n(seen, size, out.seen_cost + start);

@@ -32,9 +32,10 @@ UNSEEN_INLINE Verdicts decided(const KernelView& view, const Candidates& of, con
                                        [&](std::size_t axis) UNSEEN_INLINE_LAMBDA { return of.words.slab(axis); });
     // An irregular ring is a silhouette from everywhere; what has no triangle with an area faces everything.
     const Ints is_irregular = of.words.is_irregular(), is_empty = of.words.is_empty();
-    const Gaps found = turned_out(view, gaps);
-    const Floats front = is_irregular ? -always : is_empty ? always : found.front;
-    const Floats back = (is_irregular | is_empty) ? -always : found.back;
+    const Floats &shown = view.is_inside_out ? gaps.back : gaps.front,
+                 &hidden = view.is_inside_out ? gaps.front : gaps.back;
+    const Floats front = is_irregular ? -always : is_empty ? always : shown;
+    const Floats back = (is_irregular | is_empty) ? -always : hidden;
     const Sides sides{front > 0, back > 0};
     const Ints is_silhouette = sides.is_silhouette(), away = is_away(view, sides);
     v.away = m.is_asked & away;

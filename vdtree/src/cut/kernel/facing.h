@@ -142,11 +142,6 @@ struct Sides {
     Ints front, back;
     UNSEEN_INLINE Ints is_silhouette() const { return ~(front | back); }
 };
-// The gaps of a surface that may be inside out.
-UNSEEN_INLINE Gaps turned_out(const KernelView& view, const Gaps& gaps) {
-    return view.is_inside_out ? Gaps{gaps.back, gaps.front} : gaps;
-}
-
 // Of nodes by their places in the arrays. Only the signs count.
 template <class At>
 UNSEEN_INLINE Sides sides_of(const KernelView& view, const NodeArrays& arrays, At at) {
@@ -169,7 +164,8 @@ UNSEEN_INLINE Sides sides_of(const KernelView& view, const NodeArrays& arrays, A
     const Gaps gaps = find_gaps<true>(towards, ring[3], ~is_irregular,
                                       [&](std::size_t axis) UNSEEN_INLINE_LAMBDA { return words.slab(axis); });
     // An irregular ring is a silhouette from everywhere; what has no triangle with an area faces everything.
-    const Gaps found = turned_out(view, gaps);
+    const Floats &shown = view.is_inside_out ? gaps.back : gaps.front,
+                 &hidden = view.is_inside_out ? gaps.front : gaps.back;
     const Ints is_empty = words.is_empty();
-    return {~is_irregular & (is_empty | (found.front > 0)), ~is_irregular & ~is_empty & (found.back > 0)};
+    return {~is_irregular & (is_empty | (shown > 0)), ~is_irregular & ~is_empty & (hidden > 0)};
 }

@@ -81,8 +81,8 @@ UNSEEN_INLINE void costs_of_batch(const KernelView& view, const CostTables& tabl
                     silhouette = silhouette_costs(view, tables, of, m, inner);
         const Ints is_silhouette = mask_of(batch.is_silhouette, first),
                    folded = ~m.is_inside | mask_of(batch.is_away, first);
-        store(cost + first, cost_as_seen(is_silhouette, folded, inner.cost, silhouette.cost));
-        store(seen_cost + first, cost_as_seen(is_silhouette, folded, inner.seen, silhouette.seen));
+        store(cost + first, as_seen(is_silhouette, folded, inner.cost, silhouette.cost));
+        store(seen_cost + first, as_seen(is_silhouette, folded, inner.seen, silhouette.seen));
     }
 }
 
