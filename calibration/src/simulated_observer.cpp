@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include <calibration/observer_profile.h>
-#include <perception/random.h>
 #include <vdtree/internal/number_text.h>
+#include <vdtree/internal/random.h>
 
 #include "json_file.h"
 
@@ -60,9 +60,9 @@ Result<perception::CsfTable> table_named(const std::string& name) {
 }
 
 // Numbers of its own for each trial, other than those that make the trial.
-perception::Random chance(std::uint64_t seed, int trial) {
+Random chance(std::uint64_t seed, int trial) {
     constexpr std::uint64_t observers = 0x6f62736572766572u;
-    return perception::random_for(seed ^ observers, static_cast<std::uint64_t>(trial));
+    return random_for(seed ^ observers, static_cast<std::uint64_t>(trial));
 }
 
 } // namespace

@@ -7,10 +7,10 @@
 #include <optional>
 #include <span>
 
-#include <render/gl_object.h>
 #include <vdtree/cut.h>
 
 #include "gl.h"
+#include "gl_object.h"
 #include "programs.h"
 
 namespace unseen::render {

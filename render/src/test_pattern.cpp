@@ -7,11 +7,11 @@
 #include <optional>
 #include <string>
 
-#include <render/program.h>
 #include <render/target.h>
 
 #include "context_impl.h"
 #include "gl.h"
+#include "program.h"
 #include "shaders.h"
 
 namespace unseen::render {

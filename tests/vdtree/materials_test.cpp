@@ -94,7 +94,8 @@ TEST_F(Materials, ThatCannotBeReadAreNotedAndBadOnesAreNot) {
     EXPECT_TRUE(result->materials.empty());
 }
 
-// A file of many materials over one image, or over many images of one buffer view, is not much larger when it has been read.
+// A file of many materials over one image, or over many images of one buffer view, is not much larger when it has been
+// read.
 TEST_F(Materials, OfGltfShareTheirImage) {
     constexpr int count = 200;
     const std::string picture(1 << 20, 'x');

@@ -13,10 +13,10 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
-#include <perception/random.h>
 #include <vdtree/internal/atomic_file.h>
 
 #include <vdtree/internal/number_text.h>
+#include <vdtree/internal/random.h>
 
 namespace unseen::perception {
 namespace {
@@ -104,7 +104,8 @@ private:
     }
     bool is_inside(glm::dvec2 px) const { return px.x >= 0 && px.y >= 0 && px.x <= size_.x && px.y <= size_.y; }
 
-    // Draws until a target is in the window; a small window may have none of that amplitude, so it shrinks with every failure.
+    // Draws until a target is in the window; a small window may have none of that amplitude, so it shrinks with every
+    // failure.
     double choose_target() {
         double amplitude = 0;
         do amplitude = random_.gamma(amplitude_shape, mean_amplitude_deg / amplitude_shape);
