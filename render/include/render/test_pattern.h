@@ -21,7 +21,8 @@ struct TestPattern {
         // centre.
         grating,
         // Campbell and Robson's: mean (1 + 10^(-decades (1 - y)) cos(phase)), y from 0 at the bottom. The frequency
-        // goes from left to right from `frequency` to `highest_frequency`, as an exponential; the phase is its integral.
+        // goes from `frequency` at the left to `highest_frequency` at the right, as an exponential. The phase is its
+        // integral.
         chart,
         // Left half: rows, `white_rows` of each `rows` white, the others black; right half: the code `code`.
         match,
