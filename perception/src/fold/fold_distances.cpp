@@ -200,8 +200,8 @@ void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes
         } else if (is_new) {
             find_largest_extents(row, see.luminance, eccentricities, extents);
         }
-        float *const switch_distance = &parts.switch_distance[(i + 1) * bins], *const least_cost =
-                                                                                   &parts.least_cost[(i + 1) * bins];
+        float* const switch_distance = &parts.switch_distance[(i + 1) * bins];
+        float* const least_cost = &parts.least_cost[(i + 1) * bins];
         for (std::size_t bin = 0; bin < bins; ++bin) {
             // No fold is drawn smaller than a pixel, and a shift of the mean shows from whatever distance.
             const double eccentricity_deg = eccentricities.at(bin);

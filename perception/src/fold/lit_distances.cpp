@@ -53,8 +53,8 @@ void fill_table(DistanceCriterion::Parts& parts, const ContrastClasses& classes,
         luminance.fill(static_cast<float>(classes.level(number)));
         csf.highest_visible_log2_frequency(std::span(contrast).first(bins), std::span(eccentricity).first(bins),
                                            std::span(luminance).first(bins), std::span(log2_frequency).first(bins));
-        float *const switch_distance = &parts.switch_distance[number * bins], *const least_cost =
-                                                                                  &parts.least_cost[number * bins];
+        float* const switch_distance = &parts.switch_distance[number * bins];
+        float* const least_cost = &parts.least_cost[number * bins];
         for (std::size_t bin = 0; bin < bins; ++bin) {
             const Visibility here = visibility_of(log2_frequency[bin], screen);
             // The table's own rounding must not make anything grow with the eccentricity.

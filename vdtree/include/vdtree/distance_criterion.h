@@ -46,7 +46,7 @@ struct AbsoluteScale {
 
 // Where lights that may move light the tree, classes follow from what they make of a node, as of the viewpoint's
 // lighting: interior ones by the range of its vertices' luminances, adapted to the brightest of these. Their table's
-// rows are laid out by the library; <perception/criterion.h> makes such criteria: lit_distances().
+// rows are laid out by the library, whose own modules make such criteria.
 struct LitClasses {
     std::shared_ptr<const LightBounds> bounds; // of the tree
     AbsoluteScale scale;
