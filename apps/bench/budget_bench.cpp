@@ -35,12 +35,14 @@ struct BudgetUse {
 
 class Comparison {
 public:
-    Comparison(const vdtree::VertexTree& tree, render::Renderer renderer, glm::dvec3 direction)
+    Comparison(const vdtree::VertexTree& tree, render::Renderer renderer, const BudgetBenchOptions& options)
         : tree_(tree), renderer_(std::move(renderer)) {
         vdtree::View window;
         window.fov_y_degrees = physical_field(display_, window.height).value();
+        window.up = options.up;
         const vdtree::Sphere sphere = tree.bounding_sphere();
-        view_ = vdtree::frame_sphere(tree.origin() + glm::dvec3(sphere.centre), sphere.radius, direction, fill, window);
+        view_ = vdtree::frame_sphere(tree.origin() + glm::dvec3(sphere.centre), sphere.radius, options.direction, fill,
+                                     window);
         const auto relative = static_cast<float>(to_relative(display_, perception::Luminance(background)));
         draw_options_.background = relative;
         options_.display = display_;
@@ -206,7 +208,7 @@ Result<BudgetBenchResult> bench_budget(const BudgetBenchOptions& options) {
     if (!tree) return tree.error();
     auto renderer = render::Renderer::create(*context, *tree);
     if (!renderer) return renderer.error();
-    Comparison comparison(*tree, std::move(*renderer), options.direction);
+    Comparison comparison(*tree, std::move(*renderer), options);
     if (auto drawn = comparison.draw_reference(); !drawn) return drawn.error();
     const auto extent = vdtree::extent_criterion(*tree, comparison.view(), 1);
     if (!extent) return extent.error();

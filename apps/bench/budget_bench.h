@@ -18,6 +18,7 @@ struct BudgetBenchOptions {
     std::string picture; // of the two wireframes, side by side; empty: none
     vdtree::Index triangles = 18'000;
     glm::dvec3 direction = {1, 0, 0}; // from the model towards the eye; not 0
+    glm::dvec3 up = {0, 1, 0};        // in the picture; not 0
 };
 
 // Of each: triangles; pixels that differ visibly from the full model, and their largest V; and the share of triangles

@@ -259,12 +259,13 @@ Command effects_command(CLI::App& app) {
 
 struct BudgetArguments {
     BudgetBenchOptions options;
-    std::optional<glm::dvec3> direction;
+    std::optional<glm::dvec3> direction, up;
     ReportArguments report;
 };
 
 Result<int> run(BudgetArguments& a) {
     if (a.direction) a.options.direction = *a.direction;
+    if (a.up) a.options.up = *a.up;
     auto bench = BenchRun::open({a.options.mesh}, {a.options.picture}, a.report);
     if (!bench) return bench.error();
     const auto result = bench_budget(a.options);
@@ -282,9 +283,11 @@ Command budget_command(CLI::App& app) {
         ->check(ending_in({".png"}));
     add_triangles_option(*verb, a->options.triangles, "The budget (default: 18000)");
     add_vector(*verb, "--direction", a->direction, "From the model towards the eye (default: 1 0 0)");
+    add_vector(*verb, "--up", a->up, "Up in the picture (default: 0 1 0)");
     add_report_options(*verb, a->report);
     verb->callback([a] {
         if (a->direction && *a->direction == glm::dvec3(0)) refuse("--direction must not be 0 0 0.");
+        if (a->up && *a->up == glm::dvec3(0)) refuse("--up must not be 0 0 0.");
     });
     verb->footer("Examples:\n  unseen-bench budget horse.vdt --triangles 18000 --direction 1 0 0 -o horse.png");
     return {verb, [a] { return run(*a); }};
