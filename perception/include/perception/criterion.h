@@ -10,6 +10,7 @@
 #include <perception/csf.h>
 #include <perception/cut_rings.h>
 #include <perception/display.h>
+#include <perception/fold_model.h>
 #include <vdtree/criteria.h>
 #include <vdtree/distance_criterion.h>
 #include <vdtree/lighting.h>
@@ -34,6 +35,7 @@ struct FoldTestOptions {
     // Look at colour, too, where the tree has any: the Luebke-Hallen tests in distance form then fold where sqrt((c S)^2 + (c_rg S_rg)^2 +
     // (c_yv S_yv)^2) <= 1, with the contrasts of the ring's range in both opponent directions and castleCSF's sensitivities to them. The ranges are found anew for each criterion (ring_chroma(): one pass over the tree).
     bool chroma = false;
+    FoldModel model = {}; // of the test by errors; the others have no factors
 };
 
 // All of these tests are in distance form: they depend on the field, the window and the options, not on where the eye or the gaze are (but on
@@ -84,7 +86,7 @@ SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBoun
 // where the tree's folds have not been measured (measure_folds()), and where what files say of it is no measurement.
 //
 // With D the angular width of what changes: twice the larger of the support's radius and the extent; h, eY and their means hm, em of
-// what the model makes of the measurement (src/fold_model.h), in cd/m2 where they are luminances; the ring's range lo1..hi1 and its sphere's r1; L the middle of the range; S the
+// what the model makes of the measurement (perception/fold_model.h), in cd/m2 where they are luminances; the ring's range lo1..hi1 and its sphere's r1; L the middle of the range; S the
 // table's conservative form; and by eccentricity. A pattern is invisible where what the bands of an octave each see of it, c(rho) S(rho),
 // comes to less than 1 in their sum of powers of 3.5:
 //   patch       c = 1.9 (em + (hi1 - lo1) min(1, hm / r1)) / L, and in parts half as wide four times that, up to the largest,
