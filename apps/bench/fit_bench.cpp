@@ -97,7 +97,7 @@ public:
             auto model = JudgedModel::create(*context, meshes[i].name, std::move(*tree), options_.quick ? 128 : 256);
             if (!model) return model.error();
             if (auto ok = look_from_all_around(*model); !ok) return ok.error();
-            result_.title += meshes[i].name + " (" + grouped(model->triangles()) + "), ";
+            result_.table.title += meshes[i].name + " (" + grouped(model->triangles()) + "), ";
         }
         return finished();
     }
@@ -190,19 +190,20 @@ private:
     }
 
     FitBenchResult finished() {
-        result_.title += "each from " + std::string(options_.quick ? "one place" : "five places") +
-                         ", looked at and aside; the model's own values are marked *";
-        result_.table = {
-            {"factor", "value", "triangles", "of the model's", "largest V, looked at", "aside", "visible pixels"}};
+        result_.table.title += "each from " + std::string(options_.quick ? "one place" : "five places") +
+                               ", looked at and aside. Value of the factor: triangles kept, over those of the model's "
+                               "own value (*); largest V; visible pixels.";
+        result_.table.rows = {{"factor", "", "", "", "", ""}};
         double own = 0;
         for (const Setting& s : settings_)
             if (s.model == FoldModel()) own = static_cast<double>(s.triangles);
         for (const Setting& s : settings_) {
             const bool is_own = s.model == FoldModel();
             const double ratio = static_cast<double>(s.triangles) / own;
-            result_.table.push_back({s.factor, rounded(s.value, 3) + (is_own ? " *" : ""), grouped(s.triangles),
-                                     rounded(ratio, 4), rounded(s.largest[0], 2), rounded(s.largest[1], 2),
-                                     grouped(s.visible_pixels)});
+            if (result_.table.rows.back().front() != s.factor) result_.table.rows.push_back({s.factor});
+            result_.table.rows.back().push_back(
+                rounded(s.value, 3) + (is_own ? "*: " : ": ") + with_decimals(ratio, 3) + "; " +
+                rounded(std::max(s.largest[0], s.largest[1]), 3) + "; " + grouped(s.visible_pixels));
             Json row = {{"factor", s.factor},       {"value", s.value}, {"is_own", is_own},
                         {"triangles", s.triangles}, {"of_own", ratio},  {"visible_pixels", s.visible_pixels}};
             for (const bool is_aside : {false, true})

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "report.h"
+#include "bench_table.h"
 
 namespace unseen::app {
 
@@ -14,8 +14,7 @@ struct FitBenchOptions {
 };
 
 struct FitBenchResult {
-    std::string title;                           // the tuning set
-    std::vector<std::vector<std::string>> table; // the first row is the header
+    BenchTable table;
     Json rows = Json::array();
 };
 
