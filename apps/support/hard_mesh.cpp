@@ -163,7 +163,6 @@ std::vector<HardMesh> tuning_meshes(int triangles) {
     };
     const Mesh sphere = ball(rows, 2 * rows, 0), half = ball(rows * 2 / 3, rows * 4 / 3, 0);
     const Mesh blob = moved(sphere, [&](glm::dvec3 p) { return p * (1 + 0.2 * lumps(p)); });
-    const double crumple = 1.0 / rows; // a third of an edge
     const auto lens = [&](double slope, double grey) {
         return painted(moved(half, [=](glm::dvec3 p) { return glm::dvec3(p.x, p.y, 0.04 * p.z + slope * p.x); }),
                        [=](glm::dvec3) { return grey; });
@@ -178,28 +177,21 @@ std::vector<HardMesh> tuning_meshes(int triangles) {
     Mesh lenses = lens(0, 0.7), boxes = box({0, 0, 0}, 0.7);
     append(lenses, lens(0.1, 0.4));
     append(boxes, box({0.8, 0.3, 0.2}, 0.4));
-    constexpr int bands = 8; // of the column, in turn low ones and nine times as high ones
-    const auto column = [&](double down, double around) {
-        const double band = bands * down, low = std::fmod(band, 2) < 1 ? 0 : 0.8;
+    const auto column = [](double down, double around) {
         const double r = 0.4 + 0.03 * std::cos(24 * std::numbers::pi * around);
         const double turn = 2 * std::numbers::pi * (around + 0.1 * down);
-        return glm::dvec3(r * std::cos(turn), 2 * (band - low) / bands - 1, r * std::sin(turn));
+        return glm::dvec3(r * std::cos(turn), 2 * down - 1, r * std::sin(turn));
     };
     std::vector<HardMesh> meshes;
     meshes.push_back(
         {"rough blob", moved(blob, [&](glm::dvec3 p) { return p * (1 + 0.01 * bumps(p) + 0.001 * noise()); })});
     meshes.push_back({"painted blob", painted(blob, spotted)});
-    meshes.push_back({"grained blob", painted(blob, [&](glm::dvec3) { return 0.5 + 0.05 * noise(); })});
-    meshes.push_back({"crumpled ball", moved(sphere, [&](glm::dvec3 p) {
-                          const double x = noise(), y = noise();
-                          return p + crumple * glm::dvec3(x, y, noise());
-                      })});
     meshes.push_back({"terrain", net(rows, 2 * rows, false, [&](double down, double across) {
                           const glm::dvec3 p(4 * across - 2, 2 * down - 1, 0);
                           return p + glm::dvec3(0, 0, 0.15 * lumps(p) + 0.01 * bumps(p));
                       })});
-    meshes.push_back({"column", painted(net(bands, triangles / (2 * bands), true, column), spotted)});
     meshes.push_back({"lenses", std::move(lenses)});
+    meshes.push_back({"column", net(8, triangles / 16, true, column)}); // of long triangles
     meshes.push_back({"boxes", std::move(boxes)});
     return meshes;
 }

@@ -20,9 +20,8 @@ struct HardMesh {
 // open one. Of about so many triangles each; at least a thousand.
 std::vector<HardMesh> hard_meshes(int triangles);
 
-// What the factors of the fold test by errors are fitted on, and nothing else: blobs that are rough, painted or
-// grained, a crumpled ball, an open terrain, a painted column of triangles as long as it has low and high bands, flat
-// lenses and boxes that pass through each other. Of about so many triangles each; at least a thousand.
+// What the factors of the fold test by errors are fitted on, and nothing else: a rough and a painted blob, an open
+// terrain, flat lenses and boxes that pass through each other, a column of long triangles. Of about so many triangles each; at least a thousand.
 std::vector<HardMesh> tuning_meshes(int triangles);
 
 Result<vdtree::VertexTree> build_hard_tree(const HardMesh& hard);
