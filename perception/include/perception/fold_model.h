@@ -44,7 +44,7 @@ struct FoldModel {
     // picture's half side is 2.1 widths: of the square around a ring of 4 it shows a quarter.
     double longest_ring = 4;
     // Patches side by side whose signs differ at random are seen as 1 / n of the contrast at n times the width, up to
-    // this n: 1, 2, 4, ... What more of them come to, the drift tells.
+    // this n: 1, 2, 4, ... What more of them come to, the bias tells.
     int most_side_by_side = 4;
     // Of the contrasts of pictures of the whole mesh: the worst direction may lie between those of the pictures. Of
     // these 26, one is within 31 degrees of any; foreshortening by that angle is 1.16.

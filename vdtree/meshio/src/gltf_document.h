@@ -1,5 +1,5 @@
-// A glTF document: split from its container, and cut down to what describes triangles, so that nothing that tinygltf would believe or fetch
-// reaches it.
+// A glTF document: split from its container, and cut down to what describes triangles, so that nothing that tinygltf
+// would believe or fetch reaches it.
 #pragma once
 
 #include <cstdint>

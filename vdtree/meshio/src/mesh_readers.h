@@ -45,7 +45,8 @@ bool is_binary_stl(std::string_view bytes);
 // Whether the bytes start with one of the keywords of OFF (COFF, STOFF, ...), after comments.
 bool starts_with_off_keyword(std::string_view bytes);
 
-// A name in a mesh file as a path below its folder, or nothing: a mesh must not be able to name any file of the machine.
+// A name in a mesh file as a path below its folder, or nothing: a mesh must not be able to name any file of the
+// machine.
 std::optional<std::filesystem::path> path_beside(std::string_view name);
 
 // Materials of a Wavefront MTL file, added to those there are. `name` is that of the file, for messages.

@@ -20,7 +20,8 @@ namespace {
 // first-level cache.
 constexpr std::size_t batch_size = 1024;
 
-// What the caller's own callbacks say: the costs of folding nodes, 0 where these cannot be seen; what is no number is infinite.
+// What the caller's own callbacks say: the costs of folding nodes, 0 where these cannot be seen; what is no number is
+// infinite.
 class CallbackCosts final : public CostSource {
 public:
     CallbackCosts(const VertexTree& tree, const FoldCriterion& criterion, const VisibilityTest& visibility)
@@ -98,8 +99,8 @@ Decision decide_by_budget(const VertexTree& tree, const CostSource& source, Inde
     return {std::move(decision.unfolded.front()), decision.max_seen_cost};
 }
 
-// The corners of the cut's triangles in the order of the input, in which groups and materials are runs; these are appended to `ranges`. (The
-// index buffer's order follows from the history of the cut.)
+// The corners of the cut's triangles in the order of the input, in which groups and materials are runs; these are
+// appended to `ranges`. (The index buffer's order follows from the history of the cut.)
 std::vector<NodeId> corners_by_range(const Cut& cut, std::vector<MeshRange>& ranges) {
     const VertexTree& tree = cut.tree();
     const auto& links = unchecked_links(tree); // of unfolded nodes, which are sound

@@ -30,8 +30,8 @@ struct ReadOptions {
     bool materials = true; // read them: of OBJ, the files that it names
 };
 
-// What a file says of the surface of a range of triangles. Images are named, or are there as they were in the file: nothing here decodes
-// them.
+// What a file says of the surface of a range of triangles. Images are named, or are there as they were in the file:
+// nothing here decodes them.
 struct Material {
     std::string name;                 // of the MeshRange; different for all materials of a file
     glm::vec4 colour = glm::vec4(1);  // linear RGB, 0..1, that vertex colours and texture are multiplied with; alpha
@@ -56,7 +56,8 @@ struct ReadResult {
 
 // Polygons are triangulated (ear clipping in the plane of the polygon, so concave ones keep their area),
 // triangle strips unrolled with their orientation, glTF node transforms applied. Coincident vertices stay apart.
-// Fails on a mesh without triangles, and on vertex normals in use that are not finite; those of length 0 are told in the warnings.
+// Fails on a mesh without triangles, and on vertex normals in use that are not finite; those of length 0 are told in
+// the warnings.
 Result<ReadResult> read_mesh(const std::filesystem::path& file, const ReadOptions& options = {});
 
 // Writes to a temporary name in the same folder, then renames; an existing file is replaced only by a whole one.
