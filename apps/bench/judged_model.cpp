@@ -80,7 +80,10 @@ Result<session::Simplification> JudgedModel::simplify(Stand& stand, const WhatOp
 Result<JudgedModel::Picture> JudgedModel::draw(Stand& stand, const WhatOptions& what, bool wireframe) {
     const auto simplified = simplify(stand, what);
     if (!simplified) return simplified.error();
-    const vdtree::Cut& cut = simplified->cuts.front();
+    return draw(stand, simplified->cuts.front(), wireframe);
+}
+
+Result<JudgedModel::Picture> JudgedModel::draw(Stand& stand, const vdtree::Cut& cut, bool wireframe) {
     render::DrawOptions options;
     options.samples = samples_to_judge;
     options.background = stand.session->background();
@@ -108,12 +111,13 @@ Result<const perception::Image*> JudgedModel::full() {
     return &*full_;
 }
 
-Result<perception::Judgement> JudgedModel::judge(const Picture& picture, const WhatOptions& what, Judge judge) {
+Result<perception::Judgement> JudgedModel::judge(const Picture& picture, const std::optional<glm::dvec2>& gaze_px,
+                                                 Judge judge) {
     const auto reference = full();
     if (!reference) return reference.error();
     perception::JudgeOptions options;
     options.display = plain_.session->observer().display;
-    options.gaze_px = what.gaze_px;
+    options.gaze_px = gaze_px;
     if (judge == Judge::second) {
         options.csf = second_;
         options.beta = 2;
@@ -124,7 +128,15 @@ Result<perception::Judgement> JudgedModel::judge(const Picture& picture, const W
 Result<perception::Judgement> JudgedModel::judge(const WhatOptions& what, Judge by) {
     const auto picture = draw(what);
     if (!picture) return picture.error();
-    return judge(*picture, what, by);
+    return judge(*picture, what.gaze_px, by);
+}
+
+Result<perception::Judgement> JudgedModel::judge(const vdtree::Cut& cut, const std::optional<glm::dvec2>& gaze_px) {
+    const auto stood = stand(FoldTest::error);
+    if (!stood) return stood.error();
+    const auto picture = draw(**stood, cut, false);
+    if (!picture) return picture.error();
+    return judge(*picture, gaze_px, Judge::modern);
 }
 
 Result<Verdicts> JudgedModel::judge(const WhatOptions& what) {
@@ -133,7 +145,7 @@ Result<Verdicts> JudgedModel::judge(const WhatOptions& what) {
     Verdicts verdicts;
     verdicts.triangles = picture->triangles;
     for (std::size_t i = 0; i < judges.size(); ++i) {
-        const auto judged = judge(*picture, what, judges[i]);
+        const auto judged = judge(*picture, what.gaze_px, judges[i]);
         if (!judged) return judged.error();
         verdicts.visible_pixels[i] = judged->visible_pixels;
         verdicts.largest[i] = judged->max_ratio;

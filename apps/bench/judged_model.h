@@ -54,6 +54,8 @@ public:
     // Against the full model, which is drawn once a view.
     Result<Verdicts> judge(const WhatOptions& what); // by all judges
     Result<perception::Judgement> judge(const WhatOptions& what, Judge judge);
+    // Another cut of the tree with errors, that of session(FoldTest::error), by the first judge.
+    Result<perception::Judgement> judge(const vdtree::Cut& cut, const std::optional<glm::dvec2>& gaze_px);
 
     // The cut alone.
     Result<vdtree::Index> count(const WhatOptions& what);
@@ -68,8 +70,9 @@ private:
     Result<Stand> make_stand(vdtree::VertexTree tree);
     Result<session::Simplification> simplify(Stand& stand, const WhatOptions& what);
     Result<Picture> draw(Stand& stand, const WhatOptions& what, bool wireframe);
+    Result<Picture> draw(Stand& stand, const vdtree::Cut& cut, bool wireframe);
     Result<const perception::Image*> full();
-    Result<perception::Judgement> judge(const Picture& picture, const WhatOptions& what, Judge judge);
+    Result<perception::Judgement> judge(const Picture& picture, const std::optional<glm::dvec2>& gaze_px, Judge judge);
 
     std::optional<render::Context> context_;
     std::string name_;

@@ -14,6 +14,7 @@
 #include "budget_bench.h"
 #include "effects_bench.h"
 #include "engine_bench.h"
+#include "fit_bench.h"
 #include "options.h"
 #include "output_files.h"
 #include "perception_bench.h"
@@ -293,6 +294,32 @@ Command budget_command(CLI::App& app) {
     return {verb, [a] { return run(*a); }};
 }
 
+struct FitArguments {
+    FitBenchOptions options;
+    ReportArguments report;
+};
+
+Result<int> run(FitArguments& a) {
+    auto bench = BenchRun::open({}, {}, a.report);
+    if (!bench) return bench.error();
+    const auto result = bench_fit(a.options);
+    if (!result) return result.error();
+    return bench->close({{"rows", result->rows}}, {result->table});
+}
+
+Command fit_command(CLI::App& app) {
+    auto a = std::make_shared<FitArguments>();
+    CLI::App* verb = app.add_subcommand(
+        "fit", "What other values of the fold model's factors keep and show, on meshes that are no evidence");
+    verb->add_option("--factor", a->options.factor, "That one alone (default: each, one after the other)")
+        ->type_name("NAME")
+        ->check(one_of(fit_factors()));
+    verb->add_flag("--quick", a->options.quick, "Few views of small meshes: rough figures");
+    add_report_options(*verb, a->report);
+    verb->footer("Examples:\n  unseen-bench fit --quick --factor peak_of_shift\n  unseen-bench fit --json fit.json");
+    return {verb, [a] { return run(*a); }};
+}
+
 constexpr const char* about =
     "unseen-bench measures how fast, how small and how invisible Unseen is on this machine, against what is promised.";
 constexpr const char* examples = R"(Examples:
@@ -308,6 +335,6 @@ int main(int argc, char** argv) {
     using namespace unseen::app;
     return run_program(argc, argv, {"unseen-bench", about, examples, UNSEEN_VERSION, {}}, [](CLI::App& app) {
         return std::vector<Command>{engine_command(app), perception_command(app), effects_command(app),
-                                    budget_command(app)};
+                                    budget_command(app), fit_command(app)};
     });
 }

@@ -1,5 +1,6 @@
 // The benchmarks that draw, in a build without OpenGL: they say so.
 #include "budget_bench.h"
+#include "fit_bench.h"
 #include "perception_bench.h"
 
 namespace unseen::app {
@@ -15,5 +16,7 @@ Error no_pictures() {
 
 Result<PerceptionBenchResult> bench_perception(const PerceptionBenchOptions&) { return no_pictures(); }
 Result<BudgetBenchResult> bench_budget(const BudgetBenchOptions&) { return no_pictures(); }
+Result<FitBenchResult> bench_fit(const FitBenchOptions&) { return no_pictures(); }
+std::vector<std::string> fit_factors() { return {}; }
 
 } // namespace unseen::app

@@ -1,11 +1,14 @@
 #include "hard_mesh.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <random>
 
+#include <glm/exponential.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vec4.hpp>
 
 namespace unseen::app {
 namespace {
@@ -61,9 +64,11 @@ Mesh painted(Mesh mesh, Grey&& grey) {
     return mesh;
 }
 
+// Both with colours, or neither.
 void append(Mesh& mesh, const Mesh& more) {
     const auto first = static_cast<Index>(mesh.positions.size());
     mesh.positions.insert(mesh.positions.end(), more.positions.begin(), more.positions.end());
+    mesh.colours.insert(mesh.colours.end(), more.colours.begin(), more.colours.end());
     for (const auto& t : more.triangles) mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
 }
 
@@ -85,6 +90,28 @@ Mesh plates(int count, int side) {
     }
     return mesh;
 }
+
+// A sum of plane waves of random directions and phases, of so many radians a unit of length; of about unit deviation.
+class Waves {
+public:
+    Waves(std::mt19937_64& random, double lowest, double highest) {
+        const auto uniform = [&](double low, double high) {
+            return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
+        };
+        for (glm::dvec4& wave : waves_) {
+            const glm::dvec3 direction(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
+            wave = glm::dvec4(glm::normalize(direction) * uniform(lowest, highest), uniform(0, 2 * std::numbers::pi));
+        }
+    }
+    double operator()(glm::dvec3 p) const {
+        double sum = 0;
+        for (const glm::dvec4& wave : waves_) sum += std::sin(glm::dot(glm::dvec3(wave), p) + wave.w);
+        return sum / std::sqrt(static_cast<double>(waves_.size()) / 2);
+    }
+
+private:
+    std::array<glm::dvec4, 12> waves_;
+};
 
 // The clustering by cells, with each proxy at the darkest vertex below it.
 Result<vdtree::Clustering> cluster_to_darkest(const vdtree::ClusterInput& input) {
@@ -125,6 +152,50 @@ std::vector<HardMesh> hard_meshes(int triangles) {
                         return glm::dvec3(x, y, 0.1 * std::sin(6 * x) * std::cos(7 * y));
                     })});
     return hard;
+}
+
+std::vector<HardMesh> tuning_meshes(int triangles) {
+    const int rows = std::max(16, static_cast<int>(std::sqrt(triangles / 4.0)));
+    std::mt19937_64 random(2);
+    const auto noise = [&] { return 2 * static_cast<double>(random() >> 11) * 0x1p-53 - 1; };
+    const Waves lumps(random, 1.5, 4), bumps(random, 8, 20), spots(random, 3, 9);
+    const auto moved = [](Mesh mesh, const auto& place) {
+        for (glm::dvec3& p : mesh.positions) p = place(p);
+        return mesh;
+    };
+    const Mesh sphere = ball(rows, 2 * rows, 0), half = ball(rows * 2 / 3, rows * 4 / 3, 0);
+    const Mesh blob = moved(sphere, [&](glm::dvec3 p) { return p * (1 + 0.2 * lumps(p)); });
+    const auto lens = [&](double slope, double grey) {
+        return painted(moved(half, [=](glm::dvec3 p) { return glm::dvec3(p.x, p.y, 0.04 * p.z + slope * p.x); }),
+                       [=](glm::dvec3) { return grey; });
+    };
+    const auto box = [&](glm::dvec3 middle, double size) {
+        return moved(half, [=](glm::dvec3 p) {
+            const glm::dvec3 q = glm::pow(glm::abs(p), glm::dvec3(8));
+            return middle + size * p / std::pow(q.x + q.y + q.z, 1.0 / 8);
+        });
+    };
+    const auto spotted = [&](glm::dvec3 p) { return 0.5 + 0.3 * std::tanh(4 * spots(p)); };
+    Mesh lenses = lens(0, 0.7), boxes = box({0, 0, 0}, 0.7);
+    append(lenses, lens(0.1, 0.4));
+    append(boxes, box({0.8, 0.3, 0.2}, 0.4));
+    const auto column = [](double down, double around) {
+        const double r = 0.4 + 0.03 * std::cos(24 * std::numbers::pi * around);
+        const double turn = 2 * std::numbers::pi * (around + 0.1 * down);
+        return glm::dvec3(r * std::cos(turn), 2 * down - 1, r * std::sin(turn));
+    };
+    std::vector<HardMesh> meshes;
+    meshes.push_back(
+        {"rough blob", moved(blob, [&](glm::dvec3 p) { return p * (1 + 0.01 * bumps(p) + 0.001 * noise()); })});
+    meshes.push_back({"painted blob", painted(blob, spotted)});
+    meshes.push_back({"terrain", net(rows, 2 * rows, false, [&](double down, double across) {
+                          const glm::dvec3 p(4 * across - 2, 2 * down - 1, 0);
+                          return p + glm::dvec3(0, 0, 0.15 * lumps(p) + 0.01 * bumps(p));
+                      })});
+    meshes.push_back({"lenses", std::move(lenses)});
+    meshes.push_back({"column", net(8, triangles / 16, true, column)}); // of long triangles
+    meshes.push_back({"boxes", std::move(boxes)});
+    return meshes;
 }
 
 Result<vdtree::VertexTree> build_hard_tree(const HardMesh& hard) {

@@ -1,4 +1,4 @@
-// Meshes made to be hard for fold tests.
+// Meshes made to be hard for fold tests, and others to fit their factors on.
 #pragma once
 
 #include <string>
@@ -19,6 +19,10 @@ struct HardMesh {
 // Noise of 4% by vertex, a checkerboard of luminance, plates so thin that folds poke through, long thin triangles, a
 // surface inside out, an open one. Of about so many triangles each; at least a thousand.
 std::vector<HardMesh> hard_meshes(int triangles);
+
+// What the factors of the fold test by errors are fitted on, and nothing else: a rough and a painted blob, an open
+// terrain, flat lenses and boxes that pass through each other, a column of long triangles. Of about so many triangles each; at least a thousand.
+std::vector<HardMesh> tuning_meshes(int triangles);
 
 Result<vdtree::VertexTree> build_hard_tree(const HardMesh& hard);
 

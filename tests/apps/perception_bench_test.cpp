@@ -130,6 +130,26 @@ TEST_F(PerceptionBenchTest, EffectsAreComparedWithoutEach) {
     EXPECT_THAT(people.out, HasSubstr("no silhouettes"));
 }
 
+// A factor cut to a quarter keeps fewer triangles; the more it is, the more are kept.
+TEST_F(PerceptionBenchTest, FactorsOfTheFoldModelAreVaried) {
+    const Outcome outcome = bench({"fit", "--quick", "--factor", "peak_of_shift", "--json", "-"});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const Json rows = outcome.json()["rows"];
+    ASSERT_EQ(rows.size(), 5u);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        EXPECT_EQ(rows[i]["factor"], "peak_of_shift");
+        EXPECT_EQ(rows[i]["is_own"], rows[i]["value"] == 1.2);
+        EXPECT_GT(rows[i]["looked_at"]["largest_v"], 0);
+        EXPECT_LT(rows[i]["aside"]["largest_v"], 1);
+        if (i == 0) continue;
+        EXPECT_GT(rows[i]["value"], rows[i - 1]["value"]);
+        EXPECT_GE(rows[i]["triangles"], rows[i - 1]["triangles"]);
+    }
+    EXPECT_LT(rows.front()["of_own"], 1);
+    EXPECT_GT(rows.back()["of_own"], 1);
+    EXPECT_EQ(bench({"fit", "--factor", "pooling"}).status, 2);
+}
+
 // A machine without any OpenGL driver, which the EGL dispatcher's search path can pretend.
 TEST_F(PerceptionBenchTest, NumbersNeedNoOpenGl) {
     setenv("__EGL_VENDOR_LIBRARY_DIRS", "/nonexistent", 1);

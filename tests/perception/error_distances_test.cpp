@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <random>
 #include <utility>
@@ -12,6 +13,7 @@
 
 #include "built.h"
 #include "fold/error_distances.h"
+#include "measured.h"
 #include "shapes.h"
 #include "sound.h"
 
@@ -118,6 +120,27 @@ TEST(ErrorDistances, OfMorePatternsThanRowsAreNoLess) {
         }
     }
     EXPECT_GT(exact_rows, most_rows) << "there are rows for all";
+}
+
+TEST(ErrorDistances, RefuseFactorsThatAreNone) {
+    const VertexTree tree = support::measured(support::built(shapes::icosphere(2)));
+    FoldTestOptions options;
+    vdtree::View view;
+    view.eye = {0, 0, 5};
+    EXPECT_TRUE(error_distances(tree, view, options));
+    for (const double none : {-1.0, std::nan(""), std::numeric_limits<double>::infinity()})
+        for (double FoldModel::*factor :
+             {&FoldModel::peak_of_shift, &FoldModel::moved_by_neighbours, &FoldModel::contact_reach,
+              &FoldModel::least_sine, &FoldModel::sampled_shift_px, &FoldModel::amplitude_of_point_mean,
+              &FoldModel::amplitude_of_shift_mean, &FoldModel::longest_ring, &FoldModel::between_directions}) {
+            options.model = {};
+            options.model.*factor = none;
+            EXPECT_FALSE(error_distances(tree, view, options));
+        }
+    for (const int none : {0, FoldModel::largest_side_by_side + 1}) {
+        options.model = {.most_side_by_side = none};
+        EXPECT_FALSE(error_distances(tree, view, options));
+    }
 }
 
 } // namespace

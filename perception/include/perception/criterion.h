@@ -10,6 +10,7 @@
 #include <perception/csf.h>
 #include <perception/cut_rings.h>
 #include <perception/display.h>
+#include <perception/fold_model.h>
 #include <vdtree/criteria.h>
 #include <vdtree/distance_criterion.h>
 #include <vdtree/lighting.h>
@@ -36,6 +37,7 @@ struct FoldTestOptions {
     // with the contrasts of the ring's range in both opponent directions and castleCSF's sensitivities to them. The
     // ranges are found anew for each criterion (ring_chroma(): one pass over the tree).
     bool chroma = false;
+    FoldModel model = {}; // of the test by errors; the others have no factors
 };
 
 // All of these tests are in distance form. They depend on the field, the window and the options, and on whether there
@@ -90,7 +92,7 @@ SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBoun
 // above. Fails, too, where the tree's folds have not been measured (measure_folds()), and where what files say of it is
 // no measurement.
 //
-// The model makes of the measurement (src/fold/fold_model.h): a distance h and a luminance e, the largest, and their
+// The model makes of the measurement (perception/fold_model.h): a distance h and a luminance e, the largest, and their
 // means hm and em. D is the angular width of what changes: twice the larger of the support's radius and the extent. The
 // ring has luminances lo..hi, with L in their middle, and a sphere of radius r1. Luminances are in cd/m2. S is the
 // table's conservative form, by eccentricity. A band of an octave around rho sees c(rho) S(rho) of a pattern. The

@@ -25,6 +25,7 @@
 #include <perception/criterion.h>
 #include <perception/cut_rings.h>
 #include <perception/fold_measurement.h>
+#include <perception/fold_model.h>
 
 // Pictures, and judges of them.
 #include <perception/image.h>

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "fold/error_distances.h"
-#include "fold/fold_model.h"
 #include "fold/fold_screen.h"
 #include "fold/luminance_classes.h"
+#include "fold/pooling.h"
 #include "fold/stage_distances.h"
 
 namespace unseen::perception {
@@ -31,7 +31,9 @@ constexpr int luminance_count = static_cast<int>(LuminanceClasses::count);
 // limit.
 constexpr double frequency_step = 1.0905077326652577; // an eighth of an octave
 
-constexpr int steepest_spike = steepest_spike_octaves * contrasts_per_octave;
+// Octaves of contrast that a small part of a patch may have over all of it: sharper ones count as this, a sixteenth of
+// the width. They are rare, and each octave is more rows.
+constexpr int steepest_spike = 8 * contrasts_per_octave;
 
 // The widest mesh there can be, in widths of a node: also where nodes have none.
 constexpr float widest = 1e9f;
@@ -104,21 +106,48 @@ Pattern rounded(Pattern p, int coarseness) {
     return p;
 }
 
+// Of patterns, from far below any width that can be seen up to the lowest frequency's.
+constexpr double widest_deg = 1 / lowest_table_cpd, width_step = 0.91700404320467122; // an eighth of an octave
+constexpr std::size_t width_count = 160;
+double width_deg(std::size_t i) { return widest_deg * std::pow(width_step, static_cast<double>(i)); }
+
+// What bands of frequency see of patterns of all widths, as shares of their contrast: of this, eyes that see patterns
+// at all luminances and eccentricities have one copy.
+struct Bands {
+    using Shares = std::vector<double>; // [width * bands + band]
+
+    std::vector<double> lowest_cpd; // by band
+    Shares of_patches, of_areas, of_strips;
+
+    Bands(double highest_cpd, const FoldModel& model) {
+        for (double low = lowest_table_cpd; low < highest_cpd; low *= frequency_step) lowest_cpd.push_back(low);
+        for (std::size_t i = 0; i < width_count; ++i) {
+            const double width = width_deg(i);
+            for (const double low : lowest_cpd) {
+                const double waves = width * std::min(low * frequency_step, highest_cpd);
+                of_patches.push_back(share_of_patches(waves, model.most_side_by_side));
+                of_areas.push_back(share_of_area(waves));
+                of_strips.push_back(std::min(1.0, waves)); // half as wide
+            }
+        }
+    }
+};
+
 // What can be seen at one luminance and eccentricity. Bands of frequency an octave apart look for a pattern; what they
 // see of it is pooled as the eye pools its channels; wherever the bands' octaves begin.
 class Eye {
 public:
-    Eye(const CsfTable& csf, double eccentricity_deg, double luminance_cdm2, const Screen& screen) : screen_(screen) {
-        const double highest_cpd = screen.highest_cpd;
-        std::vector<Band> bands;
-        for (double low = lowest_table_cpd; low < highest_cpd; low *= frequency_step)
-            bands.push_back(
-                {std::min(low * frequency_step, highest_cpd),
-                 csf.monotone_sensitivity(CyclesPerDegree(low), Degrees(eccentricity_deg), Luminance(luminance_cdm2))});
+    Eye(const CsfTable& csf, double eccentricity_deg, double luminance_cdm2, const Screen& screen, const Bands& bands,
+        const FoldModel& model)
+        : screen_(screen), model_(model) {
+        std::vector<double> sensitivities;
+        for (const double low : bands.lowest_cpd)
+            sensitivities.push_back(
+                csf.monotone_sensitivity(CyclesPerDegree(low), Degrees(eccentricity_deg), Luminance(luminance_cdm2)));
         for (std::size_t i = 0; i < width_count; ++i) {
-            patches_[i] = 1 / visibility(bands, width(i), share_of_patches<double>);
-            areas_[i] = 1 / visibility(bands, width(i), share_of_area<double>);
-            strips_[i] = 1 / visibility(bands, width(i), share_of_strip);
+            patches_[i] = 1 / visibility(sensitivities, bands.of_patches, i);
+            areas_[i] = 1 / visibility(sensitivities, bands.of_areas, i);
+            strips_[i] = 1 / visibility(sensitivities, bands.of_strips, i);
         }
     }
 
@@ -130,43 +159,29 @@ public:
     double strip_distance(double contrast) const {
         const double invisible_deg = 0.5 * least_visible_width(strips_, contrast);
         if (!std::isfinite(invisible_deg)) return 0;
-        const double width_deg = std::max(invisible_deg - sampled_shift_px * screen_.pixel_deg, invisible_deg / 2);
-        return (1 + distance_rounding) * degrees_per_radian * screen_.largest_magnification / width_deg;
+        const double counted_deg =
+            std::max(invisible_deg - model_.sampled_shift_px * screen_.pixel_deg, invisible_deg / 2);
+        return (1 + distance_rounding) * degrees_per_radian * screen_.largest_magnification / counted_deg;
     }
 
 private:
-    struct Band {
-        double highest_cpd, sensitivity;
-    };
     static constexpr std::size_t bands_per_octave = 8;
-    // Widths from far below any that can be seen up to the lowest frequency's.
-    static constexpr double widest_deg = 1 / lowest_table_cpd,
-                            width_step = 0.91700404320467122; // an eighth of an octave
-    static constexpr std::size_t width_count = 160;
-    static double width(std::size_t i) { return widest_deg * std::pow(width_step, static_cast<double>(i)); }
     using Thresholds = std::array<double, width_count>; // contrasts, by width
 
-    // What a band sees of a strip whose width is half of this, in the band's waves, as a share of its contrast.
-    static double share_of_strip(double waves) { return std::min(1.0, waves); }
-
     // Of unit contrast, in thresholds.
-    static double visibility(const std::vector<Band>& bands, double width_deg, double (*share)(double)) {
-        double most = 0;
-        for (std::size_t first = 0; first < std::min(bands_per_octave, bands.size()); ++first) {
-            double sum = 0;
-            for (std::size_t i = first; i < bands.size(); i += bands_per_octave) {
-                const double seen = share(width_deg * bands[i].highest_cpd) * bands[i].sensitivity;
-                sum += to_power_of_pooling(seen);
-            }
-            most = std::max(most, sum);
-        }
-        return std::pow(most, 1 / pooling);
+    static double visibility(const std::vector<double>& sensitivities, const Bands::Shares& shares, std::size_t width) {
+        const std::size_t bands = sensitivities.size();
+        const double* const share = shares.data() + width * bands;
+        std::array<double, bands_per_octave> sums{}; // by where the octaves begin
+        for (std::size_t i = 0; i < bands; ++i)
+            sums[i % bands_per_octave] += to_power_of_pooling(share[i] * sensitivities[i]);
+        return std::pow(*std::max_element(sums.begin(), sums.end()), 1 / pooling);
     }
 
     double switch_distance(const Thresholds& thresholds, double contrast) const {
-        const double width_deg = least_visible_width(thresholds, contrast);
-        if (!std::isfinite(width_deg)) return 0; // from inside only
-        const double half = width_deg / screen_.largest_magnification / degrees_per_radian / 2;
+        const double invisible_deg = least_visible_width(thresholds, contrast);
+        if (!std::isfinite(invisible_deg)) return 0; // from inside only
+        const double half = invisible_deg / screen_.largest_magnification / degrees_per_radian / 2;
         return half < std::numbers::pi / 2 ? (1 + distance_rounding) / std::sin(half) : 1;
     }
 
@@ -175,7 +190,7 @@ private:
         // Thresholds rise as widths fall.
         const auto first = std::lower_bound(thresholds.begin(), thresholds.end(), contrast);
         if (first == thresholds.begin()) return std::numeric_limits<double>::infinity();
-        if (first == thresholds.end()) return width(width_count - 1);
+        if (first == thresholds.end()) return width_deg(width_count - 1);
         const auto above = static_cast<std::size_t>(first - thresholds.begin());
         const double t0 = thresholds[above - 1], t1 = thresholds[above]; // visible, invisible
         const double share = t1 > t0 ? std::log(contrast / t0) / std::log(t1 / t0) : 1;
@@ -183,6 +198,7 @@ private:
     }
 
     const Screen& screen_;
+    const FoldModel& model_;
     Thresholds patches_, areas_, strips_;
 };
 
@@ -191,10 +207,10 @@ private:
 class SwitchDistances {
 public:
     // `added`: rows that add() will ask for.
-    SwitchDistances(const Levels& levels, const Screen& screen, const CsfTable& csf, std::size_t bins,
-                    std::size_t added)
-        : levels_(levels), screen_(screen), csf_(csf), bins_(bins), most_patterns_(last_row - added),
-          discs_(luminance_count), eyes_(luminance_count) {
+    SwitchDistances(const Levels& levels, const Screen& screen, const CsfTable& csf, const FoldModel& model,
+                    std::size_t bins, std::size_t added)
+        : levels_(levels), screen_(screen), csf_(csf), model_(model), bands_(screen.highest_cpd, model), bins_(bins),
+          most_patterns_(last_row - added), discs_(luminance_count), eyes_(luminance_count) {
         begin();
     }
 
@@ -256,8 +272,8 @@ private:
         auto& eyes = eyes_[static_cast<std::size_t>(luminance)];
         if (eyes.empty())
             for (std::size_t b = 0; b < bins_; ++b)
-                eyes.emplace_back(csf_, static_cast<double>(b) * degrees_per_bin, levels_.luminance(luminance),
-                                  screen_);
+                eyes.emplace_back(csf_, static_cast<double>(b) * degrees_per_bin, levels_.luminance(luminance), screen_,
+                                  bands_, model_);
         return eyes[bin];
     }
 
@@ -329,6 +345,8 @@ private:
     const Levels& levels_;
     const Screen& screen_;
     const CsfTable& csf_;
+    const FoldModel& model_;
+    const Bands bands_;
     std::size_t bins_, most_patterns_;
     int coarseness_ = 1;
     bool has_too_few_ = false;
@@ -399,10 +417,10 @@ void cover(SwitchDistances& switch_distances, Shown& a, const Shown& b) {
 
 // What nodes show, no less than their children: patches, and strips where they are outlines. False where the rows do
 // not suffice.
-bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors, const SceneLuminance& scene,
+bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors, const FoldTestOptions& options,
                 const Levels& levels, const CsfTable& csf, SwitchDistances& switch_distances,
                 std::vector<Shown>& patches, std::vector<Shown>& strips) {
-    const double darkest = levels.in_cdm2(scene.darkest), brightest = levels.in_cdm2(scene.brightest);
+    const double darkest = levels.in_cdm2(options.scene.darkest), brightest = levels.in_cdm2(options.scene.brightest);
     const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
     const vdtree::LuminanceRange all = tree.ring_luminance()[vdtree::VertexTree::root()];
     const int whole = levels.luminance_level(levels.in_cdm2(static_cast<double>(all.lo + all.hi) / 2));
@@ -422,7 +440,8 @@ bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors
         patch.pattern.luminance = levels.luminance_level(middle);
         patch.pattern.largest = levels.contrast_level(change(errors[node].luminance, errors[node].distance), middle);
         const int typical = levels.contrast_level(
-            change(errors[node].wide_luminance, amplitude_of_shift_mean * errors[node].mean_distance), middle);
+            change(errors[node].wide_luminance, options.model.amplitude_of_shift_mean * errors[node].mean_distance),
+            middle);
         if (patch.pattern.largest != no_contrast)
             patch.pattern.typical =
                 std::clamp(typical, std::max(patch.pattern.largest - steepest_spike, 0), patch.pattern.largest);
@@ -498,9 +517,10 @@ Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const Fold
     parts.lengths.resize(nodes);
     parts.silhouette_lengths.resize(nodes);
     const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
-    SwitchDistances switch_distances(levels, screen, csf, parts.eccentricity_bins, measured.stages.size());
+    SwitchDistances switch_distances(levels, screen, csf, options.model, parts.eccentricity_bins,
+                                     measured.stages.size());
     std::vector<Shown> patches, strips;
-    while (!find_shown(tree, errors, options.scene, levels, csf, switch_distances, patches, strips))
+    while (!find_shown(tree, errors, options, levels, csf, switch_distances, patches, strips))
         switch_distances.coarsen();
     const std::vector<float> distances =
         stage_distances(tree, measured.stages, screen, options, parts.eccentricity_bins);
@@ -524,12 +544,24 @@ Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const Fold
     return DistanceCriterion::create(tree, std::move(parts));
 }
 
+Result<void> validate(const FoldModel& m) {
+    for (const double factor :
+         {m.peak_of_shift, m.moved_by_neighbours, m.contact_reach, m.least_sine, m.sampled_shift_px,
+          m.amplitude_of_point_mean, m.amplitude_of_shift_mean, m.longest_ring, m.between_directions})
+        if (!(factor >= 0 && std::isfinite(factor)))
+            return Error{ErrorCode::invalid_argument, "fold test: the model's factors must be finite, and 0 or more"};
+    if (m.most_side_by_side < 1 || m.most_side_by_side > FoldModel::largest_side_by_side)
+        return Error{ErrorCode::invalid_argument, "fold test: the model's most_side_by_side must be from 1 to 64"};
+    return {};
+}
+
 Result<DistanceCriterion> error_distances(const vdtree::VertexTree& tree, const vdtree::View& view,
                                           const FoldTestOptions& options) {
     if (const auto valid = check_arguments(view, options); !valid) return valid.error();
+    if (const auto valid = validate(options.model); !valid) return valid.error();
     const auto sound = vdtree::SoundTree::of(tree);
     if (!sound) return sound.error();
-    const auto errors = fold_errors_of(*sound);
+    const auto errors = fold_errors_of(*sound, options.model);
     if (!errors) return errors.error();
     return criterion_of(*sound, *errors, view, options);
 }

@@ -6,7 +6,7 @@
 #include <limits>
 #include <string>
 
-#include "fold/fold_model.h"
+#include "fold/pooling.h"
 #include "measure/measurement.h"
 #include "measure/pyramid.h"
 
@@ -20,19 +20,20 @@ using Amplitudes = decltype(FoldRecord::amplitudes);
 
 // What waves see of a patch, `waves` of theirs wide, of one grating's amplitude: of patches side by side, and of its
 // parts half as wide, four times the amplitude.
-float share_in_wave(float waves) {
-    return waves >= 1 ? std::exp2(2 * std::floor(std::log2(waves))) : share_of_patches(waves);
+float share_in_wave(float waves, int most_side_by_side) {
+    return waves >= 1 ? std::exp2(2 * std::floor(std::log2(waves))) : share_of_patches(waves, most_side_by_side);
 }
 
 struct BandShares {
     Amplitudes of_wave; // by picture and band
 
-    BandShares() {
+    explicit BandShares(int most_side_by_side) {
         for (std::size_t size = 0; size < measurement::picture_sizes.size(); ++size)
             for (std::size_t band = 0; band < measurement::picture_bands; ++band)
                 of_wave[size][band] =
                     share_in_wave(measurement::picture_side * static_cast<float>(nominal_frequency(band)) /
-                                  measurement::picture_sizes[size]);
+                                      measurement::picture_sizes[size],
+                                  most_side_by_side);
     }
 };
 
@@ -54,8 +55,15 @@ Error refused(const std::string& what) {
 } // namespace
 
 std::vector<FoldError> nested_errors(const SoundTree& tree, std::span<const FoldRecord> records,
-                                     std::span<const FoldFacing> facing) {
-    static const BandShares shares;
+                                     std::span<const FoldFacing> facing, const FoldModel& model) {
+    const BandShares shares(model.most_side_by_side);
+    // Errors are floats, and so are the factors of them.
+    const auto peak_of_shift = static_cast<float>(model.peak_of_shift),
+               moved_by_neighbours = static_cast<float>(model.moved_by_neighbours),
+               amplitude_of_point_mean = static_cast<float>(model.amplitude_of_point_mean),
+               longest_ring = static_cast<float>(model.longest_ring),
+               contact_reach = static_cast<float>(model.contact_reach),
+               least_sine = static_cast<float>(model.least_sine);
     std::vector<FoldError> errors(records.size());
     for (NodeId node = tree.interior_count(); node-- > 0;) { // children before parents
         const FoldRecord& record = records[node];
@@ -92,7 +100,7 @@ std::vector<FoldError> nested_errors(const SoundTree& tree, std::span<const Fold
     return errors;
 }
 
-Result<FoldErrors> fold_errors_of(const SoundTree& tree) {
+Result<FoldErrors> fold_errors_of(const SoundTree& tree, const FoldModel& model) {
     const auto records = tree.attribute<FoldRecord>(record_name);
     const auto facing = tree.attribute<FoldFacing>(facing_name);
     const auto stage_of = tree.attribute<std::uint8_t>(stage_of_name);
@@ -116,7 +124,7 @@ Result<FoldErrors> fold_errors_of(const SoundTree& tree) {
             return refused("an error of node " + std::to_string(node) + " is negative or not finite.");
         if (!has_stage) return refused("node " + std::to_string(node) + " folds in a stage that is not there.");
     }
-    all.of_nodes = nested_errors(tree, records, facing);
+    all.of_nodes = nested_errors(tree, records, facing, model);
     for (NodeId node = tree.interior_count(); node-- > 0;) {
         FoldError& error = all.of_nodes[node];
         error.stage = std::max(error.stage, stage_of[node]);

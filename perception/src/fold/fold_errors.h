@@ -1,10 +1,11 @@
-// What folding a node gets wrong, by the model (fold_model.h), of what was measured of it (measure/fold_record.h).
+// What folding a node gets wrong, by the model (<perception/fold_model.h>), of what was measured of it (measure/fold_record.h).
 #pragma once
 
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include <perception/fold_model.h>
 #include <vdtree/vertex_tree.h>
 
 #include "measure/fold_record.h"
@@ -31,7 +32,7 @@ struct FoldError {
 
 // The model's errors of measured folds, all of them numbers, without stages. Cost: one pass over the nodes.
 std::vector<FoldError> nested_errors(const vdtree::SoundTree& tree, std::span<const FoldRecord> records,
-                                     std::span<const FoldFacing> facing);
+                                     std::span<const FoldFacing> facing, const FoldModel& model = {});
 
 struct FoldErrors {
     std::vector<FoldError> of_nodes;
@@ -40,6 +41,6 @@ struct FoldErrors {
 
 // Of a tree from measure_folds(). Fails where it is not, where it was measured with other settings, and where a value
 // is none that is measured: attributes of files are looked at here, by nobody before.
-Result<FoldErrors> fold_errors_of(const vdtree::SoundTree& tree);
+Result<FoldErrors> fold_errors_of(const vdtree::SoundTree& tree, const FoldModel& model = {});
 
 } // namespace unseen::perception

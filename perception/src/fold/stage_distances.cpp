@@ -9,7 +9,7 @@
 #include <limits>
 #include <numbers>
 
-#include "fold/fold_model.h"
+#include "fold/pooling.h"
 #include "judge/masking.h"
 
 namespace unseen::perception {
@@ -57,8 +57,7 @@ public:
                          double contrast_factor) const {
         for (std::size_t i = 0; i < angle_count; ++i)
             for (std::size_t k = first_background; k <= last_background; ++k)
-                if (!(visibility(stage.contrast[k], bands_[i]) * contrast_factor * between_directions <= 1))
-                    return i > 0 ? angle(i - 1) : 0;
+                if (!(visibility(stage.contrast[k], bands_[i]) * contrast_factor <= 1)) return i > 0 ? angle(i - 1) : 0;
         return angle(angle_count - 1);
     }
 
@@ -107,7 +106,8 @@ std::vector<float> stage_distances(const vdtree::VertexTree& tree, std::span<con
     const double black = black_level(options.display).value(), span = to_luminance(options.display, 1).value() - black;
     // On darker displays contrasts are larger than those of the pictures.
     const double least = std::max(black / span, 1.0 / 4096);
-    const double contrast_factor = std::max(1.0, static_cast<double>(FoldStage::black) / least);
+    const double contrast_factor =
+        std::max(1.0, static_cast<double>(FoldStage::black) / least) * options.model.between_directions;
     const CsfTable& csf = options.csf ? *options.csf : CsfTable::standard();
     const double diameter = 2 * static_cast<double>(tree.bounding_sphere().radius);
 

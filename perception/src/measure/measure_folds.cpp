@@ -570,8 +570,8 @@ Result<VertexTree> measure_folds(const VertexTree& tree, int threads) {
     arena.execute([&] {
         Measurer(*measured, records, facing).run();
         // How much light many folds shift depends on the order in which they are folded: that of what the model makes
-        // of each alone.
-        errors = nested_errors(*measured, records, facing);
+        // of each alone, whatever the factors of a criterion will be.
+        errors = nested_errors(*measured, records, facing, FoldModel());
         find_luminance_bias(*measured, errors);
         stages = find_stages(*measured, errors);
     });

@@ -1,5 +1,5 @@
 // How folds are measured: what decides how fine and how dear a measurement is. The numbers are kept with it, and a
-// criterion refuses those of a measurement with others. Factors that a criterion applies stand in fold_model.h.
+// criterion refuses those of a measurement with others. Factors that a criterion applies stand in perception/fold_model.h.
 //
 // Where a comment does not say otherwise, a number was chosen by trial: larger ones cost more and changed little on the
 // meshes of the tests. None was fitted, and there is no script that finds them again.

@@ -1,0 +1,238 @@
+#include "fit_bench.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include <hard_mesh.h>
+#include <perception/criterion.h>
+#include <render/context.h>
+
+#include "judged_model.h"
+#include "progress_bar.h"
+#include "terminal.h"
+
+namespace unseen::app {
+namespace {
+
+using perception::FoldModel;
+using vdtree::NodeId;
+
+constexpr std::uint64_t seed = 30; // of the views
+
+struct Factor {
+    const char* name;
+    void (*set)(FoldModel& model, double value);
+    std::vector<double> values; // rising, the model's own among them
+};
+
+const std::vector<Factor>& factors() {
+    static const std::vector<Factor> all = {
+        {"peak_of_shift", [](FoldModel& m, double v) { m.peak_of_shift = v; }, {0.3, 0.6, 0.9, 1.2, 1.8}},
+        {"moved_by_neighbours", [](FoldModel& m, double v) { m.moved_by_neighbours = v; }, {0.35, 0.7, 1, 1.4, 2}},
+        {"contact_reach", [](FoldModel& m, double v) { m.contact_reach = v; }, {0, 1.5, 3, 6, 12}},
+        {"least_sine", [](FoldModel& m, double v) { m.least_sine = v; }, {0.05, 0.1, 0.2, 0.4, 1}},
+        {"sampled_shift_px", [](FoldModel& m, double v) { m.sampled_shift_px = v; }, {0, 0.005, 0.011, 0.016, 0.022}},
+        {"amplitude_of_point_mean",
+         [](FoldModel& m, double v) { m.amplitude_of_point_mean = v; },
+         {0, 0.5, 1, 1.9, 2.9}},
+        {"amplitude_of_shift_mean",
+         [](FoldModel& m, double v) { m.amplitude_of_shift_mean = v; },
+         {0, 0.4, 0.8, 1.6, 2.4}},
+        {"longest_ring", [](FoldModel& m, double v) { m.longest_ring = v; }, {1, 2, 4, 8, 1000}},
+        {"most_side_by_side",
+         [](FoldModel& m, double v) { m.most_side_by_side = static_cast<int>(v); },
+         {1, 2, 4, 8, 16}},
+        {"between_directions", [](FoldModel& m, double v) { m.between_directions = v; }, {0.6, 0.8, 1, 1.15, 1.5}},
+    };
+    return all;
+}
+
+// A model with one factor of another value, and what came of it.
+struct Setting {
+    std::string factor;
+    double value = 0;
+    FoldModel model;
+    std::uint64_t triangles = 0, visible_pixels = 0;
+    double largest[2] = {}; // V, looked at and aside
+    std::string worst[2];   // their meshes
+};
+
+std::vector<Setting> settings_of(const std::string& factor) {
+    std::vector<Setting> settings;
+    for (const Factor& one : factors()) {
+        if (!factor.empty() && factor != one.name) continue;
+        for (const double value : one.values) {
+            Setting& setting = settings.emplace_back();
+            setting.factor = one.name;
+            setting.value = value;
+            one.set(setting.model, value);
+        }
+    }
+    return settings;
+}
+
+// What one cut showed; settings often come to the same.
+struct Shown {
+    std::vector<NodeId> indices;
+    double largest = 0;
+    std::uint64_t visible_pixels = 0;
+};
+
+class Fit {
+public:
+    explicit Fit(const FitBenchOptions& options)
+        : options_(options), settings_(settings_of(options.factor)), random_(seed), bar_("fitting") {}
+
+    Result<FitBenchResult> run() {
+        const auto context = render::Context::headless();
+        if (!context) return context.error();
+        std::vector<HardMesh> meshes = tuning_meshes(options_.quick ? 1'500 : 8'000);
+        if (options_.quick) meshes.resize(2);
+        for (std::size_t i = 0; i < meshes.size(); ++i) {
+            bar_(static_cast<double>(i) / static_cast<double>(meshes.size()), meshes[i].name.c_str());
+            auto tree = build_hard_tree(meshes[i]);
+            if (!tree) return tree.error();
+            auto model = JudgedModel::create(*context, meshes[i].name, std::move(*tree), options_.quick ? 128 : 256);
+            if (!model) return model.error();
+            if (auto ok = look_from_all_around(*model); !ok) return ok.error();
+            result_.table.title += meshes[i].name + " (" + grouped(model->triangles()) + "), ";
+        }
+        return finished();
+    }
+
+private:
+    // From near to far, from random directions; looked at and aside, with criteria that do for all directions.
+    Result<void> look_from_all_around(JudgedModel& model) {
+        std::vector<ViewOptions> views;
+        for (const double fill : {0.9, 0.3, 0.08}) { // of the window's height
+            const double z = uniform(-1, 1), turn = uniform(0, 2 * std::numbers::pi), across = std::sqrt(1 - z * z);
+            ViewOptions& view = views.emplace_back();
+            view.direction = {across * std::cos(turn), across * std::sin(turn), z};
+            view.fill = fill * uniform(0.8, 1.2);
+        }
+        if (options_.quick) views.resize(1);
+        const auto session = model.session(FoldTest::error);
+        if (!session) return session.error();
+        for (const bool is_aside : {false, true}) {
+            if (auto looked = model.look(views.front()); !looked) return looked;
+            const auto test = test_options(**session, model.view(), is_aside);
+            if (!test) return test.error();
+            const auto criteria = criteria_of((*session)->tree(), model.view(), *test);
+            if (!criteria) return criteria.error();
+            for (const ViewOptions& view : views) {
+                if (auto looked = model.look(view); !looked) return looked;
+                if (auto judged = judge_all(model, **session, *criteria, test->gaze_px); !judged) return judged;
+            }
+        }
+        return {};
+    }
+
+    static Result<perception::FoldTestOptions> test_options(session::Session& session, const vdtree::View& view,
+                                                            bool is_aside) {
+        const auto scene = session.luminance(view);
+        if (!scene) return scene.error();
+        perception::FoldTestOptions test;
+        test.display = session.observer().display;
+        test.scene = *scene;
+        if (is_aside) test.gaze_px = session::gaze_aside(test.display, view, session::usual_degrees_aside);
+        return test;
+    }
+
+    Result<std::vector<vdtree::DistanceCriterion>> criteria_of(const vdtree::VertexTree& tree, const vdtree::View& view,
+                                                               perception::FoldTestOptions test) const {
+        std::vector<vdtree::DistanceCriterion> criteria;
+        for (const Setting& setting : settings_) {
+            test.model = setting.model;
+            auto criterion = perception::error_distances(tree, view, test);
+            if (!criterion) return criterion.error();
+            criteria.push_back(std::move(*criterion));
+        }
+        return criteria;
+    }
+
+    Result<void> judge_all(JudgedModel& model, session::Session& session,
+                           const std::vector<vdtree::DistanceCriterion>& criteria,
+                           const std::optional<glm::dvec2>& gaze_px) {
+        session.set_gaze(gaze_px ? std::optional(session::Gaze{*gaze_px}) : std::nullopt);
+        const auto recipe =
+            session.recipe(model.view(), {.fold_test = FoldTest::error,
+                                          .purpose = session::Purpose::picture}); // but for its criterion
+        if (!recipe) return recipe.error();
+        std::vector<Shown> known;
+        for (std::size_t i = 0; i < settings_.size(); ++i) {
+            vdtree::Cut cut(session.tree());
+            if (const auto made = cut.follow(criteria[i], recipe->viewpoint, recipe->options); !made)
+                return made.error();
+            const auto shown = show(model, cut, gaze_px, known);
+            if (!shown) return shown.error();
+            Setting& setting = settings_[i];
+            setting.triangles += cut.triangle_count();
+            setting.visible_pixels += (*shown)->visible_pixels;
+            if (double& largest = setting.largest[gaze_px.has_value()]; !((*shown)->largest <= largest)) {
+                largest = (*shown)->largest;
+                setting.worst[gaze_px.has_value()] = model.name();
+            }
+        }
+        return {};
+    }
+
+    static Result<const Shown*> show(JudgedModel& model, const vdtree::Cut& cut,
+                                     const std::optional<glm::dvec2>& gaze_px, std::vector<Shown>& known) {
+        const std::span<const NodeId> indices = cut.indices();
+        for (const Shown& one : known)
+            if (std::ranges::equal(one.indices, indices)) return &one;
+        const auto judged = model.judge(cut, gaze_px);
+        if (!judged) return judged.error();
+        known.push_back({{indices.begin(), indices.end()}, judged->max_ratio, judged->visible_pixels});
+        return &known.back();
+    }
+
+    FitBenchResult finished() {
+        result_.table.title += "each from " + std::string(options_.quick ? "one place" : "three places") +
+                               ", looked at and aside. Value of the factor: triangles kept, over those of the model's "
+                               "own value (*); largest V; visible pixels.";
+        result_.table.rows = {{"factor", "", "", "", "", ""}};
+        double own = 0;
+        for (const Setting& s : settings_)
+            if (s.model == FoldModel()) own = static_cast<double>(s.triangles);
+        for (const Setting& s : settings_) {
+            const bool is_own = s.model == FoldModel();
+            const double ratio = static_cast<double>(s.triangles) / own;
+            if (result_.table.rows.back().front() != s.factor) result_.table.rows.push_back({s.factor});
+            result_.table.rows.back().push_back(
+                rounded(s.value, 3) + (is_own ? "*: " : ": ") + with_decimals(ratio, 3) + "; " +
+                rounded(std::max(s.largest[0], s.largest[1]), 3) + "; " + grouped(s.visible_pixels));
+            Json row = {{"factor", s.factor},       {"value", s.value}, {"is_own", is_own},
+                        {"triangles", s.triangles}, {"of_own", ratio},  {"visible_pixels", s.visible_pixels}};
+            for (const bool is_aside : {false, true})
+                row[is_aside ? "aside" : "looked_at"] = {{"largest_v", number_or_null(s.largest[is_aside])},
+                                                         {"mesh", s.worst[is_aside]}};
+            result_.rows.push_back(std::move(row));
+        }
+        return std::move(result_);
+    }
+
+    double uniform(double low, double high) {
+        return low + (high - low) * static_cast<double>(random_() >> 11) * 0x1p-53;
+    }
+
+    const FitBenchOptions& options_;
+    std::vector<Setting> settings_;
+    std::mt19937_64 random_;
+    ProgressBar bar_;
+    FitBenchResult result_;
+};
+
+} // namespace
+
+std::vector<std::string> fit_factors() {
+    std::vector<std::string> names;
+    for (const Factor& factor : factors()) names.emplace_back(factor.name);
+    return names;
+}
+
+Result<FitBenchResult> bench_fit(const FitBenchOptions& options) { return Fit(options).run(); }
+
+} // namespace unseen::app
