@@ -20,8 +20,8 @@
 namespace unseen::app {
 namespace {
 
-constexpr double fill = 0.9;      // of the window's height
-constexpr double background = 20; // cd/m2
+constexpr double model_fill = 0.9; // of the window's height
+constexpr double background = 20;  // cd/m2
 constexpr int contour_reach_px = 4;
 
 // What one fold test makes of the budget.
@@ -41,8 +41,8 @@ public:
         window.fov_y_degrees = physical_field(display_, window.height).value();
         window.up = options.up;
         const vdtree::Sphere sphere = tree.bounding_sphere();
-        view_ = vdtree::frame_sphere(tree.origin() + glm::dvec3(sphere.centre), sphere.radius, options.direction, fill,
-                                     window);
+        view_ = vdtree::frame_sphere(tree.origin() + glm::dvec3(sphere.centre), sphere.radius, options.direction,
+                                     model_fill, window);
         const auto relative = static_cast<float>(to_relative(display_, perception::Luminance(background)));
         draw_options_.background = relative;
         options_.display = display_;
