@@ -22,7 +22,7 @@ std::string verdict(const BenchRow& row) {
 
 void print_markdown(const std::vector<std::vector<std::string>>& rows) {
     for (std::size_t r = 0; r < rows.size(); ++r) {
-        for (const std::string& cell : rows[r]) std::printf("| %s ", cell.c_str());
+        for (const std::string& cell : rows[r]) std::printf("| %s ", printable(cell).c_str());
         std::printf("|\n");
         if (r > 0) continue;
         for (std::size_t column = 0; column < rows[r].size(); ++column) std::printf(column == 0 ? "|---" : "|---:");
@@ -43,12 +43,11 @@ BenchTable table_of(const std::string& title, const std::vector<BenchRow>& rows)
 }
 
 void print(const BenchTable& table, TableStyle style) {
-    if (!table.title.empty()) std::printf("%s\n\n", table.title.c_str());
+    if (!table.title.empty()) print_line(table.title), print_line("");
     if (style == TableStyle::aligned) print_table(table.rows);
     else print_markdown(table.rows);
     if (!table.notes.empty()) std::printf("\n");
-    for (const std::string& note : table.notes)
-        std::printf(style == TableStyle::markdown ? "- %s\n" : "%s\n", note.c_str());
+    for (const std::string& note : table.notes) print_line((style == TableStyle::markdown ? "- " : "") + note);
 }
 
 Json to_json(const std::vector<BenchRow>& rows) {

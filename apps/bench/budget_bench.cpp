@@ -215,9 +215,10 @@ Result<BudgetBenchResult> bench_budget(const BudgetBenchOptions& options) {
     const auto perceptual =
         perception::luebke_hallen_distances(*tree, comparison.view(), comparison.fold_test_options());
     if (!perceptual) return perceptual.error();
-    const auto left = comparison.spend("extent", *extent, options.triangles);
+    const vdtree::Index triangles = options.triangles.of(tree->triangle_count());
+    const auto left = comparison.spend("extent", *extent, triangles);
     if (!left) return left.error();
-    const auto right = comparison.spend("luebke-hallen", *perceptual, options.triangles);
+    const auto right = comparison.spend("luebke-hallen", *perceptual, triangles);
     if (!right) return right.error();
     if (!options.picture.empty())
         if (auto written = write_picture(options.picture, *left, *right); !written) return written.error();

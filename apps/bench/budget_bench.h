@@ -10,13 +10,14 @@
 #include <vdtree/vertex_tree.h>
 
 #include "bench_table.h"
+#include "options.h"
 
 namespace unseen::app {
 
 struct BudgetBenchOptions {
     std::string mesh;    // or a tree
     std::string picture; // of the two wireframes, side by side; empty: none
-    vdtree::Index triangles = 18'000;
+    TriangleCount triangles = {.triangles = 18'000};
     glm::dvec3 direction = {1, 0, 0}; // from the model towards the eye; not 0
     glm::dvec3 up = {0, 1, 0};        // in the picture; not 0
 };

@@ -47,7 +47,8 @@ public:
         if (!report) return report.error();
         const MachineLoad load = machine_load();
         if (load.is_high()) print_note(load.advice());
-        return BenchRun(std::move(*report), load, wanted.markdown ? TableStyle::markdown : TableStyle::aligned);
+        return BenchRun(std::move(*report), std::move(all), load,
+                        wanted.markdown ? TableStyle::markdown : TableStyle::aligned);
     }
 
     // Writes the report, and the tables for people, where stdout is theirs.
@@ -60,15 +61,18 @@ public:
             if (i > 0) std::printf("\n");
             print(tables[i], style_);
         }
-        if (load_.is_high() && style_ == TableStyle::aligned) std::printf("\nNote: %s\n", load_.advice().c_str());
+        if (style_ == TableStyle::markdown) return exit_done;
+        if (load_.is_high()) std::printf("\nNote: %s\n", load_.advice().c_str());
+        print_written(outputs_);
         return exit_done;
     }
 
 private:
-    BenchRun(JsonReport report, MachineLoad load, TableStyle style)
-        : report_(std::move(report)), load_(load), style_(style) {}
+    BenchRun(JsonReport report, std::vector<std::string> outputs, MachineLoad load, TableStyle style)
+        : report_(std::move(report)), outputs_(std::move(outputs)), load_(load), style_(style) {}
 
     JsonReport report_;
+    std::vector<std::string> outputs_;
     MachineLoad load_;
     TableStyle style_;
 };

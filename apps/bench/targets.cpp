@@ -1,10 +1,10 @@
 #include "targets.h"
 
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 
 #include <nlohmann/json.hpp>
+
+#include <vdtree/internal/text_file.h>
 
 #include "embedded.h"
 
@@ -59,10 +59,9 @@ const Targets& Targets::built_in() {
 
 Result<Targets> Targets::read(const std::string& file) {
     if (file.empty()) return built_in();
-    std::ifstream in(file, std::ios::binary);
-    if (!in) return Error{ErrorCode::io_failure, "Cannot read '" + file + "': check the name."};
-    const std::string text((std::istreambuf_iterator<char>(in)), {});
-    auto targets = parse(text, file);
+    const auto text = read_text_file(file);
+    if (!text) return text.error();
+    auto targets = parse(*text, file);
     if (!targets) return targets;
     for (const auto& [key, target] : targets->of_)
         if (!built_in().of_.contains(key))

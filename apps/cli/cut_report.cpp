@@ -1,7 +1,6 @@
 #include "cut_report.h"
 
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 #include "option_names.h"
@@ -24,20 +23,45 @@ Json to_json(const session::Report& s, double draw_ms) {
             {"effects", to_json(s.effects)}};
 }
 
-void print(const session::Report& s, double draw_ms) {
-    const double share = 100.0 * s.stats.triangles / static_cast<double>(s.source_triangles);
-    std::vector<std::vector<std::string>> rows = {
-        {"triangles",
-         grouped(s.stats.triangles) + " of " + grouped(s.source_triangles) + " (" + rounded(share, 3) + "%)"},
-        {"dropped", grouped(s.dropped)},
-        {"nodes tested", grouped(s.stats.node_tests)},
-        {"adapted in", rounded(s.adapt_ms, 3) + " ms"},
-        {"extracted in", rounded(s.extract_ms, 3) + " ms"}};
-    if (!std::isnan(draw_ms)) rows.push_back({"drawn in", rounded(draw_ms, 3) + " ms"});
-    const std::string metres = std::isfinite(s.imperceptible_from_m) ? " m" : "";
-    rows.push_back({"imperceptible from", rounded(s.imperceptible_from_m, 3) + metres});
+std::string kept_text(std::uint64_t triangles, std::uint64_t source_triangles) {
+    const double percent = 100.0 * static_cast<double>(triangles) / static_cast<double>(source_triangles);
+    return "kept " + grouped(triangles) + " of " + grouped(source_triangles) + " triangles (" +
+           rounded(percent, percent > 99 ? 4 : 2) + "%)";
+}
+
+std::string visibility_text(const session::Report& s, const session::Observer& observer, const DisplayOptions& display,
+                            const std::string& where) {
+    const double from_m = s.imperceptible_from_m;
+    const std::string test = session::name_of(s.fold_tests.front());
+    if (s.stats.triangles == s.source_triangles && s.stats.max_fold_cost == 0) return "nothing is folded";
+    if (std::isnan(from_m))
+        return "whether anybody sees a difference is not known: the fold test " + test + " counts pixels";
+
+    constexpr double rounding = 1 + 1e-6;
+    std::string text = "a difference can be seen from any distance";
+    if (from_m <= observer.display.distance.value() * rounding)
+        text = "nobody sees a difference, looked at from " + rounded(from_m, 3) + " m or more";
+    else if (std::isfinite(from_m))
+        text = "a difference can be seen; looked at from " + rounded(from_m, 3) + " m or more, nobody sees it";
+
+    const bool is_default_display =
+        display.file.empty() && !display.pixels_per_degree && !display.peak_cdm2 && !display.black_cdm2;
+    text += ": by the " +
+            (display.csf.empty() ? "default observer (castleCSF, a typical person)" : "observer " + display.csf) +
+            " and judge (fold test " + test + "), " + where + ", on " +
+            (is_default_display ? "the default display" : "this display") + ", ";
+    if (!observer.gaze) return text + "wherever the gaze";
+    return text + "with the gaze at pixel " + rounded(observer.gaze->px.x, 4) + " " + rounded(observer.gaze->px.y, 4);
+}
+
+void print_details(const session::Report& s, double draw_ms) {
+    std::vector<std::vector<std::string>> rows = {{"dropped triangles", grouped(s.dropped)},
+                                                  {"nodes tested", grouped(s.stats.node_tests)},
+                                                  {"adapted in", duration(s.adapt_ms)},
+                                                  {"extracted in", duration(s.extract_ms)}};
+    if (!std::isnan(draw_ms)) rows.push_back({"drawn in", duration(draw_ms)});
     print_table(rows);
-    std::printf("effects\n");
+    print_line("effects");
     print(s.effects);
 }
 
@@ -50,8 +74,7 @@ Json to_json(std::span<const session::Effect> effects) {
 
 void print(std::span<const session::Effect> effects) {
     for (const session::Effect& effect : effects)
-        std::printf("  %-3s  %s: %s\n", effect.on ? "on" : "off", effect.name.c_str(),
-                    with_option_names(effect.why).c_str());
+        print_line(std::string(effect.on ? "  on   " : "  off  ") + effect.name + ": " + with_option_names(effect.why));
 }
 
 } // namespace unseen::app

@@ -1,17 +1,27 @@
-// What a simplification came to: JSON for programs, a table for people.
+// What a simplification came to: JSON for programs, sentences for people.
 #pragma once
 
 #include <span>
+#include <string>
 
-#include <session/simplification.h>
+#include <session/session.h>
 
+#include "options.h"
 #include "report.h"
 
 namespace unseen::app {
 
 // The keys that simplify and render report; draw_ms is NaN where nothing was drawn.
 Json to_json(const session::Report& report, double draw_ms);
-void print(const session::Report& report, double draw_ms);
+
+// "kept 36,458 of 69,666 triangles (52%)".
+std::string kept_text(std::uint64_t triangles, std::uint64_t source_triangles);
+// Who sees a difference, and from where: with the observer, the fold test that judges, and the conditions. `where`:
+// "in this view".
+std::string visibility_text(const session::Report& report, const session::Observer& observer,
+                            const DisplayOptions& display, const std::string& where);
+// What stands behind it: counts, times and effects.
+void print_details(const session::Report& report, double draw_ms);
 
 Json to_json(std::span<const session::Effect> effects);
 void print(std::span<const session::Effect> effects);

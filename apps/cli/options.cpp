@@ -70,8 +70,16 @@ void check(const ViewOptions& view) {
 
 void refuse(const std::string& message) { throw CLI::ValidationError(message, CLI::ExitCodes::ValidationError); }
 
-CLI::Validator finite() {
-    return number_that("a finite number", [](double) { return true; });
+// The parser fills an option with the words that follow, even with the next option: the count says what went wrong.
+CLI::Validator finite_numbers(int count) {
+    constexpr std::array words = {"no", "a", "two", "three"};
+    const std::string wanted =
+        std::string(words.at(static_cast<std::size_t>(count))) + (count > 1 ? " finite numbers" : " finite number");
+    return CLI::Validator(
+        [wanted](std::string& text) {
+            return finite_from(text) ? std::string() : "needs " + wanted + ", and '" + text + "' is none";
+        },
+        "");
 }
 CLI::Validator positive() {
     return number_that("a finite number above 0", [](double v) { return v > 0; });
@@ -110,7 +118,7 @@ CLI::Option* add_vector(CLI::App& verb, const std::string& name, std::optional<g
         .add_option_function<std::array<double, 3>>(
             name, [&value](const std::array<double, 3>& v) { value = glm::dvec3(v[0], v[1], v[2]); }, text)
         ->type_name("X Y Z")
-        ->check(finite());
+        ->check(finite_numbers(3));
 }
 
 CLI::Validator one_of(std::vector<std::string> names) {
@@ -161,7 +169,7 @@ void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px) {
             "Where the viewer looks, in pixels from the top left; may lie outside of the window "
             "(default: nowhere known, so everything is seen as sharply as at the fovea)")
         ->type_name("X Y")
-        ->check(finite());
+        ->check(finite_numbers(2));
 }
 
 void add_moving_gaze_options(CLI::App& verb, GazeOptions& o, bool allows_mouse) {
@@ -224,20 +232,44 @@ void add_json_option(CLI::App& verb, std::string& file) {
     verb.add_option("--json", file, "Report as JSON, to a file or to stdout (-)")->type_name("FILE|-");
 }
 
-CLI::Option* add_triangles_option(CLI::App& verb, std::uint32_t& triangles, const std::string& text) {
+void add_verbose_option(CLI::App& verb, bool& is_verbose) {
+    verb.add_flag("--verbose", is_verbose, "Say more: times, counts, and which effects took part and why");
+}
+
+std::uint32_t TriangleCount::of(std::uint64_t all) const {
+    constexpr double most = std::numeric_limits<std::uint32_t>::max();
+    if (triangles > 0) return triangles;
+    return static_cast<std::uint32_t>(std::clamp(std::round(share * static_cast<double>(all)), 1.0, most));
+}
+
+session::Request WhatOptions::request_for(std::uint64_t source_triangles) const {
+    session::Request complete = request;
+    if (budget.is_given()) complete.goal.triangles = budget.of(source_triangles);
+    return complete;
+}
+
+CLI::Option* add_triangles_option(CLI::App& verb, TriangleCount& count, const std::string& text) {
     // The parser's own conversion of unsigned numbers takes "-1" and wraps it.
     return verb
         .add_option_function<std::string>(
             "--triangles",
-            [&triangles](const std::string& digits) {
-                const auto value = number_from<std::uint64_t>(digits);
+            [&count](const std::string& given) {
+                if (given.ends_with('%')) {
+                    const auto percent = finite_from(std::string_view(given).substr(0, given.size() - 1));
+                    if (!percent || !(*percent > 0))
+                        refuse("--triangles: a share must be above 0%, such as 50%, not '" + given + "'");
+                    count = {.share = *percent / 100};
+                    return;
+                }
+                const auto value = number_from<std::uint64_t>(given);
                 if (!value || *value == 0)
-                    refuse("--triangles: must be a whole number of 1 or more, not '" + digits + "'");
-                triangles = static_cast<std::uint32_t>(
-                    std::min<std::uint64_t>(*value, std::numeric_limits<std::uint32_t>::max()));
+                    refuse("--triangles: must be a whole number of 1 or more, or a share such as 50%, not '" + given +
+                           "'");
+                count = {.triangles = static_cast<std::uint32_t>(
+                             std::min<std::uint64_t>(*value, std::numeric_limits<std::uint32_t>::max()))};
             },
             text)
-        ->type_name("N");
+        ->type_name("N|P%");
 }
 
 void add_view_options(CLI::App& verb, ViewOptions& o) {
@@ -296,9 +328,15 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
     CLI::Option* imperceptible =
         group.add_flag_function("--imperceptible", counted, "Fold what nobody can see on this display");
     CLI::Option* triangles =
-        add_triangles_option(group, goal.triangles, "At most N triangles, as inconspicuous as can be");
-    CLI::Option* fill =
-        group.add_flag("--fill-budget", goal.fill, "With --triangles: use all of them, even where it cannot be seen");
+        add_triangles_option(group, o.budget, "At most N triangles, or P% of them, as inconspicuous as can be");
+    CLI::Option* ratio =
+        group
+            .add_option_function<double>(
+                "--ratio", [&o](const double& share) { o.budget = {.share = share}; }, "The same as a share, 0..1")
+            ->type_name("SHARE")
+            ->check(number_that("a share above 0 and up to 1, such as 0.5", [](double v) { return v > 0 && v <= 1; }));
+    CLI::Option* fill = group.add_flag("--fill-budget", goal.fill,
+                                       "With --triangles or --ratio: use all of them, even where it cannot be seen");
     add_number(group, "--milliseconds", o.request.milliseconds, not_negative(), "T",
                "The best cut that T milliseconds are enough for");
     CLI::Option* pixels =
@@ -318,15 +356,18 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
     add_gaze_option(group, o.gaze_px);
     group.callback([=, &o] {
         Goal::Kind& kind = o.request.goal.kind;
-        const std::size_t given = full->count() + imperceptible->count() + triangles->count() + pixels->count();
+        const std::size_t given =
+            full->count() + imperceptible->count() + triangles->count() + ratio->count() + pixels->count();
         if (given > 1)
-            refuse("--full, --imperceptible, --triangles and --pixels exclude each other: give one of them.");
-        if (*fill && !*triangles) refuse("--fill-budget needs --triangles N.");
+            refuse("--full, --imperceptible, --triangles, --ratio and --pixels exclude each other: give one of them.");
+        if (*fill && !o.budget.is_given()) refuse("--fill-budget needs --triangles N or --ratio SHARE.");
         if (o.request.milliseconds && *full) refuse("--milliseconds and --full exclude each other.");
         if (*full) kind = Goal::Kind::full;
-        if (*triangles) kind = Goal::Kind::budget;
+        if (o.budget.is_given()) kind = Goal::Kind::budget;
         if (*pixels) kind = Goal::Kind::pixels;
-        if (const auto valid = session::validate(o.request); !valid) refuse(with_option_names(valid.error().message));
+        constexpr std::uint64_t of_some_model = 1000;
+        if (const auto valid = session::validate(o.request_for(of_some_model)); !valid)
+            refuse(with_option_names(valid.error().message));
     });
 }
 

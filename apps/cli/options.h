@@ -48,9 +48,23 @@ struct DisplayOptions {
     std::string csf; // a model's name or a file's
 };
 
+// A number of triangles, or a share of the model's.
+struct TriangleCount {
+    std::uint32_t triangles = 0; // 0: by the share
+    double share = 0;            // 0.5: half of them
+
+    bool is_given() const { return triangles > 0 || share > 0; }
+    // Of a model with so many; at least one.
+    std::uint32_t of(std::uint64_t all) const;
+};
+
 // WHAT.
 struct WhatOptions {
-    session::Request request;
+    session::Request request; // of budgets, without the number of triangles
+    TriangleCount budget;
+
+    // For a model with so many triangles.
+    session::Request request_for(std::uint64_t source_triangles) const;
     std::optional<glm::dvec2> gaze_px;
 };
 
@@ -75,10 +89,12 @@ void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px);
 void add_fold_test_option(CLI::App& verb, std::optional<FoldTest>& chosen, std::span<const FoldTest> tests,
                           const std::string& text);
 void add_json_option(CLI::App& verb, std::string& file);
-CLI::Option* add_triangles_option(CLI::App& verb, std::uint32_t& triangles, const std::string& text);
+void add_verbose_option(CLI::App& verb, bool& is_verbose);
+// "5000" or "50%".
+CLI::Option* add_triangles_option(CLI::App& verb, TriangleCount& count, const std::string& text);
 
 // Validators. All of them refuse NaN and infinities.
-CLI::Validator finite();
+CLI::Validator finite_numbers(int count); // of an option that takes so many
 CLI::Validator positive();
 CLI::Validator not_negative();
 CLI::Validator within(double low, double high);

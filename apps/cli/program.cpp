@@ -1,36 +1,93 @@
 #include "program.h"
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <exception>
 #include <new>
+#include <span>
+#include <string_view>
 #include <typeinfo>
 
+#include "interruption.h"
 #include "option_names.h"
+#include "output_files.h"
+#include "suggestion.h"
 #include "terminal.h"
 
 namespace unseen::app {
 namespace {
 
-// The parser only says that a verb is missing.
-std::string complaint_about_verb(const CLI::App& app, const Program& program, const CLI::ParseError& error) {
-    const auto unknown = app.remaining();
-    if (!unknown.empty()) {
-        const auto hint = program.hints.find(unknown.front());
-        const std::string why = hint == program.hints.end() ? "." : ": " + hint->second;
-        return "there is no verb or option '" + unknown.front() + "'" + why;
+using Apps = std::vector<const CLI::App*>;
+
+// Verbs, or the nameless groups of options.
+Apps parts_of(const CLI::App& app, bool named) {
+    return app.get_subcommands([named](const CLI::App* part) { return part->get_name().empty() != named; });
+}
+
+std::vector<std::string> verb_names(const CLI::App& app) {
+    std::vector<std::string> names;
+    for (const CLI::App* verb : parts_of(app, true)) names.push_back(verb->get_name());
+    return names;
+}
+
+std::vector<std::string> option_names(const CLI::App& app) {
+    std::vector<std::string> names;
+    for (const CLI::Option* option : app.get_options())
+        for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    for (const CLI::App* group : parts_of(app, false)) {
+        const auto more = option_names(*group);
+        names.insert(names.end(), more.begin(), more.end());
     }
-    if (error.get_name() != "RequiredError") return error.what();
+    return names;
+}
+
+// The verb that was found last; at first the program.
+const CLI::App& last_parsed(const CLI::App& app) {
+    const auto verbs = app.get_subcommands();
+    return verbs.empty() ? app : last_parsed(*verbs.front());
+}
+
+std::string complaint_about(const std::string& word, const CLI::App& app, const Program& program) {
+    const bool is_option = word.starts_with("-");
+    const bool takes_verbs = !parts_of(app, true).empty();
+    if (!is_option && !takes_verbs) return "'" + word + "' is one word too many.";
+    const auto hint = program.hints.find(word);
+    if (hint != program.hints.end()) return "there is no verb or option '" + word + "': " + hint->second;
+    const std::string near =
+        suggestion(word.substr(0, word.find('=')), is_option ? option_names(app) : verb_names(app));
+    return std::string("there is no ") + (is_option ? "option '" : "verb '") + word + "'" + (near.empty() ? "." : near);
+}
+
+// What the parser could not place comes first: it may be why something else is missing.
+std::string complaint(const CLI::App& app, const Program& program, const CLI::ParseError& error) {
+    const std::string kind = error.get_name();
+    if (kind != "ExtrasError" && kind != "RequiredError") return error.what();
+    const auto unknown = app.remaining();
+    const auto option = std::find_if(unknown.begin(), unknown.end(), [](auto& word) { return word.starts_with("-"); });
+    if (option != unknown.end()) return complaint_about(*option, app, program);
+    if (!unknown.empty()) return complaint_about(unknown.front(), app, program);
+    if (kind != "RequiredError" || parts_of(app, true).empty()) return error.what();
     std::string some;
-    const auto verbs = app.get_subcommands([](const CLI::App*) { return true; });
+    const auto verbs = verb_names(app);
     constexpr std::size_t enough = 4;
-    for (std::size_t i = 0; i < verbs.size() && i < enough; ++i) some += (i ? ", " : "") + verbs[i]->get_name();
+    for (std::size_t i = 0; i < verbs.size() && i < enough; ++i) some += (i ? ", " : "") + verbs[i];
     return "a verb is missing: " + some + (verbs.size() > enough ? ", ..." : "");
 }
 
+// Brings out what was printed. The files of a run that comes so far are written.
+int finish(int status) {
+    if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return status;
+    std::string kept;
+    for (const std::string& file : written_outputs()) kept += (kept.empty() ? " Written: " : ", ") + file;
+    print_error("cannot write to the standard output: is the disk full?" + kept);
+    return exit_failed;
+}
+
 int report_usage(const CLI::App& app, const Program& program, const CLI::ParseError& error) {
-    if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) return app.exit(error); // --help, --version
-    print_error(app.get_subcommands().empty() ? complaint_about_verb(app, program, error) : error.what());
+    if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) // --help, --version
+        return finish(app.exit(error));
+    print_error(complaint(last_parsed(app), program, error));
     std::string verb;
     for (auto verbs = app.get_subcommands(); !verbs.empty(); verbs = verbs.front()->get_subcommands())
         verb += " " + verbs.front()->get_name();
@@ -38,31 +95,45 @@ int report_usage(const CLI::App& app, const Program& program, const CLI::ParseEr
     return exit_usage;
 }
 
+// `help VERB ...`, which people type, too.
+int help(const CLI::App& app, const Program& program, std::span<char* const> words) {
+    const CLI::App* verb = &app;
+    std::string parents;
+    for (const std::string word : words) {
+        const Apps verbs = parts_of(*verb, true);
+        const auto next = std::find_if(verbs.begin(), verbs.end(), [&](auto* v) { return v->get_name() == word; });
+        if (next == verbs.end()) {
+            print_error(complaint_about(word, *verb, program));
+            return exit_usage;
+        }
+        parents += (parents.empty() ? "" : " ") + verb->get_name();
+        verb = *next;
+    }
+    std::fputs(verb->help(parents).c_str(), stdout);
+    return finish(exit_done);
+}
+
 int run(const std::vector<Command>& commands) {
     for (const Command& command : commands) {
         if (!command.parser->parsed()) continue;
         const auto status = command.run();
-        if (!status) print_error(with_option_names(status.error().message));
-        if (!status) return exit_failed;
-        if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return *status;
-        print_error("cannot write to the standard output: is the disk full?");
+        end_if_interrupted();
+        if (status) return finish(*status);
+        print_error(with_option_names(status.error().message));
         return exit_failed;
     }
     return exit_usage; // the parser insists on a verb
 }
 
-} // namespace
-
-int run_program(int argc, char** argv, const Program& program, FunctionRef<std::vector<Command>(CLI::App&)> verbs) {
-    std::signal(SIGXFSZ,
-                SIG_IGN); // a file beyond the user's limit is an error like a full disk, and not the end without a word
-    name_program(program.name);
+int run(int argc, char** argv, const Program& program, const FunctionRef<std::vector<Command>(CLI::App&)>& verbs) {
     CLI::App app(program.about, program.name);
     app.footer(program.examples);
     app.set_version_flag("--version", std::string(program.name) + " " + program.version);
     app.require_subcommand(1);
     try {
         const std::vector<Command> commands = verbs(app);
+        if (argc > 1 && std::string_view(argv[1]) == "help")
+            return help(app, program, std::span<char* const>(argv, static_cast<std::size_t>(argc)).subspan(2));
         app.parse(argc, argv);
         return run(commands);
     } catch (const CLI::ParseError& error) {
@@ -75,6 +146,19 @@ int run_program(int argc, char** argv, const Program& program, FunctionRef<std::
         print_error(error.what());
     }
     return exit_failed;
+}
+
+} // namespace
+
+int run_program(int argc, char** argv, const Program& program,
+                const FunctionRef<std::vector<Command>(CLI::App&)>& verbs) {
+    std::signal(SIGXFSZ,
+                SIG_IGN); // a file beyond the user's limit is an error like a full disk, and not the end without a word
+    clean_up_on_signals();
+    name_program(program.name);
+    const int status = run(argc, argv, program, verbs);
+    if (status != exit_done) remove_empty_made_folders();
+    return status;
 }
 
 } // namespace unseen::app

@@ -20,6 +20,7 @@ struct Program {
 };
 
 // `verbs` adds them to the parser. Returns the exit status.
-int run_program(int argc, char** argv, const Program& program, FunctionRef<std::vector<Command>(CLI::App&)> verbs);
+int run_program(int argc, char** argv, const Program& program,
+                const FunctionRef<std::vector<Command>(CLI::App&)>& verbs);
 
 } // namespace unseen::app

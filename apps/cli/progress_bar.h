@@ -8,7 +8,8 @@
 
 namespace unseen::app {
 
-// Draws itself on stderr where that is a terminal, and is silent otherwise. Gone when it is destroyed. Hand it over as
+// A bar with the share that is done and, after two seconds, the time that the rest will take at this pace. Draws itself
+// on stderr where that is a terminal, and is silent otherwise. Gone when it is destroyed. Hand it over as
 // a Progress callback by std::ref(); it never cancels.
 class ProgressBar {
 public:
@@ -23,7 +24,7 @@ private:
     std::string title_;
     bool is_shown_;
     bool is_drawn_ = false;
-    std::chrono::steady_clock::time_point next_draw_;
+    std::chrono::steady_clock::time_point start_, next_draw_;
 };
 
 } // namespace unseen::app

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "terminal.h"
+
 namespace unseen::app {
 
 Json number_or_null(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
@@ -30,7 +32,11 @@ Result<void> JsonReport::publish() {
     return file_ ? file_->commit() : Result<void>();
 }
 
-void print_table(const std::vector<std::vector<std::string>>& rows) {
+void print_line(std::string_view text) { std::printf("%s\n", printable(text).c_str()); }
+
+void print_table(std::vector<std::vector<std::string>> rows) {
+    for (auto& row : rows)
+        for (std::string& cell : row) cell = printable(cell); // before it is measured
     std::vector<std::size_t> widths;
     for (const auto& row : rows) {
         widths.resize(std::max(widths.size(), row.size()));
@@ -42,7 +48,7 @@ void print_table(const std::vector<std::vector<std::string>>& rows) {
             const std::string padding(widths[i] - row[i].size(), ' ');
             line += (i > 0 ? "  " : "") + (i == 0 ? row[i] + padding : padding + row[i]);
         }
-        std::printf("%s\n", line.c_str());
+        print_line(line);
     }
 }
 

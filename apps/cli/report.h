@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -36,8 +37,11 @@ private:
     std::string text_;
 };
 
+// A line for people, on stdout.
+void print_line(std::string_view text);
+
 // Columns of text, the first to the left and the others to the right, for stdout.
-void print_table(const std::vector<std::vector<std::string>>& rows);
+void print_table(std::vector<std::vector<std::string>> rows);
 
 // Of a tree's texture: null and "none" where it has none.
 Json texture_json(const vdtree::VertexTree& tree);

@@ -1,6 +1,8 @@
 // What people read on the terminal: notes and warnings on stderr, numbers in words of people.
 #pragma once
 
+#include <cstdint>
+#include <string>
 #include <string_view>
 
 #include <vdtree/internal/number_format.h> // IWYU pragma: export
@@ -13,5 +15,12 @@ void name_program(std::string_view name);
 void print_warning(std::string_view text); // "unseen: warning: ..." on stderr
 void print_note(std::string_view text);    // "unseen: note: ..." on stderr
 void print_error(std::string_view text);   // "unseen: ..." on stderr, with a full stop where there is none
+
+// Names of files, and what stands in them, must not steer the terminal: control characters, and bytes that are no
+// UTF-8, become \xNN. All that this header and report.h print goes through it.
+std::string printable(std::string_view text);
+
+std::string duration(double milliseconds);   // "0.05 ms", "620 ms", "61.8 s", "2 min 5 s"
+std::string file_size(std::uintmax_t bytes); // "812 bytes", "1.2 MB"
 
 } // namespace unseen::app

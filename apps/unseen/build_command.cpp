@@ -36,7 +36,7 @@ struct BuildArguments {
     meshio::ColourEncoding colours = meshio::ColourEncoding::srgb;
     int threads = 0;
     double memory_gib = 0; // 0: no limit
-    bool fold_errors = false;
+    bool fold_errors = false, is_verbose = false;
     TextureOptions texture;
 };
 
@@ -62,7 +62,7 @@ Json to_json(const vdtree::VertexTree& tree, double seconds) {
             {"peak_bytes", peak_bytes()},          {"texture", texture_json(tree)}};
 }
 
-void print(const vdtree::VertexTree& tree, double seconds) {
+void print_details(const vdtree::VertexTree& tree) {
     const double bytes_per_triangle = static_cast<double>(tree.byte_size()) / tree.triangle_count();
     print_table({{"vertices", grouped(tree.leaf_count())},
                  {"triangles", grouped(tree.triangle_count())},
@@ -70,8 +70,7 @@ void print(const vdtree::VertexTree& tree, double seconds) {
                  {"nodes", grouped(tree.node_count())},
                  {"bytes", grouped(tree.byte_size())},
                  {"bytes a triangle", rounded(bytes_per_triangle, 4)},
-                 {"texture", texture_text(tree)},
-                 {"built in", rounded(seconds, 3) + " s"}});
+                 {"texture", texture_text(tree)}});
 }
 
 meshio::ReadOptions reading(const BuildArguments& a) {
@@ -181,7 +180,14 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
     if (auto ok = report.prepare(to_json(*tree, seconds)); !ok) return ok.error();
     if (auto ok = write(a.out, *tree); !ok) return ok.error();
     if (auto ok = report.publish(); !ok) return ok.error();
-    if (!report.is_on_stdout()) print(*tree, seconds);
+    if (report.is_on_stdout()) return exit_done;
+    const std::string dropped = tree->dropped_triangles() == 0 ? std::string()
+                                                               : " (" + grouped(tree->dropped_triangles()) +
+                                                                     " that use a vertex twice were dropped)";
+    print_line("built a tree over " + grouped(tree->triangle_count()) + " triangles" + dropped + " in " +
+               duration(1000 * seconds));
+    print_written({a.out, a.json});
+    if (a.is_verbose) print_details(*tree);
     return exit_done;
 }
 
@@ -242,6 +248,7 @@ Command build_command(CLI::App& app) {
         ->type_name("GIB")
         ->check(positive());
     add_json_option(*verb, a->json);
+    add_verbose_option(*verb, a->is_verbose);
     verb->footer("Examples:\n  unseen build bunny.ply -o bunny.vdt\n"
                  "  unseen build city.obj -o city.vdt --clusterer octree --threads 4\n"
                  "  unseen build city.obj -o city.vdt --memory 4\n"

@@ -291,7 +291,9 @@ Result<int> calibrate_observer(CalibrateArguments& a, const perception::Display&
         if (auto ok = calibration::write_observer(a.out, *profile); !ok) return ok.error();
     }
     if (auto ok = report->publish(); !ok) return ok.error();
-    if (!report->is_on_stdout()) print(*procedure, truth);
+    if (report->is_on_stdout()) return exit_done;
+    print(*procedure, truth);
+    print_written({a.out, a.json, a.state});
     return exit_done;
 }
 
@@ -299,6 +301,7 @@ Result<int> write_measured_display(const CalibrateArguments& a, const perception
     if (!a.out.empty()) {
         if (auto ok = calibration::write_display(a.out, display); !ok) return ok.error();
     }
+    print_written({a.out});
     return exit_done;
 }
 

@@ -4,14 +4,15 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <numbers>
+#include <sstream>
 #include <string_view>
 
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <vdtree/internal/errors.h>
 #include <vdtree/internal/number_text.h>
+#include <vdtree/internal/text_file.h>
 
 #include "terminal.h"
 
@@ -68,10 +69,12 @@ constexpr std::array<std::string_view, column_count> column_names = {
 
 class PathReader {
 public:
-    PathReader(const std::string& file, glm::dvec3 up) : file_(file), up_(up), stream_(file) {}
+    PathReader(const std::string& file, glm::dvec3 up) : file_(file), up_(up) {}
 
     Result<std::vector<CameraPose>> read() {
-        if (!stream_) return Error{ErrorCode::io_failure, "Cannot open '" + file_ + "': is it there, and readable?"};
+        const auto text = read_text_file(file_);
+        if (!text) return text.error();
+        stream_.str(*text);
         if (auto header = read_header(); !header) return header.error();
         std::vector<CameraPose> poses;
         while (next_line()) {
@@ -82,7 +85,6 @@ public:
             if (!pose) return pose.error();
             poses.push_back(*pose);
         }
-        if (stream_.bad()) return Error{ErrorCode::io_failure, "Cannot read '" + file_ + "' to its end."};
         if (poses.empty()) return malformed("there is no frame after the header.");
         return poses;
     }
@@ -110,7 +112,6 @@ private:
 
     Result<void> read_header() {
         next_line();
-        if (line_.starts_with("\xef\xbb\xbf")) line_.erase(0, 3); // a byte order mark
         for (const std::string_view name : cells()) {
             const auto found = std::find(column_names.begin(), column_names.end(), name);
             const auto column = static_cast<Column>(found - column_names.begin());
@@ -162,7 +163,7 @@ private:
 
     std::string file_;
     glm::dvec3 up_;
-    std::ifstream stream_;
+    std::istringstream stream_;
     std::string line_;
     std::uint64_t line_number_ = 0;
     std::vector<Column> columns_;

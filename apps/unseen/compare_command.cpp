@@ -129,6 +129,17 @@ Result<void> write_maps(const CompareArguments& a, const Verdict& verdict) {
     return ok;
 }
 
+// Whose verdict it is, and under which conditions.
+std::string judged_by(const CompareArguments& a, const perception::Display& display) {
+    if (a.model == Model::rpg99)
+        return "by the judge rpg99" + (a.profile.empty() ? "" : ", as " + a.profile + " does it");
+    std::string text = "by the judge modern and the ";
+    text += a.display.csf.empty() ? "default observer (castleCSF, a typical person)" : "observer " + a.display.csf;
+    text += ", looked at from " + rounded(display.distance.value(), 3) + " m, ";
+    if (!a.gaze_px) return text + "wherever the gaze";
+    return text + "with the gaze at pixel " + rounded(a.gaze_px->x, 4) + " " + rounded(a.gaze_px->y, 4);
+}
+
 Result<int> run(const CompareArguments& a) {
     if (const auto ready =
             check_outputs({a.reference, a.test, a.display.file, a.display.csf}, {a.map, a.threshold_map, a.json});
@@ -155,10 +166,11 @@ Result<int> run(const CompareArguments& a) {
     if (!report->is_on_stdout()) {
         const double share =
             100.0 * static_cast<double>(judgement.visible_pixels) / static_cast<double>(judgement.pixels);
-        print_table({{"visible pixels", grouped(judgement.visible_pixels) + " of " + grouped(judgement.pixels) + " (" +
-                                            rounded(share, 3) + "%)"},
-                     {"largest ratio", rounded(judgement.max_ratio, 4)},
-                     {"SSIM", rounded(ssim, 6)}});
+        print_line(grouped(judgement.visible_pixels) + " of " + grouped(judgement.pixels) + " pixels differ visibly (" +
+                   rounded(share, 3) + "%); the largest difference is " + rounded(judgement.max_ratio, 3) +
+                   " times its threshold; SSIM " + rounded(ssim, 6));
+        print_line(judged_by(a, *display));
+        print_written({a.map, a.threshold_map, a.json});
     }
     return a.fail_above && judgement.visible_pixels > *a.fail_above ? exit_failed : exit_done;
 }

@@ -4,7 +4,6 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -17,10 +16,12 @@
 #include <session/observer.h>
 #include <vdtree/internal/errors.h>
 #include <vdtree/internal/number_text.h>
+#include <vdtree/internal/text_file.h>
 
 #include "log_log_plot.h"
 #include "options.h"
 #include "output_files.h"
+#include "report.h"
 #include "terminal.h"
 #include "verbs.h"
 
@@ -36,7 +37,7 @@ struct StimulusOptions {
 };
 
 struct CsfArguments {
-    std::string model_name, csv, plot, csf, save; // no model: castle
+    std::string model_name, csv, plot, csf, save, json; // no model: castle
     bool by_table = false;
     bool is_pursued = false; // the velocity is the image's, and the eye follows it
     StimulusOptions stimulus;
@@ -198,18 +199,16 @@ Result<std::string> evaluate_csv(std::istream& in, const std::string& name, cons
         std::snprintf(text.data(), text.size(), "%.17g", *value);
         out += line + "," + text.data() + "\n";
     }
-    if (in.bad()) return complain("it cannot be read to its end.");
     if (columns.empty()) return complain("there is no line with the names of the columns.");
     return out;
 }
 
 Result<int> run_csv(const CsfArguments& a, const Observer& observer) {
-    std::ifstream file;
-    if (a.csv != "-") {
-        file.open(a.csv, std::ios::binary);
-        if (!file) return Error{ErrorCode::io_failure, "Cannot read '" + a.csv + "': check the name."};
-    }
-    const auto table = evaluate_csv(a.csv == "-" ? std::cin : file, a.csv == "-" ? "stdin" : a.csv, a, observer);
+    const std::string name = a.csv == "-" ? "stdin" : a.csv;
+    const auto text = a.csv == "-" ? read_text(std::cin, name) : read_text_file(a.csv);
+    if (!text) return text.error();
+    std::istringstream lines(*text);
+    const auto table = evaluate_csv(lines, name, a, observer);
     if (!table) return table.error();
     std::fwrite(table->data(), 1, table->size(), stdout);
     return exit_done;
@@ -266,24 +265,33 @@ Result<int> run_plot(const CsfArguments& a, const Observer& observer) {
     // Coarse gratings that move are seen far better than any that stand.
     plot.y_range.y = std::max(1000.0, std::pow(10.0, std::ceil(std::log10(peak))));
     if (auto ok = write_plot(a.plot, plot); !ok) return ok.error();
+    print_written({a.plot});
     return exit_done;
 }
 
 // -------------------------------------------------------------------------------------------------------------------
 
 Result<int> run(const CsfArguments& a) {
-    if (const auto ready = check_outputs({a.csf, a.csv}, {a.plot, a.save}); !ready) return ready.error();
+    if (const auto ready = check_outputs({a.csf, a.csv}, {a.plot, a.save, a.json}); !ready) return ready.error();
+    auto report = JsonReport::open(a.json);
+    if (!report) return report.error();
     const auto observer = Observer::create(a);
     if (!observer) return observer.error();
     if (!a.save.empty()) {
         if (auto ok = calibration::write_csf(a.save, observer->table()); !ok) return ok.error();
+        print_written({a.save});
         return exit_done;
     }
     if (!a.csv.empty()) return run_csv(a, *observer);
     if (!a.plot.empty()) return run_plot(a, *observer);
     const auto value = (*observer)(a.stimulus);
     if (!value) return value.error();
-    std::printf("%.17g\n", *value);
+    const Json json = {{"observer", observer->name()}, {"sensitivity", *value}, {"least_visible_contrast", 1 / *value}};
+    if (auto ok = report->prepare(json); !ok) return ok.error();
+    if (auto ok = report->publish(); !ok) return ok.error();
+    if (report->is_on_stdout()) return exit_done;
+    print_table({{"sensitivity", rounded(*value, 3)}, {"least visible contrast", rounded(100 / *value, 3) + "%"}});
+    print_written({a.json});
     return exit_done;
 }
 
@@ -315,6 +323,8 @@ void check(const CsfArguments& a) {
         refuse("--save-table holds all frequencies, luminances and eccentricities: leave these options away.");
     if (a.stimulus.distance && a.csf.empty() && a.model_name != name(CsfModel::daly))
         refuse("--distance is for --model daly: the others know none.");
+    if (outputs > 0 && !a.json.empty())
+        refuse("--json is for one stimulus: leave --csv, --plot and --save-table away.");
     if (outputs > 0) return;
     if (!a.stimulus.frequency) refuse("--frequency is required, or else --csv, --plot or --save-table.");
     if (!a.stimulus.luminance) refuse("--luminance is required, or else --csv, --plot or --save-table.");
@@ -361,6 +371,7 @@ Command csf_command(CLI::App& app) {
     verb->add_option("--save-table", a->save, "With --table or --csf: write the table")
         ->type_name("OUT.json")
         ->check(ending_in({".json"}));
+    add_json_option(*verb, a->json);
     verb->callback([o = a.get()] { check(*o); });
     verb->footer("Examples:\n  unseen csf --frequency 4 --luminance 100\n"
                  "  unseen csf --frequency 4 --luminance 100 --model barten-1999 --velocity 10 --pursuit\n"

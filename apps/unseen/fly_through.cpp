@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <limits>
 #include <optional>
@@ -16,6 +15,7 @@
 #include "camera_path.h"
 #include "cut_report.h"
 #include "frame_image.h"
+#include "interruption.h"
 #include "output_files.h"
 #include "progress_bar.h"
 #include "report.h"
@@ -194,18 +194,32 @@ Json to_json(const session::Session& session, const std::vector<FrameRecord>& fr
     return json;
 }
 
-void print(const session::Session& session, const std::vector<FrameRecord>& frames, const session::Report& last) {
-    print_table({{"frames", grouped(frames.size())},
-                 {"triangles of the model", grouped(session.tree().triangle_count())},
-                 {"first cut", rounded(frames.front().cut_ms + frames.front().index_ms, 3) + " ms"}});
-    std::vector<std::vector<std::string>> rows = {{"", "median", "largest"}};
+// "0.12 ms (largest: 1.3 ms)".
+std::string middle_and_most(const std::vector<double>& values) {
+    return duration(median(values)) + " (largest: " + duration(largest(values)) + ")";
+}
+
+void print(const session::Session& session, const std::vector<FrameRecord>& frames, const session::Report& last,
+           const DisplayOptions& display) {
+    const auto kept = static_cast<std::uint64_t>(median(column(frames, [](auto& f) { return f.stats.triangles; })));
+    print_line(grouped(frames.size()) + " frames; the median frame " +
+               kept_text(kept, session.tree().triangle_count()));
+    print_line("in the median frame, the cut took " +
+               middle_and_most(column(frames, [](auto& f) { return f.cut_ms + f.index_ms; })) +
+               (std::isnan(frames.back().draw_ms)
+                    ? ", and nothing was drawn"
+                    : " and drawing " + middle_and_most(column(frames, [](auto& f) { return f.draw_ms; }))));
+    print_line(visibility_text(last, session.observer(), display, "in the last frame"));
+}
+
+void print_details(const std::vector<FrameRecord>& frames, const session::Report& last) {
+    print_table({{"first cut", duration(frames.front().cut_ms + frames.front().index_ms)}});
+    std::vector<std::vector<std::string>> rows = {{"of the later frames", "median", "largest"}};
     for (const Measure& m : measures_of(frames))
         if (std::isfinite(median(m.values)))
             rows.push_back({m.label, rounded(median(m.values), 4), rounded(largest(m.values), 4)});
     print_table(rows);
-    const std::string metres = std::isfinite(last.imperceptible_from_m) ? " m" : "";
-    print_table({{"imperceptible from", rounded(last.imperceptible_from_m, 3) + metres}});
-    std::printf("effects of the last frame\n");
+    print_line("effects of the last frame");
     app::print(last.effects);
 }
 
@@ -227,7 +241,8 @@ public:
             !begun)
             return begun;
         ProgressBar bar("flying");
-        for (std::size_t i = 0; i < poses.size(); ++i) {
+        const Interruptible until_interrupted;
+        for (std::size_t i = 0; i < poses.size() && !until_interrupted.is_interrupted(); ++i) {
             bar(static_cast<double>(i) / static_cast<double>(poses.size()), "frames");
             take(poses[i]);
             session_.set_time(static_cast<double>(i) * frame_s);
@@ -297,17 +312,6 @@ private:
     session::Report last_;
 };
 
-// The folder that the pictures go to is made where it is missing.
-Result<void> make_folder_of(const std::string& name) {
-    const std::filesystem::path folder = std::filesystem::path(name).parent_path();
-    if (folder.empty()) return {};
-    std::error_code failed;
-    std::filesystem::create_directories(folder, failed);
-    if (!failed) return {};
-    return Error{ErrorCode::io_failure,
-                 "Cannot make the folder '" + folder.string() + "' for the pictures: " + failed.message() + "."};
-}
-
 } // namespace
 
 std::string complaint_about_picture_names(const std::string& pattern) {
@@ -321,7 +325,8 @@ Result<void> fly_through(const std::string& model, const ViewOptions& view, cons
                          const FlyThroughOptions& options) {
     std::vector<std::string> inputs = inputs_of(model, view, display);
     inputs.insert(inputs.end(), {options.path, options.gaze.trace});
-    if (const auto ready = check_outputs(inputs, {options.csv, options.plot, options.json}); !ready) return ready;
+    if (const auto ready = check_outputs(inputs, {options.csv, options.plot, options.json, options.pictures}); !ready)
+        return ready;
     const auto path = CameraPath::read(options.path, view.up.value_or(vdtree::View().up));
     if (!path) return path.error();
     if (path->has_gaze() && (options.what.gaze_px || options.gaze.source != GazeSource::none))
@@ -340,7 +345,7 @@ Result<void> fly_through(const std::string& model, const ViewOptions& view, cons
         csv = std::move(*file);
     }
     std::optional<render::Context> context;
-    if (options.draws) {
+    if (options.draws.value_or(!options.pictures.empty())) {
         auto made = render::Context::headless();
         if (!made) return made.error();
         context = std::move(*made);
@@ -348,17 +353,16 @@ Result<void> fly_through(const std::string& model, const ViewOptions& view, cons
     auto session = open_session(model, view, display);
     if (!session) return session.error();
     const vdtree::View first_view = make_view(*session, view);
-    if (!options.pictures.empty())
-        if (auto made = make_folder_of(options.pictures); !made) return made;
-    session::Request request = options.what.request;
+    session::Request request = options.what.request_for(session->tree().triangle_count());
     request.purpose = session::Purpose::picture;
     request.threshold = options.threshold;
     if (const auto ready = session->prepare(first_view, request); !ready) return ready.error();
 
     FlyThrough flight(*session, first_view, request, options);
     Pictures pictures(options.pictures);
-    if (auto flown = flight.run(path->poses_from(first_view), std::move(*gaze), std::move(context), pictures); !flown)
-        return flown;
+    const std::vector<CameraPose> poses = path->poses_from(first_view);
+    if (auto flown = flight.run(poses, std::move(*gaze), std::move(context), pictures); !flown) return flown;
+    if (flight.records().empty()) return {}; // interrupted
     if (csv)
         if (auto ok = csv->write(to_csv(flight.records())); !ok) return ok;
     if (auto ok = report->prepare(to_json(*session, flight.records(), flight.last())); !ok) return ok;
@@ -370,7 +374,15 @@ Result<void> fly_through(const std::string& model, const ViewOptions& view, cons
         if (auto ok = csv->commit(); !ok) return ok;
     if (auto ok = report->publish(); !ok) return ok;
     pictures.keep();
-    if (!report->is_on_stdout()) print(*session, flight.records(), flight.last());
+    if (flight.records().size() < poses.size())
+        print_note("interrupted after " + grouped(flight.records().size()) + " of " + grouped(poses.size()) +
+                   " frames.");
+    if (report->is_on_stdout()) return {};
+    print(*session, flight.records(), flight.last(), display);
+    print_written({options.csv, options.plot, options.json});
+    if (!options.pictures.empty())
+        print_line("wrote " + grouped(flight.records().size()) + " pictures, " + options.pictures);
+    if (options.is_verbose) print_details(flight.records(), flight.last());
     return {};
 }
 

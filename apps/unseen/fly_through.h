@@ -14,8 +14,9 @@ struct FlyThroughOptions {
     std::string path;     // see camera_path.h
     std::string pictures; // a name with one %d (or %04d, ...) for the frame's number; empty: none
     std::string csv, plot, json;
-    double threshold = 1; // fold costs up to it
-    bool draws = true;
+    double threshold = 1;      // fold costs up to it
+    std::optional<bool> draws; // default: where there are pictures to write
+    bool is_verbose = false;
     std::optional<double> geomorph_seconds; // that vertices glide for; none: they do not
     double frames_a_second = 60;            // of the glides, moving gazes and moving lights
     WhatOptions what;
@@ -26,7 +27,7 @@ struct FlyThroughOptions {
 // Ends in an error about --output unless it is a pattern for names of PNGs.
 std::string complaint_about_picture_names(const std::string& pattern);
 
-// Prints a summary, and writes what was asked for. Reads and checks all files before anything that takes long, such as
+// Prints a summary, and writes what was asked for; of a flight that the user interrupts, the rows and pictures so far. Reads and checks all files before anything that takes long, such as
 // the fold errors that the fold test may need.
 Result<void> fly_through(const std::string& model, const ViewOptions& view, const DisplayOptions& display,
                          const FlyThroughOptions& options);

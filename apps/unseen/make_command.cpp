@@ -19,14 +19,14 @@ namespace {
 struct SubdivideArguments {
     std::string mesh, out, json;
     SubdivideOptions options;
-    std::uint32_t triangles = 0; // 0: as many as the rounds give
+    TriangleCount triangles; // not given: as many as the rounds make
 };
 
 Result<vdtree::Mesh> subdivide_with_progress(vdtree::Mesh mesh, const SubdivideArguments& a) {
     ProgressBar bar("subdividing");
     SubdivideOptions options = a.options;
     options.progress = std::ref(bar);
-    if (a.triangles > 0) options.triangles = a.triangles;
+    if (a.triangles.is_given()) options.triangles = a.triangles.of(mesh.triangles.size());
     return subdivide(std::move(mesh), options);
 }
 
@@ -50,9 +50,10 @@ Result<int> run(const SubdivideArguments& a) {
     if (auto ok = report->prepare(json); !ok) return ok.error();
     if (auto ok = write(a.out, *mesh); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
-    if (!report->is_on_stdout())
-        print_table({{"triangles", grouped(mesh->triangles.size()) + " of " + grouped(before)},
-                     {"vertices", grouped(mesh->positions.size())}});
+    if (report->is_on_stdout()) return exit_done;
+    print_line("made " + grouped(mesh->triangles.size()) + " triangles and " + grouped(mesh->positions.size()) +
+               " vertices of " + grouped(before) + " triangles");
+    print_written({a.out, a.json});
     return exit_done;
 }
 
@@ -69,7 +70,8 @@ Command subdivide_command(CLI::App& make) {
                              ->type_name("N")
                              ->check(whole(0, most_subdivisions));
     CLI::Option* triangles = add_triangles_option(
-        *verb, a->triangles, "Instead: up to N triangles; the last round splits the longest edges alone");
+        *verb, a->triangles,
+        "Instead: up to N triangles, or P% of the mesh's; the last round splits the longest edges alone");
     verb->add_option("--noise", a->options.noise,
                      "How far new vertices may move, as a share of their edge's length, 0..1 (default: 0.02)")
         ->type_name("SHARE")

@@ -12,7 +12,6 @@
 #include "output_files.h"
 #include "report.h"
 #include "session_options.h"
-#include "terminal.h"
 #include "verbs.h"
 
 namespace unseen::app {
@@ -27,6 +26,7 @@ struct RenderArguments {
     ViewOptions view;
     DisplayOptions display;
     WhatOptions what;
+    bool is_verbose = false;
     render::DrawOptions draw;
     std::optional<FoldMap> map; // instead of the picture
     FlyThroughOptions flight;   // where a path is given
@@ -39,6 +39,7 @@ Result<int> run_flight(RenderArguments& a) {
     a.flight.json = a.json;
     a.flight.what = a.what;
     a.flight.draw = a.draw;
+    a.flight.is_verbose = a.is_verbose;
     if (auto flown = fly_through(a.model, a.view, a.display, a.flight); !flown) return flown.error();
     return exit_done;
 }
@@ -57,8 +58,9 @@ Result<int> run(RenderArguments& a) {
     if (!session) return session.error();
     const vdtree::View view = make_view(*session, a.view);
     session->set_gaze(gaze->at(0, view, a.what.gaze_px));
-    a.what.request.purpose = session::Purpose::picture;
-    const auto result = session->simplify(view, a.what.request);
+    session::Request request = a.what.request_for(session->tree().triangle_count());
+    request.purpose = session::Purpose::picture;
+    const auto result = session->simplify(view, request);
     if (!result) return result.error();
     const vdtree::Cut& cut = result->cuts.front();
 
@@ -75,22 +77,27 @@ Result<int> run(RenderArguments& a) {
     const perception::Display& display = session->observer().display;
     perception::Image image = is_for_people(a.out) ? code_image(*frame, display) : luminance_image(*frame, display);
     if (a.map) {
-        auto drawn = draw_fold_map(cut, *session, view, a.what.request, *a.map, view);
+        auto drawn = draw_fold_map(cut, *session, view, request, *a.map, view);
         if (!drawn) return drawn.error();
         image = std::move(*drawn);
     }
     if (auto ok = report->prepare(to_json(*result, frame->draw_ms)); !ok) return ok.error();
     if (auto ok = perception::write_image(a.out, image); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
-    if (!report->is_on_stdout()) {
-        print(*result, frame->draw_ms);
-        print_table({{"drawn by", context->renderer_name()}});
+    if (report->is_on_stdout()) return exit_done;
+    print_line(kept_text(result->stats.triangles, result->source_triangles));
+    print_line(visibility_text(*result, session->observer(), a.display, "in this view"));
+    print_written({a.out, a.json});
+    if (a.is_verbose) {
+        print_details(*result, frame->draw_ms);
+        print_line("drawn by " + context->renderer_name());
     }
     return exit_done;
 }
 
 void add_path_options(CLI::App& verb, FlyThroughOptions& o) {
-    CLI::App& group = *verb.add_option_group("PATH", "A fly-through, with one cut that follows the camera");
+    CLI::App& group =
+        *verb.add_option_group("PATH", "A fly-through, with one cut that follows the camera; drawn with -o alone");
     group
         .add_option("--path", o.path,
                     "orbit:DEGREES[:FRAMES], around the target from VIEW on, so many degrees a frame (default: once "
@@ -114,8 +121,7 @@ void add_path_options(CLI::App& verb, FlyThroughOptions& o) {
                     "With --geomorph, --lights and moving gazes: frames a second of the path (default: 60)")
         ->type_name("N")
         ->check(within(1, 1e6));
-    group.add_flag_callback(
-        "--no-draw", [&o] { o.draws = false; }, "Only cut: draw nothing");
+    group.add_flag("--draw,!--no-draw", o.draws, "Draw the frames even where no -o keeps them, to time that");
 }
 
 bool is_moving(const GazeOptions& gaze) {
@@ -141,13 +147,13 @@ void check(const RenderArguments& a) {
             refuse("--show contrast is of the mesh's own light, and excludes --lights.");
         if (a.map == FoldMap::eccentricity && !a.what.gaze_px && o.gaze.source == GazeSource::none)
             refuse("--show eccentricity needs --gaze: without one all counts as looked at.");
-        if (!o.csv.empty() || !o.plot.empty() || o.threshold != 1 || !o.draws || o.geomorph_seconds)
-            refuse("--csv, --plot, --threshold, --geomorph and --no-draw need --path.");
+        if (!o.csv.empty() || !o.plot.empty() || o.threshold != 1 || o.draws || o.geomorph_seconds)
+            refuse("--csv, --plot, --threshold, --geomorph and --draw need --path.");
         return;
     }
     if (a.map) refuse("--show is for single pictures, and excludes --path.");
     if (a.out.empty()) return;
-    if (!o.draws) refuse("--no-draw and -o exclude each other.");
+    if (o.draws && !*o.draws) refuse("--no-draw and -o exclude each other.");
     if (const auto complaint = complaint_about_picture_names(a.out); !complaint.empty()) refuse(complaint);
 }
 
@@ -177,6 +183,7 @@ Command render_command(CLI::App& app) {
         *verb, "--show", a->map, std::move(maps),
         "Instead of the model, of its folds: cost, frequency or contrast (of their worst gratings), or eccentricity");
     add_json_option(*verb, a->json);
+    add_verbose_option(*verb, a->is_verbose);
     add_path_options(*verb, a->flight);
     CLI::Option* frames_a_second = verb->get_option("--fps");
     verb->callback([a, samples, frames_a_second] {

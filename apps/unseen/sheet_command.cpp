@@ -16,6 +16,7 @@
 #include "fold_map.h"
 #include "frame_image.h"
 #include "output_files.h"
+#include "progress_bar.h"
 #include "report.h"
 #include "session_options.h"
 #include "terminal.h"
@@ -28,15 +29,13 @@ struct SheetArguments {
     std::string model, out, json;
     ViewOptions view;
     DisplayOptions display;
-    std::uint32_t triangles = 0;       // 0: a quarter of the model's
+    TriangleCount budget = {.share = 0.25};
     std::optional<glm::dvec2> gaze_px; // default: default_gaze
     int samples = 64;
     int cell_px = 480;
-    bool maps = false;
+    bool maps = false, is_verbose = false;
     std::optional<FoldTest> test; // default: as in 'unseen render'
 };
-
-constexpr std::uint32_t default_budget_share = 4;
 
 // One column of the sheet.
 struct Column {
@@ -61,8 +60,7 @@ std::vector<Column> wishes(const session::Session& session, const vdtree::View& 
     columns[0].request.goal = Goal::full();
     columns[1].name = "imperceptible";
     columns[2].name = "budget";
-    columns[2].request.goal =
-        Goal::budget(a.triangles ? a.triangles : std::max(1U, session.tree().triangle_count() / default_budget_share));
+    columns[2].request.goal = Goal::budget(a.budget.of(session.tree().triangle_count()));
     columns[3].name = "gaze-directed";
     columns[3].gaze = session::Gaze{
         a.gaze_px.value_or(session::gaze_aside(session.observer().display, view, session::usual_degrees_aside))};
@@ -134,7 +132,9 @@ Result<std::vector<Column>> make_columns(session::Session& session, const vdtree
     if (const auto ready = session.prepare(view, columns[1].request); !ready) return ready.error();
     auto renderer = render::Renderer::create(context, session.tree());
     if (!renderer) return renderer.error();
+    ProgressBar bar("drawing and judging");
     for (Column& column : columns) {
+        bar(static_cast<double>(&column - columns.data()) / static_cast<double>(columns.size()), column.name.c_str());
         session.set_gaze(column.gaze);
         auto simplified = session.simplify(view, column.request);
         if (!simplified) return simplified.error();
@@ -233,18 +233,20 @@ Json to_json(const std::vector<Column>& columns) {
 
 void print(const std::vector<Column>& columns) {
     std::vector<std::vector<std::string>> rows = {
-        {"cut", "triangles", "nodes tested", "adapt ms", "draw ms", "visible px", "imperceptible from"}};
+        {"cut", "triangles", "nodes tested", "adapted in", "drawn in", "visible px", "imperceptible from"}};
     for (const Column& column : columns) {
         const session::Report& s = column.report;
-        rows.push_back({column.name, grouped(s.stats.triangles), grouped(s.stats.node_tests), rounded(s.adapt_ms, 3),
-                        rounded(column.draw_ms, 3),
+        rows.push_back({column.name, grouped(s.stats.triangles), grouped(s.stats.node_tests), duration(s.adapt_ms),
+                        duration(column.draw_ms),
                         column.judgement ? grouped(column.judgement->visible_pixels) : "reference",
                         metres(s.imperceptible_from_m)});
     }
     print_table(rows);
-    std::printf("effects that ran\n");
-    for (const Column& column : columns)
-        std::printf("  %s: %s\n", column.name.c_str(), effects_that_ran(column.report).c_str());
+}
+
+void print_effects(const std::vector<Column>& columns) {
+    print_line("effects that ran");
+    for (const Column& column : columns) print_line("  " + column.name + ": " + effects_that_ran(column.report));
 }
 
 Result<int> run(const SheetArguments& a) {
@@ -265,7 +267,10 @@ Result<int> run(const SheetArguments& a) {
     if (auto ok = report->prepare(to_json(*columns)); !ok) return ok.error();
     if (auto ok = perception::write_image(a.out, *sheet); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
-    if (!report->is_on_stdout()) print(*columns);
+    if (report->is_on_stdout()) return exit_done;
+    print(*columns);
+    print_written({a.out, a.json});
+    if (a.is_verbose) print_effects(*columns);
     return exit_done;
 }
 
@@ -280,7 +285,7 @@ Command sheet_command(CLI::App& app) {
         ->type_name("SHEET.png")
         ->required()
         ->check(ending_in({".png"}));
-    add_triangles_option(*verb, a->triangles, "The budget (default: a quarter of the triangles)");
+    add_triangles_option(*verb, a->budget, "The budget (default: a quarter of the triangles)");
     add_gaze_option(*verb, a->gaze_px);
     verb->get_option("--gaze")->description(
         "Gaze of the gaze-directed cut, in pixels from the top left; may lie outside "
@@ -297,6 +302,7 @@ Command sheet_command(CLI::App& app) {
     verb->add_flag("--maps", a->maps,
                    "Below, in place of the budget: maps of the folds' cost, frequency, contrast and eccentricity");
     add_json_option(*verb, a->json);
+    add_verbose_option(*verb, a->is_verbose);
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     verb->footer("Examples:\n  unseen sheet bunny.vdt -o bunny.png\n"

@@ -9,7 +9,6 @@
 #include "output_files.h"
 #include "report.h"
 #include "session_options.h"
-#include "terminal.h"
 #include "verbs.h"
 
 namespace unseen::app {
@@ -20,6 +19,7 @@ struct SimplifyArguments {
     ViewOptions view;
     DisplayOptions display;
     WhatOptions what;
+    bool is_verbose = false;
 };
 
 constexpr double nothing_drawn = std::numeric_limits<double>::quiet_NaN();
@@ -32,12 +32,15 @@ Result<int> run(const SimplifyArguments& a) {
     auto session = open_session(a.model, a.view, a.display);
     if (!session) return session.error();
     session->set_gaze(fixed_gaze(a.what));
-    auto result = session->simplify(make_view(*session, a.view), a.what.request);
+    auto result = session->simplify(make_view(*session, a.view), a.what.request_for(session->tree().triangle_count()));
     if (!result) return result.error();
     const auto start = std::chrono::steady_clock::now();
     const vdtree::Mesh mesh = result->mesh();
     result->extract_ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     if (mesh.triangles.empty()) {
+        if (!result->stats.is_complete)
+            return Error{ErrorCode::invalid_argument,
+                         "No triangle is there yet when the time is over: allow more with --milliseconds."};
         return Error{ErrorCode::invalid_argument,
                      "No triangle is left, for the model is too small in this view or the budget too low: "
                      "move nearer or allow more triangles."};
@@ -46,7 +49,11 @@ Result<int> run(const SimplifyArguments& a) {
     if (auto ok = report->prepare(to_json(*result, nothing_drawn)); !ok) return ok.error();
     if (auto ok = meshio::write_mesh(a.out, mesh.view()); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
-    if (!report->is_on_stdout()) print(*result, nothing_drawn);
+    if (report->is_on_stdout()) return exit_done;
+    print_line(kept_text(result->stats.triangles, result->source_triangles));
+    print_line(visibility_text(*result, session->observer(), a.display, "in this view"));
+    print_written({a.out, a.json});
+    if (a.is_verbose) print_details(*result, nothing_drawn);
     return exit_done;
 }
 
@@ -61,11 +68,13 @@ Command simplify_command(CLI::App& app) {
         ->required()
         ->check(ending_in({".ply", ".obj", ".glb"}));
     add_json_option(*verb, a->json);
+    add_verbose_option(*verb, a->is_verbose);
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->what);
     verb->footer("Examples:\n  unseen simplify bunny.vdt -o seen-from-the-right.ply --direction 1 0 0\n"
                  "  unseen simplify bunny.vdt -o small.obj --triangles 5000 --json report.json\n"
+                 "  unseen simplify bunny.vdt -o half.ply --triangles 50%\n"
                  "  unseen simplify bunny.vdt -o rough.glb --pixels 4 --fold-test displacement");
     return {verb, [a] { return run(*a); }};
 }

@@ -48,7 +48,8 @@ public:
     Viewer(session::Session& session, session::GazePlayer gaze, const ViewerOptions& options, render::Context& context,
            render::Renderer renderer)
         : session_(session), options_(options), window_(context.glfw_window()), renderer_(std::move(renderer)),
-          follower_(session), view_(options.first_view), request_(options.what.request), gaze_px_(options.what.gaze_px),
+          follower_(session), view_(options.first_view),
+          request_(options.what.request_for(session.tree().triangle_count())), gaze_px_(options.what.gaze_px),
           draw_(options.draw), gaze_follows_pointer_(options.gaze_follows_pointer), gaze_(std::move(gaze)) {
         request_.purpose = session::Purpose::picture;
         request_.may_measure = false; // nobody waits for that here
@@ -303,7 +304,7 @@ private:
 
 Result<void> run_viewer(render::Context& window, session::Session& session, session::GazePlayer gaze,
                         const ViewerOptions& options) {
-    session::Request request = options.what.request;
+    session::Request request = options.what.request_for(session.tree().triangle_count());
     request.purpose = session::Purpose::picture;
     if (const auto ready = session.prepare(options.first_view, request); !ready) return ready.error();
     auto renderer = render::Renderer::create(window, session.tree());

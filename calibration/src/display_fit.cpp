@@ -2,11 +2,12 @@
 #include <calibration/display_fit.h>
 #include <vdtree/internal/errors.h>
 #include <vdtree/internal/number_text.h>
+#include <vdtree/internal/text_file.h>
 
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <optional>
+#include <sstream>
 #include <string>
 
 #include "json_file.h"
@@ -53,8 +54,9 @@ Result<double> fit_gamma(std::span<const BrightnessMatch> matches) {
 }
 
 Result<PhotometerTable> read_photometer(const std::filesystem::path& file) {
-    std::ifstream stream(file, std::ios::binary);
-    if (!stream) return Error{ErrorCode::io_failure, file.string() + ": cannot be opened."};
+    const auto whole = read_text_file(file);
+    if (!whole) return whole.error();
+    std::istringstream stream(*whole);
     PhotometerTable table;
     bool has_header = false;
     std::size_t number = 0;
@@ -63,8 +65,6 @@ Result<PhotometerTable> read_photometer(const std::filesystem::path& file) {
     };
     for (std::string line; std::getline(stream, line);) {
         if (++number > most_rows) return complain("there are too many lines");
-        if (number == 1 && line.starts_with("\xef\xbb\xbf"))
-            line.erase(0, 3); // a byte order mark, which spreadsheets write
         const std::string_view text = trimmed(line);
         if (text.empty() || text.starts_with('#')) continue;
         if (!has_header) {

@@ -2,7 +2,6 @@
 #include "json_file.h"
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -11,6 +10,7 @@
 
 #include <vdtree/internal/atomic_file.h>
 #include <vdtree/internal/number_text.h>
+#include <vdtree/internal/text_file.h>
 
 namespace unseen::calibration {
 namespace {
@@ -64,11 +64,12 @@ public:
     bool parse_error(std::size_t position, const std::string&, const nlohmann::detail::exception& e) override {
         byte_ = position;
         // The library's diagnosis without its tags and its position, "[json.exception...] ...: diagnosis", on one line.
-        const std::string_view text = e.what();
-        const std::size_t colon = text.find(": ");
+        std::string_view text = e.what();
+        for (const std::string_view end_of_tag : {"] ", ": "})
+            if (const std::size_t end = text.find(end_of_tag); end != text.npos) text.remove_prefix(end + 2);
         problem_ = "is no valid JSON: ";
         constexpr std::size_t longest = 200;
-        for (const char c : text.substr(colon == text.npos ? 0 : colon + 2, longest)) {
+        for (const char c : text.substr(0, longest)) {
             if (c >= ' ' && c <= '~') problem_ += c;
         }
         return false;
@@ -90,23 +91,6 @@ private:
     std::string problem_;
     std::optional<std::size_t> byte_;
 };
-
-Result<std::string> read_text(const std::filesystem::path& file) {
-    errno = 0;
-    std::ifstream stream(file, std::ios::binary);
-    if (!stream) return system_error(file, "open");
-    std::string text;
-    std::array<char, 1u << 16> chunk;
-    while (stream) {
-        stream.read(chunk.data(), chunk.size());
-        text.append(chunk.data(), static_cast<std::size_t>(stream.gcount()));
-        if (text.size() > largest_file) {
-            return file_error(file, ErrorCode::malformed_data, "is larger than 64 MiB, which no profile is");
-        }
-    }
-    if (stream.bad()) return system_error(file, "read");
-    return text;
-}
 
 // ":LINE:COLUMN" of a 1-based byte, columns in bytes: where the parser stopped, the end of what it did not expect.
 std::string line_and_column(std::string_view text, std::size_t byte) {
@@ -166,7 +150,7 @@ Result<void> write_directly(const std::filesystem::path& file, std::string_view 
 
 Result<JsonObject> JsonObject::read(const std::filesystem::path& file,
                                     std::initializer_list<std::string_view> known_keys) {
-    Result<std::string> text = read_text(file);
+    Result<std::string> text = read_text_file(file, largest_file);
     if (!text) return text.error();
     Result<json> parsed = parse(file, *text);
     if (!parsed) return parsed.error();

@@ -32,6 +32,7 @@
 #include <vdtree/colour.h>
 #include <vdtree/internal/atomic_file.h>
 #include <vdtree/internal/number_text.h>
+#include <vdtree/internal/text_file.h>
 
 namespace unseen::perception {
 namespace {
@@ -71,12 +72,14 @@ std::optional<std::string> size_complaint(std::uint64_t width, std::uint64_t hei
 Result<Bytes> read_bytes(const std::filesystem::path& file) {
     std::error_code code;
     if (std::filesystem::is_directory(file, code)) return io_error(file, "is a folder, not an image");
+    const bool ends = std::filesystem::is_regular_file(file, code); // devices may not
     std::ifstream stream(file, std::ios::binary);
     if (!stream) return io_error(file, "cannot be opened; check the name and the permissions");
     Bytes bytes;
     std::array<char, 1 << 16> block;
     while (stream.read(block.data(), block.size()) || stream.gcount() > 0) {
         bytes.insert(bytes.end(), block.data(), block.data() + stream.gcount());
+        if (!ends && bytes.size() > largest_text_bytes) return malformed(file, "does not end after 512 MiB");
     }
     if (stream.bad()) return io_error(file, "cannot be read to its end");
     if (bytes.empty()) return malformed(file, "is empty, not an image");

@@ -116,4 +116,12 @@ TEST_F(BenchCommandTest, IsAProgramOfItsOwn) {
     for (const char* verb : {"engine", "perception", "effects", "budget"}) EXPECT_THAT(help.out, HasSubstr(verb));
 }
 
+TEST_F(BenchCommandTest, SuggestsWhatWasMeant) {
+    EXPECT_THAT(bench({"percetion", "--quick"}).err,
+                HasSubstr("unseen-bench: there is no verb 'percetion': did you mean "
+                          "'perception'?"));
+    EXPECT_THAT(bench({"engine", "--quik"}).err, HasSubstr("did you mean '--quick'?"));
+    EXPECT_EQ(bench({"help", "engine"}).out, bench({"engine", "--help"}).out);
+}
+
 } // namespace

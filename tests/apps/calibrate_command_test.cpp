@@ -34,8 +34,9 @@ TEST_F(CalibrateCommandTest, MeasuresASimulatedObserver) {
 
     // The table stands for the observer: 0.7 of the standard one.
     const auto sensitivity = [&](std::vector<std::string> more) {
-        more.insert(more.begin(), {"csf", "--frequency", "3", "--luminance", "50.25", "--eccentricity", "7"});
-        return std::strtod(run(more).out.c_str(), nullptr);
+        more.insert(more.begin(),
+                    {"csf", "--frequency", "3", "--luminance", "50.25", "--eccentricity", "7", "--json", "-"});
+        return run(more).json()["sensitivity"].get<double>();
     };
     EXPECT_NEAR(20 * std::log10(sensitivity({"--csf", "observer.json"}) / (0.7 * sensitivity({"--table"}))), 0, 1.5);
 }

@@ -1,6 +1,8 @@
 // The verbs that need no GPU, and what all verbs have in common: exit status, errors, files.
 #include "run_command.h"
 
+#include <csignal>
+
 namespace {
 
 using namespace unseen::app::testing;
@@ -9,6 +11,7 @@ using ::testing::ElementsAre;
 using ::testing::Ge;
 using ::testing::HasSubstr;
 using ::testing::Le;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 class UsageTest : public CommandTest {};
@@ -154,7 +157,7 @@ TEST_F(UsageTest, BadInputIsStatusOneWithOneSentenceAndLeavesNothing) {
         {"build", "points.obj", "-o", "o.vdt"},
         {"build", "lines.obj", "-o", "o.vdt"},
         {"build", "ball.vdt", "-o", "o.vdt"},
-        {"build", "ball.obj", "-o", "missing/o.vdt"},
+        {"build", "ball.obj", "-o", "ball.obj/o.vdt"},
         {"build", ".", "-o", "o.vdt"},
         {"info", "missing.vdt"},
         {"info", "noise.vdt"},
@@ -163,8 +166,8 @@ TEST_F(UsageTest, BadInputIsStatusOneWithOneSentenceAndLeavesNothing) {
         {"info", "empty.ply", "--json"},
         {"simplify", "cut.vdt", "-o", "o.ply"},
         {"simplify", "flipped.vdt", "-o", "o.ply", "--json", "o.json"},
-        {"simplify", "ball.vdt", "-o", "missing/o.ply", "--json", "o.json"},
-        {"simplify", "ball.vdt", "-o", "o.ply", "--json", "missing/o.json"},
+        {"simplify", "ball.vdt", "-o", "ball.obj/o.ply", "--json", "o.json"},
+        {"simplify", "ball.vdt", "-o", "o.ply", "--json", "ball.obj/o.json"},
         {"simplify", "ball.vdt", "-o", "o.ply", "--display", "display.json"},
         {"simplify", "ball.vdt", "-o", "o.ply", "--csf", "display.json"},
         {"simplify", "ball.vdt", "-o", "o.ply", "--peak", "0.1"},
@@ -492,6 +495,218 @@ TEST_F(SimplifyTest, ASingleTriangleIsValid) {
     const Outcome outcome = run({"simplify", "one.obj", "-o", "one.ply", "--full", "--json", "-"});
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     EXPECT_EQ(outcome.json()["triangles"], 1);
+}
+
+// ---- what people read, and what they type
+
+TEST_F(SimplifyTest, AnswersInThreeLines) {
+    const Outcome plain = run({"simplify", "ball.vdt", "-o", "small.glb"});
+    ASSERT_EQ(plain.status, 0) << plain.err;
+    EXPECT_THAT(plain.out,
+                ::testing::MatchesRegex(
+                    "kept [0-9,]+ of 1,472 triangles \\([0-9.]+%\\)\n"
+                    "nobody sees a difference, looked at from 0.5 m or more: by the default observer "
+                    "\\(castleCSF, a typical person\\) and judge \\(fold test error\\), in this view, on the "
+                    "default display, wherever the gaze\n"
+                    "wrote small.glb \\([0-9.]+ kB\\)\n"));
+    const auto second_line = [&](std::vector<std::string> more) {
+        more.insert(more.begin(), {"simplify", "ball.vdt", "-o", "small.glb"});
+        const std::string out = run(more).out;
+        return out.substr(out.find('\n') + 1, out.find("\nwrote") - out.find('\n') - 1);
+    };
+    EXPECT_THAT(second_line({"--gaze", "3000", "512"}), ::testing::EndsWith("with the gaze at pixel 3,000 512"));
+    EXPECT_THAT(
+        second_line({"--triangles", "100"}),
+        ::testing::ContainsRegex("^a difference can be seen; looked at from [0-9.]+ m or more, nobody sees it: "));
+    EXPECT_THAT(second_line({"--csf", "daly", "--peak", "200"}),
+                AllOf(HasSubstr("by the observer daly and judge"), HasSubstr("on this display")));
+    EXPECT_EQ(second_line({"--full"}), "nothing is folded");
+    EXPECT_THAT(second_line({"--pixels", "5"}), HasSubstr("not known: the fold test extent counts pixels"));
+}
+
+TEST_F(SimplifyTest, SaysMoreWhenItIsAsked) {
+    const Outcome verbose = run({"simplify", "ball.vdt", "-o", "o.ply", "--verbose"});
+    ASSERT_EQ(verbose.status, 0) << verbose.err;
+    for (const std::string text :
+         {"nodes tested", "adapted in", "effects\n", "  on   fold test: error", "  off  gaze: "})
+        EXPECT_THAT(verbose.out, HasSubstr(text));
+}
+
+TEST_F(BuildTest, SaysWhatItWrote) {
+    write_ball("ball.obj");
+    const Outcome built = run({"build", "ball.obj", "-o", "ball.vdt", "--json", "r.json"});
+    EXPECT_THAT(built.out,
+                ::testing::MatchesRegex("built a tree over 1,472 triangles in [0-9.]+ m?s\n"
+                                        "wrote ball.vdt \\([0-9.]+ kB\\)\nwrote r.json \\([0-9]+ bytes\\)\n"));
+    EXPECT_THAT(run({"build", "ball.obj", "-o", "ball.vdt", "--verbose"}).out, HasSubstr("bytes a triangle"));
+}
+
+TEST_F(SimplifyTest, ABudgetMayBeAShare) {
+    const int count = simplify({"--triangles", "368"})["triangles"];
+    EXPECT_LE(count, 368);
+    EXPECT_EQ(simplify({"--triangles", "25%"})["triangles"], count);
+    EXPECT_EQ(simplify({"--ratio", "0.25"})["triangles"], count);
+    for (const std::vector<std::string>& wrong :
+         std::vector<std::vector<std::string>>{{"--triangles", "0%"},
+                                               {"--triangles", "%"},
+                                               {"--triangles", "nan%"},
+                                               {"--triangles", "-5%"},
+                                               {"--ratio", "0"},
+                                               {"--ratio", "1.5"},
+                                               {"--ratio", "50%"},
+                                               {"--ratio", "0.5", "--triangles", "5"}}) {
+        std::vector<std::string> words = {"simplify", "ball.vdt", "-o", "o.ply"};
+        words.insert(words.end(), wrong.begin(), wrong.end());
+        EXPECT_EQ(run(words).status, 2) << ::testing::PrintToString(wrong);
+    }
+}
+
+TEST_F(UsageTest, SuggestsWhatWasMeant) {
+    const auto complaint = [&](const std::vector<std::string>& words) {
+        const Outcome outcome = run(words);
+        EXPECT_EQ(outcome.status, 2) << outcome.err;
+        return outcome.err;
+    };
+    EXPECT_THAT(complaint({"simplfy"}), HasSubstr("no verb 'simplfy': did you mean 'simplify'?\n"));
+    EXPECT_THAT(complaint({"redner", "ball.vdt", "-o", "o.png"}), HasSubstr("'render'?"));
+    EXPECT_THAT(complaint({"simplify", "b.vdt", "-o", "o.ply", "--triangle", "500"}),
+                HasSubstr("no option '--triangle': did you mean '--triangles'?\n"));
+    EXPECT_THAT(complaint({"simplify", "b.vdt", "--ouptut", "o.ply"}), HasSubstr("did you mean '--output'?"))
+        << "and not that -o is missing";
+    EXPECT_THAT(complaint({"make", "subdivid"}), HasSubstr("'subdivide'?"));
+    EXPECT_THAT(complaint({"info", "b.vdt", "--json=5x", "--verfy"}), HasSubstr("unseen"));
+    EXPECT_THAT(complaint({"frobnicate"}), AllOf(HasSubstr("no verb 'frobnicate'."), Not(HasSubstr("mean"))));
+    EXPECT_THAT(complaint({"info", "a.vdt", "b.vdt"}), HasSubstr("'b.vdt' is one word too many"));
+}
+
+TEST_F(UsageTest, HelpIsAVerb) {
+    EXPECT_EQ(run({"help"}).out, run({"--help"}).out);
+    EXPECT_EQ(run({"help", "simplify"}).out, run({"simplify", "--help"}).out);
+    EXPECT_EQ(run({"help", "make", "subdivide"}).out, run({"make", "subdivide", "--help"}).out);
+    const Outcome unknown = run({"help", "simplfy"});
+    EXPECT_EQ(unknown.status, 2);
+    EXPECT_THAT(unknown.err, HasSubstr("'simplify'?"));
+}
+
+TEST_F(UsageTest, OptionsSayHowManyNumbersTheyNeed) {
+    EXPECT_THAT(run({"simplify", "b.vdt", "--gaze", "500", "-o", "x.ply"}).err,
+                HasSubstr("--gaze: needs two finite numbers, and '-o' is none"));
+    EXPECT_THAT(run({"simplify", "b.vdt", "-o", "x.ply", "--eye", "1", "2", "--full"}).err,
+                HasSubstr("--eye: needs three finite numbers, and '--full' is none"));
+}
+
+TEST_F(SimplifyTest, TooLittleTimeIsNotBlamedOnTheView) {
+    const Outcome outcome = run({"simplify", "ball.vdt", "-o", "o.ply", "--milliseconds", "0"});
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_THAT(outcome.err, AllOf(IsAnErrorForPeople(), HasSubstr("--milliseconds"), Not(HasSubstr("move nearer"))));
+}
+
+// ---- files
+
+TEST_F(SimplifyTest, MakesTheFoldersOfItsOutputs) {
+    const Outcome made = run({"simplify", "ball.vdt", "-o", "new/deep/o.ply", "--json", "new/r.json"});
+    ASSERT_EQ(made.status, 0) << made.err;
+    EXPECT_TRUE(fs::exists(path("new/deep/o.ply")) && fs::exists(path("new/r.json")));
+    const auto before = files();
+    EXPECT_EQ(run({"simplify", "missing.vdt", "-o", "other/deep/o.ply"}).status, 1);
+    EXPECT_EQ(files(), before) << "not even a folder";
+}
+
+TEST_F(SimplifyTest, AReplacedFileKeepsItsPermissions) {
+    constexpr auto secret = fs::perms::owner_read;
+    write_text(path("o.ply"), "");
+    fs::permissions(path("o.ply"), secret);
+    ASSERT_EQ(run({"simplify", "ball.vdt", "-o", "o.ply"}).status, 0);
+    EXPECT_EQ(fs::status(path("o.ply")).permissions(), secret);
+    EXPECT_EQ(run({"info", "o.ply", "--json"}).json()["kind"], "mesh");
+}
+
+TEST_F(UsageTest, NamesThatAreTooLongAreRefusedFirst) {
+    const Outcome outcome = run({"build", "missing.ply", "-o", std::string(300, 'a') + ".vdt"});
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_THAT(outcome.err, HasSubstr("name too long"));
+}
+
+TEST_F(SimplifyTest, AFullStandardOutputIsAnErrorThatSaysWhatIsThere) {
+    const std::string unseen = UNSEEN_COMMAND;
+    const Outcome built = run_shell(unseen + " build ball.obj -o q.vdt > /dev/full");
+    EXPECT_EQ(built.status, 1);
+    EXPECT_THAT(built.err, AllOf(HasSubstr("is the disk full?"), HasSubstr("Written: q.vdt")));
+    EXPECT_EQ(run({"info", "q.vdt", "--verify"}).status, 0);
+    for (const std::string words : {"--help", "--version", "simplify --help", "help", "help build"})
+        EXPECT_EQ(run_shell(unseen + " " + words + " > /dev/full").status, 1) << words;
+}
+
+TEST_F(UsageTest, NamesDoNotSteerTheTerminal) {
+    const std::string evil = "\x1b[31m\xc2\x9b\xff\n";
+    const Outcome missing = run({"info", "a" + evil + ".ply"});
+    EXPECT_EQ(missing.status, 1);
+    EXPECT_THAT(missing.err, AllOf(HasSubstr("a\\x1b[31m\\xc2\\x9b\\xff\\x0a.ply"), Not(HasSubstr("\x1b"))));
+    write_text(path("m.obj"), "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl p\n"
+                              "f 1/1 2/2 3/3\n");
+    write_text(path("m.mtl"), "newmtl p\nmap_Kd \x1b[31m.png\n");
+    const Outcome image = run({"build", "m.obj", "-o", "gr\xc3\xbcn\x1b.vdt"});
+    EXPECT_THAT(image.err + image.out, AllOf(HasSubstr("\\x1b"), Not(HasSubstr("\x1b"))));
+    const Outcome verb = run({"\x1b[31m"});
+    EXPECT_THAT(verb.err, AllOf(HasSubstr("\\x1b"), Not(HasSubstr("\x1b"))));
+    write_ball("gr\xc3\xbcn.obj");
+    EXPECT_THAT(run({"build", "gr\xc3\xbcn.obj", "-o", "gr\xc3\xbcn.vdt"}).out, HasSubstr("wrote gr\xc3\xbcn.vdt"));
+}
+
+TEST_F(SimplifyTest, NumbersBeyondAllRangesAreNamedPlainly) {
+    write_text(path("d.json"), "{\"width_px\": 1e999}");
+    const Outcome outcome = run({"simplify", "ball.vdt", "-o", "o.ply", "--display", "d.json"});
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_THAT(outcome.err, AllOf(HasSubstr("1e999"), Not(HasSubstr("exception"))));
+}
+
+TEST_F(UsageTest, FilesThatNeverEndAreRefused) {
+    for (const std::vector<std::string>& words :
+         std::vector<std::vector<std::string>>{{"compare", "/dev/zero", "/dev/zero"},
+                                               {"csf", "--csv", "/dev/zero", "--luminance", "1"},
+                                               {"calibrate", "--photometer", "/dev/zero", "-o", "o.json"}}) {
+        const Outcome outcome = run(words);
+        EXPECT_EQ(outcome.status, 1) << outcome.err;
+        EXPECT_THAT(outcome.err, AllOf(IsAnErrorForPeople(), HasSubstr("512 MiB")));
+    }
+}
+
+TEST_F(UsageTest, ByteOrderMarksAreNoText) {
+    const std::string mark = "\xef\xbb\xbf";
+    write_text(path("s.csv"), mark + "frequency,luminance\n4,100\n");
+    const Outcome rows = run({"csf", "--csv", "s.csv"});
+    ASSERT_EQ(rows.status, 0) << rows.err;
+    EXPECT_THAT(rows.out, StartsWith("frequency,luminance,sensitivity\n"));
+    EXPECT_EQ(run({"csf", "--csv", "-"}, mark + "frequency,luminance\n4,100\n").out, rows.out);
+}
+
+// ---- signals
+
+class SignalTest : public CommandTest {
+protected:
+    std::set<std::string> temporaries() const {
+        std::set<std::string> names;
+        for (const std::string& name : files())
+            if (name.starts_with(".unseen-")) names.insert(name);
+        return names;
+    }
+};
+
+TEST_F(SignalTest, NothingHalfDoneIsLeft) {
+    write_ball("ball.obj");
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+        const fs::path log = folder().string() + ".log";
+        const pid_t process =
+            start({"make", "subdivide", "ball.obj", "-o", "large.ply", "--times", "6", "--json", "r.json"}, log, log);
+        ASSERT_GT(process, 0);
+        for (int i = 0; i < 6000 && temporaries().empty(); ++i) usleep(10'000);
+        EXPECT_FALSE(temporaries().empty());
+        kill(process, signal);
+        EXPECT_EQ(wait_for(process), -signal);
+        EXPECT_THAT(files(), ElementsAre("ball.obj"));
+        fs::remove(log);
+        fs::remove(log.string() + ".in");
+    }
 }
 
 } // namespace

@@ -11,10 +11,10 @@ using ::testing::HasSubstr;
 class CsfCommandTest : public CommandTest {
 protected:
     double sensitivity(std::vector<std::string> words) const {
-        words.insert(words.begin(), "csf");
+        words.insert(words.begin(), {"csf", "--json", "-"});
         const Outcome outcome = run(words);
         EXPECT_EQ(outcome.status, 0) << outcome.err;
-        return std::strtod(outcome.out.c_str(), nullptr);
+        return outcome.status == 0 ? outcome.json()["sensitivity"].get<double>() : 0;
     }
 };
 

@@ -517,9 +517,9 @@ TEST_F(RenderCommandTest, VerbsThatDrawHaveHelpWithExamples) {
 TEST_F(RenderCommandTest, FailuresLeaveNoFile) {
     const auto before = files();
     for (const std::vector<std::string>& words : std::vector<std::vector<std::string>>{
-             {"render", "ball.vdt", "-o", "missing/o.png", "--json", "o.json"},
+             {"render", "ball.vdt", "-o", "ball.obj/o.png", "--json", "o.json"},
              {"render", "missing.vdt", "-o", "o.png", "--json", "o.json"},
-             {"sheet", "ball.vdt", "-o", "missing/o.png", "--size", "32x32", "--json", "o.json"}}) {
+             {"sheet", "ball.vdt", "-o", "ball.obj/o.png", "--size", "32x32", "--json", "o.json"}}) {
         const Outcome outcome = run(words);
         EXPECT_EQ(outcome.status, 1) << outcome.out;
         EXPECT_THAT(outcome.err, IsAnErrorForPeople());
@@ -528,7 +528,7 @@ TEST_F(RenderCommandTest, FailuresLeaveNoFile) {
     EXPECT_EQ(run({"render", "ball.vdt", "--path", "orbit:0:2", "--no-draw", "--csv", "ball.vdt"}).status, 1)
         << "the model";
     EXPECT_EQ(
-        run({"render", "ball.vdt", "--path", "orbit:0:2", "--no-draw", "--csv", "o.csv", "--plot", "missing/o.png"})
+        run({"render", "ball.vdt", "--path", "orbit:0:2", "--no-draw", "--csv", "o.csv", "--plot", "ball.obj/o.png"})
             .status,
         1);
     EXPECT_EQ(files(), before);
@@ -573,6 +573,85 @@ TEST_F(NoGpuTest, RenderingSaysSoAndEverythingElseWorks) {
         EXPECT_EQ(files(), before);
     }
     EXPECT_EQ(run({"simplify", "ball.vdt", "-o", "o.ply"}).status, 0);
+    EXPECT_EQ(run({"render", "ball.vdt", "--path", "orbit:5:3", "--csv", "o.csv"}).status, 0) << "nothing is drawn";
+}
+
+TEST_F(RenderCommandTest, AnswersInThreeLines) {
+    const Outcome outcome = run({"render", "ball.vdt", "-o", "o.png", "--size", "96x80"});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    EXPECT_THAT(outcome.out, ::testing::MatchesRegex("kept [0-9,]+ of 1,472 triangles \\([0-9.]+%\\)\n"
+                                                     "nobody sees a difference, looked at from 0.5 m or more: [^\n]+\n"
+                                                     "wrote o.png \\([0-9.]+ kB\\)\n"));
+    const Outcome verbose = run({"render", "ball.vdt", "-o", "o.png", "--size", "96x80", "--verbose"});
+    for (const std::string text : {"drawn in", "effects\n", "drawn by "}) EXPECT_THAT(verbose.out, HasSubstr(text));
+}
+
+TEST_F(RenderCommandTest, FlightsDrawWhatIsKept) {
+    const std::vector<std::string> flight = {"render", "ball.vdt", "--path", "orbit:5:3",
+                                             "--size", "96x80",    "--csv",  "o.csv"};
+    const auto drawn = [&](std::vector<std::string> more) {
+        more.insert(more.begin(), flight.begin(), flight.end());
+        const Outcome outcome = run(more);
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        EXPECT_THAT(outcome.out, HasSubstr("3 frames; the median frame kept "));
+        EXPECT_THAT(outcome.out, HasSubstr("in the last frame"));
+        EXPECT_THAT(outcome.out, HasSubstr("\nwrote o.csv ("));
+        return outcome.out.find("nothing was drawn") == std::string::npos;
+    };
+    EXPECT_FALSE(drawn({}));
+    EXPECT_FALSE(drawn({"--no-draw"}));
+    EXPECT_TRUE(drawn({"--draw"}));
+    EXPECT_TRUE(drawn({"-o", "f%d.png"}));
+}
+
+// A flight of minutes, on a terminal: it says how long it will take, and Ctrl-C keeps its rows.
+TEST_F(RenderCommandTest, InterruptedFlightsKeepTheirRows) {
+    const int terminal = posix_openpt(O_RDWR | O_NOCTTY);
+    ASSERT_GE(terminal, 0);
+    ASSERT_EQ(grantpt(terminal), 0);
+    ASSERT_EQ(unlockpt(terminal), 0);
+    const fs::path out = folder().string() + ".out";
+    const pid_t process =
+        start({"render", "ball.vdt", "--path", "orbit:0.01:1000000", "--pixels", "2", "--csv", "o.csv"}, out,
+              ptsname(terminal));
+    ASSERT_GT(process, 0);
+    std::string shown;
+    std::array<char, 4096> block;
+    bool is_interrupted = false;
+    for (ssize_t got = 0; (got = read(terminal, block.data(), block.size())) > 0;) { // ends with the process
+        shown.append(block.data(), static_cast<std::size_t>(got));
+        if (is_interrupted || shown.find(" left") == std::string::npos) continue;
+        is_interrupted = true;
+        kill(process, SIGINT);
+    }
+    EXPECT_EQ(wait_for(process), -SIGINT);
+    close(terminal);
+    fs::remove(out);
+    EXPECT_THAT(shown, ::testing::ContainsRegex("flying \\[[#.]+\\] +[0-9]+% frames, [0-9]+[^\r]* left"));
+    EXPECT_THAT(shown, ::testing::ContainsRegex("interrupted after [0-9,]+ of 1,000,000 frames"));
+    const std::string csv = read_text(path("o.csv"));
+    EXPECT_TRUE(csv.ends_with('\n'));
+    EXPECT_GT(std::count(csv.begin(), csv.end(), '\n'), 1);
+    EXPECT_THAT(files(), ::testing::UnorderedElementsAre("ball.obj", "ball.vdt", "o.csv"));
+}
+
+TEST_F(RenderCommandTest, PathsAndTracesAreTextOfAnEnd) {
+    const std::string mark = "\xef\xbb\xbf";
+    for (const std::vector<std::string>& words : std::vector<std::vector<std::string>>{
+             {"--path", "/dev/zero"}, {"--path", "orbit:0:2", "--gaze-trace", "/dev/zero"}}) {
+        std::vector<std::string> all = {"render", "ball.vdt"};
+        all.insert(all.end(), words.begin(), words.end());
+        const Outcome outcome = run(all);
+        EXPECT_EQ(outcome.status, 1);
+        EXPECT_THAT(outcome.err, ::testing::AllOf(IsAnErrorForPeople(), HasSubstr("512 MiB")));
+    }
+    write_text(path("p.csv"), mark + "eye_x,eye_y,eye_z,target_x,target_y,target_z\n0,0,3,0,0,0\n");
+    write_text(path("g.csv"), mark + "time_s,x_px,y_px\n0,1,2\n");
+    const Outcome flown = run({"render", "ball.vdt", "--path", "p.csv", "--gaze-trace", "g.csv"});
+    EXPECT_EQ(flown.status, 0) << flown.err;
+    write_text(path("p.csv"), "eye_\x1b[31m\n");
+    EXPECT_THAT(run({"render", "ball.vdt", "--path", "p.csv"}).err,
+                ::testing::AllOf(HasSubstr("eye_\\x1b[31m"), ::testing::Not(HasSubstr("\x1b"))));
 }
 
 } // namespace

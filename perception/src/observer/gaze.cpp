@@ -6,8 +6,8 @@
 #include <cassert>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <numbers>
+#include <sstream>
 #include <string>
 
 #include <glm/geometric.hpp>
@@ -18,6 +18,7 @@
 
 #include <vdtree/internal/number_text.h>
 #include <vdtree/internal/random.h>
+#include <vdtree/internal/text_file.h>
 
 namespace unseen::perception {
 namespace {
@@ -152,8 +153,9 @@ glm::dvec2 GazeTrace::at(double time_s) const {
 }
 
 Result<GazeTrace> read_gaze_trace(const std::filesystem::path& file) {
-    std::ifstream stream(file, std::ios::binary);
-    if (!stream) return Error{ErrorCode::io_failure, file.string() + ": cannot be opened."};
+    const auto whole = read_text_file(file);
+    if (!whole) return whole.error();
+    std::istringstream stream(*whole);
     std::vector<GazeSample> samples;
     bool has_header = false;
     std::size_t line_number = 0;
@@ -177,7 +179,6 @@ Result<GazeTrace> read_gaze_trace(const std::filesystem::path& file) {
         if (samples.size() == most_samples) return complain("there are more than ten million samples");
         samples.push_back(*sample);
     }
-    if (stream.bad()) return Error{ErrorCode::io_failure, file.string() + ": cannot be read to its end."};
     if (samples.empty()) return complain("there is no sample");
     return GazeTrace::create(std::move(samples));
 }

@@ -2,7 +2,10 @@
 #include <vdtree/internal/atomic_file.h>
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <cerrno>
+#include <climits>
 #include <cstdint>
 #include <random>
 #include <string>
@@ -32,6 +35,36 @@ Error io_error(const fs::path& file, const std::string& what, int cause) {
     return {ErrorCode::io_failure,
             "Cannot " + what + " '" + file.string() + "': " + std::generic_category().message(cause) + "."};
 }
+
+// ---- the temporaries of this process, for signal handlers, which may neither lock nor allocate
+
+struct ListedName {
+    enum Use { unused, being_named, named };
+    std::atomic<Use> use = unused;
+    std::array<char, PATH_MAX> text;
+};
+static_assert(std::atomic<ListedName::Use>::is_always_lock_free);
+std::array<ListedName, 32> temporaries;
+
+// Its place in the list; -1 where the list is full.
+int list(const fs::path& file) {
+    const std::string& name = file.native();
+    for (std::size_t i = 0; i < temporaries.size() && name.size() < PATH_MAX; ++i) {
+        ListedName& entry = temporaries[i];
+        ListedName::Use expected = ListedName::unused;
+        if (!entry.use.compare_exchange_strong(expected, ListedName::being_named)) continue;
+        std::copy_n(name.c_str(), name.size() + 1, entry.text.begin());
+        entry.use = ListedName::named;
+        return static_cast<int>(i);
+    }
+    return -1;
+}
+
+void unlist(int place) {
+    if (place >= 0) temporaries[static_cast<std::size_t>(place)].use = ListedName::unused;
+}
+
+// ----
 
 // Does not contain the target's name, which may already be as long as a name can be.
 fs::path random_sibling(const fs::path& target, std::random_device& random) {
@@ -69,6 +102,7 @@ Result<fs::path> follow(const fs::path& target) {
 Result<AtomicFile> AtomicFile::create(const fs::path& target) {
     std::error_code failure;
     const fs::file_status status = fs::status(target, failure);
+    if (failure == std::errc::filename_too_long) return io_error(target, "create", failure.value());
     if (target.filename().empty() || fs::is_directory(status)) {
         return Error{ErrorCode::invalid_argument,
                      "Cannot write to '" + target.string() + "': it is a folder; give the name of a file."};
@@ -83,10 +117,14 @@ Result<AtomicFile> AtomicFile::create(const fs::path& target) {
     std::random_device random;
     for (int attempt = 0; attempt < max_name_attempts; ++attempt) {
         fs::path temporary = random_sibling(*real_target, random);
+        const int place = list(temporary); // before it is there: a signal may come at any time
         const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-        if (descriptor >= 0 && claim(descriptor)) return AtomicFile(descriptor, *real_target, std::move(temporary));
+        const int cause = errno;
+        if (descriptor >= 0 && claim(descriptor))
+            return AtomicFile(descriptor, *real_target, std::move(temporary), place);
+        unlist(place);
         if (descriptor >= 0) ::close(descriptor);
-        else if (errno != EEXIST) return io_error(target, "create", errno);
+        else if (cause != EEXIST) return io_error(target, "create", cause);
     }
     return io_error(target, "create", EEXIST);
 }
@@ -106,19 +144,25 @@ void AtomicFile::remove_orphans(const fs::path& target) {
     }
 }
 
-AtomicFile::AtomicFile(int descriptor, fs::path target, fs::path temporary)
-    : descriptor_(descriptor), target_(std::move(target)), temporary_(std::move(temporary)) {}
+void AtomicFile::remove_all() noexcept {
+    for (const ListedName& entry : temporaries)
+        if (entry.use == ListedName::named) ::unlink(entry.text.data());
+}
+
+AtomicFile::AtomicFile(int descriptor, fs::path target, fs::path temporary, int place)
+    : descriptor_(descriptor), target_(std::move(target)), temporary_(std::move(temporary)), place_(place) {}
 
 AtomicFile::AtomicFile(AtomicFile&& other) noexcept
     : descriptor_(std::exchange(other.descriptor_, -1)), target_(std::move(other.target_)),
-      temporary_(std::move(other.temporary_)) {}
+      temporary_(std::exchange(other.temporary_, {})), place_(std::exchange(other.place_, -1)) {}
 
 AtomicFile& AtomicFile::operator=(AtomicFile&& other) noexcept {
     if (this != &other) {
         discard();
         descriptor_ = std::exchange(other.descriptor_, -1);
         target_ = std::move(other.target_);
-        temporary_ = std::move(other.temporary_);
+        temporary_ = std::exchange(other.temporary_, {});
+        place_ = std::exchange(other.place_, -1);
     }
     return *this;
 }
@@ -126,9 +170,10 @@ AtomicFile& AtomicFile::operator=(AtomicFile&& other) noexcept {
 AtomicFile::~AtomicFile() { discard(); }
 
 void AtomicFile::discard() noexcept {
-    if (descriptor_ < 0) return;
-    ::close(std::exchange(descriptor_, -1));
-    ::unlink(temporary_.c_str());
+    if (temporary_.empty()) return; // moved away, or renamed
+    if (descriptor_ >= 0) ::close(std::exchange(descriptor_, -1));
+    ::unlink(std::exchange(temporary_, {}).c_str());
+    unlist(std::exchange(place_, -1));
 }
 
 Result<void> AtomicFile::write(std::span<const std::byte> bytes) {
@@ -144,22 +189,20 @@ Result<void> AtomicFile::write(std::span<const std::byte> bytes) {
 Result<void> AtomicFile::write(std::string_view bytes) { return write(std::as_bytes(std::span(bytes))); }
 
 Result<void> AtomicFile::commit() {
-    // The data must be on the disk before the name is, or a power cut could leave the name with an empty file.
-    if (::fsync(descriptor_) != 0 && errno != EINVAL && errno != ENOTSUP) {
+    const auto failed = [this](const std::string& what) {
         const int cause = errno;
         discard();
-        return io_error(target_, "write", cause);
-    }
-    if (::close(std::exchange(descriptor_, -1)) != 0) {
-        const int cause = errno;
-        ::unlink(temporary_.c_str());
-        return io_error(target_, "write", cause);
-    }
-    if (::rename(temporary_.c_str(), target_.c_str()) != 0) {
-        const int cause = errno;
-        ::unlink(temporary_.c_str());
-        return io_error(target_, "replace", cause);
-    }
+        return io_error(target_, what, cause);
+    };
+    constexpr mode_t permissions = 0777;
+    struct stat replaced {};
+    if (::stat(target_.c_str(), &replaced) == 0) ::fchmod(descriptor_, replaced.st_mode & permissions);
+    // The data must be on the disk before the name is, or a power cut could leave the name with an empty file.
+    if (::fsync(descriptor_) != 0 && errno != EINVAL && errno != ENOTSUP) return failed("write");
+    if (::close(std::exchange(descriptor_, -1)) != 0) return failed("write");
+    if (::rename(temporary_.c_str(), target_.c_str()) != 0) return failed("replace");
+    temporary_.clear();
+    unlist(std::exchange(place_, -1));
     return {};
 }
 
