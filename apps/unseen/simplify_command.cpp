@@ -35,16 +35,18 @@ Result<int> run(const SimplifyArguments& a) {
     auto result = session->simplify(make_view(*session, a.view), a.what.request);
     if (!result) return result.error();
     const auto start = std::chrono::steady_clock::now();
-    const vdtree::Mesh mesh = result->mesh();
+    result->cuts[0].indices();
     result->extract_ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-    if (mesh.triangles.empty()) {
+    if (result->cuts[0].triangle_count() == 0) {
         return Error{ErrorCode::invalid_argument,
                      "No triangle is left, for the model is too small in this view or the budget too low: "
                      "move nearer or allow more triangles."};
     }
 
     if (auto ok = report->prepare(to_json(*result, nothing_drawn)); !ok) return ok.error();
-    if (auto ok = meshio::write_mesh(a.out, mesh.view()); !ok) return ok.error();
+    const auto notes = meshio::write_cut(a.out, result->cuts[0]);
+    if (!notes) return notes.error();
+    for (const std::string& note : *notes) print_note(a.out + ": " + note);
     if (auto ok = report->publish(); !ok) return ok.error();
     if (!report->is_on_stdout()) print(*result, nothing_drawn);
     return exit_done;
@@ -57,16 +59,21 @@ Command simplify_command(CLI::App& app) {
     CLI::App* verb = app.add_subcommand("simplify", "Write a simplified mesh for a view");
     verb->add_option("TREE", a->model, "A tree, or a mesh")->required()->type_name("TREE.vdt|MESH");
     verb->add_option("-o,--output", a->out, "The mesh")
-        ->type_name("OUT.ply|.obj|.glb")
+        ->type_name("OUT.ply|.obj|.glb|.gltf")
         ->required()
-        ->check(ending_in({".ply", ".obj", ".glb"}));
+        ->check(ending_in({".ply", ".obj", ".glb", ".gltf"}));
     add_json_option(*verb, a->json);
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->what);
-    verb->footer("Examples:\n  unseen simplify bunny.vdt -o seen-from-the-right.ply --direction 1 0 0\n"
-                 "  unseen simplify bunny.vdt -o small.obj --triangles 5000 --json report.json\n"
-                 "  unseen simplify bunny.vdt -o rough.glb --pixels 4 --fold-test displacement");
+    verb->footer(
+        "OUT.glb, .gltf (with its data in OUT.bin) and .obj have what the model's glTF or OBJ file had: nodes, names,\n"
+        "materials, texture coordinates. Images in the file stay in it; images and .mtl files beside it are copied\n"
+        "to the folder of OUT under their names, where no other file of that name may be.\n\n"
+        "Examples:\n  unseen simplify bunny.vdt -o seen-from-the-right.ply --direction 1 0 0\n"
+        "  unseen simplify bunny.vdt -o small.obj --triangles 5000 --json report.json\n"
+        "  unseen simplify house.gltf -o small.glb --pixels 2 --drop animations\n"
+        "  unseen simplify bunny.vdt -o rough.glb --pixels 4 --fold-test displacement");
     return {verb, [a] { return run(*a); }};
 }
 

@@ -88,10 +88,10 @@ TEST_F(Materials, ThatCannotBeReadAreNotedAndBadOnesAreNot) {
     EXPECT_NE(other->warnings[0].find("1 material is in no library that was read, the first 'a'"), std::string::npos)
         << other->warnings[0];
     meshio::ReadOptions without;
-    without.materials = false;
-    const auto result = read("newmtl a\nKd nan\n", "m.mtl", without);
-    ASSERT_TRUE(result);
-    EXPECT_TRUE(result->materials.empty());
+    without.images = false;
+    const auto result = read("newmtl a\nKd 0 0 0\nmap_Kd ../p.png\n", "m.mtl", without);
+    ASSERT_TRUE(result) << result.error().message;
+    EXPECT_FALSE(result->materials.at(0).has_image());
 }
 
 // A file of many materials over one image, or over many images of one buffer view, is not much larger when it has been read.
