@@ -20,18 +20,35 @@ std::string verdict(const BenchRow& row) {
     return holds(row, *must) ? "must met" : "must missed";
 }
 
+void print_markdown(const std::vector<std::vector<std::string>>& rows) {
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+        for (const std::string& cell : rows[r]) std::printf("| %s ", cell.c_str());
+        std::printf("|\n");
+        if (r > 0) continue;
+        for (std::size_t column = 0; column < rows[r].size(); ++column) std::printf(column == 0 ? "|---" : "|---:");
+        std::printf("|\n");
+    }
+}
+
 } // namespace
 
-void print(const std::string& title, const std::vector<BenchRow>& rows) {
-    std::printf("%s\n\n", title.c_str());
-    std::vector<std::vector<std::string>> table = {{"measure", "measured", "unit", "must", "aim", "verdict"}};
-    for (const BenchRow& row : rows)
-        table.push_back({row.name, row.value ? with_decimals(*row.value, row.decimals) : "not available", row.unit,
-                         bound_text(row.target.must), bound_text(row.target.aim), verdict(row)});
-    print_table(table);
-    std::printf("\n");
-    for (const BenchRow& row : rows)
-        if (!row.note.empty()) std::printf("%s: %s\n", row.name.c_str(), row.note.c_str());
+BenchTable table_of(const std::string& title, const std::vector<BenchRow>& rows) {
+    BenchTable table{title, {{"measure", "measured", "unit", "must", "aim", "verdict"}}, {}};
+    for (const BenchRow& row : rows) {
+        table.rows.push_back({row.name, row.value ? with_decimals(*row.value, row.decimals) : "not available", row.unit,
+                              bound_text(row.target.must), bound_text(row.target.aim), verdict(row)});
+        if (!row.note.empty()) table.notes.push_back(row.name + ": " + row.note);
+    }
+    return table;
+}
+
+void print(const BenchTable& table, TableStyle style) {
+    if (!table.title.empty()) std::printf("%s\n\n", table.title.c_str());
+    if (style == TableStyle::aligned) print_table(table.rows);
+    else print_markdown(table.rows);
+    if (!table.notes.empty()) std::printf("\n");
+    for (const std::string& note : table.notes)
+        std::printf(style == TableStyle::markdown ? "- %s\n" : "%s\n", note.c_str());
 }
 
 Json to_json(const std::vector<BenchRow>& rows) {

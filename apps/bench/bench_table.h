@@ -19,8 +19,17 @@ struct BenchRow {
     int decimals = 0;
 };
 
-// A title, the rows in columns, and the notes below.
-void print(const std::string& title, const std::vector<BenchRow>& rows);
+// What is printed: a title, columns of text, and notes below. Empty parts are left out.
+struct BenchTable {
+    std::string title = {};
+    std::vector<std::vector<std::string>> rows = {}; // the first one is the header
+    std::vector<std::string> notes = {};
+};
+BenchTable table_of(const std::string& title, const std::vector<BenchRow>& rows);
+
+// To stdout: aligned for terminals, or as Markdown for pages.
+enum class TableStyle { aligned, markdown };
+void print(const BenchTable& table, TableStyle style);
 
 Json to_json(const std::vector<BenchRow>& rows);
 

@@ -184,10 +184,10 @@ Result<void> write_picture(const std::string& file, const Comparison::Spent& lef
 
 BudgetBenchResult result_of(const std::vector<BudgetUse>& uses) {
     BudgetBenchResult result;
-    result.table = {{"fold test", "triangles", "visible pixels", "largest V", "at the contour"}};
+    result.table.rows = {{"fold test", "triangles", "visible pixels", "largest V", "at the contour"}};
     for (const BudgetUse& use : uses) {
-        result.table.push_back({use.name, grouped(use.triangles), grouped(use.visible_pixels), rounded(use.largest, 3),
-                                rounded(use.contour_percent, 3) + "%"});
+        result.table.rows.push_back({use.name, grouped(use.triangles), grouped(use.visible_pixels),
+                                     rounded(use.largest, 3), rounded(use.contour_percent, 3) + "%"});
         result.tests.push_back({{"fold_test", use.name},
                                 {"triangles", use.triangles},
                                 {"visible_pixels", use.visible_pixels},

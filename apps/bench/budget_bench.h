@@ -8,7 +8,7 @@
 
 #include <vdtree/vertex_tree.h>
 
-#include "report.h"
+#include "bench_table.h"
 
 namespace unseen::app {
 
@@ -22,7 +22,7 @@ struct BudgetBenchOptions {
 // Of each: triangles; pixels that differ visibly from the full model, and their largest V; and the share of triangles with a corner within
 // four pixels of the full model's contour.
 struct BudgetBenchResult {
-    std::vector<std::vector<std::string>> table; // the first row is the header
+    BenchTable table;
     Json tests = Json::array();
 };
 

@@ -184,12 +184,12 @@ Result<EffectsBenchResult> bench_effects(const EffectsBenchOptions& options) {
     if (!trees) return trees.error();
     const std::vector<Variation> all = variations();
     EffectsBenchResult result;
-    result.table.assign(all.size() + 2, {});
-    result.table[0].push_back("triangles kept; ms of a new cut");
-    result.table[1].push_back("of");
+    result.table.rows.assign(all.size() + 2, {});
+    result.table.rows[0].push_back("triangles kept; ms of a new cut");
+    result.table.rows[1].push_back("of");
     for (std::size_t i = 0; i < all.size(); ++i) {
-        result.table[i + 2].push_back(all[i].name);
-        result.notes.push_back(all[i].name + ": " + all[i].note);
+        result.table.rows[i + 2].push_back(all[i].name);
+        result.table.notes.push_back(all[i].name + ": " + all[i].note);
     }
     const Pinned pinned;
     for (auto& [name, tree] : *trees) {
@@ -199,12 +199,12 @@ Result<EffectsBenchResult> bench_effects(const EffectsBenchOptions& options) {
         const auto with_errors = session::Session::create(session::Scene::of(std::move(*measured_tree)));
         if (!session) return session.error();
         if (!with_errors) return with_errors.error();
-        result.table[0].push_back(name);
-        result.table[1].push_back(grouped(session->tree().triangle_count()));
+        result.table.rows[0].push_back(name);
+        result.table.rows[1].push_back(grouped(session->tree().triangle_count()));
         for (std::size_t i = 0; i < all.size(); ++i) {
             const auto found = measure(all[i].needs_errors ? *with_errors : *session, all[i], options.quick ? 3 : 11);
             if (!found) return found.error();
-            result.table[i + 2].push_back(grouped(found->triangles) + "; " + rounded(found->milliseconds, 3));
+            result.table.rows[i + 2].push_back(grouped(found->triangles) + "; " + rounded(found->milliseconds, 3));
             result.effects.push_back({{"mesh", name},
                                       {"variation", all[i].name},
                                       {"triangles", found->triangles},

@@ -14,8 +14,7 @@ struct EffectsBenchOptions {
 };
 
 struct EffectsBenchResult {
-    std::vector<std::vector<std::string>> table; // the first row is the header: meshes
-    std::vector<std::string> notes;
+    BenchTable table; // a column for each mesh
     Json effects = Json::array();
 };
 

@@ -23,38 +23,52 @@
 namespace unseen::app {
 namespace {
 
+struct ReportArguments {
+    std::string json;
+    bool markdown = false;
+};
+
+void add_report_options(CLI::App& verb, ReportArguments& report) {
+    add_json_option(verb, report.json);
+    verb.add_flag("--markdown", report.markdown, "Print the tables as Markdown");
+}
+
 // A benchmark from its options to its report: what it reads, what it writes, and the load of the machine before.
 class BenchRun {
 public:
     static Result<BenchRun> open(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs,
-                                 const std::string& json) {
+                                 const ReportArguments& wanted) {
         std::vector<std::string> all = outputs;
-        all.push_back(json);
+        all.push_back(wanted.json);
         if (const auto ready = check_outputs(inputs, all); !ready) return ready.error();
-        auto report = JsonReport::open(json);
+        auto report = JsonReport::open(wanted.json);
         if (!report) return report.error();
         const MachineLoad load = machine_load();
         if (load.is_high()) print_note(load.advice());
-        return BenchRun(std::move(*report), load);
+        return BenchRun(std::move(*report), load, wanted.markdown ? TableStyle::markdown : TableStyle::aligned);
     }
 
-    // Writes the report; `print` is for people, where stdout is theirs.
-    template <class Print>
-    Result<int> close(Json json, Print print) {
+    // Writes the report, and the tables for people, where stdout is theirs.
+    Result<int> close(Json json, const std::vector<BenchTable>& tables) {
         json["load_average"] = number_or_null(load_.average);
         if (auto ok = report_.prepare(json); !ok) return ok.error();
         if (auto ok = report_.publish(); !ok) return ok.error();
         if (report_.is_on_stdout()) return exit_done;
-        print();
-        if (load_.is_high()) std::printf("\nNote: %s\n", load_.advice().c_str());
+        for (std::size_t i = 0; i < tables.size(); ++i) {
+            if (i > 0) std::printf("\n");
+            print(tables[i], style_);
+        }
+        if (load_.is_high() && style_ == TableStyle::aligned) std::printf("\nNote: %s\n", load_.advice().c_str());
         return exit_done;
     }
 
 private:
-    BenchRun(JsonReport report, MachineLoad load) : report_(std::move(report)), load_(load) {}
+    BenchRun(JsonReport report, MachineLoad load, TableStyle style)
+        : report_(std::move(report)), load_(load), style_(style) {}
 
     JsonReport report_;
     MachineLoad load_;
+    TableStyle style_;
 };
 
 void add_targets_option(CLI::App& verb, std::string& file) {
@@ -65,7 +79,8 @@ void add_targets_option(CLI::App& verb, std::string& file) {
 
 struct EngineArguments {
     EngineBenchOptions options;
-    std::string sizes = "70k,0.9M,3.5M,14M,28M", targets, json;
+    std::string sizes = "70k,0.9M,3.5M,14M,28M", targets;
+    ReportArguments report;
 };
 
 constexpr const char* quick_sizes = "70k,0.9M";
@@ -99,12 +114,12 @@ Result<int> run(EngineArguments& a) {
     const auto targets = Targets::read(a.targets);
     if (!targets) return targets.error();
     a.options.targets = *targets;
-    auto bench = BenchRun::open({a.options.mesh, a.targets}, {}, a.json);
+    auto bench = BenchRun::open({a.options.mesh, a.targets}, {}, a.report);
     if (!bench) return bench.error();
     const auto result = bench_engine(a.options);
     if (!result) return result.error();
     return bench->close({{"mesh", result->mesh}, {"rows", to_json(result->rows)}, {"sizes", result->sizes}},
-                        [&] { print(result->mesh, result->rows); });
+                        {table_of(result->mesh, result->rows)});
 }
 
 Command engine_command(CLI::App& app) {
@@ -121,7 +136,7 @@ Command engine_command(CLI::App& app) {
         ->type_name("FOLDER");
     verb->add_flag("--quick", a->options.quick, "Few frames and sizes: rough figures");
     add_targets_option(*verb, a->targets);
-    add_json_option(*verb, a->json);
+    add_report_options(*verb, a->report);
     verb->callback([a, sizes] {
         if (sizes->empty() && a->options.quick) a->sizes = quick_sizes;
         a->options.sizes = parse_sizes(a->sizes);
@@ -135,7 +150,8 @@ Command engine_command(CLI::App& app) {
 
 struct PerceptionArguments {
     PerceptionBenchOptions options;
-    std::string only, targets, json;
+    std::string only, targets;
+    ReportArguments report;
 };
 
 std::vector<std::string> parse_groups(std::string_view list) {
@@ -167,17 +183,13 @@ Result<int> run(PerceptionArguments& a) {
     std::vector<std::string> inputs = a.options.meshes;
     inputs.insert(inputs.end(), a.options.others.begin(), a.options.others.end());
     inputs.push_back(a.targets);
-    auto bench = BenchRun::open(inputs, {}, a.json);
+    auto bench = BenchRun::open(inputs, {}, a.report);
     if (!bench) return bench.error();
     const auto result = bench_perception(a.options);
     if (!result) return result.error();
-    return bench->close({{"title", result->title}, {"rows", to_json(result->rows)}, {"views", result->views}}, [&] {
-        print(result->title, result->rows);
-        for (const BenchDetails& details : result->details) {
-            std::printf("\n%s\n\n", details.title.c_str());
-            print_table(details.rows);
-        }
-    });
+    std::vector<BenchTable> tables = {table_of(result->title, result->rows)};
+    tables.insert(tables.end(), result->details.begin(), result->details.end());
+    return bench->close({{"title", result->title}, {"rows", to_json(result->rows)}, {"views", result->views}}, tables);
 }
 
 Command perception_command(CLI::App& app) {
@@ -208,7 +220,7 @@ Command perception_command(CLI::App& app) {
         ->check(whole(64, 4096));
     verb->add_flag("--quick", o.quick, "Few views: rough figures");
     add_targets_option(*verb, a->targets);
-    add_json_option(*verb, a->json);
+    add_report_options(*verb, a->report);
     verb->callback([a] { a->options.only = parse_groups(a->only); });
     verb->footer(
         "Pictures are drawn with 64 samples a pixel; all of it takes about half an hour without a graphics card.\n\n"
@@ -221,19 +233,15 @@ Command perception_command(CLI::App& app) {
 
 struct EffectsArguments {
     EffectsBenchOptions options;
-    std::string json;
+    ReportArguments report;
 };
 
 Result<int> run(EffectsArguments& a) {
-    auto bench = BenchRun::open(a.options.meshes, {}, a.json);
+    auto bench = BenchRun::open(a.options.meshes, {}, a.report);
     if (!bench) return bench.error();
     const auto result = bench_effects(a.options);
     if (!result) return result.error();
-    return bench->close({{"effects", result->effects}}, [&] {
-        print_table(result->table);
-        std::printf("\n");
-        for (const std::string& note : result->notes) std::printf("%s\n", note.c_str());
-    });
+    return bench->close({{"effects", result->effects}}, {result->table});
 }
 
 Command effects_command(CLI::App& app) {
@@ -243,7 +251,7 @@ Command effects_command(CLI::App& app) {
     verb->add_option("--mesh", a->options.meshes, "Meshes or trees (default: as for 'unseen-bench perception')")
         ->type_name("MESH");
     verb->add_flag("--quick", a->options.quick, "Few repetitions");
-    add_json_option(*verb, a->json);
+    add_report_options(*verb, a->report);
     verb->footer("Examples:\n  unseen-bench effects --mesh bunny.ply horse.ply dragon.ply");
     return {verb, [a] { return run(*a); }};
 }
@@ -251,16 +259,16 @@ Command effects_command(CLI::App& app) {
 struct BudgetArguments {
     BudgetBenchOptions options;
     std::optional<glm::dvec3> direction;
-    std::string json;
+    ReportArguments report;
 };
 
 Result<int> run(BudgetArguments& a) {
     if (a.direction) a.options.direction = *a.direction;
-    auto bench = BenchRun::open({a.options.mesh}, {a.options.picture}, a.json);
+    auto bench = BenchRun::open({a.options.mesh}, {a.options.picture}, a.report);
     if (!bench) return bench.error();
     const auto result = bench_budget(a.options);
     if (!result) return result.error();
-    return bench->close({{"tests", result->tests}}, [&] { print_table(result->table); });
+    return bench->close({{"tests", result->tests}}, {result->table});
 }
 
 Command budget_command(CLI::App& app) {
@@ -273,7 +281,7 @@ Command budget_command(CLI::App& app) {
         ->check(ending_in({".png"}));
     add_triangles_option(*verb, a->options.triangles, "The budget (default: 18000)");
     add_vector(*verb, "--direction", a->direction, "From the model towards the eye (default: 1 0 0)");
-    add_json_option(*verb, a->json);
+    add_report_options(*verb, a->report);
     verb->callback([a] {
         if (a->direction && *a->direction == glm::dvec3(0)) refuse("--direction must not be 0 0 0.");
     });

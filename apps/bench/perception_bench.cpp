@@ -400,7 +400,7 @@ private:
                 }
             }
         }
-        BenchDetails details{
+        BenchTable details{
             "Triangles kept, mean of " + std::to_string(direction_count()) + " directions and " +
                 std::to_string(main_models_) +
                 " meshes; what can be seen of it in the worst view; V, and by the second judge",
@@ -565,9 +565,9 @@ private:
                     progress(found.size() / std::size(tests), all, "hard meshes");
                     if (auto ok = judge("hard", hard_models, m, look(direction, fill, gaze), found); !ok) return ok;
                 }
-        BenchDetails details{"Hard meshes: triangles kept of all, in all views; visible pixels; largest V; largest V "
-                             "of the second judge",
-                             {{"mesh", "test", "kept", "visible", "largest V", "second: visible", "V"}}};
+        BenchTable details{"Hard meshes: triangles kept of all, in all views; visible pixels; largest V; largest V "
+                           "of the second judge",
+                           {{"mesh", "test", "kept", "visible", "largest V", "second: visible", "V"}}};
         std::vector<Judged> worst;
         for (std::size_t m = 0; m < hard_models.size(); ++m) {
             std::vector<Judged> of_mesh;
@@ -667,7 +667,7 @@ private:
                     looks.emplace_back(m, look(directions[d], fill, gaze));
             return looks;
         };
-        BenchDetails details{
+        BenchTable details{
             "One tolerance for all views against one threshold: what each keeps, in triangles, mean of " +
                 std::to_string(direction_count()) + " directions and " + std::to_string(main_models_) + " meshes",
             {{"test", "tolerance", "looked at"}}};

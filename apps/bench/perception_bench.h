@@ -25,17 +25,11 @@ struct PerceptionBenchOptions {
     Targets targets = Targets::built_in();
 };
 
-// Figures of the same things side by side.
-struct BenchDetails {
-    std::string title;
-    std::vector<std::vector<std::string>> rows; // the first one is the header
-};
-
 struct PerceptionBenchResult {
     std::string title;
     std::vector<BenchRow> rows;
-    std::vector<BenchDetails> details;
-    Json views = Json::array(); // every view that was judged
+    std::vector<BenchTable> details; // figures of the same things side by side
+    Json views = Json::array();      // every view that was judged
 };
 
 // Needs OpenGL, but for the groups csf and observers. The picture files are replaced.

@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <fstream>
 #include <set>
 
 #include <vdtree/internal/atomic_file.h>
+#include <vdtree/internal/number_text.h>
 
 namespace unseen::calibration {
 namespace {
@@ -254,10 +254,7 @@ Error JsonObject::error(std::string_view problem) const {
     return file_error(file_, ErrorCode::malformed_data, problem);
 }
 
-std::string to_text(double value) {
-    std::array<char, 32> text;
-    return std::string(text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr);
-}
+std::string to_text(double value) { return number_text(value); }
 
 std::string to_json(std::string_view text) { return json(text).dump(-1, ' ', false, json::error_handler_t::replace); }
 

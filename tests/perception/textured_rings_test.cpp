@@ -25,32 +25,13 @@ namespace {
 
 using support::built;
 
-Mesh with_colours(Mesh mesh) {
-    std::mt19937_64 random(9);
-    for (std::size_t v = 0; v < mesh.positions.size(); ++v)
-        mesh.colours.push_back(
-            {shapes::random_unit(random), shapes::random_unit(random), shapes::random_unit(random), 1});
-    return mesh;
-}
-
-Mesh textured_cases(int which) {
-    const Texture noise = textures::noise(61, 40, 5);
-    switch (which) {
-    case 0: return textures::textured_sphere(4, noise);
-    case 1: return textures::textured_grid(20, textures::checkerboard(32, 32, 4, 20, 230));
-    case 2: return with_colours(textures::textured_sphere(3, noise));
-    case 3: return textures::with_seams(textures::textured_sphere(3, noise));
-    default: return textures::with_uvs(shapes::random_soup(200, 400, 3), noise);
-    }
-}
-
 // Triangles of any cut show, anywhere, what the ring of their largest node says; and where they show one place of the
 // texture, they are as near to each other as it says.
 TEST(TexturedRings, BoundTheRingsOfAllCuts) {
     std::mt19937_64 random(17);
     int looked = 0;
     for (int which = 0; which < 5; ++which) {
-        const Mesh mesh = textured_cases(which);
+        const Mesh mesh = textures::textured_cases(which);
         const VertexTree tree = built(mesh);
         const CutRings rings = *bound_cut_rings(tree);
         const auto is_larger = [&](NodeId a, NodeId b) {

@@ -93,4 +93,25 @@ inline Mesh with_seams(const Mesh& mesh, double at = 0) {
     return out;
 }
 
+// Every vertex another colour, by chance.
+inline Mesh with_colours(Mesh mesh) {
+    std::mt19937_64 random(9);
+    for (std::size_t v = 0; v < mesh.positions.size(); ++v)
+        mesh.colours.push_back(
+            {shapes::random_unit(random), shapes::random_unit(random), shapes::random_unit(random), 1});
+    return mesh;
+}
+
+// Five kinds: smooth, flat, coloured too, with seams, and a soup.
+inline Mesh textured_cases(int which) {
+    const Texture speckled = noise(61, 40, 5);
+    switch (which) {
+    case 0: return textured_sphere(4, speckled);
+    case 1: return textured_grid(20, checkerboard(32, 32, 4, 20, 230));
+    case 2: return with_colours(textured_sphere(3, speckled));
+    case 3: return with_seams(textured_sphere(3, speckled));
+    default: return with_uvs(shapes::random_soup(200, 400, 3), speckled);
+    }
+}
+
 } // namespace unseen::textures

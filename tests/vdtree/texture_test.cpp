@@ -154,29 +154,10 @@ TEST(Textures, AreCheckedBeforeTheyAreLaid) {
     EXPECT_NE(complaint(bad).find("of vertex 4"), std::string::npos) << complaint(bad);
 }
 
-Mesh with_colours(Mesh mesh) {
-    std::mt19937_64 random(9);
-    for (std::size_t v = 0; v < mesh.positions.size(); ++v)
-        mesh.colours.push_back(
-            {shapes::random_unit(random), shapes::random_unit(random), shapes::random_unit(random), 1});
-    return mesh;
-}
-
-Mesh textured_cases(int which) {
-    const Texture noise = textures::noise(61, 40, 5);
-    switch (which) {
-    case 0: return textures::textured_sphere(4, noise);
-    case 1: return textures::textured_grid(20, textures::checkerboard(32, 32, 4, 20, 230));
-    case 2: return with_colours(textures::textured_sphere(3, noise));
-    case 3: return textures::with_seams(textures::textured_sphere(3, noise));
-    default: return textures::with_uvs(shapes::random_soup(200, 400, 3), noise);
-    }
-}
-
 TEST(Textures, BoundTheRingsOfAllMeshes) {
     for (int which = 0; which < 5; ++which) {
         for (const ClustererKind clusterer : {ClustererKind::quadric, ClustererKind::octree}) {
-            const VertexTree tree = built(textured_cases(which), {.clusterer = clusterer});
+            const VertexTree tree = built(textures::textured_cases(which), {.clusterer = clusterer});
             const auto sound = verify(tree);
             EXPECT_TRUE(sound) << which << ": " << sound.error().message;
             EXPECT_TRUE(tree.is_prelit());

@@ -124,7 +124,7 @@ Result<vdtree::DistanceCriterion> make_criterion(const Sight& sight, const Decis
     if (sight.lighting) return perception::lit_distances(tree, sight.cache.light_bounds, view, options);
     if (decision.test == FoldTest::luebke_hallen) return perception::luebke_hallen_distances(tree, view, options);
     if (decision.test == FoldTest::luebke_hallen_safe) {
-        const auto rings = cut_rings(sight.object, sight.cache);
+        const auto rings = cut_rings(sight.object, sight.cache, decision.request.chroma);
         if (!rings) return rings.error();
         return perception::luebke_hallen_safe_distances(tree, **rings, view, options);
     }

@@ -1,9 +1,9 @@
 #include <session/gaze_player.h>
 
+#include <vdtree/internal/number_text.h>
+
 #include <string>
 #include <utility>
-
-#include "number_text.h"
 
 namespace unseen::session {
 
@@ -34,9 +34,9 @@ Result<void> GazePlayer::begin(const perception::Display& display, const vdtree:
     }
     if (options_.source == GazeSource::trace) {
         const double first_s = trace_->samples().front().time_s, last_s = trace_->samples().back().time_s;
-        const std::string times = options_.trace.string() + " runs from " + shortest(first_s) + " to " +
-                                  shortest(last_s) + " s, and the frames from 0" +
-                                  (duration_s ? " to " + shortest(*duration_s) + " s" : " on");
+        const std::string times = options_.trace.string() + " runs from " + number_text(first_s) + " to " +
+                                  number_text(last_s) + " s, and the frames from 0" +
+                                  (duration_s ? " to " + number_text(*duration_s) + " s" : " on");
         if ((duration_s && first_s > *duration_s) || last_s < 0)
             return Error{ErrorCode::invalid_argument, times + ": count its times from the first frame."};
         if (duration_s && last_s < *duration_s && messages.warning)

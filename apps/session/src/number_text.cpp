@@ -20,9 +20,4 @@ std::string rounded(double value, int significant) {
             std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, significant).ptr};
 }
 
-std::string shortest(double value) {
-    std::array<char, 64> text;
-    return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
-}
-
 } // namespace unseen::session

@@ -8,6 +8,5 @@ namespace unseen::session {
 
 std::string grouped(std::uint64_t count);           // 69666 -> "69,666"
 std::string rounded(double value, int significant); // shortest of so many digits; "infinite" and "none" (NaN) in words
-std::string shortest(double value);                 // as many digits as needed to read the same value again
 
 } // namespace unseen::session

@@ -5,8 +5,7 @@
 #include <filesystem>
 
 #include <calibration/observer_profile.h>
-
-#include "number_text.h"
+#include <vdtree/internal/number_text.h>
 
 namespace unseen::session {
 namespace {
@@ -47,10 +46,10 @@ Result<float> relative_background(const perception::Display& display, std::optio
     // Asking for the black or white that the display reports must work in spite of rounding.
     constexpr double rounding = 1e-9;
     if (asked && !(relative >= -rounding && relative <= 1 + rounding)) {
-        return invalid("scene.background = " + shortest(wanted.value()) +
+        return invalid("scene.background = " + number_text(wanted.value()) +
                        " cd/m2 is not between the display's black (" +
-                       shortest(perception::black_level(display).value()) + ") and white (" +
-                       shortest(perception::to_luminance(display, 1).value()) + ").");
+                       number_text(perception::black_level(display).value()) + ") and white (" +
+                       number_text(perception::to_luminance(display, 1).value()) + ").");
     }
     return static_cast<float>(std::clamp(relative, 0.0, 1.0));
 }

@@ -50,11 +50,12 @@ std::span<const vdtree::Sphere> inner_spheres(const Object& object, ObjectCache&
     return *cache.inner_spheres;
 }
 
-Result<const perception::CutRings*> cut_rings(const Object& object, ObjectCache& cache) {
-    if (!cache.cut_rings) {
-        auto bounded = perception::bound_cut_rings(object.tree);
+Result<const perception::CutRings*> cut_rings(const Object& object, ObjectCache& cache, bool with_chroma) {
+    if (!cache.cut_rings || (with_chroma && !cache.rings_have_chroma)) {
+        auto bounded = perception::bound_cut_rings(object.tree, with_chroma);
         if (!bounded) return bounded.error();
         cache.cut_rings = std::move(*bounded);
+        cache.rings_have_chroma = with_chroma;
     }
     return &*cache.cut_rings;
 }
@@ -246,7 +247,7 @@ std::span<const vdtree::Sphere> Session::inner_spheres(std::size_t object) const
 }
 
 Result<const perception::CutRings*> Session::cut_rings(std::size_t object) const {
-    return session::cut_rings(state_->scene.objects[object], state_->caches[object]);
+    return session::cut_rings(state_->scene.objects[object], state_->caches[object], false);
 }
 
 } // namespace unseen::session

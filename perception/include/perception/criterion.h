@@ -49,9 +49,9 @@ struct FoldTestOptions {
 //            inside the sphere
 // Silhouette nodes: the slabs of the dilated ring do not prove that it faces the eye from one side, or there is an irregular edge in the ring.
 //
-// Contrast and luminance are rounded up, to classes of a 48th of an octave and of a sixteenth of the display's range, eccentricity down to
-// quarters of a degree, and the magnification is the window's largest: so a fold counts for no less than it does above, and a cut keeps
-// about a per cent more triangles at most. Cost: 100 ns a node, and 90 ns for every class in use and eccentricity; bunny: 7 ms, and 35 ms with a gaze.
+// Contrast is rounded up to classes of a 48th of an octave, luminance to sixteenths of the display's range. Eccentricity
+// is rounded down to quarters of a degree. The magnification is the window's largest. So a fold counts for no less than
+// it does above, and a cut keeps about one per cent more triangles at most. Cost: 100 ns a node, and 90 ns for every class in use and eccentricity; bunny: 7 ms, and 35 ms with a gaze.
 // With the chroma classes are coarser. Fails, too, where the chroma is asked for of a tree with a texture, whose colours are not looked at; so
 // does the next.
 Result<vdtree::DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTree& tree, const vdtree::View& view,
@@ -84,14 +84,14 @@ SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBoun
 // where the tree's folds have not been measured (measure_folds()), and where what files say of it is no measurement.
 //
 // With D the angular width of what changes: twice the larger of the support's radius and the extent; h, eY and their means hm, em of
-// what the model makes of the measurement (src/fold_model.h), in cd/m2 where they are luminances; the ring's range lo1..hi1 and its sphere's r1; L the middle of the range; S the
+// what the model makes of the measurement (src/fold/fold_model.h), in cd/m2 where they are luminances; the ring's range lo1..hi1 and its sphere's r1; L the middle of the range; S the
 // table's conservative form; and by eccentricity. A pattern is invisible where what the bands of an octave each see of it, c(rho) S(rho),
 // comes to less than 1 in their sum of powers of 3.5:
-//   patch       c = 1.9 (em + (hi1 - lo1) min(1, hm / r1)) / L, and in parts half as wide four times that, up to the largest,
+//   patch       c = (em + (hi1 - lo1) min(1, 1.6 hm / r1)) / L, and in parts half as wide four times that, up to the largest,
 //               (eY + (hi1 - lo1) min(1, h / r1)) / L;  c(rho) = c max over n = 1, 2, 4 of min(1, (n D rho)^2) / n
 //   drift       of areas 2^k times as wide, k = 1 up to the mesh's size, W:  c = drift / 2^(k fading / 2);  c(rho) = c min(1, (W rho)^2)
-//   silhouette  a strip of width w, the angle of 1.4 h, that changes between the ring's luminance and anything in the scene, with the
-//               contrast cs over the pair's mean:  c(rho) = cs min(1, 2 rho w)
+//   silhouette  a strip of width w, the angle of h plus 0.011 pixel (at most twice h), that changes between the ring's luminance
+//               and anything in the scene, with the contrast cs over the pair's mean:  c(rho) = cs min(1, 2 rho w)
 // Where the mesh was measured in stages, too, a node folds as well from where nobody can tell the whole mesh from the mesh in the node's stage, by
 // pictures of both: seldom near, but most of it far away.
 // rho goes up to the display's limit: below a pixel a fold counts by the share of the pixel that it covers, so from far enough away

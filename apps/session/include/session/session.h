@@ -86,7 +86,8 @@ public:
 
     // What silhouettes can be seen against.
     Result<perception::SceneLuminance> luminance(const vdtree::View& view) const;
-    // Spheres inside a solid, and rings of all cuts; made when they are first asked for. Refer to the session.
+    // Spheres inside a solid, and rings of all cuts, without their colours. Made when they are first asked for; they
+    // refer to the session.
     std::span<const vdtree::Sphere> inner_spheres(std::size_t object = 0) const;
     Result<const perception::CutRings*> cut_rings(std::size_t object = 0) const;
 
