@@ -128,7 +128,8 @@ private:
     void append(std::vector<float>& to, const SourceDocument::Channel& channel, Index vertex, const Part& part,
                 const NodeFrame& frame) const {
         const std::size_t size = channel.components;
-        if (tree_.is_leaf(extracted_.nodes[vertex])) { // as it was
+        const bool is_normal = channel.name == "NORMAL" && size == 3;
+        if (tree_.is_leaf(extracted_.nodes[vertex]) && (frame.has_inverse || !is_normal)) { // as it was
             for (std::size_t k = 0; k < size; ++k) to.push_back(channel.values[like_[0] * size + k]);
             return;
         }
@@ -138,7 +139,7 @@ private:
             values[k] /= static_cast<double>(std::max<std::size_t>(like_.size(), 1));
         }
         const Mesh& mesh = extracted_.mesh;
-        if (channel.name == "NORMAL" && size == 3) {
+        if (is_normal) {
             const glm::dvec3 n = frame.normal_from_world * glm::dvec3(mesh.normals[vertex]);
             const double length = glm::length(n);
             for (int k = 0; k < 3; ++k) values[static_cast<std::size_t>(k)] = length > 0 ? n[k] / length : 0.0;

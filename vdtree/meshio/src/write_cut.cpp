@@ -121,6 +121,7 @@ std::size_t node_for(json& out, const SourceDocument::Part& part, const Restored
     if (named.contains("name")) node["name"] = named["name"];
     if (is_known) notes.push_back("a node whose transform has no inverse got a copy beside it, which has the mesh.");
     nodes.push_back(std::move(node));
+    if (is_known && !out.contains("scenes")) return nodes.size() - 1; // all are shown
     json& scenes = out["scenes"];
     if (!scenes.is_array() || scenes.empty()) scenes = json::array({json::object()});
     const std::size_t scene = out.value("scene", std::size_t{0});
@@ -133,7 +134,6 @@ Result<void> write_gltf(const fs::path& name, const SourceDocument& document, st
     GltfFile file;
     json out = gltf::parse_json(document.json);
     if (!out.contains("nodes")) out["nodes"] = json::array();
-    // Roots are all that nobody names, where there are no scenes.
     for (json& node : out["nodes"]) node.erase("mesh");
     const json meshes = out.value("meshes", json::array());
     // In the order of the document's meshes, then of its nodes.
