@@ -160,6 +160,7 @@ void add_texture_options(CLI::App& verb, TextureOptions& o) {
             "(that the file requires and nobody here knows); with commas between them")
         ->type_name("NAMES")
         ->delimiter(',')
+        ->allow_extra_args(false)
         ->check(one_of({"skins", "morph-targets", "animations", "extensions"}));
 }
 

@@ -53,7 +53,8 @@ TEST_F(Materials, OfObjectsAreRead) {
     const auto scaled = read("newmtl a\nmap_Kd -s 2 3 4 p.png\n");
     ASSERT_TRUE(scaled);
     EXPECT_EQ(scaled->materials[0].image, "p.png");
-    ASSERT_EQ(scaled->warnings.size(), 1u);
+    ASSERT_EQ(scaled->warnings.size(), 2u);
+    EXPECT_NE(scaled->warnings[1].find("The image is named, but not kept"), std::string::npos) << scaled->warnings[1];
     EXPECT_NE(scaled->warnings[0].find("'-s' of an image was ignored"), std::string::npos) << scaled->warnings[0];
 
     // The first of a name counts, and a library that is named twice is read once.

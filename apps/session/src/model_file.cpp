@@ -31,9 +31,9 @@ Result<meshio::ReadResult> read_textured_mesh(const fs::path& file, const LoadOp
     reading.progress = options.messages.progress;
     auto read = meshio::read_mesh(file, reading);
     if (!read) return read;
+    if (const auto laid = lay_texture(file, *read, options); !laid) return laid.error();
     if (options.messages.warning)
         for (const std::string& warning : read->warnings) options.messages.warning(file.string() + ": " + warning);
-    if (const auto laid = lay_texture(file, *read, options); !laid) return laid.error();
     return read;
 }
 

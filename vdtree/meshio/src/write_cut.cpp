@@ -218,17 +218,21 @@ private:
     }
 
     void write_positions() {
+        constexpr glm::vec4 none(-1);
         std::vector<glm::vec4> colours;
         for (const RestoredPart& restored : parts_) {
             std::size_t components = 0;
             const std::vector<float>* values = channel("COLOR_0", restored, components);
             if (!values) continue;
-            colours.resize(extracted_.nodes.size(), missing_colour);
-            for (std::size_t i = 0; i < restored.vertices.size(); ++i)
+            colours.resize(extracted_.nodes.size(), none);
+            for (std::size_t i = 0; i < restored.vertices.size(); ++i) {
+                glm::vec4& colour = colours[restored.vertices[i]] = missing_colour;
                 for (std::size_t k = 0; k < components; ++k)
-                    colours[restored.vertices[i]][static_cast<int>(k)] = (*values)[i * components + k];
+                    colour[static_cast<int>(k)] = (*values)[i * components + k];
+            }
         }
-        const bool has_alpha = std::any_of(colours.begin(), colours.end(), [](glm::vec4 c) { return c.a != 1; });
+        const bool has_alpha =
+            std::any_of(colours.begin(), colours.end(), [&](glm::vec4 c) { return c != none && c.a != 1; });
         for (std::size_t v = 0; v < extracted_.nodes.size(); ++v) {
             out_.text("v");
             for (int k = 0; k < 3; ++k) { // floats in as few digits as theirs
@@ -237,7 +241,7 @@ private:
                 if (static_cast<double>(static_cast<float>(x)) == x) out_.number(static_cast<float>(x));
                 else out_.number(x);
             }
-            for (int k = 0; !colours.empty() && k < (has_alpha ? 4 : 3); ++k) {
+            for (int k = 0; !colours.empty() && colours[v] != none && k < (has_alpha ? 4 : 3); ++k) {
                 out_.text(" ");
                 out_.number(k < 3 ? linear_to_srgb(colours[v][k]) : colours[v].a);
             }
