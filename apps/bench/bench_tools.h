@@ -40,7 +40,8 @@ std::filesystem::path find_in_checkout(const std::filesystem::path& relative);
 // A command of the same build: its file beside this program, or else its name, to be found by PATH.
 std::string command_beside(const std::string& name);
 
-// How busy the machine is with other things: the load average of the last minute, to be asked for before the work begins.
+// How busy the machine is with other things: the load average of the last minute, to be asked for before the work
+// begins.
 struct MachineLoad {
     double average = 0; // NaN: unknown
 
@@ -49,17 +50,18 @@ struct MachineLoad {
 };
 MachineLoad machine_load();
 
-// The bunny and the dragon, where ./quickstart or the package glmark2-data has put them; and what stands in where neither is there: a tree
-// of a sphere with bumps.
+// The bunny and the dragon, where ./quickstart or the package glmark2-data has put them; and what stands in where
+// neither is there: a tree of a sphere with bumps.
 std::vector<std::string> installed_meshes();
 Result<vdtree::VertexTree> sample_tree();
 
-// Of all nodes of the tree, one by one from the first to the last, results only: nodes a second, median of `repeats`; NaN where the
-// viewpoint is refused.
+// Of all nodes of the tree, one by one from the first to the last, results only: nodes a second, median of `repeats`;
+// NaN where the viewpoint is refused.
 double full_tests_per_second(const vdtree::VertexTree& tree, const vdtree::DistanceCriterion& criterion,
                              const vdtree::Viewpoint& viewpoint, const vdtree::FollowOptions& options, int repeats);
 
-// The threshold at which follow(threshold) leaves about so many triangles, by bisection; `follow` returns how many it leaves.
+// The threshold at which follow(threshold) leaves about so many triangles, by bisection; `follow` returns how many it
+// leaves.
 struct AimedThreshold {
     float threshold = 1;
     vdtree::Index triangles = 0;

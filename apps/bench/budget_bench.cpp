@@ -89,8 +89,8 @@ public:
     const perception::FoldTestOptions& fold_test_options() const { return options_; }
 
 private:
-    // Pixels within reach of one that the model covers in part, or beside an uncovered one. The share that is uncovered is
-    // the difference between a white and a black background.
+    // Pixels within reach of one that the model covers in part, or beside an uncovered one. The share that is uncovered
+    // is the difference between a white and a black background.
     Result<std::vector<bool>> mark_contour(const vdtree::Cut& full) {
         render::DrawOptions options = draw_options_;
         options.background = 0;

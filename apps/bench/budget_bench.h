@@ -1,4 +1,5 @@
-// Two ways to spend one triangle budget, side by side: node extent, and the perceptual fold test. After figure 5 of Luebke and Hallen 2001.
+// Two ways to spend one triangle budget, side by side: node extent, and the perceptual fold test. After figure 5 of
+// Luebke and Hallen 2001.
 #pragma once
 
 #include <string>
@@ -19,8 +20,8 @@ struct BudgetBenchOptions {
     glm::dvec3 direction = {1, 0, 0}; // from the model towards the eye; not 0
 };
 
-// Of each: triangles; pixels that differ visibly from the full model, and their largest V; and the share of triangles with a corner within
-// four pixels of the full model's contour.
+// Of each: triangles; pixels that differ visibly from the full model, and their largest V; and the share of triangles
+// with a corner within four pixels of the full model's contour.
 struct BudgetBenchResult {
     BenchTable table;
     Json tests = Json::array();

@@ -14,8 +14,8 @@ struct ChildOutcome {
     std::string out;    // stdout
 };
 
-// Runs a program (found by PATH where its name has no slash) and waits for it; its stderr is this one's. Fails where it cannot be
-// started.
+// Runs a program (found by PATH where its name has no slash) and waits for it; its stderr is this one's. Fails where it
+// cannot be started.
 Result<ChildOutcome> run_child(std::vector<std::string> words);
 
 std::string own_executable(); // this program's file

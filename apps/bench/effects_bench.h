@@ -18,9 +18,9 @@ struct EffectsBenchResult {
     Json effects = Json::array();
 };
 
-// Each mesh from +Z, filling 90% of the default display's window, with the gaze 29 degrees aside: what is kept with everything that a
-// fold test knows, and with one thing less or more. Times are of new cuts with their index buffers, in CPU time of one
-// thread, medians.
+// Each mesh from +Z, filling 90% of the default display's window, with the gaze 29 degrees aside: what is kept with
+// everything that a fold test knows, and with one thing less or more. Times are of new cuts with their index buffers,
+// in CPU time of one thread, medians.
 Result<EffectsBenchResult> bench_effects(const EffectsBenchOptions& options);
 
 } // namespace unseen::app

@@ -1,4 +1,5 @@
-// The command `unseen-bench`: measures how fast, how small and how invisible Unseen is on this machine, apart from the command that people use.
+// The command `unseen-bench`: measures how fast, how small and how invisible Unseen is on this machine, apart from the
+// command that people use.
 #include <algorithm>
 #include <charconv>
 #include <cmath>

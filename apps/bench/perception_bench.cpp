@@ -250,7 +250,8 @@ private:
         result_.title += "; " + grouped(static_cast<std::uint64_t>(options_.window_px)) + " pixels a side";
         return {};
     }
-    // Where nobody named the meshes, huge ones are looked at only at random, from afar and for speed, and with --quick not at all.
+    // Where nobody named the meshes, huge ones are looked at only at random, from afar and for speed, and with --quick
+    // not at all.
     void settle_huge_models() {
         const auto huge = std::stable_partition(models_.begin(), models_.end(),
                                                 [](const auto& model) { return model->triangles() <= huge_mesh; });
@@ -602,7 +603,8 @@ private:
         SafeTolerances() { std::fill_n(&px[0][0], std::size(geometric_tests) * std::size(gazes), largest_px); }
     };
 
-    // By bisection, and only where the one so far is not safe; view by view, so that the full model is drawn once for all tests and gazes.
+    // By bisection, and only where the one so far is not safe; view by view, so that the full model is drawn once for
+    // all tests and gazes.
     Result<SafeTolerances> safe_tolerances() {
         SafeTolerances safe;
         std::size_t done = 0;

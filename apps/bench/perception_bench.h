@@ -1,5 +1,5 @@
-// Measures perception: what the fold tests save, whether anything of it can be seen, how good the models behind them are, and what
-// they cost; against what was promised.
+// Measures perception: what the fold tests save, whether anything of it can be seen, how good the models behind them
+// are, and what they cost; against what was promised.
 #pragma once
 
 #include <string>

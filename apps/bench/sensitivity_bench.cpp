@@ -1,5 +1,5 @@
-// The parts of the perception benchmark that draw nothing: contrast sensitivities against published figures, and calibration against
-// simulated observers.
+// The parts of the perception benchmark that draw nothing: contrast sensitivities against published figures, and
+// calibration against simulated observers.
 #include <algorithm>
 #include <array>
 #include <charconv>

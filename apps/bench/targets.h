@@ -19,8 +19,8 @@ class Targets {
 public:
     static const Targets& built_in();
 
-    // {"engine": {"still view, us": {"must": 1, "aim": 0.1}, ...}, ...}; empty: those that are built in. Figures that the file leaves out
-    // have no target. Fails where it is no such file, and where it names what nothing measures.
+    // {"engine": {"still view, us": {"must": 1, "aim": 0.1}, ...}, ...}; empty: those that are built in. Figures that
+    // the file leaves out have no target. Fails where it is no such file, and where it names what nothing measures.
     static Result<Targets> read(const std::string& file);
 
     // Precondition: the figure is in targets.json.

@@ -91,8 +91,8 @@ bool has_ending(const std::string& file, const std::string& ending);
 // The file name ends in one of these (lower case, with the point); upper case is fine in the name.
 CLI::Validator ending_in(std::vector<std::string> endings);
 
-// An option that takes one of these names and puts the value of the same place into `target`, which is left as it is where the option is not
-// given. What Value is, Target can be set to.
+// An option that takes one of these names and puts the value of the same place into `target`, which is left as it is
+// where the option is not given. What Value is, Target can be set to.
 template <class Target, class Value>
 CLI::Option* add_choice(CLI::App& verb, const std::string& option, Target& target,
                         std::vector<std::pair<std::string, Value>> choices, const std::string& text) {

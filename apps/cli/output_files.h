@@ -10,8 +10,8 @@
 
 namespace unseen::app {
 
-// Fails where an output is one of the inputs or another output, and where it could not be written. Names that are empty, or "-", are
-// none. Outputs are left as they are.
+// Fails where an output is one of the inputs or another output, and where it could not be written. Names that are
+// empty, or "-", are none. Outputs are left as they are.
 Result<void> check_outputs(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs);
 
 // What a command that looks at a model reads.

@@ -18,8 +18,8 @@ using Json = nlohmann::ordered_json;
 // Infinite and undefined numbers are null: JSON has neither.
 Json number_or_null(double value);
 
-// Where --json goes: nowhere (no name), stdout ("-"), or a file that appears when the report is published. Opened before
-// the work, so that a name that cannot be written fails at once.
+// Where --json goes: nowhere (no name), stdout ("-"), or a file that appears when the report is published. Opened
+// before the work, so that a name that cannot be written fails at once.
 class JsonReport {
 public:
     static Result<JsonReport> open(const std::string& name);

@@ -3,7 +3,7 @@
 
 #include <string_view>
 
-#include "number_format.h" // IWYU pragma: export
+#include <vdtree/internal/number_format.h> // IWYU pragma: export
 
 namespace unseen::app {
 

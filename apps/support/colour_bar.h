@@ -20,8 +20,8 @@ struct ColourBar {
     std::string unit;
 };
 
-// A map in code values with the bar and its unit below it: pixels keep their places. Wider than the map where that is too narrow for the
-// text, the rest black.
+// A map in code values with the bar and its unit below it: pixels keep their places. Wider than the map where that is
+// too narrow for the text, the rest black.
 Result<perception::Image> with_colour_bar(const perception::Image& map, const ColourBar& bar);
 
 } // namespace unseen::app

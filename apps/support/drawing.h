@@ -20,8 +20,8 @@ namespace unseen::app {
 // Where a line of text is held.
 enum class Align { left, centre, right };
 
-// Colours are code values 0..1, what a PNG holds, and kept to 8 bits. Places are in pixels from the top left corner of the surface, those of
-// pixels at half. What lies outside is clipped. Not for several threads at once.
+// Colours are code values 0..1, what a PNG holds, and kept to 8 bits. Places are in pixels from the top left corner of
+// the surface, those of pixels at half. What lies outside is clipped. Not for several threads at once.
 class Drawing {
 public:
     enum class Kind { image, svg };
@@ -38,8 +38,8 @@ public:
     // From point to point, antialiased, with round ends.
     void line(std::span<const glm::dvec2> points, glm::vec3 colour, double width = 1, bool dashed = false);
     void line(glm::dvec2 from, glm::dvec2 to, glm::vec3 colour, double width = 1, bool dashed = false);
-    // One line of UTF-8 (what is none comes out as question marks), `height_px` from the top of its letters to the bottom. `at` is the
-    // top left corner of it, or the middle of its upper edge, or the top right corner.
+    // One line of UTF-8 (what is none comes out as question marks), `height_px` from the top of its letters to the
+    // bottom. `at` is the top left corner of it, or the middle of its upper edge, or the top right corner.
     void text(glm::dvec2 at, std::string_view text, glm::vec3 colour, double height_px, Align align = Align::left);
     // The same turned by a quarter to the left, so that it reads upward: `at` is on its left edge.
     void text_upward(glm::dvec2 at, std::string_view text, glm::vec3 colour, double height_px,
@@ -53,7 +53,8 @@ public:
 
     // What was drawn, of an image. Errors are those of drawing.
     Result<perception::Image> image() const;
-    // SVG, or an image of whatever kind the ending says. The file is replaced whole or not at all. Nothing may be drawn afterwards.
+    // SVG, or an image of whatever kind the ending says. The file is replaced whole or not at all. Nothing may be drawn
+    // afterwards.
     Result<void> write(const std::filesystem::path& file);
 
     // How wide text() comes out; where it is wider than `most`, the height at which it fits.

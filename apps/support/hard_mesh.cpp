@@ -13,7 +13,8 @@ namespace {
 using vdtree::Index;
 using vdtree::Mesh;
 
-// A net of (rows + 1) x (columns + 1) places; `place` maps 0..1 x 0..1 to space, and the last column is welded to the first where the net is round.
+// A net of (rows + 1) x (columns + 1) places; `place` maps 0..1 x 0..1 to space, and the last column is welded to the
+// first where the net is round.
 template <class Place>
 Mesh net(int rows, int columns, bool is_round, const Place& place) {
     Mesh mesh;
@@ -66,7 +67,8 @@ void append(Mesh& mesh, const Mesh& more) {
     for (const auto& t : more.triangles) mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
 }
 
-// Closed sheets, a five-hundredth as thick as they are wide and slightly bent, one behind the other at twice their thickness.
+// Closed sheets, a five-hundredth as thick as they are wide and slightly bent, one behind the other at twice their
+// thickness.
 Mesh plates(int count, int side) {
     constexpr double thickness = 0.004;
     Mesh mesh;

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "number_format.h"
+#include <vdtree/internal/number_format.h>
+
 #include "plot_style.h"
 
 namespace unseen::app {

@@ -5,7 +5,8 @@
 #include <limits>
 #include <utility>
 
-#include "number_format.h"
+#include <vdtree/internal/number_format.h>
+
 #include "plot_style.h"
 
 namespace unseen::app {

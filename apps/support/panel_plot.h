@@ -26,8 +26,8 @@ struct PanelPlot {
     int width = 1200, panel_height = 190; // pixels
 };
 
-// Linear axes; each panel's begins at 0 and ends above its largest settled value, with the median of those as a dashed line. The largest of
-// the others is in the panel's label where it does not fit.
+// Linear axes; each panel's begins at 0 and ends above its largest settled value, with the median of those as a dashed
+// line. The largest of the others is in the panel's label where it does not fit.
 void draw(const PanelPlot& plot, Drawing& drawing);
 
 int height_of(const PanelPlot& plot); // pixels

@@ -197,7 +197,8 @@ Result<int> help(const BuildArguments& a, ProcessTeam& team) {
     return ok ? exit_done : exit_failed;
 }
 
-// A build gives large blocks back and asks for others all the time. What the process keeps, the system need not clear again.
+// A build gives large blocks back and asks for others all the time. What the process keeps, the system need not clear
+// again.
 void keep_freed_memory() {
 #ifdef __GLIBC__
     ::mallopt(M_MMAP_MAX, 0);

@@ -28,20 +28,21 @@ inline constexpr const char* calibration_window_help =
   q, Esc      stop; with --resume the answers are kept
 )";
 
-// Shows the procedure's trials until it is done or the window is closed. After every answer the state goes to `state`, unless that
-// is empty.
+// Shows the procedure's trials until it is done or the window is closed. After every answer the state goes to `state`,
+// unless that is empty.
 Result<void> run_calibration_window(calibration::Procedure& procedure, const CalibrationWindowOptions& options,
                                     const std::filesystem::path& state);
 
-// Patches are matched to rows of black and white; what the codes say about the display's gamma. Empty where the window was closed.
+// Patches are matched to rows of black and white; what the codes say about the display's gamma. Empty where the window
+// was closed.
 struct GammaMatch {
     double share; // of white rows
     double code;  // 0..1, which looks as bright
 };
 Result<std::vector<GammaMatch>> match_gamma(const CalibrationWindowOptions& options);
 
-// Campbell and Robson's chart: frequency grows to the right, contrast to the bottom. In a window until a key is pressed, or as a
-// picture where `file` is given, dithered to the display's codes.
+// Campbell and Robson's chart: frequency grows to the right, contrast to the bottom. In a window until a key is
+// pressed, or as a picture where `file` is given, dithered to the display's codes.
 Result<void> show_chart(const CalibrationWindowOptions& options, const std::string& file);
 
 } // namespace unseen::app

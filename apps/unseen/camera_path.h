@@ -31,9 +31,9 @@ struct Orbit {
 class CameraPath {
 public:
     // "orbit:DEGREES[:FRAMES]": see Orbit; without a count, once around.
-    // Otherwise the name of a CSV file: a header line that names the columns eye_x, eye_y, eye_z, target_x, target_y, target_z and
-    // optionally up_x, up_y, up_z (default: `up`) and gaze_x, gaze_y (pixels), in any order; then one line a frame.
-    // Empty lines are skipped. Errors name the file, line and column.
+    // Otherwise the name of a CSV file: a header line that names the columns eye_x, eye_y, eye_z, target_x, target_y,
+    // target_z and optionally up_x, up_y, up_z (default: `up`) and gaze_x, gaze_y (pixels), in any order; then one line
+    // a frame. Empty lines are skipped. Errors name the file, line and column.
     static Result<CameraPath> read(const std::string& path, glm::dvec3 up);
 
     std::vector<CameraPose> poses_from(const vdtree::View& first) const;

@@ -161,7 +161,8 @@ double largest(const std::vector<double>& values) {
     return most;
 }
 
-// The columns of the summary: their names in JSON, for people, and their values. Frames after the first: that one makes the cut.
+// The columns of the summary: their names in JSON, for people, and their values. Frames after the first: that one makes
+// the cut.
 struct Measure {
     const char* key;
     const char* label;

@@ -26,8 +26,8 @@ struct FlyThroughOptions {
 // Ends in an error about --output unless it is a pattern for names of PNGs.
 std::string complaint_about_picture_names(const std::string& pattern);
 
-// Prints a summary, and writes what was asked for. Reads and checks all files before anything that takes long, such as the fold errors
-// that the fold test may need.
+// Prints a summary, and writes what was asked for. Reads and checks all files before anything that takes long, such as
+// the fold errors that the fold test may need.
 Result<void> fly_through(const std::string& model, const ViewOptions& view, const DisplayOptions& display,
                          const FlyThroughOptions& options);
 

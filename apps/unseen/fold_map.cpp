@@ -160,7 +160,8 @@ struct Corner {
     NodeId node;
 };
 
-// What lies beyond a plane close before the eye: a polygon of up to four corners. New corners are those of the nearer end.
+// What lies beyond a plane close before the eye: a polygon of up to four corners. New corners are those of the nearer
+// end.
 std::vector<Corner> clipped(const std::array<Corner, 3>& triangle, double nearest) {
     std::vector<Corner> kept;
     for (std::size_t i = 0; i < 3; ++i) {

@@ -13,8 +13,8 @@ namespace {
 constexpr double bytes_of_gib = 1 << 30;
 constexpr double most_gib = 1 << 20; // more than any machine has
 
-// Measured as the highest resident set of whole builds with one thread: bunny, dragon, and the dragon with four times the triangles;
-// the program and its libraries, and bytes for each triangle and its half a vertex.
+// Measured as the highest resident set of whole builds with one thread: bunny, dragon, and the dragon with four times
+// the triangles; the program and its libraries, and bytes for each triangle and its half a vertex.
 constexpr std::uint64_t program_bytes = std::uint64_t{32} << 20;
 constexpr std::uint64_t quadric_triangle_bytes = 260, octree_triangle_bytes = 190;
 // Meshes with more vertices than closed surfaces, and with attributes.

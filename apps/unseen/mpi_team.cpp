@@ -53,8 +53,8 @@ void receive_piece(void* bytes, std::size_t size, int from, int tag) {
     wait_for(request);
 }
 
-// mpirun binds each process to a core of its own. Ours have threads, and one goes on when the others are done: they share what
-// mpirun itself, the parent, may use.
+// mpirun binds each process to a core of its own. Ours have threads, and one goes on when the others are done: they
+// share what mpirun itself, the parent, may use.
 int share_cores() {
     cpu_set_t cores;
     if (sched_getaffinity(getppid(), sizeof(cores), &cores) == 0 && sched_setaffinity(0, sizeof(cores), &cores) == 0)
@@ -63,8 +63,8 @@ int share_cores() {
     return 1;
 }
 
-// Ours are few large messages, for which the simplest of Open MPI's ways will do: it is there over any network, and some tenths of a
-// second sooner than the others. Who starts us may choose another one.
+// Ours are few large messages, for which the simplest of Open MPI's ways will do: it is there over any network, and
+// some tenths of a second sooner than the others. Who starts us may choose another one.
 void prefer_quick_start() { ::setenv("OMPI_MCA_pml", "ob1", 0); }
 
 // The number of this process, as mpirun tells it before MPI has started.
@@ -74,8 +74,8 @@ std::optional<int> rank_from_mpirun() {
     return std::nullopt;
 }
 
-// Does one task after another. MPI wants to be called by one thread, and waits for other processes for a while when it starts and ends:
-// so that thread is this one, and ours goes on.
+// Does one task after another. MPI wants to be called by one thread, and waits for other processes for a while when it
+// starts and ends: so that thread is this one, and ours goes on.
 class TaskThread {
 public:
     TaskThread() : thread_([this] { work(); }) {}

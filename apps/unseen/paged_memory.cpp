@@ -25,15 +25,17 @@ namespace fs = std::filesystem;
 
 // Blocks begin and end at multiples of this; all page sizes divide it.
 constexpr std::size_t granule = paged_alignment;
-// Freed blocks up to this in all keep their disk space for the next of their size: rounds of work ask for the same sizes again.
+// Freed blocks up to this in all keep their disk space for the next of their size: rounds of work ask for the same
+// sizes again.
 constexpr std::size_t most_kept = std::size_t{32} << 20;
 // The file is as long as all blocks there may ever be, and empty but for those that are in use.
 constexpr std::size_t longest_file = std::size_t{1} << 40, shortest_file = std::size_t{1} << 32;
 
-// How often the pager looks, far from the limit and near it. A read of one page may bring sixteen, so that two threads may come by
-// a hundred megabytes in a millisecond or two.
+// How often the pager looks, far from the limit and near it. A read of one page may bring sixteen, so that two threads
+// may come by a hundred megabytes in a millisecond or two.
 constexpr std::chrono::microseconds far_interval{2000}, near_interval{200};
-// The pager begins this share of the limit below it, or so many bytes, for what is touched before it looks, and ends twice as far below.
+// The pager begins this share of the limit below it, or so many bytes, for what is touched before it looks, and ends
+// twice as far below.
 constexpr std::uint64_t margin_share = 12, least_margin = std::uint64_t{12} << 20;
 // Between two looks at how much is resident, pages are let go of in so much of the file.
 constexpr std::size_t sweep_step = std::size_t{4} << 20;

@@ -1,5 +1,5 @@
-// The command's own operator new and delete: large blocks are paged where that is asked for, else they get large pages. The forms for
-// arrays, and those that do not throw, use these.
+// The command's own operator new and delete: large blocks are paged where that is asked for, else they get large pages.
+// The forms for arrays, and those that do not throw, use these.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -28,8 +28,8 @@ void* from_memory(Allocate&& allocate) {
 // Of a page of the larger kind, on most machines.
 constexpr std::size_t large_page = std::size_t{2} << 20;
 
-// Asks for large pages for what lies within the block: a build walks its arrays in several orders at once, and looking up small pages
-// takes a tenth of its time and more. Nothing depends on whether the system grants it.
+// Asks for large pages for what lies within the block: a build walks its arrays in several orders at once, and looking
+// up small pages takes a tenth of its time and more. Nothing depends on whether the system grants it.
 void* with_large_pages(void* block, std::size_t size) {
 #ifdef MADV_HUGEPAGE
     if (!block || size < 2 * large_page) return block;

@@ -10,9 +10,9 @@ namespace unseen::app {
 
 class ProcessTeam : public vdtree::Team {
 public:
-    // Begins to join the others, and goes on meanwhile: what depends on them waits. Null where no mpirun has started this process. To be
-    // called once, before anything starts threads. Fails where mpirun has started several and this build cannot talk to them. A member
-    // that ends without leave() takes the others with it.
+    // Begins to join the others, and goes on meanwhile: what depends on them waits. Null where no mpirun has started
+    // this process. To be called once, before anything starts threads. Fails where mpirun has started several and this
+    // build cannot talk to them. A member that ends without leave() takes the others with it.
     static Result<std::unique_ptr<ProcessTeam>> join();
 
     static bool is_there() noexcept; // this build can talk to others

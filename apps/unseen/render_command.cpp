@@ -18,7 +18,8 @@
 namespace unseen::app {
 namespace {
 
-// With fewer, an outline that moves by a fiftieth of a pixel changes a whole sample of some pixel: by more than can be seen.
+// With fewer, an outline that moves by a fiftieth of a pixel changes a whole sample of some pixel: by more than can be
+// seen.
 constexpr int samples_to_judge = 64;
 
 struct RenderArguments {

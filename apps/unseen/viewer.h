@@ -6,8 +6,7 @@
 
 #include <render/context.h>
 #include <render/renderer.h>
-#include <session/follower.h>
-#include <session/gaze_player.h>
+#include <session/session.h>
 
 #include "options.h"
 

@@ -9,7 +9,8 @@
 #include <numeric>
 #include <utility>
 
-#include <perception/random.h>
+#include <vdtree/internal/errors.h>
+#include <vdtree/internal/random.h>
 
 #include "json_file.h"
 
@@ -20,7 +21,6 @@ using perception::CsfTable;
 using perception::CyclesPerDegree;
 using perception::Degrees;
 using perception::Luminance;
-using perception::Random;
 
 constexpr int most_places = 1000, most_trials = 100'000, most_settings = 1000;
 constexpr double widest_eccentricity_deg = 90;
@@ -32,21 +32,19 @@ constexpr double two_sided_95 = 1.959964;                        // standard dev
 constexpr int most_sweeps = 8;
 constexpr double still = 5e-4; // log10 units, a fiftieth of a grid step
 
-// What observers' psychometric functions are taken to be one of; 3.5 and a lapse rate of 0.01 are QUEST's own. A choice of
-// lapse rates was tried: it costs more certainty than it gains with careless observers.
+// What observers' psychometric functions are taken to be one of; 3.5 and a lapse rate of 0.01 are QUEST's own. A choice
+// of lapse rates was tried: it costs more certainty than it gains with careless observers.
 constexpr double possible_slopes[] = {1.8, 2.5, 3.5, 5};
 constexpr double usual_lapse = 0.01;
 
 // Settings scatter at least so much (log10 units): a few that happen to agree do not make a place certain.
 constexpr double least_scatter = 0.04;
-// Thresholds are looked for up to so far above the highest that is expected (log10 units), where the standard grid ends below it: a place
-// of which nothing is seen keeps what is believed of it, in place of the grid's end.
+// Thresholds are looked for up to so far above the highest that is expected (log10 units), where the standard grid ends
+// below it: a place of which nothing is seen keeps what is believed of it, in place of the grid's end.
 constexpr double room_above_expected = 0.5, farthest_log10_threshold = 12;
 
 // Of seeing nothing at the highest contrast, however far below it the threshold is believed to be.
 constexpr double least_chance = 1e-6;
-
-Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
 
 std::string in_brackets(const char* name, std::size_t i) {
     return std::string(name).append("[").append(std::to_string(i)).append("]");
@@ -102,32 +100,33 @@ CalibrationPlan plan_for(const perception::Display& display, const CsfTable& exp
 
 Result<void> validate(const CalibrationPlan& plan) {
     if (plan.places.empty() || plan.places.size() > most_places)
-        return invalid("A calibration needs 1 to " + std::to_string(most_places) + " places, not " +
-                       std::to_string(plan.places.size()) + ".");
+        return invalid_argument("A calibration needs 1 to " + std::to_string(most_places) + " places, not " +
+                                std::to_string(plan.places.size()) + ".");
     for (std::size_t i = 0; i < plan.places.size(); ++i) {
         const auto& [frequency, eccentricity] = plan.places[i];
         const std::string where = in_brackets("places", i);
         constexpr double coarsest_cpd = 1.0 / 16, finest_cpd = 64; // of the tables
         if (!(frequency >= coarsest_cpd && frequency <= finest_cpd))
-            return invalid(where + ": the frequency must lie in 1/16 to 64 cpd, not " + to_text(frequency) + ".");
+            return invalid_argument(where + ": the frequency must lie in 1/16 to 64 cpd, not " + to_text(frequency) +
+                                    ".");
         if (!(eccentricity >= 0 && eccentricity <= widest_eccentricity_deg))
-            return invalid(where + ": the eccentricity must lie in 0 to 90 degrees, not " + to_text(eccentricity) +
-                           ".");
+            return invalid_argument(where + ": the eccentricity must lie in 0 to 90 degrees, not " +
+                                    to_text(eccentricity) + ".");
         if (std::find(plan.places.begin(), plan.places.begin() + static_cast<std::ptrdiff_t>(i), plan.places[i]) !=
             plan.places.begin() + static_cast<std::ptrdiff_t>(i))
-            return invalid(where + " is there twice.");
+            return invalid_argument(where + " is there twice.");
     }
     if (plan.trials < 1 || plan.trials > most_trials)
-        return invalid("There must be 1 to 100,000 trials, not " + std::to_string(plan.trials) + ".");
+        return invalid_argument("There must be 1 to 100,000 trials, not " + std::to_string(plan.trials) + ".");
     if (plan.settings < 2 || plan.settings > most_settings)
-        return invalid("There must be 2 to 1000 settings a place, not " + std::to_string(plan.settings) + ".");
+        return invalid_argument("There must be 2 to 1000 settings a place, not " + std::to_string(plan.settings) + ".");
     if (!(plan.luminance.value() > 0 && plan.luminance.value() <= brightest_cdm2))
-        return invalid("The luminance must be above 0 and at most 1e6 cd/m2, not " + to_text(plan.luminance.value()) +
-                       ".");
+        return invalid_argument("The luminance must be above 0 and at most 1e6 cd/m2, not " +
+                                to_text(plan.luminance.value()) + ".");
     if (plan.seed > exact_integers)
-        return invalid("The seed must be at most 2^53, not " + std::to_string(plan.seed) + ".");
+        return invalid_argument("The seed must be at most 2^53, not " + std::to_string(plan.seed) + ".");
     if (!(plan.highest_contrast > 0 && plan.highest_contrast <= 1))
-        return invalid("The highest contrast must lie in 0..1, not " + to_text(plan.highest_contrast) + ".");
+        return invalid_argument("The highest contrast must lie in 0..1, not " + to_text(plan.highest_contrast) + ".");
     return {};
 }
 
@@ -156,9 +155,9 @@ Result<Procedure> Procedure::create(CalibrationPlan plan, CsfTable expected) {
     for (std::size_t i = 0; i < plan.places.size(); ++i) {
         const double threshold = -log10_expected(expected, plan.places[i], plan.luminance);
         if (!(threshold >= lowest_log10_contrast))
-            return invalid(in_brackets("places", i) + ": a sensitivity of " + to_text(std::pow(10, -threshold)) +
-                           " is expected, but none above " + to_text(std::round(std::pow(10, -lowest_log10_contrast))) +
-                           " can be measured.");
+            return invalid_argument(in_brackets("places", i) + ": a sensitivity of " +
+                                    to_text(std::pow(10, -threshold)) + " is expected, but none above " +
+                                    to_text(std::round(std::pow(10, -lowest_log10_contrast))) + " can be measured.");
         highest_threshold = std::max(highest_threshold, std::min(threshold, farthest_log10_threshold));
     }
     std::vector<double>& thresholds = grid.log10_threshold;
@@ -168,8 +167,8 @@ Result<Procedure> Procedure::create(CalibrationPlan plan, CsfTable expected) {
     const double highest = std::log10(plan.highest_contrast);
     std::erase_if(grid.log10_contrast, [&](double c) { return c > highest; });
     if (grid.log10_contrast.empty())
-        return invalid("The display's highest contrast, " + to_text(plan.highest_contrast) +
-                       ", shows nothing that could be measured.");
+        return invalid_argument("The display's highest contrast, " + to_text(plan.highest_contrast) +
+                                ", shows nothing that could be measured.");
     if (grid.log10_contrast.back() < highest) grid.log10_contrast.push_back(highest);
     auto blank = QuestPlus::create(grid);
     if (!blank) return blank.error();
@@ -184,11 +183,12 @@ Trial Procedure::next() const {
     assert(!is_done());
     Trial trial;
     trial.number = static_cast<int>(answers_.size());
-    Random random = perception::random_for(plan_.seed, static_cast<std::uint64_t>(trial.number));
+    Random random = random_for(plan_.seed, static_cast<std::uint64_t>(trial.number));
     trial.phase_deg = 360 * random.uniform();
     trial.interval = random.uniform() < 0.5 ? 1 : 2;
     if (plan_.method == Method::adjustment) return next_adjustment(trial);
-    // Now and then the place that was asked least, so that no place rests on what the others say about it; of those that may be visible.
+    // Now and then the place that was asked least, so that no place rests on what the others say about it; of those
+    // that may be visible.
     constexpr int round = 4;
     constexpr double hardly_visible = 0.02; // chance
     const Prospect prospect = look_ahead();
@@ -225,8 +225,8 @@ Procedure::Prospect Procedure::look_ahead() const {
     return prospect;
 }
 
-// The variance of a threshold is expected to become smaller by the square of its covariance with the answer over the answer's variance.
-// Places vary together by what they say about each other, and by the slope that they have in common.
+// The variance of a threshold is expected to become smaller by the square of its covariance with the answer over the
+// answer's variance. Places vary together by what they say about each other, and by the slope that they have in common.
 double Procedure::gain_of(const QuestPlus::Forecast& answer, const std::vector<double>& pulled,
                           const Prospect& prospect) {
     const std::size_t functions = answer.right.size();
@@ -248,7 +248,7 @@ Trial Procedure::next_adjustment(Trial trial) const {
     const std::size_t round = answers_.size() / count, turn = answers_.size() % count;
     std::vector<std::size_t> order(count);
     std::iota(order.begin(), order.end(), std::size_t{0});
-    Random random = perception::random_for(~plan_.seed, round);
+    Random random = random_for(~plan_.seed, round);
     for (std::size_t i = count; i > 1; --i)
         std::swap(order[i - 1], order[static_cast<std::size_t>(random.uniform() * static_cast<double>(i))]);
     trial.place = order[turn];
@@ -256,7 +256,7 @@ Trial Procedure::next_adjustment(Trial trial) const {
     trial.is_ascending = (round + trial.place) % 2 == 0;
     // Far enough away to be on the other side for sure, and not always equally far, which could be learned.
     constexpr double nearest = 0.5, spread = 0.4; // log10 units
-    const double away = nearest + spread * perception::random_for(plan_.seed, answers_.size()).uniform();
+    const double away = nearest + spread * random_for(plan_.seed, answers_.size()).uniform();
     const double expected = -field_.belief(trial.place).mean;
     const double start = std::pow(10, expected + (trial.is_ascending ? -away : away));
     trial.contrast = std::min(start, plan_.highest_contrast);
@@ -290,7 +290,8 @@ void Procedure::combine() {
     // A grid does not tell thresholds apart that lie within a step of each other: they are spread as evenly over it.
     const double least_deviation = (thresholds[1] - thresholds[0]) / std::sqrt(12.0);
     std::vector<double> prior(thresholds.size());
-    // Of the slope and the lapse rate, which are the observer's and not the place's: what the answers of all places say.
+    // Of the slope and the lapse rate, which are the observer's and not the place's: what the answers of all places
+    // say.
     std::vector<std::vector<double>> evidence;
     for (const QuestPlus& quest : quests_) evidence.push_back(quest.log_evidence());
     std::vector<double> functions(evidence.front().size());
@@ -409,7 +410,8 @@ namespace {
 
 constexpr std::string_view state_format = "unseen-calibration";
 
-// FNV-1a over all numbers of a table, in hexadecimal. As floats, since another machine's logarithms may differ in a double's last bits.
+// FNV-1a over all numbers of a table, in hexadecimal. As floats, since another machine's logarithms may differ in a
+// double's last bits.
 std::string hash_of(const CsfTable& table) {
     std::uint64_t hash = 0xcbf29ce484222325u;
     const auto add = [&](std::uint32_t bits) {

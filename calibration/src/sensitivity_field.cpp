@@ -9,8 +9,8 @@ namespace {
 
 using Site = SensitivityField::Site;
 
-// Standard deviations of an observer from the expected one, in log10 units (0.05 is 1 dB). Observers of one age differ by
-// about 6 dB in gain; the rest is chosen wide enough for the published models to be reached from one another.
+// Standard deviations of an observer from the expected one, in log10 units (0.05 is 1 dB). Observers of one age differ
+// by about 6 dB in gain; the rest is chosen wide enough for the published models to be reached from one another.
 constexpr double gain = 0.3;
 constexpr double tilt_per_octave = 0.08;
 constexpr double cutoff_per_cpd = 0.015;
@@ -134,7 +134,8 @@ void SensitivityField::set_own(std::size_t i, const Belief& with_own) {
     change_factor(i, own - precision_[i], shift - shift_[i]);
 }
 
-// One factor changes the covariance by a matrix of rank one. Rounding adds up, so that now and then all is computed anew.
+// One factor changes the covariance by a matrix of rank one. Rounding adds up, so that now and then all is computed
+// anew.
 void SensitivityField::change_factor(std::size_t i, double more_precision, double more_shift) {
     precision_[i] += more_precision;
     shift_[i] += more_shift;

@@ -1,5 +1,5 @@
 // Creation, deletion and labels of the kinds of GL objects.
-#include <render/gl_object.h>
+#include "gl_object.h"
 
 #include "gl.h"
 

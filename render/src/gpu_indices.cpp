@@ -99,7 +99,8 @@ Result<void> GpuIndices::upload_all(std::span<const std::uint32_t> indices) {
     return {};
 }
 
-// A place that comes twice gets its last value both times, whichever the GPU does first. What lies beyond the end is nobody's.
+// A place that comes twice gets its last value both times, whichever the GPU does first. What lies beyond the end is
+// nobody's.
 void GpuIndices::patch(std::span<const vdtree::IndexWrite> writes, std::span<const std::uint32_t> indices) {
     for (std::size_t i = 0; i < writes.size();) {
         const std::size_t part = next_part_;

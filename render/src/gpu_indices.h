@@ -7,10 +7,10 @@
 #include <optional>
 #include <span>
 
-#include <render/gl_object.h>
 #include <vdtree/cut.h>
 
 #include "gl.h"
+#include "gl_object.h"
 #include "programs.h"
 
 namespace unseen::render {
@@ -24,9 +24,9 @@ struct IndexState {
 };
 
 // The buffer lies in the GPU's own memory, which drawing reads fastest. Changes go through a small buffer that stays
-// mapped. The CPU writes pairs of place and value to the next of its parts. It waits only where the GPU has not yet read
-// what was there three parts ago. A compute pass puts the values in their places, in order with the drawing before and
-// after it. The bytes that are uploaded are those of the changes. Where a whole buffer is less, or the GPU maps
+// mapped. The CPU writes pairs of place and value to the next of its parts. It waits only where the GPU has not yet
+// read what was there three parts ago. A compute pass puts the values in their places, in order with the drawing before
+// and after it. The bytes that are uploaded are those of the changes. Where a whole buffer is less, or the GPU maps
 // nothing, the whole is uploaded. The small buffer and the pass are made for the first change. Move-only; needs a
 // current context for everything.
 class GpuIndices {

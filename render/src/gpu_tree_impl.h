@@ -9,11 +9,11 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
-#include <render/gl_object.h>
 #include <render/gpu_tree.h>
 
 #include "camera.h"
 #include "context_impl.h"
+#include "gl_object.h"
 #include "gpu_indices.h"
 #include "surface_texture.h"
 #include "vertex.h"

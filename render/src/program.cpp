@@ -1,5 +1,5 @@
 // Compiles and links shader programs.
-#include <render/program.h>
+#include "program.h"
 
 #include <string>
 #include <vector>

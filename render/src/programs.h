@@ -6,7 +6,7 @@
 #include <span>
 #include <string_view>
 
-#include <render/program.h>
+#include "program.h"
 
 namespace unseen::render {
 

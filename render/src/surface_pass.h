@@ -9,10 +9,10 @@
 #include <glm/vec4.hpp>
 
 #include <render/draw.h>
-#include <render/program.h>
 
 #include "camera.h"
 #include "gpu_tree_impl.h"
+#include "program.h"
 #include "target_impl.h"
 
 namespace unseen::render {

@@ -109,8 +109,8 @@ Result<SurfaceTexture> SurfaceTexture::create(const vdtree::TextureView& texture
                          uvs.data(), 0);
     made.image_ = Texture2d::create("texture");
     const int levels = std::bit_width(std::max(texture.width, texture.height));
-    // Linear light, and not sRGB codes: their decoding in hardware and drivers is off by up to a fifth of a percent, and coarse levels would
-    // be rounded to codes.
+    // Linear light, and not sRGB codes: their decoding in hardware and drivers is off by up to a fifth of a percent,
+    // and coarse levels would be rounded to codes.
     glTextureStorage2D(made.image_.id(), levels, GL_RGB16F, static_cast<GLsizei>(texture.width),
                        static_cast<GLsizei>(texture.height));
     if (glGetError() == GL_OUT_OF_MEMORY)

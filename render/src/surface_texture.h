@@ -6,12 +6,14 @@
 #include <glm/vec2.hpp>
 #include <glm/vec4.hpp>
 
-#include <render/gl_object.h>
 #include <vdtree/texture.h>
+
+#include "gl_object.h"
 
 namespace unseen::render {
 
-// Move-only; needs a current context for everything. GL errors other than too little memory are left for the caller to ask for.
+// Move-only; needs a current context for everything. GL errors other than too little memory are left for the caller to
+// ask for.
 class SurfaceTexture {
 public:
     // `uvs`: by vertex. Its mip levels are means in linear light.

@@ -4,10 +4,10 @@
 #include <span>
 #include <vector>
 
-#include <render/gl_object.h>
 #include <render/target.h>
 
 #include "context_impl.h"
+#include "gl_object.h"
 
 namespace unseen::render {
 

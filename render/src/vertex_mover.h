@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include <render/gl_object.h>
+#include "gl_object.h"
 
 #include "gl.h"
 #include "programs.h"

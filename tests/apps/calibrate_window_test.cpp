@@ -1,4 +1,5 @@
-// unseen calibrate under X, driven by synthetic keys: trials go on with the keys, and what was answered ends in the profile.
+// unseen calibrate under X, driven by synthetic keys: trials go on with the keys, and what was answered ends in the
+// profile.
 #include "window_test.h"
 
 #include <perception/image.h>

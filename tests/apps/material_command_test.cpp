@@ -1,4 +1,5 @@
-// What went into a simplification besides triangles comes out again: nodes, names, materials, images, texture coordinates, colours.
+// What went into a simplification besides triangles comes out again: nodes, names, materials, images, texture
+// coordinates, colours.
 #include "run_command.h"
 
 #include <perception/image.h>

@@ -20,7 +20,8 @@ protected:
         const Outcome built = run({"build", "large.obj", "-o", "alone.vdt", "--threads", "2"});
         ASSERT_EQ(built.status, 0) << built.err;
     }
-    // Where a process was killed: one tree or none, never a part of one. Whoever is killed on the way out has left a whole one.
+    // Where a process was killed: one tree or none, never a part of one. Whoever is killed on the way out has left a
+    // whole one.
     void expect_whole_or_none(const Outcome& built) const {
         const bool is_there = fs::exists(path("team.vdt"));
         EXPECT_TRUE(built.status == 0 ? is_there : !built.err.empty()) << built.err;

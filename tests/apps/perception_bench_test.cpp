@@ -1,4 +1,5 @@
-// unseen-bench perception, effects and budget, on a mesh and in a window so small that the figures mean little: every row is there, and measured.
+// unseen-bench perception, effects and budget, on a mesh and in a window so small that the figures mean little: every
+// row is there, and measured.
 #include "run_bench.h"
 
 #include <perception/image.h>

@@ -534,7 +534,8 @@ TEST_F(RenderCommandTest, FailuresLeaveNoFile) {
     EXPECT_EQ(files(), before);
     // A light that comes into the model in the third frame.
     write_text(path("l.json"), R"({"lights": [{"type": "point", "intensity": 1, "distance": 1, "position": [0, 0, 9],
-                             "keyframes": [{"time_s": 0, "position": [0, 0, 9]}, {"time_s": 0.04, "position": [0, 0, 0]}]}]})");
+                             "keyframes": [{"time_s": 0, "position": [0, 0, 9]},
+                                           {"time_s": 0.04, "position": [0, 0, 0]}]}]})");
     const auto with_light = files();
     const Outcome hit =
         run({"render", "ball.vdt", "--path", "orbit:0:4", "--lights", "l.json", "-o", "f%d.png", "--size", "16x16"});

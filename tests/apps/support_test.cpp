@@ -10,16 +10,18 @@
 #include <set>
 #include <string>
 
+#include <vdtree/internal/number_format.h>
+
 #include "colour_bar.h"
 #include "drawing.h"
 #include "log_log_plot.h"
-#include "number_format.h"
 #include "panel_plot.h"
 #include "temp_folder.h"
 #include "visibility_map.h"
 
 namespace {
 
+using namespace unseen;
 using namespace unseen::app;
 using ::testing::HasSubstr;
 using unseen::perception::Image;

@@ -1,4 +1,5 @@
-// Textures from files to pictures: OBJ with MTL, glTF with images in it and beside it, PNG and JPEG; and what is said of bad ones.
+// Textures from files to pictures: OBJ with MTL, glTF with images in it and beside it, PNG and JPEG; and what is said
+// of bad ones.
 #include "run_command.h"
 
 #include <cstdio> // what jpeglib.h counts on

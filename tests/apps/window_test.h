@@ -50,7 +50,8 @@ protected:
     std::string errors() const { return read_text(path("err.txt")); }
 
 private:
-    // A command that ends on a key's press has no window left for its release. Xlib's own handler would end the test's process.
+    // A command that ends on a key's press has no window left for its release. Xlib's own handler would end the test's
+    // process.
     static int go_on_without_the_window(Display*, XErrorEvent* error) {
         if (error->error_code != BadWindow)
             ADD_FAILURE() << "X error " << int(error->error_code) << " of request " << int(error->request_code);

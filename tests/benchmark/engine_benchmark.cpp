@@ -1,5 +1,5 @@
-// Cuts that follow a view, by the perceptual test with silhouettes and by the default one: what one frame takes with its index buffer, and
-// what it goes with. `unseen-bench engine` prints the same against what is promised.
+// Cuts that follow a view, by the perceptual test with silhouettes and by the default one: what one frame takes with
+// its index buffer, and what it goes with. `unseen-bench engine` prints the same against what is promised.
 #include <benchmark/benchmark.h>
 
 #include <cmath>

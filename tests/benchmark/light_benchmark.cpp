@@ -1,5 +1,5 @@
-// Lights that move while the eye stands still: what one frame of the cut takes with its index buffer, 100,000 triangles active or half
-// of the mesh where it is smaller.
+// Lights that move while the eye stands still: what one frame of the cut takes with its index buffer, 100,000 triangles
+// active or half of the mesh where it is smaller.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// Other people's simplification of the same mesh to a tenth of its triangles, beside a budget cut of a tree that is there.
-// They begin with the mesh each time, a cut with a tree: what a view-dependent frame would take with either.
+// Other people's simplification of the same mesh to a tenth of its triangles, beside a budget cut of a tree that is
+// there. They begin with the mesh each time, a cut with a tree: what a view-dependent frame would take with either.
 #include <benchmark/benchmark.h>
 
 #include <vector>

@@ -1,4 +1,5 @@
-// The procedure with simulated observers: how near it comes to the truth, that it repeats and resumes, and what it refuses.
+// The procedure with simulated observers: how near it comes to the truth, that it repeats and resumes, and what it
+// refuses.
 #include <calibration/procedure.h>
 #include <calibration/simulated_observer.h>
 
@@ -84,8 +85,8 @@ TEST_F(ProcedureTest, ThePlanFitsTheDisplay) {
     }
 }
 
-// Some near the expected castleCSF, some of other gains, scales, slopes and lapse rates; and of other shapes: Barten's models fall faster towards
-// coarse gratings, Daly's declines aside by another law.
+// Some near the expected castleCSF, some of other gains, scales, slopes and lapse rates; and of other shapes: Barten's
+// models fall faster towards coarse gratings, Daly's declines aside by another law.
 constexpr const char* other_shapes[] = {"barten-1999:gain=0.5,frequency=0.8", "barten-2004", "daly:gain=0.6",
                                         "daly:frequency=1.3,slope=3"};
 constexpr const char* observers[] = {"castle",
@@ -98,8 +99,8 @@ constexpr const char* observers[] = {"castle",
                                      other_shapes[2],
                                      other_shapes[3]};
 
-// What is owed: 1.5 dB in 400 trials, of every run. In 200 the mean over seeds is about 1 dB (docs/calibration.md), two runs scatter about
-// it by a quarter, and observers of other shapes take some trials more.
+// What is owed: 1.5 dB in 400 trials, of every run. In 200 the mean over seeds is about 1 dB (docs/calibration.md), two
+// runs scatter about it by a quarter, and observers of other shapes take some trials more.
 TEST_F(ProcedureTest, FindsTheSensitivityOfSimulatedObservers) {
     double mean_at_200 = 0;
     for (const char* description : observers) {

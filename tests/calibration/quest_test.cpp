@@ -1,4 +1,5 @@
-// QUEST+: the psychometric function and posteriors against reference figures, and the choice of stimuli against its definition.
+// QUEST+: the psychometric function and posteriors against reference figures, and the choice of stimuli against its
+// definition.
 #include <calibration/quest.h>
 
 #include <cmath>

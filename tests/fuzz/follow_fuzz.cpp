@@ -1,5 +1,5 @@
-// Fuzz target for cuts that follow a viewpoint: the bytes choose tree, criteria, viewpoints, options and all else that can be done
-// with a cut (follow_drive.h); the cut has to stay what its definition asks for.
+// Fuzz target for cuts that follow a viewpoint: the bytes choose tree, criteria, viewpoints, options and all else that
+// can be done with a cut (follow_drive.h); the cut has to stay what its definition asks for.
 //
 // With clang: clang++ -fsanitize=fuzzer,address,undefined ... (see tests/README.md). With other compilers define
 // UNSEEN_FUZZ_STANDALONE for a main() that runs the files named on the command line.

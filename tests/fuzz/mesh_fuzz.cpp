@@ -1,6 +1,6 @@
 // Fuzz target for the mesh readers: any bytes may come in, and only a valid mesh or an error may come out.
-// tests/README.md tells how to build and run it. With other compilers than clang define UNSEEN_FUZZ_STANDALONE for a main() that runs the
-// files named on the command line.
+// tests/README.md tells how to build and run it. With other compilers than clang define UNSEEN_FUZZ_STANDALONE for a
+// main() that runs the files named on the command line.
 #include "mesh_readers.h"
 
 #include <cstddef>

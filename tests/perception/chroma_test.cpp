@@ -25,7 +25,8 @@ using vdtree::View;
 
 constexpr glm::dvec3 rec709(0.2126, 0.7152, 0.0722);
 
-// A colour of the luminance 0.3: grey, and so much of the way from there to red or, if negative, to the green of equal luminance.
+// A colour of the luminance 0.3: grey, and so much of the way from there to red or, if negative, to the green of equal
+// luminance.
 glm::vec4 red_or_green(double saturation) {
     const glm::dvec3 grey(0.3), red = glm::dvec3(1, 0.0874 / 0.7152, 0);
     return glm::vec4(grey + saturation * (red - grey), 1);
@@ -214,7 +215,7 @@ TEST(Chroma, OfGreyMeshesCostsNothing) {
             const auto with = criterion_of(tree, view_from(near), {safe, true}, gazes),
                        without = criterion_of(tree, view_from(near), {safe, false}, gazes);
             ASSERT_TRUE(with && without);
-            EXPECT_EQ(with->parts().reach, without->parts().reach);
+            EXPECT_EQ(with->parts().switch_distance, without->parts().switch_distance);
             EXPECT_EQ(with->parts().least_cost, without->parts().least_cost);
         }
     }

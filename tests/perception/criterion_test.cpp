@@ -193,8 +193,8 @@ TEST_F(LuebkeHallen, ErrorsAreSeenUpToTheFinestPixels) {
         const vdtree::DistanceCriterion::Parts& parts = made->parts();
         std::vector<std::pair<float, float>> distances;
         for (NodeId n = 0; n < tree().interior_count(); ++n)
-            distances.emplace_back(parts.lengths[n] * parts.reach[parts.classes[n].interior],
-                                   parts.silhouette_lengths[n] * parts.reach[parts.classes[n].silhouette]);
+            distances.emplace_back(parts.lengths[n] * parts.switch_distance[parts.classes[n].interior],
+                                   parts.silhouette_lengths[n] * parts.switch_distance[parts.classes[n].silhouette]);
         return distances;
     };
     const auto flat = seen_from({}), coarse = seen_from({{0, 8}, {50, 4}}), fine = seen_from({{0, 32}, {50, 4}});
@@ -255,8 +255,8 @@ TEST_F(LuebkeHallen, FoldsMoreWhereNobodyLooks) {
     EXPECT_GT(gazed.triangle_count(), 0u);
 }
 
-// v*/v: seen from cost times the distance, a fold of cost c is just imperceptible. Every display quantity is held but the
-// distance; a viewer k times as far sees every angle k times smaller (small angles).
+// v*/v: seen from cost times the distance, a fold of cost c is just imperceptible. Every display quantity is held but
+// the distance; a viewer k times as far sees every angle k times smaller (small angles).
 TEST_F(LuebkeHallen, CostIsTheRatioOfViewingDistances) {
     const double far = 400; // the model covers few degrees, so angles scale as 1/distance
     View view = window(display_, {0, 0, far});
@@ -314,8 +314,8 @@ TEST(LuebkeHallenHoles, RangeCoversTheRing) {
     EXPECT_GT(wider, static_cast<int>(tree.interior_count()) / 2);
 }
 
-// Hole 2: a node whose own triangles all face away, next to the contour, moves the contour. The dilated facing test must
-// call it a silhouette: every node whose ring has an edge between a front and a back face is one.
+// Hole 2: a node whose own triangles all face away, next to the contour, moves the contour. The dilated facing test
+// must call it a silhouette: every node whose ring has an edge between a front and a back face is one.
 TEST(LuebkeHallenHoles, NodesBesideTheContourAreSilhouettes) {
     const VertexTree tree = std::move(*vdtree::build_tree(bumpy_sphere(16).view()));
     const glm::dvec3 eye(2, 1, 4);
@@ -330,7 +330,8 @@ TEST(LuebkeHallenHoles, NodesBesideTheContourAreSilhouettes) {
     int contour_rings = 0;
     for (const auto& t : support::sound(tree).triangles()) {
         for (const auto leaf : t) {
-            // Some corner of a triangle around the leaf lies on the contour: within the ring of every node above the leaf.
+            // Some corner of a triangle around the leaf lies on the contour: within the ring of every node above the
+            // leaf.
             if ((faces[t[0]] | faces[t[1]] | faces[t[2]]) != 3) continue;
             const NodeId parent = support::sound(tree).parents()[interior + leaf];
             const auto s = tree.bounds()[parent].ring;
@@ -345,8 +346,9 @@ TEST(LuebkeHallenHoles, NodesBesideTheContourAreSilhouettes) {
     EXPECT_GT(contour_rings, 50);
 }
 
-// Files whose checksums are right and whose values are not, mapped, so that nobody has looked at all of them: no criterion reads or writes
-// where it must not, and what it makes can be followed. Returns how many were made and how many refused.
+// Files whose checksums are right and whose values are not, mapped, so that nobody has looked at all of them: no
+// criterion reads or writes where it must not, and what it makes can be followed. Returns how many were made and how
+// many refused.
 std::pair<int, int> survive_random_lies(const VertexTree& tree, std::uint64_t seed) {
     const support::TempFolder folder;
     const std::filesystem::path file = folder / "lie.vdt";

@@ -138,8 +138,8 @@ TEST(CutRings, OfADeepTreeAreQuicklyBounded) {
     for (int trial = 0; trial < 5; ++trial) expect_within_rings(random_cut(*tree, random), rings);
 }
 
-// Two squares side by side, the right edge brighter: folding the middle edge to one of its ends leaves the light as it is only where nothing
-// differs.
+// Two squares side by side, the right edge brighter: folding the middle edge to one of its ends leaves the light as it
+// is only where nothing differs.
 TEST(CutRings, FindShiftsOfTheMean) {
     const auto strip = [](float middle, float outer) {
         // 3 - 4 - 5   heights 1, widths 1
@@ -163,9 +163,9 @@ TEST(CutRings, FindShiftsOfTheMean) {
     ASSERT_EQ(even->interior_count(), 2u); // the root and the edge
     constexpr NodeId node = 1;
     EXPECT_NEAR(bound_cut_rings(*even)->mean_shift[node], 0, 1e-6);
-    // Before: each triangle has the area 1/2; two have one bright corner, two have two: 3/6 of the corners: mean 0.625. After, at (1, 1): the
-    // triangles (0, p, 3) and (2, 5, p), one bright corner each: areas 1/2, mean 0.5. The shift, -0.125 times the area of 1 after it, over the
-    // edge's share of the area, 6 corners of the 12: 1.
+    // Before: each triangle has the area 1/2; two have one bright corner, two have two: 3/6 of the corners: mean 0.625.
+    // After, at (1, 1): the triangles (0, p, 3) and (2, 5, p), one bright corner each: areas 1/2, mean 0.5. The shift,
+    // -0.125 times the area of 1 after it, over the edge's share of the area, 6 corners of the 12: 1.
     EXPECT_NEAR(bound_cut_rings(*bright)->mean_shift[node], 0.125, 1e-4);
 }
 

@@ -156,7 +156,8 @@ TEST(Display, TablesAreInterpolated) {
     }
 }
 
-// Against the tangents themselves, half a pixel to either side would be the derivative: here from the angle on, outwards.
+// Against the tangents themselves, half a pixel to either side would be the derivative: here from the angle on,
+// outwards.
 TEST(Display, PixelsPerDegreeGrowAsideOnFlatScreens) {
     const Display display;
     const double ppd = pixels_per_degree(display).value();

@@ -49,7 +49,7 @@ std::vector<FoldError> various_errors(const VertexTree& tree, std::mt19937_64& r
         e.luminance = log_uniform(-10, 0);
         e.wide_luminance = e.luminance * log_uniform(-6, 0);
         e.extent = std::max(e.extent, radius * log_uniform(-1, 0));
-        e.drift = log_uniform(-10, -2);
+        e.bias = log_uniform(-10, -2);
         e.fading = static_cast<std::uint8_t>(random() % 4);
         if (node == 0) break;
         FoldError& above = errors[parents[node]];
@@ -71,7 +71,8 @@ std::vector<int> heights_of(const VertexTree& tree) {
     return heights;
 }
 
-// Here about 80,000 patterns are rounded to fewer. The exact distances are those of nodes with no errors below them, few enough for a row each.
+// Here about 80,000 patterns are rounded to fewer. The exact distances are those of nodes with no errors below them,
+// few enough for a row each.
 TEST(ErrorDistances, OfMorePatternsThanRowsAreNoLess) {
     constexpr std::size_t most_rows = 0x10000;
     std::mt19937_64 random(5);
@@ -89,7 +90,7 @@ TEST(ErrorDistances, OfMorePatternsThanRowsAreNoLess) {
     EXPECT_TRUE(all->is_monotone());
     const vdtree::DistanceCriterion::Parts& parts = all->parts();
     const std::size_t bins = parts.eccentricity_bins;
-    EXPECT_LE(parts.reach.size(), most_rows * bins);
+    EXPECT_LE(parts.switch_distance.size(), most_rows * bins);
     std::size_t exact_rows = 0;
     for (int height = 1; height <= heights[VertexTree::root()]; ++height) {
         std::vector<FoldError> of_height(errors.size());
@@ -98,8 +99,8 @@ TEST(ErrorDistances, OfMorePatternsThanRowsAreNoLess) {
         const auto exact = criterion_of(sound, {std::move(of_height), {}}, view, options);
         ASSERT_TRUE(exact) << exact.error().message;
         const vdtree::DistanceCriterion::Parts& own = exact->parts();
-        ASSERT_LT(own.reach.size(), most_rows * bins);
-        exact_rows += own.reach.size() / bins;
+        ASSERT_LT(own.switch_distance.size(), most_rows * bins);
+        exact_rows += own.switch_distance.size() / bins;
         for (NodeId node = 0; node < errors.size(); ++node) {
             if (heights[node] != height) continue;
             const std::size_t patch = parts.classes[node].interior * bins,
@@ -107,11 +108,11 @@ TEST(ErrorDistances, OfMorePatternsThanRowsAreNoLess) {
             const std::size_t strip = parts.classes[node].silhouette * bins,
                               own_strip = own.classes[node].silhouette * bins;
             for (std::size_t bin = 0; bin < bins; ++bin) {
-                ASSERT_GE(parts.lengths[node] * parts.reach[patch + bin],
-                          own.lengths[node] * own.reach[own_patch + bin])
+                ASSERT_GE(parts.lengths[node] * parts.switch_distance[patch + bin],
+                          own.lengths[node] * own.switch_distance[own_patch + bin])
                     << "node " << node << ", bin " << bin;
-                ASSERT_GE(parts.silhouette_lengths[node] * parts.reach[strip + bin],
-                          own.silhouette_lengths[node] * own.reach[own_strip + bin])
+                ASSERT_GE(parts.silhouette_lengths[node] * parts.switch_distance[strip + bin],
+                          own.silhouette_lengths[node] * own.switch_distance[own_strip + bin])
                     << "node " << node << ", bin " << bin;
             }
         }

@@ -1,5 +1,5 @@
-// The holes of the rule as it is usually read: for each, a small exact scene in which the literal rule folds what a judge then sees, while
-// luebke_hallen_safe_distances() keeps it.
+// The holes of the rule as it is usually read: for each, a small exact scene in which the literal rule folds what a
+// judge then sees, while luebke_hallen_safe_distances() keeps it.
 #include <perception/criterion.h>
 
 #include <algorithm>
@@ -278,7 +278,8 @@ TEST(FoldHoles, OneTheRingChangesToo) {
     expect_hole(scene);
 }
 
-// A lens seen from the front. Two vertices behind its edge, all of whose triangles face away, fold to a place that sticks out.
+// A lens seen from the front. Two vertices behind its edge, all of whose triangles face away, fold to a place that
+// sticks out.
 TEST(FoldHoles, TwoWhatFacesAwayMovesTheContour) {
     constexpr int around = 24;
     constexpr double radius = 30;
@@ -303,8 +304,9 @@ TEST(FoldHoles, TwoWhatFacesAwayMovesTheContour) {
     EXPECT_EQ(scene.tree->closedness(), vdtree::Closedness::closed_outward);
 }
 
-// A fine even square inside of a fine line that is a little brighter. Pairs across the line are below a pixel and may fold; the square is even,
-// and so are its neighbours in the mesh. But once the pairs have folded, the square's triangles reach to them.
+// A fine even square inside of a fine line that is a little brighter. Pairs across the line are below a pixel and may
+// fold; the square is even, and so are its neighbours in the mesh. But once the pairs have folded, the square's
+// triangles reach to them.
 TEST(FoldHoles, ThreeTheNeighboursMayHaveFolded) {
     constexpr int lines = 65, first = 12, last = lines - 1 - first; // of the square
     constexpr double step = 0.25, grey = 0.5;
@@ -339,8 +341,8 @@ TEST(FoldHoles, ThreeTheNeighboursMayHaveFolded) {
     EXPECT_LE(*std::max_element(costs.begin(), costs.end()), 1);
 }
 
-//   o---O---o       All but O have the same grey; a and b fold to the middle between them. At every vertex, before and after, the
-//   | \/ \/ |       surface has the luminance that it had; between O and a it has not.
+//   o---O---o       All but O have the same grey; a and b fold to the middle between them. At every vertex, before and
+//   | \/ \/ |       after, the surface has the luminance that it had; between O and a it has not.
 //   o--a-b--o
 //   | /\ /\ |
 //   o---O---o
@@ -389,8 +391,8 @@ TEST(FoldHoles, FourFacesChangeWhereVerticesDoNot) {
     EXPECT_EQ(support.lo, support.hi);
 }
 
-// Rows of which every third is brighter, below a pixel; the two dark ones between fold. Each fold merges equal vertices and cannot be seen. All of
-// them make the half of the area bright where it was a third.
+// Rows of which every third is brighter, below a pixel; the two dark ones between fold. Each fold merges equal vertices
+// and cannot be seen. All of them make the half of the area bright where it was a third.
 Scene rows(float bright, float dark) {
     constexpr int lines = 161;
     Scene scene;

@@ -66,12 +66,13 @@ TEST(FoldErrors, OfAFlatEvenSquareAreNoneInLuminance) {
     for (const FoldError& error : errors_of(tree)) EXPECT_EQ(error.luminance, 0);
 }
 
-// The vector areas of a ring add up to the same whatever is in it: an even surface sends out as much light however it is folded.
+// The vector areas of a ring add up to the same whatever is in it: an even surface sends out as much light however it
+// is folded.
 TEST(FoldErrors, OfAnEvenClosedSurfaceShiftNoMean) {
     Mesh mesh = shapes::torus(32, 16);
     mesh.colours.assign(mesh.positions.size(), {0.5f, 0.5f, 0.5f, 1});
     const VertexTree tree = built(mesh);
-    for (const FoldError& error : errors_of(tree)) EXPECT_LT(error.drift, 1e-4f); // sums of many areas in floats
+    for (const FoldError& error : errors_of(tree)) EXPECT_LT(error.bias, 1e-4f); // sums of many areas in floats
     EXPECT_GT(errors_of(tree)[VertexTree::root()].distance, 0);
 }
 
@@ -192,8 +193,8 @@ TEST(FoldErrors, CountFarMoreWherePartsMeetFlat) {
     EXPECT_GT(most_of(both), 7 * most_of(alone));
 }
 
-// A narrow bright ridge, along which all folds lose light: what is drawn when all nodes like one are folded differs by no more than was measured of one of
-// them, though no fold does all of it.
+// A narrow bright ridge, along which all folds lose light: what is drawn when all nodes like one are folded differs by
+// no more than was measured of one of them, though no fold does all of it.
 TEST(FoldErrors, CountWhatNeighboursAddUpTo) {
     Mesh mesh = shapes::icosphere(5);
     for (const glm::dvec3& p : mesh.positions) {
@@ -325,7 +326,7 @@ TEST(FoldErrors, AreRefusedWhereTheyAreNone) {
     for (const float wrong : {nan, -1.0f, infinity}) {
         for (float FoldRecord::*const value :
              {&FoldRecord::shift, &FoldRecord::farthest, &FoldRecord::mean_distance, &FoldRecord::largest_luminance,
-              &FoldRecord::mean_luminance, &FoldRecord::extent, &FoldRecord::sine, &FoldRecord::drift})
+              &FoldRecord::mean_luminance, &FoldRecord::extent, &FoldRecord::sine, &FoldRecord::bias})
             EXPECT_NE(with([&](FoldRecord& r) { r.*value = wrong; }).find("node 1"), std::string::npos);
         EXPECT_NE(with([&](FoldRecord& r) { r.amplitudes[1][2] = wrong; }), "");
     }
@@ -360,7 +361,7 @@ TEST(FoldErrors, AreFiniteForHardMeshes) {
                              shapes::non_manifold_fan(5), shapes::moebius_strip(20)}) {
         const VertexTree tree = built(mesh);
         for (const FoldError& e : errors_of(tree))
-            for (const float value : {e.distance, e.mean_distance, e.luminance, e.wide_luminance, e.extent, e.drift})
+            for (const float value : {e.distance, e.mean_distance, e.luminance, e.wide_luminance, e.extent, e.bias})
                 ASSERT_TRUE(std::isfinite(value) && value >= 0);
     }
 }

@@ -63,7 +63,8 @@ TEST(FoldPicture, MeasuresGratings) {
             draw_plane(picture, Layer::folded, 0,
                        [&](const glm::vec3& p) { return 0.5f + 0.1f * std::cos(frequency * p.x + phase); });
             const auto amplitudes = picture.amplitudes();
-            // The finest has two cells a wave: what it sees depends on the phase. The coarser ones have a wave and a half or more in the picture.
+            // The finest has two cells a wave: what it sees depends on the phase. The coarser ones have a wave and a
+            // half or more in the picture.
             if (band > 0) {
                 EXPECT_NEAR(amplitudes[band], 0.1f, 0.025f) << band << ", phase " << phase;
             }

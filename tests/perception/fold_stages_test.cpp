@@ -1,5 +1,5 @@
-// Stages in which a whole mesh folds, and their pictures: the pyramid against gratings and sums that are known, stages against surfaces that show
-// nothing, and against the background alone.
+// Stages in which a whole mesh folds, and their pictures: the pyramid against gratings and sums that are known, stages
+// against surfaces that show nothing, and against the background alone.
 #include "measure/fold_stages.h"
 
 #include <algorithm>
@@ -83,7 +83,8 @@ TEST(Pyramid, BandsHaveTheirGainAtTheirFrequency) {
     }
 }
 
-// What sensitivities far away count on: of the mean over the area that a band looks at, a disc as wide as the mesh makes up no more than under a Gaussian.
+// What sensitivities far away count on: of the mean over the area that a band looks at, a disc as wide as the mesh
+// makes up no more than under a Gaussian.
 TEST(Pyramid, MeansAreThoseUnderAGaussian) {
     constexpr std::size_t side = 128;
     constexpr double margin = 1.05, radius = side / (2 * margin);
@@ -120,7 +121,8 @@ TEST(FoldStages, GoFromFineToTheRoot) {
     EXPECT_LT(largest(stages_of(tree).front(), dark), largest(stages_of(tree).back(), dark));
 }
 
-// An outline that moves by a hundredth of a cell changes the light of its cells by about that: no single sample that it passes counts as a whole cell.
+// An outline that moves by a hundredth of a cell changes the light of its cells by about that: no single sample that it
+// passes counts as a whole cell.
 TEST(FoldStages, ShowSmallMovesOfOutlinesAsSmall) {
     const VertexTree tree = built(grey(shapes::bumpy_sphere(5, 0), 0.1f));
     EXPECT_LT(largest(stages_of(tree).front(), background(1)), 0.5f); // with one sample a cell: 2.7
@@ -134,8 +136,8 @@ TEST(FoldStages, OfWhatLooksLikeItsBackgroundShowNothing) {
     EXPECT_GT(largest(stages_of(tree).back(), background(0.5f)), 0.1f);
 }
 
-// When the last stage has folded, the background is where the mesh was: over areas far wider than the mesh, the contrast is its own light over that of
-// the area's background.
+// When the last stage has folded, the background is where the mesh was: over areas far wider than the mesh, the
+// contrast is its own light over that of the area's background.
 TEST(FoldStages, EndInTheBackground) {
     constexpr float luminance = 0.8f, behind = 0.2f;
     const VertexTree tree = built(grey(shapes::torus(32, 16), luminance));

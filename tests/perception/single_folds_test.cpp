@@ -1,5 +1,6 @@
-// The oracle of single folds: each is drawn before and after at many points around it, and what changed is held against what the fold
-// tests count on: how much the luminance changes, and where. Points are exact, unlike pixels, which average.
+// The oracle of single folds: each is drawn before and after at many points around it, and what changed is held against
+// what the fold tests count on: how much the luminance changes, and where. Points are exact, unlike pixels, which
+// average.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -35,8 +36,8 @@ int wanted_folds() {
 
 constexpr double luminance_rounding = 2e-5; // of luminances in steps of 1/65535, and of what is interpolated in float
 constexpr double place_rounding = 1e-5;     // of the sphere's distance: trees keep floats
-// A known limit: masks hold the normals of each fold as it was first made. In other cuts triangles may turn over nevertheless, and lie on
-// others for which they are then seen. So many of a mesh's folds did, at most.
+// A known limit: masks hold the normals of each fold as it was first made. In other cuts triangles may turn over
+// nevertheless, and lie on others for which they are then seen. So many of a mesh's folds did, at most.
 constexpr double folds_turned_over = 0.02;
 constexpr int rows = 48; // and as many columns of points
 
@@ -53,7 +54,8 @@ struct Seen {
     bool operator==(const Seen& other) const { return nearness == other.nearness && luminance == other.luminance; }
 };
 
-// Points of a square in front of the eye: a grid whose rows and columns are shifted at random, so that no two lie in line.
+// Points of a square in front of the eye: a grid whose rows and columns are shifted at random, so that no two lie in
+// line.
 class Window {
 public:
     // Around a sphere, so many times as wide.
@@ -303,7 +305,8 @@ protected:
         const Index leaf = corner - tree_.interior_count();
         return leaf >= support::sound(tree_).first_leaf()[node] && leaf < support::sound(tree_).leaf_end()[node];
     }
-    // Whether the triangles around a node do not all face the eye, or all face away, in one of the surfaces or the other.
+    // Whether the triangles around a node do not all face the eye, or all face away, in one of the surfaces or the
+    // other.
     bool turns_over(std::initializer_list<std::span<const NodeId>> surfaces, NodeId node, glm::dvec3 eye) const {
         bool has_front = false, has_back = false;
         for (const std::span<const NodeId> indices : surfaces) {

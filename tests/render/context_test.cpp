@@ -10,7 +10,7 @@
 #include <GL/glcorearb.h>
 #include <gmock/gmock.h>
 
-#include <render/gl_object.h>
+#include "gl_object.h"
 
 namespace {
 

@@ -121,8 +121,8 @@ TEST_P(FoldOracleRuns, SeeNothingOfWhatTheSafeTestFolds) {
         [](const perception::Judgement& judged, perception::CsfModel) { EXPECT_EQ(judged.visible_pixels, 0u); });
 }
 
-// Nothing for the observer that the test goes by. For another model of the observer differences may exceed the threshold
-// a little (see docs/evidence.md).
+// Nothing for the observer that the test goes by. For another model of the observer differences may exceed the
+// threshold a little (see docs/evidence.md).
 void expect_unseen(const perception::Judgement& judged, perception::CsfModel model) {
     if (model == perception::CsfModel::castle) {
         EXPECT_EQ(judged.visible_pixels, 0u);
@@ -194,7 +194,8 @@ TEST(FoldOracle, SeesNothingOfFurtherMeshes) {
     if (looked_at == 0) GTEST_SKIP() << "UNSEEN_EXTRA_MESHES names no folder with further meshes";
 }
 
-// A test that claims to see nothing must be able to see: without what the measurement says of one thing, something shows.
+// A test that claims to see nothing must be able to see: without what the measurement says of one thing, something
+// shows.
 struct Omission {
     const char* name;
     void (*leave_out)(perception::FoldRecord&);
@@ -212,7 +213,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Omission{"a_quarter_of_the_errors",
                              [](perception::FoldRecord& r) {
                                  for (float* value : {&r.shift, &r.farthest, &r.mean_distance, &r.largest_luminance,
-                                                      &r.mean_luminance, &r.drift})
+                                                      &r.mean_luminance, &r.bias})
                                      *value /= 4;
                                  for (auto& of_size : r.amplitudes)
                                      for (float& amplitude : of_size) amplitude /= 4;

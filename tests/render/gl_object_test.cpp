@@ -7,7 +7,7 @@
 #define GL_GLEXT_PROTOTYPES 1
 #include <GL/glcorearb.h>
 
-#include <render/gl_object.h>
+#include "gl_object.h"
 
 namespace {
 

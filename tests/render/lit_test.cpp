@@ -1,4 +1,5 @@
-// Drawing under lights: every vertex in the luminance that its formula says, and simplifications that nobody tells from the whole.
+// Drawing under lights: every vertex in the luminance that its formula says, and simplifications that nobody tells from
+// the whole.
 #include <cmath>
 #include <memory>
 #include <string>

@@ -1,5 +1,5 @@
-// The oracle of the fold tests: models whole and simplified, drawn with many samples and compared by a judge that knows nothing of trees,
-// under one model of contrast sensitivity and another.
+// The oracle of the fold tests: models whole and simplified, drawn with many samples and compared by a judge that knows
+// nothing of trees, under one model of contrast sensitivity and another.
 #pragma once
 
 #include <algorithm>

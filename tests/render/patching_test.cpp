@@ -118,7 +118,8 @@ TEST_F(PatchingTest, BytesAreEightForEachChangedCorner) {
     }
 }
 
-// What the renderer has not seen it must not take for known: steps without a draw, jumps, other cuts, other ways to change a cut.
+// What the renderer has not seen it must not take for known: steps without a draw, jumps, other cuts, other ways to
+// change a cut.
 TEST_F(PatchingTest, MissedChangesUploadTheWhole) {
     Cut cut(tree()), other(tree());
     for (int frame = 0; frame < 60; ++frame) {

@@ -3,7 +3,7 @@
 
 #include <gmock/gmock.h>
 
-#include <render/program.h>
+#include "program.h"
 
 namespace {
 

@@ -1,5 +1,5 @@
-// Who keeps what, checked by the compiler: views of callables cannot be kept, options own their callbacks, and what must be kept by
-// reference refuses temporaries.
+// Who keeps what, checked by the compiler: views of callables cannot be kept, options own their callbacks, and what
+// must be kept by reference refuses temporaries.
 #include <functional>
 #include <memory>
 #include <type_traits>

@@ -1,5 +1,5 @@
-// Follows viewpoints of all kinds, good and bad, over a small tree, as bytes from anywhere say: whatever comes, a cut is what its
-// definition asks for, and a bad call is refused and changes nothing.
+// Follows viewpoints of all kinds, good and bad, over a small tree, as bytes from anywhere say: whatever comes, a cut
+// is what its definition asks for, and a bad call is refused and changes nothing.
 #pragma once
 
 #include <cmath>
@@ -89,7 +89,8 @@ private:
         }
     }
 
-    // Silhouettes, eccentricities, least costs, rows and lengths at random; now and then one that does not grow up the tree.
+    // Silhouettes, eccentricities, least costs, rows and lengths at random; now and then one that does not grow up the
+    // tree.
     void change_criterion() {
         const VertexTree& tree = *tree_;
         const std::size_t rows = 2 + in_.below(6);
@@ -98,18 +99,20 @@ private:
         if (in_.below(2)) parts.spheres = DistanceCriterion::Spheres::support;
         parts.eccentricity_bins = in_.below(2) ? 1 : 8;
         parts.bin_degrees = in_.between(0.5, 20);
-        std::vector<float> row_reach;
+        std::vector<float> row_distances;
         for (std::size_t row = 0; row < rows; ++row)
-            row_reach.push_back(static_cast<float>(static_cast<double>(row) * in_.between(0.2, 6)));
-        std::sort(row_reach.begin(), row_reach.end());
-        if (in_.below(2)) row_reach.front() = DistanceCriterion::never_visible;
-        if (in_.one_in(4)) row_reach.back() = DistanceCriterion::always_visible;
-        for (const float reach : row_reach)
+            row_distances.push_back(static_cast<float>(static_cast<double>(row) * in_.between(0.2, 6)));
+        std::sort(row_distances.begin(), row_distances.end());
+        if (in_.below(2)) row_distances.front() = DistanceCriterion::never_visible;
+        if (in_.one_in(4)) row_distances.back() = DistanceCriterion::always_visible;
+        for (const float switch_distance : row_distances)
             for (std::size_t bin = 0; bin < parts.eccentricity_bins; ++bin)
-                parts.reach.push_back(reach > 0 && reach < DistanceCriterion::always_visible
-                                          ? reach / static_cast<float>(1 + bin)
-                                          : reach);
-        if (in_.below(3) == 0) parts.least_cost.assign(parts.reach.size(), static_cast<float>(in_.between(0, 2)));
+                parts.switch_distance.push_back(switch_distance > 0 &&
+                                                        switch_distance < DistanceCriterion::always_visible
+                                                    ? switch_distance / static_cast<float>(1 + bin)
+                                                    : switch_distance);
+        if (in_.below(3) == 0)
+            parts.least_cost.assign(parts.switch_distance.size(), static_cast<float>(in_.between(0, 2)));
         if (in_.below(4)) parts.classes = random_classes(rows, is_wild);
         if (in_.below(3) == 0) parts.lengths = random_lengths(is_wild);
         if (!parts.classes.empty() && in_.below(3) == 0) parts.silhouette_lengths = random_lengths(is_wild);

@@ -1,5 +1,5 @@
-// A glTF scene with all that files say beside triangles, as .glb or as .gltf with files beside it; and what a scene holds, read back by code of
-// its own, for comparison.
+// A glTF scene with all that files say beside triangles, as .glb or as .gltf with files beside it; and what a scene
+// holds, read back by code of its own, for comparison.
 #pragma once
 
 #include <array>
@@ -81,7 +81,8 @@ struct GltfScene {
                      "metallicFactor": 0.25, "roughnessFactor": 0.75, "metallicRoughnessTexture": {"index": 1}},
                  "normalTexture": {"index": 2, "scale": 0.5}, "occlusionTexture": {"index": 1, "texCoord": 1},
                  "emissiveFactor": [0.125, 0, 0], "extensions": {"KHR_materials_ior": {"ior": 1.25}}},
-                {"name": "gold", "pbrMetallicRoughness": {"baseColorFactor": [1, 0.75, 0.25, 1], "roughnessFactor": 0.25}}],
+                {"name": "gold",
+                 "pbrMetallicRoughness": {"baseColorFactor": [1, 0.75, 0.25, 1], "roughnessFactor": 0.25}}],
             "extensionsUsed": ["KHR_materials_ior", "KHR_texture_transform"]})");
         const Ball checkered = ball(rings, sectors), gold = ball(rings / 2, sectors / 2);
         document["meshes"][0]["primitives"] = {{{"material", 0},

@@ -1,5 +1,5 @@
-// The fold test of Luebke and Hallen 2001, section 3.3, node by node and without any classes, tables of reaches or bins: what the criterion in
-// distance form is held to. For views whose field is the display's own.
+// The fold test of Luebke and Hallen 2001, section 3.3, node by node and without any classes, tables of reaches or
+// bins: what the criterion in distance form is held to. For views whose field is the display's own.
 #pragma once
 
 #include <algorithm>
@@ -16,7 +16,8 @@
 
 namespace unseen::support {
 
-// 2 theta' rho*, by interior node: imperceptible up to 1; infinite with the eye inside the ring's sphere. `viewpoint`: of the view.
+// 2 theta' rho*, by interior node: imperceptible up to 1; infinite with the eye inside the ring's sphere. `viewpoint`:
+// of the view.
 inline std::vector<float> luebke_hallen_costs(const vdtree::VertexTree& tree, const vdtree::Viewpoint& viewpoint,
                                               const perception::FoldTestOptions& options) {
     using namespace perception;

@@ -60,7 +60,7 @@ inline bool use_everything(const vdtree::VertexTree& tree) {
     extract();
     if (is_sound) (void)conserve_light(tree).has_value(); // not those with a texture
     (void)LightBounds::measure(tree).has_value();
-    const auto everything = DistanceCriterion::create(tree, {.reach = {DistanceCriterion::always_visible}});
+    const auto everything = DistanceCriterion::create(tree, {.switch_distance = {DistanceCriterion::always_visible}});
     valid &= everything.has_value();
     const std::vector<Sphere> occluders = inner_spheres(tree, {.count = 2, .cells = 8}); // quickly made
     for (const glm::dvec3 eye : {glm::dvec3(3, 1, 2), glm::dvec3(1e9, 0, 0)}) {

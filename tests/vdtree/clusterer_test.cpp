@@ -19,6 +19,8 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <vdtree/team.h>
+
 #include "build/help_cluster.h"
 #include "build/quadric_contraction.h"
 #include "build/surface.h"
@@ -152,8 +154,8 @@ TEST(Clusterers, AreWholeAndFastOnHardMeshesWhateverTheThreads) {
     }
 }
 
-// Members of a team that live in threads of this process. A message waits in the box of its two members, and who sends it waits, too:
-// whatever the order that they take turns in, none may wait for each other.
+// Members of a team that live in threads of this process. A message waits in the box of its two members, and who sends
+// it waits, too: whatever the order that they take turns in, none may wait for each other.
 class Mailboxes {
 public:
     void put(int from, int to, std::span<const std::byte> message) {

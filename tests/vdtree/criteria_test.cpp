@@ -2,11 +2,13 @@
 #include <vdtree/criteria.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <random>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 #include <glm/geometric.hpp>
@@ -54,8 +56,8 @@ std::vector<float> costs_of(MakeCriterion make, const VertexTree& tree, const Vi
 
 // Costs are ratios of distances. The pixels that they stand for, by the formulas of both criteria:
 double extent_pixels(float cost, const View& view, double tolerance) {
-    const double reach = 1 / std::sin(tolerance / pixels_per_radian(view) / 2) - 1,
-                 radius_over_gap = static_cast<double>(cost) / reach;
+    const double switch_distance = 1 / std::sin(tolerance / pixels_per_radian(view) / 2) - 1,
+                 radius_over_gap = static_cast<double>(cost) / switch_distance;
     return 2 * std::asin(radius_over_gap / (1 + radius_over_gap)) * pixels_per_radian(view);
 }
 double displacement_pixels(float cost, const View& view, double tolerance) {
@@ -362,6 +364,159 @@ TEST(Criteria, FoldFromHalfAsFarWithTwiceTheTolerance) {
         for (std::size_t i = 0; i < one.size(); ++i)
             EXPECT_NEAR(one[i], 2 * two[i], 2e-3 * one[i]); // but for the spheres' own radii
     }
+}
+
+// ---- infinite costs
+
+// A node, and an eye where its support's sphere is.
+struct EyeAtSphere {
+    NodeId node;
+    glm::dvec3 eye; // in the tree's frame
+};
+
+// Inside of spheres, and exactly on them: where radius and centre add up without rounding, also in floats.
+std::vector<EyeAtSphere> eyes_at_spheres(const VertexTree& tree, bool on_the_sphere) {
+    std::vector<EyeAtSphere> eyes;
+    for (NodeId node = 0; node < tree.interior_count(); ++node) {
+        const Sphere s = tree.support_spheres()[node];
+        if (!(s.radius > 0) || !(tree.displacement()[node] > 0)) continue;
+        for (int axis = 0; axis < 3; ++axis) {
+            glm::vec3 eye = s.centre;
+            eye[axis] += on_the_sphere ? s.radius : s.radius / 4;
+            if (!on_the_sphere || eye[axis] - s.centre[axis] == s.radius) eyes.push_back({node, glm::dvec3(eye)});
+        }
+    }
+    return eyes;
+}
+
+// The definition of a budget, a node at a time: the largest cost first, none larger than its parent's, ties by number.
+std::vector<bool> best_within(const VertexTree& tree, std::vector<float> costs, Index budget) {
+    const SoundTree sound = support::sound(tree);
+    const auto parents = sound.parents(), first = sound.first_triangle();
+    for (NodeId node = 1; node < tree.interior_count(); ++node)
+        costs[node] = std::min(costs[node], costs[parents[node]]);
+    std::vector<bool> unfolded(tree.interior_count());
+    for (;;) {
+        NodeId best = no_node;
+        for (NodeId node = 0; node < tree.interior_count(); ++node)
+            if (!unfolded[node] && costs[node] > 0 && (node == 0 || unfolded[parents[node]]) &&
+                (best == no_node || costs[node] > costs[best]))
+                best = node;
+        if (best == no_node || first[best + 1] - first[best] > budget) return unfolded;
+        budget -= first[best + 1] - first[best];
+        unfolded[best] = true;
+    }
+}
+
+std::vector<bool> state_of(const Cut& cut) {
+    std::vector<bool> unfolded(cut.tree().interior_count());
+    for (NodeId node = 0; node < unfolded.size(); ++node) unfolded[node] = cut.is_unfolded(node);
+    return unfolded;
+}
+
+// Of the nodes at which a cut ends.
+float largest_left(const VertexTree& tree, const std::vector<float>& costs, const std::vector<bool>& unfolded) {
+    const SoundTree sound = support::sound(tree);
+    float largest = 0;
+    for (NodeId node = 0; node < tree.interior_count(); ++node)
+        if (!unfolded[node] && (node == 0 || unfolded[sound.parents()[node]])) largest = std::max(largest, costs[node]);
+    return largest;
+}
+
+TEST(InfiniteCosts, AreThoseOfEyesOnAndInSpheresHoweverTheCutIsMade) {
+    constexpr Index few = 2;
+    int tested = 0, infinite_left = 0;
+    for (const shapes::Named& named : meshes_in_range()) {
+        const VertexTree tree = built(named.mesh);
+        const auto parents = support::sound(tree).parents();
+        const glm::dvec3 far = glm::dvec3(tree.bounding_sphere().centre) + glm::dvec3(0, 0, 50);
+        for (const MakeCriterion make : {&extent_criterion, &displacement_criterion}) {
+            const auto criterion = make(tree, View{}, 3);
+            ASSERT_TRUE(criterion);
+            Cut followed(tree);
+            for (const bool on_the_sphere : {false, true}) {
+                const auto eyes = eyes_at_spheres(tree, on_the_sphere);
+                for (std::size_t i = 0; i < eyes.size(); i += 1 + eyes.size() / 20) {
+                    const auto& [node, eye] = eyes[i];
+                    const auto costs = find_every_cost(tree, *criterion, {.eye = eye});
+                    ASSERT_TRUE(costs);
+                    EXPECT_EQ((*costs)[node], std::numeric_limits<float>::infinity())
+                        << named.name << ", node " << node;
+                    for (const float cost : *costs) ASSERT_FALSE(std::isnan(cost)) << named.name;
+
+                    // From the root down, and on from a cut for an eye far away.
+                    Cut fresh(tree);
+                    ASSERT_TRUE(fresh.follow(*criterion, {.eye = eye}));
+                    ASSERT_TRUE(followed.follow(*criterion, {.eye = far}));
+                    ASSERT_TRUE(followed.follow(*criterion, {.eye = eye}));
+                    for (NodeId up = node; up != no_node; up = parents[up]) {
+                        EXPECT_TRUE(fresh.is_unfolded(up)) << named.name << ", node " << up;
+                        EXPECT_TRUE(followed.is_unfolded(up)) << named.name << ", node " << up;
+                    }
+                    // With too few triangles some of these nodes are left.
+                    const float least = largest_left(tree, *costs, best_within(tree, *costs, few));
+                    infinite_left += std::isinf(least);
+                    for (const float hysteresis : {1.0f, 1.1f}) {
+                        const auto stats =
+                            fresh.follow(*criterion, {.eye = eye}, {.triangle_budget = few, .hysteresis = hysteresis});
+                        ASSERT_TRUE(stats);
+                        EXPECT_GE(stats->max_fold_cost, least) << named.name;
+                        EXPECT_LE(stats->max_fold_cost, hysteresis * least) << named.name;
+                    }
+                    ++tested;
+                }
+            }
+        }
+    }
+    EXPECT_GT(tested, 300);
+    EXPECT_GT(infinite_left, 100);
+}
+
+// Merges vertices by their numbers, four at a time, wherever they are: so the spheres of most nodes overlap.
+const auto cluster_by_number = [](const ClusterInput& input) {
+    auto count = static_cast<Index>(input.mesh.positions.size());
+    Clustering clustering{std::vector<Index>(count), {}};
+    for (Index first = 0; count > 1;) {
+        const Index next = first + count;
+        for (Index i = 0; i < count; ++i) clustering.parents[first + i] = next + i / 4;
+        first = next, count = (count + 3) / 4;
+        clustering.parents.resize(first + count, first); // the root is its own parent
+    }
+    return Result<Clustering>(clustering);
+};
+
+TEST(InfiniteCosts, UnfoldFirstUnderABudgetAndInTheOrderOfNodes) {
+    const auto made_tree = build_tree(shapes::random_soup(128, 300, 3).view(), cluster_by_number);
+    ASSERT_TRUE(made_tree) << made_tree.error().message;
+    const VertexTree& tree = *made_tree;
+    const Viewpoint viewpoint{.eye = glm::dvec3(tree.bounding_sphere().centre)};
+    const auto criterion = extent_criterion(tree, View{}, 3);
+    ASSERT_TRUE(criterion);
+    const auto costs = find_every_cost(tree, *criterion, viewpoint);
+    ASSERT_TRUE(costs);
+    const auto parents = support::sound(tree).parents();
+    int cut_between_infinite_ones = 0;
+    for (Index budget = 0; budget <= tree.triangle_count(); ++budget) {
+        const FollowOptions options{.triangle_budget = budget};
+        const std::vector<bool> wanted = best_within(tree, *costs, budget);
+        // On several threads at once, a cut each.
+        std::array<std::vector<bool>, 4> made;
+        std::vector<std::thread> threads;
+        for (auto& state : made)
+            threads.emplace_back([&] {
+                Cut cut(tree);
+                if (cut.follow(*criterion, viewpoint, options)) state = state_of(cut);
+            });
+        for (std::thread& thread : threads) thread.join();
+        for (const auto& state : made) ASSERT_EQ(state, wanted) << "budget " << budget;
+
+        bool is_one_unfolded = false, is_one_left = false;
+        for (NodeId node = 1; node < tree.interior_count(); ++node)
+            if (std::isinf((*costs)[node]) && wanted[parents[node]])
+                (wanted[node] ? is_one_unfolded : is_one_left) = true;
+        cut_between_infinite_ones += is_one_unfolded && is_one_left;
+    }
+    EXPECT_GT(cut_between_infinite_ones, 10);
 }
 
 TEST(UnboundedCosts, AreOrderedAndUnbounded) {

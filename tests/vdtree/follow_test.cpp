@@ -33,8 +33,8 @@ using support::gathered;
 using support::state_of;
 using support::triangles_of;
 
-// Frames a mesh class. A view of a few minutes has ten thousand, in which rare sequences of changes turn up, too: the environment variable
-// UNSEEN_FRAMES asks for so many.
+// Frames a mesh class. A view of a few minutes has ten thousand, in which rare sequences of changes turn up, too: the
+// environment variable UNSEEN_FRAMES asks for so many.
 int frame_count() {
     const char* asked = std::getenv("UNSEEN_FRAMES");
     return asked ? std::atoi(asked) : 400;
@@ -112,17 +112,19 @@ DistanceCriterion rich_criterion(const VertexTree& tree, std::uint64_t seed, boo
     }
     for (std::size_t row = 0; row < rows; ++row)
         for (std::size_t bin = 0; bin < parts.eccentricity_bins; ++bin)
-            parts.reach.push_back(row == 0          ? DistanceCriterion::never_visible
-                                  : row == rows - 1 ? DistanceCriterion::always_visible
-                                                    : static_cast<float>(2.0 * static_cast<double>(row) *
-                                                                         std::exp(-0.06 * static_cast<double>(bin))));
+            parts.switch_distance.push_back(
+                row == 0 ? DistanceCriterion::never_visible
+                : row == rows - 1
+                    ? DistanceCriterion::always_visible
+                    : static_cast<float>(2.0 * static_cast<double>(row) * std::exp(-0.06 * static_cast<double>(bin))));
     Result<DistanceCriterion> criterion = DistanceCriterion::create(tree, std::move(parts));
     if (!criterion) throw std::runtime_error(criterion.error().message);
     return std::move(*criterion);
 }
 
-// Costs of a fold from the definition, in doubles: nothing for what is out of sight or faces away, else the distance within which its interior, or
-// its silhouette, unfolds at the threshold 1, over its gap; least costs counted in for `seen_cost`. Without a gaze or away from the bins' edges.
+// Costs of a fold from the definition, in doubles: nothing for what is out of sight or faces away, else the distance
+// within which its interior, or its silhouette, unfolds at the threshold 1, over its gap; least costs counted in for
+// `seen_cost`. Without a gaze or away from the bins' edges.
 void expect_cost_by_definition(const DistanceCriterion& criterion, const FoldCandidate& of, const Viewpoint& viewpoint,
                                float cost, float seen_cost) {
     const DistanceCriterion::Parts& parts = criterion.parts();
@@ -138,11 +140,12 @@ void expect_cost_by_definition(const DistanceCriterion& criterion, const FoldCan
     if (std::abs(bins - std::round(bins)) < 0.02 && bins > 0.5) return;
     const auto bin = std::min(static_cast<std::size_t>(bins), parts.eccentricity_bins - 1);
     const auto costs = [&](std::size_t row, double length) -> std::array<double, 2> {
-        const double reach = parts.reach[row * parts.eccentricity_bins + bin];
-        if (reach < 0 || (length * reach <= 0 && gap > 0)) return {0, 0};
+        const double switch_distance = parts.switch_distance[row * parts.eccentricity_bins + bin];
+        if (switch_distance < 0 || (length * switch_distance <= 0 && gap > 0)) return {0, 0};
         const double infinite = std::numeric_limits<double>::infinity();
-        const double own =
-            reach >= double{DistanceCriterion::always_visible} || gap <= 0 ? infinite : length * reach / gap;
+        const double own = switch_distance >= double{DistanceCriterion::always_visible} || gap <= 0
+                               ? infinite
+                               : length * switch_distance / gap;
         return {own, parts.least_cost.empty()
                          ? own
                          : std::max<double>(own, parts.least_cost[row * parts.eccentricity_bins + bin])};
@@ -308,8 +311,8 @@ TEST_P(Follow, EqualsTheCutFromScratchOnStraightWays) {
     }
 }
 
-// Views of parts of the model, some two at a time, that turn, go on and zoom by steps of all sizes, with the eye or apart from
-// it: nodes are due by planes that cut the model, and blocks of them go in and out.
+// Views of parts of the model, some two at a time, that turn, go on and zoom by steps of all sizes, with the eye or
+// apart from it: nodes are due by planes that cut the model, and blocks of them go in and out.
 TEST_P(Follow, EqualsTheCutFromScratchInFrustaThatCutTheModel) {
     const VertexTree tree = built(GetParam().make());
     const Sphere sphere = tree.bounding_sphere();
@@ -399,7 +402,7 @@ TEST_P(Follow, DecidesAndWeighsManyNodesAsOneByOne) {
         if (variant >= 12) { // other spheres, directions of its own, least costs
             parts.spheres = DistanceCriterion::Spheres::support;
             for (const NodeBounds& bounds : tree.bounds()) parts.facing.push_back(bounds.slabs);
-            parts.least_cost.assign(parts.reach.size(), 0.5f);
+            parts.least_cost.assign(parts.switch_distance.size(), 0.5f);
         }
         const auto criterion = DistanceCriterion::create(tree, std::move(parts));
         ASSERT_TRUE(criterion);
@@ -481,12 +484,13 @@ TEST(FollowStill, CostsNothingAndChangesNothing) {
     }
 }
 
-// By distances alone, so that tests of planes would show: where a camera's frustum shows all of the model, they are seldom.
+// By distances alone, so that tests of planes would show: where a camera's frustum shows all of the model, they are
+// seldom.
 TEST(FollowFrustum, AddsHardlyATestWhereItShowsAllOfTheModel) {
     const VertexTree tree = built(shapes::bumpy_sphere(5, 0.03));
     const Sphere sphere = tree.bounding_sphere();
     DistanceCriterion::Parts parts;
-    parts.reach = {40};
+    parts.switch_distance = {40};
     const auto criterion = DistanceCriterion::create(tree, std::move(parts));
     ASSERT_TRUE(criterion);
     std::uint64_t tests[2] = {};
@@ -635,7 +639,7 @@ TEST(FollowBudget, IsTheSameWhateverWasBefore) {
 TEST(FollowBudget, StopsAtCostZeroUnlessToldToFill) {
     const VertexTree tree = built(shapes::bumpy_sphere(3));
     DistanceCriterion::Parts parts;
-    parts.reach = {DistanceCriterion::never_visible};
+    parts.switch_distance = {DistanceCriterion::never_visible};
     const auto invisible = DistanceCriterion::create(tree, parts);
     ASSERT_TRUE(invisible);
     Cut cut(tree);
@@ -711,7 +715,8 @@ float largest_cost_of(const Cut& cut, const DistanceCriterion& criterion, const 
     return largest;
 }
 
-// Even without any time every call does a step of tests and one of unfolds, and none does again what one before it has done.
+// Even without any time every call does a step of tests and one of unfolds, and none does again what one before it has
+// done.
 TEST(FollowInTime, AStillViewIsDoneInSmallStepsWithoutTestsInVain) {
     const VertexTree tree = built(shapes::bumpy_sphere(5, 0.02));
     for (const bool with_gaze : {false, true}) {
@@ -832,8 +837,8 @@ TEST(FollowScene, SharesABudgetAmongObjects) {
     EXPECT_FALSE(follow_scene(twice, 10));
 }
 
-// Whether a triangle of a surface that is turned inside out shows its seen side, the one that its normal points away from; of others,
-// the one that it points to.
+// Whether a triangle of a surface that is turned inside out shows its seen side, the one that its normal points away
+// from; of others, the one that it points to.
 bool is_seen(const VertexTree& tree, const Triangle& t, glm::dvec3 eye) {
     const auto at = [&](Index leaf) { return glm::dvec3(tree.positions()[tree.interior_count() + leaf]); };
     const glm::dvec3 normal = glm::cross(at(t[1]) - at(t[0]), at(t[2]) - at(t[0]));
@@ -849,8 +854,8 @@ TEST(FollowBackFaces, OfInsideOutSurfacesAreThoseOfTheSurfaceTurnedRight) {
     ASSERT_EQ(right.closedness(), Closedness::closed_outward);
     ASSERT_EQ(wrong.closedness(), Closedness::closed_inward);
     ASSERT_EQ(right.interior_count(), wrong.interior_count());
-    const auto for_right = DistanceCriterion::create(right, {.reach = {1000}}),
-               for_wrong = DistanceCriterion::create(wrong, {.reach = {1000}});
+    const auto for_right = DistanceCriterion::create(right, {.switch_distance = {1000}}),
+               for_wrong = DistanceCriterion::create(wrong, {.switch_distance = {1000}});
     ASSERT_TRUE(for_right && for_wrong);
     const FollowOptions culling{.cull_back_faces = true};
     Cut of_right(right), of_wrong(wrong), with_back(wrong);
@@ -979,13 +984,13 @@ TEST(FollowBadInput, CriteriaThatDoNotFitAreRefused) {
     const VertexTree tree = built(shapes::bumpy_sphere(3));
     using Parts = DistanceCriterion::Parts;
     EXPECT_FALSE(DistanceCriterion::create(tree, Parts{}));
-    EXPECT_FALSE(DistanceCriterion::create(tree, Parts{.reach = {std::nanf("")}}));
-    EXPECT_FALSE(DistanceCriterion::create(tree, Parts{.lengths = {1, 2}, .reach = {1}}));
+    EXPECT_FALSE(DistanceCriterion::create(tree, Parts{.switch_distance = {std::nanf("")}}));
+    EXPECT_FALSE(DistanceCriterion::create(tree, Parts{.lengths = {1, 2}, .switch_distance = {1}}));
     EXPECT_FALSE(DistanceCriterion::create(
-        tree, Parts{.classes = std::vector<FoldClass>(tree.interior_count(), {7, 7}), .reach = {1}}));
-    EXPECT_FALSE(
-        DistanceCriterion::create(tree, Parts{.lengths = std::vector<float>(tree.interior_count(), -1), .reach = {1}}));
-    EXPECT_FALSE(DistanceCriterion::create(tree, Parts{.reach = {1, 2}, .eccentricity_bins = 2}));
+        tree, Parts{.classes = std::vector<FoldClass>(tree.interior_count(), {7, 7}), .switch_distance = {1}}));
+    EXPECT_FALSE(DistanceCriterion::create(
+        tree, Parts{.lengths = std::vector<float>(tree.interior_count(), -1), .switch_distance = {1}}));
+    EXPECT_FALSE(DistanceCriterion::create(tree, Parts{.switch_distance = {1, 2}, .eccentricity_bins = 2}));
     EXPECT_FALSE(extent_criterion(tree, View{}, 0));
     EXPECT_FALSE(displacement_criterion(tree, View{}, std::nan("")));
 }
@@ -1013,7 +1018,7 @@ TEST(FollowHardTrees, OneTriangleCoincidentVerticesAndEqualDistances) {
     for (const VertexTree& tree : trees) {
         DistanceCriterion::Parts parts;
         parts.lengths.assign(tree.interior_count(), 0.5f); // all D equal
-        parts.reach = {2};
+        parts.switch_distance = {2};
         const auto criterion = DistanceCriterion::create(tree, parts);
         ASSERT_TRUE(criterion);
         Cut cut(tree);

@@ -1,4 +1,5 @@
-// Lights: shading of known cases, bounds against brute force, how fast they may change, and cuts that follow lights that move.
+// Lights: shading of known cases, bounds against brute force, how fast they may change, and cuts that follow lights
+// that move.
 #include <vdtree/lighting.h>
 
 #include <algorithm>
@@ -12,6 +13,7 @@
 
 #include <vdtree/builder.h>
 #include <vdtree/cut.h>
+#include <vdtree/internal/contrast_classes.h>
 
 #include "cut/kernel/lit_kernel.h"
 #include "shapes.h"
@@ -89,7 +91,8 @@ TEST(Shading, HasItsHighlightWhereTheHalfVectorIsTheNormal) {
     Lighting lighting = lit_by(directional({0, std::sqrt(0.75), 0.5}, 0.5));
     lighting.specular = 0.1;
     lighting.shininess = 24;
-    // Half-way between the light and the eye, at 30 degrees from both: the highlight is at its peak, 0.1 * (24 + 8) / 8.
+    // Half-way between the light and the eye, at 30 degrees from both: the highlight is at its peak, 0.1 * (24 + 8)
+    // / 8.
     const glm::dvec3 half_way(0, 0.5, std::sqrt(0.75));
     EXPECT_NEAR(lit_luminance(lighting, {}, half_way, 0, {0, 0, 1e9}), 0.5 * std::sqrt(0.75) * 0.4, 1e-9);
     EXPECT_LT(lit_luminance(lighting, {}, {0, 1, 0}, 0, {0, 0, 1e9}), 1e-5);
@@ -404,14 +407,16 @@ DistanceCriterion lit_criterion(const Subject& s, bool with_gaze) {
     DistanceCriterion::Parts parts;
     parts.eccentricity_bins = with_gaze ? 24 : 1;
     parts.bin_degrees = 2;
-    const ContrastClasses levels(0.5, 99.5);
-    parts.lit = LitClasses{std::make_shared<LightBounds>(s.bounds), levels, levels.row({0, 1}, 1)};
-    parts.reach.assign(ContrastClasses::row_count * parts.eccentricity_bins, DistanceCriterion::never_visible);
-    for (std::size_t row = 1; row < ContrastClasses::row_count; ++row)
+    const AbsoluteScale scale{.offset = 0.5, .span = 99.5};
+    const ContrastClasses classes(scale);
+    parts.lit = LitClasses{std::make_shared<LightBounds>(s.bounds), scale, classes.class_of({0, 1}, 1)};
+    parts.switch_distance.assign(ContrastClasses::class_count * parts.eccentricity_bins,
+                                 DistanceCriterion::never_visible);
+    for (std::size_t row = 1; row < ContrastClasses::class_count; ++row)
         for (std::size_t bin = 0; bin < parts.eccentricity_bins; ++bin) {
-            const double seen = 60 * ContrastClasses::contrast(row) * std::pow(levels.luminance(row) / 100, 0.3);
+            const double seen = 60 * ContrastClasses::contrast(row) * std::pow(classes.level(row) / 100, 0.3);
             if (seen > 1)
-                parts.reach[row * parts.eccentricity_bins + bin] =
+                parts.switch_distance[row * parts.eccentricity_bins + bin] =
                     static_cast<float>(40 * std::log(seen) / (1 + 0.3 * static_cast<double>(bin)));
         }
     Result<DistanceCriterion> made = DistanceCriterion::create(s.tree, std::move(parts));
@@ -426,6 +431,16 @@ void move_lights(std::mt19937_64& random, Lighting& lighting, double radius, dou
             light.direction = glm::normalize(light.direction + step * random_direction(random));
         if (light.kind != Kind::directional) light.position += step * radius * random_direction(random);
         if (random() % 4 == 0) light.intensity *= std::exp(random_between(random, -0.2, 0.2) * step);
+    }
+}
+
+TEST(FollowLights, RefusesAScaleThatIsNone) {
+    const Subject& s = subjects()[0];
+    const DistanceCriterion::Parts good = lit_criterion(s, false).parts();
+    for (const AbsoluteScale scale : {AbsoluteScale{-1, 2}, {0, 0}, {0, std::nan("")}, {0, infinity}}) {
+        DistanceCriterion::Parts parts = good;
+        parts.lit->scale = scale;
+        EXPECT_FALSE(DistanceCriterion::create(s.tree, std::move(parts))) << scale.offset << ", " << scale.span;
     }
 }
 

@@ -49,7 +49,8 @@ namespace fs = std::filesystem;
 using namespace std::string_literals;
 using testing::HasSubstr;
 
-// What a reader may allocate at once: a vertex of one byte a coordinate becomes 60 bytes, and small files have overhead.
+// What a reader may allocate at once: a vertex of one byte a coordinate becomes 60 bytes, and small files have
+// overhead.
 constexpr std::size_t allowed_bytes_per_byte = 64;
 constexpr std::size_t allowed_bytes = 64 * 1024;
 

@@ -235,8 +235,8 @@ TEST(Facing, HoldsForAnEyeOnAnAxis) {
     EXPECT_EQ(facing(slabs, {-0.0f, -0.0f, -1}, 100, 1), Facing::front);
 }
 
-// A node's masks, slabs and sphere contain its children's. What the node rules out must be ruled out for them, or criteria
-// would fall up the tree.
+// A node's masks, slabs and sphere contain its children's. What the node rules out must be ruled out for them, or
+// criteria would fall up the tree.
 TEST(Facing, IsNoLessCertainForAPart) {
     std::mt19937_64 random(6);
     int decided = 0;

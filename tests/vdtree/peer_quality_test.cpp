@@ -1,5 +1,5 @@
-// How far simplified surfaces stray, against meshoptimizer at equal triangle count: the bumpy sphere, loose leaves, and, from
-// the folder UNSEEN_EXTRA_MESHES, the Stanford dragon and bunny.
+// How far simplified surfaces stray, against meshoptimizer at equal triangle count: the bumpy sphere, loose leaves,
+// and, from the folder UNSEEN_EXTRA_MESHES, the Stanford dragon and bunny.
 #include <vdtree/builder.h>
 
 #include <algorithm>

@@ -270,7 +270,8 @@ TEST_F(TreeIo, RefusesTablesThatDoNotFit) {
 
 // ---- attributes
 
-// Names that nobody here knows come back from files that were read and from files that were mapped, and go into the next.
+// Names that nobody here knows come back from files that were read and from files that were mapped, and go into the
+// next.
 TEST_F(TreeIo, KeepsAttributesOfAnyName) {
     const VertexTree tree = marked(built(shapes::bumpy_sphere(2)));
     const auto expect_kept = [&](const VertexTree& kept) {
@@ -615,7 +616,8 @@ TEST_F(TreeIo, KeepsAMappedTreeWhoseFileIsReplaced) {
 }
 
 TEST_F(TreeIo, MapsNoSectionAcrossAnElement) {
-    // The offset of a section raised by one element, within the file: read, its checksum fails; mapped, it is misaligned.
+    // The offset of a section raised by one element, within the file: read, its checksum fails; mapped, it is
+    // misaligned.
     std::string bytes = bytes_of(built(shapes::cube(2)));
     const std::size_t at = TreeFile::header_bytes + TreeFile::offset_at;
     support::store(bytes, at, support::load<std::uint64_t>(bytes, at) + 4);

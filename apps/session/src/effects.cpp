@@ -6,7 +6,7 @@
 
 #include <glm/geometric.hpp>
 
-#include "number_text.h"
+#include <vdtree/internal/number_format.h>
 
 namespace unseen::session {
 namespace {
@@ -34,6 +34,9 @@ Effect fold_test_effect(const Decision& decision) {
     return {"fold test", true, name_of(decision.test) + ": pixels on the screen, whether they can be seen or not"};
 }
 
+// Without commas in thousands, for a comma parts the coordinates of a pixel.
+std::string to_tenths(double px) { return shortest(std::round(10 * px) / 10); }
+
 Effect gaze_effect(const Sight& sight, const Decision& decision) {
     if (is_full(decision)) return {"gaze", false, "nothing is folded in the full model"};
     if (!is_perceptual(decision))
@@ -43,7 +46,7 @@ Effect gaze_effect(const Sight& sight, const Decision& decision) {
     const std::string around =
         gaze->margin_deg > 0 ? ", give or take " + rounded(gaze->margin_deg, 3) + " degrees," : std::string(",");
     return {"gaze", true,
-            "the viewer looks at pixel " + rounded(gaze->px.x, 6) + ", " + rounded(gaze->px.y, 6) + around +
+            "the viewer looks at pixel " + to_tenths(gaze->px.x) + ", " + to_tenths(gaze->px.y) + around +
                 " and sees less sharply elsewhere"};
 }
 

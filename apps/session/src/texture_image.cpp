@@ -26,7 +26,8 @@ namespace {
 using vdtree::Texel;
 using vdtree::Texture;
 
-// A JPEG's blank parts take less than a bit a pixel, but no picture gets this small: a header that claims more is wrong.
+// A JPEG's blank parts take less than a bit a pixel, but no picture gets this small: a header that claims more is
+// wrong.
 constexpr std::uint64_t most_pixels_a_byte = 1024;
 constexpr std::uint64_t small_image = std::uint64_t{1} << 24; // pixels that any file may ask for
 constexpr int most_scans = 100;                               // of a progressive JPEG: more only take time

@@ -115,8 +115,8 @@ private:
     std::map<std::tuple<std::filesystem::path, const std::string*, vdtree::Wrap, vdtree::Wrap>, Texture> images_;
 };
 
-// The reflectance of a vertex: its own colour times its material's, and the texture's where it has one. Each is white where nothing is
-// said; a mesh of which nothing is said stays without colours.
+// The reflectance of a vertex: its own colour times its material's, and the texture's where it has one. Each is white
+// where nothing is said; a mesh of which nothing is said stays without colours.
 void colour_vertices(Mesh& mesh, const std::vector<Material>& materials, const std::vector<std::size_t>& of_vertex) {
     if (mesh.colours.empty()) mesh.colours.assign(mesh.positions.size(), glm::vec4(1));
     for (std::size_t v = 0; v < of_vertex.size(); ++v)
@@ -155,8 +155,8 @@ void note_drawing(meshio::ReadResult& read, const std::vector<std::size_t>& of_t
     }
 }
 
-// Lays the images of materials over the mesh, side by side. Materials without an image, and triangles without a material, get a white one.
-// Returns by material how its coordinates are drawn, the last of those without one.
+// Lays the images of materials over the mesh, side by side. Materials without an image, and triangles without a
+// material, get a white one. Returns by material how its coordinates are drawn, the last of those without one.
 Result<std::vector<meshio::UvMap>> lay_images(const std::filesystem::path& mesh_file, meshio::ReadResult& read,
                                               const std::vector<std::size_t>& of_triangle,
                                               const std::vector<std::size_t>& of_vertex) {

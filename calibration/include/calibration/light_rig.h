@@ -5,16 +5,18 @@
 //                "orbit": {"axis": [0, 1, 0], "degrees_per_second": 60}},
 //               {"type": "point", "position": [1, 2, 3], "intensity": 0.5, "distance": 3,
 //                "keyframes": [{"time_s": 0, "position": [1, 2, 3]}, {"time_s": 2, "position": [-1, 2, 3]}]},
-//               {"type": "spot", "position": [0, 3, 0], "direction": [0, -1, 0], "inner_degrees": 20, "outer_degrees": 30,
+//               {"type": "spot", "position": [0, 3, 0], "direction": [0, -1, 0],
+//                "inner_degrees": 20, "outer_degrees": 30,
 //                "intensity": 1, "distance": 3},
 //               {"type": "headlight", "intensity": 0.3}]}
 //
-// "ambient" and "material" may be missing (0: no ambient light, no highlights); of a light everything is wanted that its type has,
-// but for "orbit" or "keyframes". Positions and distances in world units (metres); "direction" leads towards a directional light,
-// and to where a spot shines. "intensity" is the relative luminance of white that faces the light: at "distance", where the light
-// has a position. A headlight shines from the camera's direction. An orbit turns position and direction about an axis through
-// "centre" (default: the model's). Keyframes give any of position, direction and intensity, all the same ones, at ascending times; in
-// between, positions and intensities go straight and directions along the shorter arc; before and after, they stay.
+// "ambient" and "material" may be missing (0: no ambient light, no highlights); of a light everything is wanted that
+// its type has, but for "orbit" or "keyframes". Positions and distances in world units (metres); "direction" leads
+// towards a directional light, and to where a spot shines. "intensity" is the relative luminance of white that faces
+// the light: at "distance", where the light has a position. A headlight shines from the camera's direction. An orbit
+// turns position and direction about an axis through "centre" (default: the model's). Keyframes give any of position,
+// direction and intensity, all the same ones, at ascending times; in between, positions and intensities go straight and
+// directions along the shorter arc; before and after, they stay.
 #pragma once
 
 #include <filesystem>

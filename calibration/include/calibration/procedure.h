@@ -35,10 +35,11 @@ struct CalibrationPlan {
 // The lowest contrast that is shown, 10^-3.5: nobody sees a fainter grating. Thresholds below it cannot be measured.
 inline constexpr double lowest_log10_contrast = -3.5;
 
-// A plan whose gratings fit a display: octaves from 0.5 cpd to 16, as far as a cycle has `pixels_per_cycle`; eccentricities of 0,
-// 5, 10 and 20 degrees, as far as they fit beside a fixation cross at the screen's edge; of these, what the expected observer
-// sees at a third of the highest contrast. The luminance is midway between the display's black and white where none is given; one
-// that is must lie between them, and the highest contrast is what the display has room for on either side of it.
+// A plan whose gratings fit a display: octaves from 0.5 cpd to 16, as far as a cycle has `pixels_per_cycle`;
+// eccentricities of 0, 5, 10 and 20 degrees, as far as they fit beside a fixation cross at the screen's edge; of these,
+// what the expected observer sees at a third of the highest contrast. The luminance is midway between the display's
+// black and white where none is given; one that is must lie between them, and the highest contrast is what the display
+// has room for on either side of it.
 inline constexpr double pixels_per_cycle = 4;
 CalibrationPlan plan_for(const perception::Display& display, const perception::CsfTable& expected,
                          std::optional<perception::Luminance> luminance = {});
@@ -46,11 +47,13 @@ CalibrationPlan plan_for(const perception::Display& display, const perception::C
 // Whether a patch and the cross beside it fit on the display.
 bool fits(const perception::Display& display, const GratingPlace& place);
 
-// 1 to 1000 places with frequencies of 1/16 to 64 cpd and eccentricities of 0 to 90 degrees, none twice; 1 to 100,000 trials; 2 to 1000
-// settings; luminance above 0 and at most 1e6 cd/m2; 0 < highest_contrast <= 1; a seed of at most 2^53. The error names the field.
+// 1 to 1000 places with frequencies of 1/16 to 64 cpd and eccentricities of 0 to 90 degrees, none twice; 1 to 100,000
+// trials; 2 to 1000 settings; luminance above 0 and at most 1e6 cd/m2; 0 < highest_contrast <= 1; a seed of at most
+// 2^53. The error names the field.
 Result<void> validate(const CalibrationPlan& plan);
 
-// One thing to show. Two-interval: the grating is in `interval` 1 or 2. Adjustment: it begins at `contrast`, unseen if ascending.
+// One thing to show. Two-interval: the grating is in `interval` 1 or 2. Adjustment: it begins at `contrast`, unseen if
+// ascending.
 struct Trial {
     int number = 0; // from 0
     std::size_t place = 0;
@@ -80,8 +83,8 @@ struct PlaceEstimate {
 
 class Procedure {
 public:
-    // `expected` is what an observer is believed to see before any answer. Fails on plans that validate() refuses, where no contrast is
-    // left to show, and where the expected threshold of a place is below the lowest contrast.
+    // `expected` is what an observer is believed to see before any answer. Fails on plans that validate() refuses,
+    // where no contrast is left to show, and where the expected threshold of a place is below the lowest contrast.
     static Result<Procedure> create(CalibrationPlan plan, perception::CsfTable expected);
 
     const CalibrationPlan& plan() const noexcept { return plan_; }
@@ -89,23 +92,25 @@ public:
     int trials() const noexcept; // in all
     bool is_done() const noexcept { return static_cast<int>(answers_.size()) >= trials(); }
 
-    // The same until it is answered, and the same for the same plan and answers. Precondition: !is_done(). Two-interval: the place
-    // and the contrast whose answer is expected to leave the least variance of the thresholds of all places that can be seen at all;
-    // every fourth time at the place that was asked least, of those that may be visible. Cost: about 1 ms for 18 places.
+    // The same until it is answered, and the same for the same plan and answers. Precondition: !is_done().
+    // Two-interval: the place and the contrast whose answer is expected to leave the least variance of the thresholds
+    // of all places that can be seen at all; every fourth time at the place that was asked least, of those that may be
+    // visible. Cost: about 1 ms for 18 places.
     Trial next() const;
     // Answers next(). Preconditions: !is_done(), and the plan's method.
     void choose(int interval);
     void set(double contrast); // above 0, below the lowest contrast: as that; the highest or more: not seen even there
 
     std::vector<PlaceEstimate> estimates() const;
-    // The expected table with the measured deviations, on the axes of a profile (see calibrated_table in the sources): beyond the
-    // measured places, and at other luminances, the deviation of the nearest measured frequency and eccentricity is taken. Fails where
-    // that is no table (CsfTable::create()): where the expected one comes near to the largest sensitivity that there can be.
+    // The expected table with the measured deviations, on the axes of a profile (see calibrated_table in the sources):
+    // beyond the measured places, and at other luminances, the deviation of the nearest measured frequency and
+    // eccentricity is taken. Fails where that is no table (CsfTable::create()): where the expected one comes near to
+    // the largest sensitivity that there can be.
     Result<perception::CsfTable> table(std::string source) const;
 
-    // The plan and all answers, to go on later. Reading checks everything, the plan and each answer, and fails on a bad file with
-    // its name and the place; and where `expected` is another table than the calibration was begun with (a hash of its numbers is kept,
-    // as floats; files from before that was so have none, and take any).
+    // The plan and all answers, to go on later. Reading checks everything, the plan and each answer, and fails on a bad
+    // file with its name and the place; and where `expected` is another table than the calibration was begun with (a
+    // hash of its numbers is kept, as floats; files from before that was so have none, and take any).
     Result<void> save(const std::filesystem::path& file) const;
     static Result<Procedure> resume(const std::filesystem::path& file, perception::CsfTable expected);
 
@@ -116,10 +121,10 @@ private:
     void weigh_settings();
     // What is believed of the places, as far as the next trial goes by it.
     struct Prospect {
-        std::vector<double>
-            visible; // by place: the chance that the display can show its threshold; others need not be known well
-        std::vector<double>
-            shifts; // by place and slope: where its log10 threshold would be with that, relative to where it is believed
+        // By place: the chance that the display can show its threshold; others need not be known well.
+        std::vector<double> visible;
+        // By place and slope: where its log10 threshold would be with that, relative to where it is believed.
+        std::vector<double> shifts;
     };
     Prospect look_ahead() const;
     static double gain_of(const QuestPlus::Forecast& answer, const std::vector<double>& pulled,

@@ -1,5 +1,5 @@
-// QUEST+ (Watson 2017): an adaptive measurement of a psychometric function on a grid of its parameters. Stimuli are chosen for the
-// threshold alone (King-Smith et al. 1994), of which slope and lapse rate are only disturbances.
+// QUEST+ (Watson 2017): an adaptive measurement of a psychometric function on a grid of its parameters. Stimuli are
+// chosen for the threshold alone (King-Smith et al. 1994), of which slope and lapse rate are only disturbances.
 #pragma once
 
 #include <memory>
@@ -11,7 +11,8 @@
 
 namespace unseen::calibration {
 
-// How often an observer is right, over x = log10 contrast - log10 threshold: QUEST's Weibull function (Watson and Pelli 1983)
+// How often an observer is right, over x = log10 contrast - log10 threshold: QUEST's Weibull function (Watson and Pelli
+// 1983)
 //   p(x) = lapse guess + (1 - lapse) (1 - (1 - guess) exp(-10^(slope (x + shift))))
 // shifted so that p(0) = at_threshold: the threshold is the contrast of that many right answers, whatever the slope.
 struct Psychometric {
@@ -34,7 +35,8 @@ struct QuestGrid {
     double guess = 0.5, at_threshold = 0.82;
 };
 
-// Thresholds 10^-3.5 to 10^0.5 in steps of 0.025, contrasts 10^-3.5 to 1 in steps of 0.05, slope and lapse as by default.
+// Thresholds 10^-3.5 to 10^0.5 in steps of 0.025, contrasts 10^-3.5 to 1 in steps of 0.05, slope and lapse as by
+// default.
 QuestGrid standard_grid();
 
 // Copies share the grid's tables. Cost: a function value for each combination of parameters in update(), and two
@@ -46,8 +48,8 @@ public:
 
     const QuestGrid& grid() const noexcept;
 
-    // Belief before all answers: log weights, up to a constant, one for each log10_threshold, and one for each pair of slope and
-    // lapse, slopes first (none: all equal). May be replaced at any time; the answers stay.
+    // Belief before all answers: log weights, up to a constant, one for each log10_threshold, and one for each pair of
+    // slope and lapse, slopes first (none: all equal). May be replaced at any time; the answers stay.
     void set_log_prior(std::span<const double> of_thresholds, std::span<const double> of_functions = {});
     // What the answers say about the pairs of slope and lapse: the log of the likelihood's mean over the prior of the
     // thresholds, up to a constant, in the same order.

@@ -1,4 +1,5 @@
-// What is believed about an observer's contrast sensitivity everywhere, from answers at some frequencies and eccentricities.
+// What is believed about an observer's contrast sensitivity everywhere, from answers at some frequencies and
+// eccentricities.
 #pragma once
 
 #include <span>
@@ -17,11 +18,11 @@ struct GratingPlace {
 // A Gaussian process over log10 sensitivity: an expected table, plus a deviation d(f, e) of mean 0 and covariance
 //   gain^2 + tilt^2 u u' + cutoff^2 f f' + decline^2 e e' + fall^2 (f e)(f' e') + loss^2 s s'
 //   + local(s) local(s') exp(-du^2 / 2 lu^2 - dv^2 / 2 lv^2)
-// with u octaves from 3 cpd, v = log2(1 + e / 2 deg), and s what the expected observer has lost here, log10 units below the
-// sensitivity to 3 cpd in the fovea. The first six terms are a shape with six parameters: how sensitive the observer is, how steep
-// over frequency, how fine, how fast it falls aside, and how much of every loss is there; the last lets every place differ from it,
-// the more, the more is lost. So what is measured in one place tells about the others, and what does not fit the shape still
-// comes through.
+// with u octaves from 3 cpd, v = log2(1 + e / 2 deg), and s what the expected observer has lost here, log10 units below
+// the sensitivity to 3 cpd in the fovea. The first six terms are a shape with six parameters: how sensitive the
+// observer is, how steep over frequency, how fine, how fast it falls aside, and how much of every loss is there; the
+// last lets every place differ from it, the more, the more is lost. So what is measured in one place tells about the
+// others, and what does not fit the shape still comes through.
 //
 // Answers come in as likelihoods by place, and are combined by expectation propagation (Minka 2001) with one Gaussian
 // factor for each place. Cost of set_own(): places^2, of a prediction places^3.

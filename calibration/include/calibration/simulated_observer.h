@@ -30,8 +30,8 @@ struct SimulatedObserver {
 // Fails where the observer sees more at one of the plan's places than can be measured: contrasts below the lowest.
 Result<void> check_measurable(const SimulatedObserver& observer, const CalibrationPlan& plan);
 
-// "NAME[:key=value,...]": NAME is a CSF model or the file of an observer profile; the keys are gain, frequency, eccentricity, slope,
-// lapse, scatter, delay. Such as "castle:gain=0.7,slope=3". The error names the key.
+// "NAME[:key=value,...]": NAME is a CSF model or the file of an observer profile; the keys are gain, frequency,
+// eccentricity, slope, lapse, scatter, delay. Such as "castle:gain=0.7,slope=3". The error names the key.
 Result<SimulatedObserver> simulated_observer(std::string_view description, std::uint64_t seed);
 
 } // namespace unseen::calibration

@@ -2,8 +2,7 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
-#include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -106,13 +105,17 @@ struct CsfSamples {
     std::vector<double> sensitivity;      // > 0 and at most 1e6; [(e * luminances + l) * frequencies + f]
 };
 
+// Copies are cheap and share their data; any number of threads may look up at once.
 class CsfTable {
 public:
-    // Checks the samples: the ranges above, and that each axis rises by `smallest_spacing` at least from sample to sample. The
-    // error names the field and the index. Then prepares the conservative form below.
+    CsfTable(const CsfTable&) = default; // and no move: there is no empty table
+    CsfTable& operator=(const CsfTable&) = default;
+
+    // Checks the samples: the ranges above, and that each axis rises by `smallest_spacing` at least from sample to
+    // sample. The error names the field and the index. Then prepares the conservative form below.
     static Result<CsfTable> create(CsfSamples samples);
-    // Of neighbours on an axis, in octaves or degrees: closer ones are no measurement but a slip, and would make the slope
-    // between them meaningless in float.
+    // Of neighbours on an axis, in octaves or degrees: closer ones are no measurement but a slip, and would make the
+    // slope between them meaningless in float.
     static constexpr double smallest_spacing = 1e-4;
     static constexpr Degrees highest_eccentricity{180};
     // Filled from a model under fixed conditions, for patches of patch_area(frequency): 1/16 to 64 cpd, 0 to 120 deg,
@@ -123,7 +126,7 @@ public:
     // The default table, built once.
     static const CsfTable& standard();
 
-    const CsfSamples& samples() const noexcept { return samples_; }
+    const CsfSamples& samples() const noexcept;
 
     // The samples, interpolated.
     double sensitivity(CyclesPerDegree frequency, Degrees eccentricity, Luminance luminance) const;
@@ -146,59 +149,10 @@ public:
                                         std::span<const float> luminance_cdm2, std::span<float> log2_frequency) const;
 
 private:
-    // The samples of one axis, with a uniform grid over them that finds the samples around a value in constant time.
-    struct Axis {
-        std::vector<double> positions;         // log2 cpd, degrees, log2 cd/m2
-        std::vector<std::uint32_t> first_cell; // of each of the uniform buckets, and the last cell once more
-        double buckets_per_unit = 0;
-    };
-    // Two neighbouring samples and how far a position, clamped to the axis, lies between them, 0..1.
-    struct Cell {
-        std::size_t first = 0, second = 0;
-        double fraction = 0;
-    };
-    // The column over frequency at an eccentricity and a luminance, blended from the four around it.
-    struct Blend {
-        std::array<const float*, 4> columns;
-        std::array<double, 4> weights; // at least 0, sum 1
+    struct State;
+    explicit CsfTable(std::shared_ptr<const State> state);
 
-        double operator[](std::size_t f) const {
-            return (weights[0] * double(columns[0][f]) + weights[1] * double(columns[1][f])) +
-                   (weights[2] * double(columns[2][f]) + weights[3] * double(columns[3][f]));
-        }
-    };
-    struct Query {
-        Blend column;
-        double log2_threshold;
-        std::size_t sample; // the last one that reaches the threshold, as far as known
-    };
-
-    // What a model's table knows beyond its samples: log S is the smaller of two smooth surfaces. Interpolated each for
-    // itself, they keep the kink between them sharp. Empty: the samples are all there is.
-    struct Branches {
-        std::vector<double> sensitivity; // same layout as the samples
-        std::vector<double> ceiling;     // [l * frequencies + f], whatever the eccentricity
-    };
-
-    CsfTable() = default;
-    static Result<CsfTable> create(CsfSamples samples, Branches branches);
-    static Axis make_axis(std::vector<double> positions);
-    static std::size_t find_cell(const Axis& axis, double position);
-    static Cell locate(const Axis& axis, double position);
-    Blend blend(double eccentricity_deg, double log2_luminance) const;
-    template <std::size_t Count>
-    void bisect(std::array<Query, Count>& queries) const;
-    double log2_crossing(const Query& query) const;
-    const std::vector<double>& surface() const;
-    void prepare_monotone();
-    void prepare_extrapolation();
-
-    CsfSamples samples_;
-    Branches branches_;
-    Axis frequency_, eccentricity_, luminance_;
-    Axis monotone_eccentricity_;       // the samples' eccentricities, and more of them where they lie far apart
-    std::vector<float> log2_monotone_; // [(e * luminances + l) * frequencies + f] over these
-    double last_slope_ = 0; // octaves of sensitivity per octave of frequency above the last; negative, or 0: none falls
+    std::shared_ptr<const State> state_; // the samples and what look-ups need; never changes, so copies share it
 };
 
 } // namespace unseen::perception

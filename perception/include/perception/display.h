@@ -23,10 +23,10 @@ struct PixelsPerDegreeAt {
     double pixels_per_degree = 0;
 };
 
-// A flat screen, seen from straight in front of its centre (which is also the centre of the window). Or, with `lens`, a headset: then
-// pitch and distance are those of the flat picture that is drawn for it, whose directions the viewer sees where they are; the lens says
-// how fine the panel's pixels are there.
-// Default: the 20-inch monitor of the 2001 paper's field, 34.357 pixels per degree at its centre.
+// A flat screen, seen from straight in front of its centre (which is also the centre of the window). Or, with `lens`, a
+// headset: then pitch and distance are those of the flat picture that is drawn for it, whose directions the viewer sees
+// where they are; the lens says how fine the panel's pixels are there. Default: the 20-inch monitor of the 2001 paper's
+// field, 34.357 pixels per degree at its centre.
 struct Display {
     std::string name = "20-inch 1600x1200 at 0.5 m";
     int width_px = 1600;
@@ -41,25 +41,28 @@ struct Display {
                                // included; from 0 to 1, strictly ascending, interpolated
     Lux ambient{0};
     double reflectivity = 0.005; // share of the ambient light that the screen scatters back, 0..1
-    // Of headsets: angles strictly ascending from 0, at least two; interpolated, and constant beyond the last. Empty: flat.
+    // Of headsets: angles strictly ascending from 0, at least two; interpolated, and constant beyond the last. Empty:
+    // flat.
     std::vector<PixelsPerDegreeAt> lens;
     double field_deg =
         0; // of headsets: the whole field of view across; 0: that of the screen. Nothing is computed from it
 };
 
-// Finite and positive sizes within what a display can be, 0 < black < peak, reflectivity in 0..1, tables as above. The error names
-// the field by its key in a display profile.
+// Finite and positive sizes within what a display can be, 0 < black < peak, reflectivity in 0..1, tables as above. The
+// error names the field by its key in a display profile.
 Result<void> validate(const Display& display);
 
-// At the centre of the screen, where a flat picture has the fewest: 1 / (2 atan(pitch / (2 distance))). Of headsets: of the flat
-// picture, not the panel. This is what frequencies in a picture are told by, such as a judge's.
+// At the centre of the screen, where a flat picture has the fewest: 1 / (2 atan(pitch / (2 distance))). Of headsets: of
+// the flat picture, not the panel. This is what frequencies in a picture are told by, such as a judge's.
 PixelsPerDegree pixels_per_degree(const Display& display);
-// Of the largest pixel: what a change fills however small it is. Headsets: the picture's centre, or where the panel is coarsest.
+// Of the largest pixel: what a change fills however small it is. Headsets: the picture's centre, or where the panel is
+// coarsest.
 PixelsPerDegree coarsest_pixels_per_degree(const Display& display);
 // Of the smallest pixel, whose nyquist() no detail exceeds. Headsets: where the panel is finest.
 PixelsPerDegree finest_pixels_per_degree(const Display& display);
-// At an angle from the centre, along the radius; above 0. Flat screens: ppd (tan(a + delta) - tan a) / tan delta, delta half a pixel, so
-// about ppd / cos^2 a; angles are clamped so that a + delta is at most 89.9 degrees. Headsets: by the lens's table.
+// At an angle from the centre, along the radius; above 0. Flat screens: ppd (tan(a + delta) - tan a) / tan delta, delta
+// half a pixel, so about ppd / cos^2 a; angles are clamped so that a + delta is at most 89.9 degrees. Headsets: by the
+// lens's table.
 PixelsPerDegree pixels_per_degree_at(const Display& display, Degrees from_centre);
 // The angle across the whole display: that of the screen's width, or the headset's.
 Degrees display_field(const Display& display);

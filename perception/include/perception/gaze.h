@@ -23,10 +23,12 @@ struct GazeSample {
     bool operator==(const GazeSample&) const = default;
 };
 
-// Recorded or simulated: linear between samples, which ascend strictly in time; the first before, the last after them. Not empty.
+// Recorded or simulated: linear between samples, which ascend strictly in time; the first before, the last after them.
+// Not empty.
 class GazeTrace {
 public:
-    // Fails on no samples, times that do not ascend, gaps longer than `longest_gap_s`, and non-finite numbers, naming the index.
+    // Fails on no samples, times that do not ascend, gaps longer than `longest_gap_s`, and non-finite numbers, naming
+    // the index.
     static Result<GazeTrace> create(std::vector<GazeSample> samples);
     static constexpr double longest_gap_s = 1; // a blink takes up to 0.4 s; longer, the tracker lost the eye
 
@@ -39,15 +41,15 @@ private:
     std::vector<GazeSample> samples_;
 };
 
-// CSV with the header "time_s,x_px,y_px" and one sample a line; empty lines and those that begin with # are skipped. Times out of
-// order, gaps and bad numbers are errors that name the file and the line.
+// CSV with the header "time_s,x_px,y_px" and one sample a line; empty lines and those that begin with # are skipped.
+// Times out of order, gaps and bad numbers are errors that name the file and the line.
 Result<GazeTrace> read_gaze_trace(const std::filesystem::path& file);
 Result<void> write_gaze_trace(const std::filesystem::path& file, const GazeTrace& trace);
 
-// Fixations and saccades by published statistics. Fixations: log-normal durations of median 250 ms (Rayner 1998: 200 to 330 ms).
-// Saccades: amplitudes of a gamma distribution of shape 2 and mean 5.5 degrees, cut at 20; durations 2.2 A + 21 ms (Carpenter 1988), along
-// the minimum-jerk curve, whose peak velocity 1.875 A / duration is near the main sequence 600 (1 - exp(-A / 6)) deg/s (Dai 2016).
-// Targets are inside of the window.
+// Fixations and saccades by published statistics. Fixations: log-normal durations of median 250 ms (Rayner 1998: 200 to
+// 330 ms). Saccades: amplitudes of a gamma distribution of shape 2 and mean 5.5 degrees, cut at 20; durations 2.2 A +
+// 21 ms (Carpenter 1988), along the minimum-jerk curve, whose peak velocity 1.875 A / duration is near the main
+// sequence 600 (1 - exp(-A / 6)) deg/s (Dai 2016). Targets are inside of the window.
 struct SimulatedGaze {
     std::uint64_t seed = 1;
     double duration_s = 10;
@@ -70,7 +72,8 @@ struct TrackerOptions {
 // What a renderer knows at an instant.
 struct TrackedGaze {
     glm::dvec2 px = glm::dvec2(0); // where the eye was `latency` ago
-    // Everything may be so much nearer to the true gaze: eccentricities shrink to max(0, e - margin), margin = error + speed latency.
+    // Everything may be so much nearer to the true gaze: eccentricities shrink to max(0, e - margin), margin = error +
+    // speed latency.
     double margin_deg = 0;
     double speed_deg_s = 0;
     bool is_suppressed = false;
@@ -102,10 +105,10 @@ Result<void> validate(const TrackerOptions& options);
 // Without a tracker the head alone says where the viewer looks: the eyes stay within so much of straight ahead.
 inline constexpr Degrees head_only_margin{15};
 
-// The table as it is for a viewer whose gaze is known to a margin only: S'(e) = S(max(0, e - margin)), up to the 180 degrees that a table
-// can have; beyond the last column that stays below them, what it sees or one that is left out, whichever is more. Margins below
-// CsfTable::smallest_spacing count as it, but for 0. Where the margin is 180 degrees or more, infinite or NaN, everything is seen as
-// it is best seen anywhere. Precondition: not below 0.
+// The table as it is for a viewer whose gaze is known to a margin only: S'(e) = S(max(0, e - margin)), up to the 180
+// degrees that a table can have; beyond the last column that stays below them, what it sees or one that is left out,
+// whichever is more. Margins below CsfTable::smallest_spacing count as it, but for 0. Where the margin is 180 degrees
+// or more, infinite or NaN, everything is seen as it is best seen anywhere. Precondition: not below 0.
 CsfTable widened(const CsfTable& table, Degrees margin);
 
 // Keeps widened tables. Margins are rounded up to one of a few, so that not every frame needs a table of its own.

@@ -30,11 +30,11 @@ struct Judgement {
 // The modern map, in double. Both images are luminance in cd/m2 and of one size. A decimated Laplacian pyramid with its
 // base band; Weber contrast of the difference against the reference's local luminance; sensitivity by pixel and
 // band (luminance, eccentricity, area pi (1.5 / rho)^2); Daly masking from the reference alone; Minkowski sum over the
-// bands. A hit in a low band counts its whole block. A NaN or negative luminance is an error, and so are options that are none: a display
-// that validate() refuses, a gaze that is not finite, a sensitivity to colour, a beta outside of 1 to 20.
-// Calibrated: a Gabor patch of 1.5 cycles radius reaches V = 1 within 3 dB of contrast 1 / S at any frequency between
-// 0.5 cpd and the display's limit, since a band's contrast is tilted by the slope of S within it (see the source).
-// Cost: about 0.4 s and 70 bytes a pixel for 1024 x 1024 pixels on one core.
+// bands. A hit in a low band counts its whole block. A NaN or negative luminance is an error, and so are options that
+// are none: a display that validate() refuses, a gaze that is not finite, a sensitivity to colour, a beta outside of 1
+// to 20. Calibrated: a Gabor patch of 1.5 cycles radius reaches V = 1 within 3 dB of contrast 1 / S at any frequency
+// between 0.5 cpd and the display's limit, since a band's contrast is tilted by the slope of S within it (see the
+// source). Cost: about 0.4 s and 70 bytes a pixel for 1024 x 1024 pixels on one core.
 Result<Judgement> judge_modern(const Image& reference, const Image& test, const JudgeOptions& options);
 
 // The threshold map of judge_modern, cd/m2: the luminance step at the pixel's most sensitive band that is just

@@ -4,6 +4,7 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <cstdint>
 #include <initializer_list>
 #include <limits>
 
@@ -234,6 +235,85 @@ std::vector<double> refined(std::span<const double> degrees) {
     return all;
 }
 
+// The samples of one axis, with a uniform grid over them that finds the samples around a value in constant time.
+struct Axis {
+    std::vector<double> positions;         // log2 cpd, degrees, log2 cd/m2
+    std::vector<std::uint32_t> first_cell; // of each of the uniform buckets, and the last cell once more
+    double buckets_per_unit = 0;
+};
+
+// Two neighbouring samples and how far a position, clamped to the axis, lies between them, 0..1.
+struct Cell {
+    std::size_t first = 0, second = 0;
+    double fraction = 0;
+};
+
+// The column over frequency at an eccentricity and a luminance, blended from the four around it.
+struct Blend {
+    std::array<const float*, 4> columns;
+    std::array<double, 4> weights; // at least 0, sum 1
+
+    double operator[](std::size_t f) const {
+        return (weights[0] * double(columns[0][f]) + weights[1] * double(columns[1][f])) +
+               (weights[2] * double(columns[2][f]) + weights[3] * double(columns[3][f]));
+    }
+};
+
+struct Query {
+    Blend column;
+    double log2_threshold;
+    std::size_t sample; // the last one that reaches the threshold, as far as known
+};
+
+// What a model's table knows beyond its samples: log S is the smaller of two smooth surfaces. Interpolated each for
+// itself, they keep the kink between them sharp. Empty: the samples are all there is.
+struct Branches {
+    std::vector<double> sensitivity; // same layout as the samples
+    std::vector<double> ceiling;     // [l * frequencies + f], whatever the eccentricity
+};
+
+Axis make_axis(std::vector<double> positions) {
+    Axis axis;
+    if (positions.size() > 1) {
+        const std::size_t buckets = buckets_per_sample * positions.size(), last_cell = positions.size() - 2;
+        axis.buckets_per_unit = double(buckets) / (positions.back() - positions.front());
+        std::size_t cell = 0;
+        for (std::size_t b = 0; b <= buckets; ++b) {
+            const double start = positions.front() + double(b) / axis.buckets_per_unit;
+            while (cell < last_cell && positions[cell + 1] <= start) ++cell;
+            axis.first_cell.push_back(static_cast<std::uint32_t>(cell));
+        }
+        axis.first_cell.push_back(static_cast<std::uint32_t>(last_cell));
+    }
+    axis.positions = std::move(positions);
+    return axis;
+}
+
+// The cell whose samples enclose a position within the axis: the last one that does not start above it.
+std::size_t find_cell(const Axis& axis, double position) {
+    const auto bucket = static_cast<std::size_t>((position - axis.positions.front()) * axis.buckets_per_unit);
+    // One bucket more on either side: a position on a bucket's edge may be rounded into the neighbour.
+    std::size_t cell = axis.first_cell[bucket > 0 ? bucket - 1 : 0];
+    std::size_t last = axis.first_cell[std::min(bucket + 2, axis.first_cell.size() - 1)];
+    while (cell < last) {
+        const std::size_t middle = (cell + last + 1) / 2;
+        if (axis.positions[middle] <= position) {
+            cell = middle;
+        } else {
+            last = middle - 1;
+        }
+    }
+    return cell;
+}
+
+Cell locate(const Axis& axis, double position) {
+    if (axis.positions.size() < 2) return {};
+    const double inside = std::clamp(position, axis.positions.front(), axis.positions.back());
+    const std::size_t cell = find_cell(axis, inside);
+    const double start = axis.positions[cell], length = axis.positions[cell + 1] - start;
+    return {cell, cell + 1, (inside - start) / length};
+}
+
 // Written so that NaN is not valid.
 bool is_valid(double contrast, double eccentricity_deg, double luminance_cdm2) {
     return contrast >= 0 && luminance_cdm2 >= 0 && !std::isnan(eccentricity_deg);
@@ -241,9 +321,30 @@ bool is_valid(double contrast, double eccentricity_deg, double luminance_cdm2) {
 
 } // namespace
 
-Result<CsfTable> CsfTable::create(CsfSamples samples) { return create(std::move(samples), {}); }
+struct CsfTable::State {
+    static Result<CsfTable> make_table(CsfSamples samples, Branches branches);
 
-Result<CsfTable> CsfTable::create(CsfSamples samples, Branches branches) {
+    Blend blend(double eccentricity_deg, double log2_luminance) const;
+    template <std::size_t Count>
+    void bisect(std::array<Query, Count>& queries) const;
+    double log2_crossing(const Query& query) const;
+    const std::vector<double>& surface() const;
+    void prepare_monotone();
+    void prepare_extrapolation();
+
+    CsfSamples samples;
+    Branches branches;
+    Axis frequency, eccentricity, luminance;
+    Axis monotone_eccentricity;       // the samples' eccentricities, and more of them where they lie far apart
+    std::vector<float> log2_monotone; // [(e * luminances + l) * frequencies + f] over these
+    double last_slope = 0; // octaves of sensitivity per octave of frequency above the last; negative, or 0: none falls
+};
+
+CsfTable::CsfTable(std::shared_ptr<const State> state) : state_(std::move(state)) {}
+
+Result<CsfTable> CsfTable::create(CsfSamples samples) { return State::make_table(std::move(samples), {}); }
+
+Result<CsfTable> CsfTable::State::make_table(CsfSamples samples, Branches branches) {
     const CsfSamples& s = samples;
     if (s.frequency_cpd.size() < 2) return bad("frequency_cpd needs two samples or more");
     if (s.eccentricity_deg.empty()) return bad("eccentricity_deg is empty");
@@ -274,16 +375,16 @@ Result<CsfTable> CsfTable::create(CsfSamples samples, Branches branches) {
         }
     }
 
-    CsfTable table;
-    table.frequency_ = make_axis(std::move(log2_frequency));
-    table.eccentricity_ = make_axis(samples.eccentricity_deg);
-    table.monotone_eccentricity_ = make_axis(refined(samples.eccentricity_deg));
-    table.luminance_ = make_axis(std::move(log2_luminance));
-    table.samples_ = std::move(samples);
-    table.branches_ = std::move(branches);
-    table.prepare_monotone();
-    table.prepare_extrapolation();
-    return table;
+    const auto table = std::make_shared<State>();
+    table->frequency = make_axis(std::move(log2_frequency));
+    table->eccentricity = make_axis(samples.eccentricity_deg);
+    table->monotone_eccentricity = make_axis(refined(samples.eccentricity_deg));
+    table->luminance = make_axis(std::move(log2_luminance));
+    table->samples = std::move(samples);
+    table->branches = std::move(branches);
+    table->prepare_monotone();
+    table->prepare_extrapolation();
+    return CsfTable(table);
 }
 
 Result<CsfTable> CsfTable::from_model(CsfModel model, const CsfConditions& conditions) {
@@ -308,7 +409,7 @@ Result<CsfTable> CsfTable::from_model(CsfModel model, const CsfConditions& condi
     } else {
         fill(samples, model, conditions.field, stimulus);
     }
-    return create(std::move(samples), std::move(branches));
+    return State::make_table(std::move(samples), std::move(branches));
 }
 
 CsfTable CsfTable::from_model(CsfModel model) {
@@ -322,53 +423,11 @@ const CsfTable& CsfTable::standard() {
     return table;
 }
 
-CsfTable::Axis CsfTable::make_axis(std::vector<double> positions) {
-    Axis axis;
-    if (positions.size() > 1) {
-        const std::size_t buckets = buckets_per_sample * positions.size(), last_cell = positions.size() - 2;
-        axis.buckets_per_unit = double(buckets) / (positions.back() - positions.front());
-        std::size_t cell = 0;
-        for (std::size_t b = 0; b <= buckets; ++b) {
-            const double start = positions.front() + double(b) / axis.buckets_per_unit;
-            while (cell < last_cell && positions[cell + 1] <= start) ++cell;
-            axis.first_cell.push_back(static_cast<std::uint32_t>(cell));
-        }
-        axis.first_cell.push_back(static_cast<std::uint32_t>(last_cell));
-    }
-    axis.positions = std::move(positions);
-    return axis;
-}
-
-// The cell whose samples enclose a position within the axis: the last one that does not start above it.
-std::size_t CsfTable::find_cell(const Axis& axis, double position) {
-    const auto bucket = static_cast<std::size_t>((position - axis.positions.front()) * axis.buckets_per_unit);
-    // One bucket more on either side: a position on a bucket's edge may be rounded into the neighbour.
-    std::size_t cell = axis.first_cell[bucket > 0 ? bucket - 1 : 0];
-    std::size_t last = axis.first_cell[std::min(bucket + 2, axis.first_cell.size() - 1)];
-    while (cell < last) {
-        const std::size_t middle = (cell + last + 1) / 2;
-        if (axis.positions[middle] <= position) {
-            cell = middle;
-        } else {
-            last = middle - 1;
-        }
-    }
-    return cell;
-}
-
-CsfTable::Cell CsfTable::locate(const Axis& axis, double position) {
-    if (axis.positions.size() < 2) return {};
-    const double inside = std::clamp(position, axis.positions.front(), axis.positions.back());
-    const std::size_t cell = find_cell(axis, inside);
-    const double start = axis.positions[cell], length = axis.positions[cell + 1] - start;
-    return {cell, cell + 1, (inside - start) / length};
-}
-
-CsfTable::Blend CsfTable::blend(double eccentricity_deg, double log2_luminance) const {
-    const Cell e = locate(monotone_eccentricity_, eccentricity_deg), l = locate(luminance_, log2_luminance);
-    const std::size_t frequencies = frequency_.positions.size(), luminances = luminance_.positions.size();
+Blend CsfTable::State::blend(double eccentricity_deg, double log2_luminance) const {
+    const Cell e = locate(monotone_eccentricity, eccentricity_deg), l = locate(luminance, log2_luminance);
+    const std::size_t frequencies = frequency.positions.size(), luminances = luminance.positions.size();
     const auto column = [&](std::size_t ei, std::size_t li) {
-        return log2_monotone_.data() + (ei * luminances + li) * frequencies;
+        return log2_monotone.data() + (ei * luminances + li) * frequencies;
     };
     return {{column(e.first, l.first), column(e.first, l.second), //
              column(e.second, l.first), column(e.second, l.second)},
@@ -377,25 +436,25 @@ CsfTable::Blend CsfTable::blend(double eccentricity_deg, double log2_luminance) 
 }
 
 // What interpolation works on.
-const std::vector<double>& CsfTable::surface() const {
-    return branches_.sensitivity.empty() ? samples_.sensitivity : branches_.sensitivity;
+const std::vector<double>& CsfTable::State::surface() const {
+    return branches.sensitivity.empty() ? samples.sensitivity : branches.sensitivity;
 }
 
 // Running maxima along the three axes in turn. Each is the largest value over a set that only shrinks along the axes
 // before it, so it leaves what they have reached. A ceiling is left out, which can only make the maxima larger.
-void CsfTable::prepare_monotone() {
-    const std::size_t frequencies = frequency_.positions.size();
-    const std::size_t plane = frequencies * luminance_.positions.size();
+void CsfTable::State::prepare_monotone() {
+    const std::size_t frequencies = frequency.positions.size();
+    const std::size_t plane = frequencies * luminance.positions.size();
     const std::vector<double> logs = log2_of(surface());
-    log2_monotone_.reserve(plane * monotone_eccentricity_.positions.size());
-    for (const double degrees : monotone_eccentricity_.positions) {
-        const Cell e = locate(eccentricity_, degrees);
+    log2_monotone.reserve(plane * monotone_eccentricity.positions.size());
+    for (const double degrees : monotone_eccentricity.positions) {
+        const Cell e = locate(eccentricity, degrees);
         const double *low = logs.data() + e.first * plane, *high = logs.data() + e.second * plane;
         for (std::size_t i = 0; i < plane; ++i) {
-            log2_monotone_.push_back(static_cast<float>(std::lerp(low[i], high[i], e.fraction)));
+            log2_monotone.push_back(static_cast<float>(std::lerp(low[i], high[i], e.fraction)));
         }
     }
-    std::vector<float>& v = log2_monotone_;
+    std::vector<float>& v = log2_monotone;
     for (std::size_t i = v.size() - 1; i-- > 0;) {
         if ((i + 1) % frequencies != 0) v[i] = std::max(v[i], v[i + 1]);
     }
@@ -407,26 +466,28 @@ void CsfTable::prepare_monotone() {
 
 // One slope for the whole table: a slope per column could make a frequency rise with eccentricity. The shallowest is
 // the safe one.
-void CsfTable::prepare_extrapolation() {
-    const std::size_t frequencies = frequency_.positions.size();
+void CsfTable::State::prepare_extrapolation() {
+    const std::size_t frequencies = frequency.positions.size();
     double shallowest = -std::numeric_limits<double>::infinity();
-    for (std::size_t start = 0; start < log2_monotone_.size(); start += frequencies) {
-        const float* column = log2_monotone_.data() + start;
+    for (std::size_t start = 0; start < log2_monotone.size(); start += frequencies) {
+        const float* column = log2_monotone.data() + start;
         std::size_t f = frequencies - 1;
         while (f > 0 && !(column[f - 1] > column[f])) --f;
         if (f == 0) continue;
-        const double octaves = frequency_.positions[f] - frequency_.positions[f - 1];
+        const double octaves = frequency.positions[f] - frequency.positions[f - 1];
         shallowest = std::max(shallowest, (double(column[f]) - double(column[f - 1])) / octaves);
     }
-    last_slope_ = std::isfinite(shallowest) ? shallowest : 0;
+    last_slope = std::isfinite(shallowest) ? shallowest : 0;
 }
+
+const CsfSamples& CsfTable::samples() const noexcept { return state_->samples; }
 
 double CsfTable::sensitivity(CyclesPerDegree frequency, Degrees eccentricity, Luminance luminance) const {
     const double log2_cpd = std::log2(frequency.value()), log2_cdm2 = std::log2(luminance.value());
     if (std::isnan(log2_cpd) || std::isnan(log2_cdm2) || std::isnan(eccentricity.value())) return nan;
-    const Cell f = locate(frequency_, log2_cpd), e = locate(eccentricity_, eccentricity.value());
-    const Cell l = locate(luminance_, log2_cdm2);
-    const std::size_t frequencies = frequency_.positions.size(), luminances = luminance_.positions.size();
+    const Cell f = locate(state_->frequency, log2_cpd), e = locate(state_->eccentricity, eccentricity.value());
+    const Cell l = locate(state_->luminance, log2_cdm2);
+    const std::size_t frequencies = state_->frequency.positions.size(), luminances = state_->luminance.positions.size();
     const auto along_frequency = [&](const std::vector<double>& values, std::size_t ei, std::size_t li) {
         const double* column = values.data() + (ei * luminances + li) * frequencies;
         return std::lerp(std::log2(column[f.first]), std::log2(column[f.second]), f.fraction);
@@ -434,21 +495,21 @@ double CsfTable::sensitivity(CyclesPerDegree frequency, Degrees eccentricity, Lu
     const auto along_luminance = [&](const std::vector<double>& values, std::size_t ei) {
         return std::lerp(along_frequency(values, ei, l.first), along_frequency(values, ei, l.second), l.fraction);
     };
-    const double log2_s =
-        std::lerp(along_luminance(surface(), e.first), along_luminance(surface(), e.second), e.fraction);
-    if (branches_.ceiling.empty()) return std::exp2(log2_s);
-    return std::exp2(std::min(log2_s, along_luminance(branches_.ceiling, 0)));
+    const double log2_s = std::lerp(along_luminance(state_->surface(), e.first),
+                                    along_luminance(state_->surface(), e.second), e.fraction);
+    if (state_->branches.ceiling.empty()) return std::exp2(log2_s);
+    return std::exp2(std::min(log2_s, along_luminance(state_->branches.ceiling, 0)));
 }
 
 double CsfTable::monotone_sensitivity(CyclesPerDegree frequency, Degrees eccentricity, Luminance luminance) const {
     const double log2_cpd = std::log2(frequency.value()), log2_cdm2 = std::log2(luminance.value());
     if (std::isnan(log2_cpd) || std::isnan(log2_cdm2) || std::isnan(eccentricity.value())) return nan;
-    const Blend column = blend(eccentricity.value(), log2_cdm2);
-    const double beyond = log2_cpd - frequency_.positions.back();
-    if (beyond > 0 && last_slope_ < 0) {
-        return std::exp2(column[frequency_.positions.size() - 1] + last_slope_ * beyond);
+    const Blend column = state_->blend(eccentricity.value(), log2_cdm2);
+    const double beyond = log2_cpd - state_->frequency.positions.back();
+    if (beyond > 0 && state_->last_slope < 0) {
+        return std::exp2(column[state_->frequency.positions.size() - 1] + state_->last_slope * beyond);
     }
-    const Cell f = locate(frequency_, log2_cpd);
+    const Cell f = locate(state_->frequency, log2_cpd);
     return std::exp2(std::lerp(column[f.first], column[f.second], f.fraction));
 }
 
@@ -459,36 +520,37 @@ double CsfTable::peak_sensitivity(Degrees eccentricity, Luminance luminance) con
 // Bisection for the last sample that still reaches each query's threshold, all queries in step: the loads of one hide
 // behind those of the others, and no branch depends on the data.
 template <std::size_t Count>
-void CsfTable::bisect(std::array<Query, Count>& queries) const {
-    for (std::size_t count = frequency_.positions.size(); count > 1;) {
+void CsfTable::State::bisect(std::array<Query, Count>& queries) const {
+    for (std::size_t count = frequency.positions.size(); count > 1;) {
         const std::size_t half = count / 2;
         for (Query& q : queries) q.sample += q.column[q.sample + half] >= q.log2_threshold ? half : 0;
         count -= half;
     }
 }
 
-double CsfTable::log2_crossing(const Query& q) const {
+double CsfTable::State::log2_crossing(const Query& q) const {
     constexpr double infinity = std::numeric_limits<double>::infinity();
-    const double value = q.column[q.sample], position = frequency_.positions[q.sample];
+    const double value = q.column[q.sample], position = frequency.positions[q.sample];
     if (!(value >= q.log2_threshold)) return -infinity; // only at the first sample: not even the peak
     const double excess = value - q.log2_threshold;
-    if (q.sample + 1 == frequency_.positions.size()) {
+    if (q.sample + 1 == frequency.positions.size()) {
         if (excess == 0) return position;
-        return last_slope_ < 0 ? position - excess / last_slope_ : infinity;
+        return last_slope < 0 ? position - excess / last_slope : infinity;
     }
     // On a plateau, where only rounding tells two samples apart, its highest frequency.
     const double drop = value - q.column[q.sample + 1];
     const double share = drop > excess ? excess / drop : 1;
-    return position + share * (frequency_.positions[q.sample + 1] - position);
+    return position + share * (frequency.positions[q.sample + 1] - position);
 }
 
 CyclesPerDegree CsfTable::highest_visible_frequency(double contrast, Degrees eccentricity, Luminance luminance) const {
     if (!is_valid(contrast, eccentricity.value(), luminance.value())) {
         return CyclesPerDegree(std::numeric_limits<double>::infinity());
     }
-    std::array<Query, 1> query{{{blend(eccentricity.value(), std::log2(luminance.value())), -std::log2(contrast), 0}}};
-    bisect(query);
-    return CyclesPerDegree(std::exp2(log2_crossing(query[0])));
+    std::array<Query, 1> query{
+        {{state_->blend(eccentricity.value(), std::log2(luminance.value())), -std::log2(contrast), 0}}};
+    state_->bisect(query);
+    return CyclesPerDegree(std::exp2(state_->log2_crossing(query[0])));
 }
 
 void CsfTable::highest_visible_log2_frequency(std::span<const float> contrast, std::span<const float> eccentricity_deg,
@@ -496,6 +558,7 @@ void CsfTable::highest_visible_log2_frequency(std::span<const float> contrast, s
                                               std::span<float> log2_frequency) const {
     assert(contrast.size() == eccentricity_deg.size() && contrast.size() == luminance_cdm2.size() &&
            contrast.size() == log2_frequency.size());
+    const State& state = *state_;
     std::array<Query, queries_in_step> queries;
     for (std::size_t begin = 0; begin < log2_frequency.size(); begin += queries_in_step) {
         const std::size_t count = std::min(queries_in_step, log2_frequency.size() - begin);
@@ -503,12 +566,13 @@ void CsfTable::highest_visible_log2_frequency(std::span<const float> contrast, s
             // A short last block repeats its last query.
             const std::size_t i = begin + std::min(j, count - 1);
             const double c = contrast[i], e = eccentricity_deg[i], l = luminance_cdm2[i];
-            queries[j] = is_valid(c, e, l) ? Query{blend(e, std::log2(l)), -std::log2(c), 0} : Query{blend(0, 0), 0, 0};
+            queries[j] = is_valid(c, e, l) ? Query{state.blend(e, std::log2(l)), -std::log2(c), 0}
+                                           : Query{state.blend(0, 0), 0, 0};
         }
-        bisect(queries);
+        state.bisect(queries);
         for (std::size_t i = begin; i < begin + count; ++i) {
             log2_frequency[i] = is_valid(contrast[i], eccentricity_deg[i], luminance_cdm2[i])
-                                    ? static_cast<float>(log2_crossing(queries[i - begin]))
+                                    ? static_cast<float>(state.log2_crossing(queries[i - begin]))
                                     : std::numeric_limits<float>::infinity();
         }
     }

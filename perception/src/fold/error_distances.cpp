@@ -1,4 +1,4 @@
-// The fold test by errors in distance form: rows of a reach table for patches and for strips.
+// The fold test by errors in distance form: rows of a switch distance table for patches and for strips.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -27,7 +27,8 @@ constexpr int contrast_count = static_cast<int>(contrasts.count()) - 1; // witho
 constexpr int no_contrast = -1;
 constexpr int luminance_count = static_cast<int>(LuminanceClasses::count);
 
-// Of the frequencies at which patterns are looked for that a strip may hold, from the lowest one up to the display's limit.
+// Of the frequencies at which patterns are looked for that a strip may hold, from the lowest one up to the display's
+// limit.
 constexpr double frequency_step = 1.0905077326652577; // an eighth of an octave
 
 constexpr int steepest_spike = steepest_spike_octaves * contrasts_per_octave;
@@ -54,17 +55,18 @@ private:
     LuminanceClasses luminances_;
 };
 
-// What a node's fold shows, as far as that decides from where it can be seen: levels of contrast at widths relative to the node's.
+// What a node's fold shows, as far as that decides from where it can be seen: levels of contrast at widths relative to
+// the node's.
 struct Pattern {
     int luminance = 0;
     int typical = no_contrast;    // over the whole width
     int largest = no_contrast;    // in a small part of it
-    int drift = no_contrast;      // of what many such nodes shift together
+    int bias = no_contrast;       // of what many such nodes shift together
     int fading = 0, quarters = 0; // of octaves, from the node's width to the mesh's
     bool is_strip = false;
 
     auto operator<=>(const Pattern&) const = default;
-    bool is_nothing() const { return largest == no_contrast && drift == no_contrast; }
+    bool is_nothing() const { return largest == no_contrast && bias == no_contrast; }
 };
 
 // At least as visible as both.
@@ -74,27 +76,27 @@ Pattern above(const Pattern& a, const Pattern& b) {
     Pattern all{std::max(a.luminance, b.luminance),
                 std::max(a.typical, b.typical),
                 std::max(a.largest, b.largest),
-                std::max(a.drift, b.drift),
+                std::max(a.bias, b.bias),
                 0,
                 std::max(a.quarters, b.quarters),
                 a.is_strip};
-    all.fading = a.drift == no_contrast ? b.fading : b.drift == no_contrast ? a.fading : std::min(a.fading, b.fading);
+    all.fading = a.bias == no_contrast ? b.fading : b.bias == no_contrast ? a.fading : std::min(a.fading, b.fading);
     return all;
 }
 
-// Few patterns are to stand for many: rounded up, onto one grid, so that what is above two of them is there, too. `coarseness`: of the grid,
-// 1 or a power of two.
+// Few patterns are to stand for many: rounded up, onto one grid, so that what is above two of them is there, too.
+// `coarseness`: of the grid, 1 or a power of two.
 Pattern rounded(Pattern p, int coarseness) {
-    constexpr int coarsest_fading = 32; // on coarser grids drift does not fade at all, which is above any that does
+    constexpr int coarsest_fading = 32; // on coarser grids bias does not fade at all, which is above any that does
     const int typical_step = coarseness * contrasts_per_octave / 8, spike_step = coarseness * contrasts_per_octave / 4;
-    const int drift_step = coarseness * contrasts_per_octave / 8;
+    const int bias_step = coarseness * contrasts_per_octave / 8;
     const auto up = [](int value, int step) { return std::min((value + step - 1) / step * step, contrast_count - 1); };
     if (p.typical != no_contrast) {
         p.typical = up(p.typical, typical_step);
         p.largest = p.largest > p.typical ? up(p.largest, spike_step) : p.typical;
     }
-    if (p.drift != no_contrast) {
-        p.drift = up(p.drift, drift_step);
+    if (p.bias != no_contrast) {
+        p.bias = up(p.bias, bias_step);
         if (coarseness > coarsest_fading) p.fading = 0;
     } else {
         p.fading = p.quarters = 0;
@@ -102,8 +104,8 @@ Pattern rounded(Pattern p, int coarseness) {
     return p;
 }
 
-// What can be seen at one luminance and eccentricity. Bands of frequency an octave apart look for a pattern; what they see of it is
-// pooled as the eye pools its channels; wherever the bands' octaves begin.
+// What can be seen at one luminance and eccentricity. Bands of frequency an octave apart look for a pattern; what they
+// see of it is pooled as the eye pools its channels; wherever the bands' octaves begin.
 class Eye {
 public:
     Eye(const CsfTable& csf, double eccentricity_deg, double luminance_cdm2, const Screen& screen) : screen_(screen) {
@@ -121,15 +123,15 @@ public:
     }
 
     // The distances, in radii, from which a round patch among others like it is invisible, and an area on its own.
-    double patch_reach(double contrast) const { return reach(patches_, contrast); }
-    double area_reach(double contrast) const { return reach(areas_, contrast); }
+    double patch_distance(double contrast) const { return switch_distance(patches_, contrast); }
+    double area_distance(double contrast) const { return switch_distance(areas_, contrast); }
 
     // The distance, in widths, from which a long strip is invisible.
-    double strip_reach(double contrast) const {
+    double strip_distance(double contrast) const {
         const double invisible_deg = 0.5 * least_visible_width(strips_, contrast);
         if (!std::isfinite(invisible_deg)) return 0;
         const double width_deg = std::max(invisible_deg - sampled_shift_px * screen_.pixel_deg, invisible_deg / 2);
-        return (1 + reach_rounding) * degrees_per_radian * screen_.largest_magnification / width_deg;
+        return (1 + distance_rounding) * degrees_per_radian * screen_.largest_magnification / width_deg;
     }
 
 private:
@@ -161,11 +163,11 @@ private:
         return std::pow(most, 1 / pooling);
     }
 
-    double reach(const Thresholds& thresholds, double contrast) const {
+    double switch_distance(const Thresholds& thresholds, double contrast) const {
         const double width_deg = least_visible_width(thresholds, contrast);
         if (!std::isfinite(width_deg)) return 0; // from inside only
         const double half = width_deg / screen_.largest_magnification / degrees_per_radian / 2;
-        return half < std::numbers::pi / 2 ? (1 + reach_rounding) / std::sin(half) : 1;
+        return half < std::numbers::pi / 2 ? (1 + distance_rounding) / std::sin(half) : 1;
     }
 
     // The widest that is invisible; infinite where all are.
@@ -184,12 +186,13 @@ private:
     Thresholds patches_, areas_, strips_;
 };
 
-// The reach of patterns by eccentricity, computed when they are first asked for. Where patterns are too many for the rows' numbers, begin again with
-// coarser ones.
-class Reaches {
+// The switch distance of patterns by eccentricity, computed when they are first asked for. Where patterns are too many
+// for the rows' numbers, begin again with coarser ones.
+class SwitchDistances {
 public:
     // `added`: rows that add() will ask for.
-    Reaches(const Levels& levels, const Screen& screen, const CsfTable& csf, std::size_t bins, std::size_t added)
+    SwitchDistances(const Levels& levels, const Screen& screen, const CsfTable& csf, std::size_t bins,
+                    std::size_t added)
         : levels_(levels), screen_(screen), csf_(csf), bins_(bins), most_patterns_(last_row - added),
           discs_(luminance_count), eyes_(luminance_count) {
         begin();
@@ -208,42 +211,44 @@ public:
         return row;
     }
     bool has_too_few() const { return has_too_few_; } // of what there is, nothing is to be used then
-    // Forgets all rows. Ends well: at a coarseness of 256 each contrast is one of two, and there are no more than 16 luminances, 121 quarters and four
-    // ways to combine a typical and a largest contrast: 16,000 patches.
+    // Forgets all rows. Ends well: at a coarseness of 256 each contrast is one of two, and there are no more than 16
+    // luminances, 121 quarters and four ways to combine a typical and a largest contrast: 16,000 patches.
     void coarsen() {
         coarseness_ *= 2;
         begin();
     }
-    // On the grid, and without drift that can nowhere be seen from as far as the rest.
+    // On the grid, and without bias that can nowhere be seen from as far as the rest.
     Pattern simplified(Pattern p) {
         p = rounded(p, coarseness_);
-        if (p.drift == no_contrast || p.typical == no_contrast) return p;
+        if (p.bias == no_contrast || p.typical == no_contrast) return p;
         const Discs& tables = discs(p.luminance);
         const float* const typical = &tables.patches[static_cast<std::size_t>(p.typical) * bins_];
         bool is_needed = false;
-        for_each_drift(p, [&](int contrast, float width) {
+        for_each_bias(p, [&](int contrast, float width) {
             const float* const from = &tables.areas[static_cast<std::size_t>(contrast) * bins_];
             for (std::size_t bin = 0; bin < bins_; ++bin) is_needed |= width * from[bin] > typical[bin];
         });
         if (is_needed) return p;
-        p.drift = no_contrast;
+        p.bias = no_contrast;
         return rounded(p, coarseness_);
     }
     // A row of distances, in lengths of its own.
     std::uint16_t add(std::span<const float> distances, float length) {
         for (const float distance : distances)
-            reach_.push_back(std::min(distance / length, DistanceCriterion::always_visible));
-        return static_cast<std::uint16_t>(reach_.size() / bins_ - 1);
+            switch_distance_.push_back(std::min(distance / length, DistanceCriterion::always_visible));
+        return static_cast<std::uint16_t>(switch_distance_.size() / bins_ - 1);
     }
-    std::span<const float> reach(std::uint16_t row) const { return std::span(reach_).subspan(row * bins_, bins_); }
-    std::vector<float> take() { return std::move(reach_); }
+    std::span<const float> switch_distance(std::uint16_t row) const {
+        return std::span(switch_distance_).subspan(row * bins_, bins_);
+    }
+    std::vector<float> take() { return std::move(switch_distance_); }
 
 private:
     static constexpr std::size_t last_row = std::numeric_limits<std::uint16_t>::max();
 
     void begin() {
         rows_.clear();
-        reach_.assign(bins_, DistanceCriterion::never_visible); // row 0: what changes nothing
+        switch_distance_.assign(bins_, DistanceCriterion::never_visible); // row 0: what changes nothing
         has_too_few_ = false;
     }
 
@@ -265,9 +270,9 @@ private:
             for (int contrast = 0; contrast < contrast_count; ++contrast) {
                 for (std::size_t bin = 0; bin < bins_; ++bin) {
                     tables.patches.push_back(
-                        static_cast<float>(eye(luminance, bin).patch_reach(Levels::contrast(contrast))));
+                        static_cast<float>(eye(luminance, bin).patch_distance(Levels::contrast(contrast))));
                     tables.areas.push_back(
-                        static_cast<float>(eye(luminance, bin).area_reach(Levels::contrast(contrast))));
+                        static_cast<float>(eye(luminance, bin).area_distance(Levels::contrast(contrast))));
                 }
             }
         }
@@ -275,13 +280,13 @@ private:
     }
 
     void add_patch(const Pattern& p) {
-        const std::size_t first = reach_.size();
-        reach_.resize(first + bins_, 0);
+        const std::size_t first = switch_distance_.size();
+        switch_distance_.resize(first + bins_, 0);
         const Discs& tables = discs(p.luminance);
         const auto include = [&](const std::vector<float>& one, int contrast, float width) {
             const float* const from = &one[static_cast<std::size_t>(contrast) * bins_];
             for (std::size_t bin = 0; bin < bins_; ++bin)
-                reach_[first + bin] = std::max(reach_[first + bin], width * from[bin]);
+                switch_distance_[first + bin] = std::max(switch_distance_[first + bin], width * from[bin]);
         };
         if (p.typical != no_contrast) {
             // The same light in a part half as wide has four times the contrast; but nowhere more than the largest.
@@ -293,30 +298,32 @@ private:
                 if (contrast == p.largest) break;
             }
         }
-        if (p.drift != no_contrast)
-            for_each_drift(p, [&](int contrast, float width) { include(tables.areas, contrast, width); });
+        if (p.bias != no_contrast)
+            for_each_bias(p, [&](int contrast, float width) { include(tables.areas, contrast, width); });
         make_monotone(first);
     }
 
     // Calls f(contrast, width) for the mesh and for areas down to twice the node's width, at whole octaves.
     template <class F>
-    static void for_each_drift(const Pattern& p, F&& f) {
+    static void for_each_bias(const Pattern& p, F&& f) {
         for (int quarters = p.quarters; quarters >= 4; quarters = (quarters - 1) / 4 * 4) {
-            const int contrast = p.drift - (quarters * p.fading * contrasts_per_octave / 2 + 3) / 4;
+            const int contrast = p.bias - (quarters * p.fading * contrasts_per_octave / 2 + 3) / 4;
             if (contrast >= 0) f(contrast, std::exp2(static_cast<float>(quarters) / 4));
         }
     }
 
     void add_strip(const Pattern& p) {
-        const std::size_t first = reach_.size();
+        const std::size_t first = switch_distance_.size();
         for (std::size_t bin = 0; bin < bins_; ++bin)
-            reach_.push_back(static_cast<float>(eye(p.luminance, bin).strip_reach(Levels::contrast(p.largest))));
+            switch_distance_.push_back(
+                static_cast<float>(eye(p.luminance, bin).strip_distance(Levels::contrast(p.largest))));
         make_monotone(first);
     }
 
     // The table's own rounding must not make anything grow with the eccentricity.
     void make_monotone(std::size_t first) {
-        for (std::size_t i = first + 1; i < reach_.size(); ++i) reach_[i] = std::min(reach_[i], reach_[i - 1]);
+        for (std::size_t i = first + 1; i < switch_distance_.size(); ++i)
+            switch_distance_[i] = std::min(switch_distance_[i], switch_distance_[i - 1]);
     }
 
     const Levels& levels_;
@@ -328,7 +335,7 @@ private:
     std::vector<Discs> discs_;
     std::vector<std::vector<Eye>> eyes_; // by luminance; by bin
     std::map<Pattern, std::uint16_t> rows_;
-    std::vector<float> reach_;
+    std::vector<float> switch_distance_;
 };
 
 // A pattern of a width, and what it comes to.
@@ -339,11 +346,12 @@ struct Shown {
 };
 
 // By how much the one must be wider to be seen from as far as the other everywhere.
-float shortfall(const Reaches& reaches, const Shown& a, const Shown& b) {
+float shortfall(const SwitchDistances& switch_distances, const Shown& a, const Shown& b) {
     constexpr float infinity = std::numeric_limits<float>::infinity();
     if (b.row == 0) return 1;
     if (a.row == b.row) return a.length > 0 ? std::max(b.length / a.length, 1.0f) : b.length > 0 ? infinity : 1;
-    const std::span<const float> of_a = reaches.reach(a.row), of_b = reaches.reach(b.row);
+    const std::span<const float> of_a = switch_distances.switch_distance(a.row),
+                                 of_b = switch_distances.switch_distance(b.row);
     float factor = 0;
     for (std::size_t bin = 0; bin < of_a.size(); ++bin) {
         if (!(of_b[bin] > 0)) continue;
@@ -355,43 +363,45 @@ float shortfall(const Reaches& reaches, const Shown& a, const Shown& b) {
 }
 
 // From how far it is seen, in all.
-float weight(const Reaches& reaches, const Shown& shown) {
+float weight(const SwitchDistances& switch_distances, const Shown& shown) {
     float sum = 0;
-    const std::span<const float> reach = reaches.reach(shown.row);
-    for (std::size_t bin = 0; bin < reach.size(); bin += 8)
-        sum += std::log2(1 + std::max(reach[bin], 0.0f) * shown.length);
+    const std::span<const float> switch_distance = switch_distances.switch_distance(shown.row);
+    for (std::size_t bin = 0; bin < switch_distance.size(); bin += 8)
+        sum += std::log2(1 + std::max(switch_distance[bin], 0.0f) * shown.length);
     return sum;
 }
 
 // Makes `a` be seen from as far as `b`: wider, or of more contrast, whichever adds less.
-void cover(Reaches& reaches, Shown& a, const Shown& b) {
+void cover(SwitchDistances& switch_distances, Shown& a, const Shown& b) {
     if (a.row == 0) {
         if (b.row != 0) a = {b.pattern, std::max(a.length, b.length), b.row};
         return;
     }
     if (a.row == b.row) a.length = std::max(a.length, b.length);
-    const float factor = shortfall(reaches, a, b);
+    const float factor = shortfall(switch_distances, a, b);
     if (factor <= 1) return;
     Shown wider = a, richer = a;
     wider.length *= factor;
     richer.pattern = above(a.pattern, b.pattern);
     richer.length = std::max(a.length, b.length);
-    richer.row = reaches.row(richer.pattern);
-    // Drifts of different widths are told at different octaves.
-    richer.length *= std::max(shortfall(reaches, richer, a), shortfall(reaches, richer, b));
+    richer.row = switch_distances.row(richer.pattern);
+    // Biases of different widths are told at different octaves.
+    richer.length *= std::max(shortfall(switch_distances, richer, a), shortfall(switch_distances, richer, b));
     if (!std::isfinite(wider.length) && !std::isfinite(richer.length)) {
-        richer.pattern.fading = 0; // then the larger drift is above both everywhere
+        richer.pattern.fading = 0; // then the larger bias is above both everywhere
         richer.length = std::max(a.length, b.length);
-        richer.row = reaches.row(richer.pattern);
+        richer.row = switch_distances.row(richer.pattern);
     }
-    const bool is_wider_less = !std::isfinite(richer.length) || weight(reaches, wider) <= weight(reaches, richer);
+    const bool is_wider_less =
+        !std::isfinite(richer.length) || weight(switch_distances, wider) <= weight(switch_distances, richer);
     a = std::isfinite(wider.length) && is_wider_less ? wider : richer;
 }
 
-// What nodes show, no less than their children: patches, and strips where they are outlines. False where the rows do not suffice.
+// What nodes show, no less than their children: patches, and strips where they are outlines. False where the rows do
+// not suffice.
 bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors, const SceneLuminance& scene,
-                const Levels& levels, const CsfTable& csf, Reaches& reaches, std::vector<Shown>& patches,
-                std::vector<Shown>& strips) {
+                const Levels& levels, const CsfTable& csf, SwitchDistances& switch_distances,
+                std::vector<Shown>& patches, std::vector<Shown>& strips) {
     const double darkest = levels.in_cdm2(scene.darkest), brightest = levels.in_cdm2(scene.brightest);
     const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
     const vdtree::LuminanceRange all = tree.ring_luminance()[vdtree::VertexTree::root()];
@@ -417,16 +427,16 @@ bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors
             patch.pattern.typical =
                 std::clamp(typical, std::max(patch.pattern.largest - steepest_spike, 0), patch.pattern.largest);
         patch.length = std::max(tree.support_spheres()[node].radius, errors[node].extent);
-        const int drift = levels.contrast_level(static_cast<double>(errors[node].drift), 1);
-        if (drift != no_contrast && Levels::contrast(drift) * whole_peak > 1) {
+        const int bias = levels.contrast_level(static_cast<double>(errors[node].bias), 1);
+        if (bias != no_contrast && Levels::contrast(bias) * whole_peak > 1) {
             patch.pattern.luminance = std::max(patch.pattern.luminance, whole);
-            patch.pattern.drift = drift, patch.pattern.fading = errors[node].fading;
+            patch.pattern.bias = bias, patch.pattern.fading = errors[node].fading;
             patch.pattern.quarters = static_cast<int>(
                 std::ceil(4 * std::log2(std::max(std::min(widest, object_radius / patch.length), 1.0f))));
         }
-        patch.pattern = reaches.simplified(patch.pattern);
-        patch.row = reaches.row(patch.pattern);
-        cover(reaches, patch, patches[node]); // the children's
+        patch.pattern = switch_distances.simplified(patch.pattern);
+        patch.row = switch_distances.row(patch.pattern);
+        cover(switch_distances, patch, patches[node]); // the children's
         patches[node] = patch;
 
         Shown strip;
@@ -438,34 +448,34 @@ bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors
             strip.pattern = above(strip.pattern, own);
         }
         strip.length = errors[node].distance;
-        strip.row = reaches.row(strip.pattern);
-        cover(reaches, strip, strips[node]);
+        strip.row = switch_distances.row(strip.pattern);
+        cover(switch_distances, strip, strips[node]);
         strips[node] = strip;
         if (node > 0) {
             const NodeId parent = tree.parents()[node];
-            cover(reaches, patches[parent], patch);
-            cover(reaches, strips[parent], strip);
+            cover(switch_distances, patches[parent], patch);
+            cover(switch_distances, strips[parent], strip);
         }
-        if (reaches.has_too_few()) return false;
+        if (switch_distances.has_too_few()) return false;
     }
     return true;
 }
 
-// A node folds as well where the whole mesh does, as far as the node's stage: takes the stage where that is nowhere seen from farther, unless a
-// child would then be. Children before parents.
-void fold_in_stages(const vdtree::SoundTree& tree, std::span<const FoldError> errors, const Reaches& reaches,
-                    std::span<const Shown> stages, std::span<Shown> shown) {
+// A node folds as well where the whole mesh does, as far as the node's stage: takes the stage where that is nowhere
+// seen from farther, unless a child would then be. Children before parents.
+void fold_in_stages(const vdtree::SoundTree& tree, std::span<const FoldError> errors,
+                    const SwitchDistances& switch_distances, std::span<const Shown> stages, std::span<Shown> shown) {
     std::vector<bool> may_take(shown.size(), true);
     for (std::size_t node = shown.size(); node-- > 0;) {
         const std::size_t number = errors[node].stage;
-        if (may_take[node] && shortfall(reaches, shown[node], stages[number]) <= 1) {
+        if (may_take[node] && shortfall(switch_distances, shown[node], stages[number]) <= 1) {
             shown[node] = stages[number]; // no more than the parent's own, nor its stage
             continue;
         }
         if (node == 0) return;
         const NodeId parent = tree.parents()[node];
         const std::size_t above = errors[parent].stage;
-        if (!(shortfall(reaches, stages[above], shown[node]) <= 1)) may_take[parent] = false;
+        if (!(shortfall(switch_distances, stages[above], shown[node]) <= 1)) may_take[parent] = false;
     }
 }
 
@@ -488,20 +498,21 @@ Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const Fold
     parts.lengths.resize(nodes);
     parts.silhouette_lengths.resize(nodes);
     const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
-    Reaches reaches(levels, screen, csf, parts.eccentricity_bins, measured.stages.size());
+    SwitchDistances switch_distances(levels, screen, csf, parts.eccentricity_bins, measured.stages.size());
     std::vector<Shown> patches, strips;
-    while (!find_shown(tree, errors, options.scene, levels, csf, reaches, patches, strips)) reaches.coarsen();
+    while (!find_shown(tree, errors, options.scene, levels, csf, switch_distances, patches, strips))
+        switch_distances.coarsen();
     const std::vector<float> distances =
         stage_distances(tree, measured.stages, screen, options, parts.eccentricity_bins);
     if (!distances.empty() && object_radius > 0) {
         std::vector<Shown> stages;
         for (std::size_t first = 0; first < distances.size(); first += parts.eccentricity_bins) {
             const std::uint16_t row =
-                reaches.add(std::span(distances).subspan(first, parts.eccentricity_bins), object_radius);
+                switch_distances.add(std::span(distances).subspan(first, parts.eccentricity_bins), object_radius);
             stages.push_back({.pattern = {}, .length = object_radius, .row = row});
         }
-        fold_in_stages(tree, errors, reaches, stages, patches);
-        fold_in_stages(tree, errors, reaches, stages, strips);
+        fold_in_stages(tree, errors, switch_distances, stages, patches);
+        fold_in_stages(tree, errors, switch_distances, stages, strips);
     }
     for (NodeId node = 0; node < nodes; ++node) {
         parts.classes[node] = {patches[node].row, strips[node].row};
@@ -509,7 +520,7 @@ Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const Fold
         parts.lengths[node] = patches[node].length;
         parts.silhouette_lengths[node] = strips[node].length;
     }
-    parts.reach = reaches.take();
+    parts.switch_distance = switch_distances.take();
     return DistanceCriterion::create(tree, std::move(parts));
 }
 

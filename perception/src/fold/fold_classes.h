@@ -103,8 +103,8 @@ private:
     ClassSeries contrasts_;
 };
 
-// Gives the classes in use their rows of the table, row 0 to what changes nothing. Where they are too many for the rows' numbers, all classes are
-// rounded up to fewer: then begin again with coarser rows.
+// Gives the classes in use their rows of the table, row 0 to what changes nothing. Where they are too many for the
+// rows' numbers, all classes are rounded up to fewer: then begin again with coarser rows.
 class Rows {
 public:
     // `is_grey`: of contrasts and shifts of luminance alone.

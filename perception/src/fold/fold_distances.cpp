@@ -1,4 +1,4 @@
-// The fold tests after Luebke and Hallen in distance form: a table of reaches by class and eccentricity.
+// The fold tests after Luebke and Hallen in distance form: a table of switch distances by class and eccentricity.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -82,8 +82,8 @@ struct Row {
         return std::hypot(grey, chroma.x * see.red_green->monotone_sensitivity(frequency, eccentricity, luminance),
                           chroma.y * see.yellow_violet->monotone_sensitivity(frequency, eccentricity, luminance));
     }
-    // To a pattern that moves by a share of half a wave of this frequency, within a patch that holds no lower ones: the bands of higher
-    // frequencies see the share of it that lies in their own half waves.
+    // To a pattern that moves by a share of half a wave of this frequency, within a patch that holds no lower ones: the
+    // bands of higher frequencies see the share of it that lies in their own half waves.
     double moved_sensitivity(const Sensitivities& see, double lowest_cpd, Degrees eccentricity,
                              Luminance luminance) const {
         constexpr double steps_per_octave = 2;
@@ -109,12 +109,12 @@ struct Row {
     }
 };
 
-// The largest extents, in degrees on the screen, of which a row shows nothing; infinite where it does at no extent. Smaller is what comes first:
-// bins in ascending eccentricity.
+// The largest extents, in degrees on the screen, of which a row shows nothing; infinite where it does at no extent.
+// Smaller is what comes first: bins in ascending eccentricity.
 class LargestExtents {
 public:
-    // Extents around the spheres are larger than these, from whose nearest points eccentricity is counted: they reach nearer to the gaze, by
-    // half of their width at most.
+    // Extents around the spheres are larger than these, from whose nearest points eccentricity is counted: they reach
+    // nearer to the gaze, by half of their width at most.
     LargestExtents(const Row& row, const Sensitivities& see, const Screen& screen, bool is_around_spheres)
         : row_(row), see_(see), is_around_spheres_(is_around_spheres),
           step_(step_of(screen.pixel_deg / smallest_of_a_pixel)) {}
@@ -173,19 +173,19 @@ void find_largest_extents(const Row& row, const CsfTable& csf, const Bins& bins,
 }
 
 // The distance, in lengths, from which an extent is no larger than this on the screen.
-float reach_of(double extent_deg, const Screen& screen, bool is_around_spheres) {
+float switch_distance_of(double extent_deg, const Screen& screen, bool is_around_spheres) {
     if (std::isinf(extent_deg)) return 0; // only from inside
     const double half = extent_deg / screen.largest_magnification / degrees_per_radian / 2;
     const double in_lengths = half < std::numbers::pi / 2 ? 1 / std::sin(half) : 1; // from the centre
-    return static_cast<float>((is_around_spheres ? in_lengths : in_lengths - 1) * (1 + reach_rounding));
+    return static_cast<float>((is_around_spheres ? in_lengths : in_lengths - 1) * (1 + distance_rounding));
 }
 
 void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes& classes, const Bins& eccentricities,
                 const Screen& screen, const Sensitivities& see) {
     const std::size_t bins = parts.eccentricity_bins;
     const bool is_around_spheres = !parts.lengths.empty();
-    parts.reach.assign((rows.levels().size() + 1) * bins, DistanceCriterion::never_visible);
-    parts.least_cost.assign(parts.reach.size(), 0);
+    parts.switch_distance.assign((rows.levels().size() + 1) * bins, DistanceCriterion::never_visible);
+    parts.least_cost.assign(parts.switch_distance.size(), 0);
     std::unordered_map<std::uint64_t, std::vector<double>> known; // extents, which do not depend on shifts of the mean
     for (std::size_t i = 0; i < rows.levels().size(); ++i) {
         const Row row(rows.levels()[i], classes);
@@ -200,16 +200,17 @@ void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes
         } else if (is_new) {
             find_largest_extents(row, see.luminance, eccentricities, extents);
         }
-        float *const reach = &parts.reach[(i + 1) * bins], *const least_cost = &parts.least_cost[(i + 1) * bins];
+        float* const switch_distance = &parts.switch_distance[(i + 1) * bins];
+        float* const least_cost = &parts.least_cost[(i + 1) * bins];
         for (std::size_t bin = 0; bin < bins; ++bin) {
             // No fold is drawn smaller than a pixel, and a shift of the mean shows from whatever distance.
             const double eccentricity_deg = eccentricities.at(bin);
-            reach[bin] = reach_of(extents[bin], screen, is_around_spheres);
+            switch_distance[bin] = switch_distance_of(extents[bin], screen, is_around_spheres);
             least_cost[bin] = static_cast<float>(
                 std::max(screen.pixel_deg / extents[bin], row.shift_visibility(see, eccentricity_deg)));
             // The table's own rounding must not make anything grow with the eccentricity.
             if (bin == 0) continue;
-            reach[bin] = std::min(reach[bin], reach[bin - 1]);
+            switch_distance[bin] = std::min(switch_distance[bin], switch_distance[bin - 1]);
             least_cost[bin] = std::min(least_cost[bin], least_cost[bin - 1]);
         }
     }
@@ -253,8 +254,8 @@ void saturate(RingLooks& parent, const RingLooks& child) {
     parent.chroma_shift = glm::max(parent.chroma_shift, child.chroma_shift);
 }
 
-// Of a surface that faces the eye: its vertices' contrast where the texture is brightest, the texture's where the vertices are, and how far
-// that moves: no less than in the children, whose shares of their extents are rounded up.
+// Of a surface that faces the eye: its vertices' contrast where the texture is brightest, the texture's where the
+// vertices are, and how far that moves: no less than in the children, whose shares of their extents are rounded up.
 void add_texture(RingLooks& inside, const Rings& rings, NodeId node, const Classes& classes,
                  std::vector<double>& motions) {
     const vdtree::LuminanceRange vertices = rings.vertices[node], texture = rings.texture[node];

@@ -75,7 +75,7 @@ std::vector<FoldError> nested_errors(const SoundTree& tree, std::span<const Fold
         }
         error.extent = std::max(error.extent, record.extent);
         error.facing |= facing[node].facing;
-        error.drift = record.drift, error.fading = facing[node].fading;
+        error.bias = record.bias, error.fading = facing[node].fading;
         // Where parts meet, a fold moves the line along which the one hides the other, like an outline, whatever they
         // face: the farther, the flatter they meet. That is nothing that a mean over cells would tell.
         const float moved = std::max(error.distance, moved_point);

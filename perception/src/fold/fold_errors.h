@@ -21,7 +21,7 @@ struct FoldError {
     // and of parts 2^-k as wide of 4^k times that, up to `luminance`.
     float luminance = 0, wide_luminance = 0;
     float extent = 0;           // mesh units: see FoldRecord; no less than the children's
-    float drift = 0;            // see FoldRecord
+    float bias = 0;             // see FoldRecord
     vdtree::NormalSlabs facing; // see FoldFacing; all where parts of the surface meet; it includes the children's
     std::uint8_t fading = 0;
     std::uint8_t stage = 0; // in which it folds: see fold_stages.h; no earlier than the children

@@ -41,7 +41,7 @@ inline constexpr float contact_reach = 6;
 inline constexpr float least_sine = 0.1f;
 
 // Patches side by side whose signs differ at random: 1 / n of the contrast for n times the width, up to this n. What
-// more of them come to, the drift tells. By trial.
+// more of them come to, the bias tells. By trial.
 inline constexpr int most_side_by_side = 4;
 
 // What a band sees of a patch, as a share of its contrast, by the patch's width in the band's waves. Derived: the share

@@ -16,8 +16,8 @@ inline constexpr std::size_t bin_count = 128;  // up to 64 degrees; beyond, sens
 // The lowest frequency that a sensitivity table must know.
 inline constexpr double lowest_table_cpd = 0.5;
 
-// Covers the rounding of a reach to float.
-inline constexpr double reach_rounding = 1e-6;
+// Covers the rounding of a switch distance to float.
+inline constexpr double distance_rounding = 1e-6;
 
 // What has to hold before a fold test computes with its arguments.
 inline Result<void> check_arguments(const vdtree::View& view, const FoldTestOptions& options) {

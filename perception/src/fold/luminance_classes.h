@@ -1,5 +1,5 @@
-// Contrasts and luminances in classes, rounded up, so that few rows of a table do for all nodes. (Under moving lights the kernels have
-// classes of their own, vdtree::ContrastClasses.)
+// Contrasts and luminances in classes, rounded up, so that few rows of a table do for all nodes. (Under moving lights
+// the kernels have classes of their own, vdtree::ContrastClasses.)
 #pragma once
 
 #include <algorithm>
@@ -10,8 +10,8 @@
 
 namespace unseen::perception {
 
-// A series of classes: none, then values in equal steps of their logarithm from 2^least on. Values are rounded up, and what is no number is the
-// largest.
+// A series of classes: none, then values in equal steps of their logarithm from 2^least on. Values are rounded up, and
+// what is no number is the largest.
 struct ClassSeries {
     int per_octave, least_octave, octaves;
 

@@ -1,5 +1,6 @@
-// A stage is seen at the distance at which the contrasts of its pictures, in thresholds, masked by the mesh's own and pooled over the
-// bands, come to 1. The nearer the eye, the lower the frequencies of all bands: one table of sensitivities serves all stages.
+// A stage is seen at the distance at which the contrasts of its pictures, in thresholds, masked by the mesh's own and
+// pooled over the bands, come to 1. The nearer the eye, the lower the frequencies of all bands: one table of
+// sensitivities serves all stages.
 #include "fold/stage_distances.h"
 
 #include <algorithm>
@@ -62,16 +63,17 @@ public:
     }
 
 private:
-    // Of the contrast of a grating of so many times the display's highest frequency: pixels show the mean over their area. What is beyond the limit is
-    // taken for a grating of the limit.
+    // Of the contrast of a grating of so many times the display's highest frequency: pixels show the mean over their
+    // area. What is beyond the limit is taken for a grating of the limit.
     static double share_on_display(double times_highest) {
         if (!(times_highest < 2)) return 0;
         const double x = times_highest * std::numbers::pi / 2;
         return x > 0 ? std::sin(x) / x : 1;
     }
 
-    // Of the mean luminance around a place that a band looks at, which adapts to it, a mesh that fills its whole sphere makes up at most this: the
-    // pyramid's kernel is about a Gaussian of the deviation 1 / (sqrt(8) cycles) in diameters of the sphere.
+    // Of the mean luminance around a place that a band looks at, which adapts to it, a mesh that fills its whole sphere
+    // makes up at most this: the pyramid's kernel is about a Gaussian of the deviation 1 / (sqrt(8) cycles) in
+    // diameters of the sphere.
     static double share_of_mesh(double cycles) { return 1 - std::exp(-cycles * cycles); }
 
     static double visibility(const float (&contrast)[FoldStage::band_count][FoldStage::masks.size()],
@@ -117,7 +119,7 @@ std::vector<float> stage_distances(const vdtree::VertexTree& tree, std::span<con
             const double seen = on_screen / screen.largest_magnification / degrees_per_radian;
             float& distance = distances[stage * bins + bin];
             distance = seen > 0
-                           ? static_cast<float>(std::max(diameter, (1 + reach_rounding) * diameter / std::sin(seen)))
+                           ? static_cast<float>(std::max(diameter, (1 + distance_rounding) * diameter / std::sin(seen)))
                            : std::numeric_limits<float>::infinity();
             if (bin > 0) distance = std::min(distance, distances[stage * bins + bin - 1]);
             if (stage > 0) distance = std::max(distance, distances[(stage - 1) * bins + bin]);

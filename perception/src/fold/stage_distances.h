@@ -12,9 +12,10 @@
 
 namespace unseen::perception {
 
-// Distances in mesh units, [stage * bins + bin], from a point of the mesh: beyond, a picture of that stage cannot be told from one
-// of the mesh. They grow with the stage, do not grow with the bin, and are infinite where no distance will do. Never less than the diameter of
-// the mesh's sphere: from nearer the eye may be among what the pictures show from outside. Empty where there are no stages.
+// Distances in mesh units, [stage * bins + bin], from a point of the mesh: beyond, a picture of that stage cannot be
+// told from one of the mesh. They grow with the stage, do not grow with the bin, and are infinite where no distance
+// will do. Never less than the diameter of the mesh's sphere: from nearer the eye may be among what the pictures show
+// from outside. Empty where there are no stages.
 std::vector<float> stage_distances(const vdtree::VertexTree& tree, std::span<const FoldStage> stages,
                                    const Screen& screen, const FoldTestOptions& options, std::size_t bins);
 

@@ -5,8 +5,9 @@
 
 namespace unseen::perception {
 
-// By how much a masker of this contrast, in thresholds of its own, raises the threshold of what lies over it in the same band. Daly 1993:
-// (1 + (k1 (k2 m)^s)^b)^(1/b), b = 4; k1 = 6^(-7/3), k2 = 6^(10/3); s = 0.7, for noise that one knows.
+// By how much a masker of this contrast, in thresholds of its own, raises the threshold of what lies over it in the
+// same band. Daly 1993: (1 + (k1 (k2 m)^s)^b)^(1/b), b = 4; k1 = 6^(-7/3), k2 = 6^(10/3); s = 0.7, for noise that one
+// knows.
 inline double daly_elevation(double masker) {
     constexpr double k1 = 0.015286700226364008, k2 = 392.4980480517423, s = 0.7;
     constexpr double asymptotic = 1e3; // from here on 1 + t^4 is t^4 in double, and t^4 could overflow

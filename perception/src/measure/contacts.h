@@ -9,9 +9,9 @@
 
 namespace unseen::perception {
 
-// Of triangles that are near to others which are no neighbours of theirs or of their neighbours, over or under them and not beside them
-// in one sheet; unless they face and look alike, so that it makes no difference which of them is seen. Near is, as triangles go, nearer than a
-// quarter of the circle around the first.
+// Of triangles that are near to others which are no neighbours of theirs or of their neighbours, over or under them and
+// not beside them in one sheet; unless they face and look alike, so that it makes no difference which of them is seen.
+// Near is, as triangles go, nearer than a quarter of the circle around the first.
 struct Contact {
     float gap = std::numeric_limits<
         float>::infinity(); // mesh units: the least distance; 0 where they intersect; infinite where none is near
@@ -21,7 +21,8 @@ struct Contact {
     void include(const Contact& other) { gap = std::min(gap, other.gap), sine = std::min(sine, other.sine); }
 };
 
-// By interior node: of all triangles that touch its support, or the supports below. In parallel; some microseconds a triangle.
+// By interior node: of all triangles that touch its support, or the supports below. In parallel; some microseconds a
+// triangle.
 std::vector<Contact> find_contacts(const vdtree::SoundTree& tree);
 
 } // namespace unseen::perception

@@ -1,4 +1,5 @@
-// Bounds the rings of all cuts: from every triangle corner up the tree, and along each edge up the tree on both sides at once.
+// Bounds the rings of all cuts: from every triangle corner up the tree, and along each edge up the tree on both sides
+// at once.
 #include <perception/cut_rings.h>
 
 #include <algorithm>
@@ -26,8 +27,8 @@ using namespace vdtree;
 
 namespace {
 
-// Trees are some tens of nodes deep. Where one is deeper than this, as only made-up ones are, whatever is above counts as reaching
-// everywhere, so that no tree costs the square of its depth.
+// Trees are some tens of nodes deep. Where one is deeper than this, as only made-up ones are, whatever is above counts
+// as reaching everywhere, so that no tree costs the square of its depth.
 constexpr int most_steps = 1024;
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
@@ -326,13 +327,15 @@ private:
         }
     }
 
-    // What the light shifts by, of vertices alone and of all that is drawn. The latter is measured, by means over parts of triangles; where
-    // the texture hardly moves, what it can add to the former is less than what such means are wrong by.
+    // What the light shifts by, of vertices alone and of all that is drawn. The latter is measured, by means over parts
+    // of triangles; where the texture hardly moves, what it can add to the former is less than what such means are
+    // wrong by.
     double shift_of_both(NodeId node, glm::dvec2 shift) const {
         const double texture_lo = rings_.texture[node].lo, texture_hi = rings_.texture[node].hi,
                      vertices_hi = rings_.vertices[node].hi;
         const double radius = g_.support_spheres[node].radius, deviation = rings_.texture_deviation[node];
-        // Triangles whose points move by the deviation, against corners that do not, are stretched by it over their heights, about.
+        // Triangles whose points move by the deviation, against corners that do not, are stretched by it over their
+        // heights, about.
         constexpr double heights_in_radius = 2;
         const double stretch = radius > 0 ? std::min(1.0, heights_in_radius * deviation / radius) : 1.0;
         return std::min(shift.y, shift.x * texture_hi + vertices_hi * (texture_hi - texture_lo) * stretch);

@@ -13,7 +13,7 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
-#include "measure/drift.h"
+#include "measure/luminance_bias.h"
 #include "measure/pyramid.h"
 #include <vdtree/internal/simd.h>
 

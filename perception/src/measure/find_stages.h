@@ -11,8 +11,8 @@
 
 namespace unseen::perception {
 
-// Reads the errors, and notes in which stage every node folds. No stages for trees with translucent vertices, and of no extent. Cost: some
-// hundred pictures of up to half of the triangles; in parallel.
+// Reads the errors, and notes in which stage every node folds. No stages for trees with translucent vertices, and of no
+// extent. Cost: some hundred pictures of up to half of the triangles; in parallel.
 std::vector<FoldStage> find_stages(const vdtree::SoundTree& tree, std::span<FoldError> errors);
 
 } // namespace unseen::perception

@@ -1,5 +1,5 @@
-// What a fold changes, as a small picture: the mesh's own surface and the folded one, seen along the node's normal, and how much of the difference
-// of their luminances lies in which band of spatial frequency.
+// What a fold changes, as a small picture: the mesh's own surface and the folded one, seen along the node's normal, and
+// how much of the difference of their luminances lies in which band of spatial frequency.
 #pragma once
 
 #include <array>
@@ -21,7 +21,8 @@ public:
     static constexpr std::size_t side = measurement::picture_side;   // cells
     static constexpr std::size_t bands = measurement::picture_bands; // an octave each, the finest first
 
-    // Looks against the normal, a unit vector, at a square of `half_width`, mesh units, to each side of the centre. Nothing is seen yet.
+    // Looks against the normal, a unit vector, at a square of `half_width`, mesh units, to each side of the centre.
+    // Nothing is seen yet.
     void look(glm::vec3 centre, glm::vec3 normal, float half_width);
 
     // Draws a triangle of one of the surfaces, whichever way it is turned; what lies highest along the normal is seen.
@@ -32,8 +33,9 @@ public:
     // Whether all that was drawn since look() is turned to one side: then nothing is hidden under something else.
     bool is_height_field() const { return !(has_front_ && has_back_); }
 
-    // The largest difference of the luminances in each band, as the amplitude of a grating of the band's own frequency; where only one
-    // surface is seen, they do not differ. Bands are those of a Laplacian pyramid: the lowest has waves longer than the picture.
+    // The largest difference of the luminances in each band, as the amplitude of a grating of the band's own frequency;
+    // where only one surface is seen, they do not differ. Bands are those of a Laplacian pyramid: the lowest has waves
+    // longer than the picture.
     std::array<float, bands> amplitudes() const;
     float wavelength(std::size_t band) const; // mesh units
 

@@ -37,9 +37,9 @@ struct FoldRecord {
     // frequencies.
     float amplitudes[measurement::picture_sizes.size()][measurement::picture_bands] = {};
     // By how much the mean luminance of an area shifts, as a share of it, where all nodes like this one are folded:
-    // that of an area 2^k times as wide as the node by at most drift / 2^(k fading / 2), for any k from 1 up to the
+    // that of an area 2^k times as wide as the node by at most bias / 2^(k fading / 2), for any k from 1 up to the
     // whole mesh. What is folded together, the model's errors decide.
-    float drift = 0;
+    float bias = 0;
 
     bool operator==(const FoldRecord&) const = default;
 };
@@ -64,7 +64,7 @@ inline constexpr std::uint8_t most_fading = 3;
 inline bool is_sound(const FoldRecord& r) {
     bool sound = r.gap >= 0 && r.sine <= 1;
     for (const float value :
-         {r.shift, r.farthest, r.mean_distance, r.largest_luminance, r.mean_luminance, r.extent, r.sine, r.drift})
+         {r.shift, r.farthest, r.mean_distance, r.largest_luminance, r.mean_luminance, r.extent, r.sine, r.bias})
         sound &= value >= 0 && std::isfinite(value);
     for (const auto& of_size : r.amplitudes)
         for (const float amplitude : of_size) sound &= amplitude >= 0 && std::isfinite(amplitude);

@@ -1,4 +1,5 @@
-// What pictures of the whole mesh, folded in stages, show of the folds: for meshes that are seen from far away, or aside.
+// What pictures of the whole mesh, folded in stages, show of the folds: for meshes that are seen from far away, or
+// aside.
 #pragma once
 
 #include <array>
@@ -7,24 +8,27 @@
 
 namespace unseen::perception {
 
-// All nodes fold in one order, by about how much light each fold changes; after each stage a share of them is left. Pictures from
-// directions all around (parallel projection, the mesh's sphere over 128 cells, 16 samples a cell) of the mesh and of the stage
-// are split into bands of an octave each (Laplacian pyramid: Burt and Adelson 1983), and the largest contrast of their difference is noted.
+// All nodes fold in one order, by about how much light each fold changes; after each stage a share of them is left.
+// Pictures from directions all around (parallel projection, the mesh's sphere over 128 cells, 16 samples a cell) of the
+// mesh and of the stage are split into bands of an octave each (Laplacian pyramid: Burt and Adelson 1983), and the
+// largest contrast of their difference is noted.
 //
 // A measurement, not a bound: the eye may stand between the directions, and near the mesh its picture is another one.
 struct FoldStage {
     using Component = float;
 
-    // Relative luminances behind the mesh. With any one between two of these, contrasts are no larger than the larger ones of the two: the
-    // difference is linear in the background, and so is what it is divided by.
+    // Relative luminances behind the mesh. With any one between two of these, contrasts are no larger than the larger
+    // ones of the two: the difference is linear in the background, and so is what it is divided by.
     static constexpr std::array<float, 9> backgrounds = {0, 0.02f, 0.05f, 0.1f, 0.15f, 0.2f, 0.3f, 0.5f, 1};
-    // Contrasts of the mesh's own picture in the same band and place, from which on a row of contrasts counts: what may mask the difference.
+    // Contrasts of the mesh's own picture in the same band and place, from which on a row of contrasts counts: what may
+    // mask the difference.
     static constexpr std::array<float, 6> masks = {0, 0.01f, 0.03f, 0.1f, 0.3f, 1};
     static constexpr std::size_t band_count = 11; // each half the frequency of the one before
     // Added to what luminances are divided by: about a display's black.
     static constexpr float black = 0.005f;
 
-    // Differences over the local mean luminance of the mesh's picture, amplitudes of gratings; by background, band and mask.
+    // Differences over the local mean luminance of the mesh's picture, amplitudes of gratings; by background, band and
+    // mask.
     float contrast[backgrounds.size()][band_count][masks.size()] = {};
 
     // Of a band: cycles over the diameter of VertexTree::bounding_sphere().

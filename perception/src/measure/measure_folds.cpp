@@ -17,11 +17,11 @@
 
 #include "fold/fold_errors.h"
 #include "measure/contacts.h"
-#include "measure/drift.h"
 #include "measure/find_stages.h"
 #include "measure/fold_picture.h"
 #include "measure/fold_record.h"
 #include "measure/leaf_triangles.h"
+#include "measure/luminance_bias.h"
 #include "measure/measurement.h"
 
 namespace unseen::perception {
@@ -123,7 +123,8 @@ private:
     // Triangles whose area is less than a thousandth of its edges' squares count by their edges.
     static constexpr float least_determinant = 1e-6f;
 
-    // The nearest point a + v ab + w ac of each triangle: of its inside, where the foot of the perpendicular lies there, or of an edge.
+    // The nearest point a + v ab + w ac of each triangle: of its inside, where the foot of the perpendicular lies
+    // there, or of an edge.
 #if defined(__x86_64__) && defined(__GNUC__)
     [[gnu::target_clones("avx2", "default")]]
 #endif
@@ -261,7 +262,8 @@ private:
         return support_[a].radius != support_[b].radius ? support_[a].radius > support_[b].radius : a < b;
     }
 
-    // What stands for a leaf outside the node when it folds: nodes up to its size are folded, as far as they have no more to hide.
+    // What stands for a leaf outside the node when it folds: nodes up to its size are folded, as far as they have no
+    // more to hide.
     NodeId stand_in(Index leaf, NodeId node) const {
         NodeId at = interior_ + leaf;
         const int most = much_more * luminance_span(node);
@@ -374,8 +376,8 @@ private:
         return mean;
     }
 
-    // Compares pictures of the mesh with those of the folded surface: with folded neighbours, and with none folded. Returns whether nothing is hidden
-    // under something else.
+    // Compares pictures of the mesh with those of the folded surface: with folded neighbours, and with none folded.
+    // Returns whether nothing is hidden under something else.
     bool draw(NodeId node, Scratch& scratch, float width, FoldRecord& record) const {
         glm::vec3 normal(0);
         for (const RingTriangle& t : scratch.after) {
@@ -438,8 +440,8 @@ private:
         return count > 0 ? sum / static_cast<float>(count) : 0;
     }
 
-    // Where two such surfaces differ most, they do so at a vertex or where two edges cross: looked at are the middles of the edges
-    // that move, and of their halves. The vertices are among the samples.
+    // Where two such surfaces differ most, they do so at a vertex or where two edges cross: looked at are the middles
+    // of the edges that move, and of their halves. The vertices are among the samples.
     static void compare(std::span<const RingTriangle> surface, Surface& with, Difference& worst, Mean& mean) {
         if (with.empty()) return;
         const std::size_t count = std::min(surface.size(), triangles_compared);
@@ -567,14 +569,15 @@ Result<VertexTree> measure_folds(const VertexTree& tree, int threads) {
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
     arena.execute([&] {
         Measurer(*measured, records, facing).run();
-        // How much light many folds shift depends on the order in which they are folded: that of what the model makes of each alone.
+        // How much light many folds shift depends on the order in which they are folded: that of what the model makes
+        // of each alone.
         errors = nested_errors(*measured, records, facing);
-        find_drift(*measured, errors);
+        find_luminance_bias(*measured, errors);
         stages = find_stages(*measured, errors);
     });
     std::vector<std::uint8_t> stage_of(tree.interior_count());
     for (NodeId node = 0; node < errors.size(); ++node) {
-        records[node].drift = errors[node].drift;
+        records[node].bias = errors[node].bias;
         facing[node].fading = errors[node].fading;
         stage_of[node] = errors[node].stage;
         if (!scale_back(records[node], scale))

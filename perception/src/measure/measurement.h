@@ -32,7 +32,7 @@ inline constexpr std::size_t most_triangles_drawn = 4096; // of the mesh's own; 
 // Half of a picture's side, in widths of what changes. Half an octave apart, so that nothing lies between bands.
 inline constexpr std::array<float, 2> picture_sizes = {1.5f, 2.1f};
 
-// ---- shifts of the mean (drift.cpp)
+// ---- shifts of the mean (luminance_bias.cpp)
 inline constexpr float levels_per_octave = 1; // of the order in which nodes fold
 inline constexpr int most_levels = 40;
 // Of a surface's area that its vector area must come to; else its parts count without cancelling.

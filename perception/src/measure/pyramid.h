@@ -1,5 +1,5 @@
-// A pyramid (pyramid_kernel.h) of pictures with nothing around them: coarser levels reach beyond the finer ones, so that what
-// a small picture comes to over a large area is told, too.
+// A pyramid (pyramid_kernel.h) of pictures with nothing around them: coarser levels reach beyond the finer ones, so
+// that what a small picture comes to over a large area is told, too.
 #pragma once
 
 #include <cstddef>
@@ -26,8 +26,8 @@ Raster reduce(const Raster& plane);
 // Back to the resolution of a level with so many samples a side.
 Raster expand(const Raster& next, std::size_t side);
 
-// The frequency that a level's band (the level less its next one, expanded) is named after, in cycles a sample of the first level; and
-// by how much the band changes the amplitude of a grating of that frequency.
+// The frequency that a level's band (the level less its next one, expanded) is named after, in cycles a sample of the
+// first level; and by how much the band changes the amplitude of a grating of that frequency.
 double nominal_frequency(std::size_t level);
 double band_gain(std::size_t level);
 

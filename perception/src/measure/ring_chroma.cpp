@@ -18,7 +18,8 @@ using namespace vdtree;
 
 namespace {
 
-// Of relative luminance; a hundredth of the least contrast of colour that eyes can see, and above the rounding of greys.
+// Of relative luminance; a hundredth of the least contrast of colour that eyes can see, and above the rounding of
+// greys.
 constexpr float grey_slack = 1e-5f;
 // Pure blue as bright as white has 11: whatever is beyond comes from impossible colours.
 constexpr double most_chroma = 100;

@@ -1,4 +1,5 @@
-// Patterns for measuring displays and their viewers, exact to a fraction of a code: gratings, a chart, brightness matches.
+// Patterns for measuring displays and their viewers, exact to a fraction of a code: gratings, a chart, brightness
+// matches.
 #pragma once
 
 #include <memory>
@@ -16,10 +17,15 @@ namespace unseen::render {
 // Directions are tangents on the screen from its centre (right, up): pixels from the centre times `tangent_per_pixel`.
 struct TestPattern {
     enum class Kind {
-        grating, // a Gabor patch: mean (1 + contrast exp(-r^2 / 2 sigma^2) cos(2 pi frequency x + phase)), angles about its centre
-        chart, // Campbell and Robson's: mean (1 + 10^(-decades (1 - y)) cos(phase)), y from 0 at the bottom; frequency from left to right from
-               // `frequency` to `highest_frequency`, as an exponential, the phase its integral
-        match, // left half: rows, `white_rows` of each `rows` white, the others black; right half: the code `code`
+        // A Gabor patch: mean (1 + contrast exp(-r^2 / 2 sigma^2) cos(2 pi frequency x + phase)), angles about its
+        // centre.
+        grating,
+        // Campbell and Robson's: mean (1 + 10^(-decades (1 - y)) cos(phase)), y from 0 at the bottom. The frequency
+        // goes from `frequency` at the left to `highest_frequency` at the right, as an exponential. The phase is its
+        // integral.
+        chart,
+        // Left half: rows, `white_rows` of each `rows` white, the others black; right half: the code `code`.
+        match,
     };
     Kind kind = Kind::grating;
     double tangent_per_pixel = 0.000508;
@@ -39,8 +45,8 @@ struct TestPattern {
     unsigned frame = 0;   // picks the dither's noise
 };
 
-// Draws what a display of 256 grey levels is to show. A luminance between those of two codes gets either, at random by pixel and
-// frame, so that its mean is right (spatio-temporal dithering); beyond the codes' range it is clipped.
+// Draws what a display of 256 grey levels is to show. A luminance between those of two codes gets either, at random by
+// pixel and frame, so that its mean is right (spatio-temporal dithering); beyond the codes' range it is clipped.
 class TestPatternDrawer {
 public:
     // `code_luminances`: cd/m2 of the 256 codes, finite and ascending. Keeps a handle to the context.

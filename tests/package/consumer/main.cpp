@@ -1,12 +1,11 @@
 // What a first program with Unseen looks like: a tetrahedron, folded as far as nobody can see it.
 #include <cstdio>
 
-#include <calibration/display_profile.h>
-#include <perception/criterion.h>
-#include <vdtree/builder.h>
-#include <vdtree/cut.h>
+#include <calibration/calibration.h>
+#include <perception/perception.h>
+#include <vdtree/vdtree.h>
 #ifdef WITH_RENDER
-#include <render/renderer.h>
+#include <render/render.h>
 #endif
 #ifdef WITH_SESSION
 #include <session/session.h>
@@ -30,6 +29,8 @@ int main() {
     if (!criterion) return std::printf("%s\n", criterion.error().message.c_str()), 1;
     const auto stats = cut.follow(*criterion, perception::viewpoint_of(*tree, view, options, {}, false));
     if (!stats) return std::printf("%s\n", stats.error().message.c_str()), 1;
+    const auto plan = calibration::plan_for(options.display, perception::CsfTable::standard());
+    if (plan.places.empty()) return std::printf("nothing to calibrate on the default display\n"), 1;
     std::printf("%u of %u triangles, largest fold cost %g\n", stats->triangles, tree->triangle_count(),
                 static_cast<double>(stats->max_fold_cost));
 #ifdef WITH_SESSION

@@ -20,8 +20,8 @@ enum class AttributeDomain : std::uint32_t {
 inline constexpr std::size_t longest_attribute_name = 20; // characters
 inline constexpr std::size_t most_attributes = 32;        // of one tree
 
-// The size of the numbers that a value consists of, all of one size: what hosts of the other byte order swap in files. A struct names
-// the type of its numbers as `Component`.
+// The size of the numbers that a value consists of, all of one size: what hosts of the other byte order swap in files.
+// A struct names the type of its numbers as `Component`.
 template <class T>
 constexpr std::uint32_t attribute_component_bytes() {
     if constexpr (std::is_arithmetic_v<T>) return sizeof(T);

@@ -16,8 +16,8 @@ constexpr T rec709_luminance(const glm::vec<3, T>& rgb) {
     return static_cast<T>(0.2126) * rgb.r + static_cast<T>(0.7152) * rgb.g + static_cast<T>(0.0722) * rgb.b;
 }
 
-// IEC 61966-2-1, one channel, 0..1 both ways. The limits, 0.04045 and 0.0031308, are each other's image to the standard's
-// own rounding. Values below 0 continue the straight line, and NaN stays NaN.
+// IEC 61966-2-1, one channel, 0..1 both ways. The limits, 0.04045 and 0.0031308, are each other's image to the
+// standard's own rounding. Values below 0 continue the straight line, and NaN stays NaN.
 template <class T>
 T srgb_to_linear(T encoded) {
     if (!(encoded > static_cast<T>(0.04045))) return encoded / static_cast<T>(12.92);

@@ -16,7 +16,8 @@ namespace unseen::vdtree {
 // A parameter: refers to the caller's object for the time of the call.
 using FoldCriterion = FunctionRef<void(const VertexTree&, std::span<const NodeId> nodes, std::span<float> costs)>;
 
-// Costs from here on are infinite: no finite change of distance hides the fold. They differ so that budgets have an order.
+// Costs from here on are infinite: no finite change of distance hides the fold. They differ so that budgets have an
+// order.
 inline constexpr float least_unbounded_cost = 1e30f;
 inline bool is_unbounded(float cost) noexcept { return !(cost < least_unbounded_cost); }
 inline float unbounded_cost(float order) noexcept { return least_unbounded_cost * (1 + order); }

@@ -12,8 +12,8 @@ template <class Signature>
 class FunctionRef;
 
 // Refers to any callable with the signature R(Args...), for the time of one call: two words, one indirect call, no
-// allocation. Take it as `const FunctionRef<...>&`, to which temporaries bind. There is no empty one, and it can be neither
-// copied nor assigned, so options cannot have one, nor can a std::function: what is to be kept is a Callback.
+// allocation. Take it as `const FunctionRef<...>&`, to which temporaries bind. There is no empty one, and it can be
+// neither copied nor assigned, so options cannot have one, nor can a std::function: what is to be kept is a Callback.
 template <class R, class... Args>
 class FunctionRef<R(Args...)> {
 public:
@@ -37,8 +37,8 @@ private:
     R (*call_)(void*, Args...);
 };
 
-// Owns a copy of its callable, so it may be kept, as in options; empty by default. To keep a reference to something that is
-// not to be copied, say so with std::ref(), which refuses temporaries: it must outlive the callback.
+// Owns a copy of its callable, so it may be kept, as in options; empty by default. To keep a reference to something
+// that is not to be copied, say so with std::ref(), which refuses temporaries: it must outlive the callback.
 template <class Signature>
 using Callback = std::function<Signature>;
 

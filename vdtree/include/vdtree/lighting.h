@@ -1,11 +1,14 @@
 // Lights that may move, and what they make of a tree: the luminance of its vertices, and bounds of it by node.
 //
-// Surfaces are matt (Lambert) with a highlight (Blinn and Phong, normalised so that a sharper highlight is a brighter one), and cast no
-// shadows. The relative luminance of a vertex at x with the normal n and the albedo a, lit from the directions l and seen from v:
-//     ambient a + sum over lights of E max(0, n.l) (a + specular (shininess + 8) / 8 max(0, n.h)^shininess),  h = (l + v) / |l + v|
-// cut off at 1, where the display ends. E is the light's intensity; for point and spot lights times (distance / |position - x|)^2, and for
-// spots times the smooth step of the cosine of the angle from their axis, from 0 at the outer one to 1 at the inner one. A vertex
-// without a normal has the ambient light alone. In between, luminance is interpolated linearly.
+// Surfaces are matt (Lambert) with a highlight (Blinn and Phong, normalised so that a sharper highlight is a brighter
+// one), and cast no shadows. The relative luminance of a vertex at x with the normal n and the albedo a, lit from the
+// directions l and seen from v:
+//     ambient a + sum over lights of E max(0, n.l) (a + specular (shininess + 8) / 8 max(0, n.h)^shininess),
+//     h = (l + v) / |l + v|,
+// cut off at 1, where the display ends. E is the light's intensity; for point and spot lights times (distance /
+// |position - x|)^2, and for spots times the smooth step of the cosine of the angle from their axis, from 0 at the
+// outer one to 1 at the inner one. A vertex without a normal has the ambient light alone. In between, luminance is
+// interpolated linearly.
 #pragma once
 
 #include <cstdint>
@@ -42,18 +45,19 @@ struct Lighting {
 inline constexpr std::size_t most_lights = 16;
 inline constexpr double most_shininess = 1024;
 
-// Not negative, intensities up to 1e12, distances and places up to 1e18 mesh units, directions of unit length, angles in order, not all
-// dark. The error names the field, as in "lights[2].distance".
+// Not negative, intensities up to 1e12, distances and places up to 1e18 mesh units, directions of unit length, angles
+// in order, not all dark. The error names the field, as in "lights[2].distance".
 Result<void> validate(const Lighting& lighting);
 
-// validate(), and no light at a vertex, where its direction is not defined, or within a closed surface, of which it can light nothing
-// that is seen. Cost: of a light within the bounding sphere, a descent and three rays through the tree.
+// validate(), and no light at a vertex, where its direction is not defined, or within a closed surface, of which it can
+// light nothing that is seen. Cost: of a light within the bounding sphere, a descent and three rays through the tree.
 Result<void> check_lights(const VertexTree& tree, const Lighting& lighting);
 
 // Relative luminance of a vertex. `normal`: unit or zero.
 double lit_luminance(const Lighting& lighting, glm::dvec3 position, glm::dvec3 normal, double albedo, glm::dvec3 eye);
 
-// Of white light: the luminance of a node's colour, or default_albedo; with a texture, which is multiplied with it, 1 in its place.
+// Of white light: the luminance of a node's colour, or default_albedo; with a texture, which is multiplied with it, 1
+// in its place.
 float albedo_of(const VertexTree& tree, NodeId node);
 
 // What the vertices have that a fold may show: those of the ring, and the proxies of the subtree.
@@ -61,13 +65,15 @@ struct VertexCone {
     glm::vec3 axis = glm::vec3(0, 0, 1); // unit; all normals are within the angle from it
     float cosine = 1, sine = 0;          // of the angle; -1 and 0 where they point anywhere, or one of them is zero
     LuminanceRange albedo;               // with the texture's share, if there is one
-    // Coordinates of the normals along two directions across the axis, across_axis(); of no account where `largest` is not above `least`.
-    // Normals differ more along a ridge's curvature than across it, and seldom by as much as the cone allows.
+    // Coordinates of the normals along two directions across the axis, across_axis(); of no account where `largest` is
+    // not above `least`. Normals differ more along a ridge's curvature than across it, and seldom by as much as the
+    // cone allows.
     float least_across[2] = {0, 0}, largest_across[2] = {0, 0};
     bool has_box() const noexcept { return largest_across[0] > least_across[0]; }
 };
 
-// Two unit vectors that make an orthonormal frame with a unit vector (Duff and others 2017, "Building an Orthonormal Basis, Revisited").
+// Two unit vectors that make an orthonormal frame with a unit vector (Duff and others 2017, "Building an Orthonormal
+// Basis, Revisited").
 inline void across_axis(const glm::vec3& axis, glm::vec3& first, glm::vec3& second) noexcept {
     const float sign = axis.z < 0 ? -1.0f : 1.0f, a = -1 / (sign + axis.z), b = axis.x * axis.y * a;
     first = {1 + sign * axis.x * axis.x * a, sign * b, -sign * axis.x};
@@ -86,13 +92,13 @@ private:
     std::vector<VertexCone> cones_;
 };
 
-// Contains lit_luminance() of every vertex in the sphere whose normal and albedo are in the cone. Larger for larger spheres and cones
-// without boxes.
-// Cost: some ten nanoseconds a light.
+// Contains lit_luminance() of every vertex in the sphere whose normal and albedo are in the cone. Larger for larger
+// spheres and cones without boxes. Cost: some ten nanoseconds a light.
 LuminanceRange lit_range(const Lighting& lighting, const VertexCone& cone, const Sphere& sphere, glm::dvec3 eye);
 
-// How far lights have moved, as an angle in radians: of the directions of directional lights and spots; positions count in radii of the
-// tree; intensities by eight times their logarithm; with highlights, the eye like a light. Infinite where anything else differs.
+// How far lights have moved, as an angle in radians: of the directions of directional lights and spots; positions count
+// in radii of the tree; intensities by eight times their logarithm; with highlights, the eye like a light. Infinite
+// where anything else differs.
 double light_motion(const VertexTree& tree, const Lighting& from, glm::dvec3 eye_from, const Lighting& to,
                     glm::dvec3 eye_to);
 

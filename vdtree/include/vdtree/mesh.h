@@ -57,7 +57,8 @@ struct Mesh {
 };
 
 // Checks what every algorithm relies on: finite positions, indices in range, attributes as long as the
-// positions, ranges within the triangles, a texture of as many texels as it says, with UVs. The error names the first offender.
+// positions, ranges within the triangles, a texture of as many texels as it says, with UVs. The error names the first
+// offender.
 Result<void> validate(const MeshView& mesh);
 
 // Removes the triangles that use a vertex twice, shrinks the ranges to match, and returns how many went.

@@ -36,16 +36,16 @@ inline constexpr int normal_cell_count = 384;
 // The cell of a direction of any positive length, or -1 for zero and non-finite ones.
 int normal_cell(glm::dvec3 normal) noexcept;
 
-// The unit vectors at a cell's corners. Its sides are arcs of great circles, so the cell lies in a cap of the sphere (up to
-// a hemisphere) iff its corners do.
+// The unit vectors at a cell's corners. Its sides are arcs of great circles, so the cell lies in a cap of the sphere
+// (up to a hemisphere) iff its corners do.
 struct NormalCell {
     std::array<float, 4> x, y, z;
 };
 const std::array<NormalCell, normal_cell_count>& normal_cells() noexcept;
 
-// Slabs that contain the same directions as a mask, in 14 bytes: the least and the largest coordinate along the three axes
-// and the four diagonals of the cube, in 1/127, rounded outward. Cheaper to test than the mask, and much tighter where the
-// directions are alike; unions are exact, so nothing is lost up the tree.
+// Slabs that contain the same directions as a mask, in 14 bytes: the least and the largest coordinate along the three
+// axes and the four diagonals of the cube, in 1/127, rounded outward. Cheaper to test than the mask, and much tighter
+// where the directions are alike; unions are exact, so nothing is lost up the tree.
 struct NormalSlabs {
     static constexpr int axis_count = 7; // x, y, z, then the diagonals (1,1,1), (-1,1,1), (1,-1,1), (1,1,-1)
     std::array<std::int8_t, axis_count> lo{127, 127, 127, 127, 127, 127, 127};
@@ -78,12 +78,13 @@ enum class Facing : std::uint8_t { none, front, back, mixed };
 // How triangles with the mask's normals, each with a point within `radius` of a centre at distance `distance` and
 // direction `to_eye` (unit) from the eye, can face the eye. `mixed` whenever both cannot be ruled out, also when
 // the eye is inside the sphere; `none` for an empty mask. Conservative for a perspective view: the directions to
-// the eye from points of the sphere differ from `to_eye` by asin(radius / distance) at most. Cost: four products per set cell.
+// the eye from points of the sphere differ from `to_eye` by asin(radius / distance) at most. Cost: four products per
+// set cell.
 Facing facing(const NormalMask& mask, glm::vec3 to_eye, float distance, float radius) noexcept;
 Facing facing(const NormalSlabs& slabs, glm::vec3 to_eye, float distance, float radius) noexcept;
 
-// Both hold, so what either rules out is ruled out: the slabs first. `mask` may be a function that gives the mask; it is called
-// only where the slabs do not decide.
+// Both hold, so what either rules out is ruled out: the slabs first. `mask` may be a function that gives the mask; it
+// is called only where the slabs do not decide.
 template <class Mask>
 Facing facing(const NormalSlabs& slabs, const Mask& mask, glm::vec3 to_eye, float distance, float radius) noexcept {
     const Facing by_slabs = facing(slabs, to_eye, distance, radius);

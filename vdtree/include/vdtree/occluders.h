@@ -13,11 +13,11 @@ struct InnerSphereOptions {
         96; // of a grid along the tree's longest side, 8 to 512: spheres stay out of all cells that the surface touches
 };
 
-// Spheres that a closed surface encloses and nowhere touches: every line from outside to a point in one crosses the surface before.
-// For Viewpoint::occluders, with the eye outside of the tree's bounding sphere. Empty for open surfaces, where VertexTree::check() fails, and where
-// nothing fits in.
-// Where surfaces intersect themselves, inside is where their winding number is not 0. Cost: some 0.1 s, and 50 ns a triangle; up to a
-// dozen bytes for every cell while it works.
+// Spheres that a closed surface encloses and nowhere touches: every line from outside to a point in one crosses the
+// surface before. For Viewpoint::occluders, with the eye outside of the tree's bounding sphere. Empty for open
+// surfaces, where VertexTree::check() fails, and where nothing fits in. Where surfaces intersect themselves, inside is
+// where their winding number is not 0. Cost: some 0.1 s, and 50 ns a triangle; up to a dozen bytes for every cell while
+// it works.
 std::vector<Sphere> inner_spheres(const VertexTree& tree, const InnerSphereOptions& options = {});
 
 } // namespace unseen::vdtree

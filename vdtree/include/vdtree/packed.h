@@ -25,8 +25,8 @@ struct Unorm16 {
 };
 static_assert(static_cast<float>(Unorm16{Unorm16::largest}) == 1.0f);
 
-// A unit vector or zero in 4 bytes: octahedral coordinates in 1/32767 (Meyer, Suessmuth, Sussner, Stamminger and Greiner
-// 2010; Cigolle and others 2014). At most 6.5e-5 from the vector that was packed; the six axes are exact.
+// A unit vector or zero in 4 bytes: octahedral coordinates in 1/32767 (Meyer, Suessmuth, Sussner, Stamminger and
+// Greiner 2010; Cigolle and others 2014). At most 6.5e-5 from the vector that was packed; the six axes are exact.
 struct PackedNormal {
     static constexpr std::int16_t largest = 32767;
     static constexpr std::int16_t none = -32768; // x and y of the zero vector

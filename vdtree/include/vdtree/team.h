@@ -7,8 +7,8 @@
 
 namespace unseen::vdtree {
 
-// What build_tree() on member 0 and help_build_tree() on all others need from each other. Called on the building thread only.
-// A member that fails leaves those that wait for it waiting: whoever made the team has to end them.
+// What build_tree() on member 0 and help_build_tree() on all others need from each other. Called on the building thread
+// only. A member that fails leaves those that wait for it waiting: whoever made the team has to end them.
 class Team {
 public:
     virtual ~Team() = default;

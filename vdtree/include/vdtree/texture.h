@@ -1,4 +1,5 @@
-// Images that are laid over a surface by its texture coordinates, and what can be seen of them over a range of coordinates.
+// Images that are laid over a surface by its texture coordinates, and what can be seen of them over a range of
+// coordinates.
 #pragma once
 
 #include <array>
@@ -21,8 +22,8 @@ using Texel = std::array<std::uint8_t, 4>;
 // What lies beyond the coordinates 0..1.
 enum class Wrap : std::uint32_t { repeat, clamp };
 
-// Row-major. Row 0 is where v is 0 and texel (x, y) covers u from x / width to (x + 1) / width, v likewise: images of formats whose v
-// runs upward (OBJ, PLY) are stored from the bottom row, others (glTF) from the top.
+// Row-major. Row 0 is where v is 0 and texel (x, y) covers u from x / width to (x + 1) / width, v likewise: images of
+// formats whose v runs upward (OBJ, PLY) are stored from the bottom row, others (glTF) from the top.
 struct TextureView {
     std::uint32_t width = 0, height = 0;
     Wrap wrap_u = Wrap::repeat, wrap_v = Wrap::repeat;
@@ -41,7 +42,8 @@ struct Texture {
 
 inline constexpr std::uint32_t largest_texture_side = 16384; // texels; what graphics processors take
 
-// An empty texture is none, and valid; else the sides must be from 1 to the largest, and the texels as many as they say.
+// An empty texture is none, and valid; else the sides must be from 1 to the largest, and the texels as many as they
+// say.
 Result<void> validate(const TextureView& texture);
 
 // Linear light, 0..1, of a texel: its RGB, or its relative luminance (Rec. 709).
@@ -80,12 +82,14 @@ public:
     // Of a valid texture that is not empty. Cost: a pass over the texels; 11 bytes of memory for each.
     explicit TexturePyramid(const TextureView& texture);
 
-    // What bilinear filtering can return for coordinates in the box, which may reach beyond 0..1: the range of the texels there, and of
-    // others nearer than a seventh of its longer side. That of a box within another lies within the other's. Coarser mip levels mix texels that
-    // are as far away as a pixel is wide. Cost: up to some hundred look-ups.
+    // What bilinear filtering can return for coordinates in the box, which may reach beyond 0..1: the range of the
+    // texels there, and of others nearer than a seventh of its longer side. That of a box within another lies within
+    // the other's. Coarser mip levels mix texels that are as far away as a pixel is wide. Cost: up to some hundred
+    // look-ups.
     Range range(const UvBox& box) const;
 
-    // The mean luminance over an area of this width (in texture coordinates, 0: none) around a point, about: bilinear in the nearest level.
+    // The mean luminance over an area of this width (in texture coordinates, 0: none) around a point, about: bilinear
+    // in the nearest level.
     double mean(glm::dvec2 uv, double width) const;
 
 private:

@@ -99,17 +99,17 @@ public:
     bool is_leaf(NodeId node) const noexcept { return node >= interior_count(); }
     static constexpr NodeId root() noexcept { return 0; }
 
-    // Whether an interior node can be unfolded: its links, its triangles, and the positions and bounds of its children are in
-    // order. Always, but for trees from map_tree, whose nodes are looked at when they are first asked about, from the root
-    // down; a damaged node must stay folded, and has no children for for_each_child. Values that are read of mapped nodes of
-    // which this has not been asked may be anything; how nodes hang together is told by for_each_child and SoundTree only.
-    // Cost: one bit; the first time, the children and triangles.
+    // Whether an interior node can be unfolded: its links, its triangles, and the positions and bounds of its children
+    // are in order. Always, but for trees from map_tree, whose nodes are looked at when they are first asked about,
+    // from the root down; a damaged node must stay folded, and has no children for for_each_child. Values that are read
+    // of mapped nodes of which this has not been asked may be anything; how nodes hang together is told by
+    // for_each_child and SoundTree only. Cost: one bit; the first time, the children and triangles.
     bool is_sound(NodeId node) const { return !checks_ || looks_sound(node); }
     NodeId first_damaged() const noexcept; // the first node for which is_sound was false, or no_node
 
-    // Of trees from map_tree: looks at all that read_tree looks at, but for the checksums of pages: is_sound for all nodes,
-    // and every value's range. The error names a damaged node or section. Cost: the first time one pass over the whole file,
-    // in parallel; nothing once it has succeeded, and for other trees.
+    // Of trees from map_tree: looks at all that read_tree looks at, but for the checksums of pages: is_sound for all
+    // nodes, and every value's range. The error names a damaged node or section. Cost: the first time one pass over the
+    // whole file, in parallel; nothing once it has succeeded, and for other trees.
     Result<void> check() const;
 
     // Calls f(child) for each child of an interior node in depth-first order. Cost: the number of children.
@@ -149,20 +149,23 @@ public:
     Sphere bounding_sphere() const noexcept;         // of the triangles' corners
     LuminanceRange luminance_range() const noexcept; // of all that is drawn
 
-    // Luminance and its bounds under another light, without attributes; everything else is shared with this tree. Cost: one pass
-    // over the triangles and the nodes. A pre-lit mesh (with colours) is shaded by its colours times the light.
+    // Luminance and its bounds under another light, without attributes; everything else is shared with this tree. Cost:
+    // one pass over the triangles and the nodes. A pre-lit mesh (with colours) is shaded by its colours times the
+    // light.
     const Light& light() const noexcept;
     bool is_prelit() const noexcept; // luminance comes from the colours alone
     // Fails where check() does.
     Result<VertexTree> relit(const Light& light) const;
 
-    // The same tree without its texture, under its light, with luminance and bounds of its vertices alone; everything else is shared, but
-    // for attributes, which it has not. Vertices without colours then have the default albedo, lit. Fails where check() does. Cost: as relit().
+    // The same tree without its texture, under its light, with luminance and bounds of its vertices alone; everything
+    // else is shared, but for attributes, which it has not. Vertices without colours then have the default albedo, lit.
+    // Fails where check() does. Cost: as relit().
     Result<VertexTree> untextured() const;
 
-    // Named values that others keep with the tree: see <vdtree/attribute.h>. Empty where there are none of that name, or of another
-    // type's sizes. Valid as long as a handle with the attribute. Of read and mapped files nobody has looked at them, SoundTree
-    // neither: the owner of a name checks each value where it uses it, and what has the sizes of T may have been anything.
+    // Named values that others keep with the tree: see <vdtree/attribute.h>. Empty where there are none of that name,
+    // or of another type's sizes. Valid as long as a handle with the attribute. Of read and mapped files nobody has
+    // looked at them, SoundTree neither: the owner of a name checks each value where it uses it, and what has the sizes
+    // of T may have been anything.
     template <class T>
     std::span<const T> attribute(std::string_view name) const noexcept {
         static_assert(is_attribute_value<T>());
@@ -171,10 +174,10 @@ public:
     }
     std::vector<AttributeInfo> attributes() const;
 
-    // Another handle that has this attribute, in place of one of the same name, and shares all else. relit(), untextured() and
-    // conserve_light() drop all attributes: they were measured under another light. Files keep them, those of names that no program
-    // knows, too. Fails on names that are none (AttributeInfo), on a number of values that is not the domain's, and where there are
-    // most_attributes already. Cost: none.
+    // Another handle that has this attribute, in place of one of the same name, and shares all else. relit(),
+    // untextured() and conserve_light() drop all attributes: they were measured under another light. Files keep them,
+    // those of names that no program knows, too. Fails on names that are none (AttributeInfo), on a number of values
+    // that is not the domain's, and where there are most_attributes already. Cost: none.
     template <class T>
     Result<VertexTree> with_attribute(std::string_view name, AttributeDomain domain, std::vector<T> values) const {
         static_assert(is_attribute_value<T>());
@@ -214,16 +217,16 @@ private:
     Links links_;
 };
 
-// A tree all of which has been looked at: what walks a whole tree takes one of these, so that no file can lead it out of bounds.
-// Another handle to the tree's data.
+// A tree all of which has been looked at: what walks a whole tree takes one of these, so that no file can lead it out
+// of bounds. Another handle to the tree's data.
 class SoundTree : public VertexTree {
 public:
     // Fails where VertexTree::check() does, and costs as much: nothing for trees that were built or read.
     static Result<SoundTree> of(const VertexTree& tree);
 
-    // By node: the parent (no_node for the root). By interior node: the leaves supported, [first_leaf, leaf_end), the end of
-    // its subtree among the interior nodes, and its triangles, [first_triangle[n], first_triangle[n + 1]) (one longer than
-    // the nodes). Corners of triangles are leaf numbers, oriented like the input.
+    // By node: the parent (no_node for the root). By interior node: the leaves supported, [first_leaf, leaf_end), the
+    // end of its subtree among the interior nodes, and its triangles, [first_triangle[n], first_triangle[n + 1]) (one
+    // longer than the nodes). Corners of triangles are leaf numbers, oriented like the input.
     std::span<const NodeId> parents() const noexcept { return links_.parents; }
     std::span<const Index> first_leaf() const noexcept { return links_.first_leaf; }
     std::span<const Index> leaf_end() const noexcept { return links_.leaf_end; }
@@ -236,9 +239,8 @@ private:
 };
 
 // Checks everything that the tree promises: that spheres, masks, slabs, intervals and displacements contain what they
-// should and nest, and that every triangle vanishes where it is said to. Displacements are compared with the first 4096 leaves of a node;
-// attributes are their owners'. The error names the first offender.
-// Cost: leaves times depth.
+// should and nest, and that every triangle vanishes where it is said to. Displacements are compared with the first 4096
+// leaves of a node; attributes are their owners'. The error names the first offender. Cost: leaves times depth.
 Result<void> verify(const VertexTree& tree);
 
 template <class F>

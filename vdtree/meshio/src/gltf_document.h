@@ -1,5 +1,5 @@
-// A glTF document: split from its container, and cut down to what describes triangles, so that nothing that tinygltf would believe or fetch
-// reaches it.
+// A glTF document: split from its container, and cut down to what describes triangles, so that nothing that tinygltf
+// would believe or fetch reaches it.
 #pragma once
 
 #include <cstdint>
@@ -51,8 +51,8 @@ Reduced reduce(const json& document);
 // Fails on what no cut can keep, unless it is to be dropped; what is dropped is told in the warnings.
 void check_kept(const json& document, const LeftOut& drop, std::vector<std::string>& warnings);
 
-// The document as far as it is kept beside the triangles: without geometry, what is dropped, extensions that nobody here knows, and images
-// that lie in the file.
+// The document as far as it is kept beside the triangles: without geometry, what is dropped, extensions that nobody
+// here knows, and images that lie in the file.
 json without_geometry(json document, std::vector<std::string>& warnings);
 
 } // namespace unseen::meshio::gltf

@@ -54,7 +54,8 @@ public:
         return *file;
     }
 
-    // All images, for who writes them again, those beside the mesh file once. What cannot be read is told in the warnings.
+    // All images, for who writes them again, those beside the mesh file once. What cannot be read is told in the
+    // warnings.
     std::vector<SourceDocument::File> read_all(std::vector<std::string>& warnings) {
         std::vector<SourceDocument::File> all;
         std::set<std::string> read_already;
@@ -404,7 +405,8 @@ private:
         stack.push_back({index, depth, parent});
     }
 
-    // Accessors of a primitive's vertices, by attribute. Primitives of one mesh with the same ones share their vertices.
+    // Accessors of a primitive's vertices, by attribute. Primitives of one mesh with the same ones share their
+    // vertices.
     using VertexSource = std::map<std::string, int>;
 
     void add_mesh(std::size_t index, std::int32_t node, const Placement& placement) {

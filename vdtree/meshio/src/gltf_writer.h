@@ -1,4 +1,5 @@
-// A glTF file put together: accessors over arrays in memory, and bytes of images, are numbered as they are added and written at the end.
+// A glTF file put together: accessors over arrays in memory, and bytes of images, are numbered as they are added and
+// written at the end.
 #pragma once
 
 #include <cstddef>
@@ -34,8 +35,8 @@ public:
     nlohmann::json primitive(const nlohmann::json& attributes, std::size_t index_view, std::uint64_t first_triangle,
                              std::uint64_t count);
 
-    // Adds asset, accessors, bufferViews and buffers to the document. By the name's ending one GLB file, or JSON with the data in a .bin of the same
-    // name; that file is not replaced where there is no JSON beside it yet.
+    // Adds asset, accessors, bufferViews and buffers to the document. By the name's ending one GLB file, or JSON with
+    // the data in a .bin of the same name; that file is not replaced where there is no JSON beside it yet.
     Result<void> write(const std::filesystem::path& file, nlohmann::json document) const;
 
 private:

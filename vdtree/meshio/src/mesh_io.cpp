@@ -84,8 +84,8 @@ Result<ReadResult> read_as(Format format, const MeshSource& source) {
     return malformed(source, "unknown format.");
 }
 
-// Of the vertices that triangles use. A normal that is not finite is refused, for nobody knows what it was to be; one of length 0, which
-// stands for none as well, is computed from the faces.
+// Of the vertices that triangles use. A normal that is not finite is refused, for nobody knows what it was to be; one
+// of length 0, which stands for none as well, is computed from the faces.
 Result<void> check_normals(const MeshSource& source, ReadResult& result) {
     const Mesh& mesh = result.mesh;
     if (mesh.normals.empty()) return {};

@@ -46,7 +46,8 @@ bool is_binary_stl(std::string_view bytes);
 // Whether the bytes start with one of the keywords of OFF (COFF, STOFF, ...), after comments.
 bool starts_with_off_keyword(std::string_view bytes);
 
-// A name in a mesh file as a path below its folder, or nothing: a mesh must not be able to name any file of the machine.
+// A name in a mesh file as a path below its folder, or nothing: a mesh must not be able to name any file of the
+// machine.
 std::optional<std::filesystem::path> path_beside(std::string_view name);
 
 struct MtlContents {
@@ -54,7 +55,8 @@ struct MtlContents {
     std::set<std::filesystem::path> images; // all that are named, below the mesh file's folder
     std::vector<std::string> warnings;
 };
-// Those of a Wavefront MTL file, added to what there is. `name` is that of the file, for messages; without images, bad ones are no errors.
+// Those of a Wavefront MTL file, added to what there is. `name` is that of the file, for messages; without images, bad
+// ones are no errors.
 Result<void> read_mtl(std::string_view bytes, const std::string& name, bool with_images, MtlContents& contents);
 
 // Reads a regular file whole; pipes and devices are refused.

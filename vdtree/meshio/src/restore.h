@@ -20,9 +20,10 @@ struct RestoredPart {
     std::vector<std::vector<float>> channels; // like those of the document; empty: the part has it not
 };
 
-// Parts of which nothing is left are left out. Vertices of the mesh come with the values that they had; those of proxies follow from the
-// mesh that was drawn, and else are the means of the vertices that they stand for, of those with the same attributes. Fails
-// where tree and document contradict each other. Cost: the cut's triangles, and the tree's leaves.
+// Parts of which nothing is left are left out. Vertices of the mesh come with the values that they had; those of
+// proxies follow from the mesh that was drawn, and else are the means of the vertices that they stand for, of those
+// with the same attributes. Fails where tree and document contradict each other. Cost: the cut's triangles, and the
+// tree's leaves.
 Result<std::vector<RestoredPart>> restore(const vdtree::Cut& cut, const vdtree::ExtractedMesh& extracted,
                                           const SourceDocument& document);
 

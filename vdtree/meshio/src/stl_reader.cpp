@@ -57,8 +57,8 @@ void add_facet(ReadResult& result, const glm::vec3& normal, const std::array<glm
     ++result.source_faces;
 }
 
-// A facet's normal of zero means "compute it" in STL, and so does one that is not finite, which flat facets often have: what it was to
-// say follows from the corners.
+// A facet's normal of zero means "compute it" in STL, and so does one that is not finite, which flat facets often have:
+// what it was to say follows from the corners.
 void settle_normals(ReadResult& result) {
     Mesh& mesh = result.mesh;
     const bool any = std::any_of(mesh.normals.begin(), mesh.normals.end(), is_direction);

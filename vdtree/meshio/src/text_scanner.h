@@ -14,8 +14,8 @@ inline bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\v' || c ==
 inline bool is_newline(char c) { return c == '\n' || c == '\r'; }
 inline bool is_space(char c) { return is_blank(c) || is_newline(c); }
 
-// What a decimal number stands for that is too large for a double, or too small: infinity or 0, of its sign. (Not strtod, which obeys
-// the locale.)
+// What a decimal number stands for that is too large for a double, or too small: infinity or 0, of its sign. (Not
+// strtod, which obeys the locale.)
 inline double out_of_range_number(std::string_view digits) {
     const bool is_negative = digits.starts_with('-');
     if (is_negative) digits.remove_prefix(1);

@@ -30,7 +30,7 @@ namespace {
 
 using File = SourceDocument::File;
 
-Error cannot_write(const fs::path& file, const std::string& why) {
+Error failed_to_write(const fs::path& file, const std::string& why) {
     return {ErrorCode::io_failure, "Cannot write '" + file.string() + "': " + why};
 }
 
@@ -67,12 +67,12 @@ Result<void> write_beside(const fs::path& file, const SourceDocument& document, 
         const auto there = read_whole_file(target);
         if (!there) return there.error();
         if (*there != *beside.bytes)
-            return cannot_write(target, "another file of that name is there; write the mesh to another folder.");
+            return failed_to_write(target, "another file of that name is there; write the mesh to another folder.");
     }
     for (const auto& [target, bytes] : missing) {
         std::error_code failed;
         if (target.has_parent_path()) fs::create_directories(target.parent_path(), failed);
-        if (failed) return cannot_write(target, failed.message() + ".");
+        if (failed) return failed_to_write(target, failed.message() + ".");
         auto out = AtomicFile::create(target);
         if (!out) return out.error();
         if (const auto written = out->write(std::string_view(*bytes)); !written) return written;
@@ -288,7 +288,7 @@ Result<void> write_document(const fs::path& file, const Cut& cut, SourceDocument
     if (!converted) return converted.error();
     ExtractedMesh extracted = extract_with_sources(cut);
     if (extracted.mesh.triangles.empty())
-        return cannot_write(file, "the cut has no triangles, and no format holds materials of nothing.");
+        return failed_to_write(file, "the cut has no triangles, and no format holds materials of nothing.");
     auto parts = restore(cut, extracted, *converted);
     if (!parts) return parts.error();
     if (ending == ".ply") {

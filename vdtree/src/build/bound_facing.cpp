@@ -16,8 +16,8 @@ namespace unseen::vdtree {
 
 namespace {
 
-// A node with more triangles around it than this after its fold faces everywhere, and with it every node above: it is a good
-// part of the model, mixed from almost everywhere, and replaying the folds of deep trees to the end would cost
+// A node with more triangles around it than this after its fold faces everywhere, and with it every node above: it is a
+// good part of the model, mixed from almost everywhere, and replaying the folds of deep trees to the end would cost
 // their size squared.
 constexpr std::uint16_t most_border_triangles = 1024;
 
@@ -60,15 +60,17 @@ private:
     std::array<std::array<Index, NormalBatch::capacity>, targets> targets_;
 };
 
-// Follows triangles through the folds of a part in the order in which the clusterer made them: whenever a corner moves to a
-// proxy, the node of the proxy sees the triangle as it is then, until two corners meet and the triangle vanishes.
+// Follows triangles through the folds of a part in the order in which the clusterer made them: whenever a corner moves
+// to a proxy, the node of the proxy sees the triangle as it is then, until two corners meet and the triangle vanishes.
 //
-// Each step changes the node above one corner, and its number in the order of making grows from step to step, so it is the
-// order of making that decides which corner moves next: nothing but the triangle's own ancestors has to be known. Which corner that is, and when
-// a triangle vanishes, is as good as random, and the processor is not to guess: many triangles are followed in turns, a step each.
+// Each step changes the node above one corner, and its number in the order of making grows from step to step, so it is
+// the order of making that decides which corner moves next: nothing but the triangle's own ancestors has to be known.
+// Which corner that is, and when a triangle vanishes, is as good as random, and the processor is not to guess: many
+// triangles are followed in turns, a step each.
 class Folds {
 public:
-    // Adds the directions that nodes see to `facing`, by node, and those around leaves to `around`, by their numbers among the part's.
+    // Adds the directions that nodes see to `facing`, by node, and those around leaves to `around`, by their numbers
+    // among the part's.
     Folds(const BoundInput& input, const Ancestors& ancestors, const TreePart& part, std::span<Directions> facing,
           std::span<Directions> around)
         : in_(input), ancestors_(ancestors), part_(part), is_top_(input.parts.is_top(part)),
@@ -129,7 +131,8 @@ private:
     // Of an interior node of the part.
     Step step_of(NodeId node) const { return is_top_ ? step_from(node) : steps_[node - part_.begin]; }
 
-    // A triangle with all three corners in the part. A step that comes too late, for two corners have met, may use the fourth places.
+    // A triangle with all three corners in the part. A step that comes too late, for two corners have met, may use the
+    // fourth places.
     struct Followed {
         Triangle triangle;
         Corner at[4];

@@ -15,17 +15,18 @@ namespace unseen::vdtree {
 
 namespace {
 
-// Displacements of nodes with more leaves than this are bounded through their children's: looking for the farthest of very
-// many leaves again in each of their ancestors would cost the square of their number where trees are deep.
+// Displacements of nodes with more leaves than this are bounded through their children's: looking for the farthest of
+// very many leaves again in each of their ancestors would cost the square of their number where trees are deep.
 constexpr Index most_measured_leaves = 4096;
 // So many leaves are looked at one by one sooner than their nodes.
 constexpr Index few_leaves = 12;
 
-// Of the radius: spheres that stick out by less do not move the centre any more. Less is not worth the time: what the spheres
-// of children add is more.
+// Of the radius: spheres that stick out by less do not move the centre any more. Less is not worth the time: what the
+// spheres of children add is more.
 constexpr double node_slack = 1e-3;
 
-// Bounds the nodes of a part, children first, several at a time. Leaves are seen as points, interior children as their spheres.
+// Bounds the nodes of a part, children first, several at a time. Leaves are seen as points, interior children as their
+// spheres.
 class SphereWorker {
 public:
     // `heights`: by interior node; how many there are below each other, itself the first.

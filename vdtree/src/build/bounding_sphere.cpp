@@ -215,8 +215,8 @@ private:
     const FunctionRef<glm::dvec3(glm::dvec3)>& farthest_;
 };
 
-// Grows a basis by what sticks out farthest until nothing does by more than `slack`, a share of the radius. For balls the
-// points of the basis are cutting planes: their smallest sphere is never larger than the one looked for.
+// Grows a basis by what sticks out farthest until nothing does by more than `slack`, a share of the radius. For balls
+// the points of the basis are cutting planes: their smallest sphere is never larger than the one looked for.
 template <class AnyBalls>
 DSphere grow_basis(AnyBalls& balls, double slack) {
     // A pair far apart is a good beginning.
@@ -447,7 +447,8 @@ struct Kernel {
             store(farthest_in(sets, load(from, first), first), out, first);
     }
 
-    // What most lanes need, as grow_basis() does it: a pair far apart, and what sticks out farthest from the sphere around it. `far`: from its centre.
+    // What most lanes need, as grow_basis() does it: a pair far apart, and what sticks out farthest from the sphere
+    // around it. `far`: from its centre.
     UNSEEN_INLINE static void begin(const Sets& sets, double slack, Bases& bases, FarthestOfLanes& out) {
         for (std::size_t first = 0; first < lanes; first += width) {
             const FarBalls one = farthest_in(sets, Points{}, first);

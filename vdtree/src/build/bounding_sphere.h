@@ -22,16 +22,17 @@ struct DSphere {
 // The smallest sphere that contains all points (Welzl 1991, move to front). Deterministic.
 // Cost: expected linear for the sizes used here (tens of points).
 DSphere smallest_sphere(std::span<const glm::dvec3> points);
-// Likewise of points that somebody else keeps, one of which is `first`: asks now and then, ten times or so, for the one that is farthest
-// from a place.
+// Likewise of points that somebody else keeps, one of which is `first`: asks now and then, ten times or so, for the one
+// that is farthest from a place.
 DSphere smallest_sphere(glm::dvec3 first, const FunctionRef<glm::dvec3(glm::dvec3 from)>& farthest);
 
 // Nearly the smallest sphere that contains all points and all spheres: the radius exceeds the smallest one by a
 // relative 1e-4 at most, and contains them all.
 DSphere enclosing_sphere(std::span<const glm::dvec3> points, std::span<const DSphere> spheres);
 
-// Several sets of points and spheres, each to be enclosed by a sphere of its own, at the same time: the farthest points of all are looked
-// for together, and what takes long for one of them is done while others wait for it. Keeps its memory.
+// Several sets of points and spheres, each to be enclosed by a sphere of its own, at the same time: the farthest points
+// of all are looked for together, and what takes long for one of them is done while others wait for it. Keeps its
+// memory.
 class BallLanes {
 public:
     static constexpr std::size_t lanes = 8;
@@ -61,8 +62,8 @@ public:
     }
     void forget_spheres(std::size_t lane) { sphere_counts_[lane] = 0; }
 
-    // For as many lanes as there are in `out`, from the first on: each sphere contains everything, and its radius exceeds the smallest one by a
-    // relative `slack` at most, but for the rounding of the centre to floats.
+    // For as many lanes as there are in `out`, from the first on: each sphere contains everything, and its radius
+    // exceeds the smallest one by a relative `slack` at most, but for the rounding of the centre to floats.
     void enclose(double slack, std::span<Sphere> out);
 
     using Lane = std::array<double, lanes>; // a number of each lane

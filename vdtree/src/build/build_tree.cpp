@@ -140,8 +140,8 @@ CleanMesh clean(const MeshView& mesh) {
     return out;
 }
 
-// The origin of the tree's float positions. Float coordinates stay exact: where all coordinates of an axis have one sign
-// and the largest is at most twice the smallest, their differences are exact (Sterbenz), else the axis keeps 0.
+// The origin of the tree's float positions. Float coordinates stay exact: where all coordinates of an axis have one
+// sign and the largest is at most twice the smallest, their differences are exact (Sterbenz), else the axis keeps 0.
 // Coordinates of double precision then lose at most half a unit in the last place of a float of the extent's size.
 glm::dvec3 choose_origin(std::span<const glm::dvec3> positions) {
     glm::dvec3 low = positions[0], high = low, origin(0);

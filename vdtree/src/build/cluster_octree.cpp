@@ -1,8 +1,8 @@
 // Octree clustering: the vertices' cells in a tree of cubes, without the cubes that do not split anything.
 //
-// A vertex's path down the tree is its Morton code, so sorted codes are the tree: two neighbours part at the first digit in
-// which they differ. The codes are first dealt into buckets by their leading digits; each bucket is sorted and made a subtree by
-// itself, in parallel, and the subtrees are joined by the digits that tell the buckets apart.
+// A vertex's path down the tree is its Morton code, so sorted codes are the tree: two neighbours part at the first
+// digit in which they differ. The codes are first dealt into buckets by their leading digits; each bucket is sorted and
+// made a subtree by itself, in parallel, and the subtrees are joined by the digits that tell the buckets apart.
 #include <vdtree/builder.h>
 
 #include <algorithm>
@@ -31,11 +31,13 @@ using ClusterRef = Index;
 // The clusters of one bucket, or those above the buckets.
 class Subtree {
 public:
-    // `parents`: of the clusters that are there already; those that are joined here get the number of the one made from them.
+    // `parents`: of the clusters that are there already; those that are joined here get the number of the one made from
+    // them.
     Subtree(std::span<const glm::dvec3> positions, std::span<Index> parents)
         : positions_(positions), parents_(parents) {}
 
-    // Items of distinct vertices, with their codes in a grid over all of them. Leaves the same vertices in another order.
+    // Items of distinct vertices, with their codes in a grid over all of them. Leaves the same vertices in another
+    // order.
     ClusterRef build(std::span<CodedIndex> items, std::span<CodedIndex> scratch) {
         sort_by_code(items, scratch);
         const auto same_cell = [](const CodedIndex& a, const CodedIndex& b) { return a.code == b.code; };
@@ -82,9 +84,9 @@ private:
         return (std::countl_zero(a ^ b) - (64 - code_bits)) / digit_bits;
     }
 
-    // Vertices in one cell of the grid: they coincide, or they get a finer grid of their own. A grid tells the two points that
-    // are farthest apart along some axis from each other, and each is 2^21 times finer than the last, so that this
-    // ends within a hundred grids, where doubles end.
+    // Vertices in one cell of the grid: they coincide, or they get a finer grid of their own. A grid tells the two
+    // points that are farthest apart along some axis from each other, and each is 2^21 times finer than the last, so
+    // that this ends within a hundred grids, where doubles end.
     ClusterRef build_cell(std::span<CodedIndex> items, std::span<CodedIndex> scratch) {
         glm::dvec3 low = positions_[items[0].index], high = low;
         for (const CodedIndex& item : items) {

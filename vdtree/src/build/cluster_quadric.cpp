@@ -1,10 +1,12 @@
-// Pair contraction by quadric error over position, luminance and the mesh's own attributes (Garland and Heckbert 1997, 1998).
+// Pair contraction by quadric error over position, luminance and the mesh's own attributes (Garland and Heckbert 1997,
+// 1998).
 //
-// The welded vertices are parted by a kd-tree, each part is contracted by itself to a small share of its vertices, and the
-// parts are joined up the kd-tree while contraction goes on (see quadric_contraction.h). The parts depend on the mesh alone, so the
-// result does not depend on threads. Within a part, contraction runs in rounds: each cluster chooses its best partner, and
-// pairs that choose each other are contracted. That is nearest-neighbour agglomeration: the hierarchy differs little from
-// strictly greedy order, but the work is linear a round, cache-friendly, and the tree is balanced.
+// The welded vertices are parted by a kd-tree, each part is contracted by itself to a small share of its vertices, and
+// the parts are joined up the kd-tree while contraction goes on (see quadric_contraction.h). The parts depend on the
+// mesh alone, so the result does not depend on threads. Within a part, contraction runs in rounds: each cluster chooses
+// its best partner, and pairs that choose each other are contracted. That is nearest-neighbour agglomeration: the
+// hierarchy differs little from strictly greedy order, but the work is linear a round, cache-friendly, and the tree is
+// balanced.
 #include <vdtree/builder.h>
 
 #include <algorithm>
@@ -20,6 +22,8 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 
+#include <vdtree/team.h>
+
 #include "build/help_cluster.h"
 #include "build/progress_counter.h"
 #include "build/quadric.h"
@@ -33,20 +37,21 @@ namespace {
 
 // A part has at most so many welded vertices. Its quadrics then fit a core's cache.
 constexpr Index largest_part = 1 << 15;
-// Parts, and joined parts, are contracted to at most so many clusters: one in 32 of a full part. Few enough that joining costs
-// next to nothing, many enough that those along the border of the part, which had fewer partners to choose from, are a small share.
+// Parts, and joined parts, are contracted to at most so many clusters: one in 32 of a full part. Few enough that
+// joining costs next to nothing, many enough that those along the border of the part, which had fewer partners to
+// choose from, are a small share.
 constexpr Index part_target = largest_part / 32;
 
-// One unit of relative luminance counts as this share of the model's extent. From 0.01 to 0.2, the triangles that the perceptual
-// fold test leaves of bunny and dragon differ by 0.5%; but with 0.2 the surface strays 1.3 to 1.7 times as far for its triangles,
-// for on a bumpy surface luminance then drowns the shape.
+// One unit of relative luminance counts as this share of the model's extent. From 0.01 to 0.2, the triangles that the
+// perceptual fold test leaves of bunny and dragon differ by 0.5%; but with 0.2 the surface strays 1.3 to 1.7 times as
+// far for its triangles, for on a bumpy surface luminance then drowns the shape.
 constexpr double luminance_scale = 0.01;
 // A normal that turns by one radian, and a colour that goes from 0 to 1, count as these shares of the extent. Less than
 // luminance, which is what is seen of both in most lights.
 constexpr double normal_scale = 0.0025;
 constexpr double colour_scale = 0.005;
-// A texture that slides by a length on the surface counts as this share of the length: what one sees of it depends on the
-// texture, and most of a displacement is seen whatever it is.
+// A texture that slides by a length on the surface counts as this share of the length: what one sees of it depends on
+// the texture, and most of a displacement is seen whatever it is.
 constexpr double texture_scale = 0.1;
 // Attributes count as if they were within this many extents, so that stray values stay finite when squared.
 constexpr double largest_value = 1e3;
@@ -58,7 +63,8 @@ Index part_begin(std::size_t part, std::size_t parts, std::size_t slots) {
     return static_cast<Index>(static_cast<std::uint64_t>(part) * slots / parts);
 }
 
-// Welded vertices ("slots") in an order in which every part is a range, and the mesh's vertices in the order of their slots.
+// Welded vertices ("slots") in an order in which every part is a range, and the mesh's vertices in the order of their
+// slots.
 struct SpatialNumbering {
     std::size_t parts = 1;             // a power of two
     std::vector<Index> vertex_of_slot; // the first of its vertices
@@ -102,8 +108,8 @@ private:
         return {low, high - low};
     }
 
-    // Halves along the longest side of the bounding box, until there is one part; ties by vertex number. The items are in one of the two
-    // arrays.
+    // Halves along the longest side of the bounding box, until there is one part; ties by vertex number. The items are
+    // in one of the two arrays.
     void split(std::size_t first_part, std::size_t parts, std::vector<Item>& from, std::vector<Item>& to) {
         if (first_part >= wanted_end_ || first_part + parts <= wanted_first_) return;
         const auto begin_of = [&](std::size_t part) { return part_begin(part, parts_, slots_.size()); };
@@ -116,7 +122,8 @@ private:
                              [&] { split(first_part + parts / 2, parts / 2, to, from); });
     }
 
-    // The `left` lowest items first. They are dealt into slices; only one of these has items of both halves, which are compared.
+    // The `left` lowest items first. They are dealt into slices; only one of these has items of both halves, which are
+    // compared.
     static void halve(std::span<const Item> from, std::span<Item> to, std::size_t left) {
         constexpr std::size_t slices = 2048;
         const Box bounds = box(from);
@@ -478,9 +485,9 @@ void exchange_joinable(Joinable& c, Message& message) {
 // The merges of all parts; first those of the parts themselves, then those of joined pairs of parts, and so on.
 using Level = std::vector<MergeRecord>;
 
-// Contracts the parts and joins them up the kd-tree, in one process or with a team. Each member has a run of parts; what is joined
-// belongs to the member that has its first part. Messages go to lower ranks only, those of a level are sent before any are waited for,
-// and so nobody waits in a circle.
+// Contracts the parts and joins them up the kd-tree, in one process or with a team. Each member has a run of parts;
+// what is joined belongs to the member that has its first part. Messages go to lower ranks only, those of a level are
+// sent before any are waited for, and so nobody waits in a circle.
 class PartContractor {
 public:
     PartContractor(const PartMaker& maker, const Members& members, ProgressCounter& counter)
@@ -645,7 +652,8 @@ private:
             raise(made_by_joining_[vanishing.joined], maker_.length_from_unit_box(vanishing.deviation));
     }
 
-    // Coincident vertices are joined first, whatever their attributes: above them, everything moves together, without cracks.
+    // Coincident vertices are joined first, whatever their attributes: above them, everything moves together, without
+    // cracks.
     void join_coincident() {
         const auto& first_member = numbering_.first_member;
         result_.parents.resize(vertices());

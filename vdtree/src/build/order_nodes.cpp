@@ -32,7 +32,8 @@ constexpr Index ahead = 16;
 } // namespace
 
 Ancestors::Ancestors(const TreeShape& shape) : shape_(shape), jump_(shape.interior()) {
-    // The jump from a node is as long as two jumps from its parent where these are equally long, else it leads to the parent.
+    // The jump from a node is as long as two jumps from its parent where these are equally long, else it leads to the
+    // parent.
     std::vector<Index> depth(shape.interior(), 0);
     for (NodeId node = 0; node < shape.interior(); ++node) {
         const NodeId up = shape.parents[node];
@@ -168,7 +169,8 @@ namespace {
 
 // For some triangles, the nodes that they vanish at.
 //
-// When that is found is as good as random, and the processor is not to guess: all of them go up the tree in turns, a step each.
+// When that is found is as good as random, and the processor is not to guess: all of them go up the tree in turns, a
+// step each.
 template <std::size_t most>
 void find_vanishing(std::span<const Triangle> triangles, const NodeOrder& nodes, const Ancestors& ancestors,
                     NodeId* out) {

@@ -15,7 +15,8 @@ struct NodeOrder {
 };
 
 // Depth-first pre-order, children in the order of their clusters, passing over clusters with one child. `lone` further
-// vertices, which no triangle uses, get a subtree of their own beside the clustering's root. Cost: two passes over the clusters.
+// vertices, which no triangle uses, get a subtree of their own beside the clustering's root. Cost: two passes over the
+// clusters.
 NodeOrder order_nodes(const Clustering& clustering, Index vertices, Index lone);
 
 struct TriangleOrder {

@@ -1,5 +1,5 @@
-// Many values that all threads make. The system clears pages where they are first touched, which takes as long as filling them; one
-// thread doing that for a whole array would keep the others waiting.
+// Many values that all threads make. The system clears pages where they are first touched, which takes as long as
+// filling them; one thread doing that for a whole array would keep the others waiting.
 #pragma once
 
 #include <cstddef>

@@ -1,13 +1,13 @@
 // Quadrics over position and any number of attribute channels, in floats, four or eight at a time.
 //
-// A cluster's quadric is the sum over its triangles of the squared distance from the triangle's plane and, for each channel,
-// of the squared difference from the channel's linear function on the triangle:
+// A cluster's quadric is the sum over its triangles of the squared distance from the triangle's plane and, for each
+// channel, of the squared difference from the channel's linear function on the triangle:
 //
 //   E(x, s) = sum w (n.x)^2 + sum_j sum w_j (g_j.x + d_j - s_j)^2
 //
 // Weighting the second term with 1 / (1 + |g|^2) makes it, for one channel, the squared distance in the space of
-// position and channel (Garland and Heckbert 1998), and bounds what slivers contribute. The channel values are not stored: the
-// best s for a given x is linear in x (Hoppe 1999), which leaves a form in x alone.
+// position and channel (Garland and Heckbert 1998), and bounds what slivers contribute. The channel values are not
+// stored: the best s for a given x is linear in x (Hoppe 1999), which leaves a form in x alone.
 //
 // Positions are relative to the cluster's own place and channel values to its own reference, so floats suffice: what
 // is subtracted is never larger than the cluster.
@@ -37,8 +37,8 @@ constexpr std::size_t quadric_stride(std::size_t channels) {
     return (quadric::first_channel + channels * quadric::channel_size + 3) / 4 * 4;
 }
 
-// sum = a + b, where b's place lies at (dx, dy, dz) from a's and b's references exceed a's by `difference`. F is float or
-// one of the vectors.
+// sum = a + b, where b's place lies at (dx, dy, dz) from a's and b's references exceed a's by `difference`. F is float
+// or one of the vectors.
 template <class F>
 UNSEEN_INLINE void add_from(const F* a, const F* b, F dx, F dy, F dz, const F* difference, std::size_t channels,
                             F* sum) {
@@ -69,8 +69,8 @@ struct Minimum {
     F x, y, z, error;
 };
 
-// The least error of a sum whose parts lie at 0 and (dx, dy, dz), with the best channel values. Where the form is nearly flat
-// its minimum may be far away; then the middle of the two is the better place.
+// The least error of a sum whose parts lie at 0 and (dx, dy, dz), with the best channel values. Where the form is
+// nearly flat its minimum may be far away; then the middle of the two is the better place.
 template <class F>
 UNSEEN_INLINE Minimum<F> minimise(const F* q, F dx, F dy, F dz, std::size_t channels) {
     using namespace quadric;

@@ -23,9 +23,9 @@ namespace unseen::vdtree {
 
 namespace {
 
-// Weight of the squared distance between a cluster's vertices and its proxy, against that from the planes. Keeps clusters
-// compact where the planes do not care. With 0.01 bunny and dragon stray 7 to 11% farther for their triangles; with
-// 0.001 hardly less far than with this, but clusters grow long in flat areas.
+// Weight of the squared distance between a cluster's vertices and its proxy, against that from the planes. Keeps
+// clusters compact where the planes do not care. With 0.01 bunny and dragon stray 7 to 11% farther for their triangles;
+// with 0.001 hardly less far than with this, but clusters grow long in flat areas.
 constexpr float compactness = 0.003f;
 // Weight of a channel's variance within a cluster, against the deviation from the interpolated value.
 constexpr float channel_compactness = 0.1f;
@@ -35,8 +35,8 @@ constexpr double boundary_weight = 4;
 constexpr float gap_weight = 1;
 // Areas may be tiny or zero; every vertex keeps a little weight of its own, so that the form has a minimum.
 constexpr double least_weight = 1e-6; // share of the largest vertex area
-// A round that contracts a smaller share of the clusters takes other than mutually best pairs too: errors that grow along
-// a chain would otherwise contract one pair a round.
+// A round that contracts a smaller share of the clusters takes other than mutually best pairs too: errors that grow
+// along a chain would otherwise contract one pair a round.
 constexpr std::size_t least_round_share = 16; // one in so many
 // Clusters that no edge reaches are paired with so many neighbours each way along a Morton curve.
 constexpr std::size_t curve_neighbours = 3;
@@ -163,7 +163,8 @@ private:
                 channel[quadric::w] += point * channel_compactness;
             }
         }
-        // Where vertices with different values coincide, that difference is there before any contraction and costs nothing.
+        // Where vertices with different values coincide, that difference is there before any contraction and costs
+        // nothing.
         for (Index s = 0; s < own_; ++s) {
             float* q = quadric_of(s);
             for (std::size_t c = 0; c < channels_; ++c) {
@@ -179,7 +180,8 @@ private:
         Index side; // triangle * 3 + its first corner
     };
 
-    // Every edge with an own end: within the part a pair, to a ghost an outer edge. An edge with one triangle holds the contour.
+    // Every edge with an own end: within the part a pair, to a ghost an outer edge. An edge with one triangle holds the
+    // contour.
     void find_edges() {
         std::vector<Index> start(own_ + 1, 0);
         const auto for_each_side = [&](auto&& f) {
@@ -322,9 +324,9 @@ private:
 
     // ---- components
 
-    // What edges connect, as far as the range goes. A closed component that is down to three clusters, a last triangle, is held: they
-    // are not contracted until the component is released. Then it vanishes, and its one vertex that is left becomes
-    // part of what stays near it, which so grows to cover both.
+    // What edges connect, as far as the range goes. A closed component that is down to three clusters, a last triangle,
+    // is held: they are not contracted until the component is released. Then it vanishes, and its one vertex that is
+    // left becomes part of what stays near it, which so grows to cover both.
     struct Component {
         Index parent; // itself, or the one that it was joined to across a gap
         Index clusters = 0;
@@ -363,7 +365,8 @@ private:
         return x;
     }
 
-    // Of two held components that are each other's nearest, one is released, and so is each that is near something larger.
+    // Of two held components that are each other's nearest, one is released, and so is each that is near something
+    // larger.
     void release_components() {
         const Index count = static_cast<Index>(live_.size());
         bool any = false;
@@ -440,8 +443,8 @@ private:
 
     // ---- errors
 
-    // A pair and its error, in ascending error, then in the order of the pairs. Errors are not negative, so that floats compare like
-    // their bits.
+    // A pair and its error, in ascending error, then in the order of the pairs. Errors are not negative, so that floats
+    // compare like their bits.
     class Rank {
     public:
         Rank() = default; // no pair: above all
@@ -558,8 +561,8 @@ private:
         sort_by_code(curve_, curve_scratch_);
     }
 
-    // Clusters that no edge reaches get pairs with their neighbours along a Morton curve. One with edges out of the range
-    // rather waits for these.
+    // Clusters that no edge reaches get pairs with their neighbours along a Morton curve. One with edges out of the
+    // range rather waits for these.
     void connect_lone_clusters() {
         lone_.assign(live_.size(), 0);
         bool any = false;
@@ -644,7 +647,8 @@ private:
         }
     }
 
-    // Clusters that want the same partner are contracted with each other: a hub would otherwise contract with one spoke a round.
+    // Clusters that want the same partner are contracted with each other: a hub would otherwise contract with one spoke
+    // a round.
     void contract_rivals() {
         std::vector<Index> waiting(best_.size(), none); // by the partner that is wanted
         for (Index s = 0; s < best_.size(); ++s) {
@@ -737,8 +741,9 @@ private:
         renumber_pairs(kept);
     }
 
-    // Sorted by a, each pair once, with its error where it is still known. Linear: two counting passes, and a mark by which a's
-    // other pairs are known. Which pairs go is as good as random: they are overwritten, for the processor is not to guess.
+    // Sorted by a, each pair once, with its error where it is still known. Linear: two counting passes, and a mark by
+    // which a's other pairs are known. Which pairs go is as good as random: they are overwritten, for the processor is
+    // not to guess.
     void renumber_pairs(Index clusters) {
         start_.assign(clusters + 1, 0);
         std::size_t inner = 0;
@@ -791,7 +796,8 @@ private:
         Index cluster;
         float error;
     };
-    // By cluster: its number after the round, and whether it was made in it. (Never so many clusters are live that they need the bit.)
+    // By cluster: its number after the round, and whether it was made in it. (Never so many clusters are live that they
+    // need the bit.)
     static constexpr Index is_new = Index{1} << 31;
     std::vector<Index> new_number_, start_, marks_;
     std::vector<Partner> partners_;

@@ -1,11 +1,13 @@
-// Contraction by quadric error of one spatial part of a mesh, and joining such parts: what cluster_quadric() is made of.
+// Contraction by quadric error of one spatial part of a mesh, and joining such parts: what cluster_quadric() is made
+// of.
 //
-// A mesh's welded vertices ("slots") are numbered so that every part is a range of them. contract_part() takes one part's
-// own vertices, those of other parts that share a triangle with them, and these triangles, and contracts pairs of its own
-// until few are left. join() puts two neighbouring ranges together: edges between them, on which neither could
-// contract, become contractible, and contraction goes on. Both depend on nothing but their arguments, so the parts of a mesh may be
-// contracted in any order, by any thread or process; all that they take and give are contiguous arrays of plain numbers.
-// Triangles are never cut: a cluster is a set of slots, and parts fit each other without seams.
+// A mesh's welded vertices ("slots") are numbered so that every part is a range of them. contract_part() takes one
+// part's own vertices, those of other parts that share a triangle with them, and these triangles, and contracts pairs
+// of its own until few are left. join() puts two neighbouring ranges together: edges between them, on which neither
+// could contract, become contractible, and contraction goes on. Both depend on nothing but their arguments, so the
+// parts of a mesh may be contracted in any order, by any thread or process; all that they take and give are contiguous
+// arrays of plain numbers. Triangles are never cut: a cluster is a set of slots, and parts fit each other without
+// seams.
 //
 // Lengths are in units of the mesh's extent ("unit box"), weights are areas over the largest vertex area.
 #pragma once
@@ -19,8 +21,9 @@
 
 namespace unseen::vdtree {
 
-// One part's input. Local slot numbers: own slots are 0 .. own_slots - 1, slot s being number first_slot + s of the mesh;
-// then come the ghosts, slots of other parts. Local vertices are numbered by slot, so own vertices come first too.
+// One part's input. Local slot numbers: own slots are 0 .. own_slots - 1, slot s being number first_slot + s of the
+// mesh; then come the ghosts, slots of other parts. Local vertices are numbered by slot, so own vertices come first
+// too.
 struct PartMesh {
     Index first_slot = 0;
     Index own_slots = 0;
@@ -42,9 +45,9 @@ struct LiveClusters {
     std::vector<glm::dvec3> places;
     std::vector<float> references; // by cluster and channel: what the quadric's channel values are relative to
     std::vector<float> deviations; // by cluster, see Contraction
-    // Merges, known by the cluster that they joined; no_merge where there is none. `made_by`: the one that made the cluster.
-    // `vanishing`: the one at which the last triangles of its connected part go, or, of several parts that were joined across
-    // gaps, of the part that is to stay longest.
+    // Merges, known by the cluster that they joined; no_merge where there is none. `made_by`: the one that made the
+    // cluster. `vanishing`: the one at which the last triangles of its connected part go, or, of several parts that
+    // were joined across gaps, of the part that is to stay longest.
     std::vector<Index> made_by, vanishing;
     std::vector<float> quadrics; // quadric_stride(channels) each, see quadric.h
     std::size_t size() const { return names.size(); }
@@ -71,8 +74,8 @@ struct Contraction {
     std::vector<float> errors;      // by merge: quadric error of the new cluster, weight times unit-box length squared
     std::vector<float> deviations;  // by merge: its square root over the weight, unit-box length; at least the parts'
     std::vector<Index> round_ends;  // by round: the number of merges up to its end
-    // Where two parts of the surface were joined across a gap, the lighter one goes first: what it then strays is the width of
-    // the gap. So of many loose parts those that stay are spread out.
+    // Where two parts of the surface were joined across a gap, the lighter one goes first: what it then strays is the
+    // width of the gap. So of many loose parts those that stay are spread out.
     struct Vanishing {
         Index joined;    // the merge, here or in a part that was joined, known by the cluster that it joined
         float deviation; // that the merge has at least; unit-box length
@@ -96,8 +99,8 @@ struct Contraction {
 // Called after every round with the number of merges made in it; false stops at once (the result is then of no use).
 using RoundCallback = FunctionRef<bool(std::size_t merges)>;
 
-// Contracts until at most `target` clusters are left (at least 1; fewer may remain). Cost: linear in the part for each round,
-// and a round contracts a good share of the clusters. Memory: about 420 bytes a slot.
+// Contracts until at most `target` clusters are left (at least 1; fewer may remain). Cost: linear in the part for each
+// round, and a round contracts a good share of the clusters. Memory: about 420 bytes a slot.
 Contraction contract_part(const PartMesh& part, Index target, const RoundCallback& after_round);
 
 // Joins neighbouring ranges; left.end_slot == right.first_slot. The merges of both have to be kept elsewhere.

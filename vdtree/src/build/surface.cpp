@@ -75,8 +75,8 @@ struct HashedVertex {
     Index vertex;
 };
 
-// Vertices whose hashes begin alike, ascending: finds the first at each position. Positions made to collide would fill the
-// table in quadratic time; they are sorted instead.
+// Vertices whose hashes begin alike, ascending: finds the first at each position. Positions made to collide would fill
+// the table in quadratic time; they are sorted instead.
 class CoincidenceFinder {
 public:
     CoincidenceFinder(std::span<const glm::dvec3> positions, std::span<Index> first)
@@ -162,7 +162,8 @@ struct Wedge {
     Index following, preceding;
 };
 
-// What is collected at the places of a range: the wedges of the triangles there, and the sum of these triangles' area vectors, twice.
+// What is collected at the places of a range: the wedges of the triangles there, and the sum of these triangles' area
+// vectors, twice.
 struct Wedges {
     std::vector<Index> start; // one longer
     ParallelArray<Wedge> wedges;
@@ -173,15 +174,15 @@ struct Wedges {
     }
 };
 
-// Triangles that the welding degenerates have neither edges nor an area. `vertex_areas`: by vertex, of which only those at the range's
-// places grow.
+// Triangles that the welding degenerates have neither edges nor an area. `vertex_areas`: by vertex, of which only those
+// at the range's places grow.
 Wedges collect_wedges(const MeshView& mesh, const Places& places, VertexRange vertices,
                       std::span<double> vertex_areas) {
     Wedges out;
     out.start.assign(vertices.size() + 1, 0);
     out.sums.assign(vertices.size(), glm::dvec3(0));
-    // Each thread looks at all triangles, for a range of the places: they are soon seen, and collecting is what takes time. All sums are
-    // made in the order of the triangles.
+    // Each thread looks at all triangles, for a range of the places: they are soon seen, and collecting is what takes
+    // time. All sums are made in the order of the triangles.
     constexpr int most_ranges = 8;
     const auto ranges = static_cast<std::size_t>(std::min(tbb::this_task_arena::max_concurrency(), most_ranges));
     const auto for_each_triangle = [&](auto&& use) {
@@ -219,7 +220,8 @@ Wedges collect_wedges(const MeshView& mesh, const Places& places, VertexRange ve
 // Looks at the wedges around one place after another.
 class Fan {
 public:
-    // Whether every edge at the place has two triangles that run it in opposite ways: each neighbour follows once and precedes once.
+    // Whether every edge at the place has two triangles that run it in opposite ways: each neighbour follows once and
+    // precedes once.
     bool is_regular(Index place, std::span<const Wedge> wedges) {
         const std::uint64_t stamp = std::uint64_t{place} << 32;
         for (const Wedge& wedge : wedges) {
@@ -254,7 +256,8 @@ private:
     }
 
     std::vector<Index> following_, preceding_;
-    // Neighbours in the lower halves, stamped with the place that they were seen at; no place has the stamp of the others.
+    // Neighbours in the lower halves, stamped with the place that they were seen at; no place has the stamp of the
+    // others.
     std::array<std::uint64_t, 1 << slot_bits> slots_ = [] {
         std::array<std::uint64_t, 1 << slot_bits> none;
         none.fill(~std::uint64_t{0});
@@ -286,7 +289,8 @@ Closedness find_closedness(const MeshView& mesh, std::span<const Index> coincide
     return volume > 0 ? Closedness::closed_outward : volume < 0 ? Closedness::closed_inward : Closedness::open;
 }
 
-// What is found around the places of a range: for these, regularity and the sum of the faces; for all vertices there, areas.
+// What is found around the places of a range: for these, regularity and the sum of the faces; for all vertices there,
+// areas.
 Surface survey(const MeshView& mesh, std::span<const Index> coincident, VertexRange range) {
     Surface surface;
     surface.irregular.assign(coincident.size(), 0);
@@ -385,7 +389,8 @@ Surface complete(const MeshView& mesh, std::span<const Index> coincident, Surfac
     const bool inward = surface.closedness == Closedness::closed_inward;
     const float face_sign = inward ? -1 : 1;
     const double own_sign = inward && agreement_of_own_normals(mesh) > 0 ? -1 : 1;
-    // A vertex is as irregular as the position that it shares. Those that stand for their positions come last, for the others read them.
+    // A vertex is as irregular as the position that it shares. Those that stand for their positions come last, for the
+    // others read them.
     const auto spread = [&](bool standing) {
         tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices, grain), [&](const auto& range) {
             for (std::size_t v = range.begin(); v < range.end(); ++v) {

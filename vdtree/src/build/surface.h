@@ -14,8 +14,8 @@ std::vector<Index> find_coincident(std::span<const glm::dvec3> positions);
 
 struct Surface {
     Closedness closedness = Closedness::open;
-    // By vertex: whether it is at a boundary, non-manifold or inconsistently oriented edge, after welding coincident vertices;
-    // triangles that the welding degenerates have no edges.
+    // By vertex: whether it is at a boundary, non-manifold or inconsistently oriented edge, after welding coincident
+    // vertices; triangles that the welding degenerates have no edges.
     std::vector<std::uint8_t> irregular;
     // By vertex: a third of the area of the triangles around.
     std::vector<double> areas;
@@ -27,7 +27,8 @@ struct Surface {
 
 // Cost: linear, and 48 bytes a triangle while it lasts.
 Surface analyse_surface(const MeshView& mesh, std::span<const Index> coincident);
-// The same by all members of a team together; each calls this with the same mesh. Sends 21 bytes a vertex to each and back.
+// The same by all members of a team together; each calls this with the same mesh. Sends 21 bytes a vertex to each and
+// back.
 Result<Surface> analyse_surface(const MeshView& mesh, std::span<const Index> coincident, Team& team);
 
 } // namespace unseen::vdtree

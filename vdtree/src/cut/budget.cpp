@@ -22,7 +22,8 @@ namespace {
 constexpr unsigned bucket_shift = 19;
 constexpr std::size_t bucket_count = (0x7f800000u >> bucket_shift) + 1; // infinity's is the last
 
-// The threshold is guessed from so many nodes of all trees together, so that the triangles of those that unfold are found to a few percent.
+// The threshold is guessed from so many nodes of all trees together, so that the triangles of those that unfold are
+// found to a few percent.
 constexpr std::size_t samples = 6144;
 // A guess leaves room for so many standard deviations of what it is a guess of, and for a share besides.
 constexpr double guess_deviations = 2.5, guess_share = 0.01;
@@ -207,7 +208,8 @@ private:
         const std::size_t bucket = bucket_of(entry.cost);
         (bucket < far_bucket_ ? far_ : bounded_[bucket]).push_back(entry);
     }
-    // Entries with what their costs are at most; those of folded ones, where a threshold is given at which all that were asked for are.
+    // Entries with what their costs are at most; those of folded ones, where a threshold is given at which all that
+    // were asked for are.
     template <class F>
     void find_bounds(std::uint32_t tree, const float* folded_at, F&& f) {
         const auto& nodes = asked_[tree];
@@ -225,7 +227,8 @@ private:
         for (const Entry& entry : bounded) ask(entry.tree, entry.node, entry.cost);
         answer(f);
     }
-    // The costs of what is asked, as far as they may lie in the bucket: f(entry); or g(entry), with what they are at most.
+    // The costs of what is asked, as far as they may lie in the bucket: f(entry); or g(entry), with what they are at
+    // most.
     template <class F, class G>
     void answer(std::size_t bucket, F&& f, G&& g) {
         if (!has_bounds_) return answer(f);
@@ -281,8 +284,8 @@ private:
         }
     }
 
-    // Unfolds a whole bucket with everything under it that belongs to it, or, where the budget ends in it, in order until one does
-    // not fit; then returns false.
+    // Unfolds a whole bucket with everything under it that belongs to it, or, where the budget ends in it, in order
+    // until one does not fit; then returns false.
     bool take_bucket(std::size_t bucket) {
         const std::vector<Entry> waiting = std::move(buckets_[bucket]);
         buckets_[bucket].clear();

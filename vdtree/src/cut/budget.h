@@ -27,12 +27,13 @@ struct BudgetDecision {
     float max_seen_cost = 0; // the largest seen cost among them
 };
 
-// Unfolds in descending cost, ties by the lower tree and then by the lower node, while the triangles of all trees together stay within
-// the budget; the first node that does not fit ends it, for taking a cheaper one instead would leave the largest cost
-// as it is. A node counts as at most its parent. Nodes of cost 0 stay folded unless the limits say so.
-// Cost: one test for each node unfolded, and its children, and half as many more. Most of them tell no more than whether a node unfolds at a
-// threshold that is guessed from a sample, or what it costs at most; the costs of outlines are asked for near the budget's end only. Where
-// the guess does not help (too little is left of the budget at it, time is limited, or nodes do not nest), all costs, from the root down.
+// Unfolds in descending cost, ties by the lower tree and then by the lower node, while the triangles of all trees
+// together stay within the budget; the first node that does not fit ends it, for taking a cheaper one instead would
+// leave the largest cost as it is. A node counts as at most its parent. Nodes of cost 0 stay folded unless the limits
+// say so. Cost: one test for each node unfolded, and its children, and half as many more. Most of them tell no more
+// than whether a node unfolds at a threshold that is guessed from a sample, or what it costs at most; the costs of
+// outlines are asked for near the budget's end only. Where the guess does not help (too little is left of the budget at
+// it, time is limited, or nodes do not nest), all costs, from the root down.
 BudgetDecision decide_budget(std::span<const VertexTree* const> trees, std::span<const CostSource* const> sources,
                              const BudgetLimits& limits);
 

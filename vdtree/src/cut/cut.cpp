@@ -20,7 +20,8 @@ namespace {
 // first-level cache.
 constexpr std::size_t batch_size = 1024;
 
-// What the caller's own callbacks say: the costs of folding nodes, 0 where these cannot be seen; what is no number is infinite.
+// What the caller's own callbacks say: the costs of folding nodes, 0 where these cannot be seen; what is no number is
+// infinite.
 class CallbackCosts final : public CostSource {
 public:
     CallbackCosts(const VertexTree& tree, const FoldCriterion& criterion, const VisibilityTest& visibility)
@@ -98,8 +99,8 @@ Decision decide_by_budget(const VertexTree& tree, const CostSource& source, Inde
     return {std::move(decision.unfolded.front()), decision.max_seen_cost};
 }
 
-// The cut's triangles in the order of the input, in which groups and materials are runs: input triangle, triangle of the tree. (The
-// index buffer's order follows from the history of the cut.)
+// The cut's triangles in the order of the input, in which groups and materials are runs: input triangle, triangle of
+// the tree. (The index buffer's order follows from the history of the cut.)
 std::vector<std::pair<Index, Index>> triangles_in_order(const Cut& cut) {
     const VertexTree& tree = cut.tree();
     const auto first = unchecked_links(tree).first_triangle; // of unfolded nodes, which are sound

@@ -18,9 +18,9 @@ class TreeDecider {
 public:
     std::uint64_t decisions = 0; // in all runs
 
-    // One bit a node that unfolds. `decide(nodes, bits)` says what would, one bit each in whole words; on_folded(nodes) hears of the
-    // others under those that do (and of the root), some at a time. Parents come before their children, and as far as that goes subtree by subtree, for
-    // children lie beside their parents.
+    // One bit a node that unfolds. `decide(nodes, bits)` says what would, one bit each in whole words; on_folded(nodes)
+    // hears of the others under those that do (and of the root), some at a time. Parents come before their children,
+    // and as far as that goes subtree by subtree, for children lie beside their parents.
     template <class Decide, class OnFolded>
     std::vector<std::uint64_t> run(const VertexTree& tree, Decide&& decide, OnFolded&& on_folded) {
         constexpr std::size_t at_once = 1024; // what they read stays in the cache
@@ -63,7 +63,8 @@ private:
         folded_.resize(folded);
     }
 
-    // The interior children of unfolding_ wait. Most nodes have at most two: the node's neighbour, and one that is anywhere.
+    // The interior children of unfolding_ wait. Most nodes have at most two: the node's neighbour, and one that is
+    // anywhere.
     void add_children(std::span<const NodeId> subtree_end) {
         constexpr std::size_t far = 64, near = 32; // nodes between a prefetch and its use
         const std::size_t count = unfolding_.size();

@@ -11,6 +11,8 @@
 #include <glm/geometric.hpp>
 
 #include <vdtree/criteria.h>
+#include <vdtree/internal/contrast_classes.h>
+#include <vdtree/internal/errors.h>
 
 #include "tree/unchecked_links.h"
 
@@ -23,76 +25,81 @@ std::uint64_t next_id() {
     return ++last;
 }
 
-Error invalid(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
-
 // With lights, rows are compared by their contrasts and luminances.
 Result<void> check_growth(const DistanceCriterion::Parts& p) {
     const std::size_t bins = p.eccentricity_bins;
     const auto grows = [&](std::size_t from, std::size_t to) {
         for (std::size_t bin = 0; bin < bins; ++bin) {
-            if (!(p.reach[from * bins + bin] <= p.reach[to * bins + bin])) return false;
+            if (!(p.switch_distance[from * bins + bin] <= p.switch_distance[to * bins + bin])) return false;
             if (!p.least_cost.empty() && !(p.least_cost[from * bins + bin] <= p.least_cost[to * bins + bin]))
                 return false;
         }
         return true;
     };
-    for (std::size_t l = 0; l < ContrastClasses::luminance_count; ++l)
+    for (std::size_t l = 0; l < ContrastClasses::level_count; ++l)
         for (std::size_t c = 0; c < ContrastClasses::contrast_count; ++c)
-            if ((c > 0 && !grows(ContrastClasses::row_of(l, c - 1), ContrastClasses::row_of(l, c))) ||
-                (l > 0 && !grows(ContrastClasses::row_of(l - 1, c), ContrastClasses::row_of(l, c))))
-                return invalid(
-                    "The reaches of a criterion with lights must not fall with the contrast or the luminance.");
+            if ((c > 0 && !grows(ContrastClasses::class_at(l, c - 1), ContrastClasses::class_at(l, c))) ||
+                (l > 0 && !grows(ContrastClasses::class_at(l - 1, c), ContrastClasses::class_at(l, c))))
+                return invalid_argument(
+                    "The switch distances of a criterion with lights must not fall with the contrast or the "
+                    "luminance.");
     return {};
 }
 
 Result<void> check(const VertexTree& tree, const DistanceCriterion::Parts& p) {
     const std::size_t nodes = tree.interior_count();
     if (!p.classes.empty() && p.classes.size() != nodes)
-        return invalid("A criterion has " + std::to_string(p.classes.size()) + " classes for " + std::to_string(nodes) +
-                       " interior nodes.");
+        return invalid_argument("A criterion has " + std::to_string(p.classes.size()) + " classes for " +
+                                std::to_string(nodes) + " interior nodes.");
     if (p.lit && (!p.lit->bounds || p.lit->bounds->cones().size() != nodes || !p.classes.empty()))
-        return invalid("A criterion with lights needs bounds of its tree's normals, and no other classes.");
+        return invalid_argument("A criterion with lights needs bounds of its tree's normals, and no other classes.");
     if (!p.facing.empty() && p.facing.size() != nodes)
-        return invalid("A criterion has " + std::to_string(p.facing.size()) + " sets of directions for " +
-                       std::to_string(nodes) + " interior nodes.");
+        return invalid_argument("A criterion has " + std::to_string(p.facing.size()) + " sets of directions for " +
+                                std::to_string(nodes) + " interior nodes.");
     for (const auto* lengths : {&p.lengths, &p.silhouette_lengths}) {
         if (!lengths->empty() && lengths->size() != nodes)
-            return invalid("A criterion has " + std::to_string(lengths->size()) + " lengths for " +
-                           std::to_string(nodes) + " interior nodes.");
+            return invalid_argument("A criterion has " + std::to_string(lengths->size()) + " lengths for " +
+                                    std::to_string(nodes) + " interior nodes.");
         for (std::size_t i = 0; i < lengths->size(); ++i)
             if (!((*lengths)[i] >= 0) || !std::isfinite((*lengths)[i]))
-                return invalid("The length of node " + std::to_string(i) + " must be 0 or more and finite.");
+                return invalid_argument("The length of node " + std::to_string(i) + " must be 0 or more and finite.");
     }
-    if (p.eccentricity_bins == 0 || p.reach.empty() || p.reach.size() % p.eccentricity_bins != 0)
-        return invalid("A criterion's table of " + std::to_string(p.reach.size()) + " reaches has no whole rows of " +
-                       std::to_string(p.eccentricity_bins) + " bins.");
-    if (!p.least_cost.empty() && p.least_cost.size() != p.reach.size())
-        return invalid("A criterion's table of least costs is not of the size of its reaches.");
+    if (p.eccentricity_bins == 0 || p.switch_distance.empty() || p.switch_distance.size() % p.eccentricity_bins != 0)
+        return invalid_argument("A criterion's table of " + std::to_string(p.switch_distance.size()) +
+                                " switch distances has no whole rows of " + std::to_string(p.eccentricity_bins) +
+                                " bins.");
+    if (!p.least_cost.empty() && p.least_cost.size() != p.switch_distance.size())
+        return invalid_argument("A criterion's table of least costs is not of the size of its switch distances.");
     for (std::size_t i = 0; i < p.least_cost.size(); ++i)
         if (!(p.least_cost[i] >= 0) || (i % p.eccentricity_bins != 0 && p.least_cost[i] > p.least_cost[i - 1]))
-            return invalid("Least cost " + std::to_string(i) +
-                           " of a criterion is negative, not a number, or grows with the eccentricity.");
+            return invalid_argument("Least cost " + std::to_string(i) +
+                                    " of a criterion is negative, not a number, or grows with the eccentricity.");
     if (!(p.bin_degrees > 0) || !std::isfinite(p.bin_degrees))
-        return invalid("The bins of eccentricity need a positive width.");
-    const std::size_t rows = p.reach.size() / p.eccentricity_bins;
-    if (p.lit && (rows < ContrastClasses::row_count || p.lit->silhouette >= rows))
-        return invalid("A criterion with lights needs a row for each class of contrasts.");
+        return invalid_argument("The bins of eccentricity need a positive width.");
+    const std::size_t rows = p.switch_distance.size() / p.eccentricity_bins;
+    if (p.lit && !(p.lit->scale.offset >= 0 && p.lit->scale.span > 0 && std::isfinite(p.lit->scale.of(1))))
+        return invalid_argument(
+            "A criterion with lights needs a scale whose offset is 0 or more and whose span is above 0.");
+    if (p.lit && (rows < ContrastClasses::class_count || p.lit->silhouette >= rows))
+        return invalid_argument("A criterion with lights needs a row for each class of contrasts.");
     if (p.lit)
         if (const auto grows = check_growth(p); !grows) return grows.error();
     for (std::size_t i = 0; i < p.classes.size(); ++i)
         if (p.classes[i].interior >= rows || p.classes[i].silhouette >= rows)
-            return invalid("Node " + std::to_string(i) + " has a class beyond the " + std::to_string(rows) +
-                           " rows of the table.");
-    for (std::size_t i = 0; i < p.reach.size(); ++i) {
-        if (std::isnan(p.reach[i])) return invalid("Reach " + std::to_string(i) + " of a criterion is not a number.");
-        if (i % p.eccentricity_bins != 0 && p.reach[i] > p.reach[i - 1])
-            return invalid("Reach " + std::to_string(i) + " of a criterion grows with the eccentricity.");
+            return invalid_argument("Node " + std::to_string(i) + " has a class beyond the " + std::to_string(rows) +
+                                    " rows of the table.");
+    for (std::size_t i = 0; i < p.switch_distance.size(); ++i) {
+        if (std::isnan(p.switch_distance[i]))
+            return invalid_argument("Switch distance " + std::to_string(i) + " of a criterion is not a number.");
+        if (i % p.eccentricity_bins != 0 && p.switch_distance[i] > p.switch_distance[i - 1])
+            return invalid_argument("Switch distance " + std::to_string(i) +
+                                    " of a criterion grows with the eccentricity.");
     }
     return {};
 }
 
-// By how much longer a node of one row must be than one of another to be seen from as far everywhere: few pairs of rows come again and
-// again.
+// By how much longer a node of one row must be than one of another to be seen from as far everywhere: few pairs of rows
+// come again and again.
 class RowRatios {
 public:
     explicit RowRatios(const DistanceCriterion::Parts& parts) : parts_(parts), known_(1u << known_bits) {}
@@ -107,7 +114,7 @@ public:
     }
 
 private:
-    // A few roundings of the products of lengths and reaches.
+    // A few roundings of the products of lengths and switch distances.
     static constexpr float rounding = 1e-6f;
     static constexpr float infinity = std::numeric_limits<float>::infinity();
 
@@ -115,14 +122,14 @@ private:
         const std::size_t bins = parts_.eccentricity_bins, a = row * bins, b = of * bins;
         float ratio = 0;
         for (std::size_t bin = 0; bin < bins; ++bin) {
-            const float needed = parts_.reach[a + bin], given = parts_.reach[b + bin];
+            const float needed = parts_.switch_distance[a + bin], given = parts_.switch_distance[b + bin];
             if (!parts_.least_cost.empty() && parts_.least_cost[a + bin] > parts_.least_cost[b + bin]) return infinity;
             if (needed <= DistanceCriterion::never_visible) continue;
             if (!(given >= 0) || (!(given > 0) && needed > 0)) return infinity;
             const bool is_everywhere = given >= DistanceCriterion::always_visible;
             if (needed > 0 && !is_everywhere) ratio = std::max(ratio, needed / given);
         }
-        // Products of lengths and reaches that are both no larger are exactly so.
+        // Products of lengths and switch distances that are both no larger are exactly so.
         return ratio <= 1 ? std::min(ratio * (1 + rounding), 1.0f) : ratio * (1 + rounding);
     }
 
@@ -170,7 +177,8 @@ DistanceCriterion::DistanceCriterion(Parts parts) : parts_(std::move(parts)), id
 
 Result<DistanceCriterion> DistanceCriterion::create(const VertexTree& tree, Parts parts) {
     if (const auto valid = check(tree, parts); !valid) return valid.error();
-    for (float& reach : parts.reach) reach = std::clamp(reach, never_visible, always_visible);
+    for (float& switch_distance : parts.switch_distance)
+        switch_distance = std::clamp(switch_distance, never_visible, always_visible);
     DistanceCriterion criterion(std::move(parts));
     criterion.interior_count_ = tree.interior_count();
     // With lights the ranges nest but for rounding, which may lift a child by a class.
@@ -194,26 +202,26 @@ Frustum frustum_of(const VertexTree& tree, const View& view, const Similarity& p
 }
 
 Result<DistanceCriterion> extent_criterion(const VertexTree& tree, const View& view, double tolerance_pixels) {
-    if (!(tolerance_pixels > 0)) return invalid("The tolerance must be more than 0 pixels.");
+    if (!(tolerance_pixels > 0)) return invalid_argument("The tolerance must be more than 0 pixels.");
     DistanceCriterion::Parts parts;
     parts.spheres = DistanceCriterion::Spheres::support;
     const double half_angle = std::min(radians_of_pixels(view, tolerance_pixels), std::numbers::pi) / 2;
-    parts.reach = {static_cast<float>(1 / std::sin(half_angle) - 1)};
+    parts.switch_distance = {static_cast<float>(1 / std::sin(half_angle) - 1)};
     return DistanceCriterion::create(tree, std::move(parts));
 }
 
 Result<DistanceCriterion> displacement_criterion(const VertexTree& tree, const View& view, double tolerance_pixels) {
-    if (!(tolerance_pixels > 0)) return invalid("The tolerance must be more than 0 pixels.");
+    if (!(tolerance_pixels > 0)) return invalid_argument("The tolerance must be more than 0 pixels.");
     DistanceCriterion::Parts parts;
     parts.spheres = DistanceCriterion::Spheres::support;
     const auto displacement = tree.displacement();
     parts.lengths.assign(displacement.begin(), displacement.end());
     const double half_angle = std::min(radians_of_pixels(view, tolerance_pixels), std::numbers::pi) / 2;
-    const float reach = static_cast<float>(1 / (2 * std::sin(half_angle)));
-    parts.reach = {reach};
+    const float switch_distance = static_cast<float>(1 / (2 * std::sin(half_angle)));
+    parts.switch_distance = {switch_distance};
     if (std::find(displacement.begin(), displacement.end(), 0.0f) !=
         displacement.end()) { // a row of their own for what never moves
-        parts.reach = {DistanceCriterion::never_visible, reach};
+        parts.switch_distance = {DistanceCriterion::never_visible, switch_distance};
         for (const float moved : displacement) parts.classes.push_back(moved == 0 ? FoldClass{0, 0} : FoldClass{1, 1});
     }
     return DistanceCriterion::create(tree, std::move(parts));

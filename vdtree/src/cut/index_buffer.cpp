@@ -30,7 +30,8 @@ void IndexBuffer::find_leaves(std::span<const std::uint64_t> unfolded, Index tri
     const auto corners = links.triangles;
     shown_by_.resize(unfolded.size()); // by none before the first time
     places_.resize(unfolded.size() + 1);
-    // First which triangles come: most nodes have two or less, and nobody could foretell how many, so nothing branches on that.
+    // First which triangles come: most nodes have two or less, and nobody could foretell how many, so nothing branches
+    // on that.
     constexpr Index mostly = 2;
     coming_.resize(std::size_t{triangles} + mostly);
     runs_.clear();

@@ -9,10 +9,11 @@
 
 namespace unseen::vdtree {
 
-// For patches, every vertex in use has a list of the corners that show it, with the leaves that these stand for. A fold hands its
-// children's corners to the proxy, an unfold deals them out again, so its cost is the valence of what changes, whatever the tree's
-// size; the lists' memory goes with the triangles shown. A list is a block of power-of-two size in one pool: nearly always one
-// cache line. For gathering, the leaves at the corners are kept, so that only what has come since is looked up in the tree.
+// For patches, every vertex in use has a list of the corners that show it, with the leaves that these stand for. A fold
+// hands its children's corners to the proxy, an unfold deals them out again, so its cost is the valence of what
+// changes, whatever the tree's size; the lists' memory goes with the triangles shown. A list is a block of power-of-two
+// size in one pool: nearly always one cache line. For gathering, the leaves at the corners are kept, so that only what
+// has come since is looked up in the tree.
 class IndexBuffer {
 public:
     explicit IndexBuffer(const VertexTree& tree) : tree_(&tree) {}
@@ -20,11 +21,11 @@ public:
     std::span<const NodeId> indices() const noexcept { return indices_; }
     bool can_patch() const noexcept { return has_lists_; }
 
-    // Everything anew, in the order of the triangles. `unfolded` has one bit a node, `proxies` one node a leaf. Cost: a nanosecond for each
-    // corner, and what triangles take that were not there when it was gathered last.
+    // Everything anew, in the order of the triangles. `unfolded` has one bit a node, `proxies` one node a leaf. Cost: a
+    // nanosecond for each corner, and what triangles take that were not there when it was gathered last.
     void gather(std::span<const std::uint64_t> unfolded, std::span<const NodeId> proxies, Index triangles);
-    // Makes the lists for what was gathered just now. Cost: a few times gather()'s. Buffers that are too large for them stay
-    // without (a vertex in 2^27 triangles, or more than some 10^9 corners).
+    // Makes the lists for what was gathered just now. Cost: a few times gather()'s. Buffers that are too large for them
+    // stay without (a vertex in 2^27 triangles, or more than some 10^9 corners).
     void make_lists();
     void drop_lists() noexcept;
 
@@ -34,8 +35,8 @@ public:
     void fold(NodeId node, std::span<const NodeId> children);
     // `proxies` is current: the children stand for their leaves.
     void unfold(NodeId node, std::span<const NodeId> children, std::span<const NodeId> proxies);
-    // Bring nearer what changes around active nodes will read: their lists' places, then the lists, then what these show. In this
-    // order, for some nodes at once, so that the reads overlap.
+    // Bring nearer what changes around active nodes will read: their lists' places, then the lists, then what these
+    // show. In this order, for some nodes at once, so that the reads overlap.
     void prefetch_places(std::span<const NodeId> active) const;
     void prefetch_lists(std::span<const NodeId> active) const;
     void prefetch_corners(std::span<const NodeId> active) const;
@@ -86,8 +87,8 @@ private:
     std::vector<Index> holes_;           // triangles without corners
     std::vector<IndexWrite>
         removals_; // what such triangles showed, still in its list until all of these are done at once
-    // Of the last gathering: the leaves at the corners, in the buffer's order, the nodes whose triangles these are, a bit each, and where the
-    // triangles of each word of them begin.
+    // Of the last gathering: the leaves at the corners, in the buffer's order, the nodes whose triangles these are, a
+    // bit each, and where the triangles of each word of them begin.
     std::vector<Triangle> leaves_;
     std::vector<std::uint64_t> shown_by_;
     std::vector<Index> places_;

@@ -1,5 +1,6 @@
-// A grid over the mesh: the cells that the surface touches, the others parted into connected rooms, each of which lies inside or outside as a
-// whole. Then every inner cell's distance from the nearest cell that is not, and the largest spheres that lie apart.
+// A grid over the mesh: the cells that the surface touches, the others parted into connected rooms, each of which lies
+// inside or outside as a whole. Then every inner cell's distance from the nearest cell that is not, and the largest
+// spheres that lie apart.
 #include <vdtree/occluders.h>
 
 #include <algorithm>
@@ -17,8 +18,8 @@ namespace {
 
 constexpr int fewest_cells = 8, most_cells = 512;
 constexpr int border = 2; // free cells around the mesh
-// Columns are counted through points a little off their middles, in cells: meshes are often made on grids, and a line through an edge
-// counts nothing.
+// Columns are counted through points a little off their middles, in cells: meshes are often made on grids, and a line
+// through an edge counts nothing.
 constexpr double off_middle_y = 0.0131, off_middle_z = -0.0217;
 // A room lies inside where so many of its columns say so. (All should; a line may pass through an edge.)
 constexpr double most_of_a_room = 0.9;
@@ -148,7 +149,8 @@ private:
         }
     }
 
-    // Of the cells' middles from the nearest cell that is not an inner one, squared, in cells: the squares add up axis by axis.
+    // Of the cells' middles from the nearest cell that is not an inner one, squared, in cells: the squares add up axis
+    // by axis.
     void find_distances(const std::vector<std::uint8_t>& is_inner) {
         squared_.resize(is_inner.size());
         for (std::size_t row = 0; row < is_inner.size(); row += side()) {

@@ -47,8 +47,8 @@ bool is_temporary(const fs::path& file) {
            name.starts_with(temporary_begin) && name.ends_with(temporary_end);
 }
 
-// Tells others that the file's writer lives. False where one of them has removed it just before. Where the file system knows no
-// locks, nobody gets one, and nothing is removed.
+// Tells others that the file's writer lives. False where one of them has removed it just before. Where the file system
+// knows no locks, nobody gets one, and nothing is removed.
 bool claim(int descriptor) {
     ::flock(descriptor, LOCK_EX);
     struct stat status {};

@@ -17,7 +17,8 @@ struct ElementLayout {
     std::size_t element_bytes, number_bytes, component_bytes;
 };
 
-// Swaps the numbers in a piece of an array of elements, from byte `at` of it on: elements may cross the ends of the piece, numbers may not.
+// Swaps the numbers in a piece of an array of elements, from byte `at` of it on: elements may cross the ends of the
+// piece, numbers may not.
 inline void swap_elements(std::byte* data, std::size_t bytes, std::uint64_t at, const ElementLayout& layout) {
     const std::size_t component = layout.component_bytes;
     if (layout.number_bytes == layout.element_bytes) return swap_components(data, bytes, component);

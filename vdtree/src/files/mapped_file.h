@@ -19,8 +19,8 @@ public:
     MappedFile& operator=(const MappedFile&) = delete;
     ~MappedFile();
 
-    // Pages come from the disk one by one, without what lies beside them: for scattered use. Whoever goes through all of it
-    // should not do it this way.
+    // Pages come from the disk one by one, without what lies beside them: for scattered use. Whoever goes through all
+    // of it should not do it this way.
     std::span<const std::byte> bytes() const noexcept { return bytes_; }
 
 private:

@@ -85,7 +85,8 @@ UNSEEN_INLINE void measure_all(const Batch<capacity>& batch) {
         y[i] *= scale;
         z[i] *= scale;
     }
-    // Whole units outward: what is cut off is below the ends of the scale. Four numbers of eight bits are shifted into each lane.
+    // Whole units outward: what is cut off is below the ends of the scale. Four numbers of eight bits are shifted into
+    // each lane.
     for (std::size_t i = 0; i < batch.count; ++i) {
         const Float8 along = x[i] * axis_x + y[i] * axis_y + z[i] * axis_z;
         const Int8 reach = reached(along) | reached(-along) << 8;

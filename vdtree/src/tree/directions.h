@@ -15,11 +15,13 @@
 
 namespace unseen::vdtree {
 
-// The borders between the cells of a cube's face lie at equal angles: tan(k pi / 16) for k = 1, 2, 3 and their opposites.
+// The borders between the cells of a cube's face lie at equal angles: tan(k pi / 16) for k = 1, 2, 3 and their
+// opposites.
 inline constexpr double cell_borders[3] = {0.19891236737965800691, 0.41421356237309504880, 0.66817863791929891999};
 
-// Cell of a direction given its largest absolute component, which is positive and finite. Multiplications and comparisons
-// only: the same vector always has the same cell, whatever the compiler makes of it, and NormalBatch gives the same.
+// Cell of a direction given its largest absolute component, which is positive and finite. Multiplications and
+// comparisons only: the same vector always has the same cell, whatever the compiler makes of it, and NormalBatch gives
+// the same.
 inline int cell_of(glm::dvec3 v, double largest) noexcept {
     const glm::dvec3 size = glm::abs(v);
     const int axis = size.x >= size.y ? (size.x >= size.z ? 0 : 2) : (size.y >= size.z ? 1 : 2);
@@ -64,8 +66,8 @@ NormalSlabs slabs_between(const SlabCoordinates<Float>& low, const SlabCoordinat
 
 struct alignas(64) Directions {
     NormalMask mask;
-    // For each slab two bytes: 128 more than its upper end, and 128 more than its lower end's opposite; 0: nothing yet. In the order
-    // in which NormalBatch comes by them; the last two bytes are of no slab.
+    // For each slab two bytes: 128 more than its upper end, and 128 more than its lower end's opposite; 0: nothing yet.
+    // In the order in which NormalBatch comes by them; the last two bytes are of no slab.
     using Reach = std::array<std::uint8_t, 16>;
     Reach reach{};
 

@@ -6,7 +6,8 @@ namespace unseen::vdtree {
 
 LeafRings find_rings(std::span<const Triangle> triangles, const LeafPlaces& places, const TreeParts& parts) {
     const std::size_t leaves = places.weld.size();
-    // Around a regular vertex the triangles close up: each neighbour follows it in one triangle and precedes it in another.
+    // Around a regular vertex the triangles close up: each neighbour follows it in one triangle and precedes it in
+    // another.
     const auto closed = [&](Index leaf) { return places.alone[leaf] && !places.irregular[leaf]; };
     LeafRings rings;
     rings.start.assign(leaves + 1, 0);

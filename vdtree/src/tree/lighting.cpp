@@ -18,7 +18,8 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 
 // What a direction may be longer or shorter than 1 by rounding.
 constexpr double unit_rounding = 1e-6;
-// The least angle between the inner and the outer cosine of a spot, as their difference: below, its edge is as hard as none.
+// The least angle between the inner and the outer cosine of a spot, as their difference: below, its edge is as hard as
+// none.
 constexpr double least_edge = 1e-5;
 // A light so near to a vertex, in radii of the tree, lies on it.
 constexpr double least_light_distance = 1e-4;

@@ -53,8 +53,8 @@ const char* walk_children(const TreeGeometry& g, NodeId node, F&& f) {
     return child == skip ? nullptr : links_fault;
 }
 
-// Whether a triangle with different corners has two in the leaves [begin, end), and no two in one child of those whose first
-// leaves are given, ascending.
+// Whether a triangle with different corners has two in the leaves [begin, end), and no two in one child of those whose
+// first leaves are given, ascending.
 bool vanishes(Triangle t, Index begin, Index end, std::span<const Index> child_starts) {
     std::sort(t.begin(), t.end());
     const auto inside = [&](Index leaf) { return begin <= leaf && leaf < end; };

@@ -9,11 +9,11 @@
 
 namespace unseen::vdtree {
 
-// What is wrong with how an interior node refers to others; null where nothing is. It looks at the node, the links of its
-// children and the triangles that vanish at it, whatever they say, and at nothing else; where the root's parts are the whole
-// tree and every node from the root down to here is sound, children tile their parents, triangles their nodes, and each number
-// lies within its array; triangles vanish where they are said to. Any node may be asked about. Cost: the number of
-// children and triangles.
+// What is wrong with how an interior node refers to others; null where nothing is. It looks at the node, the links of
+// its children and the triangles that vanish at it, whatever they say, and at nothing else; where the root's parts are
+// the whole tree and every node from the root down to here is sound, children tile their parents, triangles their
+// nodes, and each number lies within its array; triangles vanish where they are said to. Any node may be asked about.
+// Cost: the number of children and triangles.
 const char* fault_in_links(const TreeGeometry& g, NodeId node);
 
 // That the root stands for the whole tree.
@@ -23,8 +23,8 @@ const char* fault_in_root(const TreeGeometry& g) noexcept;
 // negative radius.
 const char* fault_in_values(const TreeGeometry& g, NodeId node) noexcept;
 
-// What is wrong with the values of all nodes, triangles and leaves, as a sentence; empty where nothing is. With links in order
-// everywhere nothing that is made of the tree can lead out of bounds then. Cost: one pass over the arrays.
+// What is wrong with the values of all nodes, triangles and leaves, as a sentence; empty where nothing is. With links
+// in order everywhere nothing that is made of the tree can lead out of bounds then. Cost: one pass over the arrays.
 std::string fault_in_sections(const TreeGeometry& g, const TreeLuminance& l);
 
 class NodeChecks {

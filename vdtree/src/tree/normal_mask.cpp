@@ -109,8 +109,8 @@ struct Slab {
     float reach() const { return std::max(-lo, hi); } // the largest absolute coordinate
 };
 
-// Whether all directions in the slabs have n . u below -sine. Three independent slabs make a parallelepiped, whose largest
-// n . u is a sum; tried are the box of x, y and z, and those with a diagonal in place of one of the three.
+// Whether all directions in the slabs have n . u below -sine. Three independent slabs make a parallelepiped, whose
+// largest n . u is a sum; tried are the box of x, y and z, and those with a diagonal in place of one of the three.
 //
 // A parallelepiped reaches out of the unit sphere, to `reach`, so `sine` is multiplied by that: then a node that is not
 // ruled out has no ancestor that is (whose sphere contains its sphere, and whose slabs contain its slabs), for any

@@ -30,7 +30,8 @@ struct Moments {
     }
 };
 
-// Where coordinates differ by less than this share of themselves in some direction, no direction of the surface follows.
+// Where coordinates differ by less than this share of themselves in some direction, no direction of the surface
+// follows.
 constexpr double least_determinant = 1e-12;
 
 } // namespace
@@ -39,7 +40,8 @@ TextureFits::TextureFits(const TreeGeometry& g, const TreeParts& parts) : g_(&g)
     const TreeLinks tree = links_of(g);
     const NodeId interior = tree.interior();
     std::vector<Moments> around(tree.leaves()), sums(interior);
-    // Around each leaf's own coordinates, lest small rings far from 0 lose their digits: moved to the parent's where they are summed.
+    // Around each leaf's own coordinates, lest small rings far from 0 lose their digits: moved to the parent's where
+    // they are summed.
     const auto add = [&](Moments& to, const glm::vec2& uv0, const glm::vec3& p0, NodeId vertex) {
         to.add(glm::dvec2(g.uvs[vertex]) - glm::dvec2(uv0), glm::dvec3(g.positions[vertex]) - glm::dvec3(p0));
     };
@@ -113,7 +115,8 @@ std::vector<glm::vec2> TextureFits::fitted_uvs(const std::vector<UvBox>& footpri
 }
 
 double TextureFits::residual_of_subtree(NodeId node) const {
-    // Trees are some tens of nodes deep, and each node looks at all below: where one is far deeper, nobody pays for the square of that.
+    // Trees are some tens of nodes deep, and each node looks at all below: where one is far deeper, nobody pays for the
+    // square of that.
     constexpr NodeId most_ancestors = 256;
     NodeId ancestors = 0;
     for (NodeId above = g_->parents[node]; above != no_node; above = g_->parents[above])

@@ -1,5 +1,5 @@
-// How the nodes of a tree hang together, as its file says: for what asks VertexTree::is_sound() about each node before it follows
-// that node's links, and so need not look at the whole tree. Everything else takes a SoundTree.
+// How the nodes of a tree hang together, as its file says: for what asks VertexTree::is_sound() about each node before
+// it follows that node's links, and so need not look at the whole tree. Everything else takes a SoundTree.
 #pragma once
 
 #include <vdtree/vertex_tree.h>

@@ -14,8 +14,9 @@ namespace unseen::vdtree {
 
 namespace {
 
-// Whether `inner` lies in `outer`. The difference of two floats is exact in double, squares and their sum lose a few units
-// in the last place: this much relative slack, far below the rounding outward of the radii, is not counted as a fault.
+// Whether `inner` lies in `outer`. The difference of two floats is exact in double, squares and their sum lose a few
+// units in the last place: this much relative slack, far below the rounding outward of the radii, is not counted as a
+// fault.
 constexpr double slack = 1e-14;
 
 bool contains(const Sphere& outer, glm::vec3 point, double radius) {

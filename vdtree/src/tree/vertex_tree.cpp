@@ -37,8 +37,8 @@ PackedRange shortened(PackedRange ring, PackedRange spread) {
     return {ring.lo, {static_cast<std::uint16_t>(std::min<int>(ring.hi.value, hi))}};
 }
 
-// By leaf: the luminance of the triangles around, its own where there is none, and a third of their area, in double against
-// overflow at extreme scales. And the luminance of all corners.
+// By leaf: the luminance of the triangles around, its own where there is none, and a third of their area, in double
+// against overflow at extreme scales. And the luminance of all corners.
 struct LeafSurroundings {
     std::vector<PackedRange> ring;
     std::vector<double> areas;

@@ -11,11 +11,12 @@
 
 namespace unseen::vdtree {
 
-// Calls f(i, child) for the interior children of node_at(i), for all i below `count`, in order. The nodes must be sound.
+// Calls f(i, child) for the interior children of node_at(i), for all i below `count`, in order. The nodes must be
+// sound.
 template <class NodeAt, class F>
 void walk_children(const VertexTree& tree, std::size_t count, NodeAt node_at, F&& f) {
-    // Places between a prefetch and its use: first the node's own link; then that of its second child, which most have and which is
-    // anywhere. (The first one is the node's neighbour.)
+    // Places between a prefetch and its use: first the node's own link; then that of its second child, which most have
+    // and which is anywhere. (The first one is the node's neighbour.)
     constexpr std::size_t far = 32, near = 16;
     const auto subtree_end = unchecked_links(tree).subtree_end;
     const auto prefetch_second = [&](NodeId node) {

@@ -4,10 +4,14 @@
 #include <memory>
 #include <optional>
 
-#include <session/session.h>
+#include <session/request.h>
+#include <session/simplification.h>
 #include <vdtree/geomorph.h>
+#include <vdtree/view.h>
 
 namespace unseen::session {
+
+class Session;
 
 // One cut an object, from frame to frame. For the goals imperceptible and pixels the cost goes with what changes from
 // one call to the next; for a budget, with hysteresis 1 or several objects, each call begins anew; full: only the first

@@ -31,8 +31,9 @@ Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file, const Lo
 // The same, but tree files of 256 MiB and more are mapped: only what is used is read, and checked.
 Result<vdtree::VertexTree> open_tree(const std::filesystem::path& file, const LoadOptions& options = {});
 
-// A tree with what its folds change, which the fold test `error` goes by: light is conserved first, then measured. Fails on
-// textured trees, of which nothing is measured. Cost: some 50 us a node, and a second; in parallel. `threads`: 0: all cores.
+// A tree with what its folds change, which the fold test `error` goes by: light is conserved first, then measured.
+// Fails on textured trees, of which nothing is measured. Cost: some 50 us a node, and a second; in parallel. `threads`:
+// 0: all cores.
 Result<vdtree::VertexTree> measured(const vdtree::VertexTree& tree, int threads = 0);
 
 } // namespace unseen::session

@@ -1,9 +1,16 @@
-// A scene before an observer: what is asked of it again and again, with what can be kept from one request to the next.
+// session: from a scene, an observer and a request to cuts, as the command `unseen` makes them. The header to include
+// first.
+//
+// A Scene is objects, lights and a background, from files or made. A Session puts an Observer (display, sensitivity,
+// gaze) before it, and is asked again and again: a Request says what is wanted, a Plan how it would be met and why, a
+// Simplification has the cuts. A Follower keeps cuts at what a moving view asks for.
 //
 //     auto scene = session::Scene::load("bunny.ply");
 //     auto session = session::Session::create(std::move(*scene));
 //     auto small = session->simplify({.goal = session::Goal::imperceptible()});
 //     meshio::write_mesh("small.ply", small->mesh().view());
+//
+// No command line, no OpenGL, and nothing is printed: Messages are told what takes long.
 #pragma once
 
 #include <memory>
@@ -13,8 +20,13 @@
 
 #include <perception/criterion.h>
 #include <perception/cut_rings.h>
+#include <session/follower.h>
+#include <session/gaze_player.h>
+#include <session/messages.h>
+#include <session/model_file.h>
 #include <session/observer.h>
 #include <session/plan.h>
+#include <session/request.h>
 #include <session/scene.h>
 #include <session/simplification.h>
 #include <vdtree/distance_criterion.h>
@@ -34,8 +46,9 @@ struct CutRecipe {
     vdtree::FollowOptions options;                              // threshold, budget and time of the request
 };
 
-// For one thread at a time. Kept are criteria, sensitivity tables for unsure gazes, and what is derived from a tree
-// alone: spheres that hide, rings of all cuts, bounds under lights.
+// A scene before an observer, with what can be kept from one request to the next. For one thread at a time. Kept are
+// criteria, sensitivity tables for unsure gazes, and what is derived from a tree alone: spheres that hide, rings of all
+// cuts, bounds under lights.
 class Session {
 public:
     // Fails on a scene without objects, a background that the display does not show, and a display that is none.

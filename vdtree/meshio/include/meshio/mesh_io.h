@@ -39,8 +39,8 @@ struct ReadOptions {
     LeftOut drop = {};  // files with other such things are refused; messages call this field read.drop
 };
 
-// What a file says of the surface of a range of triangles. Images are named, or are there as they were in the file: nothing here decodes
-// them.
+// What a file says of the surface of a range of triangles. Images are named, or are there as they were in the file:
+// nothing here decodes them.
 struct Material {
     std::string name;                 // of the MeshRange; different for all materials of a file
     glm::vec4 colour = glm::vec4(1);  // linear RGB, 0..1, that vertex colours and texture are multiplied with; alpha
@@ -67,7 +67,8 @@ struct ReadResult {
 
 // Polygons are triangulated (ear clipping in the plane of the polygon, so concave ones keep their area),
 // triangle strips unrolled with their orientation, glTF node transforms applied. Coincident vertices stay apart.
-// Fails on a mesh without triangles, and on vertex normals in use that are not finite; those of length 0 are told in the warnings.
+// Fails on a mesh without triangles, and on vertex normals in use that are not finite; those of length 0 are told in
+// the warnings.
 Result<ReadResult> read_mesh(const std::filesystem::path& file, const ReadOptions& options = {});
 
 // Writes to a temporary name in the same folder, then renames; an existing file is replaced only by a whole one.
@@ -77,10 +78,10 @@ Result<ReadResult> read_mesh(const std::filesystem::path& file, const ReadOption
 // Progress is told, and can cancel, while a PLY is written.
 Result<void> write_mesh(const std::filesystem::path& file, const vdtree::MeshView& mesh, const Progress& progress = {});
 
-// Writes a cut with all that the file of its mesh said (SourceDocument): nodes, names, materials, textures, texture coordinates and colours
-// as they were there. Images and libraries that lay beside that file are written beside this one, under the same names; fails where
-// one is there with other contents. Returns what the format cannot keep, one sentence each. Trees without a document are
-// written like extract_mesh(). Fails on damaged documents, too.
+// Writes a cut with all that the file of its mesh said (SourceDocument): nodes, names, materials, textures, texture
+// coordinates and colours as they were there. Images and libraries that lay beside that file are written beside this
+// one, under the same names; fails where one is there with other contents. Returns what the format cannot keep, one
+// sentence each. Trees without a document are written like extract_mesh(). Fails on damaged documents, too.
 Result<std::vector<std::string>> write_cut(const std::filesystem::path& file, const vdtree::Cut& cut);
 
 } // namespace unseen::meshio

@@ -1,5 +1,6 @@
-// What a mesh file says beyond its triangles: nodes, materials, textures, images, and what its vertices had before materials were laid over
-// them. It goes with the mesh and its tree as bytes (MeshView::document), so that a cut can be written with all of it.
+// What a mesh file says beyond its triangles: nodes, materials, textures, images, and what its vertices had before
+// materials were laid over them. It goes with the mesh and its tree as bytes (MeshView::document), so that a cut can be
+// written with all of it.
 #pragma once
 
 #include <cstddef>
@@ -30,7 +31,8 @@ struct UvMap {
 struct SourceDocument {
     enum class Format : std::uint32_t { gltf = 1, obj = 2 };
 
-    // What lies in the mesh file, or beside it: of glTF its images, in their order; of OBJ the images and libraries that it names.
+    // What lies in the mesh file, or beside it: of glTF its images, in their order; of OBJ the images and libraries
+    // that it names.
     struct File {
         enum class Use : std::uint32_t { image = 0, library = 1 };
         Use use = Use::image;
@@ -38,7 +40,8 @@ struct SourceDocument {
         std::shared_ptr<const std::string> bytes = nullptr; // null: not at hand
     };
 
-    // Triangles that belong together: of one primitive of a glTF node, or of one object, group and material of an OBJ file.
+    // Triangles that belong together: of one primitive of a glTF node, or of one object, group and material of an OBJ
+    // file.
     struct Part {
         std::int32_t node = -1, mesh = -1, primitive = -1;  // of glTF; -1: none
         std::string object = {}, group = {}, material = {}; // of OBJ; empty: none
@@ -53,7 +56,8 @@ struct SourceDocument {
         std::uint32_t part = 0;
     };
 
-    // An attribute as the file has it, in the frame of its node, by vertex of the mesh; 0 for vertices whose part has it not.
+    // An attribute as the file has it, in the frame of its node, by vertex of the mesh; 0 for vertices whose part has
+    // it not.
     struct Channel {
         std::string name; // as in glTF: NORMAL, TEXCOORD_0, COLOR_0, ...
         std::uint32_t components = 0;
@@ -75,8 +79,8 @@ struct SourceDocument {
 // As bytes that unpack() takes; docs/file-format.md describes them.
 std::vector<std::byte> pack(const SourceDocument& document);
 
-// Of any bytes: fails where they are not what pack() writes, contradict themselves, or have matrices that are not finite. Nothing is
-// allocated that the bytes do not hold.
+// Of any bytes: fails where they are not what pack() writes, contradict themselves, or have matrices that are not
+// finite. Nothing is allocated that the bytes do not hold.
 Result<SourceDocument> unpack(std::span<const std::byte> bytes);
 
 } // namespace unseen::meshio

@@ -7,9 +7,9 @@ struct Costs {
 // gap.
 UNSEEN_INLINE Costs costs_of(const KernelView& view, const CostTables& tables, const Ints& row, const Measures& m,
                              const Floats& unit) {
-    const Floats reach = entries(view, tables.reach, row, m.bin), length = unit * reach;
-    const Ints seldom = (reach < 0) | ((length <= 0) & (m.gap > 0)); // from nowhere, or from inside only
-    const Ints always = (reach >= DistanceCriterion::always_visible) | (m.gap <= 0);
+    const Floats switch_distance = entries(view, tables.switch_distance, row, m.bin), length = unit * switch_distance;
+    const Ints seldom = (switch_distance < 0) | ((length <= 0) & (m.gap > 0)); // from nowhere, or from inside only
+    const Ints always = (switch_distance >= DistanceCriterion::always_visible) | (m.gap <= 0);
     const Floats cost = always ? all(std::numeric_limits<float>::infinity()) : length / m.gap;
     Costs costs{seldom ? all(0) : cost, {}};
     costs.seen = costs.cost;

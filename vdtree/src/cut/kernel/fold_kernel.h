@@ -18,7 +18,7 @@
 namespace unseen::vdtree {
 
 inline constexpr std::size_t kernel_lanes = 16;
-// Mesh units; stands for 0 where a division or an infinite reach would make no number of it.
+// Mesh units; stands for 0 where a division or an infinite switch distance would make no number of it.
 inline constexpr float least_length = 1e-30f;
 
 // What all nodes are measured from, and by.
@@ -40,7 +40,7 @@ struct KernelView {
     std::vector<Occluder> occluders;
 
     // [row * bins + bin], in lengths; infinite: from everywhere; minus infinity: from nowhere.
-    std::span<const float> reach;
+    std::span<const float> switch_distance;
     std::int32_t bins = 1;
     float bins_per_radian = 0;
     float inverse_threshold = 1;
@@ -73,7 +73,7 @@ void decide_range(const KernelView& view, const NodeArrays& arrays, NodeId first
 
 // What the costs of folds are looked up in: a criterion's own tables, [row * bins + bin]; the second one may be null.
 struct CostTables {
-    const float *reach = nullptr, *least_cost = nullptr;
+    const float *switch_distance = nullptr, *least_cost = nullptr;
 };
 // The thresholds at which nodes would just fold, without and with their least costs, and whether they unfold at the
 // view's. `view` must ask for the facing of everybody.

@@ -30,21 +30,21 @@ FoldTester::FoldTester(const VertexTree& tree, const DistanceCriterion& criterio
                data_of(parts.lengths),
                data_of(parts.silhouette_lengths)};
     const bool has_least_costs = least_costs && !parts.least_cost.empty();
-    reach_.resize(parts.reach.size());
-    for (std::size_t i = 0; i < reach_.size(); ++i) {
-        const bool always =
-            parts.reach[i] >= DistanceCriterion::always_visible || (has_least_costs && parts.least_cost[i] > threshold);
-        const bool never = parts.reach[i] <= DistanceCriterion::never_visible;
-        reach_[i] = never ? -infinity : always ? infinity : parts.reach[i];
+    switch_distance_.resize(parts.switch_distance.size());
+    for (std::size_t i = 0; i < switch_distance_.size(); ++i) {
+        const bool always = parts.switch_distance[i] >= DistanceCriterion::always_visible ||
+                            (has_least_costs && parts.least_cost[i] > threshold);
+        const bool never = parts.switch_distance[i] <= DistanceCriterion::never_visible;
+        switch_distance_[i] = never ? -infinity : always ? infinity : parts.switch_distance[i];
     }
-    view_.reach = reach_;
+    view_.switch_distance = switch_distance_;
     view_.bins = static_cast<std::int32_t>(parts.eccentricity_bins);
     view_.bins_per_radian = static_cast<float>(180 / (std::numbers::pi * parts.bin_degrees));
     view_.inverse_threshold = 1 / threshold;
     view_.near_ones_too = cull_back_faces;
     view_.is_inside_out = tree.closedness() == Closedness::closed_inward;
     view_.nobody = !cull_back_faces && !criterion.uses_silhouettes();
-    if (parts.lit) lit_.emplace(tree, *parts.lit, reach_, parts.eccentricity_bins);
+    if (parts.lit) lit_.emplace(tree, *parts.lit, switch_distance_, parts.eccentricity_bins);
 }
 
 void FoldTester::look_from(const Viewpoint& viewpoint, double length_per_radian) {
@@ -161,7 +161,7 @@ void FoldTester::find_costs(std::span<const NodeId> nodes, const NodeCosts& cost
 
 CostTables FoldTester::cost_tables() const {
     const DistanceCriterion::Parts& parts = criterion_.parts();
-    return {parts.reach.data(), parts.least_cost.empty() ? nullptr : parts.least_cost.data()};
+    return {parts.switch_distance.data(), parts.least_cost.empty() ? nullptr : parts.least_cost.data()};
 }
 
 void FoldTester::find_cost_bounds(std::span<const NodeId> nodes, const float* folded_at, float* cost,
@@ -249,13 +249,13 @@ void FoldTester::leave_room_for_lights(LitFindings& lit, FoldBatch& batch) const
             lit.slack[i] = infinity;
             continue;
         }
-        const auto reach = [&](std::int32_t row) {
-            return view_.reach[static_cast<std::size_t>(row * view_.bins + batch.bin[i])];
+        const auto switch_distance = [&](std::int32_t row) {
+            return view_.switch_distance[static_cast<std::size_t>(row * view_.bins + batch.bin[i])];
         };
         batch.interior_row[i] = lit.farthest_row[i];
-        batch.interior[i] = units[i] * reach(batch.interior_row[i]);
+        batch.interior[i] = units[i] * switch_distance(batch.interior_row[i]);
         const float outline = std::max(batch.silhouette_length[i], least_length) * view_.inverse_threshold *
-                              reach(batch.silhouette_row[i]);
+                              switch_distance(batch.silhouette_row[i]);
         batch.silhouette[i] = std::max(batch.interior[i], outline);
     }
 }

@@ -94,8 +94,8 @@ private:
     CostTables cost_tables() const;
 
     const DistanceCriterion& criterion_;
-    NodeArrays arrays_;        // of the tree and the criterion
-    std::vector<float> reach_; // of the criterion; infinite where the fold is seen from everywhere
+    NodeArrays arrays_;                  // of the tree and the criterion
+    std::vector<float> switch_distance_; // of the criterion; infinite where the fold is seen from everywhere
     KernelView view_, costs_view_;
     std::optional<LitTester> lit_; // where lights give the classes
 };

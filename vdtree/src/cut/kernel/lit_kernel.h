@@ -1,5 +1,5 @@
-// The arithmetic of lights, sixteen nodes at once: between which luminances a node's vertices are, and how far the lights may move before
-// that differs by so much.
+// The arithmetic of lights, sixteen nodes at once: between which luminances a node's vertices are, and how far the
+// lights may move before that differs by so much.
 #pragma once
 
 #include <vector>
@@ -37,7 +37,8 @@ struct KernelLights {
 struct LitBatch {
     alignas(64) float axis[3][kernel_lanes];
     alignas(64) float cosine[kernel_lanes], sine[kernel_lanes];
-    // Across the axis, from one normal to all others: least and largest coordinates along two directions. Without a box: beyond any normal's.
+    // Across the axis, from one normal to all others: least and largest coordinates along two directions. Without a
+    // box: beyond any normal's.
     alignas(64) float across[2][3][kernel_lanes], least_across[2][kernel_lanes], largest_across[2][kernel_lanes];
     alignas(64) float steepness[kernel_lanes],
         spread[kernel_lanes]; // of the box's bounds: most change in a radian; of their difference
@@ -47,9 +48,9 @@ struct LitBatch {
 
     // Out, by find_ranges():
     alignas(64) float lo[kernel_lanes], hi[kernel_lanes];
-    // While the lights move by m, m <= cap (see light_motion()): hi - lo changes by at most jump + fine_rate m for m <= fine_cap, and by
-    // at most rough_rate for each further unit; hi + lo by 2 jump and at the rates fine_sum_rate and full_rate; and hi by
-    // jump + rise_rate m.
+    // While the lights move by m, m <= cap (see light_motion()): hi - lo changes by at most jump + fine_rate m for m <=
+    // fine_cap, and by at most rough_rate for each further unit; hi + lo by 2 jump and at the rates fine_sum_rate and
+    // full_rate; and hi by jump + rise_rate m.
     alignas(64) float cap[kernel_lanes], fine_cap[kernel_lanes];
     alignas(64) float fine_rate[kernel_lanes], rough_rate[kernel_lanes],
         fine_sum_rate[kernel_lanes], full_rate[kernel_lanes];

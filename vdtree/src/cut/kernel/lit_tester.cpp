@@ -17,13 +17,16 @@ UNSEEN_INLINE auto at(const Values& values, std::int32_t i) {
 
 } // namespace
 
-LitTester::LitTester(const VertexTree& tree, const LitClasses& classes, std::span<const float> reach, std::size_t bins)
-    : tree_(tree), cones_(classes.bounds->cones().data()), reach_(reach), bins_(static_cast<std::int32_t>(bins)),
-      silhouette_row_(classes.silhouette), black_(static_cast<float>(classes.levels.black() / classes.levels.span())) {
+LitTester::LitTester(const VertexTree& tree, const LitClasses& classes, std::span<const float> switch_distance,
+                     std::size_t bins)
+    : tree_(tree), cones_(classes.bounds->cones().data()), switch_distance_(switch_distance),
+      bins_(static_cast<std::int32_t>(bins)), silhouette_row_(classes.silhouette),
+      black_(static_cast<float>(classes.scale.offset / classes.scale.span)) {
+    const ContrastClasses levels(classes.scale);
     for (std::size_t i = 0; i < contrasts_.size(); ++i)
         contrasts_[i] = static_cast<float>(ContrastClasses::contrast_of_index(i));
     for (std::size_t i = 0; i < luminances_.size(); ++i)
-        luminances_[i] = static_cast<float>(classes.levels.luminance_of_index(i) / classes.levels.span());
+        luminances_[i] = static_cast<float>(levels.level_of_index(i) / classes.scale.span);
     fill_guesses();
 }
 
@@ -39,16 +42,16 @@ void LitTester::fill_guesses() {
     };
     fill(contrast_guesses_, contrasts_, 1, least_contrast_bits, contrast_shift);
     fill(luminance_guesses_, luminances_, luminances_[0], least_luminance_bits, luminance_shift);
-    reach_guesses_.reserve(static_cast<std::size_t>(luminance_count * bins_ * reach_guess_count));
+    distance_guesses_.reserve(static_cast<std::size_t>(luminance_count * bins_ * distance_guess_count));
     for (std::int32_t luminance = 0; luminance < luminance_count; ++luminance)
         for (std::int32_t bin = 0; bin < bins_; ++bin) {
             std::int32_t first = 0;
-            for (std::int32_t i = 0; i < reach_guess_count; ++i) {
-                const float least = bucket_start(i, least_reach_bits, reach_shift) * rounded;
+            for (std::int32_t i = 0; i < distance_guess_count; ++i) {
+                const float least = bucket_start(i, least_distance_bits, distance_shift) * rounded;
                 while (i > 0 && first + 1 < contrast_count &&
-                       !(least < at(reach_, row(luminance, first) * bins_ + bin)))
+                       !(least < at(switch_distance_, row(luminance, first) * bins_ + bin)))
                     ++first;
-                reach_guesses_.push_back(first);
+                distance_guesses_.push_back(first);
             }
         }
 }
@@ -88,8 +91,9 @@ UNSEEN_INLINE void LitTester::find_classes(LitFindings& lit) const {
 
 UNSEEN_INLINE void LitTester::find_room(LitFindings& lit) const {
     const LitBatch& batch = lit.ranges;
-    const auto reach = [&](std::int32_t luminance, std::int32_t contrast, std::int32_t bin)
-                           UNSEEN_INLINE_LAMBDA { return at(reach_, row(luminance, contrast) * bins_ + bin); };
+    const auto switch_distance =
+        [&](std::int32_t luminance, std::int32_t contrast, std::int32_t bin)
+            UNSEEN_INLINE_LAMBDA { return at(switch_distance_, row(luminance, contrast) * bins_ + bin); };
     // Any class of luminance where that changes nothing, else the next one or the same.
     alignas(64) std::int32_t luminance[kernel_lanes], first[kernel_lanes], there[kernel_lanes], gap_bits[kernel_lanes];
     for (std::size_t i = 0; i < kernel_lanes; ++i) {
@@ -97,19 +101,19 @@ UNSEEN_INLINE void LitTester::find_room(LitFindings& lit) const {
         const std::int32_t last = unfolded ? 0 : luminance_count - 1, next = own + (own < last   ? 1
                                                                                     : own > last ? -1
                                                                                                  : 0);
-        const std::int32_t at_last = lit.gap[i] < reach(last, lit.contrast[i], lit.bin[i]);
-        const std::int32_t at_next = lit.gap[i] < reach(next, lit.contrast[i], lit.bin[i]);
+        const std::int32_t at_last = lit.gap[i] < switch_distance(last, lit.contrast[i], lit.bin[i]);
+        const std::int32_t at_next = lit.gap[i] < switch_distance(next, lit.contrast[i], lit.bin[i]);
         luminance[i] = at_last == unfolded ? last : at_next == unfolded ? next : own;
     }
     std::memcpy(gap_bits, lit.gap, sizeof gap_bits);
     for (std::size_t i = 0; i < kernel_lanes; ++i) {
-        const std::int32_t guess = bucket(gap_bits[i], least_reach_bits, reach_shift, reach_guess_count);
-        first[i] = at(reach_guesses_, (luminance[i] * bins_ + lit.bin[i]) * reach_guess_count + guess);
+        const std::int32_t guess = bucket(gap_bits[i], least_distance_bits, distance_shift, distance_guess_count);
+        first[i] = at(distance_guesses_, (luminance[i] * bins_ + lit.bin[i]) * distance_guess_count + guess);
     }
     for (std::int32_t moved = 1; moved;) {
         moved = 0;
         for (std::size_t i = 0; i < kernel_lanes; ++i) {
-            const float reached = reach(luminance[i], std::min(first[i], contrast_count - 1), lit.bin[i]);
+            const float reached = switch_distance(luminance[i], std::min(first[i], contrast_count - 1), lit.bin[i]);
             const std::int32_t step = (first[i] < contrast_count) & !(lit.gap[i] < reached);
             first[i] += step;
             moved |= step;
@@ -124,8 +128,8 @@ UNSEEN_INLINE void LitTester::find_room(LitFindings& lit) const {
         lit.farthest_row[i] = row(luminance[i], there[i]);
     }
 
-    // How far the lights may move with the contrast at most that of its class (unfolded: more than that of the class below) and
-    // the luminance likewise.
+    // How far the lights may move with the contrast at most that of its class (unfolded: more than that of the class
+    // below) and the luminance likewise.
     for (std::size_t i = 0; i < kernel_lanes; ++i) {
         const bool unfolded = lit.is_unfolded[i] != 0;
         const std::int32_t contrast = there[i];

@@ -13,7 +13,8 @@ UNSEEN_INLINE Floats entries(const KernelView& view, const float* table, const I
 // The distances of rows at bins.
 UNSEEN_INLINE Floats distances(const KernelView& view, const Ints& rows, const Ints& bins, const Floats& lengths) {
     // A length of 0 times infinity is no number.
-    return max_of(lengths, all(least_length)) * view.inverse_threshold * entries(view, view.reach.data(), rows, bins);
+    return max_of(lengths, all(least_length)) * view.inverse_threshold *
+           entries(view, view.switch_distance.data(), rows, bins);
 }
 
 // What is tested: spheres, lengths, and rows of the criterion's table.

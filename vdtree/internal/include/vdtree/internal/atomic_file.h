@@ -11,8 +11,8 @@
 namespace unseen::vdtree {
 
 // A file written under a temporary name in the folder of its target. commit() renames it to the target;
-// without commit() the destructor removes it, so a failed writer leaves neither a part nor a changed target behind. A process that is
-// killed leaves the temporary; it holds a lock on it as long as it lives, so that others know.
+// without commit() the destructor removes it, so a failed writer leaves neither a part nor a changed target behind. A
+// process that is killed leaves the temporary; it holds a lock on it as long as it lives, so that others know.
 class AtomicFile {
 public:
     // Fails where the folder is missing or not writable, and where the target exists but is no regular file

@@ -20,8 +20,8 @@ public:
             for (NodeId& corner : corners_[t]) around_[corner += tree.interior_count()].push_back(t);
     }
 
-    // Folds a node whose interior children have been folded. Calls leave(corners) for each triangle that is drawn around the children; what
-    // it becomes is in ring() afterwards. Cost: the triangles around the node.
+    // Folds a node whose interior children have been folded. Calls leave(corners) for each triangle that is drawn
+    // around the children; what it becomes is in ring() afterwards. Cost: the triangles around the node.
     template <class F>
     void fold(NodeId node, F&& leave) {
         std::vector<Index>& ring = around_[node];

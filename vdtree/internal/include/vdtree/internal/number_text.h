@@ -10,8 +10,8 @@
 
 namespace unseen {
 
-// The number that the whole text is, with an optional leading '+', which std::from_chars does not know. Nothing where there is
-// more or less than a number, or one beyond the type's range. "inf" and "nan" are taken.
+// The number that the whole text is, with an optional leading '+', which std::from_chars does not know. Nothing where
+// there is more or less than a number, or one beyond the type's range. "inf" and "nan" are taken.
 template <class Number>
 std::optional<Number> number_from(std::string_view text) {
     if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);

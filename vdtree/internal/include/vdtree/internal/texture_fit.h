@@ -1,4 +1,5 @@
-// Affine maps from a texture to the surface that it lies on, one a node, and how far the vertices around the node are from them.
+// Affine maps from a texture to the surface that it lies on, one a node, and how far the vertices around the node are
+// from them.
 #pragma once
 
 #include <cmath>
@@ -13,8 +14,8 @@
 
 namespace unseen::vdtree {
 
-// Fitted to the corners of the ring; where texture coordinates fit no map at all, to their positions' middle. Distances hold whatever the
-// map is: points interpolated between vertices are no farther from it than these.
+// Fitted to the corners of the ring; where texture coordinates fit no map at all, to their positions' middle. Distances
+// hold whatever the map is: points interpolated between vertices are no farther from it than these.
 class TextureFits {
 public:
     TextureFits() = default;
@@ -32,11 +33,13 @@ public:
         return squared >= 0 ? std::sqrt(squared) : std::numeric_limits<double>::infinity(); // NaN: no map
     }
 
-    // The largest of the leaves and proxies under a node, itself included; where they are very many, what is known without looking.
+    // The largest of the leaves and proxies under a node, itself included; where they are very many, what is known
+    // without looking.
     double residual_of_subtree(NodeId node) const;
 
-    // Texture coordinates of all vertices, those of proxies where their maps have the place nearest to the proxy, within the footprints: so
-    // that a fold slides the texture over the surface as little as can be. Where a fold moves nothing, and without a map, they stay.
+    // Texture coordinates of all vertices, those of proxies where their maps have the place nearest to the proxy,
+    // within the footprints: so that a fold slides the texture over the surface as little as can be. Where a fold moves
+    // nothing, and without a map, they stay.
     std::vector<glm::vec2> fitted_uvs(const std::vector<UvBox>& footprints) const;
 
     // Whether leaves and proxies under a node differ in texture coordinates.

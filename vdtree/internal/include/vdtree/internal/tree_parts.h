@@ -1,5 +1,5 @@
-// A tree in parts that can be worked on at the same time. What is bounded depends on the tree alone, not on the parts, and
-// the parts on the tree alone, not on the threads.
+// A tree in parts that can be worked on at the same time. What is bounded depends on the tree alone, not on the parts,
+// and the parts on the tree alone, not on the threads.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,8 @@
 
 namespace unseen::vdtree {
 
-// What one task works on: a run of sibling subtrees, or the nodes above all of these and the leaves that are their children.
+// What one task works on: a run of sibling subtrees, or the nodes above all of these and the leaves that are their
+// children.
 struct TreePart {
     NodeId begin, end;                  // nodes; above the subtrees: all, of which it owns some
     Index first_leaf, leaf_end;         // likewise
@@ -50,8 +51,8 @@ public:
         for (std::size_t i = top_nodes_.size(); i-- > 0;) worker(top_nodes_[i]);
     }
 
-    // Calls one of make_worker()'s workers with the nodes of each part, ascending, for several parts at the same time; in the end with those
-    // above.
+    // Calls one of make_worker()'s workers with the nodes of each part, ascending, for several parts at the same time;
+    // in the end with those above.
     template <class MakeWorker>
     void part_by_part(MakeWorker&& make_worker) const {
         tbb::parallel_for(std::size_t{0}, parts_.size(), [&](std::size_t i) {
@@ -76,7 +77,8 @@ public:
         for (Index t = part.first_triangle; t < part.triangle_end; ++t) f(t);
         for (const Index t : part.crossing) f(t);
     }
-    // Calls make_worker(part)'s worker for these, for several parts at the same time. Each changes only what its part owns.
+    // Calls make_worker(part)'s worker for these, for several parts at the same time. Each changes only what its part
+    // owns.
     template <class MakeWorker>
     void for_each_triangle(MakeWorker&& make_worker) const {
         for_each([&](const TreePart& part) { for_each_triangle(part, make_worker(part)); });

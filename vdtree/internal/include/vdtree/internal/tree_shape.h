@@ -68,8 +68,8 @@ class Ancestors {
 public:
     explicit Ancestors(const TreeShape& shape);
 
-    // The lowest of `node` and its ancestors that `found` accepts; with a node, it must accept all that are above. Calls `found`
-    // only with interior nodes; there must be one that it accepts.
+    // The lowest of `node` and its ancestors that `found` accepts; with a node, it must accept all that are above.
+    // Calls `found` only with interior nodes; there must be one that it accepts.
     template <class Found>
     NodeId lowest(NodeId node, Found&& found) const {
         // Most are near: walk before jumping.

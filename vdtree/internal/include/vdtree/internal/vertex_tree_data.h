@@ -108,8 +108,8 @@ TreeLuminance copy_of(const TreeLuminance& light);
 
 class TreeParts;
 
-// Luminance of every node and the bounds over support and ring, bottom-up. `parts`: of this tree, with its triangles. Cost: one
-// pass over triangles and nodes; parallel.
+// Luminance of every node and the bounds over support and ring, bottom-up. `parts`: of this tree, with its triangles.
+// Cost: one pass over triangles and nodes; parallel.
 TreeLuminance derive_luminance(const TreeGeometry& geometry, const TreeParts& parts, const Light& light, bool prelit,
                                bool textured);
 

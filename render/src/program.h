@@ -7,8 +7,9 @@
 #include <glm/mat4x4.hpp>
 #include <glm/vec4.hpp>
 
-#include <render/gl_object.h>
 #include <vdtree/result.h>
+
+#include "gl_object.h"
 
 namespace unseen::render {
 

@@ -1,7 +1,8 @@
-// The mesh is folded node by node, in about the order in which a viewer lets it, and the light that each fold adds or takes is noted.
-// Of a patch of surface that faces the eye, light is the sum over its triangles of their luminance times their vector area, times the
-// direction to the eye: a sum that holds for every direction, and over which folds add up.
-#include "measure/drift.h"
+// The mesh is folded node by node, in about the order in which a viewer lets it, and the light that each fold adds or
+// takes is noted. Of a patch of surface that faces the eye, light is the sum over its triangles of their luminance
+// times their vector area, times the direction to the eye: a sum that holds for every direction, and over which folds
+// add up.
+#include "measure/luminance_bias.h"
 
 #include <algorithm>
 #include <array>
@@ -20,9 +21,9 @@ namespace {
 
 using namespace measurement;
 
-class DriftFinder {
+class BiasFinder {
 public:
-    DriftFinder(const SoundTree& tree, std::span<FoldError> errors)
+    BiasFinder(const SoundTree& tree, std::span<FoldError> errors)
         : tree_(tree), errors_(errors), interior_(tree.interior_count()), luminance_(tree.luminance()),
           parents_(tree.parents()), mesh_(tree), surfaces_(interior_), light_(interior_), found_(interior_) {}
 
@@ -156,7 +157,7 @@ private:
         for (std::size_t fading = 0; fading <= most_fading; ++fading) {
             const float excess = count * std::log2(amounts[fading]) - sum * static_cast<float>(fading) / 2;
             if (excess < least)
-                least = excess, errors_[node].drift = amounts[fading],
+                least = excess, errors_[node].bias = amounts[fading],
                 errors_[node].fading = static_cast<std::uint8_t>(fading);
         }
     }
@@ -220,6 +221,6 @@ private:
 
 } // namespace
 
-void find_drift(const SoundTree& tree, std::span<FoldError> errors) { DriftFinder(tree, errors).run(); }
+void find_luminance_bias(const SoundTree& tree, std::span<FoldError> errors) { BiasFinder(tree, errors).run(); }
 
 } // namespace unseen::perception

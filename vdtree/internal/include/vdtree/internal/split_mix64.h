@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-namespace unseen::vdtree {
+namespace unseen {
 
 // SplitMix64 (Steele, Lea and Flood 2014).
 class SplitMix64 {
@@ -22,4 +22,4 @@ private:
     std::uint64_t state_;
 };
 
-} // namespace unseen::vdtree
+} // namespace unseen

@@ -1,4 +1,4 @@
-#include "number_format.h"
+#include <vdtree/internal/number_format.h>
 
 #include <algorithm>
 #include <array>
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 
-namespace unseen::app {
+namespace unseen {
 namespace {
 
 constexpr double smallest_written_out = 1e-6, largest_written_out = 1e15;
@@ -64,4 +64,4 @@ std::string shortest(double value) {
     return std::isfinite(value) && is_written_out(value) ? text_of(value, std::chars_format::fixed) : text_of(value);
 }
 
-} // namespace unseen::app
+} // namespace unseen

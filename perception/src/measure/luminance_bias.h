@@ -10,8 +10,9 @@
 
 namespace unseen::perception {
 
-// Reads the luminance errors and extents, and adds the drift. Cost: as of folding the mesh once, one node after the other.
-void find_drift(const vdtree::SoundTree& tree, std::span<FoldError> errors);
+// Reads the luminance errors and extents, and adds the bias. Cost: as of folding the mesh once, one node after the
+// other.
+void find_luminance_bias(const vdtree::SoundTree& tree, std::span<FoldError> errors);
 
 // The radius of what a fold of the node changes, in mesh units.
 inline float changed_radius(const vdtree::VertexTree& tree, std::span<const FoldError> errors, vdtree::NodeId node) {

@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <numbers>
 
-#include <vdtree/split_mix64.h>
+#include <vdtree/internal/split_mix64.h>
 
-namespace unseen::perception {
+namespace unseen {
 
 // Distributions are made here: those of <random> differ between libraries.
 class Random {
@@ -33,7 +33,7 @@ public:
     }
 
 private:
-    vdtree::SplitMix64 generator_;
+    SplitMix64 generator_;
 };
 
 // A generator of its own for the `index`-th item of a run, so that a run can be taken up anywhere.
@@ -41,4 +41,4 @@ inline Random random_for(std::uint64_t seed, std::uint64_t index) {
     return Random(Random(seed ^ Random(index).bits()).bits());
 }
 
-} // namespace unseen::perception
+} // namespace unseen
