@@ -18,6 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using namespace unseen::vdtree;
+namespace meshio = unseen::meshio;
 namespace shapes = unseen::shapes;
 
 void expect(const unseen::Result<void>& done) {

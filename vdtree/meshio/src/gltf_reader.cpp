@@ -318,6 +318,10 @@ public:
             result_.warnings.push_back(counted_were(skipped_primitives_, "primitive") +
                                        " left out for having no triangles or no positions.");
         }
+        std::uint64_t hidden = 0;
+        for (std::size_t i = 0; i < reached_.size(); ++i) hidden += !reached_[i] && model_.nodes[i].mesh >= 0;
+        if (hidden > 0)
+            result_.warnings.push_back(counted_were(hidden, "node") + " not in the scene that is shown and left out.");
         keep_channels();
         return std::move(result_);
     }
