@@ -14,6 +14,7 @@ session::LoadOptions load_options(const TextureOptions& texture, ProgressBar& ba
     session::LoadOptions options;
     options.texture = texture.file;
     options.without_textures = texture.is_left_out;
+    options.drop = texture.drop;
     options.messages = terminal_messages();
     options.messages.progress = std::ref(bar);
     return options;
@@ -25,6 +26,7 @@ Result<meshio::ReadResult> read_mesh_file(const std::filesystem::path& file) {
     ProgressBar bar("reading " + file.filename().string());
     meshio::ReadOptions options;
     options.progress = std::ref(bar);
+    options.drop = {true, true, true, true}; // nothing is made of it
     auto read = meshio::read_mesh(file, options);
     if (!read) return read;
     for (const std::string& warning : read->warnings) print_warning(file.string() + ": " + warning);

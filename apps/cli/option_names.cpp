@@ -25,6 +25,7 @@ constexpr OptionName option_names[] = {
     {"observer.csf", "--csf"},
     {"scene.lights", "--lights"},
     {"Scene::relight()", "--light or --ambient"},
+    {"read.drop = ", "--drop "},
     {"load.texture", "--texture"},
     {"load.without_textures", "--no-texture"},
     {"load.unit_metres", "--unit"},

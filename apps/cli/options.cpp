@@ -154,7 +154,22 @@ void add_texture_options(CLI::App& verb, TextureOptions& o) {
                 "--texture", o.file,
                 "Of a mesh with texture coordinates: the image that lies over it, instead of its materials' images")
             ->type_name("IMAGE");
-    verb.add_flag("--no-texture", o.is_left_out, "Leave images out")->excludes(file);
+    verb.add_flag("--no-texture", o.is_left_out, "Look at no images; simplified meshes keep them")->excludes(file);
+    verb.add_option_function<std::vector<std::string>>(
+            "--drop",
+            [&o](const std::vector<std::string>& names) {
+                for (const std::string& name : names)
+                    (name == "skins"           ? o.drop.skins
+                     : name == "morph-targets" ? o.drop.morph_targets
+                     : name == "animations"    ? o.drop.animations
+                                               : o.drop.extensions) = true;
+            },
+            "Leave out what glTF files have and simplified meshes cannot: skins, morph-targets, animations, extensions "
+            "(that the file requires and nobody here knows); with commas between them")
+        ->type_name("NAMES")
+        ->delimiter(',')
+        ->allow_extra_args(false)
+        ->check(one_of({"skins", "morph-targets", "animations", "extensions"}));
 }
 
 void add_geomorph_option(CLI::App& verb, std::optional<double>& seconds) {

@@ -12,6 +12,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
+#include <meshio/mesh_io.h>
 #include <session/gaze_player.h>
 #include <session/request.h>
 
@@ -24,6 +25,7 @@ using session::name_of;
 struct TextureOptions {
     std::string file;         // instead of the materials'
     bool is_left_out = false; // --no-texture
+    meshio::LeftOut drop;     // of glTF files
 };
 
 // VIEW. What is not given follows from the model and the display, see session/session.h.

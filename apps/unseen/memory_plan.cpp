@@ -38,7 +38,8 @@ std::uint64_t unlimited_peak(const vdtree::MeshView& mesh, vdtree::ClustererKind
     const std::uint64_t triangles = mesh.triangles.size(), vertices = mesh.positions.size();
     const std::uint64_t usual = triangles / 2; // of a closed surface
     const bool octree = clusterer == vdtree::ClustererKind::octree;
-    return program_bytes + triangles * (octree ? octree_triangle_bytes : quadric_triangle_bytes) +
+    return program_bytes + 2 * mesh.document.size() +
+           triangles * (octree ? octree_triangle_bytes : quadric_triangle_bytes) +
            (vertices > usual ? vertices - usual : 0) * vertex_bytes;
 }
 

@@ -35,9 +35,9 @@ Result<int> run(const SimplifyArguments& a) {
     auto result = session->simplify(make_view(*session, a.view), a.what.request_for(session->tree().triangle_count()));
     if (!result) return result.error();
     const auto start = std::chrono::steady_clock::now();
-    const vdtree::Mesh mesh = result->mesh();
+    result->cuts[0].indices();
     result->extract_ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-    if (mesh.triangles.empty()) {
+    if (result->cuts[0].triangle_count() == 0) {
         if (!result->stats.is_complete)
             return Error{ErrorCode::invalid_argument,
                          "No triangle is there yet when the time is over: allow more with --milliseconds."};
@@ -47,7 +47,9 @@ Result<int> run(const SimplifyArguments& a) {
     }
 
     if (auto ok = report->prepare(to_json(*result, nothing_drawn)); !ok) return ok.error();
-    if (auto ok = meshio::write_mesh(a.out, mesh.view()); !ok) return ok.error();
+    const auto notes = meshio::write_cut(a.out, result->cuts[0]);
+    if (!notes) return notes.error();
+    for (const std::string& note : *notes) print_note(a.out + ": " + note);
     if (auto ok = report->publish(); !ok) return ok.error();
     if (report->is_on_stdout()) return exit_done;
     print_line(kept_text(result->stats.triangles, result->source_triangles));
@@ -64,18 +66,23 @@ Command simplify_command(CLI::App& app) {
     CLI::App* verb = app.add_subcommand("simplify", "Write a simplified mesh for a view");
     verb->add_option("TREE", a->model, "A tree, or a mesh")->required()->type_name("TREE.vdt|MESH");
     verb->add_option("-o,--output", a->out, "The mesh")
-        ->type_name("OUT.ply|.obj|.glb")
+        ->type_name("OUT.ply|.obj|.glb|.gltf")
         ->required()
-        ->check(ending_in({".ply", ".obj", ".glb"}));
+        ->check(ending_in({".ply", ".obj", ".glb", ".gltf"}));
     add_json_option(*verb, a->json);
     add_verbose_option(*verb, a->is_verbose);
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->what);
-    verb->footer("Examples:\n  unseen simplify bunny.vdt -o seen-from-the-right.ply --direction 1 0 0\n"
-                 "  unseen simplify bunny.vdt -o small.obj --triangles 5000 --json report.json\n"
-                 "  unseen simplify bunny.vdt -o half.ply --triangles 50%\n"
-                 "  unseen simplify bunny.vdt -o rough.glb --pixels 4 --fold-test displacement");
+    verb->footer(
+        "OUT.glb, .gltf (with its data in OUT.bin) and .obj have what the model's glTF or OBJ file had: nodes, names,\n"
+        "materials, texture coordinates. Images in the file stay in it; images and .mtl files beside it are copied\n"
+        "to the folder of OUT under their names, where no other file of that name may be.\n\n"
+        "Examples:\n  unseen simplify bunny.vdt -o seen-from-the-right.ply --direction 1 0 0\n"
+        "  unseen simplify bunny.vdt -o small.obj --triangles 5000 --json report.json\n"
+        "  unseen simplify bunny.vdt -o half.ply --triangles 50%\n"
+        "  unseen simplify house.gltf -o small.glb --pixels 2 --drop animations\n"
+        "  unseen simplify bunny.vdt -o rough.glb --pixels 4 --fold-test displacement");
     return {verb, [a] { return run(*a); }};
 }
 

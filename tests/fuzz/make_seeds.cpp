@@ -18,6 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using namespace unseen::vdtree;
+namespace meshio = unseen::meshio;
 namespace shapes = unseen::shapes;
 
 void expect(const unseen::Result<void>& done) {
@@ -60,11 +61,24 @@ void make_meshes(const fs::path& folder) {
           "\"nodes\":[0]}]}");
 }
 
+Mesh with_document(Mesh mesh) {
+    mesh.ranges = {{"part", MeshRange::Kind::primitive, 0, mesh.triangles.size()}};
+    const std::size_t vertices = mesh.positions.size();
+    mesh.document = meshio::pack({.json = "{}",
+                                  .files = {{.uri = "image.png"}},
+                                  .parts = {{.node = 0, .mesh = 0, .primitive = 0, .channels = 1}},
+                                  .runs = {{0, 0}},
+                                  .channels = {{"TEXCOORD_0", 2, std::vector<float>(2 * vertices, 0.5f)}},
+                                  .vertex_parts = std::vector<std::uint32_t>(vertices, 0)});
+    return mesh;
+}
+
 void make_trees(const fs::path& folder) {
     const std::pair<const char*, Mesh> meshes[] = {{"ball", shapes::bumpy_sphere(1)},
                                                    {"open", shapes::grid(4)},
                                                    {"triangle", shapes::single_triangle()},
-                                                   {"attributes", shapes::with_attributes(shapes::icosphere(1))}};
+                                                   {"attributes", shapes::with_attributes(shapes::icosphere(1))},
+                                                   {"document", with_document(shapes::icosphere(1))}};
     for (const auto& [name, mesh] : meshes) {
         const auto tree = build_tree(mesh.view());
         if (!tree) throw std::runtime_error(tree.error().message);

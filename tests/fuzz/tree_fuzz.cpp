@@ -12,6 +12,7 @@
 
 #include <vdtree/tree_io.h>
 
+#include "restore.h"
 #include "tree_file.h"
 #include "tree_use.h"
 
@@ -38,11 +39,21 @@ private:
     int descriptor_;
 };
 
+// What a mesh's file said beyond triangles, as far as it goes without writing files.
+void restore_document(const unseen::vdtree::VertexTree& tree) {
+    const auto document = unseen::meshio::unpack(tree.document());
+    if (!document) return;
+    unseen::vdtree::Cut cut(tree);
+    cut.unfold_all();
+    (void)unseen::meshio::restore(cut, extract_with_sources(cut), *document).has_value();
+}
+
 void read_and_use(const std::string& bytes) {
     static MemoryFile file;
     file.hold(bytes);
     for (const bool mapped : {false, true}) {
         const auto tree = mapped ? unseen::vdtree::map_tree(file.path()) : unseen::vdtree::read_tree(file.path());
+        if (tree) restore_document(*tree);
         if (tree ? !unseen::support::use_everything(*tree) : tree.error().message.empty()) std::abort();
     }
 }

@@ -53,7 +53,8 @@ TEST_F(Materials, OfObjectsAreRead) {
     const auto scaled = read("newmtl a\nmap_Kd -s 2 3 4 p.png\n");
     ASSERT_TRUE(scaled);
     EXPECT_EQ(scaled->materials[0].image, "p.png");
-    ASSERT_EQ(scaled->warnings.size(), 1u);
+    ASSERT_EQ(scaled->warnings.size(), 2u);
+    EXPECT_NE(scaled->warnings[1].find("The image is named, but not kept"), std::string::npos) << scaled->warnings[1];
     EXPECT_NE(scaled->warnings[0].find("'-s' of an image was ignored"), std::string::npos) << scaled->warnings[0];
 
     // The first of a name counts, and a library that is named twice is read once.
@@ -88,10 +89,10 @@ TEST_F(Materials, ThatCannotBeReadAreNotedAndBadOnesAreNot) {
     EXPECT_NE(other->warnings[0].find("1 material is in no library that was read, the first 'a'"), std::string::npos)
         << other->warnings[0];
     meshio::ReadOptions without;
-    without.materials = false;
-    const auto result = read("newmtl a\nKd nan\n", "m.mtl", without);
-    ASSERT_TRUE(result);
-    EXPECT_TRUE(result->materials.empty());
+    without.images = false;
+    const auto result = read("newmtl a\nKd 0 0 0\nmap_Kd ../p.png\n", "m.mtl", without);
+    ASSERT_TRUE(result) << result.error().message;
+    EXPECT_FALSE(result->materials.at(0).has_image());
 }
 
 // A file of many materials over one image, or over many images of one buffer view, is not much larger when it has been

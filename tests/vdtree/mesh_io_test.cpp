@@ -746,7 +746,9 @@ TEST(Gltf, ReadsSparseAccessors) {
 
 TEST(Gltf, ReadsOnlyTheSceneThatIsShown) {
     const std::string nodes = R"([{"mesh":0},{"mesh":0,"translation":[5,0,0]}])";
-    EXPECT_EQ(read(glb(gltf_triangle_json(nodes), gltf_triangle_data()), "a.glb").mesh.positions.size(), 3u);
+    const meshio::ReadResult result = read(glb(gltf_triangle_json(nodes), gltf_triangle_data()), "a.glb");
+    EXPECT_EQ(result.mesh.positions.size(), 3u);
+    EXPECT_THAT(result.warnings, ElementsAre("1 node was not in the scene that is shown and left out."));
 }
 
 // ---- finding the format, options ----

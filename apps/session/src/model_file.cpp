@@ -26,13 +26,14 @@ Result<vdtree::VertexTree> with_texture(Result<vdtree::VertexTree> tree, const f
 
 Result<meshio::ReadResult> read_textured_mesh(const fs::path& file, const LoadOptions& options,
                                               meshio::ReadOptions reading) {
-    reading.materials = options.texture.empty() && !options.without_textures;
+    reading.images = options.texture.empty() && !options.without_textures;
+    reading.drop = options.drop;
     reading.progress = options.messages.progress;
     auto read = meshio::read_mesh(file, reading);
     if (!read) return read;
+    if (const auto laid = lay_texture(file, *read, options); !laid) return laid.error();
     if (options.messages.warning)
         for (const std::string& warning : read->warnings) options.messages.warning(file.string() + ": " + warning);
-    if (const auto laid = lay_texture(file, *read, options); !laid) return laid.error();
     return read;
 }
 

@@ -30,14 +30,19 @@ constexpr std::size_t no_material = std::numeric_limits<std::size_t>::max(), unu
 
 // By triangle: the number of its material, or of the first one that looks the same.
 std::vector<std::size_t> materials_of_triangles(const meshio::ReadResult& read) {
-    using Look =
-        std::tuple<std::filesystem::path, const std::string*, vdtree::Wrap, vdtree::Wrap, std::array<float, 4>>;
+    using Look = std::tuple<std::filesystem::path, const std::string*, vdtree::Wrap, vdtree::Wrap, std::array<float, 4>,
+                            std::array<double, 6>>;
     std::map<Look, std::size_t> first;
     std::map<std::string, std::size_t> numbers;
     for (std::size_t i = 0; i < read.materials.size(); ++i) {
         const meshio::Material& m = read.materials[i];
-        const Look look{
-            m.image, m.image_bytes.get(), m.wrap_u, m.wrap_v, {m.colour.r, m.colour.g, m.colour.b, m.colour.a}};
+        const glm::dmat2& uv = m.uv_map.linear;
+        const Look look{m.image,
+                        m.image_bytes.get(),
+                        m.wrap_u,
+                        m.wrap_v,
+                        {m.colour.r, m.colour.g, m.colour.b, m.colour.a},
+                        {uv[0][0], uv[0][1], uv[1][0], uv[1][1], m.uv_map.offset.x, m.uv_map.offset.y}};
         numbers.emplace(m.name, first.try_emplace(look, i).first->second);
     }
     std::vector<std::size_t> of(read.mesh.triangles.size(), no_material);
@@ -51,7 +56,13 @@ std::vector<std::size_t> materials_of_triangles(const meshio::ReadResult& read) 
 }
 
 // Gives every vertex one material: those that several use are doubled.
-std::vector<std::size_t> part_vertices(Mesh& mesh, const std::vector<std::size_t>& of_triangle) {
+std::vector<std::size_t> part_vertices(meshio::ReadResult& read, const std::vector<std::size_t>& of_triangle) {
+    Mesh& mesh = read.mesh;
+    const auto repeat = [](auto& values, std::size_t which, std::size_t count = 1) {
+        if (values.empty()) return;
+        for (std::size_t i = 0; i < count; ++i)
+            values.push_back(typename std::remove_cvref_t<decltype(values)>::value_type(values[which * count + i]));
+    };
     std::vector<std::size_t> of_vertex(mesh.positions.size(), unused);
     std::map<std::pair<Index, std::size_t>, Index> doubled;
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -62,10 +73,12 @@ std::vector<std::size_t> part_vertices(Mesh& mesh, const std::vector<std::size_t
                 doubled.try_emplace({v, of_triangle[t]}, static_cast<Index>(mesh.positions.size()));
             if (is_new) {
                 of_vertex.push_back(of_triangle[t]);
-                mesh.positions.push_back(glm::dvec3(mesh.positions[v]));
-                mesh.uvs.push_back(glm::vec2(mesh.uvs[v]));
-                if (!mesh.normals.empty()) mesh.normals.push_back(glm::vec3(mesh.normals[v]));
-                if (!mesh.colours.empty()) mesh.colours.push_back(glm::vec4(mesh.colours[v]));
+                repeat(mesh.positions, v);
+                repeat(mesh.uvs, v);
+                repeat(mesh.normals, v);
+                repeat(mesh.colours, v);
+                if (read.document)
+                    for (auto& channel : read.document->channels) repeat(channel.values, v, channel.components);
             }
             v = entry->second;
         }
@@ -102,23 +115,12 @@ private:
     std::map<std::tuple<std::filesystem::path, const std::string*, vdtree::Wrap, vdtree::Wrap>, Texture> images_;
 };
 
-// Multiplies materials' colours into those of the vertices.
+// The reflectance of a vertex: its own colour times its material's, and the texture's where it has one. Each is white
+// where nothing is said; a mesh of which nothing is said stays without colours.
 void colour_vertices(Mesh& mesh, const std::vector<Material>& materials, const std::vector<std::size_t>& of_vertex) {
-    const auto is_white = [&](std::size_t m) { return m >= materials.size() || materials[m].colour == glm::vec4(1); };
-    if (std::all_of(of_vertex.begin(), of_vertex.end(), is_white)) return;
     if (mesh.colours.empty()) mesh.colours.assign(mesh.positions.size(), glm::vec4(1));
     for (std::size_t v = 0; v < of_vertex.size(); ++v)
-        if (!is_white(of_vertex[v])) mesh.colours[v] *= materials[of_vertex[v]].colour;
-}
-
-// Without an image, of materials' opacity only: where vertices have colours at all, which make it known.
-void thin_vertices(Mesh& mesh, const std::vector<Material>& materials, const std::vector<std::size_t>& of_triangle) {
-    if (mesh.colours.empty()) return;
-    for (std::size_t t = 0; t < of_triangle.size(); ++t) {
-        if (of_triangle[t] == no_material) continue;
-        for (const Index v : mesh.triangles[t])
-            mesh.colours[v].a = std::min(mesh.colours[v].a, materials[of_triangle[t]].colour.a);
-    }
+        if (of_vertex[v] < materials.size()) mesh.colours[v] *= materials[of_vertex[v]].colour;
 }
 
 Result<void> check_uvs(const std::filesystem::path& mesh_file, const meshio::ReadResult& read) {
@@ -142,30 +144,41 @@ Result<void> lay_one(const std::filesystem::path& mesh_file, meshio::ReadResult&
     return {};
 }
 
-// Materials without an image, and triangles without a material, get a white one.
-Result<void> lay_materials(const std::filesystem::path& mesh_file, meshio::ReadResult& read) {
-    Mesh& mesh = read.mesh;
-    const std::vector<std::size_t> of_triangle = materials_of_triangles(read);
-    const auto has_image = [&](std::size_t m) { return m != no_material && read.materials[m].has_image(); };
-    if (std::none_of(of_triangle.begin(), of_triangle.end(), has_image)) {
-        thin_vertices(mesh, read.materials, of_triangle);
-        return {};
+// Says how the vertices of each part are drawn. `uv_maps`: by material, the last of triangles without one.
+void note_drawing(meshio::ReadResult& read, const std::vector<std::size_t>& of_triangle,
+                  const std::vector<meshio::UvMap>& uv_maps) {
+    if (!read.document) return;
+    for (const auto& run : read.document->runs) {
+        const std::size_t material = std::min(of_triangle[run.first_triangle], read.materials.size());
+        read.document->parts[run.part].drawn_uv = uv_maps[material];
+        if (material < read.materials.size()) read.document->parts[run.part].colour = read.materials[material].colour;
     }
-    if (const auto ok = check_uvs(mesh_file, read); !ok) return ok;
-    const std::vector<std::size_t> of_vertex = part_vertices(mesh, of_triangle);
+}
 
+// Lays the images of materials over the mesh, side by side. Materials without an image, and triangles without a
+// material, get a white one. Returns by material how its coordinates are drawn, the last of those without one.
+Result<std::vector<meshio::UvMap>> lay_images(const std::filesystem::path& mesh_file, meshio::ReadResult& read,
+                                              const std::vector<std::size_t>& of_triangle,
+                                              const std::vector<std::size_t>& of_vertex) {
+    Mesh& mesh = read.mesh;
+    const auto has_image = [&](std::size_t m) { return m != no_material && read.materials[m].has_image(); };
     Images images(mesh_file, read.uvs_from_top);
     static const Texture white{1, 1, vdtree::Wrap::clamp, vdtree::Wrap::clamp, {{255, 255, 255, 255}}};
     std::vector<const Texture*> of_material(read.materials.size() + 1, &white); // the last: no material
-    std::vector<AtlasPart> parts;
-    std::map<const Texture*, std::size_t> part_of;
-    std::vector<std::size_t> part_of_vertex(of_vertex.size(), 0);
     for (const std::size_t m : of_triangle) {
         if (!has_image(m) || of_material[m] != &white) continue;
         auto image = images.of(read.materials[m]);
         if (!image) return image.error();
         of_material[m] = *image;
     }
+    constexpr meshio::UvMap middle{glm::dmat2(0), glm::dvec2(0.5)};
+    std::vector<meshio::UvMap> maps(of_material.size(), middle);
+    for (std::size_t m = 0; m < read.materials.size(); ++m)
+        if (of_material[m] != &white) maps[m] = read.materials[m].uv_map;
+
+    std::vector<AtlasPart> parts;
+    std::map<const Texture*, std::size_t> part_of;
+    std::vector<std::size_t> part_of_material(of_material.size(), 0);
     for (std::size_t v = 0; v < of_vertex.size(); ++v) {
         if (of_vertex[v] == unused) continue;
         const std::size_t m = std::min(of_vertex[v], read.materials.size());
@@ -174,30 +187,74 @@ Result<void> lay_materials(const std::filesystem::path& mesh_file, meshio::ReadR
             parts.push_back({m < read.materials.size() ? "material '" + read.materials[m].name + "'" : "no material",
                              of_material[m],
                              {}});
-        part_of_vertex[v] = entry->second;
-        if (of_material[m] == &white) mesh.uvs[v] = glm::vec2(0.5f);
+        part_of_material[m] = entry->second;
+        mesh.uvs[v] = glm::vec2(maps[m](mesh.uvs[v]));
         parts[entry->second].used.include(mesh.uvs[v]);
     }
-    colour_vertices(mesh, read.materials, of_vertex);
     if (parts.size() == 1) {
         mesh.texture = *parts[0].texture;
-        return {};
+        return maps;
     }
     auto atlas = make_atlas(parts);
     if (!atlas) return Error{atlas.error().code, with_advice(mesh_file.string() + ": " + atlas.error().message)};
     for (std::size_t v = 0; v < of_vertex.size(); ++v) { // those that are not used get some place, too
-        const AtlasPlace& place = atlas->places[part_of_vertex[v]];
+        const AtlasPlace& place = atlas->places[part_of_material[std::min(of_vertex[v], read.materials.size())]];
         mesh.uvs[v] = glm::vec2(place.scale * glm::dvec2(mesh.uvs[v]) + place.offset);
     }
+    for (std::size_t m = 0; m < maps.size(); ++m) {
+        const AtlasPlace& place = atlas->places[part_of_material[m]];
+        for (int k = 0; k < 2; ++k) maps[m].linear[k] *= place.scale;
+        maps[m].offset = place.scale * maps[m].offset + place.offset;
+    }
     mesh.texture = std::move(atlas->texture);
+    return maps;
+}
+
+Result<void> lay_materials(const std::filesystem::path& mesh_file, meshio::ReadResult& read, bool with_images) {
+    const std::vector<std::size_t> of_triangle = materials_of_triangles(read);
+    const auto any = [&](auto&& holds) {
+        return std::any_of(of_triangle.begin(), of_triangle.end(),
+                           [&](std::size_t m) { return m != no_material && holds(read.materials[m]); });
+    };
+    const bool has_images = with_images && any([](const Material& m) { return m.has_image(); });
+    const bool has_colours = any([](const Material& m) { return m.colour != glm::vec4(1); });
+    if (!has_images && !has_colours) return {};
+    if (has_images)
+        if (const auto ok = check_uvs(mesh_file, read); !ok) return ok;
+    const std::vector<std::size_t> of_vertex = part_vertices(read, of_triangle);
+    if (has_colours) colour_vertices(read.mesh, read.materials, of_vertex);
+    Result<std::vector<meshio::UvMap>> maps = std::vector<meshio::UvMap>(read.materials.size() + 1);
+    if (has_images) maps = lay_images(mesh_file, read, of_triangle, of_vertex);
+    if (!maps) return maps.error();
+    note_drawing(read, of_triangle, *maps);
     return {};
+}
+
+// Hands what else the file said over to the mesh.
+void keep_document(meshio::ReadResult& read) {
+    if (!read.document) return;
+    meshio::SourceDocument& document = *read.document;
+    document.vertex_parts.assign(read.mesh.positions.size(), 0);
+    for (std::size_t i = 0; i < document.runs.size(); ++i) {
+        const std::size_t end =
+            i + 1 < document.runs.size() ? document.runs[i + 1].first_triangle : read.mesh.triangles.size();
+        for (std::size_t t = document.runs[i].first_triangle; t < end; ++t)
+            for (const Index v : read.mesh.triangles[t]) document.vertex_parts[v] = document.runs[i].part;
+    }
+    read.mesh.document = meshio::pack(document);
+    read.document.reset();
 }
 
 } // namespace
 
 Result<void> lay_texture(const std::filesystem::path& mesh_file, meshio::ReadResult& read, const LoadOptions& options) {
-    if (options.without_textures) return {};
-    return options.texture.empty() ? lay_materials(mesh_file, read) : lay_one(mesh_file, read, options.texture);
+    const bool has_own_image = !options.texture.empty();
+    if (const auto laid = lay_materials(mesh_file, read, !has_own_image && !options.without_textures); !laid)
+        return laid;
+    if (has_own_image)
+        if (const auto laid = lay_one(mesh_file, read, options.texture); !laid) return laid;
+    keep_document(read);
+    return {};
 }
 
 } // namespace unseen::session

@@ -170,4 +170,13 @@ Result<std::vector<float>> find_every_cost(const VertexTree& tree, const Distanc
 // The cut as a mesh of its own: only the vertices in use, in double precision, with the tree's attributes.
 Mesh extract_mesh(const Cut& cut);
 
+// The same, with the tree's node of each vertex, and the input's number of each triangle; the latter where the tree has
+// ranges.
+struct ExtractedMesh {
+    Mesh mesh;
+    std::vector<NodeId> nodes;
+    std::vector<Index> source_triangles; // ascending
+};
+ExtractedMesh extract_with_sources(const Cut& cut);
+
 } // namespace unseen::vdtree

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -38,6 +39,7 @@ struct MeshView {
     std::span<const glm::vec2> uvs = {};
     std::span<const MeshRange> ranges = {}; // ordered by first_triangle; may overlap between kinds
     TextureView texture = {};               // over the whole mesh by its UVs, multiplied with the colours; empty: none
+    std::span<const std::byte> document = {}; // what else its file said, for who wrote it here; trees keep it unread
 };
 
 // A triangle soup that owns its arrays.
@@ -49,8 +51,9 @@ struct Mesh {
     std::vector<glm::vec2> uvs;
     std::vector<MeshRange> ranges;
     Texture texture;
+    std::vector<std::byte> document;
 
-    MeshView view() const { return {positions, triangles, normals, colours, uvs, ranges, texture.view()}; }
+    MeshView view() const { return {positions, triangles, normals, colours, uvs, ranges, texture.view(), document}; }
 };
 
 // Checks what every algorithm relies on: finite positions, indices in range, attributes as long as the

@@ -143,6 +143,8 @@ public:
     std::span<const Index> source_triangles() const noexcept;
     std::span<const MeshRange> ranges() const noexcept;
     std::uint64_t dropped_triangles() const noexcept; // input triangles that used a vertex twice
+    std::span<const std::byte>
+    document() const noexcept; // MeshView::document; of read and mapped files it may be anything
     Closedness closedness() const noexcept;
     Sphere bounding_sphere() const noexcept;         // of the triangles' corners
     LuminanceRange luminance_range() const noexcept; // of all that is drawn

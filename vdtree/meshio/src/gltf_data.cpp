@@ -46,6 +46,8 @@ std::optional<std::string> decode_base64(std::string_view text) {
     return bytes;
 }
 
+} // namespace
+
 std::string decode_percent(std::string_view text) {
     std::string decoded;
     for (std::size_t i = 0; i < text.size(); ++i) {
@@ -62,8 +64,6 @@ std::string decode_percent(std::string_view text) {
     }
     return decoded;
 }
-
-} // namespace
 
 Buffers::Buffers(const MeshSource& source, const json& document, std::optional<std::string_view> bin)
     : source_(source) {
@@ -106,17 +106,18 @@ fs::path Buffers::below_folder(const std::string& uri, const std::string& where)
 std::string_view Buffers::resolve(const std::string& uri, const std::string& where) {
     const auto [found, is_new] = loaded_.try_emplace(uri);
     if (!is_new) return found->second;
-    found->second = uri.starts_with("data:") ? decode_data(uri, where) : read_beside(uri, where);
+    const bool is_data = uri.starts_with("data:");
+    found->second = is_data ? decode_data(uri, where) : read_beside(uri, where);
+    if (!is_data) external_bytes_ += found->second.size();
     return found->second;
 }
 
 // Only files in the mesh file's folder and below: a mesh must not be able to name any file of the machine.
-std::string Buffers::read_beside(const std::string& uri, const std::string& where) {
+std::string Buffers::read_beside(const std::string& uri, const std::string& where) const {
     const fs::path relative = below_folder(uri, where);
     if (source_.folder.empty()) fail(where + " lies in another file, which a mesh in memory cannot have.");
     Result<std::string> bytes = read_whole_file(source_.folder / relative);
     if (!bytes) fail(where + ": " + bytes.error().message);
-    external_bytes_ += bytes->size();
     return std::move(*bytes);
 }
 
@@ -240,13 +241,19 @@ void Accessors::for_each_sparse(const tinygltf::Accessor& a, std::size_t size, c
     }
 }
 
+int Accessors::components_of(int index) const {
+    switch (accessor(index).type) {
+    case TINYGLTF_TYPE_VEC2: return 2;
+    case TINYGLTF_TYPE_VEC3: return 3;
+    case TINYGLTF_TYPE_VEC4: return 4;
+    default: return 0;
+    }
+}
+
 std::vector<glm::dvec4> Accessors::vectors(int index, int components, const char* use) const {
     const tinygltf::Accessor& a = accessor(index);
     const std::string where = numbered("accessor", static_cast<std::size_t>(index));
-    const int found = a.type == TINYGLTF_TYPE_VEC2   ? 2
-                      : a.type == TINYGLTF_TYPE_VEC3 ? 3
-                      : a.type == TINYGLTF_TYPE_VEC4 ? 4
-                                                     : 0;
+    const int found = components_of(index);
     const bool fits = components == 0 ? found == 3 || found == 4 : found == components;
     if (!fits) fail(where + " has the wrong type for " + use + "; correct the JSON.");
     const std::size_t component_size = component_size_of(a.componentType, where);

@@ -17,6 +17,8 @@
 
 namespace unseen::meshio::gltf {
 
+std::string decode_percent(std::string_view text); // of URIs
+
 class Buffers {
 public:
     // The source must outlive the buffers. `bin`: the container's own, for the first.
@@ -25,13 +27,15 @@ public:
     static std::string decode_data(std::string_view uri, const std::string& where); // "data:...;base64,..."
     static std::filesystem::path below_folder(const std::string& uri, const std::string& where);
 
+    // Beside the mesh file; fails where it cannot be read.
+    std::string read_beside(const std::string& uri, const std::string& where) const;
+
     std::size_t count() const { return buffers_.size(); }
     std::string_view operator[](std::size_t i) const { return buffers_[i]; }
     std::uint64_t external_bytes() const { return external_bytes_; }
 
 private:
     std::string_view resolve(const std::string& uri, const std::string& where);
-    std::string read_beside(const std::string& uri, const std::string& where);
 
     const MeshSource& source_;
     std::map<std::string, std::string> loaded_;
@@ -44,6 +48,7 @@ public:
     Accessors(const tinygltf::Model& model, const Buffers& buffers) : model_(model), buffers_(buffers) {}
 
     std::size_t count_of(int index) const { return accessor(index).count; }
+    int components_of(int index) const; // 2, 3 or 4; 0: of another type
 
     // The accessor's elements with `components` components (0: 3 or 4), others 1 where there is a fourth.
     std::vector<glm::dvec4> vectors(int index, int components, const char* use) const;

@@ -26,10 +26,6 @@ constexpr std::uint32_t chunk_bin = 0x004E4942;
 constexpr std::size_t glb_header_bytes = 12;
 constexpr std::size_t chunk_header_bytes = 8;
 
-// Extensions without which the positions or triangles cannot be read.
-constexpr std::string_view unsupported_extensions[] = {"KHR_draco_mesh_compression", "EXT_meshopt_compression",
-                                                       "KHR_meshopt_compression", "EXT_mesh_gpu_instancing"};
-
 std::uint32_t word_at(std::string_view bytes, std::size_t offset) {
     std::array<char, 4> raw;
     std::memcpy(raw.data(), bytes.data() + offset, raw.size());
@@ -140,7 +136,6 @@ public:
 
     json reduce() {
         check_version();
-        check_extensions();
         copy_array("bufferViews", "buffer view", [&](const json& in, json& out) {
             integer(in, out, "buffer", max_int, true);
             integer(in, out, "byteOffset", max_size, false);
@@ -157,8 +152,8 @@ public:
         return std::move(reduced_);
     }
 
-    bool has_skins() const { return has_skins_; }
-    bool has_morph_targets() const { return has_morph_targets_; }
+    bool has_tangents() const { return has_tangents_; }
+    bool has_other_attributes() const { return has_other_attributes_; }
 
 private:
     void check_version() {
@@ -170,17 +165,6 @@ private:
                  ", and only 2 is read; convert it.");
         }
         reduced_["asset"]["version"] = "2.0";
-    }
-
-    void check_extensions() const {
-        for (const json& extension : array_of(document_, "extensionsRequired")) {
-            if (!extension.is_string()) continue;
-            const auto& required = extension.get_ref<const std::string&>();
-            if (std::find(std::begin(unsupported_extensions), std::end(unsupported_extensions), required) !=
-                std::end(unsupported_extensions)) {
-                fail("it needs the extension " + required + ", which is not read; export it without.");
-            }
-        }
     }
 
     template <class Copy>
@@ -226,6 +210,14 @@ private:
         if (const json* value = member(in, "name"); value != nullptr && value->is_string()) out["name"] = *value;
     }
 
+    // More sets of coordinates and colours are found in attacks, not in meshes.
+    static bool is_read(std::string_view attribute) {
+        constexpr std::string_view read[] = {"POSITION",   "NORMAL",     "TEXCOORD_0", "TEXCOORD_1", "TEXCOORD_2",
+                                             "TEXCOORD_3", "TEXCOORD_4", "TEXCOORD_5", "TEXCOORD_6", "TEXCOORD_7",
+                                             "COLOR_0",    "COLOR_1",    "COLOR_2",    "COLOR_3"};
+        return std::find(std::begin(read), std::end(read), attribute) != std::end(read);
+    }
+
     const json& object(const json& in, const char* key) const {
         const json* value = member(in, key);
         if (value == nullptr || !value->is_object()) fail(where_ + " has no " + key + "; correct the JSON.");
@@ -268,10 +260,11 @@ private:
             integer(primitive, copied, "mode", max_int, false);
             json& attributes = copied["attributes"] = json::object();
             const json& attributes_in = object(primitive, "attributes");
-            for (const char* key : {"POSITION", "NORMAL", "TEXCOORD_0", "COLOR_0"}) {
-                integer(attributes_in, attributes, key, max_int, false);
+            for (const auto& [key, value] : attributes_in.items()) {
+                const bool is_of_skin = key.starts_with("JOINTS_") || key.starts_with("WEIGHTS_");
+                if (is_read(key)) integer(attributes_in, attributes, key.c_str(), max_int, false);
+                else (key == "TANGENT" ? has_tangents_ : has_other_attributes_) |= !is_of_skin;
             }
-            has_morph_targets_ = has_morph_targets_ || member(primitive, "targets") != nullptr;
             primitives.push_back(std::move(copied));
         }
     }
@@ -284,14 +277,12 @@ private:
         numbers(in, out, "translation", 3);
         numbers(in, out, "rotation", 4);
         numbers(in, out, "scale", 3);
-        has_skins_ = has_skins_ || member(in, "skin") != nullptr;
     }
 
     const json& document_;
     json reduced_ = json::object();
     std::string where_;
-    bool has_skins_ = false;
-    bool has_morph_targets_ = false;
+    bool has_tangents_ = false, has_other_attributes_ = false;
 };
 
 bool ignore_image(tinygltf::Image*, const int, std::string*, std::string*, int, int, const unsigned char*, int, void*) {
@@ -324,7 +315,7 @@ tinygltf::Model to_model(const json& reduced) {
 Reduced reduce(const json& document) {
     Reducer reducer(document);
     tinygltf::Model model = to_model(reducer.reduce());
-    return {std::move(model), reducer.has_skins(), reducer.has_morph_targets()};
+    return {std::move(model), reducer.has_tangents(), reducer.has_other_attributes()};
 }
 
 } // namespace unseen::meshio::gltf

@@ -7,9 +7,12 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 #include <tiny_gltf.h>
+
+#include <meshio/mesh_io.h>
 
 namespace unseen::meshio::gltf {
 
@@ -41,8 +44,15 @@ inline constexpr std::int64_t max_int = std::numeric_limits<int>::max();
 // What describes triangles, every integer in range, without buffers and images.
 struct Reduced {
     tinygltf::Model model;
-    bool has_skins = false, has_morph_targets = false; // which were left out
+    bool has_tangents = false, has_other_attributes = false; // which were left out
 };
 Reduced reduce(const json& document);
+
+// Fails on what no cut can keep, unless it is to be dropped; what is dropped is told in the warnings.
+void check_kept(const json& document, const LeftOut& drop, std::vector<std::string>& warnings);
+
+// The document as far as it is kept beside the triangles: without geometry, what is dropped, extensions that nobody
+// here knows, and images that lie in the file.
+json without_geometry(json document, std::vector<std::string>& warnings);
 
 } // namespace unseen::meshio::gltf

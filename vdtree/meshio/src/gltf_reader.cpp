@@ -37,15 +37,99 @@ constexpr std::uint64_t bytes_per_vertex =
 constexpr std::uint64_t bytes_per_visit = 64;                // of a primitive: takes time even where it is empty
 constexpr std::uint64_t bytes_per_index = sizeof(Index) * 3; // in a strip an index makes a triangle
 
+// ---- images ----
+
+// Images as files, straight from the document: each is read once.
+class ImageReader {
+public:
+    // `spend` is told of all bytes of images in the file, and fails where they are too many.
+    ImageReader(const json& document, const Buffers& buffers, Callback<void(std::uint64_t)> spend)
+        : images_(array_of(document, "images")), views_(array_of(document, "bufferViews")), buffers_(buffers),
+          spend_(std::move(spend)), files_(images_.size()) {}
+
+    // One that lies beside the mesh file has no bytes.
+    const SourceDocument::File& read(std::size_t index) {
+        std::optional<SourceDocument::File>& file = files_[index];
+        if (!file) file = read_anew(images_[index], numbered("image", index));
+        return *file;
+    }
+
+    // All images, for who writes them again, those beside the mesh file once. What cannot be read is told in the
+    // warnings.
+    std::vector<SourceDocument::File> read_all(std::vector<std::string>& warnings) {
+        std::vector<SourceDocument::File> all;
+        std::set<std::string> read_already;
+        for (std::size_t i = 0; i < images_.size(); ++i) {
+            SourceDocument::File& file = all.emplace_back();
+            try {
+                file = read(i);
+                if (!file.uri.empty() && read_already.insert(file.uri).second)
+                    file.bytes =
+                        std::make_shared<const std::string>(buffers_.read_beside(file.uri, numbered("image", i)));
+            } catch (const Broken& broken) {
+                if (const json* uri = member(images_[i], "uri"); uri != nullptr && uri->is_string())
+                    file.uri = uri->get<std::string>();
+                warnings.push_back(broken.what + " It is named, but not kept.");
+            }
+        }
+        return all;
+    }
+
+private:
+    SourceDocument::File read_anew(const json& image, const std::string& where) {
+        if (!image.is_object()) fail(where + " is no object; correct the JSON.");
+        SourceDocument::File file;
+        if (const json* uri = member(image, "uri")) {
+            if (!uri->is_string()) fail(where + ": its uri is no text; correct the JSON.");
+            const auto& text = uri->get_ref<const std::string&>();
+            if (text.starts_with("data:")) file.bytes = kept(Buffers::decode_data(text, where));
+            else file.uri = text;
+            return file;
+        }
+        const json* view_index = member(image, "bufferView");
+        if (view_index == nullptr) fail(where + " has no bufferView; correct the JSON.");
+        const auto index = static_cast<std::size_t>(to_integer_in_range(*view_index, max_int, where + ": bufferView"));
+        if (index >= views_.size() || !views_[index].is_object()) {
+            fail(where + ": its bufferView is " + std::to_string(index) + ", but there are " +
+                 std::to_string(views_.size()) + " bufferViews; correct the JSON.");
+        }
+        const auto number = [&](const char* key, std::int64_t missing) {
+            const json* value = member(views_[index], key);
+            if (value == nullptr && missing >= 0) return static_cast<std::size_t>(missing);
+            const std::string view = numbered("bufferViews", index);
+            if (value == nullptr) fail(view + " has no " + key + "; correct the JSON.");
+            return static_cast<std::size_t>(to_integer_in_range(*value, max_size, view + ": " + key));
+        };
+        const std::size_t buffer = number("buffer", -1), offset = number("byteOffset", 0),
+                          length = number("byteLength", -1);
+        if (buffer >= buffers_.count() || offset > buffers_[buffer].size() ||
+            length > buffers_[buffer].size() - offset) {
+            fail(where + " ends behind its buffer; the data are cut short or the JSON is wrong.");
+        }
+        if (length == 0) fail(where + " is empty; correct the JSON.");
+        file.bytes = kept(std::string(buffers_[buffer].substr(offset, length)));
+        return file;
+    }
+
+    std::shared_ptr<const std::string> kept(std::string bytes) {
+        spend_(bytes.size());
+        return std::make_shared<const std::string>(std::move(bytes));
+    }
+
+    const json& images_;
+    const json& views_;
+    const Buffers& buffers_;
+    Callback<void(std::uint64_t)> spend_;
+    std::vector<std::optional<SourceDocument::File>> files_;
+};
+
 // ---- materials ----
 
 // The colours and images of materials, straight from the document.
 class MaterialReader {
 public:
-    // `spend` is told of all bytes of images, and fails where they are too many.
-    MaterialReader(const json& document, const Buffers& buffers, std::vector<std::string>& warnings,
-                   Callback<void(std::uint64_t)> spend)
-        : document_(document), buffers_(buffers), warnings_(warnings), spend_(std::move(spend)) {}
+    // `images`: null: colours only.
+    MaterialReader(const json& document, ImageReader* images) : document_(document), images_(images) {}
 
     // Alpha counts where it is not said to be ignored.
     Material read(std::size_t index, std::string name) {
@@ -57,7 +141,8 @@ public:
         if (const json* factor = member(*surface, "baseColorFactor")) material.colour = colour(*factor);
         const json* mode = member(of_file, "alphaMode");
         if (mode == nullptr || *mode == "OPAQUE") material.colour.a = 1;
-        if (const json* texture = optional_object(*surface, "baseColorTexture")) add_texture(*texture, material);
+        const json* texture = optional_object(*surface, "baseColorTexture");
+        if (images_ != nullptr && texture != nullptr) add_texture(*texture, material);
         return material;
     }
 
@@ -93,12 +178,17 @@ private:
     }
 
     void add_texture(const json& info, Material& material) {
-        if (const json* set = member(info, "texCoord"); set != nullptr && *set != 0) {
+        const json* set = member(info, "texCoord");
+        const json* extensions = optional_object(info, "extensions");
+        const json* transform = extensions ? optional_object(*extensions, "KHR_texture_transform") : nullptr;
+        if (transform != nullptr) {
+            material.uv_map = uv_map(*transform);
+            if (const json* other = member(*transform, "texCoord")) set = other;
+        }
+        if (set != nullptr && *set != 0) {
             fail(where_ + ": its texture lies by the texture coordinates " + set->dump() +
                  ", and only 0 is read; export it without, or leave the textures out.");
         }
-        if (member(info, "extensions") != nullptr)
-            warnings_.push_back(where_ + ": the transform of its texture was ignored.");
         const json& texture = element("textures", info, "index");
         if (member(texture, "sampler") != nullptr) {
             const std::string of_texture = where_;
@@ -107,7 +197,29 @@ private:
             material.wrap_v = wrap(sampler, "wrapT");
             where_ = of_texture;
         }
-        add_image(element("images", texture, "source"), material);
+        element("images", texture, "source"); // it is there
+        const SourceDocument::File& image =
+            images_->read(static_cast<std::size_t>(to_integer_in_range(texture["source"], max_int, where_)));
+        if (image.uri.empty()) material.image_bytes = image.bytes;
+        else material.image = Buffers::below_folder(image.uri, where_);
+    }
+
+    // KHR_texture_transform: scaled, turned and moved.
+    UvMap uv_map(const json& transform) const {
+        const auto numbers = [&](const char* key, glm::dvec2 missing) {
+            const json* values = member(transform, key);
+            if (values == nullptr) return missing;
+            if (!values->is_array() || values->size() != 2 || !(*values)[0].is_number() || !(*values)[1].is_number())
+                fail(where_ + ": the " + key + " of its texture should be 2 numbers; correct it.");
+            return glm::dvec2((*values)[0].get<double>(), (*values)[1].get<double>());
+        };
+        const json* rotation = member(transform, "rotation");
+        if (rotation != nullptr && !rotation->is_number())
+            fail(where_ + ": the rotation of its texture should be a number; correct it.");
+        const double angle = rotation != nullptr ? rotation->get<double>() : 0.0;
+        const glm::dvec2 scale = numbers("scale", glm::dvec2(1));
+        const double c = std::cos(angle), s = std::sin(angle);
+        return {glm::dmat2(scale.x * c, -scale.x * s, scale.y * s, scale.y * c), numbers("offset", glm::dvec2(0))};
     }
 
     Wrap wrap(const json& sampler, const char* key) const {
@@ -120,49 +232,8 @@ private:
         return *value == clamps ? Wrap::clamp : Wrap::repeat;
     }
 
-    void add_image(const json& image, Material& material) {
-        if (const json* uri = member(image, "uri")) {
-            if (!uri->is_string()) fail(where_ + ": its uri is no text; correct the JSON.");
-            const auto& text = uri->get_ref<const std::string&>();
-            if (text.starts_with("data:"))
-                material.image_bytes = shared(image, [&] { return Buffers::decode_data(text, where_); });
-            else material.image = Buffers::below_folder(text, where_);
-            return;
-        }
-        const std::string of_image = where_;
-        const json& view = element("bufferViews", image, "bufferView");
-        const auto number = [&](const char* key, std::int64_t missing) {
-            const json* value = member(view, key);
-            if (value == nullptr && missing >= 0) return static_cast<std::size_t>(missing);
-            if (value == nullptr) fail(where_ + " has no " + key + "; correct the JSON.");
-            return static_cast<std::size_t>(to_integer_in_range(*value, max_size, where_ + ": " + key));
-        };
-        const std::size_t buffer = number("buffer", -1), offset = number("byteOffset", 0),
-                          length = number("byteLength", -1);
-        if (buffer >= buffers_.count() || offset > buffers_[buffer].size() ||
-            length > buffers_[buffer].size() - offset) {
-            fail(of_image + " ends behind its buffer; the data are cut short or the JSON is wrong.");
-        }
-        if (length == 0) fail(of_image + " is empty; correct the JSON.");
-        material.image_bytes = shared(image, [&] { return std::string(buffers_[buffer].substr(offset, length)); });
-    }
-
-    // Each image is copied once, however many materials have it.
-    template <class F>
-    std::shared_ptr<const std::string> shared(const json& image, F&& bytes) {
-        auto& known = images_[&image];
-        if (!known) {
-            known = std::make_shared<const std::string>(bytes());
-            spend_(known->size());
-        }
-        return known;
-    }
-
     const json& document_;
-    const Buffers& buffers_;
-    std::vector<std::string>& warnings_;
-    Callback<void(std::uint64_t)> spend_;
-    std::map<const json*, std::shared_ptr<const std::string>> images_;
+    ImageReader* images_;
     std::string where_;
 };
 
@@ -237,7 +308,7 @@ public:
     // Empty where the caller cancelled.
     std::optional<ReadResult> read() {
         if (model_.nodes.empty()) {
-            for (std::size_t i = 0; i < model_.meshes.size(); ++i) add_mesh(model_.meshes[i], Placement{});
+            for (std::size_t i = 0; i < model_.meshes.size(); ++i) add_mesh(i, -1, Placement{});
         } else {
             for (const int root : root_nodes()) {
                 if (!add_tree(root)) return std::nullopt;
@@ -247,6 +318,11 @@ public:
             result_.warnings.push_back(counted_were(skipped_primitives_, "primitive") +
                                        " left out for having no triangles or no positions.");
         }
+        std::uint64_t hidden = 0;
+        for (std::size_t i = 0; i < reached_.size(); ++i) hidden += !reached_[i] && model_.nodes[i].mesh >= 0;
+        if (hidden > 0)
+            result_.warnings.push_back(counted_were(hidden, "node") + " not in the scene that is shown and left out.");
+        keep_channels();
         return std::move(result_);
     }
 
@@ -309,7 +385,8 @@ private:
                     fail(where + " uses mesh " + std::to_string(node.mesh) + ", but there are " +
                          std::to_string(model_.meshes.size()) + "; correct the JSON.");
                 }
-                add_mesh(model_.meshes[static_cast<std::size_t>(node.mesh)], placement_of(world));
+                add_mesh(static_cast<std::size_t>(node.mesh), static_cast<std::int32_t>(visit.node),
+                         placement_of(world));
             }
             // Reversed, so that children come off the stack in their order.
             for (auto child = node.children.rbegin(); child != node.children.rend(); ++child) {
@@ -332,44 +409,81 @@ private:
         stack.push_back({index, depth, parent});
     }
 
-    // Accessors of a primitive's vertices. Primitives of one mesh with the same ones share their vertices.
-    using VertexSource = std::array<int, 4>; // position, normal, UV, colour; -1: none
+    // Accessors of a primitive's vertices, by attribute. Primitives of one mesh with the same ones share their
+    // vertices.
+    using VertexSource = std::map<std::string, int>;
 
-    void add_mesh(const tinygltf::Mesh& mesh, const Placement& placement) {
+    void add_mesh(std::size_t index, std::int32_t node, const Placement& placement) {
+        const tinygltf::Mesh& mesh = model_.meshes[index];
         std::map<VertexSource, Index> first_vertices;
-        for (const tinygltf::Primitive& primitive : mesh.primitives) {
+        for (std::size_t i = 0; i < mesh.primitives.size(); ++i) {
+            const tinygltf::Primitive& primitive = mesh.primitives[i];
             spend(1, bytes_per_visit);
             const bool has_triangles = primitive.mode == TINYGLTF_MODE_TRIANGLES ||
                                        primitive.mode == TINYGLTF_MODE_TRIANGLE_STRIP ||
                                        primitive.mode == TINYGLTF_MODE_TRIANGLE_FAN;
-            const VertexSource vertices = vertex_source(primitive);
-            if (!has_triangles || vertices[0] < 0) {
+            const VertexSource& vertices = primitive.attributes;
+            if (!has_triangles || !vertices.contains("POSITION")) {
                 ++skipped_primitives_;
                 continue;
             }
             const auto [first, is_new] =
                 first_vertices.try_emplace(vertices, static_cast<Index>(result_.mesh.positions.size()));
             if (is_new) add_vertices(vertices, placement);
-            add_triangles(mesh, primitive, first->second, accessors_.count_of(vertices[0]), placement.is_mirrored);
+            const std::uint64_t first_triangle = result_.mesh.triangles.size();
+            add_triangles(mesh, primitive, first->second, accessors_.count_of(vertices.at("POSITION")),
+                          placement.is_mirrored);
+            if (result_.mesh.triangles.size() == first_triangle) continue;
+            spend(1, sizeof(SourceDocument::Part) + sizeof(SourceDocument::Run));
+            document_.runs.push_back({first_triangle, static_cast<std::uint32_t>(document_.parts.size())});
+            document_.parts.push_back({.node = node,
+                                       .mesh = static_cast<std::int32_t>(index),
+                                       .primitive = static_cast<std::int32_t>(i),
+                                       .to_world = placement.matrix,
+                                       .channels = channels_of(vertices)});
         }
     }
 
-    static VertexSource vertex_source(const tinygltf::Primitive& primitive) {
-        const auto find = [&](const char* name) {
-            const auto found = primitive.attributes.find(name);
-            return found == primitive.attributes.end() ? -1 : found->second;
-        };
-        return {find("POSITION"), find("NORMAL"), find("TEXCOORD_0"), find("COLOR_0")};
+    // What is kept as the file has it: all but positions.
+    std::size_t channel(const std::string& attribute, int accessor) {
+        const auto components = static_cast<std::uint32_t>(accessors_.components_of(accessor));
+        auto& channels = document_.channels;
+        for (std::size_t i = 0; i < channels.size(); ++i)
+            if (channels[i].name == attribute && channels[i].components == components) return i;
+        channels.push_back({attribute, components, {}});
+        return channels.size() - 1;
+    }
+    std::uint32_t channels_of(const VertexSource& vertices) {
+        std::uint32_t bits = 0;
+        for (const auto& [attribute, accessor] : vertices)
+            if (attribute != "POSITION") bits |= std::uint32_t{1} << channel(attribute, accessor);
+        return bits;
+    }
+    void keep(const std::string& attribute, int accessor, std::size_t first, const std::vector<glm::dvec4>& values) {
+        SourceDocument::Channel& kept = document_.channels[channel(attribute, accessor)];
+        spend(first + values.size() - kept.values.size() / kept.components, kept.components * sizeof(float));
+        kept.values.resize(first * kept.components);
+        for (const glm::dvec4& value : values)
+            for (int k = 0; k < static_cast<int>(kept.components); ++k)
+                kept.values.push_back(static_cast<float>(value[k]));
+    }
+    void keep_channels() {
+        for (SourceDocument::Channel& kept : document_.channels) {
+            const std::size_t size = result_.mesh.positions.size() * kept.components;
+            spend(size - kept.values.size(), sizeof(float));
+            kept.values.resize(size);
+        }
+        result_.document = std::move(document_);
     }
 
     void add_vertices(const VertexSource& from, const Placement& placement) {
         Mesh& mesh = result_.mesh;
         const std::size_t first = mesh.positions.size();
-        const std::size_t count = accessors_.count_of(from[0]);
-        for (const int attribute : from) {
-            if (attribute >= 0 && accessors_.count_of(attribute) != count) {
-                fail(numbered("accessor", static_cast<std::size_t>(attribute)) + " has " +
-                     std::to_string(accessors_.count_of(attribute)) + " elements for " + std::to_string(count) +
+        const std::size_t count = accessors_.count_of(from.at("POSITION"));
+        for (const auto& [attribute, accessor] : from) {
+            if (accessors_.count_of(accessor) != count) {
+                fail(numbered("accessor", static_cast<std::size_t>(accessor)) + " has " +
+                     std::to_string(accessors_.count_of(accessor)) + " elements for " + std::to_string(count) +
                      " positions; correct the JSON.");
             }
         }
@@ -377,32 +491,44 @@ private:
         if (count >= std::numeric_limits<Index>::max() - first) {
             fail("it has more vertices than 32-bit indices can number; split the scene.");
         }
-        for (const glm::dvec4& p : accessors_.vectors(from[0], 3, "positions")) {
-            mesh.positions.push_back(glm::dvec3(placement.matrix * glm::dvec4(p.x, p.y, p.z, 1.0)));
-        }
-        if (from[1] >= 0) {
-            mesh.normals.resize(first, missing_normal);
-            for (const glm::dvec4& n : accessors_.vectors(from[1], 3, "normals")) {
-                if (!std::isfinite(n.x) || !std::isfinite(n.y) || !std::isfinite(n.z)) {
-                    fail("normal " + std::to_string(mesh.normals.size() - first) + " of " +
-                         numbered("accessor", static_cast<std::size_t>(from[1])) + " is NaN or infinite; correct it.");
-                }
-                mesh.normals.push_back(placed_normal(placement, glm::dvec3(n)));
-            }
-        }
-        if (from[2] >= 0) {
-            mesh.uvs.resize(first, glm::vec2(0.0f));
-            for (const glm::dvec4& uv : accessors_.vectors(from[2], 2, "texture coordinates")) {
-                mesh.uvs.emplace_back(uv.x, uv.y);
-            }
-        }
-        if (from[3] >= 0) {
-            mesh.colours.resize(first, missing_colour);
-            for (const glm::dvec4& c : accessors_.vectors(from[3], 0, "colours")) mesh.colours.emplace_back(c);
-        }
+        for (const auto& [attribute, accessor] : from) add_attribute(attribute, accessor, first, placement);
         if (!mesh.normals.empty()) mesh.normals.resize(mesh.positions.size(), missing_normal);
         if (!mesh.uvs.empty()) mesh.uvs.resize(mesh.positions.size(), glm::vec2(0.0f));
         if (!mesh.colours.empty()) mesh.colours.resize(mesh.positions.size(), missing_colour);
+    }
+
+    void add_attribute(const std::string& attribute, int accessor, std::size_t first, const Placement& placement) {
+        Mesh& mesh = result_.mesh;
+        if (attribute == "POSITION") {
+            for (const glm::dvec4& p : accessors_.vectors(accessor, 3, "positions"))
+                mesh.positions.push_back(glm::dvec3(placement.matrix * glm::dvec4(p.x, p.y, p.z, 1.0)));
+            return;
+        }
+        const bool is_colour = attribute.starts_with("COLOR_"), is_normal = attribute == "NORMAL";
+        const auto values = accessors_.vectors(accessor,
+                                               is_colour   ? 0
+                                               : is_normal ? 3
+                                                           : 2,
+                                               is_colour   ? "colours"
+                                               : is_normal ? "normals"
+                                                           : "texture coordinates");
+        if (is_normal) {
+            mesh.normals.resize(first, missing_normal);
+            for (const glm::dvec4& n : values) {
+                if (!std::isfinite(n.x) || !std::isfinite(n.y) || !std::isfinite(n.z)) {
+                    fail("normal " + std::to_string(mesh.normals.size() - first) + " of " +
+                         numbered("accessor", static_cast<std::size_t>(accessor)) + " is NaN or infinite; correct it.");
+                }
+                mesh.normals.push_back(placed_normal(placement, glm::dvec3(n)));
+            }
+        } else if (attribute == "TEXCOORD_0") {
+            mesh.uvs.resize(first, glm::vec2(0.0f));
+            for (const glm::dvec4& uv : values) mesh.uvs.emplace_back(uv.x, uv.y);
+        } else if (attribute == "COLOR_0") {
+            mesh.colours.resize(first, missing_colour);
+            for (const glm::dvec4& c : values) mesh.colours.emplace_back(c);
+        }
+        keep(attribute, accessor, first, values);
     }
 
     void add_triangles(const tinygltf::Mesh& mesh, const tinygltf::Primitive& primitive, Index first, std::size_t count,
@@ -466,6 +592,7 @@ private:
     std::vector<bool> reached_;
     std::set<std::size_t> used_materials_;
     std::unordered_map<std::string, std::size_t> first_of_name_; // of materials
+    SourceDocument document_;
     std::uint64_t bytes_left_;
     std::uint64_t skipped_primitives_ = 0;
 };
@@ -476,19 +603,22 @@ Result<ReadResult> read_document(const MeshSource& source) {
     const json document = parse_json(container.json_text);
     if (!source.keep_going(source.bytes.size() / 4, "reading glTF")) return cancelled(source);
 
+    std::vector<std::string> warnings;
     const Reduced reduced = reduce(document);
+    check_kept(document, source.options.drop, warnings);
+    if (reduced.has_tangents) warnings.push_back("tangents were left out; they follow from normals and coordinates.");
+    if (reduced.has_other_attributes) warnings.push_back("vertex attributes that are not known were left out.");
     const Buffers buffers(source, document, container.bin);
     SceneReader scene(source, reduced.model, buffers);
     std::optional<ReadResult> result = scene.read();
     if (!result) return cancelled(source);
     result->uvs_from_top = true;
-    if (source.options.materials) {
-        const auto spend = [&](std::uint64_t bytes) { scene.spend(1, bytes); };
-        MaterialReader materials(document, buffers, result->warnings, spend);
-        scene.read_materials(materials, *result);
-    }
-    if (reduced.has_skins) result->warnings.push_back("skins were ignored; the mesh is in its bind pose.");
-    if (reduced.has_morph_targets) result->warnings.push_back("morph targets were ignored.");
+    ImageReader images(document, buffers, [&](std::uint64_t bytes) { scene.spend(1, bytes); });
+    MaterialReader materials(document, source.options.images ? &images : nullptr);
+    scene.read_materials(materials, *result);
+    result->document->files = images.read_all(warnings);
+    result->document->json = without_geometry(document, warnings).dump(-1, ' ', false, json::error_handler_t::replace);
+    result->warnings.insert(result->warnings.end(), warnings.begin(), warnings.end());
     return std::move(*result);
 }
 

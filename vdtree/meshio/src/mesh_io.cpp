@@ -1,6 +1,7 @@
 // Finds out what a file is, has it read, and does what all formats share.
 #include <meshio/mesh_io.h>
 
+#include "file_output.h"
 #include "mesh_readers.h"
 #include "text_scanner.h"
 #include <vdtree/internal/finite.h>
@@ -28,12 +29,6 @@ enum class Format { ply, obj, off, stl, gltf };
 constexpr std::string_view utf8_mark = "\xEF\xBB\xBF";
 // Longer than any word of the formats; the rest of a longer one helps nobody.
 constexpr std::size_t max_quoted = 40;
-
-std::string lower_ending(const fs::path& name) {
-    std::string ending = name.extension().string();
-    for (char& c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    return ending;
-}
 
 std::optional<Format> format_by_ending(const fs::path& name) {
     const std::string ending = lower_ending(name);
@@ -142,6 +137,29 @@ void repair_attributes(ReadResult& result) {
     if (uvs > 0) result.warnings.push_back(counted_were(uvs, "texture coordinate") + " not finite and set to 0.");
 }
 
+// The runs of those triangles that stay. To be called before the others are dropped.
+std::vector<SourceDocument::Run> shortened(const std::vector<SourceDocument::Run>& runs, const Mesh& mesh) {
+    std::vector<SourceDocument::Run> kept;
+    std::uint64_t dropped = 0;
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+        const std::uint64_t first = runs[i].first_triangle - dropped;
+        const std::uint64_t end = i + 1 < runs.size() ? runs[i + 1].first_triangle : mesh.triangles.size();
+        for (std::uint64_t t = runs[i].first_triangle; t < end; ++t) {
+            const Triangle& corners = mesh.triangles[t];
+            dropped += corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0];
+        }
+        if (end - dropped > first) kept.push_back({first, runs[i].part});
+    }
+    return kept;
+}
+
+void finish_document(SourceDocument& document, const Mesh& mesh) {
+    document.runs = shortened(document.runs, mesh);
+    for (auto& channel : document.channels)
+        for (float& value : channel.values)
+            if (!std::isfinite(value)) value = 0;
+}
+
 Result<ReadResult> finish(const MeshSource& source, ReadResult result) {
     // Before the checks: they would accept a mesh without triangles.
     if (result.mesh.triangles.empty()) {
@@ -151,6 +169,7 @@ Result<ReadResult> finish(const MeshSource& source, ReadResult result) {
         return malformed(source, valid.error().message);
     }
     repair_attributes(result);
+    if (result.document) finish_document(*result.document, result.mesh);
     result.dropped_triangles = drop_degenerate_triangles(result.mesh);
     if (result.mesh.triangles.empty()) {
         return malformed(source, "all of its " + std::to_string(result.dropped_triangles) +

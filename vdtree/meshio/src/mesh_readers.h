@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -49,9 +50,14 @@ bool starts_with_off_keyword(std::string_view bytes);
 // machine.
 std::optional<std::filesystem::path> path_beside(std::string_view name);
 
-// Materials of a Wavefront MTL file, added to those there are. `name` is that of the file, for messages.
-Result<void> read_mtl(std::string_view bytes, const std::string& name, std::vector<Material>& materials,
-                      std::vector<std::string>& warnings);
+struct MtlContents {
+    std::vector<Material> materials;
+    std::set<std::filesystem::path> images; // all that are named, below the mesh file's folder
+    std::vector<std::string> warnings;
+};
+// Those of a Wavefront MTL file, added to what there is. `name` is that of the file, for messages; without images, bad
+// ones are no errors.
+Result<void> read_mtl(std::string_view bytes, const std::string& name, bool with_images, MtlContents& contents);
 
 // Reads a regular file whole; pipes and devices are refused.
 Result<std::string> read_whole_file(const std::filesystem::path& file);

@@ -1,4 +1,4 @@
-// Wavefront MTL: of each material its diffuse colour, its opacity and its diffuse image.
+// Wavefront MTL: of each material its diffuse colour, its opacity and its diffuse image, and the names of all images.
 #include "mesh_readers.h"
 #include "text_scanner.h"
 
@@ -11,10 +11,9 @@ namespace {
 
 class MtlReader {
 public:
-    MtlReader(std::string_view bytes, const std::string& name, std::vector<Material>& materials,
-              std::vector<std::string>& warnings)
-        : bytes_(bytes), name_(name), materials_(materials), warnings_(warnings) {
-        for (const Material& m : materials) names_.insert(m.name);
+    MtlReader(std::string_view bytes, const std::string& name, bool with_images, MtlContents& contents)
+        : bytes_(bytes), name_(name), with_images_(with_images), contents_(contents), materials_(contents.materials) {
+        for (const Material& m : materials_) names_.insert(m.name);
     }
 
     Result<void> read() {
@@ -30,12 +29,13 @@ public:
                 begin(trimmed(rest));
                 continue;
             }
+            if (names_image(keyword)) note_image(rest);
             if (!is_open_) continue; // before the first material, or in one that was there before
             Result<void> done;
             if (keyword == "Kd") done = read_colour(rest, lines.line());
             else if (keyword == "d") done = read_alpha(rest, lines.line(), false);
             else if (keyword == "Tr") done = read_alpha(rest, lines.line(), true);
-            else if (keyword == "map_Kd") done = read_image(rest, lines.line());
+            else if (keyword == "map_Kd" && with_images_) done = read_image(rest, lines.line());
             if (!done) return done;
         }
         return {};
@@ -86,25 +86,43 @@ private:
         return {};
     }
 
-    // map_Kd [-option values ...] FILE; the name may have blanks.
+    static bool names_image(std::string_view keyword) {
+        return keyword.starts_with("map_") || keyword == "bump" || keyword == "disp" || keyword == "decal" ||
+               keyword == "norm" || keyword == "refl";
+    }
+
+    // [-option values ...] FILE; leaves the name, which may have blanks. Calls f(option, its last value) for each.
+    template <class F>
+    static void skip_options(std::string_view& rest, F&& f) {
+        while ((rest = trimmed(rest)).starts_with('-')) {
+            const std::string_view option = take_word(rest);
+            std::string_view value;
+            if (option == "-s" || option == "-o" || option == "-t") {
+                double number = 0;
+                for (std::string_view next = rest; to_number(take_word(next), number);) rest = next; // one to three
+            } else {
+                if (option == "-mm") take_word(rest);
+                value = take_word(rest); // -blendu, -blendv, -bm, -cc, -boost, -imfchan, -texres, -type: one value
+            }
+            f(option, value);
+        }
+    }
+
+    // Any image, for who copies it.
+    void note_image(std::string_view rest) {
+        skip_options(rest, [](std::string_view, std::string_view) {});
+        if (const auto path = path_beside(rest)) contents_.images.insert(*path);
+    }
+
     Result<void> read_image(std::string_view rest, std::uint64_t line) {
         Material& m = material();
         m.wrap_u = m.wrap_v = Wrap::repeat;
-        while ((rest = trimmed(rest)).starts_with('-')) {
-            const std::string_view option = take_word(rest);
-            if (option == "-clamp") {
-                m.wrap_u = m.wrap_v = take_word(rest) == "on" ? Wrap::clamp : Wrap::repeat;
-            } else if (option == "-s" || option == "-o" || option == "-t") {
-                double value = 0;
-                for (std::string_view next = rest; to_number(take_word(next), value);) rest = next; // one to three
-                warnings_.push_back(name_ + ": line " + std::to_string(line) + ": " + in_quotes(option) +
-                                    " of an image was ignored.");
-            } else if (option == "-mm") {
-                take_word(rest), take_word(rest);
-            } else {
-                take_word(rest); // -blendu, -blendv, -cc, -boost, -imfchan, -texres, -type: one value
-            }
-        }
+        skip_options(rest, [&](std::string_view option, std::string_view value) {
+            if (option == "-clamp") m.wrap_u = m.wrap_v = value == "on" ? Wrap::clamp : Wrap::repeat;
+            if (option == "-s" || option == "-o" || option == "-t")
+                contents_.warnings.push_back(name_ + ": line " + std::to_string(line) + ": " + in_quotes(option) +
+                                             " of an image was ignored.");
+        });
         if (rest.empty())
             return bad(line, "material " + in_quotes(m.name) + " names no image; add it or remove the line.");
         const auto path = path_beside(rest);
@@ -117,17 +135,17 @@ private:
 
     std::string_view bytes_;
     const std::string& name_;
+    const bool with_images_;
+    MtlContents& contents_;
     std::vector<Material>& materials_;
-    std::vector<std::string>& warnings_;
     std::unordered_set<std::string> names_; // of all materials so far
     bool is_open_ = false;
 };
 
 } // namespace
 
-Result<void> read_mtl(std::string_view bytes, const std::string& name, std::vector<Material>& materials,
-                      std::vector<std::string>& warnings) {
-    return MtlReader(bytes, name, materials, warnings).read();
+Result<void> read_mtl(std::string_view bytes, const std::string& name, bool with_images, MtlContents& contents) {
+    return MtlReader(bytes, name, with_images, contents).read();
 }
 
 } // namespace unseen::meshio

@@ -10,6 +10,8 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <map>
+#include <memory>
 #include <numeric>
 #include <random>
 #include <set>
@@ -182,6 +184,7 @@ public:
         add_attributes();
         if (has_index_overflow_) return too_many_vertices();
         add_warnings();
+        keep_document();
         return std::move(result_);
     }
 
@@ -261,11 +264,12 @@ private:
                 if (Result<void> done = add_face(rest, statements.line()); !done) return done;
             } else if (keyword == "g" || keyword == "o") {
                 start_range(group_, rest, MeshRange::Kind::group);
+                change_part(keyword == "g" ? &SourceDocument::Part::group : &SourceDocument::Part::object, rest);
             } else if (keyword == "mtllib") {
-                if (source_.options.materials)
-                    if (Result<void> done = read_materials(rest, statements.line()); !done) return done;
+                if (Result<void> done = read_materials(rest, statements.line()); !done) return done;
             } else if (keyword == "usemtl") {
                 start_range(material_, rest, MeshRange::Kind::material);
+                change_part(&SourceDocument::Part::material, rest);
             } else {
                 note_unknown(keyword, statements.line());
             }
@@ -299,6 +303,12 @@ private:
         }
         points_.clear();
         for (const Corner& corner : corners_) points_.push_back(positions()[corner.position]);
+        begin_triangle();
+        auto& [has_normals, has_uvs] = part_attributes_[document_.runs.back().part];
+        for (const Corner& corner : corners_) {
+            has_normals = has_normals || corner.normal != none;
+            has_uvs = has_uvs || corner.uv != none;
+        }
         polygons_.triangulate(points_, [&](const Triangle& t) {
             triangle_corners_.push_back(corners_[t[0]]);
             triangle_corners_.push_back(corners_[t[1]]);
@@ -382,13 +392,65 @@ private:
             return {};
         }
         if (!libraries_.insert(*path).second) return {}; // it is often named again and again
-        const Result<std::string> bytes = read_whole_file(source_.folder / *path);
+        document_.files.push_back({.use = SourceDocument::File::Use::library, .uri = path->generic_string()});
+        Result<std::string> bytes = read_whole_file(source_.folder / *path);
         if (!bytes) {
             warn(where + " were left out: " + bytes.error().message);
             return {};
         }
         has_library_ = true;
-        return read_mtl(*bytes, (source_.folder / *path).string(), result_.materials, result_.warnings);
+        document_.files.back().bytes = std::make_shared<const std::string>(std::move(*bytes));
+        return read_mtl(*document_.files.back().bytes, (source_.folder / *path).string(), source_.options.images,
+                        library_);
+    }
+
+    // ---- what is kept beside the triangles ----
+
+    // From the next triangle on.
+    void change_part(std::string SourceDocument::Part::*name, std::string_view rest) {
+        part_.*name = trimmed(rest);
+        has_parts_ = has_parts_ || name != &SourceDocument::Part::group;
+        part_changes_ = true;
+    }
+
+    void begin_triangle() {
+        if (!part_changes_) return;
+        part_changes_ = false;
+        const auto [found, is_new] = part_numbers_.try_emplace(std::array{part_.object, part_.group, part_.material},
+                                                               static_cast<std::uint32_t>(document_.parts.size()));
+        if (is_new) document_.parts.push_back(part_);
+        if (is_new) part_attributes_.emplace_back();
+        document_.runs.push_back({triangle_corners_.size() / 3, found->second});
+    }
+
+    void keep_document() {
+        result_.materials = std::move(library_.materials);
+        for (std::string& warning : library_.warnings) warn(std::move(warning));
+        if (!has_parts_ || result_.mesh.triangles.empty()) return;
+        document_.format = SourceDocument::Format::obj;
+        for (const fs::path& image : library_.images) {
+            Result<std::string> bytes = read_whole_file(source_.folder / image);
+            if (!bytes) warn(bytes.error().message + " The image is named, but not kept.");
+            document_.files.push_back(
+                {.uri = image.generic_string(),
+                 .bytes = bytes ? std::make_shared<const std::string>(std::move(*bytes)) : nullptr});
+        }
+        const Mesh& mesh = result_.mesh;
+        const auto keep = [&](const char* name, int components, const auto& values, auto&& has_part) {
+            if (values.empty()) return;
+            SourceDocument::Channel channel{name, static_cast<std::uint32_t>(components), {}};
+            channel.values.reserve(values.size() * channel.components);
+            for (const auto& value : values)
+                for (int k = 0; k < components; ++k) channel.values.push_back(value[k]);
+            for (std::size_t part = 0; part < document_.parts.size(); ++part)
+                if (has_part(part_attributes_[part]))
+                    document_.parts[part].channels |= std::uint32_t{1} << document_.channels.size();
+            document_.channels.push_back(std::move(channel));
+        };
+        keep("NORMAL", 3, mesh.normals, [](PartAttributes of) { return of.has_normals; });
+        keep("TEXCOORD_0", 2, mesh.uvs, [](PartAttributes of) { return of.has_uvs; });
+        keep("COLOR_0", 4, mesh.colours, [](PartAttributes) { return true; });
+        result_.document = std::move(document_);
     }
 
     struct OpenRange {
@@ -477,7 +539,7 @@ private:
 
     void warn_of_unknown_materials() {
         std::set<std::string> known, unknown;
-        for (const Material& material : result_.materials) known.insert(material.name);
+        for (const Material& material : library_.materials) known.insert(material.name);
         for (const MeshRange& range : ranges())
             if (range.kind == MeshRange::Kind::material && !known.contains(range.name)) unknown.insert(range.name);
         if (!unknown.empty())
@@ -512,6 +574,16 @@ private:
     OpenRange group_, material_;
     std::set<fs::path> libraries_; // that were asked for
     bool has_library_ = false;     // that could be read
+    MtlContents library_;
+    SourceDocument document_;
+    SourceDocument::Part part_; // of the next triangle
+    struct PartAttributes {
+        bool has_normals = false, has_uvs = false;
+    };
+    std::vector<PartAttributes> part_attributes_;
+    std::map<std::array<std::string, 3>, std::uint32_t> part_numbers_;
+    bool part_changes_ = true; // since the last triangle
+    bool has_parts_ = false;   // by objects or materials
     PolygonTriangulator polygons_;
     std::uint64_t statements_ = 0;
     std::uint64_t small_faces_ = 0;

@@ -280,6 +280,7 @@ Result<VertexTree> TreeBuilder::build(const Clusterer& clusterer) {
     g_->closedness = surface_.closedness;
     g_->dropped_triangles = clean_.dropped + options_.dropped_before;
     g_->ranges.assign(source_.ranges.begin(), source_.ranges.end());
+    g_->document = std::vector<std::byte>(source_.document.begin(), source_.document.end());
     auto data = std::make_shared<VertexTree::Data>();
     data->light =
         std::make_shared<TreeLuminance>(derive_luminance(*g_, *parts_, options_.light, prelit_, is_textured()));

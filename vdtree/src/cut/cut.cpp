@@ -99,23 +99,24 @@ Decision decide_by_budget(const VertexTree& tree, const CostSource& source, Inde
     return {std::move(decision.unfolded.front()), decision.max_seen_cost};
 }
 
-// The corners of the cut's triangles in the order of the input, in which groups and materials are runs; these are
-// appended to `ranges`. (The index buffer's order follows from the history of the cut.)
-std::vector<NodeId> corners_by_range(const Cut& cut, std::vector<MeshRange>& ranges) {
+// The cut's triangles in the order of the input, in which groups and materials are runs: input triangle, triangle of
+// the tree. (The index buffer's order follows from the history of the cut.)
+std::vector<std::pair<Index, Index>> triangles_in_order(const Cut& cut) {
     const VertexTree& tree = cut.tree();
-    const auto& links = unchecked_links(tree); // of unfolded nodes, which are sound
-    const auto first = links.first_triangle;
-    std::vector<std::pair<Index, Index>> order; // input triangle, triangle of the tree
+    const auto first = unchecked_links(tree).first_triangle; // of unfolded nodes, which are sound
+    std::vector<std::pair<Index, Index>> order;
     order.reserve(cut.triangle_count());
     for (NodeId node = 0; node < tree.interior_count(); ++node) {
         if (!cut.is_unfolded(node)) continue;
         for (Index t = first[node]; t < first[node + 1]; ++t) order.emplace_back(tree.source_triangles()[t], t);
     }
     std::sort(order.begin(), order.end());
-    std::vector<NodeId> corners;
-    corners.reserve(3 * order.size());
-    for (const auto& [source, triangle] : order)
-        for (const Index leaf : links.triangles[triangle]) corners.push_back(cut.proxy_of_leaf(leaf));
+    return order;
+}
+
+// Those ranges of the input, of which something is left.
+std::vector<MeshRange> ranges_left(const VertexTree& tree, const std::vector<std::pair<Index, Index>>& order) {
+    std::vector<MeshRange> ranges;
     for (const MeshRange& range : tree.ranges()) {
         const auto place = [&](std::uint64_t source) {
             const auto found = std::partition_point(order.begin(), order.end(),
@@ -127,7 +128,7 @@ std::vector<NodeId> corners_by_range(const Cut& cut, std::vector<MeshRange>& ran
         left.triangle_count = place(range.first_triangle + range.triangle_count) - left.first_triangle;
         if (left.triangle_count > 0) ranges.push_back(std::move(left));
     }
-    return corners;
+    return ranges;
 }
 
 } // namespace
@@ -276,34 +277,46 @@ Result<std::vector<AdjustStats>> follow_scene(std::span<const SceneObject> objec
     return stats;
 }
 
-Mesh extract_mesh(const Cut& cut) {
+ExtractedMesh extract_with_sources(const Cut& cut) {
     const VertexTree& tree = cut.tree();
-    Mesh mesh;
-    std::vector<NodeId> by_range;
-    if (!tree.ranges().empty()) by_range = corners_by_range(cut, mesh.ranges);
-    const std::span<const NodeId> indices = tree.ranges().empty() ? cut.indices() : by_range;
+    ExtractedMesh out;
+    Mesh& mesh = out.mesh;
+    std::vector<NodeId> in_order;
+    if (!tree.ranges().empty()) {
+        const auto order = triangles_in_order(cut);
+        mesh.ranges = ranges_left(tree, order);
+        out.source_triangles.reserve(order.size());
+        in_order.reserve(3 * order.size());
+        for (const auto& [source, triangle] : order) {
+            out.source_triangles.push_back(source);
+            for (const Index leaf : unchecked_links(tree).triangles[triangle])
+                in_order.push_back(cut.proxy_of_leaf(leaf));
+        }
+    }
+    const std::span<const NodeId> indices = tree.ranges().empty() ? cut.indices() : in_order;
     std::vector<Index> vertex_of_node(tree.node_count(), no_node);
-    std::vector<NodeId> used;
     mesh.triangles.resize(cut.triangle_count());
     for (std::size_t i = 0; i < indices.size(); ++i) {
         Index& vertex = vertex_of_node[indices[i]];
         if (vertex == no_node) {
-            vertex = static_cast<Index>(used.size());
-            used.push_back(indices[i]);
+            vertex = static_cast<Index>(out.nodes.size());
+            out.nodes.push_back(indices[i]);
         }
         mesh.triangles[i / 3][i % 3] = vertex;
     }
-    mesh.positions.reserve(used.size());
-    for (const NodeId node : used) mesh.positions.push_back(tree.origin() + glm::dvec3(tree.positions()[node]));
-    const auto gather = [&](auto values, auto& out) {
+    mesh.positions.reserve(out.nodes.size());
+    for (const NodeId node : out.nodes) mesh.positions.push_back(tree.origin() + glm::dvec3(tree.positions()[node]));
+    const auto gather = [&](auto values, auto& to) {
         if (values.empty()) return;
-        out.reserve(used.size());
-        for (const NodeId node : used) out.push_back(values[node]);
+        to.reserve(out.nodes.size());
+        for (const NodeId node : out.nodes) to.push_back(values[node]);
     };
     gather(tree.normals(), mesh.normals);
     gather(tree.colours(), mesh.colours);
     gather(tree.uvs(), mesh.uvs);
-    return mesh;
+    return out;
 }
+
+Mesh extract_mesh(const Cut& cut) { return extract_with_sources(cut).mesh; }
 
 } // namespace unseen::vdtree

@@ -103,6 +103,7 @@ void for_each_array(Geometry& g, Luminance& l, F&& f) {
     f("triangles", g.triangles);
     f("source_triangles", g.source_triangles);
     f("source_vertices", g.source_vertices);
+    f("document", g.document);
     f("texture", g.texture);
     f("texels", g.texels);
     f("ring_texture", g.ring_texture);
@@ -111,7 +112,7 @@ void for_each_array(Geometry& g, Luminance& l, F&& f) {
 bool is_of_texture(std::string_view name) { return name == "texture" || name == "texels" || name == "ring_texture"; }
 
 // Sections that are there only where they have elements.
-bool is_optional(std::string_view name) { return is_of_texture(name); }
+bool is_optional(std::string_view name) { return is_of_texture(name) || name == "document"; }
 
 enum class OpenMode { read, map };
 
@@ -120,7 +121,7 @@ constexpr std::uint32_t component_bytes() {
     if constexpr (std::is_arithmetic_v<T>) return sizeof(T);
     else if constexpr (std::is_same_v<T, Unorm16> || std::is_same_v<T, PackedRange> || std::is_same_v<T, PackedNormal>)
         return 2;
-    else if constexpr (std::is_same_v<T, Texel>) return 1;
+    else if constexpr (std::is_same_v<T, Texel> || std::is_same_v<T, std::byte>) return 1;
     else return 4; // vectors, spheres and triangles of 4-byte components; of NodeBounds, the sphere
 }
 

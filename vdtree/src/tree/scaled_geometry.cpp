@@ -57,6 +57,7 @@ std::shared_ptr<const TreeGeometry> scaled_geometry(const std::shared_ptr<const 
                                  view_of(g.triangles),
                                  view_of(g.source_triangles),
                                  view_of(g.source_vertices),
+                                 view_of(g.document),
                                  view_of(g.texture),
                                  view_of(g.texels),
                                  view_of(g.ring_texture)};

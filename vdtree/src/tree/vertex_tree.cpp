@@ -269,6 +269,7 @@ std::span<const float> VertexTree::displacement() const noexcept { return data_-
 std::span<const Index> VertexTree::source_vertices() const noexcept { return data_->geometry->source_vertices; }
 std::span<const Index> VertexTree::source_triangles() const noexcept { return data_->geometry->source_triangles; }
 std::span<const MeshRange> VertexTree::ranges() const noexcept { return data_->geometry->ranges; }
+std::span<const std::byte> VertexTree::document() const noexcept { return data_->geometry->document; }
 std::uint64_t VertexTree::dropped_triangles() const noexcept { return data_->geometry->dropped_triangles; }
 Closedness VertexTree::closedness() const noexcept { return data_->geometry->closedness; }
 Sphere VertexTree::bounding_sphere() const noexcept { return data_->geometry->bounding_sphere; }
@@ -371,7 +372,7 @@ std::uint64_t VertexTree::byte_size() const noexcept {
            bytes_of(g.uvs) + bytes_of(g.first_leaf) + bytes_of(g.leaf_end) + bytes_of(g.subtree_end) +
            bytes_of(g.first_triangle) + bytes_of(g.bounds) + bytes_of(g.support_spheres) + bytes_of(g.mask_at) +
            bytes_of(g.mask_records) + bytes_of(g.displacement) + bytes_of(g.triangles) + bytes_of(g.source_triangles) +
-           bytes_of(g.source_vertices) + bytes_of(g.texels) + bytes_of(g.ring_texture) +
+           bytes_of(g.source_vertices) + bytes_of(g.document) + bytes_of(g.texels) + bytes_of(g.ring_texture) +
            g.ranges.capacity() * sizeof(MeshRange) + bytes_of(l.luminance) + bytes_of(l.support_range) +
            bytes_of(l.ring_range) + bytes_of(l.adaptation);
 }

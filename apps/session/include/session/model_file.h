@@ -12,14 +12,15 @@ namespace unseen::session {
 // Error messages and reasons call these fields load.texture and so on.
 struct LoadOptions {
     std::filesystem::path texture = {}; // an image that lies over a mesh instead of its materials' images; empty: none
-    bool without_textures = false;      // leave all images out
+    bool without_textures = false;      // look at no images; colours of materials count all the same
+    meshio::LeftOut drop = {};          // what glTF files may have that trees cannot
     double unit_metres = 1;             // world units (metres) a mesh unit; above 0. Of Scene::load()
     Messages messages = {};
 };
 
 // A mesh with its texture: those of several materials become one, side by side, and materials' colours become those of
 // the vertices. Images are PNG, JPEG, PFM or EXR. Errors name the file, and what is wrong in it. The reader's warnings
-// are messages. `reading.materials` and `reading.progress` are taken from the options.
+// are messages. `reading.images`, `reading.drop` and `reading.progress` are taken from the options.
 Result<meshio::ReadResult> read_textured_mesh(const std::filesystem::path& file, const LoadOptions& options = {},
                                               meshio::ReadOptions reading = {});
 

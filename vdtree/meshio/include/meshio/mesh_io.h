@@ -2,7 +2,7 @@
 //
 // Read: PLY (ASCII, both endians, face lists and triangle strips), OBJ, OFF, STL (ASCII and binary) and
 // glTF 2.0 (.gltf, .glb), told apart by their content where it is unambiguous, else by the file name's ending.
-// Write: PLY, OBJ, glTF binary, by ending.
+// Write: PLY, OBJ, glTF (.gltf, .glb), by ending.
 //
 // Nothing in a file is believed: every count is checked against the bytes that are there before memory is
 // allocated for it, so memory stays proportional to the file. Errors name file, and line, byte or index.
@@ -15,6 +15,8 @@
 #include <string>
 #include <vector>
 
+#include <meshio/source_document.h>
+#include <vdtree/cut.h>
 #include <vdtree/function_ref.h>
 #include <vdtree/mesh.h>
 #include <vdtree/result.h>
@@ -23,11 +25,18 @@ namespace unseen::meshio {
 
 enum class ColourEncoding { srgb, linear };
 
+// What glTF files may have that no cut can keep.
+struct LeftOut {
+    bool skins = false, morph_targets = false, animations = false;
+    bool extensions = false; // that the file requires and nobody here knows
+};
+
 struct ReadOptions {
     // How 8-bit and float colours of PLY, OBJ and OFF are encoded; glTF defines its own (linear).
     ColourEncoding colours = ColourEncoding::srgb;
     Progress progress = {};
-    bool materials = true; // read them: of OBJ, the files that it names
+    bool images = true; // say where those of materials are; else materials have colours only
+    LeftOut drop = {};  // files with other such things are refused; messages call this field read.drop
 };
 
 // What a file says of the surface of a range of triangles. Images are named, or are there as they were in the file:
@@ -39,17 +48,19 @@ struct Material {
     std::shared_ptr<const std::string> image_bytes =
         {}; // the image file itself, where the mesh file holds it; shared by all materials that have it; or null
     vdtree::Wrap wrap_u = vdtree::Wrap::repeat, wrap_v = vdtree::Wrap::repeat;
+    UvMap uv_map = {}; // from the vertices' texture coordinates to the image's
 
     bool has_image() const { return !image.empty() || image_bytes; }
 };
 
 struct ReadResult {
     vdtree::Mesh mesh;
-    std::uint64_t source_faces = 0;       // faces of the file before triangulation
-    std::uint64_t dropped_triangles = 0;  // triangles that used a vertex twice
-    std::vector<std::string> warnings;    // repairs that were made, one sentence each
-    std::vector<Material> materials = {}; // of OBJ and glTF
-    bool uvs_from_top = false;            // v grows downward in images (glTF), not upward (OBJ, PLY)
+    std::uint64_t source_faces = 0;              // faces of the file before triangulation
+    std::uint64_t dropped_triangles = 0;         // triangles that used a vertex twice
+    std::vector<std::string> warnings;           // repairs that were made, one sentence each
+    std::vector<Material> materials = {};        // of OBJ and glTF
+    std::optional<SourceDocument> document = {}; // of glTF, and of OBJ with objects or materials; without vertex_parts
+    bool uvs_from_top = false;                   // v grows downward in images (glTF), not upward (OBJ, PLY)
     std::optional<std::uint64_t> bad_uv =
         {}; // the first vertex whose texture coordinates were not finite, and set to 0
 };
@@ -63,8 +74,14 @@ Result<ReadResult> read_mesh(const std::filesystem::path& file, const ReadOption
 // Writes to a temporary name in the same folder, then renames; an existing file is replaced only by a whole one.
 // PLY: binary little-endian, float positions where they are exact and double otherwise; normals, colours (sRGB
 // 8 bit), UVs where present. OBJ: text with as many digits as needed to read the same values again.
-// GLB: one primitive for each material range.
+// glTF: one primitive for each material range; of OUT.gltf the data lie in OUT.bin.
 // Progress is told, and can cancel, while a PLY is written.
 Result<void> write_mesh(const std::filesystem::path& file, const vdtree::MeshView& mesh, const Progress& progress = {});
+
+// Writes a cut with all that the file of its mesh said (SourceDocument): nodes, names, materials, textures, texture
+// coordinates and colours as they were there. Images and libraries that lay beside that file are written beside this
+// one, under the same names; fails where one is there with other contents. Returns what the format cannot keep, one
+// sentence each. Trees without a document are written like extract_mesh(). Fails on damaged documents, too.
+Result<std::vector<std::string>> write_cut(const std::filesystem::path& file, const vdtree::Cut& cut);
 
 } // namespace unseen::meshio

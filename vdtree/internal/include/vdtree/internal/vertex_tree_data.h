@@ -1,6 +1,7 @@
 // The arrays of a vertex tree, as the builder fills them and the file stores them. See <vdtree/vertex_tree.h>.
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <string>
 #include <vector>
@@ -46,6 +47,7 @@ struct GeometryArrays {
     Storage<Index> source_triangles; // empty without ranges
 
     Storage<Index> source_vertices; // by leaf
+    Storage<std::byte> document;    // MeshView::document
 
     // Of textured trees only.
     Storage<TextureFacts> texture; // one

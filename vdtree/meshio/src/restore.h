@@ -1,0 +1,38 @@
+// A cut taken apart into the parts of its source document, each with the attributes that it had there.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include <meshio/source_document.h>
+#include <vdtree/cut.h>
+
+namespace unseen::meshio {
+
+struct RestoredPart {
+    std::uint32_t part = 0;
+    std::vector<vdtree::Triangle> triangles;  // over the following
+    std::vector<vdtree::Index> vertices;      // of the extracted mesh
+    std::vector<glm::vec3> positions;         // in the frame of the part's node ...
+    bool is_in_world = false;                 // ... or, where that cannot be turned back, in the world's
+    std::vector<std::vector<float>> channels; // like those of the document; empty: the part has it not
+};
+
+// Parts of which nothing is left are left out. Vertices of the mesh come with the values that they had; those of
+// proxies follow from the mesh that was drawn, and else are the means of the vertices that they stand for, of those
+// with the same attributes. Fails where tree and document contradict each other. Cost: the cut's triangles, and the
+// tree's leaves.
+Result<std::vector<RestoredPart>> restore(const vdtree::Cut& cut, const vdtree::ExtractedMesh& extracted,
+                                          const SourceDocument& document);
+
+// The inverse of a matrix from a node to the world, or nothing where it has none.
+struct NodeFrame {
+    bool has_inverse = false, is_mirrored = false;
+    glm::dmat4 from_world = glm::dmat4(1);
+    glm::dmat3 normal_from_world = glm::dmat3(1);
+};
+NodeFrame frame_of(const glm::dmat4& to_world);
+
+} // namespace unseen::meshio
