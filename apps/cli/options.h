@@ -24,6 +24,7 @@ using session::name_of;
 struct TextureOptions {
     std::string file;         // instead of the materials'
     bool is_left_out = false; // --no-texture
+    bool is_prelit = false;   // --prelit, of colours as well
 };
 
 // VIEW. What is not given follows from the model and the display, see session/session.h.
