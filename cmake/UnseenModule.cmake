@@ -35,6 +35,19 @@ function(unseen_set_compile_options target)
     endif()
 endfunction()
 
+# Compiles several sources of a target at once, so that heavy headers are read once for all of them. For targets whose
+# sources use no name for two things; the sources in SINGLE stay alone.
+function(unseen_unite_sources target)
+    cmake_parse_arguments(arg "" "" "SINGLE" ${ARGN})
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 5)
+    if(arg_SINGLE)
+        set_source_files_properties(${arg_SINGLE} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+    endif()
+    if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+        target_compile_options(${target} PRIVATE -Wno-subobject-linkage) # knows only the outermost file as a source
+    endif()
+endfunction()
+
 function(unseen_install_package)
     include(CMakePackageConfigHelpers)
     configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/unseenConfig.cmake.in

@@ -12,6 +12,7 @@
 #include <calibration/observer_profile.h>
 #include <calibration/procedure.h>
 #include <calibration/simulated_observer.h>
+#include <vdtree/internal/errors.h>
 
 #include "calibration_window.h"
 #include "options.h"
@@ -43,8 +44,6 @@ struct CalibrateArguments {
     CalibrationWindowOptions window;
 };
 
-Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
-
 std::string today() {
     std::array<char, 32> text;
     const std::time_t now = std::time(nullptr);
@@ -69,8 +68,9 @@ Result<CalibrationPlan> make_plan(const CalibrateArguments& a, const perception:
         const double black = perception::black_level(display).value(),
                      white = perception::to_luminance(display, 1).value();
         if (!(*a.luminance > black && *a.luminance < white))
-            return invalid("--luminance " + shortest(*a.luminance) + " cd/m2 is not between the display's black (" +
-                           shortest(black) + ") and white (" + shortest(white) + ").");
+            return invalid_argument("--luminance " + shortest(*a.luminance) +
+                                    " cd/m2 is not between the display's black (" + shortest(black) + ") and white (" +
+                                    shortest(white) + ").");
         luminance = perception::Luminance(*a.luminance);
     }
     CalibrationPlan plan = calibration::plan_for(display, expected, luminance);
@@ -80,7 +80,8 @@ Result<CalibrationPlan> make_plan(const CalibrateArguments& a, const perception:
     if (a.settings) plan.settings = static_cast<int>(*a.settings);
     if (std::vector<GratingPlace> named = places_named(a); !named.empty()) plan.places = std::move(named);
     if (plan.places.empty())
-        return invalid("No grating fits the display '" + display.name + "': give --frequencies and --eccentricities.");
+        return invalid_argument("No grating fits the display '" + display.name +
+                                "': give --frequencies and --eccentricities.");
     if (auto valid = calibration::validate(plan); !valid) return valid.error();
     return plan;
 }
@@ -104,8 +105,8 @@ Result<void> check_resumed(const CalibrateArguments& a, const CalibrationPlan& p
     if (!named.empty() && !std::is_permutation(named.begin(), named.end(), plan.places.begin(), plan.places.end()))
         add("--frequencies and --eccentricities", "");
     if (differing.empty()) return {};
-    return invalid("'" + a.state + "' was not begun so: leave away " + differing +
-                   ", or begin anew with another file.");
+    return invalid_argument("'" + a.state + "' was not begun so: leave away " + differing +
+                            ", or begin anew with another file.");
 }
 
 // What a person is shown must be what the plan says, also where the plan comes from a file.
@@ -114,14 +115,14 @@ Result<void> check_display(const CalibrationPlan& plan, const perception::Displa
     const double mean = plan.luminance.value(), amplitude = mean * plan.highest_contrast;
     constexpr double rounding = 1e-9;
     if (!(mean - amplitude >= black - rounding * white && mean + amplitude <= white * (1 + rounding)))
-        return invalid("The display '" + display.name + "' cannot show contrasts up to " +
-                       rounded(plan.highest_contrast, 3) + " around " + rounded(mean, 4) +
-                       " cd/m2: use the one that the calibration was begun on.");
+        return invalid_argument("The display '" + display.name + "' cannot show contrasts up to " +
+                                rounded(plan.highest_contrast, 3) + " around " + rounded(mean, 4) +
+                                " cd/m2: use the one that the calibration was begun on.");
     for (const calibration::GratingPlace& place : plan.places)
         if (!calibration::fits(display, place))
-            return invalid("The display '" + display.name + "' has no room for a grating of " +
-                           shortest(place.frequency_cpd) + " cpd at " + shortest(place.eccentricity_deg) +
-                           " degrees: choose other --frequencies and --eccentricities.");
+            return invalid_argument("The display '" + display.name + "' has no room for a grating of " +
+                                    shortest(place.frequency_cpd) + " cpd at " + shortest(place.eccentricity_deg) +
+                                    " degrees: choose other --frequencies and --eccentricities.");
     return {};
 }
 
@@ -307,7 +308,7 @@ Result<int> calibrate_gamma(CalibrateArguments& a, perception::Display display) 
     if (!matches) return matches.error();
     std::vector<calibration::BrightnessMatch> fitted;
     for (const GammaMatch& m : *matches) fitted.push_back({m.share, m.code});
-    if (fitted.empty()) return invalid("The window was closed before anything was matched.");
+    if (fitted.empty()) return invalid_argument("The window was closed before anything was matched.");
     const auto gamma = calibration::fit_gamma(fitted);
     if (!gamma) return gamma.error();
     for (const GammaMatch& m : *matches)

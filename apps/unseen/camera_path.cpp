@@ -10,6 +10,7 @@
 
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <vdtree/internal/errors.h>
 #include <vdtree/internal/number_text.h>
 
 #include "terminal.h"
@@ -19,8 +20,6 @@ namespace {
 
 constexpr std::string_view orbit_prefix = "orbit:";
 constexpr double least_orbit_degrees = 1e-4; // below, once around would take millions of frames
-
-Error invalid(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
 
 template <class Number>
 bool parse(std::string_view text, Number& value) {
@@ -36,14 +35,14 @@ Result<Orbit> parse_orbit(const std::string& path) {
     const std::size_t colon = text.find(':');
     double degrees = 0;
     if (!parse(text.substr(0, colon), degrees) || !(std::abs(degrees) <= 360))
-        return invalid("'" + path + "' must be orbit:DEGREES[:FRAMES] with -360 to 360 degrees a frame.");
+        return invalid_argument("'" + path + "' must be orbit:DEGREES[:FRAMES] with -360 to 360 degrees a frame.");
     int frames = 0;
     if (colon != std::string_view::npos) {
         if (!parse(text.substr(colon + 1), frames) || frames < 1 || frames > most_path_frames)
-            return invalid("'" + path + "' must be orbit:DEGREES[:FRAMES] with 1 to " +
-                           std::to_string(most_path_frames) + " frames.");
+            return invalid_argument("'" + path + "' must be orbit:DEGREES[:FRAMES] with 1 to " +
+                                    std::to_string(most_path_frames) + " frames.");
     } else if (!(std::abs(degrees) >= least_orbit_degrees)) {
-        return invalid("'" + path + "' never comes around; say how many frames: orbit:DEGREES:FRAMES.");
+        return invalid_argument("'" + path + "' never comes around; say how many frames: orbit:DEGREES:FRAMES.");
     } else {
         frames = std::clamp(static_cast<int>(std::ceil(360 / std::abs(degrees))), 1, most_path_frames);
     }

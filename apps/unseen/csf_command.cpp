@@ -15,6 +15,7 @@
 #include <perception/image.h>
 #include <perception/motion.h>
 #include <session/observer.h>
+#include <vdtree/internal/errors.h>
 #include <vdtree/internal/number_text.h>
 
 #include "log_log_plot.h"
@@ -47,8 +48,6 @@ std::optional<VisualField> field_of(const std::string& name) {
     if (name == "worst") return VisualField::worst;
     return std::nullopt;
 }
-
-Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
 
 CsfConditions conditions_of(const StimulusOptions& s, bool is_pursued) {
     CsfConditions c;
@@ -83,7 +82,7 @@ public:
             by_table = choice->model.has_value();
             if (choice->model) observer.model_ = *choice->model;
             if (choice->table && has_conditions(a.stimulus))
-                return invalid(
+                return invalid_argument(
                     "a viewer's table was measured under conditions of its own: leave --temporal, --velocity, "
                     "--field and --distance away.");
             observer.table_ = std::move(choice->table);
@@ -102,22 +101,23 @@ public:
     }
 
     Result<double> operator()(const StimulusOptions& s) const {
-        if (!s.frequency) return invalid("--frequency is missing.");
-        if (!s.luminance) return invalid("--luminance is missing.");
+        if (!s.frequency) return invalid_argument("--frequency is missing.");
+        if (!s.luminance) return invalid_argument("--luminance is missing.");
         if (table_ && (s.area || !same_conditions(s, fixed_)))
-            return invalid(
+            return invalid_argument(
                 "a table holds patches of 1.5 cycles radius under the same conditions: leave area, temporal, "
                 "velocity, field and distance away.");
         Stimulus stimulus = stimulus_of(conditions_of(s, is_pursued_), CyclesPerDegree(*s.frequency),
                                         Degrees(s.eccentricity.value_or(0)), Luminance(*s.luminance));
         if (s.area) stimulus.area = SquareDegrees(*s.area);
         if (stimulus.temporal.value() > 0 && stimulus.velocity.value() > 0)
-            return invalid("no sensitivity: give a temporal frequency or a velocity, not both.");
+            return invalid_argument("no sensitivity: give a temporal frequency or a velocity, not both.");
         const double value = table_ ? table_->sensitivity(stimulus.frequency, stimulus.eccentricity, stimulus.luminance)
                                     : sensitivity(model_, stimulus);
         if (!std::isfinite(value))
-            return invalid("no sensitivity: frequency, luminance, area and distance must be above 0, eccentricity, "
-                           "temporal frequency and velocity 0 or more, and none of them extreme.");
+            return invalid_argument(
+                "no sensitivity: frequency, luminance, area and distance must be above 0, eccentricity, "
+                "temporal frequency and velocity 0 or more, and none of them extreme.");
         return value;
     }
 
@@ -147,7 +147,7 @@ Result<void> read_cell(const std::string& column, const std::string& cell, Stimu
     if (cell.empty()) return {};
     if (column == "field") {
         stimulus.field = field_of(cell);
-        if (!stimulus.field) return invalid("field must be nasal, temporal or worst, not '" + cell + "'.");
+        if (!stimulus.field) return invalid_argument("field must be nasal, temporal or worst, not '" + cell + "'.");
         return {};
     }
     std::optional<double>* value = column == "frequency"      ? &stimulus.frequency
@@ -160,7 +160,7 @@ Result<void> read_cell(const std::string& column, const std::string& cell, Stimu
                                                               : nullptr;
     if (!value) return {};
     *value = finite_from(cell);
-    if (!*value) return invalid(column + " must be a finite number, not '" + cell + "'.");
+    if (!*value) return invalid_argument(column + " must be a finite number, not '" + cell + "'.");
     return {};
 }
 

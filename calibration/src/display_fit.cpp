@@ -1,5 +1,6 @@
 // Fits of a display's transfer function, and photometers' tables.
 #include <calibration/display_fit.h>
+#include <vdtree/internal/errors.h>
 #include <vdtree/internal/number_text.h>
 
 #include <charconv>
@@ -15,8 +16,6 @@ namespace {
 
 constexpr double least_gamma = 0.5, largest_gamma = 5;
 constexpr std::size_t most_rows = 100'000;
-
-Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
 
 // What is wrong with a further row, or nothing.
 std::string append_row(PhotometerTable& table, std::string_view line) {
@@ -40,16 +39,16 @@ Result<double> fit_gamma(std::span<const BrightnessMatch> matches) {
     double upper = 0, lower = 0;
     for (const BrightnessMatch& m : matches) {
         if (!(m.white > 0 && m.white < 1 && m.code > 0 && m.code < 1))
-            return invalid("A brightness match must lie between black and white, not be code " + to_text(m.code) +
-                           " for " + to_text(m.white) + " of white.");
+            return invalid_argument("A brightness match must lie between black and white, not be code " +
+                                    to_text(m.code) + " for " + to_text(m.white) + " of white.");
         upper += std::log(m.white) * std::log(m.code);
         lower += std::log(m.code) * std::log(m.code);
     }
-    if (!(lower > 0)) return invalid("There are no brightness matches to fit a gamma to.");
+    if (!(lower > 0)) return invalid_argument("There are no brightness matches to fit a gamma to.");
     const double gamma = upper / lower;
     if (!(gamma >= least_gamma && gamma <= largest_gamma))
-        return invalid("The matches give a gamma of " + to_text(gamma) +
-                       ", which no display has (0.5 to 5): match again.");
+        return invalid_argument("The matches give a gamma of " + to_text(gamma) +
+                                ", which no display has (0.5 to 5): match again.");
     return gamma;
 }
 

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <utility>
 
+#include <vdtree/internal/errors.h>
 #include <vdtree/internal/random.h>
 
 #include "json_file.h"
@@ -44,8 +45,6 @@ constexpr double room_above_expected = 0.5, farthest_log10_threshold = 12;
 
 // Of seeing nothing at the highest contrast, however far below it the threshold is believed to be.
 constexpr double least_chance = 1e-6;
-
-Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
 
 std::string in_brackets(const char* name, std::size_t i) {
     return std::string(name).append("[").append(std::to_string(i)).append("]");
@@ -101,32 +100,33 @@ CalibrationPlan plan_for(const perception::Display& display, const CsfTable& exp
 
 Result<void> validate(const CalibrationPlan& plan) {
     if (plan.places.empty() || plan.places.size() > most_places)
-        return invalid("A calibration needs 1 to " + std::to_string(most_places) + " places, not " +
-                       std::to_string(plan.places.size()) + ".");
+        return invalid_argument("A calibration needs 1 to " + std::to_string(most_places) + " places, not " +
+                                std::to_string(plan.places.size()) + ".");
     for (std::size_t i = 0; i < plan.places.size(); ++i) {
         const auto& [frequency, eccentricity] = plan.places[i];
         const std::string where = in_brackets("places", i);
         constexpr double coarsest_cpd = 1.0 / 16, finest_cpd = 64; // of the tables
         if (!(frequency >= coarsest_cpd && frequency <= finest_cpd))
-            return invalid(where + ": the frequency must lie in 1/16 to 64 cpd, not " + to_text(frequency) + ".");
+            return invalid_argument(where + ": the frequency must lie in 1/16 to 64 cpd, not " + to_text(frequency) +
+                                    ".");
         if (!(eccentricity >= 0 && eccentricity <= widest_eccentricity_deg))
-            return invalid(where + ": the eccentricity must lie in 0 to 90 degrees, not " + to_text(eccentricity) +
-                           ".");
+            return invalid_argument(where + ": the eccentricity must lie in 0 to 90 degrees, not " +
+                                    to_text(eccentricity) + ".");
         if (std::find(plan.places.begin(), plan.places.begin() + static_cast<std::ptrdiff_t>(i), plan.places[i]) !=
             plan.places.begin() + static_cast<std::ptrdiff_t>(i))
-            return invalid(where + " is there twice.");
+            return invalid_argument(where + " is there twice.");
     }
     if (plan.trials < 1 || plan.trials > most_trials)
-        return invalid("There must be 1 to 100,000 trials, not " + std::to_string(plan.trials) + ".");
+        return invalid_argument("There must be 1 to 100,000 trials, not " + std::to_string(plan.trials) + ".");
     if (plan.settings < 2 || plan.settings > most_settings)
-        return invalid("There must be 2 to 1000 settings a place, not " + std::to_string(plan.settings) + ".");
+        return invalid_argument("There must be 2 to 1000 settings a place, not " + std::to_string(plan.settings) + ".");
     if (!(plan.luminance.value() > 0 && plan.luminance.value() <= brightest_cdm2))
-        return invalid("The luminance must be above 0 and at most 1e6 cd/m2, not " + to_text(plan.luminance.value()) +
-                       ".");
+        return invalid_argument("The luminance must be above 0 and at most 1e6 cd/m2, not " +
+                                to_text(plan.luminance.value()) + ".");
     if (plan.seed > exact_integers)
-        return invalid("The seed must be at most 2^53, not " + std::to_string(plan.seed) + ".");
+        return invalid_argument("The seed must be at most 2^53, not " + std::to_string(plan.seed) + ".");
     if (!(plan.highest_contrast > 0 && plan.highest_contrast <= 1))
-        return invalid("The highest contrast must lie in 0..1, not " + to_text(plan.highest_contrast) + ".");
+        return invalid_argument("The highest contrast must lie in 0..1, not " + to_text(plan.highest_contrast) + ".");
     return {};
 }
 
@@ -155,9 +155,9 @@ Result<Procedure> Procedure::create(CalibrationPlan plan, CsfTable expected) {
     for (std::size_t i = 0; i < plan.places.size(); ++i) {
         const double threshold = -log10_expected(expected, plan.places[i], plan.luminance);
         if (!(threshold >= lowest_log10_contrast))
-            return invalid(in_brackets("places", i) + ": a sensitivity of " + to_text(std::pow(10, -threshold)) +
-                           " is expected, but none above " + to_text(std::round(std::pow(10, -lowest_log10_contrast))) +
-                           " can be measured.");
+            return invalid_argument(in_brackets("places", i) + ": a sensitivity of " +
+                                    to_text(std::pow(10, -threshold)) + " is expected, but none above " +
+                                    to_text(std::round(std::pow(10, -lowest_log10_contrast))) + " can be measured.");
         highest_threshold = std::max(highest_threshold, std::min(threshold, farthest_log10_threshold));
     }
     std::vector<double>& thresholds = grid.log10_threshold;
@@ -167,8 +167,8 @@ Result<Procedure> Procedure::create(CalibrationPlan plan, CsfTable expected) {
     const double highest = std::log10(plan.highest_contrast);
     std::erase_if(grid.log10_contrast, [&](double c) { return c > highest; });
     if (grid.log10_contrast.empty())
-        return invalid("The display's highest contrast, " + to_text(plan.highest_contrast) +
-                       ", shows nothing that could be measured.");
+        return invalid_argument("The display's highest contrast, " + to_text(plan.highest_contrast) +
+                                ", shows nothing that could be measured.");
     if (grid.log10_contrast.back() < highest) grid.log10_contrast.push_back(highest);
     auto blank = QuestPlus::create(grid);
     if (!blank) return blank.error();

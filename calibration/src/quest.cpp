@@ -7,19 +7,19 @@
 #include <limits>
 #include <string>
 
+#include <vdtree/internal/errors.h>
+
 #include "json_file.h"
 
 namespace unseen::calibration {
 namespace {
 
-Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
-
 Result<void> check_axis(const std::vector<double>& axis, const std::string& name) {
-    if (axis.empty()) return invalid("QUEST+: " + name + " has no values.");
+    if (axis.empty()) return invalid_argument("QUEST+: " + name + " has no values.");
     for (std::size_t i = 0; i < axis.size(); ++i)
         if (!std::isfinite(axis[i]) || (i > 0 && !(axis[i] > axis[i - 1])))
-            return invalid("QUEST+: " + name + "[" + std::to_string(i) + "] is " + to_text(axis[i]) +
-                           ": the values must be finite and ascend.");
+            return invalid_argument("QUEST+: " + name + "[" + std::to_string(i) + "] is " + to_text(axis[i]) +
+                                    ": the values must be finite and ascend.");
     return {};
 }
 
@@ -37,15 +37,15 @@ double Psychometric::probability(double x) const {
 
 Result<void> validate(const Psychometric& f) {
     if (!(f.slope > 0 && std::isfinite(f.slope)))
-        return invalid("The slope must be above 0, not " + to_text(f.slope) + ".");
+        return invalid_argument("The slope must be above 0, not " + to_text(f.slope) + ".");
     if (!(f.lapse >= 0 && f.lapse < 1))
-        return invalid("The lapse rate must lie in 0..1, not " + to_text(f.lapse) + ".");
+        return invalid_argument("The lapse rate must lie in 0..1, not " + to_text(f.lapse) + ".");
     if (!(f.guess >= 0 && f.guess < 1))
-        return invalid("The guess rate must lie in 0..1, not " + to_text(f.guess) + ".");
+        return invalid_argument("The guess rate must lie in 0..1, not " + to_text(f.guess) + ".");
     if (!std::isfinite(f.shift()))
-        return invalid("The threshold cannot be at " + to_text(f.at_threshold) +
-                       " right answers: with a guess rate of " + to_text(f.guess) + " and a lapse rate of " +
-                       to_text(f.lapse) + " they never are so many or so few.");
+        return invalid_argument("The threshold cannot be at " + to_text(f.at_threshold) +
+                                " right answers: with a guess rate of " + to_text(f.guess) + " and a lapse rate of " +
+                                to_text(f.lapse) + " they never are so many or so few.");
     return {};
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include <calibration/observer_profile.h>
+#include <vdtree/internal/errors.h>
 #include <vdtree/internal/number_text.h>
 #include <vdtree/internal/random.h>
 
@@ -13,8 +14,6 @@
 
 namespace unseen::calibration {
 namespace {
-
-Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
 
 struct Key {
     std::string_view name;
@@ -38,13 +37,13 @@ Result<void> apply(SimulatedObserver& observer, std::string_view assignment) {
     const std::string_view name = assignment.substr(0, equals);
     const auto key = std::find_if(std::begin(keys), std::end(keys), [&](const Key& k) { return k.name == name; });
     if (key == std::end(keys) || equals == assignment.npos)
-        return invalid("observer: '" + std::string(assignment) +
-                       "' is none of gain=, frequency=, eccentricity=, slope=, lapse=, scatter= and delay=.");
+        return invalid_argument("observer: '" + std::string(assignment) +
+                                "' is none of gain=, frequency=, eccentricity=, slope=, lapse=, scatter= and delay=.");
     const std::string_view text = assignment.substr(equals + 1);
     const auto parsed = number_from<double>(text);
     if (!parsed || !(*parsed >= key->least && *parsed <= key->most))
-        return invalid("observer: " + std::string(name) + " must be a number from " + to_text(key->least) + " to " +
-                       to_text(key->most) + ", not '" + std::string(text) + "'.");
+        return invalid_argument("observer: " + std::string(name) + " must be a number from " + to_text(key->least) +
+                                " to " + to_text(key->most) + ", not '" + std::string(text) + "'.");
     if (key->value) observer.*key->value = *parsed;
     else observer.psychometric.*key->of_psychometric = *parsed;
     return {};
@@ -53,9 +52,10 @@ Result<void> apply(SimulatedObserver& observer, std::string_view assignment) {
 Result<perception::CsfTable> table_named(const std::string& name) {
     if (name.ends_with(".json")) return read_csf(name);
     const auto model = perception::csf_model(name);
-    if (!model) return invalid("observer: '" + name + "' is neither a CSF model nor the file of a profile (.json).");
+    if (!model)
+        return invalid_argument("observer: '" + name + "' is neither a CSF model nor the file of a profile (.json).");
     if (!perception::is_achromatic(*model))
-        return invalid("observer: " + name + " is sensitivity to colour, not to luminance contrast.");
+        return invalid_argument("observer: " + name + " is sensitivity to colour, not to luminance contrast.");
     return perception::CsfTable::from_model(*model);
 }
 
@@ -88,10 +88,11 @@ Result<void> check_measurable(const SimulatedObserver& observer, const Calibrati
     for (const GratingPlace& place : plan.places) {
         const double sensitivity = observer.sensitivity(place, plan.luminance);
         if (!(std::log10(sensitivity) <= -lowest_log10_contrast))
-            return invalid("observer: the sensitivity at " + to_text(place.frequency_cpd) + " cpd and " +
-                           to_text(place.eccentricity_deg) + " degrees is " + to_text(std::round(sensitivity)) +
-                           ", but none above " + to_text(std::round(std::pow(10, -lowest_log10_contrast))) +
-                           " can be measured: give a lower gain.");
+            return invalid_argument("observer: the sensitivity at " + to_text(place.frequency_cpd) + " cpd and " +
+                                    to_text(place.eccentricity_deg) + " degrees is " +
+                                    to_text(std::round(sensitivity)) + ", but none above " +
+                                    to_text(std::round(std::pow(10, -lowest_log10_contrast))) +
+                                    " can be measured: give a lower gain.");
     }
     return {};
 }

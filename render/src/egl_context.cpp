@@ -4,6 +4,8 @@
 #include <string_view>
 #include <vector>
 
+#include <vdtree/internal/errors.h>
+
 #include <EGL/egl.h>
 #include <EGL/eglext.h>
 
@@ -114,8 +116,6 @@ private:
     EGLContext context_ = EGL_NO_CONTEXT;
     EGLSurface surface_ = EGL_NO_SURFACE; // a pixel buffer where EGL cannot do without
 };
-
-Error unsupported(std::string reason) { return {ErrorCode::unsupported, std::move(reason)}; }
 
 Result<void> EglPlatform::open(const Candidate& candidate) {
     const auto get_display = egl_function<PFNEGLGETPLATFORMDISPLAYEXTPROC>("eglGetPlatformDisplayEXT");

@@ -6,6 +6,7 @@
 #include <string>
 
 #include <vdtree/colour.h>
+#include <vdtree/internal/errors.h>
 
 #include "gl.h"
 
@@ -27,8 +28,6 @@ enum UniformLocation {
     uv_bounds_location = 61,
 };
 
-Error invalid(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
-
 bool is_finite(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 bool is_finite(glm::dquat q) { return std::isfinite(q.w) && is_finite(glm::dvec3(q.x, q.y, q.z)); }
@@ -42,21 +41,22 @@ bool fits_float(const glm::dmat4& matrix) {
 
 Result<void> check(const vdtree::Similarity& placement) {
     if (!(placement.scale > 0) || !std::isfinite(placement.scale))
-        return invalid("The placement's scale must be positive and finite, not " + std::to_string(placement.scale) +
-                       ".");
+        return invalid_argument("The placement's scale must be positive and finite, not " +
+                                std::to_string(placement.scale) + ".");
     if (!is_finite(placement.rotation) || !is_finite(placement.translation))
-        return invalid("The placement's rotation and translation must be finite.");
+        return invalid_argument("The placement's rotation and translation must be finite.");
     return {};
 }
 
 Result<void> check(const Item& item, const Context& context) {
     if (auto valid = check(item.placement); !valid) return valid;
     if (&item.cut.tree().context().impl() != &context.impl())
-        return invalid("The cut belongs to another OpenGL context than the target.");
+        return invalid_argument("The cut belongs to another OpenGL context than the target.");
     if (!item.lighting) return {};
     if (auto valid = vdtree::validate(*item.lighting); !valid) return valid;
     if (!item.cut.impl().glides.moves.empty())
-        return invalid("Vertices that glide cannot be lit: draw the cut instead of the geomorph, or without lights.");
+        return invalid_argument(
+            "Vertices that glide cannot be lit: draw the cut instead of the geomorph, or without lights.");
     return {};
 }
 
@@ -119,7 +119,7 @@ Result<std::vector<Projection>> projections_of(std::span<const Item> items, cons
         const GpuTree::Impl& tree = item.cut.tree().impl();
         projections.push_back(projection_of(view, item.placement, tree.tree.origin(), tree.frame));
         if (!fits_float(projections.back().clip_from_unit))
-            return invalid("The model cannot be drawn from so far away for its size; move the eye nearer.");
+            return invalid_argument("The model cannot be drawn from so far away for its size; move the eye nearer.");
     }
     if (projections.empty()) return projections;
     const auto nearest = std::ranges::min_element(projections, {}, &Projection::near_plane);
@@ -139,14 +139,14 @@ Result<SurfacePass> SurfacePass::prepare(std::span<const Item> items, const Came
     const vdtree::View& view = camera.view;
     if (auto valid = vdtree::validate(view); !valid) return valid.error();
     if (view.width != target.width || view.height != target.height)
-        return invalid("The view is of " + std::to_string(view.width) + "x" + std::to_string(view.height) +
-                       " pixels, and the target has " + std::to_string(target.width) + "x" +
-                       std::to_string(target.height) + ".");
+        return invalid_argument("The view is of " + std::to_string(view.width) + "x" + std::to_string(view.height) +
+                                " pixels, and the target has " + std::to_string(target.width) + "x" +
+                                std::to_string(target.height) + ".");
     if (!std::isfinite(camera.point.x) || !std::isfinite(camera.point.y))
-        return invalid("The camera's point of each pixel must be finite.");
+        return invalid_argument("The camera's point of each pixel must be finite.");
     if (camera.near_plane && !(*camera.near_plane > 0 && std::isfinite(*camera.near_plane)))
-        return invalid("The near plane's distance must be positive and finite, not " +
-                       std::to_string(*camera.near_plane) + ".");
+        return invalid_argument("The near plane's distance must be positive and finite, not " +
+                                std::to_string(*camera.near_plane) + ".");
     if (!target.outputs.empty())
         if (auto valid = target.check_attachment(attachment); !valid) return valid.error();
     for (const Item& item : items)

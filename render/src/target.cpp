@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <string>
 
+#include <vdtree/internal/errors.h>
+
 #include "gl.h"
 
 namespace unseen::render {
@@ -17,18 +19,16 @@ int limit(GLenum name) {
 
 std::string size_text(int width, int height) { return std::to_string(width) + "x" + std::to_string(height); }
 
-Error invalid(const std::string& message) { return {ErrorCode::invalid_argument, message}; }
-Error unsupported(const std::string& message) { return {ErrorCode::unsupported, message}; }
-
 Result<void> check(int width, int height, const TargetOptions& options) {
     if (width < 1 || height < 1)
-        return invalid("A frame of " + size_text(width, height) + " pixels cannot be drawn: it needs at least 1x1.");
+        return invalid_argument("A frame of " + size_text(width, height) +
+                                " pixels cannot be drawn: it needs at least 1x1.");
     const int most = largest_target_side();
     if (width > most || height > most)
         return unsupported("A frame of " + size_text(width, height) +
                            " pixels cannot be drawn: this OpenGL can draw at most " + size_text(most, most) +
                            "; choose a smaller size.");
-    if (options.colours.empty() && !options.depth) return invalid("A target needs colours, or depth.");
+    if (options.colours.empty() && !options.depth) return invalid_argument("A target needs colours, or depth.");
     const int attachments = std::min(limit(GL_MAX_COLOR_ATTACHMENTS), limit(GL_MAX_DRAW_BUFFERS));
     if (options.colours.size() > static_cast<std::size_t>(attachments))
         return unsupported("This OpenGL draws at most " + std::to_string(attachments) + " colours into a target.");
@@ -149,13 +149,13 @@ void Target::Impl::bind(int attachment) const {
 
 Result<void> Target::Impl::check_attachment(int attachment) const {
     if (attachment >= 0 && static_cast<std::size_t>(attachment) < outputs.size()) return {};
-    return invalid("The target has no colour " + std::to_string(attachment) + ", only " +
-                   std::to_string(outputs.size()) + ".");
+    return invalid_argument("The target has no colour " + std::to_string(attachment) + ", only " +
+                            std::to_string(outputs.size()) + ".");
 }
 
 // A window's samples are resolved by GL itself.
 Result<void> Target::Impl::check_readable() const {
-    if (samples > 0 && id != 0) return invalid("A target with samples is resolved before it is read.");
+    if (samples > 0 && id != 0) return invalid_argument("A target with samples is resolved before it is read.");
     return {};
 }
 
@@ -198,7 +198,7 @@ Result<void> resolve(const Target& from, Target& to) {
     const Target::Impl &source = from.impl(), &result = to.impl();
     if (source.width != result.width || source.height != result.height || source.outputs != result.outputs ||
         source.top_row_first != result.top_row_first)
-        return invalid("Samples are resolved into a target of the same size and format.");
+        return invalid_argument("Samples are resolved into a target of the same size and format.");
     return in_context(source.context, "Resolving samples", [&]() -> Result<void> {
         glDisable(GL_SCISSOR_TEST);
         glEnable(GL_FRAMEBUFFER_SRGB); // means of light, not of codes
@@ -224,7 +224,7 @@ Result<std::vector<glm::vec4>> read_pixels(const Target& target, int attachment)
 Result<std::vector<float>> read_luminance(const Target& target, int attachment) {
     if (auto valid = target.impl().check_attachment(attachment); !valid) return valid.error();
     if (target.impl().output(attachment) != Output::linear)
-        return invalid("A target for displays keeps no luminance; draw into one in floats.");
+        return invalid_argument("A target for displays keeps no luminance; draw into one in floats.");
     return read_channels(target, attachment, 3, 1);
 }
 
@@ -234,7 +234,7 @@ Result<std::vector<float>> read_colour(const Target& target, int attachment) {
 
 Result<std::vector<float>> read_depth(const Target& target) {
     const Target::Impl& from = target.impl();
-    if (!from.has_depth) return invalid("The target has no depth.");
+    if (!from.has_depth) return invalid_argument("The target has no depth.");
     std::vector<float> depth(static_cast<std::size_t>(from.width) * static_cast<std::size_t>(from.height));
     auto done = in_context(from.context, "Reading depth", [&]() -> Result<void> {
         if (auto valid = from.check_readable(); !valid) return valid;

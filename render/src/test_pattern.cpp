@@ -8,6 +8,7 @@
 #include <string>
 
 #include <render/target.h>
+#include <vdtree/internal/errors.h>
 
 #include "context_impl.h"
 #include "gl.h"
@@ -30,24 +31,23 @@ enum UniformLocation {
     marks_location
 };
 
-Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
-
 Result<void> check(const TestPattern& p) {
     const double finite[] = {p.mean,     p.frequency_cpd,    p.highest_frequency_cpd,
                              p.decades,  p.sigma_deg,        p.phase_deg,
                              p.centre.x, p.centre.y,         p.mark_code,
                              p.code,     p.tangent_per_pixel};
     for (const double value : finite)
-        if (!std::isfinite(value)) return invalid("A test pattern's numbers must be finite.");
-    if (!(p.tangent_per_pixel > 0)) return invalid("A test pattern's pixels must have a size above 0.");
-    if (!(p.contrast >= 0 && p.contrast <= 1)) return invalid("A test pattern's contrast must lie in 0..1.");
-    if (!(p.mean > 0)) return invalid("A test pattern's mean luminance must be above 0.");
-    if (!(p.frequency_cpd > 0 && p.sigma_deg > 0)) return invalid("A grating's frequency and size must be above 0.");
+        if (!std::isfinite(value)) return invalid_argument("A test pattern's numbers must be finite.");
+    if (!(p.tangent_per_pixel > 0)) return invalid_argument("A test pattern's pixels must have a size above 0.");
+    if (!(p.contrast >= 0 && p.contrast <= 1)) return invalid_argument("A test pattern's contrast must lie in 0..1.");
+    if (!(p.mean > 0)) return invalid_argument("A test pattern's mean luminance must be above 0.");
+    if (!(p.frequency_cpd > 0 && p.sigma_deg > 0))
+        return invalid_argument("A grating's frequency and size must be above 0.");
     if (p.kind == TestPattern::Kind::chart && !(p.highest_frequency_cpd > p.frequency_cpd))
-        return invalid("A chart's frequencies must ascend.");
+        return invalid_argument("A chart's frequencies must ascend.");
     if (!(p.rows >= 1 && p.white_rows >= 0 && p.white_rows <= p.rows))
-        return invalid("White rows must be 0 to all of the rows.");
-    if (p.marks.size() > most_marks) return invalid("A test pattern has at most 8 marks.");
+        return invalid_argument("White rows must be 0 to all of the rows.");
+    if (p.marks.size() > most_marks) return invalid_argument("A test pattern has at most 8 marks.");
     return {};
 }
 
@@ -75,13 +75,13 @@ TestPatternDrawer::~TestPatternDrawer() = default;
 
 Result<TestPatternDrawer> TestPatternDrawer::create(const Context& context, std::span<const double> code_luminances) {
     if (code_luminances.size() != code_count)
-        return invalid("A display has 256 codes, not " + std::to_string(code_luminances.size()) + ".");
+        return invalid_argument("A display has 256 codes, not " + std::to_string(code_luminances.size()) + ".");
     std::array<float, code_count> levels;
     for (std::size_t i = 0; i < code_count; ++i) {
         levels[i] = static_cast<float>(code_luminances[i]);
         if (!std::isfinite(levels[i]) || (i > 0 && !(levels[i] >= levels[i - 1])))
-            return invalid("The luminances of a display's codes must ascend; that of code " + std::to_string(i) +
-                           " does not.");
+            return invalid_argument("The luminances of a display's codes must ascend; that of code " +
+                                    std::to_string(i) + " does not.");
     }
     auto impl = std::make_unique<Impl>(context);
     auto made = in_context(context, "Making test patterns", [&]() -> Result<void> {

@@ -16,8 +16,8 @@ namespace {
 using Kind = vdtree::LightSource::Kind;
 
 constexpr const char* good = R"({"ambient": 0.1, "material": {"specular": 0.05, "shininess": 40},
-  "lights": [{"type": "directional", "direction": [0, 0, 2], "intensity": 0.7,
-              "orbit": {"axis": [0, 1, 0], "degrees_per_second": 90}},
+  "lights": [{"type": "directional", "direction": [0, 0, 2],
+              "intensity": 0.7, "orbit": {"axis": [0, 1, 0], "degrees_per_second": 90}},
              {"type": "point", "position": [4, 0, 0], "intensity": 0.5, "distance": 3,
               "keyframes": [{"time_s": 0, "position": [4, 0, 0], "intensity": 0.5},
                             {"time_s": 2, "position": [0, 4, 0], "intensity": 1}]},

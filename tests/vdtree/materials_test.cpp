@@ -110,14 +110,15 @@ TEST_F(Materials, OfGltfShareTheirImage) {
             if (i == 0 || !has_one_image) images += comma + R"({"bufferView":2,"mimeType":"image/png"})";
         }
         return mesh_files::glb(
-            R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)" +
-                R"("meshes":[{"primitives":[)" + primitives +
-                R"(]}],"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},)" +
-                R"({"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}],)" +
+            R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],)"
+            R"("meshes":[{"primitives":[)" +
+                primitives + R"(]}],"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},)" +
+                R"({"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}],)"
                 R"("bufferViews":[{"buffer":0,"byteLength":36},)" +
-                R"({"buffer":0,"byteOffset":36,"byteLength":6},{"buffer":0,"byteOffset":44,"byteLength":1048576}],)" +
-                R"("buffers":[)" + R"({"byteLength":1048620}],"materials":[)" + materials + R"(],"textures":[)" +
-                textures + R"(],"images":[)" + images + "]}",
+                R"({"buffer":0,"byteOffset":36,"byteLength":6},{"buffer":0,"byteOffset":44,"byteLength":1048576}],)"
+                R"("buffers":[)" +
+                R"({"byteLength":1048620}],"materials":[)" + materials + R"(],"textures":[)" + textures +
+                R"(],"images":[)" + images + "]}",
             mesh_files::gltf_triangle_data() + "  " + picture);
     };
     write("one.glb", glb(true));

@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include <vdtree/internal/errors.h>
+
 #include <glm/geometric.hpp>
 
 namespace unseen::session {
 namespace {
-
-Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
 
 perception::FoldTestOptions test_options(const Sight& sight, const Request& request) {
     perception::FoldTestOptions options;
@@ -45,18 +45,19 @@ Choice suitable_test(const Sight& sight, bool chroma, bool may_measure) {
 Result<void> check_knowledge(const Sight& sight, FoldTest test, bool chroma) {
     if (!is_perceptual(test)) return {};
     if (sight.lighting && test != FoldTest::luebke_hallen)
-        return invalid("request.fold_test = " + name_of(test) +
-                       " knows only the light that the tree was built for: with scene.lights, use request.fold_test = "
-                       "luebke-hallen.");
+        return invalid_argument(
+            "request.fold_test = " + name_of(test) +
+            " knows only the light that the tree was built for: with scene.lights, use request.fold_test = "
+            "luebke-hallen.");
     if (sight.lighting && chroma)
-        return invalid(
+        return invalid_argument(
             "request.chroma and scene.lights exclude each other: ranges of colour are those of the tree's own light.");
     if (sight.object.tree.texture().empty()) return {};
     if (chroma)
-        return invalid(
+        return invalid_argument(
             "request.chroma does not look at the colours of textures: leave it out, or add load.without_textures.");
     if (test == FoldTest::error)
-        return invalid(
+        return invalid_argument(
             "request.fold_test = error does not measure textures: use request.fold_test = luebke-hallen-safe, or add "
             "load.without_textures.");
     return {};
@@ -174,7 +175,7 @@ Result<Decision> decide(const Sight& sight, const Request& request) {
     if (const auto known = check_knowledge(sight, choice.test, request.chroma); !known) return known.error();
     const bool measures = choice.test == FoldTest::error && !has_errors;
     if (measures && !request.may_measure)
-        return invalid(
+        return invalid_argument(
             "request.fold_test = error goes by errors that the tree does not hold: allow request.may_measure, or call "
             "session::measured().");
     return Decision{request, choice.test, std::move(choice.why), measures};

@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include <calibration/observer_profile.h>
+#include <vdtree/internal/errors.h>
 #include <vdtree/internal/number_text.h>
 
 namespace unseen::session {
@@ -12,19 +13,18 @@ namespace {
 
 constexpr double default_background_cdm2 = 20;
 
-Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
-
 } // namespace
 
 Result<CsfChoice> choose_csf(const std::string& model_or_file) {
     const auto model = perception::csf_model(model_or_file);
     if (model) {
         if (perception::is_achromatic(*model)) return CsfChoice{*model, {}};
-        return invalid("observer.csf = " + model_or_file + " is sensitivity to colour, not to luminance contrast.");
+        return invalid_argument("observer.csf = " + model_or_file +
+                                " is sensitivity to colour, not to luminance contrast.");
     }
     std::error_code unknown;
     if (!std::filesystem::exists(model_or_file, unknown))
-        return invalid("observer.csf: there is no such file, and " + model.error().message + ".");
+        return invalid_argument("observer.csf: there is no such file, and " + model.error().message + ".");
     auto table = calibration::read_csf(model_or_file);
     if (!table) return table.error();
     return CsfChoice{{}, std::move(*table)};
@@ -46,10 +46,10 @@ Result<float> relative_background(const perception::Display& display, std::optio
     // Asking for the black or white that the display reports must work in spite of rounding.
     constexpr double rounding = 1e-9;
     if (asked && !(relative >= -rounding && relative <= 1 + rounding)) {
-        return invalid("scene.background = " + number_text(wanted.value()) +
-                       " cd/m2 is not between the display's black (" +
-                       number_text(perception::black_level(display).value()) + ") and white (" +
-                       number_text(perception::to_luminance(display, 1).value()) + ").");
+        return invalid_argument("scene.background = " + number_text(wanted.value()) +
+                                " cd/m2 is not between the display's black (" +
+                                number_text(perception::black_level(display).value()) + ") and white (" +
+                                number_text(perception::to_luminance(display, 1).value()) + ").");
     }
     return static_cast<float>(std::clamp(relative, 0.0, 1.0));
 }

@@ -3,11 +3,10 @@
 #include <cmath>
 
 #include <perception/criterion.h>
+#include <vdtree/internal/errors.h>
 
 namespace unseen::session {
 namespace {
-
-Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
 
 bool is_positive(double value) { return value > 0 && std::isfinite(value); }
 
@@ -15,16 +14,18 @@ Result<void> validate_goal(const Request& r) {
     using Kind = Goal::Kind;
     const FoldTest test = r.fold_test.value_or(r.goal.kind == Kind::pixels ? FoldTest::extent : FoldTest::error);
     if (r.goal.kind == Kind::budget && r.goal.triangles == 0)
-        return invalid("request.goal.triangles must be 1 or more.");
-    if (r.goal.fill && r.goal.kind != Kind::budget) return invalid("request.goal.fill needs request.goal.triangles.");
+        return invalid_argument("request.goal.triangles must be 1 or more.");
+    if (r.goal.fill && r.goal.kind != Kind::budget)
+        return invalid_argument("request.goal.fill needs request.goal.triangles.");
     if (r.goal.kind == Kind::pixels && !is_positive(r.goal.tolerance_px))
-        return invalid("request.goal.pixels must be above 0 and finite.");
+        return invalid_argument("request.goal.pixels must be above 0 and finite.");
     if (r.goal.kind == Kind::pixels && is_perceptual(test))
-        return invalid("request.goal.pixels needs request.fold_test = extent or displacement: " + name_of(test) +
-                       " knows no pixels.");
+        return invalid_argument("request.goal.pixels needs request.fold_test = extent or displacement: " +
+                                name_of(test) + " knows no pixels.");
     if (r.goal.kind == Kind::imperceptible && !is_perceptual(test))
-        return invalid("request.fold_test = " + name_of(test) +
-                       " cannot tell what is imperceptible: ask for request.goal.triangles or request.goal.pixels.");
+        return invalid_argument(
+            "request.fold_test = " + name_of(test) +
+            " cannot tell what is imperceptible: ask for request.goal.triangles or request.goal.pixels.");
     return {};
 }
 
@@ -39,16 +40,18 @@ Result<void> validate(const Request& r) {
         !r.fold_test || *r.fold_test == FoldTest::luebke_hallen || *r.fold_test == FoldTest::luebke_hallen_safe;
     const bool may_count = r.goal.kind == Goal::Kind::imperceptible || r.goal.kind == Goal::Kind::budget;
     if (r.chroma && !(knows_chroma && may_count))
-        return invalid("request.chroma needs request.fold_test = luebke-hallen or luebke-hallen-safe, and a goal that "
-                       "folds by it.");
+        return invalid_argument(
+            "request.chroma needs request.fold_test = luebke-hallen or luebke-hallen-safe, and a goal that "
+            "folds by it.");
     if (r.milliseconds && !(*r.milliseconds >= 0 && std::isfinite(*r.milliseconds)))
-        return invalid("request.milliseconds must be 0 or more, and finite.");
+        return invalid_argument("request.milliseconds must be 0 or more, and finite.");
     if (r.milliseconds && r.goal.kind == Goal::Kind::full)
-        return invalid("request.milliseconds has no meaning for the full model.");
-    if (!is_positive(r.threshold)) return invalid("request.threshold must be above 0 and finite.");
+        return invalid_argument("request.milliseconds has no meaning for the full model.");
+    if (!is_positive(r.threshold)) return invalid_argument("request.threshold must be above 0 and finite.");
     if (r.threshold != 1 && r.goal.kind != Goal::Kind::imperceptible)
-        return invalid("request.threshold is of the goal imperceptible: the others say themselves how much is folded.");
-    if (!(r.hysteresis >= 1 && r.hysteresis <= 2)) return invalid("request.hysteresis must be from 1 to 2.");
+        return invalid_argument(
+            "request.threshold is of the goal imperceptible: the others say themselves how much is folded.");
+    if (!(r.hysteresis >= 1 && r.hysteresis <= 2)) return invalid_argument("request.hysteresis must be from 1 to 2.");
     return {};
 }
 

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include <vdtree/internal/errors.h>
+
 #include <glm/geometric.hpp>
 
 namespace unseen::session {
 namespace {
-
-Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
 
 // Scaled first, so that neither tiny nor huge directions under- or overflow when squared.
 glm::vec3 unit_vector(glm::dvec3 v) {
@@ -24,7 +24,7 @@ bool is_direction(glm::dvec3 v) {
 
 Result<Scene> Scene::load(const std::filesystem::path& file, const LoadOptions& options) {
     if (!(options.unit_metres > 0 && std::isfinite(options.unit_metres)))
-        return invalid("load.unit_metres must be above 0 and finite.");
+        return invalid_argument("load.unit_metres must be above 0 and finite.");
     auto tree = open_tree(file, options);
     if (!tree) return tree.error();
     Scene scene = of(std::move(*tree), options.unit_metres);
@@ -42,9 +42,10 @@ Scene Scene::of(vdtree::VertexTree tree, double unit_metres) {
 
 Result<void> Scene::relight(std::optional<glm::dvec3> towards, std::optional<double> ambient) {
     if (!towards && !ambient) return {};
-    if (towards && !is_direction(*towards)) return invalid("A light's direction must be finite and not 0 0 0.");
+    if (towards && !is_direction(*towards))
+        return invalid_argument("A light's direction must be finite and not 0 0 0.");
     if (ambient && !(*ambient >= 0 && *ambient <= 1))
-        return invalid("The share of light from everywhere must be from 0 to 1.");
+        return invalid_argument("The share of light from everywhere must be from 0 to 1.");
     for (Object& object : objects) {
         vdtree::Light light = object.tree.light();
         if (towards) light.direction = unit_vector(*towards);

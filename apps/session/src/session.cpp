@@ -7,6 +7,7 @@
 
 #include <perception/gaze.h>
 #include <session/follower.h>
+#include <vdtree/internal/errors.h>
 #include <vdtree/occluders.h>
 
 #include "session_state.h"
@@ -16,8 +17,6 @@ namespace {
 
 constexpr double default_fill = 0.9;
 constexpr double point_radius = 1e-3; // world units: what is framed where all vertices coincide
-
-Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
 
 // The smallest sphere around two.
 WorldSphere united(const WorldSphere& a, const WorldSphere& b) {
@@ -67,7 +66,8 @@ Session::State::State(Scene scene_, Observer observer_, Messages messages_, floa
       caches(scene.objects.size()), tree_count(scene.objects.size(), 1) {}
 
 Result<std::shared_ptr<Session::State>> Session::State::create(Scene scene, Observer observer, Messages messages) {
-    if (scene.objects.empty()) return invalid("A scene needs an object: load one, or add it to scene.objects.");
+    if (scene.objects.empty())
+        return invalid_argument("A scene needs an object: load one, or add it to scene.objects.");
     if (const auto valid = perception::validate(observer.display); !valid) return valid.error();
     const auto background = relative_background(observer.display, scene.background);
     if (!background) return background.error();
@@ -226,7 +226,7 @@ Result<std::vector<Plan>> Session::prepare(const vdtree::View& view, const Reque
 
 Result<CutRecipe> Session::recipe(const vdtree::View& view, const Request& request, std::size_t object) {
     if (request.goal.kind == Goal::Kind::full)
-        return invalid("request.goal full folds nothing, so there is nothing to cut by.");
+        return invalid_argument("request.goal full folds nothing, so there is nothing to cut by.");
     const auto prepared = state_->prepare(view, request);
     if (!prepared) return prepared.error();
     return make_recipe(prepared->sights[object], prepared->decisions[object]);

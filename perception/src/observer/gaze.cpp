@@ -14,6 +14,7 @@
 #include <glm/vec3.hpp>
 
 #include <vdtree/internal/atomic_file.h>
+#include <vdtree/internal/errors.h>
 
 #include <vdtree/internal/number_text.h>
 #include <vdtree/internal/random.h>
@@ -31,8 +32,6 @@ constexpr double seconds_per_degree = 0.0022, least_saccade_s = 0.021;
 
 // Margins that tables are made for; beyond the last, nothing is known.
 constexpr double margins_deg[] = {0, 0.25, 0.5, 0.75, 1, 1.5, 2, 3, 4, 6, 8, 12, 15, 20, 30, 45, 60};
-
-Error invalid(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
 
 // What is wrong with a sample after another, or nothing.
 std::string complaint_about(const GazeSample& sample, const GazeSample* before) {
@@ -135,10 +134,10 @@ private:
 // ---- traces -------------------------------------------------------------------------------------------------------
 
 Result<GazeTrace> GazeTrace::create(std::vector<GazeSample> samples) {
-    if (samples.empty()) return invalid("A gaze trace needs at least one sample.");
+    if (samples.empty()) return invalid_argument("A gaze trace needs at least one sample.");
     for (std::size_t i = 0; i < samples.size(); ++i) {
         const std::string problem = complaint_about(samples[i], i > 0 ? &samples[i - 1] : nullptr);
-        if (!problem.empty()) return invalid("Gaze sample " + std::to_string(i) + " " + problem + ".");
+        if (!problem.empty()) return invalid_argument("Gaze sample " + std::to_string(i) + " " + problem + ".");
     }
     return GazeTrace(std::move(samples));
 }
@@ -196,10 +195,12 @@ Result<void> write_gaze_trace(const std::filesystem::path& file, const GazeTrace
 Result<GazeTrace> simulate_gaze(const SimulatedGaze& o, const Display& display) {
     if (!(o.duration_s > 0 && o.samples_per_s > 0 &&
           o.duration_s * o.samples_per_s <= static_cast<double>(most_samples)))
-        return invalid("A simulated gaze needs a duration and a rate above 0, and at most ten million samples.");
-    if (o.width_px < 1 || o.height_px < 1) return invalid("A simulated gaze needs a window of at least 1x1 pixels.");
+        return invalid_argument(
+            "A simulated gaze needs a duration and a rate above 0, and at most ten million samples.");
+    if (o.width_px < 1 || o.height_px < 1)
+        return invalid_argument("A simulated gaze needs a window of at least 1x1 pixels.");
     if (o.samples_per_s < 1 / GazeTrace::longest_gap_s)
-        return invalid("A simulated gaze needs a sample a second at least.");
+        return invalid_argument("A simulated gaze needs a sample a second at least.");
     if (auto valid = validate(display); !valid) return valid.error();
     EyeModel eye(o, display);
     std::vector<GazeSample> samples;
@@ -224,11 +225,11 @@ Result<GazeTrace> simulate_gaze(const SimulatedGaze& o, const Display& display) 
 Result<void> validate(const TrackerOptions& o) {
     constexpr double widest_deg = 180, slowest_s = 10;
     if (!(o.error_deg >= 0 && o.error_deg <= widest_deg))
-        return invalid("The gaze's error must lie in 0 to 180 degrees, not " + number_text(o.error_deg) + ".");
+        return invalid_argument("The gaze's error must lie in 0 to 180 degrees, not " + number_text(o.error_deg) + ".");
     if (!(o.latency_s >= 0 && o.latency_s <= slowest_s))
-        return invalid("The gaze's latency must lie in 0 to 10 s, not " + number_text(o.latency_s) + ".");
+        return invalid_argument("The gaze's latency must lie in 0 to 10 s, not " + number_text(o.latency_s) + ".");
     if (!(o.suppressed_s >= 0 && o.suppressed_s <= 1))
-        return invalid("Suppression must last 0 to 1 s, not " + number_text(o.suppressed_s) + ".");
+        return invalid_argument("Suppression must last 0 to 1 s, not " + number_text(o.suppressed_s) + ".");
     return {};
 }
 

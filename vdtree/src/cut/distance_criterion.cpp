@@ -12,6 +12,7 @@
 
 #include <vdtree/criteria.h>
 #include <vdtree/internal/contrast_classes.h>
+#include <vdtree/internal/errors.h>
 
 #include "tree/unchecked_links.h"
 
@@ -23,8 +24,6 @@ std::uint64_t next_id() {
     static std::atomic<std::uint64_t> last{0};
     return ++last;
 }
-
-Error invalid(std::string message) { return {ErrorCode::invalid_argument, std::move(message)}; }
 
 // With lights, rows are compared by their contrasts and luminances.
 Result<void> check_growth(const DistanceCriterion::Parts& p) {
@@ -41,56 +40,60 @@ Result<void> check_growth(const DistanceCriterion::Parts& p) {
         for (std::size_t c = 0; c < ContrastClasses::contrast_count; ++c)
             if ((c > 0 && !grows(ContrastClasses::class_at(l, c - 1), ContrastClasses::class_at(l, c))) ||
                 (l > 0 && !grows(ContrastClasses::class_at(l - 1, c), ContrastClasses::class_at(l, c))))
-                return invalid("The switch distances of a criterion with lights must not fall with the contrast or the "
-                               "luminance.");
+                return invalid_argument(
+                    "The switch distances of a criterion with lights must not fall with the contrast or the "
+                    "luminance.");
     return {};
 }
 
 Result<void> check(const VertexTree& tree, const DistanceCriterion::Parts& p) {
     const std::size_t nodes = tree.interior_count();
     if (!p.classes.empty() && p.classes.size() != nodes)
-        return invalid("A criterion has " + std::to_string(p.classes.size()) + " classes for " + std::to_string(nodes) +
-                       " interior nodes.");
+        return invalid_argument("A criterion has " + std::to_string(p.classes.size()) + " classes for " +
+                                std::to_string(nodes) + " interior nodes.");
     if (p.lit && (!p.lit->bounds || p.lit->bounds->cones().size() != nodes || !p.classes.empty()))
-        return invalid("A criterion with lights needs bounds of its tree's normals, and no other classes.");
+        return invalid_argument("A criterion with lights needs bounds of its tree's normals, and no other classes.");
     if (!p.facing.empty() && p.facing.size() != nodes)
-        return invalid("A criterion has " + std::to_string(p.facing.size()) + " sets of directions for " +
-                       std::to_string(nodes) + " interior nodes.");
+        return invalid_argument("A criterion has " + std::to_string(p.facing.size()) + " sets of directions for " +
+                                std::to_string(nodes) + " interior nodes.");
     for (const auto* lengths : {&p.lengths, &p.silhouette_lengths}) {
         if (!lengths->empty() && lengths->size() != nodes)
-            return invalid("A criterion has " + std::to_string(lengths->size()) + " lengths for " +
-                           std::to_string(nodes) + " interior nodes.");
+            return invalid_argument("A criterion has " + std::to_string(lengths->size()) + " lengths for " +
+                                    std::to_string(nodes) + " interior nodes.");
         for (std::size_t i = 0; i < lengths->size(); ++i)
             if (!((*lengths)[i] >= 0) || !std::isfinite((*lengths)[i]))
-                return invalid("The length of node " + std::to_string(i) + " must be 0 or more and finite.");
+                return invalid_argument("The length of node " + std::to_string(i) + " must be 0 or more and finite.");
     }
     if (p.eccentricity_bins == 0 || p.switch_distance.empty() || p.switch_distance.size() % p.eccentricity_bins != 0)
-        return invalid("A criterion's table of " + std::to_string(p.switch_distance.size()) +
-                       " switch distances has no whole rows of " + std::to_string(p.eccentricity_bins) + " bins.");
+        return invalid_argument("A criterion's table of " + std::to_string(p.switch_distance.size()) +
+                                " switch distances has no whole rows of " + std::to_string(p.eccentricity_bins) +
+                                " bins.");
     if (!p.least_cost.empty() && p.least_cost.size() != p.switch_distance.size())
-        return invalid("A criterion's table of least costs is not of the size of its switch distances.");
+        return invalid_argument("A criterion's table of least costs is not of the size of its switch distances.");
     for (std::size_t i = 0; i < p.least_cost.size(); ++i)
         if (!(p.least_cost[i] >= 0) || (i % p.eccentricity_bins != 0 && p.least_cost[i] > p.least_cost[i - 1]))
-            return invalid("Least cost " + std::to_string(i) +
-                           " of a criterion is negative, not a number, or grows with the eccentricity.");
+            return invalid_argument("Least cost " + std::to_string(i) +
+                                    " of a criterion is negative, not a number, or grows with the eccentricity.");
     if (!(p.bin_degrees > 0) || !std::isfinite(p.bin_degrees))
-        return invalid("The bins of eccentricity need a positive width.");
+        return invalid_argument("The bins of eccentricity need a positive width.");
     const std::size_t rows = p.switch_distance.size() / p.eccentricity_bins;
     if (p.lit && !(p.lit->scale.offset >= 0 && p.lit->scale.span > 0 && std::isfinite(p.lit->scale.of(1))))
-        return invalid("A criterion with lights needs a scale whose offset is 0 or more and whose span is above 0.");
+        return invalid_argument(
+            "A criterion with lights needs a scale whose offset is 0 or more and whose span is above 0.");
     if (p.lit && (rows < ContrastClasses::class_count || p.lit->silhouette >= rows))
-        return invalid("A criterion with lights needs a row for each class of contrasts.");
+        return invalid_argument("A criterion with lights needs a row for each class of contrasts.");
     if (p.lit)
         if (const auto grows = check_growth(p); !grows) return grows.error();
     for (std::size_t i = 0; i < p.classes.size(); ++i)
         if (p.classes[i].interior >= rows || p.classes[i].silhouette >= rows)
-            return invalid("Node " + std::to_string(i) + " has a class beyond the " + std::to_string(rows) +
-                           " rows of the table.");
+            return invalid_argument("Node " + std::to_string(i) + " has a class beyond the " + std::to_string(rows) +
+                                    " rows of the table.");
     for (std::size_t i = 0; i < p.switch_distance.size(); ++i) {
         if (std::isnan(p.switch_distance[i]))
-            return invalid("Switch distance " + std::to_string(i) + " of a criterion is not a number.");
+            return invalid_argument("Switch distance " + std::to_string(i) + " of a criterion is not a number.");
         if (i % p.eccentricity_bins != 0 && p.switch_distance[i] > p.switch_distance[i - 1])
-            return invalid("Switch distance " + std::to_string(i) + " of a criterion grows with the eccentricity.");
+            return invalid_argument("Switch distance " + std::to_string(i) +
+                                    " of a criterion grows with the eccentricity.");
     }
     return {};
 }
@@ -199,7 +202,7 @@ Frustum frustum_of(const VertexTree& tree, const View& view, const Similarity& p
 }
 
 Result<DistanceCriterion> extent_criterion(const VertexTree& tree, const View& view, double tolerance_pixels) {
-    if (!(tolerance_pixels > 0)) return invalid("The tolerance must be more than 0 pixels.");
+    if (!(tolerance_pixels > 0)) return invalid_argument("The tolerance must be more than 0 pixels.");
     DistanceCriterion::Parts parts;
     parts.spheres = DistanceCriterion::Spheres::support;
     const double half_angle = std::min(radians_of_pixels(view, tolerance_pixels), std::numbers::pi) / 2;
@@ -208,7 +211,7 @@ Result<DistanceCriterion> extent_criterion(const VertexTree& tree, const View& v
 }
 
 Result<DistanceCriterion> displacement_criterion(const VertexTree& tree, const View& view, double tolerance_pixels) {
-    if (!(tolerance_pixels > 0)) return invalid("The tolerance must be more than 0 pixels.");
+    if (!(tolerance_pixels > 0)) return invalid_argument("The tolerance must be more than 0 pixels.");
     DistanceCriterion::Parts parts;
     parts.spheres = DistanceCriterion::Spheres::support;
     const auto displacement = tree.displacement();

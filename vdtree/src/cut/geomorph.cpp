@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include <vdtree/internal/errors.h>
+
 #include <glm/common.hpp>
 
 #include "cut/state.h"
@@ -32,8 +34,6 @@ MovedVertex between(const MovedVertex& proxy, const MovedVertex& own, float shar
     return {own.node, glm::mix(proxy.position, own.position, share), glm::mix(proxy.luminance, own.luminance, share),
             glm::mix(proxy.colour, own.colour, share)};
 }
-
-Error invalid(const char* what) { return {ErrorCode::invalid_argument, what}; }
 
 } // namespace
 
@@ -97,16 +97,17 @@ std::uint64_t Geomorph::byte_size() const noexcept { return state_->byte_size();
 
 Result<Geomorph> Geomorph::create(const VertexTree& tree, const GeomorphOptions& options) {
     if (!(options.seconds >= 0) || !std::isfinite(options.seconds))
-        return invalid("The time of a geomorph must be 0 or more seconds, and finite.");
-    if (!(options.jump_share >= 0)) return invalid("The share of triangles that makes a jump must be 0 or more.");
+        return invalid_argument("The time of a geomorph must be 0 or more seconds, and finite.");
+    if (!(options.jump_share >= 0))
+        return invalid_argument("The share of triangles that makes a jump must be 0 or more.");
     return Geomorph(std::make_unique<State>(tree, options));
 }
 
 Result<void> Geomorph::step(const Cut& cut, double seconds) {
     if (!(seconds >= 0) || !std::isfinite(seconds))
-        return invalid("A geomorph's time step must be 0 or more seconds, and finite.");
+        return invalid_argument("A geomorph's time step must be 0 or more seconds, and finite.");
     if (std::addressof(cut.tree().data()) != std::addressof(state_->drawn_cut.tree().data()))
-        return invalid("The cut belongs to another tree than the geomorph's; make a geomorph for that tree.");
+        return invalid_argument("The cut belongs to another tree than the geomorph's; make a geomorph for that tree.");
     state_->step(CutState::of(cut), seconds);
     return {};
 }

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "tree/unit_vector.h"
+#include <vdtree/internal/errors.h>
 #include <vdtree/internal/finite.h>
 
 namespace unseen::vdtree {
@@ -16,22 +17,22 @@ namespace {
 constexpr double least_up_sine = 1e-6;
 constexpr int largest_window_px = 32768;
 
-Error invalid(const std::string& what) { return {ErrorCode::invalid_argument, what}; }
-
 } // namespace
 
 Result<void> validate(const View& view) {
     if (!is_finite(view.eye) || !is_finite(view.target) || !is_finite(view.up))
-        return invalid("The view's eye, target and up must be finite.");
-    if (view.eye == view.target) return invalid("The view's eye and target are the same point; move one of them.");
+        return invalid_argument("The view's eye, target and up must be finite.");
+    if (view.eye == view.target)
+        return invalid_argument("The view's eye and target are the same point; move one of them.");
     const glm::dvec3 back = unit(view.eye - view.target), up = unit(view.up);
     if (!(glm::length(glm::cross(back, up)) > least_up_sine))
-        return invalid("The view's up vector lies along the line of sight; choose another.");
+        return invalid_argument("The view's up vector lies along the line of sight; choose another.");
     if (!(view.fov_y_degrees > 0 && view.fov_y_degrees < 180))
-        return invalid("The field of view must be above 0 and below 180 degrees.");
+        return invalid_argument("The field of view must be above 0 and below 180 degrees.");
     if (view.width < 1 || view.height < 1 || view.width > largest_window_px || view.height > largest_window_px)
-        return invalid("The window must have 1 to " + std::to_string(largest_window_px) + " pixels a side, not " +
-                       std::to_string(view.width) + "x" + std::to_string(view.height) + ".");
+        return invalid_argument("The window must have 1 to " + std::to_string(largest_window_px) +
+                                " pixels a side, not " + std::to_string(view.width) + "x" +
+                                std::to_string(view.height) + ".");
     return {};
 }
 
