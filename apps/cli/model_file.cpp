@@ -15,6 +15,7 @@ session::LoadOptions load_options(const TextureOptions& texture, ProgressBar& ba
     options.texture = texture.file;
     options.without_textures = texture.is_left_out;
     options.drop = texture.drop;
+    options.prelit = texture.is_prelit;
     options.messages = terminal_messages();
     options.messages.progress = std::ref(bar);
     return options;

@@ -28,6 +28,7 @@ constexpr OptionName option_names[] = {
     {"read.drop = ", "--drop "},
     {"load.texture", "--texture"},
     {"load.without_textures", "--no-texture"},
+    {"load.prelit", "--prelit"},
     {"load.unit_metres", "--unit"},
     {"Follower::set_glide()", "--geomorph"},
     {"session::read_textured_mesh()", "unseen build"},

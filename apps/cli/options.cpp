@@ -60,6 +60,8 @@ void check(const ViewOptions& view) {
     if (view.target && !view.eye) refuse("--target needs --eye; without an eye the whole model is framed.");
     if (view.direction && *view.direction == glm::dvec3(0)) refuse("--direction must not be 0 0 0.");
     if (view.light && *view.light == glm::dvec3(0)) refuse("--light must not be 0 0 0.");
+    if (view.texture.is_prelit && (view.light || view.ambient || !view.lights.empty()))
+        refuse("--prelit excludes --light, --ambient and --lights, which light the colours.");
     if (!view.lights.empty() && (view.light || view.ambient))
         refuse("--lights excludes --light and --ambient: say all of it in the file.");
     if (view.up && *view.up == glm::dvec3(0)) refuse("--up must not be 0 0 0.");
@@ -170,6 +172,8 @@ void add_texture_options(CLI::App& verb, TextureOptions& o) {
         ->delimiter(',')
         ->allow_extra_args(false)
         ->check(one_of({"skins", "morph-targets", "animations", "extensions"}));
+    verb.add_flag("--prelit", o.is_prelit,
+                  "Of a mesh: its colours and images have light baked in (default: they are reflectance, and are lit)");
 }
 
 void add_geomorph_option(CLI::App& verb, std::optional<double>& seconds) {
@@ -306,7 +310,7 @@ void add_view_options(CLI::App& verb, ViewOptions& o) {
             },
             "The window in pixels (default: 1024x1024)")
         ->type_name("WxH");
-    add_vector(group, "--light", o.light, "Direction towards the light (default: 0.4 0.7 0.6; colours come pre-lit)");
+    add_vector(group, "--light", o.light, "Direction towards the light (default: 0.4 0.7 0.6)");
     add_number(group, "--ambient", o.ambient, within(0, 1), "A", "Share of light from everywhere, 0..1 (default: 0.2)");
     group
         .add_option("--lights", o.lights,

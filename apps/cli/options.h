@@ -26,6 +26,7 @@ struct TextureOptions {
     std::string file;         // instead of the materials'
     bool is_left_out = false; // --no-texture
     meshio::LeftOut drop;     // of glTF files
+    bool is_prelit = false;   // --prelit, of colours as well
 };
 
 // VIEW. What is not given follows from the model and the display, see session/session.h.

@@ -18,6 +18,7 @@
 #include "build_team.h"
 #include "memory_plan.h"
 #include "model_file.h"
+#include "option_names.h"
 #include "options.h"
 #include "output_files.h"
 #include "paged_memory.h"
@@ -91,6 +92,7 @@ vdtree::BuildOptions building(const BuildArguments& a, ProcessTeam* team) {
     vdtree::BuildOptions options;
     options.clusterer = a.clusterer;
     options.threads = a.threads;
+    options.prelit = a.texture.is_prelit;
     if (team && team->size() > 1) {
         options.team = team;
         options.threads = threads(a, team);
@@ -169,6 +171,8 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
     const auto start = std::chrono::steady_clock::now();
     auto tree = build(a, std::move(source->read), team);
     if (!tree) return tree.error();
+    if (const std::string hint = session::hint_at_baked_light(*tree); !hint.empty())
+        print_note(with_option_names(a.mesh + ": " + hint));
     if (a.fold_errors) {
         print_note("measuring what folds change ...");
         tree = session::measured(*tree, a.threads);

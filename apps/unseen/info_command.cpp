@@ -34,6 +34,11 @@ const char* text_of(vdtree::Closedness closedness) {
     return "open, non-manifold or inconsistently oriented";
 }
 
+std::string text_of_colours(const vdtree::VertexTree& tree) {
+    if (tree.colours().empty() && tree.texture().empty()) return "none";
+    return tree.is_prelit() ? "pre-lit" : "reflectance";
+}
+
 template <class T>
 std::uint64_t bytes_of(const std::vector<T>& values) {
     return values.size() * sizeof(T);
@@ -66,18 +71,19 @@ Result<int> describe_tree(const InfoArguments& a) {
                  {"texture", texture_json(*tree)},
                  {"ranges", tree->ranges().size()}};
     if (a.verify) json["verified"] = true;
-    Rows rows = {{"kind", "tree"},
-                 {"vertices", grouped(tree->leaf_count())},
-                 {"triangles", grouped(tree->triangle_count())},
-                 {"dropped", grouped(tree->dropped_triangles())},
-                 {"nodes", grouped(tree->node_count())},
-                 {"bytes in memory", grouped(tree->byte_size())},
-                 {"bytes on disk", grouped(file_bytes)},
-                 {"surface", text_of(tree->closedness())},
-                 {"luminance", rounded(static_cast<double>(range.lo), 3) + " to " +
-                                   rounded(static_cast<double>(range.hi), 3) + (tree->is_prelit() ? ", pre-lit" : "")},
-                 {"texture", texture_text(*tree)},
-                 {"groups and materials", grouped(tree->ranges().size())}};
+    Rows rows = {
+        {"kind", "tree"},
+        {"vertices", grouped(tree->leaf_count())},
+        {"triangles", grouped(tree->triangle_count())},
+        {"dropped", grouped(tree->dropped_triangles())},
+        {"nodes", grouped(tree->node_count())},
+        {"bytes in memory", grouped(tree->byte_size())},
+        {"bytes on disk", grouped(file_bytes)},
+        {"surface", text_of(tree->closedness())},
+        {"luminance", rounded(static_cast<double>(range.lo), 3) + " to " + rounded(static_cast<double>(range.hi), 3)},
+        {"colours", text_of_colours(*tree)},
+        {"texture", texture_text(*tree)},
+        {"groups and materials", grouped(tree->ranges().size())}};
     if (a.verify) rows.push_back({"verified", "sound"});
     output(a.json, json, rows);
     return exit_done;

@@ -285,6 +285,45 @@ TEST_F(BuildTest, RemembersDroppedTriangles) {
     EXPECT_EQ(report["dropped"], 2);
 }
 
+TEST_F(BuildTest, ColoursAreReflectanceUnlessTheyArePrelit) {
+    // The ball in greys that a light from +x made.
+    std::istringstream ball(read_text(write_ball("grey.obj")));
+    std::ostringstream shaded;
+    for (std::string line; std::getline(ball, line);) {
+        shaded << line;
+        double x = 0;
+        if (std::sscanf(line.c_str(), "v %lf", &x) == 1) {
+            const double grey = 0.3 + 0.6 * std::clamp(x, 0.0, 1.0);
+            shaded << ' ' << grey << ' ' << grey << ' ' << grey;
+        }
+        shaded << '\n';
+    }
+    write_text(path("shaded.obj"), shaded.str());
+
+    const Outcome lit = run({"build", "shaded.obj", "-o", "lit.vdt"}),
+                  prelit = run({"build", "shaded.obj", "-o", "prelit.vdt", "--prelit"});
+    EXPECT_EQ(lit.status + prelit.status, 0) << lit.err << prelit.err;
+    EXPECT_THAT(lit.err, AllOf(HasSubstr("a light from 1 "), HasSubstr("%"), HasSubstr("if so, use --prelit")));
+    EXPECT_EQ(prelit.err, "");
+    EXPECT_EQ(run({"info", "lit.vdt", "--json"}).json()["prelit"], false);
+    EXPECT_EQ(run({"info", "prelit.vdt", "--json"}).json()["prelit"], true);
+    EXPECT_THAT(run({"info", "lit.vdt"}).out, HasSubstr("reflectance"));
+    EXPECT_THAT(run({"info", "prelit.vdt"}).out, HasSubstr("pre-lit"));
+
+    const auto is_prelit = [&](std::vector<std::string> words) {
+        words.insert(words.begin(), {"simplify", "shaded.obj", "-o", "o.ply", "--full", "--json", "-"});
+        return effect_named(run(words).json(), "pre-lit colours")["on"].get<bool>();
+    };
+    EXPECT_FALSE(is_prelit({}));
+    EXPECT_TRUE(is_prelit({"--prelit"}));
+    const Outcome of_tree = run({"simplify", "lit.vdt", "-o", "o.ply", "--prelit"});
+    EXPECT_EQ(of_tree.status, 1);
+    EXPECT_THAT(of_tree.err, AllOf(IsAnErrorForPeople(), HasSubstr("decided when it was built")));
+    const Outcome both = run({"simplify", "shaded.obj", "-o", "o.ply", "--prelit", "--ambient", "0.3"});
+    EXPECT_EQ(both.status, 2);
+    EXPECT_THAT(both.err, AllOf(IsAnErrorForPeople(), HasSubstr("--prelit excludes")));
+}
+
 TEST_F(InfoTest, HasTheStableKeys) {
     build_ball();
     for (const std::string file : {"ball.obj", "ball.vdt"}) {

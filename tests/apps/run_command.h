@@ -161,8 +161,8 @@ private:
 
 // Whether a sentence speaks of the session library's fields instead of the command's options.
 inline bool names_fields(const std::string& text) {
-    const std::vector<std::string> fields = {
-        "request.", "observer.csf", "load.texture", "load.without", "scene.lights", "scene.background", "::"};
+    const std::vector<std::string> fields = {"request.",    "observer.csf", "load.texture",     "load.without",
+                                             "load.prelit", "scene.lights", "scene.background", "::"};
     return std::any_of(fields.begin(), fields.end(),
                        [&](const std::string& field) { return text.find(field) != std::string::npos; });
 }

@@ -84,8 +84,9 @@ protected:
         std::free(bytes);
         return out;
     }
+    // Pictures are drawn as they are, without light.
     Json build(const std::string& mesh, std::vector<std::string> more = {}) const {
-        std::vector<std::string> words = {"build", mesh, "-o", "t.vdt", "--json", "-"};
+        std::vector<std::string> words = {"build", mesh, "-o", "t.vdt", "--prelit", "--json", "-"};
         words.insert(words.end(), more.begin(), more.end());
         const Outcome outcome = run(words);
         EXPECT_EQ(outcome.status, 0) << outcome.err;

@@ -50,7 +50,7 @@ VertexTree checkerboard(Colour&& colour, vdtree::Light light = {}) {
             mesh.triangles.push_back({at(row, column), at(row + 1, column + 1), at(row + 1, column)});
         }
     }
-    auto tree = vdtree::build_tree(mesh.view(), {.light = light});
+    auto tree = vdtree::build_tree(mesh.view(), {.light = light, .prelit = true});
     if (!tree) throw std::runtime_error(tree.error().message);
     return std::move(*tree);
 }

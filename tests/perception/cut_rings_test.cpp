@@ -157,8 +157,8 @@ TEST(CutRings, FindShiftsOfTheMean) {
         clustering.positions = {{1, 1, 0}, {1, 0.5, 0}}; // of the edge and of the root
         return clustering;
     };
-    auto even = build_tree(strip(0.5f, 0.5f).view(), merge_middle),
-         bright = build_tree(strip(1, 0.25f).view(), merge_middle);
+    auto even = build_tree(strip(0.5f, 0.5f).view(), merge_middle, {.prelit = true}),
+         bright = build_tree(strip(1, 0.25f).view(), merge_middle, {.prelit = true});
     ASSERT_TRUE(even && bright);
     ASSERT_EQ(even->interior_count(), 2u); // the root and the edge
     constexpr NodeId node = 1;

@@ -78,7 +78,7 @@ std::vector<int> heights_of(const VertexTree& tree) {
 TEST(ErrorDistances, OfMorePatternsThanRowsAreNoLess) {
     constexpr std::size_t most_rows = 0x10000;
     std::mt19937_64 random(5);
-    const VertexTree tree = support::built(noisy_height_field(320, random));
+    const VertexTree tree = support::built(noisy_height_field(320, random), {.prelit = true});
     const vdtree::SoundTree sound = support::sound(tree);
     const std::vector<FoldError> errors = various_errors(tree, random);
     const std::vector<int> heights = heights_of(tree);

@@ -68,7 +68,7 @@ struct Scene {
             clustering.positions.push_back({0, 0, 0});
             return clustering;
         };
-        auto built = vdtree::build_tree(mesh.view(), merge);
+        auto built = vdtree::build_tree(mesh.view(), merge, {.prelit = true});
         if (!built) throw std::runtime_error(built.error().message);
         tree = std::move(*built);
         std::vector<NodeId> parent_of_vertex(mesh.positions.size());
@@ -438,7 +438,7 @@ TEST(LuebkeHallenSafe, FoldsNothingThatLuebkeHallenKeeps) {
         return 0.5f + 0.1f * static_cast<float>(std::sin(0.7 * row) * std::cos(1.3 * column));
     });
     for (glm::dvec3& p : mesh.positions) p.z = 3 * std::sin(0.2 * p.x) * std::cos(0.3 * p.y);
-    const VertexTree tree = std::move(*vdtree::build_tree(mesh.view()));
+    const VertexTree tree = std::move(*vdtree::build_tree(mesh.view(), {.prelit = true}));
     const perception::CutRings rings = *perception::bound_cut_rings(tree);
     View view = view_of_screen();
     std::size_t kept = 0, more = 0;

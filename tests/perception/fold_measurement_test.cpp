@@ -34,7 +34,8 @@ using namespace vdtree;
 
 namespace {
 
-VertexTree built(const Mesh& mesh) { return support::measured(support::built(mesh, {.threads = 1})); }
+// Colours are what is drawn.
+VertexTree built(const Mesh& mesh) { return support::measured(support::built(mesh, {.prelit = true, .threads = 1})); }
 
 std::vector<FoldError> errors_of(const VertexTree& tree) {
     const auto errors = fold_errors_of(support::sound(tree));

@@ -24,8 +24,9 @@ using namespace vdtree;
 
 namespace {
 
+// Colours are what is drawn.
 VertexTree built(const Mesh& mesh, int threads = 1) {
-    return support::measured(support::built(mesh, {.threads = 1}), threads);
+    return support::measured(support::built(mesh, {.prelit = true, .threads = 1}), threads);
 }
 
 std::span<const FoldStage> stages_of(const VertexTree& tree) { return tree.attribute<FoldStage>(stages_name); }

@@ -213,6 +213,7 @@ void fold_whole(Cut& cut, NodeId node) { cut.fold_subtree(node); }
 struct Case {
     const char* name;
     Mesh (*make)();
+    bool prelit = true;
 };
 
 Mesh painted(Mesh mesh, double (*grey)(glm::dvec3)) {
@@ -235,6 +236,7 @@ const Case cases[] = {
          return shapes::together(shapes::cube(8), shapes::placed(shapes::torus(30, 12), 0.5, {4, 0.5, 0}));
      }},
     {"checkerboard", [] { return painted(shapes::icosphere(3), checks_at); }},
+    {"lit_checkerboard", [] { return painted(shapes::icosphere(3), checks_at); }, false},
     {"noise", [] { return painted(shapes::icosphere(3), noise_at); }},
     {"star", [] { return shapes::spiky_star(3); }},
     {"inside_out", [] { return shapes::inside_out(shapes::bumpy_sphere(3, 0.03)); }},
@@ -245,7 +247,8 @@ const Case cases[] = {
 class SingleFolds : public testing::TestWithParam<Case> {
 protected:
     SingleFolds()
-        : tree_(std::move(*build_tree(GetParam().make().view()))), rings_(*bound_cut_rings(tree_)), cut_(tree_) {}
+        : tree_(std::move(*build_tree(GetParam().make().view(), {.prelit = GetParam().prelit}))),
+          rings_(*bound_cut_rings(tree_)), cut_(tree_) {}
 
     // Folds as many nodes as this mesh's share. `prepare` makes the cut before, `bound` says what is claimed of it.
     template <class MayFold, class BoundOf>

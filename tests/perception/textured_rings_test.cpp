@@ -30,9 +30,9 @@ using support::built;
 TEST(TexturedRings, BoundTheRingsOfAllCuts) {
     std::mt19937_64 random(17);
     int looked = 0;
-    for (int which = 0; which < 5; ++which) {
-        const Mesh mesh = textures::textured_cases(which);
-        const VertexTree tree = built(mesh);
+    for (int which = 0; which < 10; ++which) {
+        const Mesh mesh = textures::textured_cases(which % 5);
+        const VertexTree tree = built(mesh, {.prelit = which < 5});
         const CutRings rings = *bound_cut_rings(tree);
         const auto is_larger = [&](NodeId a, NodeId b) {
             const float ra = tree.support_spheres()[a].radius, rb = tree.support_spheres()[b].radius;

@@ -37,7 +37,7 @@ VertexTree square(float alpha_on_the_right) {
             mesh.triangles.push_back({at(row, column), at(row + 1, column + 1), at(row + 1, column)});
         }
     }
-    auto tree = vdtree::build_tree(mesh.view());
+    auto tree = vdtree::build_tree(mesh.view(), {.prelit = true});
     if (!tree) throw std::runtime_error(tree.error().message);
     return std::move(*tree);
 }

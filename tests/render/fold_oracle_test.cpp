@@ -33,7 +33,9 @@ using vdtree::Mesh;
 using vdtree::VertexTree;
 using vdtree::View;
 
-VertexTree measured(const Mesh& mesh) { return support::measured(built(mesh), 0); }
+VertexTree measured(const Mesh& mesh, bool prelit = false) {
+    return support::measured(built(mesh, {.prelit = prelit}), 0);
+}
 
 Mesh painted(Mesh mesh, double (*grey)(glm::dvec3)) {
     for (const glm::dvec3& p : mesh.positions) {
@@ -48,9 +50,19 @@ double noise_at(glm::dvec3 p) { // one value for a place, evenly spread over 4% 
     return 0.5 + 0.04 * (n - std::floor(n) - 0.5);
 }
 
+// White towards the default light, red behind.
+Mesh white_and_red() {
+    Mesh mesh = shapes::icosphere(5);
+    for (const glm::dvec3& p : mesh.positions)
+        mesh.colours.push_back(glm::dot(p, glm::dvec3(vdtree::Light().direction)) > 0 ? glm::vec4(1)
+                                                                                      : glm::vec4(1, 0, 0, 1));
+    return mesh;
+}
+
 struct Case {
     const char* name;
     Mesh (*make)();
+    bool prelit = false;
 };
 const Case cases[] = {
     {"organic", [] { return shapes::bumpy_sphere(5, 0.02); }},
@@ -62,8 +74,16 @@ const Case cases[] = {
      [] {
          return painted(shapes::icosphere(5),
                         [](glm::dvec3 p) { return std::sin(20 * p.x) * std::sin(20 * p.y) > 0 ? 0.8 : 0.2; });
+     },
+     true},
+    {"noise", [] { return painted(shapes::icosphere(5), noise_at); }, true},
+    {"lit_waves",
+     [] {
+         return painted(shapes::bumpy_sphere(5, 0.01),
+                        [](glm::dvec3 p) { return 0.5 + 0.2 * std::sin(9 * p.x) * std::sin(9 * p.y); });
      }},
-    {"noise", [] { return painted(shapes::icosphere(5), noise_at); }},
+    {"lit_noise", [] { return painted(shapes::icosphere(5), noise_at); }},
+    {"lit_white_and_red", white_and_red},
     {"inside_out", [] { return shapes::inside_out(shapes::bumpy_sphere(4, 0.03)); }},
     {"open", [] { return shapes::grid(40); }},
 };
@@ -101,7 +121,7 @@ INSTANTIATE_TEST_SUITE_P(Meshes, FoldOracleRuns, testing::ValuesIn(cases),
                          [](const auto& test) { return std::string(test.param.name); });
 
 TEST_P(FoldOracleRuns, SeeNothingOfWhatLuebkeAndHallensTestFolds) {
-    const VertexTree tree = built(GetParam().make());
+    const VertexTree tree = built(GetParam().make(), {.prelit = GetParam().prelit});
     run(
         tree,
         [&](const View& view, const perception::FoldTestOptions& options) {
@@ -111,7 +131,7 @@ TEST_P(FoldOracleRuns, SeeNothingOfWhatLuebkeAndHallensTestFolds) {
 }
 
 TEST_P(FoldOracleRuns, SeeNothingOfWhatTheSafeTestFolds) {
-    const VertexTree tree = built(GetParam().make());
+    const VertexTree tree = built(GetParam().make(), {.prelit = GetParam().prelit});
     const perception::CutRings rings = *perception::bound_cut_rings(tree);
     run(
         tree,
@@ -133,7 +153,7 @@ void expect_unseen(const perception::Judgement& judged, perception::CsfModel mod
 }
 
 TEST_P(FoldOracleRuns, SeeNothingOfWhatTheErrorTestFolds) {
-    const VertexTree tree = measured(GetParam().make());
+    const VertexTree tree = measured(GetParam().make(), GetParam().prelit);
     run(
         tree,
         [&](const View& view, const perception::FoldTestOptions& options) {
@@ -222,7 +242,8 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST_P(FoldMutations, AreSeen) {
     const VertexTree tree = measured(
-        painted(shapes::icosphere(6), [](glm::dvec3 p) { return 0.5 + 0.2 * std::sin(9 * p.x) * std::sin(9 * p.y); }));
+        painted(shapes::icosphere(6), [](glm::dvec3 p) { return 0.5 + 0.2 * std::sin(9 * p.x) * std::sin(9 * p.y); }),
+        true);
     std::uint64_t triangles = 0, fewer = 0;
     ASSERT_EQ(seen_by_castle(tree, {.count = 4}, triangles), 0u);
     const auto records = tree.attribute<perception::FoldRecord>(perception::record_name);

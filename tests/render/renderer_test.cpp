@@ -14,6 +14,9 @@
 
 #include <render/renderer.h>
 
+#include "built.h"
+#include "shapes.h"
+
 namespace {
 
 using namespace unseen::render;
@@ -399,6 +402,36 @@ TEST_F(RendererTest, ShadesColoursSoThatTheirLuminanceIsTheVertexs) {
         const glm::vec3 c = colour_at(frame, i % 64, i / 64);
         EXPECT_NEAR(at(frame, i % 64, i / 64), 0.2126 * c.r + 0.7152 * c.g + 0.0722 * c.b, 1e-5);
     }
+}
+
+// A ball, white on one side and red on the other, seen from where the light is and from behind.
+TEST_F(RendererTest, DrawsColoursTimesTheLight) {
+    const unseen::vdtree::Light light;
+    const glm::dvec3 sun(light.direction);
+    const auto facing = [&](bool white_is_lit, bool from_the_light) {
+        Mesh mesh = unseen::shapes::icosphere(5);
+        for (const glm::dvec3& p : mesh.positions)
+            mesh.colours.push_back((glm::dot(p, sun) > 0) == white_is_lit ? glm::vec4(1) : glm::vec4(1, 0, 0, 1));
+        const auto tree = unseen::support::built(mesh);
+        Cut whole(tree);
+        whole.unfold_all();
+        View view;
+        view.width = view.height = 65;
+        view.eye = (from_the_light ? 4.0 : -4.0) * sun;
+        const Frame frame = draw(tree, whole, view);
+        const glm::vec3 colour = colour_at(frame, 32, 32);
+        EXPECT_NEAR(at(frame, 32, 32), 0.2126 * colour.r + 0.7152 * colour.g + 0.0722 * colour.b, 1e-5);
+        EXPECT_LE(*std::max_element(frame.colour.begin(), frame.colour.end()), 1 + value_tolerance);
+        return colour;
+    };
+    const auto expect = [](glm::vec3 seen, glm::dvec3 wanted) {
+        for (int k = 0; k < 3; ++k) EXPECT_NEAR(seen[k], wanted[k], 2e-3) << k; // corners are a degree off the axis
+    };
+    const double ambient = 0.2;
+    expect(facing(true, true), {1, 1, 1});
+    expect(facing(true, false), {ambient, 0, 0});
+    expect(facing(false, true), {1, 0, 0});
+    expect(facing(false, false), {ambient, ambient, ambient});
 }
 
 TEST_F(RendererTest, DrawsUncolouredMeshesGreyUnderTheirLight) {

@@ -20,12 +20,14 @@
 namespace unseen {
 namespace {
 
-using support::built;
 using vdtree::Cut;
 using vdtree::Mesh;
 using vdtree::Texture;
 using vdtree::VertexTree;
 using vdtree::View;
+
+// Textures and colours are what is drawn.
+VertexTree built(const Mesh& mesh) { return support::built(mesh, {.prelit = true}); }
 
 constexpr glm::dvec3 rec709(0.2126, 0.7152, 0.0722);
 constexpr double code_step = 3e-4; // of linear light: the rounding of half floats and of filters

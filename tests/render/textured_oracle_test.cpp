@@ -51,6 +51,7 @@ Mesh squeezed(Mesh mesh) {
 struct Case {
     const char* name;
     Mesh (*make)();
+    bool prelit = true;
 };
 const Case cases[] = {
     {"checkerboard_on_a_sphere",
@@ -61,6 +62,9 @@ const Case cases[] = {
      [] { return textures::textured_grid(40, textures::checkerboard(128, 128, 16, 40, 220)); }},
     {"noise_squeezed_on_a_plane",
      [] { return squeezed(textures::textured_grid(40, textures::noise(128, 128, 5, 90, 160))); }},
+    {"lit_checkerboard_on_a_sphere",
+     [] { return textures::textured_sphere(5, textures::checkerboard(128, 128, 16, 40, 220), 0.9); }, false},
+    {"lit_hills_on_a_bumpy_sphere", [] { return textures::with_uvs(shapes::bumpy_sphere(5, 0.01), hills()); }, false},
     {"seams", [] { return textures::with_seams(textures::textured_sphere(4, hills())); }},
 };
 
@@ -69,7 +73,7 @@ INSTANTIATE_TEST_SUITE_P(Meshes, TexturedOracle, testing::ValuesIn(cases),
                          [](const auto& test) { return std::string(test.param.name); });
 
 TEST_P(TexturedOracle, SeesNothingOfWhatTheSafeTestFolds) {
-    const VertexTree tree = built(GetParam().make());
+    const VertexTree tree = built(GetParam().make(), {.prelit = GetParam().prelit});
     const perception::CutRings rings = *perception::bound_cut_rings(tree);
     auto context = render::Context::headless();
     if (!context) GTEST_SKIP() << context.error().message;

@@ -16,10 +16,9 @@ struct ClusteringTask {
     explicit ClusteringTask(const vdtree::Mesh& mesh)
         : view(mesh.view()), coincident(vdtree::find_coincident(view.positions)),
           surface(vdtree::analyse_surface(view, coincident)) {
-        const bool prelit = !view.colours.empty();
         for (std::size_t v = 0; v < view.positions.size(); ++v)
-            luminance.push_back(
-                vdtree::vertex_luminance(surface.normals[v], prelit ? &view.colours[v] : nullptr, {}, prelit));
+            luminance.push_back(vdtree::vertex_luminance(surface.normals[v],
+                                                         view.colours.empty() ? nullptr : &view.colours[v], {}, false));
     }
     vdtree::ClusterInput input() const { return {view, luminance, surface.normals, surface.areas, coincident}; }
 

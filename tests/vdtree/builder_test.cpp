@@ -792,7 +792,7 @@ TEST(BuildTree, TurnsTheNormalsOfInsideOutSurfaces) {
 TEST(BuildTree, MergesAcrossASeamAtTheCostOfItsColours) {
     for (const bool colours_differ : {false, true}) {
         for (const ClustererKind kind : {ClustererKind::quadric, ClustererKind::octree}) {
-            const auto tree = build_tree(shapes::seam(colours_differ).view(), {.clusterer = kind});
+            const auto tree = build_tree(shapes::seam(colours_differ).view(), {.clusterer = kind, .prelit = true});
             ASSERT_TRUE(tree);
             EXPECT_TRUE(tree->is_prelit());
             int merges = 0;
@@ -839,9 +839,33 @@ TEST(Relit, EqualsATreeBuiltWithThatLight) {
     EXPECT_TRUE(verify(*quadric->relit(light)));
 }
 
+TEST(BuildTree, LightsColoursUnlessTheyArePrelit) {
+    Mesh mesh = shapes::with_attributes(shapes::icosphere(2));
+    mesh.colours[0] = glm::vec4(1);
+    mesh.normals[0] = Light().direction; // as bright as can be
+    const BuildOptions lit_options{.clusterer = ClustererKind::octree},
+        prelit_options{.clusterer = ClustererKind::octree, .prelit = true};
+    const auto lit = build_tree(mesh.view(), lit_options), prelit = build_tree(mesh.view(), prelit_options);
+    ASSERT_TRUE(lit && prelit);
+    EXPECT_FALSE(lit->is_prelit());
+    EXPECT_TRUE(prelit->is_prelit());
+    EXPECT_TRUE(verify(*lit));
+    EXPECT_EQ(support::difference(*lit, *prelit->relit(Light())), "");
+    for (Index leaf = 0; leaf < lit->leaf_count(); ++leaf)
+        if (lit->source_vertices()[leaf] == 0) {
+            EXPECT_NEAR(lit->luminance()[lit->interior_count() + leaf], 1, packed_normal_error);
+        }
+    // Without colours there is nothing that light could be baked into.
+    mesh.colours.clear();
+    const auto grey = build_tree(mesh.view(), lit_options), same = build_tree(mesh.view(), prelit_options);
+    ASSERT_TRUE(grey && same);
+    EXPECT_FALSE(same->is_prelit());
+    EXPECT_EQ(support::difference(*grey, *same), "");
+}
+
 TEST(Relit, ShadesColoursByTheLight) {
     const Mesh mesh = shapes::with_attributes(shapes::icosphere(2));
-    const auto tree = build_tree(mesh.view());
+    const auto tree = build_tree(mesh.view(), {.prelit = true});
     ASSERT_TRUE(tree);
     EXPECT_TRUE(tree->is_prelit());
     const Light light{.direction = {0, 0, 1}, .ambient = 0.3f};

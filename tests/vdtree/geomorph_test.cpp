@@ -33,7 +33,7 @@ VertexTree built(Mesh mesh, ClustererKind kind) {
         const glm::dvec3 wave = 0.5 + 0.4 * glm::sin(7.0 * p);
         mesh.colours.push_back(glm::vec4(glm::vec3(wave), 1));
     }
-    Result<VertexTree> tree = build_tree(mesh.view(), {.clusterer = kind, .threads = 1});
+    Result<VertexTree> tree = build_tree(mesh.view(), {.clusterer = kind, .prelit = true, .threads = 1});
     if (!tree) throw std::runtime_error(tree.error().message);
     return std::move(*tree);
 }

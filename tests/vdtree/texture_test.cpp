@@ -157,7 +157,7 @@ TEST(Textures, AreCheckedBeforeTheyAreLaid) {
 TEST(Textures, BoundTheRingsOfAllMeshes) {
     for (int which = 0; which < 5; ++which) {
         for (const ClustererKind clusterer : {ClustererKind::quadric, ClustererKind::octree}) {
-            const VertexTree tree = built(textures::textured_cases(which), {.clusterer = clusterer});
+            const VertexTree tree = built(textures::textured_cases(which), {.clusterer = clusterer, .prelit = true});
             const auto sound = verify(tree);
             EXPECT_TRUE(sound) << which << ": " << sound.error().message;
             EXPECT_TRUE(tree.is_prelit());
@@ -174,11 +174,12 @@ TEST(Textures, AreKeptInFiles) {
     const std::filesystem::path file = folder.path() / "t.vdt";
     Mesh mesh = textures::with_seams(textures::textured_sphere(3, textures::noise(33, 20, 8)));
     mesh.texture.wrap_v = Wrap::clamp;
-    const VertexTree tree = built(mesh);
+    const VertexTree tree = built(mesh, {.prelit = true});
     ASSERT_TRUE(write_tree(file, tree));
     for (const bool mapped : {false, true}) {
         const auto again = mapped ? map_tree(file) : read_tree(file);
         ASSERT_TRUE(again) << again.error().message;
+        EXPECT_TRUE(again->is_prelit());
         const TextureView texture = again->texture();
         EXPECT_EQ(texture.width, 33u);
         EXPECT_EQ(texture.height, 20u);
@@ -248,7 +249,8 @@ TEST(Textures, StayAtTheirSeams) {
     Mesh mesh = textures::textured_grid(8, textures::checkerboard(32, 32, 16, 0, 255));
     Mesh unwelded = shapes::unwelded(mesh);
     unwelded.texture = mesh.texture;
-    const VertexTree split = built(unwelded), seamed = built(textures::with_seams(mesh, 4));
+    const VertexTree split = built(unwelded, {.prelit = true}),
+                     seamed = built(textures::with_seams(mesh, 4), {.prelit = true});
     const auto contrast_of_coincident = [](const VertexTree& tree) {
         float most = 0;
         for (NodeId node = 0; node < tree.interior_count(); ++node)

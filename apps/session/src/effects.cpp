@@ -75,9 +75,9 @@ Effect prelit_effect(const Sight& sight) {
         return {"pre-lit colours", true,
                 sight.object.tree.colours().empty() ? "the texture is taken as lit"
                                                     : "the mesh's colours are taken as lit"};
-    if (!sight.object.tree.texture().empty()) return {"pre-lit colours", false, "Scene::relight() lights the texture"};
-    return {"pre-lit colours", false,
-            sight.object.tree.colours().empty() ? "the mesh has no colours" : "Scene::relight() lights the colours"};
+    if (sight.object.tree.colours().empty() && sight.object.tree.texture().empty())
+        return {"pre-lit colours", false, "the mesh has no colours"};
+    return {"pre-lit colours", false, "colours are reflectance, and are lit"};
 }
 
 Effect texture_effect(const Sight& sight, const Decision& decision) {

@@ -57,6 +57,9 @@ std::string_view name(ClustererKind kind);
 struct BuildOptions {
     ClustererKind clusterer = ClustererKind::quadric;
     Light light = {};
+    // What colours and textures are. False: reflectance, which is multiplied with `light`. True: light that is baked
+    // in; they are drawn as they are. Without either, the default albedo is lit.
+    bool prelit = false;
     int threads = 0;                  // 0: as many as there are cores. The tree does not depend on it.
     std::uint64_t dropped_before = 0; // triangles that a reader has dropped; counted with the tree's
     Progress progress = {};

@@ -16,6 +16,7 @@
 
 // Meshes, and trees of them.
 #include <vdtree/attribute.h>
+#include <vdtree/baked_light.h>
 #include <vdtree/builder.h>
 #include <vdtree/colour.h>
 #include <vdtree/conserve_light.h>

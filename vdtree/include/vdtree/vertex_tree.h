@@ -60,7 +60,7 @@ struct PackedRange {
     bool operator==(const PackedRange&) const = default;
 };
 
-// One directional light and ambient light, for meshes whose luminance is not pre-lit by colours:
+// One directional light and ambient light, for meshes that are not pre-lit:
 // relative luminance = albedo * (ambient + (1 - ambient) * max(0, n.direction)).
 struct Light {
     glm::vec3 direction = {0.39800623f, 0.69651091f, 0.59700935f}; // towards the light: (0.4, 0.7, 0.6) normalised
@@ -121,7 +121,7 @@ public:
     std::span<const glm::vec3> positions() const noexcept;
     std::span<const Unorm16> luminance() const noexcept;    // under light(); never empty
     std::span<const PackedNormal> normals() const noexcept; // unit length or zero; never empty
-    std::span<const glm::vec4> colours() const noexcept;    // linear
+    std::span<const glm::vec4> colours() const noexcept;    // linear; reflectance, unless is_prelit()
     std::span<const glm::vec2> uvs() const noexcept;
 
     // What lies over the surface by uvs(), and is multiplied with the vertices' colours and luminance; empty: none.
@@ -150,10 +150,10 @@ public:
     LuminanceRange luminance_range() const noexcept; // of all that is drawn
 
     // Luminance and its bounds under another light, without attributes; everything else is shared with this tree. Cost:
-    // one pass over the triangles and the nodes. A pre-lit mesh (with colours) is shaded by its colours times the
-    // light.
+    // one pass over the triangles and the nodes. The colours and the texture of a pre-lit mesh then count as
+    // reflectance.
     const Light& light() const noexcept;
-    bool is_prelit() const noexcept; // luminance comes from the colours alone
+    bool is_prelit() const noexcept; // luminance is that of the colours and the texture alone
     // Fails where check() does.
     Result<VertexTree> relit(const Light& light) const;
 

@@ -296,7 +296,7 @@ Result<void> TreeBuilder::help() {
 }
 
 Result<void> TreeBuilder::analyse() {
-    prelit_ = !mesh_.colours.empty() || is_textured();
+    prelit_ = options_.prelit && (!mesh_.colours.empty() || is_textured());
     coincident_ = find_coincident(mesh_.positions);
     if (!options_.team || options_.clusterer != ClustererKind::quadric) { // only quadrics are helped with
         surface_ = analyse_surface(mesh_, coincident_);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include <meshio/mesh_io.h>
 #include <session/messages.h>
@@ -14,7 +15,9 @@ struct LoadOptions {
     std::filesystem::path texture = {}; // an image that lies over a mesh instead of its materials' images; empty: none
     bool without_textures = false;      // look at no images; colours of materials count all the same
     meshio::LeftOut drop = {};          // what glTF files may have that trees cannot
-    double unit_metres = 1;             // world units (metres) a mesh unit; above 0. Of Scene::load()
+    // A mesh's colours and textures are light that is baked in, not reflectance: see vdtree::BuildOptions. Not of trees.
+    bool prelit = false;
+    double unit_metres = 1; // world units (metres) a mesh unit; above 0. Of Scene::load()
     Messages messages = {};
 };
 
@@ -30,6 +33,10 @@ Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file, const Lo
 
 // The same, but tree files of 256 MiB and more are mapped: only what is used is read, and checked.
 Result<vdtree::VertexTree> open_tree(const std::filesystem::path& file, const LoadOptions& options = {});
+
+// What to tell the user where the colours of a tree that was not built as pre-lit look as if light were in them, by
+// vdtree::find_baked_light(): a sentence, or nothing. load_tree() notes it where it builds a tree.
+std::string hint_at_baked_light(const vdtree::VertexTree& tree);
 
 // A tree with what its folds change, which the fold test `error` goes by: light is conserved first, then measured.
 // Fails on textured trees, of which nothing is measured. Cost: some 50 us a node, and a second; in parallel. `threads`:
