@@ -9,6 +9,7 @@
 #include "output_files.h"
 #include "report.h"
 #include "session_options.h"
+#include "terminal.h"
 #include "verbs.h"
 
 namespace unseen::app {
