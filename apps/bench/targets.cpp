@@ -11,14 +11,12 @@
 namespace unseen::app {
 namespace {
 
-using Json = nlohmann::json;
-
 std::string key_of(std::string_view bench, std::string_view figure) {
     return std::string(bench) + "/" + std::string(figure);
 }
 
 // Nothing but numbers named must and aim.
-std::optional<Target> target_of(const Json& json) {
+std::optional<Target> target_of(const nlohmann::json& json) {
     if (!json.is_object()) return std::nullopt;
     Target target;
     for (const auto& [name, value] : json.items()) {
@@ -34,7 +32,7 @@ Result<Targets> Targets::parse(std::string_view text, const std::string& name) {
     const auto malformed = [&](const std::string& what) {
         return Error{ErrorCode::malformed_data, name + ": " + what};
     };
-    const Json json = Json::parse(text, nullptr, false);
+    const auto json = nlohmann::json::parse(text, nullptr, false);
     if (!json.is_object()) return malformed("is no JSON object of targets; apps/bench/targets.json is one.");
     Targets targets;
     for (const auto& [bench, figures] : json.items()) {
