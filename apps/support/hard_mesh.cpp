@@ -199,9 +199,10 @@ std::vector<HardMesh> tuning_meshes(int triangles) {
 }
 
 Result<vdtree::VertexTree> build_hard_tree(const HardMesh& hard) {
-    if (!hard.proxies_at_darkest) return vdtree::build_tree(hard.mesh.view());
+    const vdtree::BuildOptions options{.prelit = true}; // colours are what is drawn
+    if (!hard.proxies_at_darkest) return vdtree::build_tree(hard.mesh.view(), options);
     const auto cluster = [](const vdtree::ClusterInput& input) { return cluster_to_darkest(input); };
-    return vdtree::build_tree(hard.mesh.view(), cluster);
+    return vdtree::build_tree(hard.mesh.view(), cluster, options);
 }
 
 } // namespace unseen::app
