@@ -51,7 +51,8 @@ std::string visibility_text(const session::Report& s, const session::Observer& o
             " and judge (fold test " + test + "), " + where + ", on " +
             (is_default_display ? "the default display" : "this display") + ", ";
     if (!observer.gaze) return text + "wherever the gaze";
-    return text + "with the gaze at pixel " + rounded(observer.gaze->px.x, 4) + " " + rounded(observer.gaze->px.y, 4);
+    const auto tenths = [](double px) { return shortest(std::round(10 * px) / 10); };
+    return text + "with the gaze at pixel " + tenths(observer.gaze->px.x) + " " + tenths(observer.gaze->px.y);
 }
 
 void print_details(const session::Report& s, double draw_ms) {

@@ -61,13 +61,14 @@ std::string complaint_about(const std::string& word, const CLI::App& app, const 
 
 // What the parser could not place comes first: it may be why something else is missing.
 std::string complaint(const CLI::App& app, const Program& program, const CLI::ParseError& error) {
-    const std::string kind = error.get_name();
-    if (kind != "ExtrasError" && kind != "RequiredError") return error.what();
+    const bool is_missing = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::RequiredError);
+    if (!is_missing && error.get_exit_code() != static_cast<int>(CLI::ExitCodes::ExtrasError)) return error.what();
+    const bool takes_verbs = !parts_of(app, true).empty();
     const auto unknown = app.remaining();
     const auto option = std::find_if(unknown.begin(), unknown.end(), [](auto& word) { return word.starts_with("-"); });
-    if (option != unknown.end()) return complaint_about(*option, app, program);
-    if (!unknown.empty()) return complaint_about(unknown.front(), app, program);
-    if (kind != "RequiredError" || parts_of(app, true).empty()) return error.what();
+    if (!unknown.empty())
+        return complaint_about(takes_verbs || option == unknown.end() ? unknown.front() : *option, app, program);
+    if (!is_missing || !takes_verbs) return error.what();
     std::string some;
     const auto verbs = verb_names(app);
     constexpr std::size_t enough = 4;

@@ -137,7 +137,7 @@ std::string judged_by(const CompareArguments& a, const perception::Display& disp
     text += a.display.csf.empty() ? "default observer (castleCSF, a typical person)" : "observer " + a.display.csf;
     text += ", looked at from " + rounded(display.distance.value(), 3) + " m, ";
     if (!a.gaze_px) return text + "wherever the gaze";
-    return text + "with the gaze at pixel " + rounded(a.gaze_px->x, 4) + " " + rounded(a.gaze_px->y, 4);
+    return text + "with the gaze at pixel " + shortest(a.gaze_px->x) + " " + shortest(a.gaze_px->y);
 }
 
 Result<int> run(const CompareArguments& a) {

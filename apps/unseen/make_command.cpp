@@ -51,8 +51,8 @@ Result<int> run(const SubdivideArguments& a) {
     if (auto ok = write(a.out, *mesh); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
     if (report->is_on_stdout()) return exit_done;
-    print_line("made " + grouped(mesh->triangles.size()) + " triangles and " + grouped(mesh->positions.size()) +
-               " vertices of " + grouped(before) + " triangles");
+    print_line("made " + grouped(mesh->triangles.size()) + " triangles of " + grouped(before) + ", with " +
+               grouped(mesh->positions.size()) + " vertices");
     print_written({a.out, a.json});
     return exit_done;
 }

@@ -1,8 +1,6 @@
 // The verbs that need no GPU, and what all verbs have in common: exit status, errors, files.
 #include "run_command.h"
 
-#include <csignal>
-
 namespace {
 
 using namespace unseen::app::testing;
@@ -230,7 +228,7 @@ TEST_F(MakeTest, SubdividedMeshesStayClosed) {
     EXPECT_EQ(twice.json()["vertices"], 642) << "Euler: 2 + half the triangles";
     const Outcome some = run({"make", "subdivide", "ball.obj", "-o", "some.ply", "--triangles", "1000"});
     ASSERT_EQ(some.status, 0) << some.err;
-    EXPECT_THAT(some.out, HasSubstr("1,000 of 80"));
+    EXPECT_THAT(some.out, HasSubstr("made 1,000 triangles of 80, with 502 vertices\nwrote some.ply ("));
     for (const std::string name : {"twice", "some"}) {
         ASSERT_EQ(run({"build", name + ".ply", "-o", name + ".vdt"}).status, 0);
         EXPECT_EQ(run({"info", name + ".vdt", "--json"}).json()["closed"], true) << name;
@@ -553,7 +551,7 @@ TEST_F(SimplifyTest, AnswersInThreeLines) {
         const std::string out = run(more).out;
         return out.substr(out.find('\n') + 1, out.find("\nwrote") - out.find('\n') - 1);
     };
-    EXPECT_THAT(second_line({"--gaze", "3000", "512"}), ::testing::EndsWith("with the gaze at pixel 3,000 512"));
+    EXPECT_THAT(second_line({"--gaze", "3000", "512"}), ::testing::EndsWith("with the gaze at pixel 3000 512"));
     EXPECT_THAT(
         second_line({"--triangles", "100"}),
         ::testing::ContainsRegex("^a difference can be seen; looked at from [0-9.]+ m or more, nobody sees it: "));
@@ -613,7 +611,6 @@ TEST_F(UsageTest, SuggestsWhatWasMeant) {
     EXPECT_THAT(complaint({"simplify", "b.vdt", "--ouptut", "o.ply"}), HasSubstr("did you mean '--output'?"))
         << "and not that -o is missing";
     EXPECT_THAT(complaint({"make", "subdivid"}), HasSubstr("'subdivide'?"));
-    EXPECT_THAT(complaint({"info", "b.vdt", "--json=5x", "--verfy"}), HasSubstr("unseen"));
     EXPECT_THAT(complaint({"frobnicate"}), AllOf(HasSubstr("no verb 'frobnicate'."), Not(HasSubstr("mean"))));
     EXPECT_THAT(complaint({"info", "a.vdt", "b.vdt"}), HasSubstr("'b.vdt' is one word too many"));
 }
