@@ -323,6 +323,8 @@ void add_view_options(CLI::App& verb, ViewOptions& o) {
         ->type_name("METRES")
         ->check(positive());
     add_texture_options(group, o.texture);
+    group.add_flag("--no-cache", o.no_cache,
+                   "Of a mesh: build and measure its tree anew, and do not keep it (default: see unseen cache)");
     group.callback([&o] { check(o); });
 }
 

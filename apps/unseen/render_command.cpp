@@ -81,7 +81,9 @@ Result<int> run(RenderArguments& a) {
         if (!drawn) return drawn.error();
         image = std::move(*drawn);
     }
-    if (auto ok = report->prepare(to_json(*result, frame->draw_ms)); !ok) return ok.error();
+    Json json = to_json(*result, frame->draw_ms);
+    json["tree"] = name_of(session->scene().objects[0].origin);
+    if (auto ok = report->prepare(json); !ok) return ok.error();
     if (auto ok = perception::write_image(a.out, image); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
     if (report->is_on_stdout()) return exit_done;
