@@ -343,8 +343,8 @@ TEST_F(ObjMaterialTest, ColoursOfMaterialsCount) {
     write_model();
     for (const std::vector<std::string>& option : {std::vector<std::string>{}, {"--no-texture"}}) {
         std::vector<std::string> words = {
-            "render", "in/model.obj", "-o", "p.pfm", "--full", "--size",    "64x32", "--eye", "0", "0",
-            "4",      "--target",     "0",  "0",     "0",      "--samples", "4",     "--fov", "40"};
+            "render", "in/model.obj", "-o", "p.pfm", "--full", "--size",    "64x32", "--eye", "0",  "0",
+            "4",      "--target",     "0",  "0",     "0",      "--samples", "4",     "--fov", "40", "--prelit"};
         words.insert(words.end(), option.begin(), option.end());
         const Outcome drawn = run(words);
         if (drawn.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << drawn.err;
@@ -356,7 +356,7 @@ TEST_F(ObjMaterialTest, ColoursOfMaterialsCount) {
     }
     for (const std::string model : {"in/model.obj", "scene.glb"}) {
         if (model == "scene.glb") write_text(path(model), GltfScene().glb(images()));
-        succeed({"build", model, "-o", "t.vdt", "--no-texture"});
+        succeed({"build", model, "-o", "t.vdt", "--no-texture", "--prelit"});
         const std::string info = run({"info", "t.vdt"}).out;
         double darkest = 0, brightest = 0;
         ASSERT_EQ(std::sscanf(info.c_str() + info.find("luminance"), "luminance %lf to %lf", &darkest, &brightest), 2);
