@@ -39,10 +39,10 @@ public:
         : tree_(tree), renderer_(std::move(renderer)) {
         vdtree::View window;
         window.fov_y_degrees = physical_field(display_, window.height).value();
-        window.up = options.up;
         const vdtree::Sphere sphere = tree.bounding_sphere();
         view_ = vdtree::frame_sphere(tree.origin() + glm::dvec3(sphere.centre), sphere.radius, options.direction,
                                      model_fill, window);
+        if (options.up) view_.up = *options.up;
         const auto relative = static_cast<float>(to_relative(display_, perception::Luminance(background)));
         draw_options_.background = relative;
         options_.display = display_;

@@ -2,6 +2,7 @@
 // Luebke and Hallen 2001.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,7 +20,7 @@ struct BudgetBenchOptions {
     std::string picture; // of the two wireframes, side by side; empty: none
     TriangleCount triangles = {.triangles = 18'000};
     glm::dvec3 direction = {1, 0, 0}; // from the model towards the eye; not 0
-    glm::dvec3 up = {0, 1, 0};        // in the picture; not 0
+    std::optional<glm::dvec3> up;     // in the picture; not along the direction; default: +Y, or -Z where that is
 };
 
 // Of each: triangles; pixels that differ visibly from the full model, and their largest V; and the share of triangles

@@ -173,7 +173,8 @@ struct Building {
 Result<Building> build(const fs::path& mesh, const fs::path& tree, std::vector<std::string> more,
                        std::vector<std::string> launcher = {}) {
     std::vector<std::string> words = std::move(launcher);
-    words.insert(words.end(), {command_beside("unseen"), "build", mesh.string(), "-o", tree.string(), "--json", "-"});
+    words.insert(words.end(), {command_beside("unseen"), "build", mesh.string(), "-o", tree.string(),
+                               "--no-fold-errors", "--json", "-"});
     words.insert(words.end(), more.begin(), more.end());
     print_note("building " + tree.filename().string() + " ...");
     const auto outcome = run_child(words);

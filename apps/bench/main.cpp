@@ -270,7 +270,7 @@ struct BudgetArguments {
 
 Result<int> run(BudgetArguments& a) {
     if (a.direction) a.options.direction = *a.direction;
-    if (a.up) a.options.up = *a.up;
+    a.options.up = a.up;
     auto bench = BenchRun::open({a.options.mesh}, {a.options.picture}, a.report);
     if (!bench) return bench.error();
     const auto result = bench_budget(a.options);

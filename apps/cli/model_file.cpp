@@ -49,14 +49,17 @@ Result<vdtree::VertexTree> build_tree_of(meshio::ReadResult&& read, vdtree::Buil
 
 Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file) {
     ProgressBar bar(file.filename().string());
-    return session::load_tree(file, load_options({}, bar));
+    session::LoadOptions options = load_options({}, bar);
+    options.measures = false;
+    options.cache.is_off = true;
+    return session::load_tree(file, options);
 }
 
-Result<session::Scene> load_scene(const std::filesystem::path& file, const TextureOptions& texture,
-                                  double unit_metres) {
+Result<session::Scene> load_scene(const std::filesystem::path& file, const ViewOptions& view) {
     ProgressBar bar(file.filename().string());
-    session::LoadOptions options = load_options(texture, bar);
-    options.unit_metres = unit_metres;
+    session::LoadOptions options = load_options(view.texture, bar);
+    options.unit_metres = view.unit_metres;
+    options.cache.is_off = view.no_cache;
     return session::Scene::load(file, options);
 }
 

@@ -22,8 +22,10 @@ Result<meshio::ReadResult> read_textured_mesh(const std::filesystem::path& file,
 // The tree of a mesh. Triangles that its reader dropped count as the tree's dropped ones.
 Result<vdtree::VertexTree> build_tree_of(meshio::ReadResult&& read, vdtree::BuildOptions options);
 
-// A tree file, or a mesh file with a note that its tree is built now.
+// A tree file, or the tree of a mesh file as build_tree() makes it, built now and kept nowhere.
 Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file);
-Result<session::Scene> load_scene(const std::filesystem::path& file, const TextureOptions& texture, double unit_metres);
+
+// What verbs look at: trees of mesh files are measured, and kept for the next time.
+Result<session::Scene> load_scene(const std::filesystem::path& file, const ViewOptions& view);
 
 } // namespace unseen::app

@@ -33,7 +33,8 @@ constexpr OptionName option_names[] = {
     {"Follower::set_glide()", "--geomorph"},
     {"session::read_textured_mesh()", "unseen build"},
     {"vdtree::write_tree()", "'unseen build'"},
-    {"session::measured()", "unseen build --fold-errors"},
+    {"session::measured()", "unseen build"},
+    {"session::TreeCache", "unseen cache"},
 };
 
 } // namespace

@@ -201,8 +201,12 @@ void add_moving_gaze_options(CLI::App& verb, GazeOptions& o, bool allows_mouse) 
                    std::string("simulated: fixations and saccades by published statistics; head: no tracker, within 15 "
                                "degrees of the middle") +
                        (allows_mouse ? "; mouse: at the pointer" : ""));
-    CLI::Option* trace = group.add_option("--gaze-trace", o.trace, "A recording: CSV with the header time_s,x_px,y_px")
-                             ->type_name("FILE.csv");
+    CLI::Option* trace =
+        group
+            .add_option("--gaze-trace", o.trace,
+                        "A recording: a table with columns such as time_s, x_px and y_px, or as Tobii, "
+                        "Pupil Labs and EyeLink name them; blinks hold the last position")
+            ->type_name("FILE.csv|FILE.tsv");
     CLI::Option* seed = group
                             .add_option_function<double>(
                                 "--seed", [&o](const double& v) { o.seed = static_cast<std::uint64_t>(v); },
@@ -323,6 +327,8 @@ void add_view_options(CLI::App& verb, ViewOptions& o) {
         ->type_name("METRES")
         ->check(positive());
     add_texture_options(group, o.texture);
+    group.add_flag("--no-cache", o.no_cache,
+                   "Of a mesh: build and measure its tree anew, and do not keep it (default: see unseen cache)");
     group.callback([&o] { check(o); });
 }
 

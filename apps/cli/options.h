@@ -42,6 +42,7 @@ struct ViewOptions {
     std::optional<double> background_cdm2;
     double unit_metres = 1; // world units a mesh unit
     TextureOptions texture;
+    bool no_cache = false; // trees are neither kept nor taken from what was kept
 };
 
 // DISPLAY.

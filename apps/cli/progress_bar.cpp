@@ -34,6 +34,8 @@ ProgressBar::~ProgressBar() {
 
 bool ProgressBar::operator()(double share_done, const char* stage) {
     const auto now = std::chrono::steady_clock::now();
+    if (share_done < last_share_) start_ = now; // other work, at another pace
+    last_share_ = share_done;
     if (!is_shown_ || now < next_draw_) return true;
     next_draw_ = now + draw_interval;
     is_drawn_ = true;

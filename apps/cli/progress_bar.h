@@ -9,7 +9,7 @@
 namespace unseen::app {
 
 // A bar with the share that is done and, after two seconds, the time that the rest will take at this pace. Draws itself
-// on stderr where that is a terminal, and is silent otherwise. Gone when it is destroyed. Hand it over as
+// on stderr where that is a terminal, and is silent otherwise. Where the share falls, other work begins. Gone when it is destroyed. Hand it over as
 // a Progress callback by std::ref(); it never cancels.
 class ProgressBar {
 public:
@@ -24,6 +24,7 @@ private:
     std::string title_;
     bool is_shown_;
     bool is_drawn_ = false;
+    double last_share_ = 0;
     std::chrono::steady_clock::time_point start_, next_draw_;
 };
 

@@ -79,7 +79,7 @@ Result<session::Session> open_session(const std::filesystem::path& model, const 
                                       const DisplayOptions& display) {
     auto around = read_surroundings(view, display);
     if (!around) return around.error();
-    auto scene = load_scene(model, view.texture, view.unit_metres);
+    auto scene = load_scene(model, view);
     if (!scene) return scene.error();
     return assemble(std::move(*scene), std::move(*around), view);
 }

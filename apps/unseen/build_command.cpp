@@ -13,6 +13,7 @@
 #include <malloc.h>
 #endif
 
+#include <perception/fold_measurement.h>
 #include <session/model_file.h>
 
 #include "build_team.h"
@@ -37,7 +38,7 @@ struct BuildArguments {
     meshio::ColourEncoding colours = meshio::ColourEncoding::srgb;
     int threads = 0;
     double memory_gib = 0; // 0: no limit
-    bool fold_errors = false, is_verbose = false;
+    bool no_fold_errors = false, is_verbose = false;
     TextureOptions texture;
 };
 
@@ -60,7 +61,8 @@ Json to_json(const vdtree::VertexTree& tree, double seconds) {
     return {{"vertices", tree.leaf_count()},       {"triangles", tree.triangle_count()},
             {"dropped", tree.dropped_triangles()}, {"nodes", tree.node_count()},
             {"bytes", tree.byte_size()},           {"build_seconds", number_or_null(seconds)},
-            {"peak_bytes", peak_bytes()},          {"texture", texture_json(tree)}};
+            {"peak_bytes", peak_bytes()},          {"fold_errors", perception::has_fold_measurement(tree)},
+            {"texture", texture_json(tree)}};
 }
 
 void print_details(const vdtree::VertexTree& tree) {
@@ -144,8 +146,6 @@ Result<Source> open_source(const BuildArguments& a, ProcessTeam* team) {
     if (const auto ok = vdtree::prepare_tree_file(a.out); !ok) return ok.error();
     auto read = read_source(a, team, read_textured_mesh);
     if (!read) return read.error();
-    if (a.fold_errors && !read->mesh.texture.texels.empty())
-        return Error{ErrorCode::invalid_argument, "--fold-errors does not measure textures: add --no-texture."};
     return Source{std::move(*report), std::move(*read)};
 }
 
@@ -153,6 +153,16 @@ Result<vdtree::VertexTree> build(const BuildArguments& a, meshio::ReadResult&& r
     auto tree = build_tree_of(std::move(read), building(a, team));
     if (team && tree) team->leave(); // else the others go when this one ends
     return tree;
+}
+
+Result<vdtree::VertexTree> measure(const BuildArguments& a, vdtree::VertexTree&& tree) {
+    if (!tree.texture().empty()) {
+        print_note(a.mesh + " has a texture, and what folds change of it is not measured: the fold test is then "
+                            "luebke-hallen-safe (--no-texture leaves the texture out).");
+        return std::move(tree);
+    }
+    ProgressBar bar("measuring what folds change");
+    return session::measured(tree, a.threads, std::ref(bar));
 }
 
 // The first of a team, or the only one.
@@ -173,11 +183,8 @@ Result<int> lead(const BuildArguments& a, ProcessTeam* team) {
     if (!tree) return tree.error();
     if (const std::string hint = session::hint_at_baked_light(*tree); !hint.empty())
         print_note(with_option_names(a.mesh + ": " + hint));
-    if (a.fold_errors) {
-        print_note("measuring what folds change ...");
-        tree = session::measured(*tree, a.threads);
-        if (!tree) return tree.error();
-    }
+    if (!a.no_fold_errors) tree = measure(a, std::move(*tree));
+    if (!tree) return tree.error();
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
     JsonReport& report = source->report;
@@ -242,10 +249,14 @@ Command build_command(CLI::App& app) {
     verb->add_option("--threads", a->threads, "Threads of each process; the tree is the same (default: all cores)")
         ->type_name("N")
         ->check(whole(1, most_threads));
-    verb->add_flag("--fold-errors", a->fold_errors,
-                   "Measure what every fold changes, for the fold test 'error' (else that is done at each start), and "
-                   "give proxies the luminance "
-                   "that keeps the surface's light");
+    CLI::Option* leave = verb->add_flag("--no-fold-errors", a->no_fold_errors,
+                                        "Leave out the following: faster, and a smaller file; the default fold test "
+                                        "measures then when it first needs to");
+    verb->add_flag(
+            "--fold-errors",
+            "The default, where there is no texture: measure what every fold changes, for the fold test 'error', "
+            "and give proxies the luminance that keeps the surface's light")
+        ->excludes(leave);
     add_texture_options(*verb, a->texture);
     verb->add_option("--memory", a->memory_gib,
                      "Memory that each process aims to keep to; the rest waits in a temporary file beside the tree")
@@ -254,7 +265,7 @@ Command build_command(CLI::App& app) {
     add_json_option(*verb, a->json);
     add_verbose_option(*verb, a->is_verbose);
     verb->footer("Examples:\n  unseen build bunny.ply -o bunny.vdt\n"
-                 "  unseen build city.obj -o city.vdt --clusterer octree --threads 4\n"
+                 "  unseen build city.obj -o city.vdt --clusterer octree --threads 4 --no-fold-errors\n"
                  "  unseen build city.obj -o city.vdt --memory 4\n"
                  "  unseen build scan.ply -o scan.vdt --texture scan.jpg" +
                  std::string(ProcessTeam::is_there() ? "\n  mpirun -np 4 unseen build city.obj -o city.vdt" : ""));

@@ -81,7 +81,9 @@ Result<int> run(RenderArguments& a) {
         if (!drawn) return drawn.error();
         image = std::move(*drawn);
     }
-    if (auto ok = report->prepare(to_json(*result, frame->draw_ms)); !ok) return ok.error();
+    Json json = to_json(*result, frame->draw_ms);
+    json["tree"] = name_of(session->scene().objects[0].origin);
+    if (auto ok = report->prepare(json); !ok) return ok.error();
     if (auto ok = perception::write_image(a.out, image); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
     if (report->is_on_stdout()) return exit_done;
@@ -121,7 +123,10 @@ void add_path_options(CLI::App& verb, FlyThroughOptions& o) {
                     "With --geomorph, --lights and moving gazes: frames a second of the path (default: 60)")
         ->type_name("N")
         ->check(within(1, 1e6));
-    group.add_flag("--draw,!--no-draw", o.draws, "Draw the frames even where no -o keeps them, to time that");
+    // Not by its address: the parser takes an optional<bool> for a count and begins with 0.
+    group.add_flag_function(
+        "--draw,!--no-draw", [&o](std::int64_t count) { o.draws = count > 0; },
+        "Draw the frames even where no -o keeps them, to time that");
 }
 
 bool is_moving(const GazeOptions& gaze) {

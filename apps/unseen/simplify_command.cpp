@@ -47,7 +47,9 @@ Result<int> run(const SimplifyArguments& a) {
                      "move nearer or allow more triangles."};
     }
 
-    if (auto ok = report->prepare(to_json(*result, nothing_drawn)); !ok) return ok.error();
+    Json json = to_json(*result, nothing_drawn);
+    json["tree"] = name_of(session->scene().objects[0].origin);
+    if (auto ok = report->prepare(json); !ok) return ok.error();
     const auto notes = meshio::write_cut(a.out, result->cuts[0]);
     if (!notes) return notes.error();
     for (const std::string& note : *notes) print_note(a.out + ": " + note);

@@ -11,6 +11,7 @@ Command make_command(CLI::App& app);
 Command simplify_command(CLI::App& app);
 Command render_command(CLI::App& app);
 Command compare_command(CLI::App& app);
+Command cache_command(CLI::App& app);
 Command calibrate_command(CLI::App& app);
 Command csf_command(CLI::App& app);
 Command sheet_command(CLI::App& app);

@@ -117,7 +117,7 @@ TEST_F(CompareTest, AMapThatCannotBeWrittenLeavesNoOtherFile) {
     write("a.pfm", disc(20, 20));
     const auto before = files();
     const Outcome outcome =
-        run({"compare", "a.pfm", "a.pfm", "--map", "map.png", "--threshold-map", "missing/t.pfm", "--json", "o.json"});
+        run({"compare", "a.pfm", "a.pfm", "--map", "map.png", "--threshold-map", "a.pfm/t.pfm", "--json", "o.json"});
     EXPECT_EQ(outcome.status, 1);
     EXPECT_THAT(outcome.err, IsAnErrorForPeople());
     EXPECT_EQ(files(), before);

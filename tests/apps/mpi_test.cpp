@@ -17,7 +17,7 @@ protected:
     // Several parts, of 2^15 vertices each at most.
     void write_parts() const { write_ball("large.obj", 250, 300); }
     void build_alone() const {
-        const Outcome built = run({"build", "large.obj", "-o", "alone.vdt", "--threads", "2"});
+        const Outcome built = run({"build", "large.obj", "--no-fold-errors", "-o", "alone.vdt", "--threads", "2"});
         ASSERT_EQ(built.status, 0) << built.err;
     }
     // Where a process was killed: one tree or none, never a part of one. Whoever is killed on the way out has left a
@@ -34,7 +34,8 @@ TEST_F(TeamTest, MakesTheSameTreeAndSaysSoOnce) {
     write_parts();
     build_alone();
     for (const int processes : {1, 2, 3}) {
-        const Outcome built = run_team(processes, "exec " UNSEEN_COMMAND " build large.obj -o team.vdt --json -");
+        const Outcome built =
+            run_team(processes, "exec " UNSEEN_COMMAND " build large.obj --no-fold-errors -o team.vdt --json -");
         ASSERT_EQ(built.status, 0) << built.err;
         EXPECT_TRUE(built.json().is_object()) << built.out;
         EXPECT_EQ(built.err, "");
@@ -82,8 +83,9 @@ TEST_F(TeamTest, AMemberThatDiesLeavesNoPartOfATree) {
     for (const std::string seconds : {"0.05", "0.3"}) {
         const Outcome built =
             run_team(2, "if [ $OMPI_COMM_WORLD_RANK = 1 ]; then exec timeout -s KILL " + seconds +
-                            " " UNSEEN_COMMAND " build large.obj -o team.vdt --threads 1; else exec " UNSEEN_COMMAND
-                            " build large.obj -o team.vdt --threads 1; fi");
+                            " " UNSEEN_COMMAND
+                            " build large.obj --no-fold-errors -o team.vdt --threads 1; else exec " UNSEEN_COMMAND
+                            " build large.obj --no-fold-errors -o team.vdt --threads 1; fi");
         expect_whole_or_none(built);
     }
 }
@@ -95,11 +97,12 @@ TEST_F(TeamTest, WhatADeadTeamLeavesIsRemovedAtTheNextStart) {
     for (const std::string seconds : {"0.1", "0.4", "0.6"}) {
         const Outcome built =
             run_team(2, "if [ $OMPI_COMM_WORLD_RANK = 0 ]; then exec timeout -s KILL " + seconds +
-                            " " UNSEEN_COMMAND " build large.obj -o team.vdt --memory 0.1; else exec " UNSEEN_COMMAND
-                            " build large.obj -o team.vdt --memory 0.1; fi");
+                            " " UNSEEN_COMMAND
+                            " build large.obj --no-fold-errors -o team.vdt --memory 0.1; else exec " UNSEEN_COMMAND
+                            " build large.obj --no-fold-errors -o team.vdt --memory 0.1; fi");
         expect_whole_or_none(built);
     }
-    const Outcome built = run({"build", "large.obj", "-o", "team.vdt"});
+    const Outcome built = run({"build", "large.obj", "--no-fold-errors", "-o", "team.vdt"});
     ASSERT_EQ(built.status, 0) << built.err;
     EXPECT_THAT(files(), ::testing::UnorderedElementsAre("large.obj", "alone.vdt", "team.vdt"));
 }

@@ -192,6 +192,35 @@ TEST_F(RenderCommandTest, GazesArePlayedAndRepeat) {
     EXPECT_THAT(effect_named(still.json(), "gaze")["why"].get<std::string>(), HasSubstr("give or take 15 degrees"));
 }
 
+TEST_F(RenderCommandTest, GazesAreReadAsTrackersWriteThem) {
+    const auto triangles = [&](const std::string& trace) {
+        const Outcome flown = run({"render", "ball.vdt", "--path", "orbit:0:12", "--size", "800x640", "--fold-test",
+                                   "error", "--csv", "out.csv", "--no-draw", "--gaze-trace", trace});
+        EXPECT_EQ(flown.status, 0) << flown.err;
+        std::vector<double> column;
+        for (const auto& row : numbers_of(read_text(path("out.csv")))) column.push_back(row[1]);
+        return std::pair(column, flown.err);
+    };
+    write_text(path("own.csv"), "time_s,x_px,y_px\n0,0,0\n0.0625,0,0\n0.125,400,320\n0.5,400,320\n");
+    const auto [expected, silence] = triangles("own.csv");
+    EXPECT_EQ(silence, "");
+    EXPECT_NE(expected.front(), expected.back());
+    write_text(path("tobii.tsv"),
+               "Recording timestamp [us]\tSensor\tGaze point X [DACS px]\tGaze point Y [DACS px]\r\n"
+               "0\tEye Tracker\t0\t0\r\n62500\t\t\t\r\n125000\t\t400\t320\r\n500000\t\t400\t320\r\n");
+    EXPECT_EQ(triangles("tobii.tsv"), std::pair(expected, std::string()));
+    // 0..1 runs across the window.
+    write_text(path("pupil.csv"), "gaze_timestamp,world_index,confidence,norm_pos_x,norm_pos_y\n"
+                                  "64,0,1,0,1\n64.0625,1,0.2,0.7,0.1\n64.125,2,1,0.5,0.5\n64.5,3,1,0.5,0.5\n");
+    const auto [pupil, notes] = triangles("pupil.csv");
+    EXPECT_EQ(pupil, expected);
+    EXPECT_THAT(notes, HasSubstr("note: pupil.csv: times count from its first row, not by 'gaze_timestamp'"));
+    EXPECT_THAT(run({"render", "ball.vdt", "--path", "orbit:0:2", "--no-draw", "--gaze-trace",
+                     fs::absolute("data/gaze/simulated-tobii.tsv")})
+                    .err,
+                "");
+}
+
 TEST_F(RenderCommandTest, BadGazesAreRefused) {
     const std::vector<std::string> flight = {"render", "ball.vdt", "--path", "orbit:0:2", "--no-draw"};
     const auto with = [&](std::vector<std::string> more) {

@@ -22,7 +22,9 @@ using session::Session;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-vdtree::VertexTree tree_of(const vdtree::Mesh& mesh) { return *vdtree::build_tree(mesh.view()); }
+vdtree::VertexTree tree_of(const vdtree::Mesh& mesh, const vdtree::BuildOptions& options = {}) {
+    return *vdtree::build_tree(mesh.view(), options);
+}
 
 // Two balls beside each other, the second one half as large.
 Session two_balls() {
@@ -122,6 +124,8 @@ TEST(Session, FoldsObjectsBeforeTheLuminanceOfAll) {
     vdtree::Mesh grey = shapes::bumpy_sphere(4, 0.03), white = shapes::cube(2);
     grey.colours.assign(grey.positions.size(), glm::vec4(0.2f, 0.2f, 0.2f, 1));
     white.colours.assign(white.positions.size(), glm::vec4(1));
+    vdtree::BuildOptions prelit;
+    prelit.prelit = true;
     const auto triangles_of_grey = [](Session& session) {
         vdtree::View view = session.default_view();
         view.eye = {0, 0, 100};
@@ -129,9 +133,9 @@ TEST(Session, FoldsObjectsBeforeTheLuminanceOfAll) {
         auto simplified = session.simplify(view, {.fold_test = FoldTest::luebke_hallen});
         return simplified->cuts[0].triangle_count();
     };
-    session::Scene both = session::Scene::of(tree_of(grey));
-    both.objects.push_back({tree_of(white), {.translation = {0, 0, -5}}});
-    auto alone = Session::create(session::Scene::of(tree_of(grey)));
+    session::Scene both = session::Scene::of(tree_of(grey, prelit));
+    both.objects.push_back({tree_of(white, prelit), {.translation = {0, 0, -5}}});
+    auto alone = Session::create(session::Scene::of(tree_of(grey, prelit)));
     auto together = Session::create(std::move(both));
     EXPECT_GT(triangles_of_grey(*together), triangles_of_grey(*alone));
 }

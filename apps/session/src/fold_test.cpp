@@ -9,6 +9,8 @@
 
 #include <glm/geometric.hpp>
 
+#include "loaded_tree.h"
+
 namespace unseen::session {
 namespace {
 
@@ -31,7 +33,6 @@ struct Choice {
 
 // Of the tests by luminance one that knows the scene, and colours where they count.
 Choice suitable_test(const Sight& sight, bool chroma, bool may_measure) {
-    constexpr vdtree::NodeId most_measured = 2'000'000; // nodes; about a minute on one core
     const vdtree::VertexTree& tree = sight.object.tree;
     if (sight.lighting) return {FoldTest::luebke_hallen, "the test error does not know lights that move"};
     if (!tree.texture().empty()) return {FoldTest::luebke_hallen_safe, "the test error does not know textures"};

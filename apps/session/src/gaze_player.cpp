@@ -11,15 +11,20 @@ Result<GazePlayer> GazePlayer::create(const GazeOptions& options) {
     if (auto valid = perception::validate(options.tracker); !valid) return valid.error();
     GazePlayer player(options);
     if (options.source == GazeSource::trace) {
-        auto trace = perception::read_gaze_trace(options.trace);
-        if (!trace) return trace.error();
-        player.trace_ = std::move(*trace);
+        auto recording = perception::read_gaze_recording(options.trace);
+        if (!recording) return recording.error();
+        player.recording_ = std::move(*recording);
     }
     return player;
 }
 
 Result<void> GazePlayer::begin(const perception::Display& display, const vdtree::View& view,
                                std::optional<double> duration_s, const Messages& messages) {
+    const auto play = [&](Result<perception::GazeTrace> trace) -> Result<void> {
+        if (!trace) return trace.error();
+        tracker_.emplace(std::move(*trace), options_.tracker, display, view.width, view.height);
+        return {};
+    };
     if (options_.source == GazeSource::simulated) {
         perception::SimulatedGaze simulated;
         simulated.seed = options_.seed;
@@ -28,22 +33,22 @@ Result<void> GazePlayer::begin(const perception::Display& display, const vdtree:
         simulated.duration_s = duration_s.value_or(longest_s) + spare_s;
         simulated.width_px = view.width;
         simulated.height_px = view.height;
-        auto trace = perception::simulate_gaze(simulated, display);
-        if (!trace) return trace.error();
-        trace_ = std::move(*trace);
+        return play(perception::simulate_gaze(simulated, display));
     }
-    if (options_.source == GazeSource::trace) {
-        const double first_s = trace_->samples().front().time_s, last_s = trace_->samples().back().time_s;
-        const std::string times = options_.trace.string() + " runs from " + number_text(first_s) + " to " +
-                                  number_text(last_s) + " s, and the frames from 0" +
-                                  (duration_s ? " to " + number_text(*duration_s) + " s" : " on");
-        if ((duration_s && first_s > *duration_s) || last_s < 0)
-            return Error{ErrorCode::invalid_argument, times + ": count its times from the first frame."};
-        if (duration_s && last_s < *duration_s && messages.warning)
-            messages.warning(times + ": after its end the last gaze holds.");
-    }
-    if (trace_) tracker_.emplace(*std::exchange(trace_, {}), options_.tracker, display, view.width, view.height);
-    return {};
+    if (!recording_) return {};
+    const perception::GazeRecording recording = *std::exchange(recording_, {});
+    const std::string file = options_.trace.string();
+    if (messages.note)
+        for (const std::string& note : recording.notes) messages.note(file + ": " + note);
+    const double first_s = recording.trace.samples().front().time_s, last_s = recording.trace.samples().back().time_s;
+    const std::string times = file + " runs from " + number_text(first_s) + " to " + number_text(last_s) +
+                              " s, and the frames from 0" +
+                              (duration_s ? " to " + number_text(*duration_s) + " s" : " on");
+    if ((duration_s && first_s > *duration_s) || last_s < 0)
+        return Error{ErrorCode::invalid_argument, times + ": count its times from the first frame."};
+    if (duration_s && last_s < *duration_s && messages.warning)
+        messages.warning(times + ": after its end the last gaze holds.");
+    return play(recording.in_window(view.width, view.height));
 }
 
 std::optional<Gaze> GazePlayer::around(std::optional<glm::dvec2> px) const {

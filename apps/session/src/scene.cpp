@@ -5,6 +5,8 @@
 
 #include <vdtree/internal/errors.h>
 
+#include "loaded_tree.h"
+
 #include <glm/geometric.hpp>
 
 namespace unseen::session {
@@ -25,9 +27,11 @@ bool is_direction(glm::dvec3 v) {
 Result<Scene> Scene::load(const std::filesystem::path& file, const LoadOptions& options) {
     if (!(options.unit_metres > 0 && std::isfinite(options.unit_metres)))
         return invalid_argument("load.unit_metres must be above 0 and finite.");
-    auto tree = open_tree(file, options);
-    if (!tree) return tree.error();
-    Scene scene = of(std::move(*tree), options.unit_metres);
+    auto loaded = session::load(file, options, true);
+    if (!loaded) return loaded.error();
+    Scene scene = of(std::move(loaded->tree), options.unit_metres);
+    scene.objects[0].origin = loaded->origin;
+    scene.objects[0].measurement = std::move(loaded->measurement);
     scene.objects[0].name = file.filename().string();
     scene.objects[0].texture_left_out = options.without_textures;
     return scene;

@@ -10,6 +10,7 @@
 #include <vdtree/internal/errors.h>
 #include <vdtree/occluders.h>
 
+#include "loaded_tree.h"
 #include "session_state.h"
 
 namespace unseen::session {
@@ -137,12 +138,15 @@ Result<std::vector<Sight>> Session::State::look(const vdtree::View& view) {
 
 Result<void> Session::State::measure(std::size_t object) {
     constexpr vdtree::NodeId told_from = 20'000; // nodes; about half a second on one core
-    vdtree::VertexTree& tree = scene.objects[object].tree;
-    if (messages.note && tree.interior_count() >= told_from)
+    Object& of = scene.objects[object];
+    // What is kept is of the tree as it was read.
+    if (of.measurement && &of.measurement->tree.data() != &of.tree.data()) of.measurement.reset();
+    if (messages.note && of.tree.interior_count() >= told_from && !of.measurement)
         messages.note("measuring what folds change (session::measured() keeps that in the tree) ...");
-    auto with_errors = measured(tree);
+    auto with_errors = measured_once(of.tree, of.measurement.get(), messages);
     if (!with_errors) return with_errors.error();
-    tree = std::move(*with_errors);
+    of.measurement.reset();
+    of.tree = std::move(*with_errors);
     caches[object] = {};
     ++tree_count[object];
     return {};

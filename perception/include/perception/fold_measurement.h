@@ -1,6 +1,9 @@
 // What folding each node of a tree changes, measured: for error_distances() in <perception/criterion.h>.
 #pragma once
 
+#include <span>
+
+#include <vdtree/function_ref.h>
 #include <vdtree/result.h>
 #include <vdtree/vertex_tree.h>
 
@@ -21,10 +24,15 @@ namespace unseen::perception {
 // points are few.
 //
 // Fails where check() does, and on trees with a texture, of which nothing is measured. Cost: some 50 us a node, and a
-// second; in parallel. The result does not depend on the threads. `threads`: 0: all cores.
-Result<vdtree::VertexTree> measure_folds(const vdtree::VertexTree& tree, int threads = 0);
+// second; in parallel. The result does not depend on the threads. `threads`: 0: all cores. Progress is told, and can
+// cancel, up to the whole mesh's pictures.
+Result<vdtree::VertexTree> measure_folds(const vdtree::VertexTree& tree, int threads = 0,
+                                         const Progress& progress = {});
 
 // Whether a tree comes from there. What files say is looked at when a criterion is made.
 bool has_fold_measurement(const vdtree::VertexTree& tree);
+
+// The numbers that a measurement goes by. Criteria refuse trees that were measured by others.
+std::span<const float> measurement_settings() noexcept;
 
 } // namespace unseen::perception

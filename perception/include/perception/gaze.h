@@ -1,11 +1,13 @@
 // Where the viewer looks, and how surely that is known.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include <glm/vec2.hpp>
@@ -30,7 +32,9 @@ public:
     // Fails on no samples, times that do not ascend, gaps longer than `longest_gap_s`, and non-finite numbers, naming
     // the index.
     static Result<GazeTrace> create(std::vector<GazeSample> samples);
-    static constexpr double longest_gap_s = 1; // a blink takes up to 0.4 s; longer, the tracker lost the eye
+    static constexpr double longest_gap_s = 1;
+    static constexpr double farthest_px = 1e6;              // from the window's corner: a thousand windows away
+    static constexpr std::size_t most_samples = 10'000'000; // of files and simulations
 
     const std::vector<GazeSample>& samples() const noexcept { return samples_; }
     double duration_s() const noexcept { return samples_.back().time_s - samples_.front().time_s; }
@@ -41,9 +45,44 @@ private:
     std::vector<GazeSample> samples_;
 };
 
-// CSV with the header "time_s,x_px,y_px" and one sample a line; empty lines and those that begin with # are skipped.
-// Times out of order, gaps and bad numbers are errors that name the file and the line.
-Result<GazeTrace> read_gaze_trace(const std::filesystem::path& file);
+// A recording as a tracker's program wrote it.
+struct GazeRecording {
+    GazeTrace trace;
+    bool is_normalised = false;     // not pixels, but shares of the window from its top left
+    std::vector<std::string> notes; // sentences about what was made of the file and is not plain from its names
+
+    // In pixels of a window. Fails on sizes that put a sample farther away than traces have them.
+    Result<GazeTrace> in_window(int width_px, int height_px) const;
+};
+
+// Samples that a tracker is less sure of are gaps: what Pupil Labs recommend for their `confidence`.
+inline constexpr double least_confidence = 0.6;
+// Blinks take 0.1 to 0.4 s (Schiffman 2001); longer, the tracker lost the eye.
+inline constexpr double longest_blink_s = 0.4;
+
+// A table in UTF-8 with a header and one sample a row, separated by tabs, semicolons or commas, as the header is. Empty
+// lines and those that begin with # are skipped.
+//
+// Columns are known by their names, whatever their case, spaces and underscores; others are ignored.
+// - Time: "time", "t", or the timestamps of Tobii, Pupil Labs and EyeLink. The unit is part of the name ("time_ms",
+//   "timestamp [ns]"; s, ms, us, ns), that of the program whose name it is, or seconds. Timestamps are a clock's and
+//   count from the first row; "time" and Tobii's "Recording timestamp" stay as they are.
+// - Position: "x" and "y", with "gaze", "gaze point", "left", "right" before or behind: "Gaze point left X [DACS px]",
+//   "LEFT_GAZE_X", "gaze x [px]", "x_norm"; and Pupil's "norm_pos_x", "norm_pos_y", whose y points up. Pixels come
+//   before shares of the screen, and these before those of Tobii's media (MCS). Where no name says which, they are
+//   shares if all are within -0.5..1.5. Of two eyes, the mean of those that are seen, unless the file has it.
+// - Whether the eye is seen: "confidence" (see `least_confidence`), "Validity left" and "right" of Tobii,
+//   "LEFT_IN_BLINK" of EyeLink, "worn" and "blink id" of Pupil Labs.
+//
+// Rows without a position (empty, NaN, ".", NA) and with an eye that is not seen are gaps. The last position holds in
+// them, and the first before it: during a blink nothing is seen (Volkmann, Riggs & Moore 1980), so what counts is where
+// the eye lands, and a glide there would be a movement that nobody made. Of rows with the same time the last with a
+// position counts.
+//
+// Errors name the file, the line and the column. Times that fall are errors, and rows more than
+// `GazeTrace::longest_gap_s` apart.
+Result<GazeRecording> read_gaze_recording(const std::filesystem::path& file);
+// With the columns time_s, x_px, y_px.
 Result<void> write_gaze_trace(const std::filesystem::path& file, const GazeTrace& trace);
 
 // Fixations and saccades by published statistics. Fixations: log-normal durations of median 250 ms (Rayner 1998: 200 to

@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <iterator>
 #include <limits>
 #include <string>
+#include <thread>
 
 #include <glm/geometric.hpp>
 #include <tbb/parallel_for.h>
@@ -181,22 +183,37 @@ public:
           support_(tree.support_spheres()), interior_(tree.interior_count()), of_leaf_(tree), crossing_(interior_),
           contacts_(find_contacts(tree)), witnesses_(interior_) {}
 
-    void run() {
+    // False where `progress` has cancelled; it is called on the calling thread only.
+    bool run(const Progress& progress) {
         std::vector<NodeId> parts, above;
         for (NodeId node = 0; node < interior_;) {
             const bool is_part = leaf_end_[node] - first_leaf_[node] <= leaves_of_part;
             (is_part ? parts : above).push_back(node);
             node = is_part ? tree_.subtree_end()[node] : node + 1;
         }
+        const std::thread::id caller = std::this_thread::get_id();
+        std::atomic<NodeId> done = 0;
+        std::atomic<bool> is_cancelled = false;
+        const auto go_on = [&](NodeId more) {
+            const double share = static_cast<double>(done += more) / interior_;
+            if (progress && std::this_thread::get_id() == caller && !progress(share, stage)) is_cancelled = true;
+            return !is_cancelled;
+        };
         tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
+            if (is_cancelled) return;
+            const NodeId begin = parts[i], end = tree_.subtree_end()[begin];
             Scratch scratch;
-            for (NodeId node = tree_.subtree_end()[parts[i]]; node-- > parts[i];) measure(node, scratch);
+            for (NodeId node = end; node-- > begin;) measure(node, scratch);
+            go_on(end - begin);
         });
         Scratch scratch;
-        for (std::size_t i = above.size(); i-- > 0;) measure(above[i], scratch);
+        for (std::size_t i = above.size(); i-- > 0 && go_on(1);) measure(above[i], scratch);
+        return go_on(0);
     }
 
 private:
+    static constexpr const char* stage = "measuring folds";
+
     struct Mean {
         Difference sum;
         int count = 0;
@@ -548,7 +565,9 @@ private:
 
 bool has_fold_measurement(const VertexTree& tree) { return !tree.attribute<FoldRecord>(record_name).empty(); }
 
-Result<VertexTree> measure_folds(const VertexTree& tree, int threads) {
+std::span<const float> measurement_settings() noexcept { return settings; }
+
+Result<VertexTree> measure_folds(const VertexTree& tree, int threads, const Progress& progress) {
     const auto sound = SoundTree::of(tree);
     if (!sound) return sound.error();
     if (!tree.texture().empty())
@@ -567,14 +586,17 @@ Result<VertexTree> measure_folds(const VertexTree& tree, int threads) {
     std::vector<FoldError> errors;
     std::vector<FoldStage> stages;
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
+    bool is_whole = false;
     arena.execute([&] {
-        Measurer(*measured, records, facing).run();
+        is_whole = Measurer(*measured, records, facing).run(progress);
+        if (!is_whole) return;
         // How much light many folds shift depends on the order in which they are folded: that of what the model makes
         // of each alone, whatever the factors of a criterion will be.
         errors = nested_errors(*measured, records, facing, FoldModel());
         find_luminance_bias(*measured, errors);
         stages = find_stages(*measured, errors);
     });
+    if (!is_whole) return Error{ErrorCode::cancelled, "Measuring what folds change was cancelled."};
     std::vector<std::uint8_t> stage_of(tree.interior_count());
     for (NodeId node = 0; node < errors.size(); ++node) {
         records[node].bias = errors[node].bias;

@@ -1,29 +1,21 @@
-// Gazes: traces from files, from statistics, and through a tracker.
+// Gazes: traces, simulated ones, and what a tracker makes of them.
 #include <perception/gaze.h>
 
 #include <algorithm>
-#include <array>
 #include <cassert>
-#include <charconv>
 #include <cmath>
 #include <numbers>
-#include <sstream>
 #include <string>
 
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
-#include <vdtree/internal/atomic_file.h>
 #include <vdtree/internal/errors.h>
-
 #include <vdtree/internal/number_text.h>
 #include <vdtree/internal/random.h>
-#include <vdtree/internal/text_file.h>
 
 namespace unseen::perception {
 namespace {
-
-constexpr std::size_t most_samples = 10'000'000;
 
 // Of fixations and saccades, see the header.
 constexpr double median_fixation_s = 0.25, fixation_spread = 0.35; // standard deviation of the logarithm
@@ -36,11 +28,10 @@ constexpr double margins_deg[] = {0, 0.25, 0.5, 0.75, 1, 1.5, 2, 3, 4, 6, 8, 12,
 
 // What is wrong with a sample after another, or nothing.
 std::string complaint_about(const GazeSample& sample, const GazeSample* before) {
-    constexpr double farthest_px = 1e6; // from the window's corner: a thousand windows away
     if (!std::isfinite(sample.time_s)) return "has a time_s that is not finite";
     for (const auto& [name, px] : {std::pair("x_px", sample.px.x), std::pair("y_px", sample.px.y)}) {
         if (!std::isfinite(px)) return "has an " + std::string(name) + " that is not finite";
-        if (std::abs(px) > farthest_px)
+        if (std::abs(px) > GazeTrace::farthest_px)
             return "has an " + std::string(name) + " of " + number_text(px) + ": at most a million pixels aside can be";
     }
     if (!before) return {};
@@ -50,21 +41,6 @@ std::string complaint_about(const GazeSample& sample, const GazeSample* before) 
     if (!(sample.time_s - before->time_s <= GazeTrace::longest_gap_s))
         return "follows a gap of " + number_text(sample.time_s - before->time_s) + " s: at most 1 s may be missing";
     return {};
-}
-
-// "0.004,512,384.5".
-std::optional<GazeSample> parse_sample(std::string_view line) {
-    std::array<double, 3> values;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-        const std::size_t comma = line.find(',');
-        if ((comma == line.npos) != (i + 1 == values.size())) return std::nullopt;
-        const std::string_view cell = trimmed(line.substr(0, comma));
-        const auto value = number_from<double>(cell);
-        if (!value) return std::nullopt;
-        values[i] = *value;
-        if (comma != line.npos) line.remove_prefix(comma + 1);
-    }
-    return GazeSample{values[0], {values[1], values[2]}};
 }
 
 // Share of the way at a share of the time: minimum jerk (Hogan 1984).
@@ -152,50 +128,9 @@ glm::dvec2 GazeTrace::at(double time_s) const {
     return a.px + (b.px - a.px) * ((time_s - a.time_s) / (b.time_s - a.time_s));
 }
 
-Result<GazeTrace> read_gaze_trace(const std::filesystem::path& file) {
-    const auto whole = read_text_file(file);
-    if (!whole) return whole.error();
-    std::istringstream stream(*whole);
-    std::vector<GazeSample> samples;
-    bool has_header = false;
-    std::size_t line_number = 0;
-    const auto complain = [&](const std::string& what) {
-        return Error{ErrorCode::malformed_data,
-                     file.string() + ": line " + std::to_string(line_number) + ": " + what + "."};
-    };
-    for (std::string line; std::getline(stream, line);) {
-        ++line_number;
-        const std::string_view text = trimmed(line);
-        if (text.empty() || text.starts_with('#')) continue;
-        if (!has_header) {
-            if (text != "time_s,x_px,y_px") return complain("the first line must be \"time_s,x_px,y_px\"");
-            has_header = true;
-            continue;
-        }
-        const auto sample = parse_sample(text);
-        if (!sample) return complain("must be three numbers: time_s,x_px,y_px");
-        const std::string problem = complaint_about(*sample, samples.empty() ? nullptr : &samples.back());
-        if (!problem.empty()) return complain("the sample " + problem);
-        if (samples.size() == most_samples) return complain("there are more than ten million samples");
-        samples.push_back(*sample);
-    }
-    if (samples.empty()) return complain("there is no sample");
-    return GazeTrace::create(std::move(samples));
-}
-
-Result<void> write_gaze_trace(const std::filesystem::path& file, const GazeTrace& trace) {
-    std::string text = "time_s,x_px,y_px\n";
-    for (const GazeSample& s : trace.samples())
-        text += number_text(s.time_s) + "," + number_text(s.px.x) + "," + number_text(s.px.y) + "\n";
-    auto whole = vdtree::AtomicFile::create(file);
-    if (!whole) return whole.error();
-    if (auto written = whole->write(text); !written) return written;
-    return whole->commit();
-}
-
 Result<GazeTrace> simulate_gaze(const SimulatedGaze& o, const Display& display) {
     if (!(o.duration_s > 0 && o.samples_per_s > 0 &&
-          o.duration_s * o.samples_per_s <= static_cast<double>(most_samples)))
+          o.duration_s * o.samples_per_s <= static_cast<double>(GazeTrace::most_samples)))
         return invalid_argument(
             "A simulated gaze needs a duration and a rate above 0, and at most ten million samples.");
     if (o.width_px < 1 || o.height_px < 1)

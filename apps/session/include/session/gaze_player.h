@@ -21,19 +21,20 @@ enum class GazeSource {
 
 struct GazeOptions {
     GazeSource source = GazeSource::none;
-    std::filesystem::path trace = {}; // of GazeSource::trace, see perception::read_gaze_trace()
+    std::filesystem::path trace = {}; // of GazeSource::trace, see perception::read_gaze_recording()
     std::uint64_t seed = 1;           // of GazeSource::simulated
     perception::TrackerOptions tracker = {};
 };
 
 class GazePlayer {
 public:
-    // Reads the trace. Errors name its line, or the tracker's field.
+    // Reads the recording. Errors name its line, or the tracker's field.
     static Result<GazePlayer> create(const GazeOptions& options);
 
-    // To be called before the first frame: simulates a gaze that is to be simulated, in the view's window, for frames
-    // up to `duration_s`; where nobody knows when they end, for an hour, after which the eye keeps still. Fails where a
-    // recording has nothing for the frames; warns where it ends before them, and its last gaze holds.
+    // To be called before the first frame: puts a recording into the view's window and notes what was made of its file,
+    // or simulates a gaze there, for frames up to `duration_s`; where nobody knows when they end, for an hour, after
+    // which the eye keeps still. Fails where a recording has nothing for the frames; warns where it ends before them,
+    // and its last gaze holds.
     Result<void> begin(const perception::Display& display, const vdtree::View& view, std::optional<double> duration_s,
                        const Messages& messages = {});
 
@@ -47,7 +48,7 @@ private:
     explicit GazePlayer(const GazeOptions& options) : options_(options) {}
 
     GazeOptions options_;
-    std::optional<perception::GazeTrace> trace_; // until begin()
+    std::optional<perception::GazeRecording> recording_; // until begin()
     std::optional<perception::GazeTracker> tracker_;
 };
 

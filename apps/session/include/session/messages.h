@@ -11,7 +11,7 @@ namespace unseen::session {
 struct Messages {
     Callback<void(const std::string&)> note = {};    // something takes long, and how to spare it
     Callback<void(const std::string&)> warning = {}; // something is odd, and what is made of it
-    Progress progress = {};                          // of reading, then of building; false cancels
+    Progress progress = {};                          // of reading, then of building, then of measuring; false cancels
 };
 
 } // namespace unseen::session

@@ -6,6 +6,7 @@
 
 #include <meshio/mesh_io.h>
 #include <session/messages.h>
+#include <session/tree_cache.h>
 #include <vdtree/vertex_tree.h>
 
 namespace unseen::session {
@@ -18,6 +19,10 @@ struct LoadOptions {
     // A mesh's colours and textures are light that is baked in, not reflectance: see vdtree::BuildOptions. Not of trees.
     bool prelit = false;
     double unit_metres = 1; // world units (metres) a mesh unit; above 0. Of Scene::load()
+    // Of a mesh: measure what folds change, too (see measured()), where its tree has no texture and at most two million
+    // folds.
+    bool measures = true;
+    CacheOptions cache = {}; // where trees of meshes, and measurements, are kept for the next time
     Messages messages = {};
 };
 
@@ -27,8 +32,14 @@ struct LoadOptions {
 Result<meshio::ReadResult> read_textured_mesh(const std::filesystem::path& file, const LoadOptions& options = {},
                                               meshio::ReadOptions reading = {});
 
-// A tree file, read and checked to the last byte, or the tree of a mesh file: building takes some ten seconds for a
-// million triangles, and a note says so. A tree has its texture, and takes no other.
+// Where a tree comes from: made by the program, a tree file, just built, or built before and kept (TreeCache).
+enum class TreeOrigin { given, file, built, cache };
+std::string name_of(TreeOrigin origin);
+
+// A tree file, read and checked to the last byte, or the tree of a mesh file: built and measured, which takes some ten
+// seconds for a million triangles and some 50 us a fold, or read from the cache where the same mesh was built before
+// with the same options. What the reader warns of is told only when the tree is built, and a note says where it is
+// kept; a cache that cannot be written to costs nothing but that. A tree has its texture, and takes no other.
 Result<vdtree::VertexTree> load_tree(const std::filesystem::path& file, const LoadOptions& options = {});
 
 // The same, but tree files of 256 MiB and more are mapped: only what is used is read, and checked.
@@ -41,6 +52,6 @@ std::string hint_at_baked_light(const vdtree::VertexTree& tree);
 // A tree with what its folds change, which the fold test `error` goes by: light is conserved first, then measured.
 // Fails on textured trees, of which nothing is measured. Cost: some 50 us a node, and a second; in parallel. `threads`:
 // 0: all cores.
-Result<vdtree::VertexTree> measured(const vdtree::VertexTree& tree, int threads = 0);
+Result<vdtree::VertexTree> measured(const vdtree::VertexTree& tree, int threads = 0, const Progress& progress = {});
 
 } // namespace unseen::session

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,12 +15,16 @@
 
 namespace unseen::session {
 
+struct MeasurementPlace; // the library's own
+
 struct Object {
     vdtree::VertexTree tree;
     vdtree::Similarity placement = {}; // to the world, in metres
     std::string name = {};             // for messages
     // What was done to the tree since it was built, for the reasons that a plan gives.
     bool texture_left_out = false, is_relit = false;
+    TreeOrigin origin = TreeOrigin::given;
+    std::shared_ptr<const MeasurementPlace> measurement = {}; // where that of a tree file's tree is kept; null: nowhere
 };
 
 // A value, made once and then given to a Session. Error messages and reasons call these fields scene.lights and so on.

@@ -29,6 +29,7 @@
 #include <session/request.h>
 #include <session/scene.h>
 #include <session/simplification.h>
+#include <session/tree_cache.h>
 #include <vdtree/distance_criterion.h>
 
 namespace unseen::session {

@@ -1,0 +1,16 @@
+// What a tree is kept under.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <session/model_file.h>
+
+namespace unseen::session {
+
+// A hash of all that the tree of a file depends on: the bytes of the file and of those it refers to (libraries of
+// materials, images, buffers), the options, and how trees are built and measured. Nothing for what is no regular file,
+// and where it is not sure what the file refers to. Cost: reading the files once.
+std::optional<std::string> cache_key(const std::filesystem::path& file, const LoadOptions& options);
+
+} // namespace unseen::session

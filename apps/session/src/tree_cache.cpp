@@ -1,0 +1,140 @@
+#include <session/tree_cache.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstdlib>
+#include <limits>
+#include <string_view>
+#include <system_error>
+
+#include <vdtree/internal/errors.h>
+#include <vdtree/internal/number_format.h>
+#include <vdtree/tree_io.h>
+
+namespace unseen::session {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uint64_t default_most_bytes = std::uint64_t{4} << 30;
+constexpr std::string_view ending = ".vdt";
+constexpr std::size_t key_digits = 32;
+constexpr std::size_t longest_source = 120; // bytes of a name; with the rest it is shorter than file systems allow
+
+std::string variable(const char* name) {
+    const char* value = std::getenv(name);
+    return value ? value : "";
+}
+
+fs::path folder_of(const CacheOptions& options) {
+    if (options.is_off || !options.folder.empty()) return options.is_off ? fs::path() : options.folder;
+    if (const std::string own = variable("UNSEEN_CACHE"); !own.empty())
+        return own == "off" ? fs::path() : fs::path(own);
+    // Folders that are not absolute are not valid there.
+    if (const fs::path all = variable("XDG_CACHE_HOME"); all.is_absolute()) return all / "unseen";
+    if (const fs::path home = variable("HOME"); home.is_absolute()) return home / ".cache" / "unseen";
+    return {};
+}
+
+std::uint64_t most_bytes_of(const CacheOptions& options) {
+    if (options.most_bytes > 0) return options.most_bytes;
+    const auto set = parse_size(variable("UNSEEN_CACHE_SIZE"));
+    return set ? *set : default_most_bytes;
+}
+
+// Files are called KEY-SOURCE.vdt.
+bool is_kept(const std::string& name) {
+    return name.size() > key_digits + ending.size() && name[key_digits] == '-' && name.ends_with(ending) &&
+           name.find_first_not_of("0123456789abcdef") == key_digits;
+}
+
+std::string source_of(const std::string& name) {
+    return name.substr(key_digits + 1, name.size() - key_digits - 1 - ending.size());
+}
+
+// The files' clock is not the system's in this version of the standard's library.
+std::chrono::system_clock::time_point to_system(fs::file_time_type time) {
+    const auto ago = fs::file_time_type::clock::now() - time;
+    return std::chrono::system_clock::now() - std::chrono::duration_cast<std::chrono::system_clock::duration>(ago);
+}
+
+} // namespace
+
+Result<std::uint64_t> parse_size(const std::string& text) {
+    constexpr std::string_view units = "KMGT";
+    std::uint64_t number = 0;
+    const char* const end = text.data() + text.size();
+    const auto [rest, error] = std::from_chars(text.data(), end, number);
+    const std::string_view unit(rest, static_cast<std::size_t>(end - rest));
+    const std::size_t place = unit.empty() ? 0 : units.find(unit) + 1; // of a word that is none: 0
+    const bool is_unit = unit.empty() || (unit.size() == 1 && place > 0);
+    const std::size_t shift = 10 * place;
+    if (error != std::errc() || !is_unit || number == 0 || number > std::numeric_limits<std::uint64_t>::max() >> shift)
+        return invalid_argument("'" + text + "' is no size: give bytes above 0, or a number with K, M, G or T.");
+    return number << shift;
+}
+
+TreeCache::TreeCache(const CacheOptions& options) : folder_(folder_of(options)), most_bytes_(most_bytes_of(options)) {}
+
+Result<std::optional<vdtree::VertexTree>> TreeCache::find(const std::string& key, const Progress& progress) const {
+    for (const CachedTree& kept : trees()) {
+        if (!kept.file.filename().string().starts_with(key)) continue;
+        auto tree = vdtree::read_tree(kept.file, progress);
+        std::error_code ignored;
+        if (tree) {
+            fs::last_write_time(kept.file, fs::file_time_type::clock::now(), ignored);
+            return std::optional(std::move(*tree));
+        }
+        if (tree.error().code == ErrorCode::cancelled) return tree.error();
+        fs::remove(kept.file, ignored);
+    }
+    return std::optional<vdtree::VertexTree>();
+}
+
+Result<void> TreeCache::keep(const std::string& key, const fs::path& source, const vdtree::VertexTree& tree) const {
+    std::error_code failure;
+    if (fs::create_directories(folder_, failure)) // what somebody looks at is nobody else's business
+        fs::permissions(folder_, fs::perms::owner_all, failure);
+    if (failure)
+        return Error{ErrorCode::io_failure, "Cannot make '" + folder_.string() + "': " + failure.message() + "."};
+    if (tree.byte_size() > most_bytes_)
+        return unsupported("The tree is larger than the " + grouped(most_bytes_) + " bytes that are kept.");
+    const fs::path file =
+        folder_ / (key + "-" + source.filename().string().substr(0, longest_source) + std::string(ending));
+    if (const auto ready = vdtree::prepare_tree_file(file); !ready) return ready;
+    if (const auto written = vdtree::write_tree(file, tree); !written) return written;
+    shrink(most_bytes_);
+    return {};
+}
+
+std::vector<CachedTree> TreeCache::trees() const {
+    std::vector<CachedTree> found;
+    if (!is_on()) return found;
+    std::error_code failure;
+    for (fs::directory_iterator i(folder_, failure), end; !failure && i != end; i.increment(failure)) {
+        const std::string name = i->path().filename().string();
+        std::error_code gone; // by another process, meanwhile
+        if (!is_kept(name) || !i->is_regular_file(gone)) continue;
+        const std::uint64_t bytes = i->file_size(gone);
+        if (gone) continue;
+        const fs::file_time_type time = i->last_write_time(gone);
+        if (!gone) found.push_back({i->path(), source_of(name), bytes, to_system(time)});
+    }
+    std::sort(found.begin(), found.end(), [](const CachedTree& a, const CachedTree& b) {
+        return a.last_use != b.last_use ? a.last_use > b.last_use : a.file < b.file;
+    });
+    return found;
+}
+
+std::vector<CachedTree> TreeCache::shrink(std::uint64_t most_bytes) const {
+    std::vector<CachedTree> removed;
+    std::uint64_t bytes = 0;
+    for (CachedTree& kept : trees()) {
+        bytes += kept.bytes;
+        std::error_code failure;
+        if (bytes > most_bytes && fs::remove(kept.file, failure)) removed.push_back(std::move(kept));
+    }
+    return removed;
+}
+
+} // namespace unseen::session

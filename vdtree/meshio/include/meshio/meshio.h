@@ -1,0 +1,13 @@
+// meshio: mesh files. The header to include first.
+//
+// read_mesh() reads PLY, OBJ, OFF, STL and glTF into a vdtree::Mesh; write_mesh() writes meshes, and write_cut() a cut
+// with everything that its mesh file said beyond triangles: nodes, names, materials, images.
+//
+//     const auto read = meshio::read_mesh("house.glb");
+//     const auto tree = vdtree::build_tree(read->mesh.view());
+//     vdtree::Cut cut(*tree); // and follow a view, see <vdtree/vdtree.h>
+//     const auto notes = meshio::write_cut("small.glb", cut);
+#pragma once
+
+#include <meshio/mesh_io.h>
+#include <meshio/source_document.h>
