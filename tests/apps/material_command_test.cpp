@@ -359,7 +359,7 @@ TEST_F(ObjMaterialTest, ColoursOfMaterialsCount) {
     }
     for (const std::string model : {"in/model.obj", "scene.glb"}) {
         if (model == "scene.glb") write_text(path(model), GltfScene().glb(images()));
-        succeed({"build", model, "-o", "t.vdt", "--no-texture"});
+        succeed({"build", model, "-o", "t.vdt", "--no-texture", "--prelit"});
         const std::string info = run({"info", "t.vdt"}).out;
         double darkest = 0, brightest = 0;
         ASSERT_EQ(std::sscanf(info.c_str() + info.find("luminance"), "luminance %lf to %lf", &darkest, &brightest), 2);
