@@ -74,7 +74,7 @@ public:
     Viewer& operator=(const Viewer&) = delete;
 
     Result<void> run() {
-        if (auto begun = gaze_.begin(display(), view_, terminal_messages()); !begun) return begun;
+        if (auto begun = gaze_.begin(display(), view_, std::nullopt, terminal_messages()); !begun) return begun;
         if (options_.geomorph_seconds)
             if (auto set = follower_.set_glide(*options_.geomorph_seconds); !set) return set;
         for (int frame = 0; !glfwWindowShouldClose(window_);) {
