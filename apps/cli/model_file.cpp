@@ -15,6 +15,8 @@ session::LoadOptions load_options(const TextureOptions& texture, ProgressBar& ba
     options.texture = texture.file;
     options.without_textures = texture.is_left_out;
     options.drop = texture.drop;
+    options.skip_bad = texture.skips_bad;
+    options.weld = !texture.is_unwelded;
     options.prelit = texture.is_prelit;
     options.messages = terminal_messages();
     options.messages.progress = std::ref(bar);
@@ -23,14 +25,17 @@ session::LoadOptions load_options(const TextureOptions& texture, ProgressBar& ba
 
 } // namespace
 
-Result<meshio::ReadResult> read_mesh_file(const std::filesystem::path& file) {
+Result<meshio::ReadResult> read_mesh_file(const std::filesystem::path& file, bool skip_bad) {
     ProgressBar bar("reading " + file.filename().string());
     meshio::ReadOptions options;
     options.progress = std::ref(bar);
     options.drop = {true, true, true, true}; // nothing is made of it
+    options.skip_bad = skip_bad;
     auto read = meshio::read_mesh(file, options);
     if (!read) return read;
-    for (const std::string& warning : read->warnings) print_warning(file.string() + ": " + warning);
+    const session::Messages messages = terminal_messages();
+    for (const std::string& warning : read->warnings) messages.warning(file.string() + ": " + warning);
+    for (const std::string& note : read->notes) messages.note(file.string() + ": " + note);
     return read;
 }
 

@@ -13,7 +13,7 @@
 namespace unseen::app {
 
 // A mesh as its reader returns it.
-Result<meshio::ReadResult> read_mesh_file(const std::filesystem::path& file);
+Result<meshio::ReadResult> read_mesh_file(const std::filesystem::path& file, bool skip_bad = false);
 
 // A mesh with its texture.
 Result<meshio::ReadResult> read_textured_mesh(const std::filesystem::path& file, const meshio::ReadOptions& options,

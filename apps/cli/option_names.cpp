@@ -26,6 +26,8 @@ constexpr OptionName option_names[] = {
     {"scene.lights", "--lights"},
     {"Scene::relight()", "--light or --ambient"},
     {"read.drop = ", "--drop "},
+    {"read.skip_bad", "--skip-bad"},
+    {"read.weld = false", "--no-weld"},
     {"load.texture", "--texture"},
     {"load.without_textures", "--no-texture"},
     {"load.prelit", "--prelit"},

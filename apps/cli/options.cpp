@@ -150,6 +150,12 @@ CLI::Validator ending_in(std::vector<std::string> endings) {
         "");
 }
 
+void add_skip_bad_option(CLI::App& verb, bool& skips_bad) {
+    verb.add_flag(
+        "--skip-bad", skips_bad,
+        "Of a mesh: leave out faces that use vertices with NaN or infinite coordinates, or that are not there");
+}
+
 void add_texture_options(CLI::App& verb, TextureOptions& o) {
     CLI::Option* file =
         verb.add_option(
@@ -172,6 +178,11 @@ void add_texture_options(CLI::App& verb, TextureOptions& o) {
         ->delimiter(',')
         ->allow_extra_args(false)
         ->check(one_of({"skins", "morph-targets", "animations", "extensions"}));
+    add_skip_bad_option(verb, o.skips_bad);
+    verb.add_flag(
+        "--no-weld", o.is_unwelded,
+        "Of an STL file: each facet keeps its normal and three vertices of its own (default: those at the same "
+        "place become one)");
     verb.add_flag("--prelit", o.is_prelit,
                   "Of a mesh: its colours and images have light baked in (default: they are reflectance, and are lit)");
 }

@@ -26,6 +26,8 @@ struct TextureOptions {
     std::string file;         // instead of the materials'
     bool is_left_out = false; // --no-texture
     meshio::LeftOut drop;     // of glTF files
+    bool skips_bad = false;   // --skip-bad
+    bool is_unwelded = false; // --no-weld
     bool is_prelit = false;   // --prelit, of colours as well
 };
 
@@ -87,6 +89,7 @@ void add_moving_gaze_options(CLI::App& verb, GazeOptions& options, bool allows_m
 void check_gaze(const WhatOptions& what, const GazeOptions& gaze);
 void check_geomorph(const std::optional<double>& seconds, const ViewOptions& view);
 void add_texture_options(CLI::App& verb, TextureOptions& options);
+void add_skip_bad_option(CLI::App& verb, bool& skips_bad); // part of add_texture_options()
 void add_geomorph_option(CLI::App& verb, std::optional<double>& seconds);
 void add_gaze_option(CLI::App& verb, std::optional<glm::dvec2>& gaze_px);
 // Of `tests`.

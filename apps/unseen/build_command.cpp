@@ -113,8 +113,13 @@ Result<void> check_names(const BuildArguments& a) {
 // Without words.
 Result<meshio::ReadResult> read_quietly(const std::filesystem::path& file, const meshio::ReadOptions& options,
                                         const TextureOptions& texture) {
-    return session::read_textured_mesh(
-        file, {.texture = texture.file, .without_textures = texture.is_left_out, .drop = texture.drop}, options);
+    return session::read_textured_mesh(file,
+                                       {.texture = texture.file,
+                                        .without_textures = texture.is_left_out,
+                                        .drop = texture.drop,
+                                        .skip_bad = texture.skips_bad,
+                                        .weld = !texture.is_unwelded},
+                                       options);
 }
 
 // The mesh, if it can be built within the limit of memory. `read_file` reads it, with or without words.

@@ -3,6 +3,8 @@
 #include <filesystem>
 #include <memory>
 
+#include <meshio/examine.h>
+
 #include "model_file.h"
 #include "options.h"
 #include "progress_bar.h"
@@ -15,7 +17,7 @@ namespace {
 
 struct InfoArguments {
     std::string file;
-    bool verify = false, json = false;
+    bool verify = false, json = false, is_verbose = false;
 };
 
 using Rows = std::vector<std::vector<std::string>>;
@@ -89,14 +91,81 @@ Result<int> describe_tree(const InfoArguments& a) {
     return exit_done;
 }
 
+// A count of something unusual, and what it means for simplification.
+struct Finding {
+    const char* key; // in JSON; with blanks for underscores, in the table
+    std::uint64_t count;
+    const char* meaning;
+};
+
+std::vector<Finding> findings(const meshio::ReadResult& read, const meshio::Examination& mesh) {
+    return {
+        {"bad_vertices", read.bad.vertices, "NaN or infinite coordinates: refused without --skip-bad"},
+        {"bad_faces", read.bad.faces,
+         "corners that are not there, or NaN or infinite ones of STL: refused without --skip-bad"},
+        {"boundary_edges", mesh.boundary_edges,
+         "open: both sides are drawn, and nothing folds for facing away or being hidden; borders are held in place"},
+        {"boundary_loops", mesh.boundary_loops, "the holes and rims that these edges make"},
+        {"non_manifold_edges", mesh.non_manifold_edges, "more than two triangles meet: the surface counts as open"},
+        {"non_manifold_vertices", mesh.non_manifold_vertices,
+         "surfaces touch in a point only: that alone does not make them open"},
+        {"inconsistent_edges", mesh.inconsistent_edges,
+         "neighbours face opposite ways: the surface counts as open, and normals computed there may point anywhere"},
+        {"inside_out_components", mesh.inside_out_components,
+         "closed parts that face inward: a model of such parts only is turned, beside others they count as cavities"},
+        {"degenerate_triangles", mesh.degenerate_triangles,
+         "zero area: never seen; those that use a vertex twice are dropped, the others cost triangles until they fold"},
+        {"duplicate_triangles", mesh.duplicate_triangles,
+         "on the corners of others: drawn twice, and their edges are non-manifold as a rule"},
+        {"duplicate_vertices", mesh.duplicate_vertices,
+         "equal to others in all attributes: they cost memory and hold folds back; weld them"},
+        {"unreferenced_vertices", mesh.unreferenced_vertices, "in no triangle: they are not drawn"},
+    };
+}
+
+Json examination_json(const meshio::ReadResult& read, const meshio::Examination& mesh) {
+    Json json = {{"components", mesh.components},
+                 {"closed_components", mesh.closed_components},
+                 {"coincident_vertices", mesh.coincident_vertices},
+                 {"unwelded", mesh.is_unwelded},
+                 {"low", {mesh.low.x, mesh.low.y, mesh.low.z}},
+                 {"high", {mesh.high.x, mesh.high.y, mesh.high.z}}};
+    for (const Finding& finding : findings(read, mesh)) json[finding.key] = finding.count;
+    return json;
+}
+
+// Nothing in a file says what a unit is: what the usual ones would make of it.
+std::string text_of_extent(const meshio::Examination& mesh) {
+    const glm::dvec3 extent = mesh.high - mesh.low;
+    const double largest = std::max({extent.x, extent.y, extent.z});
+    return rounded(extent.x, 4) + " x " + rounded(extent.y, 4) + " x " + rounded(extent.z, 4) +
+           " units: " + rounded(largest, 4) + " m, or " + rounded(largest / 1000, 4) +
+           " m with --unit 0.001 (millimetres)";
+}
+
+// One sentence each; those that are fine only where asked for.
+void print_findings(const meshio::ReadResult& read, const meshio::Examination& mesh, bool with_all) {
+    bool all_fine = !mesh.is_unwelded;
+    if (mesh.is_unwelded)
+        print_line("unwelded: no two triangles share a vertex: more memory, and more triangles for the same picture; "
+                   "weld it");
+    for (const Finding& finding : findings(read, mesh)) {
+        all_fine = all_fine && finding.count == 0;
+        if (finding.count == 0 && !with_all) continue;
+        std::string name = finding.key;
+        std::replace(name.begin(), name.end(), '_', ' ');
+        print_line(name + ": " + grouped(finding.count) +
+                   (finding.count > 0 ? std::string(": ") + finding.meaning : std::string()));
+    }
+    if (all_fine) print_line("nothing unusual: closed, manifold and consistently oriented");
+}
+
 Result<int> describe_mesh(const InfoArguments& a) {
-    auto read = read_mesh_file(a.file);
+    auto read = read_mesh_file(a.file, !a.verify);
     if (!read) return read.error();
     const vdtree::Mesh& mesh = read->mesh;
-    if (a.verify) {
-        if (auto valid = vdtree::validate(mesh.view()); !valid)
-            return Error{valid.error().code, a.file + ": " + valid.error().message};
-    }
+    const auto examined = meshio::examine(mesh.view()); // validates it, too
+    if (!examined) return Error{examined.error().code, a.file + ": " + examined.error().message};
     const std::uint64_t bytes = bytes_of(mesh.positions) + bytes_of(mesh.triangles) + bytes_of(mesh.normals) +
                                 bytes_of(mesh.colours) + bytes_of(mesh.uvs);
     const std::uint64_t file_bytes = file_bytes_of(a.file);
@@ -111,6 +180,7 @@ Result<int> describe_mesh(const InfoArguments& a) {
                  {"file_bytes", file_bytes},
                  {"faces", read->source_faces},
                  {"images", images},
+                 {"examination", examination_json(*read, *examined)},
                  {"ranges", mesh.ranges.size()}};
     if (a.verify) json["verified"] = true;
     const auto yes = [](bool has) { return std::string(has ? "yes" : "no"); };
@@ -125,9 +195,13 @@ Result<int> describe_mesh(const InfoArguments& a) {
                  {"colours", yes(!mesh.colours.empty())},
                  {"texture coordinates", yes(!mesh.uvs.empty())},
                  {"materials with images", std::to_string(images)},
-                 {"groups and materials", grouped(mesh.ranges.size())}};
+                 {"groups and materials", grouped(mesh.ranges.size())},
+                 {"components", grouped(examined->components)},
+                 {"of them closed", grouped(examined->closed_components)},
+                 {"extent", text_of_extent(*examined)}};
     if (a.verify) rows.push_back({"verified", "sound"});
     output(a.json, json, rows);
+    if (!a.json) print_findings(*read, *examined, a.is_verbose);
     return exit_done;
 }
 
@@ -137,11 +211,16 @@ Result<int> run(const InfoArguments& a) { return vdtree::is_tree_file(a.file) ? 
 
 Command info_command(CLI::App& app) {
     auto a = std::make_shared<InfoArguments>();
-    CLI::App* verb = app.add_subcommand("info", "Say what a mesh or a tree holds");
+    CLI::App* verb = app.add_subcommand("info", "Say what a mesh or a tree holds, and what is wrong with it");
     verb->add_option("FILE", a->file, "A mesh or a tree")->required()->type_name("MESH|TREE.vdt");
     verb->add_flag("--verify", a->verify, "Check everything: checksums, ranges, nesting of the bounds");
     verb->add_flag("--json", a->json, "JSON instead of a table");
-    verb->footer("Examples:\n  unseen info bunny.ply\n  unseen info bunny.vdt --verify --json");
+    verb->add_flag("--verbose", a->is_verbose, "Of a mesh: counts of zero as well");
+    verb->footer(
+        "A mesh is examined: holes, non-manifold and inconsistent edges, duplicates, parts that are inside out, size;\n"
+        "what is unusual is said with what it means for simplification. Bad vertices and faces are counted and left\n"
+        "out, but for --verify.\n\n"
+        "Examples:\n  unseen info bunny.ply\n  unseen info bunny.vdt --verify --json");
     return {verb, [a] { return run(*a); }};
 }
 

@@ -19,6 +19,7 @@ namespace {
 struct SubdivideArguments {
     std::string mesh, out, json;
     SubdivideOptions options;
+    bool skips_bad = false;
     TriangleCount triangles; // not given: as many as the rounds make
 };
 
@@ -39,7 +40,7 @@ Result<int> run(const SubdivideArguments& a) {
     if (const auto ready = check_outputs({a.mesh}, {a.out, a.json}); !ready) return ready.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
-    auto read = read_mesh_file(a.mesh);
+    auto read = read_mesh_file(a.mesh, a.skips_bad);
     if (!read) return read.error();
     const std::uint64_t before = read->mesh.triangles.size();
     const auto mesh = subdivide_with_progress(std::move(read->mesh), a);
@@ -76,6 +77,7 @@ Command subdivide_command(CLI::App& make) {
                      "How far new vertices may move, as a share of their edge's length, 0..1 (default: 0.02)")
         ->type_name("SHARE")
         ->check(within(0, 1));
+    add_skip_bad_option(*verb, a->skips_bad);
     add_json_option(*verb, a->json);
     verb->callback([=] {
         if (times->count() + triangles->count() != 1) refuse("give either --times or --triangles.");

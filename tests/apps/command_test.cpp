@@ -270,6 +270,47 @@ TEST_F(BuildTest, TheTreeDoesNotDependOnTheThreads) {
     EXPECT_TRUE(read_text(path("one.vdt")) == read_text(path("two.vdt")));
 }
 
+TEST_F(BuildTest, LeavesOutBadFacesWhereAsked) {
+    write_text(path("m.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan 1 0\nf 1 2 3\nf 2 4 3\nf 1 2 9\n");
+    const Outcome refused = run({"build", "m.obj", "-o", "m.vdt"});
+    EXPECT_EQ(refused.status, 1);
+    EXPECT_THAT(refused.err,
+                AllOf(HasSubstr("line 4: vertex 4"), HasSubstr("line 7: face 3"), HasSubstr("--skip-bad")));
+    const Outcome built = run({"build", "m.obj", "-o", "m.vdt", "--skip-bad"});
+    EXPECT_EQ(built.status, 0) << built.err;
+    EXPECT_THAT(built.err, HasSubstr("2 faces were left out"));
+    EXPECT_EQ(run({"info", "m.vdt", "--json"}).json()["triangles"], 1);
+    EXPECT_EQ(run({"make", "subdivide", "m.obj", "-o", "n.ply", "--times", "1", "--skip-bad"}).status, 0);
+}
+
+TEST_F(BuildTest, WeldsStlUnlessAskedNotTo) {
+    write_text(path("m.stl"), "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+                              "endloop\nendfacet\nfacet normal 0 0 1\nouter loop\nvertex 1 0 0\nvertex 1 1 0\n"
+                              "vertex 0 1 0\nendloop\nendfacet\nendsolid\n");
+    const Outcome welded = run({"build", "m.stl", "-o", "m.vdt"});
+    EXPECT_THAT(welded.err, AllOf(HasSubstr("6 vertices"), HasSubstr("welded to 4"), HasSubstr("--no-weld")));
+    EXPECT_EQ(run({"info", "m.vdt", "--json"}).json()["vertices"], 4);
+    ASSERT_EQ(run({"build", "m.stl", "-o", "m.vdt", "--no-weld"}).status, 0);
+    EXPECT_EQ(run({"info", "m.vdt", "--json"}).json()["vertices"], 6);
+}
+
+TEST_F(InfoTest, SaysWhatIsUnusualAboutAMesh) {
+    write_text(path("m.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv nan 1 0\nf 1 2 3\nf 2 3 4\nf 2 5 3\n");
+    const Json found = run({"info", "m.obj", "--json"}).json()["examination"];
+    EXPECT_EQ(found["boundary_edges"], 4);
+    EXPECT_EQ(found["inconsistent_edges"], 1);
+    EXPECT_EQ(found["bad_vertices"], 1);
+    EXPECT_EQ(found["components"], 1);
+    EXPECT_EQ(found["high"], Json({1, 1, 0}));
+    const Outcome table = run({"info", "m.obj"});
+    EXPECT_THAT(table.out, AllOf(HasSubstr("\nboundary edges: 4: open"), HasSubstr("\ninconsistent edges: 1: "),
+                                 Not(HasSubstr("duplicate")), HasSubstr("1 m, or 0.001 m with --unit 0.001")));
+    EXPECT_THAT(run({"info", "m.obj", "--verbose"}).out, HasSubstr("\nduplicate triangles: 0\n"));
+    EXPECT_EQ(run({"info", "m.obj", "--verify"}).status, 1);
+    write_ball("ball.obj");
+    EXPECT_THAT(run({"info", "ball.obj"}).out, HasSubstr("nothing unusual"));
+}
+
 TEST_F(BuildTest, RemembersDroppedTriangles) {
     write_text(path("m.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 1 2\nf 3 2 3\n");
     ASSERT_EQ(run({"build", "m.obj", "-o", "m.vdt"}).status, 0);

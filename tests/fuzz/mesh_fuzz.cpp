@@ -3,6 +3,8 @@
 // main() that runs the files named on the command line.
 #include "mesh_readers.h"
 
+#include <meshio/examine.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -18,13 +20,15 @@ constexpr const char* names[] = {"fuzz.ply", "fuzz.obj", "fuzz.off", "fuzz.stl",
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     if (size == 0) return 0;
     const std::string_view bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
-    const auto result = unseen::meshio::read_mesh_bytes(bytes, names[data[0] % std::size(names)]);
+    unseen::meshio::ReadOptions options;
+    options.skip_bad = data[0] >= 128;
+    const auto result = unseen::meshio::read_mesh_bytes(bytes, names[data[0] % std::size(names)], options);
     if (!result) {
         if (result.error().message.empty()) std::abort();
         return 0;
     }
     const bool is_mesh = !result->mesh.triangles.empty() && unseen::vdtree::validate(result->mesh.view());
-    if (!is_mesh) std::abort();
+    if (!is_mesh || !unseen::meshio::examine(result->mesh.view())) std::abort();
     return 0;
 }
 

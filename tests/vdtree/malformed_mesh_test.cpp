@@ -55,18 +55,19 @@ constexpr std::size_t allowed_bytes_per_byte = 64;
 constexpr std::size_t allowed_bytes = 64 * 1024;
 
 // Reads from memory that ends where the file ends, so that an address sanitizer sees every byte read too many.
-Result<meshio::ReadResult> read_exactly(const std::string& bytes, const std::string& name) {
+Result<meshio::ReadResult> read_exactly(const std::string& bytes, const std::string& name,
+                                        const meshio::ReadOptions& options = {}) {
     const std::unique_ptr<char[]> copy(new char[bytes.size()]);
     std::copy(bytes.begin(), bytes.end(), copy.get());
     largest_allocation = 0;
-    Result<meshio::ReadResult> result = meshio::read_mesh_bytes({copy.get(), bytes.size()}, name);
+    Result<meshio::ReadResult> result = meshio::read_mesh_bytes({copy.get(), bytes.size()}, name, options);
     EXPECT_LE(largest_allocation.load(), allowed_bytes + allowed_bytes_per_byte * bytes.size()) << name;
     return result;
 }
 
 // Whatever loads must be a mesh; whatever does not must say so and name the file.
-bool is_read_or_refused(const std::string& bytes, const std::string& name) {
-    const Result<meshio::ReadResult> result = read_exactly(bytes, name);
+bool is_read_or_refused(const std::string& bytes, const std::string& name, const meshio::ReadOptions& options = {}) {
+    const Result<meshio::ReadResult> result = read_exactly(bytes, name, options);
     if (!result) {
         EXPECT_TRUE(result.error().message.starts_with(name + ": ")) << result.error().message;
         return false;
@@ -154,6 +155,7 @@ TEST(MalformedMesh, WordsInWrongPlacesAreNoCrash) {
             const std::size_t at = random() % bytes.size();
             bytes.replace(at, random() % 4, words[random() % std::size(words)]);
             is_read_or_refused(bytes, name);
+            is_read_or_refused(bytes, name, {.skip_bad = true});
         }
     }
 }
@@ -254,21 +256,98 @@ TEST(MalformedMesh, NumbersBeyondDoublesAreInfiniteOrZero) {
 TEST(MalformedMesh, CoordinatesMustBeFinite) {
     for (const std::string value : {"nan", "-nan", "inf", "-inf", "1e400", "infinity"}) {
         EXPECT_THAT(error_of(replaced(mesh_files::ascii_ply_quad(), "1 1 0", "1 " + value + " 0"), "a.ply"),
-                    HasSubstr("Vertex 2"));
+                    HasSubstr("vertex 2 has"));
         EXPECT_THAT(error_of(replaced(mesh_files::obj_quad(), "v 1 1 0", "v 1 " + value + " 0"), "a.obj"),
                     HasSubstr("line 4: vertex 3"));
         EXPECT_THAT(error_of(replaced(mesh_files::off_quad(), "1 1 0", "1 " + value + " 0"), "a.off"),
-                    HasSubstr("Vertex 2"));
+                    HasSubstr("line 6: vertex 2 has"));
         EXPECT_THAT(error_of(replaced(mesh_files::ascii_stl_facet(), "1 0 0", "1 " + value + " 0"), "a.stl"),
-                    HasSubstr("Vertex 1"));
+                    HasSubstr("facet 0 has"));
     }
     std::string stl = mesh_files::binary_stl_facet();
     stl.replace(84 + 12, 4, mesh_files::floats(std::numeric_limits<float>::infinity()));
-    EXPECT_THAT(error_of(stl, "a.stl"), HasSubstr("Vertex 0"));
+    EXPECT_THAT(error_of(stl, "a.stl"), HasSubstr("facet 0 has"));
     EXPECT_THAT(error_of(replaced(mesh_files::glb_triangle(), mesh_files::floats(1, 0, 0),
                                   mesh_files::floats(std::numeric_limits<float>::quiet_NaN(), 0, 0)),
                          "a.glb"),
-                HasSubstr("Vertex 1"));
+                HasSubstr("vertex 1 of accessor 0 has"));
+}
+
+// ---- bad vertices and faces, left out ----
+
+// Three triangles, the second with a vertex that is NaN, the third with one that is not there: in every format that has
+// indices.
+const std::string three_ply = "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\n"
+                              "property float z\nelement face 3\nproperty list uchar int vertex_index\nend_header\n"
+                              "inf 0 0\n0 0 0\n1 0 0\n1 nan 0\n0 1 0\n3 1 2 4\n3 1 2 3\n3 1 2 9\n";
+const std::string three_obj = "v inf 0 0\nv 0 0 0\nv 1 0 0\nv 1 nan 0\nv 0 1 0\nf 2 3 5\nf 2 3 4\nf 2 3 10\n";
+const std::string three_off = "OFF\n5 3 0\ninf 0 0\n0 0 0\n1 0 0\n1 nan 0\n0 1 0\n3 1 2 4\n3 1 2 3\n3 1 2 9\n";
+
+TEST(MalformedMesh, BadVerticesAndFacesAreCountedAndTheFirstIsNamed) {
+    EXPECT_EQ(error_of(three_obj, "a.obj"),
+              "a.obj: line 1: vertex 1 has a NaN or infinite coordinate (the first of 2 such vertices); line 8: face 3 "
+              "uses vertex 10, but there are 5. Correct it, or leave out the faces concerned with read.skip_bad.");
+    EXPECT_THAT(error_of(three_ply, "a.ply"), HasSubstr("vertex 0 has a NaN or infinite coordinate (the first of 2"));
+    EXPECT_THAT(error_of(three_off, "a.off"),
+                HasSubstr("line 3: vertex 0 has a NaN or infinite coordinate (the first"));
+}
+
+TEST(MalformedMesh, BadVerticesAndFacesAreLeftOutWhereAsked) {
+    meshio::ReadOptions options;
+    options.skip_bad = true;
+    std::string gltf = mesh_files::gltf_triangle_data();
+    gltf.replace(40, 2, "\7\0"s); // the last index
+    const std::string none_left = mesh_files::glb(mesh_files::gltf_triangle_json(), gltf);
+    for (const auto& [name, bytes] :
+         {std::pair("a.ply", three_ply), std::pair("a.obj", three_obj), std::pair("a.off", three_off)}) {
+        const Result<meshio::ReadResult> read = meshio::read_mesh_bytes(bytes, name, options);
+        ASSERT_TRUE(read) << read.error().message;
+        EXPECT_EQ(read->bad.vertices, 2u) << name;
+        EXPECT_EQ(read->bad.faces, 1u) << name;
+        EXPECT_EQ(read->bad.left_out, 2u) << name;
+        EXPECT_EQ(read->source_faces, 3u) << name;
+        EXPECT_EQ(read->dropped_triangles, 0u) << name;
+        EXPECT_EQ(read->mesh.triangles, (std::vector<Triangle>{{1, 2, 4}})) << name;
+        EXPECT_TRUE(validate(read->mesh.view())) << name;
+        ASSERT_EQ(read->warnings.size(), 1u) << name;
+        EXPECT_THAT(read->warnings[0], HasSubstr("2 faces were left out: ")) << name;
+    }
+    const Result<meshio::ReadResult> none = meshio::read_mesh_bytes(none_left, "a.glb", options);
+    ASSERT_FALSE(none);
+    EXPECT_EQ(none.error().message, "a.glb: no face is left without the bad ones: mesh 'tri': index 2 names vertex 7, "
+                                    "but there are 3.");
+}
+
+TEST(MalformedMesh, BadFacetsOfStlAreLeftOutWhereAsked) {
+    std::string stl = mesh_files::binary_stl_facet();
+    stl += stl.substr(84);
+    stl[80] = 2;
+    stl.replace(84 + 50 + 16, 4, mesh_files::floats(std::numeric_limits<float>::quiet_NaN()));
+    EXPECT_EQ(error_of(stl, "a.stl"), "a.stl: facet 1 has a NaN or infinite coordinate. Correct it, or leave out the "
+                                      "faces concerned with read.skip_bad.");
+    meshio::ReadOptions options;
+    options.skip_bad = true;
+    const Result<meshio::ReadResult> read = meshio::read_mesh_bytes(stl, "a.stl", options);
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_EQ(read->mesh.triangles.size(), 1u);
+    EXPECT_EQ(read->mesh.positions.size(), 3u);
+    EXPECT_EQ(read->bad.left_out, 1u);
+}
+
+TEST(MalformedMesh, PolygonsAndStripsLoseOnlyWhatIsBad) {
+    meshio::ReadOptions options;
+    options.skip_bad = true;
+    const std::string strip = "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\n"
+                              "property float z\nelement tristrips 1\nproperty list int int vertex_indices\n"
+                              "end_header\nnan 0 0\n0 1 0\n1 0 0\n1 1 0\n2 0 0\n2 1 0\n6 0 1 2 3 4 5\n";
+    const Result<meshio::ReadResult> read = meshio::read_mesh_bytes(strip, "a.ply", options);
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_EQ(read->mesh.triangles.size(), 3u);
+    EXPECT_EQ(read->bad.left_out, 1u);
+    const std::string quads = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 nan\nf 1 2 3 4\nf 1 2 3\n";
+    const Result<meshio::ReadResult> rest = meshio::read_mesh_bytes(quads, "a.obj", options);
+    ASSERT_TRUE(rest) << rest.error().message;
+    EXPECT_EQ(rest->mesh.triangles, (std::vector<Triangle>{{0, 1, 2}})); // nothing of the quad
 }
 
 TEST(MalformedMesh, AMeshWithoutTrianglesIsAnError) {

@@ -515,7 +515,44 @@ TEST(Stl, KeepsThreeVerticesAFacet) {
     std::string two = mesh_files::binary_stl_facet();
     two += two.substr(84);
     two[80] = 2;
-    EXPECT_EQ(read(two, "a.stl").mesh.positions.size(), 6u); // nothing is welded
+    meshio::ReadOptions apart;
+    apart.weld = false;
+    EXPECT_EQ(read(two, "a.stl", apart).mesh.positions.size(), 6u);
+}
+
+TEST(Stl, IsWeldedWherePositionsAreEqual) {
+    // The two triangles of a square; 0 and -0 are equal.
+    std::string square = mesh_files::binary_stl_facet();
+    square += mesh_files::floats(0, 0, 1) + mesh_files::floats(1, -0.0f, 0) + mesh_files::floats(1, 1, 0) +
+              mesh_files::floats(-0.0f, 1, 0) + std::string(2, '\0');
+    square[80] = 2;
+    const meshio::ReadResult welded = read(square, "a.stl");
+    EXPECT_EQ(welded.mesh.positions.size(), 4u);
+    EXPECT_THAT(welded.mesh.triangles, ElementsAre(Triangle{0, 1, 2}, Triangle{1, 3, 2}));
+    EXPECT_TRUE(welded.mesh.normals.empty());
+    ASSERT_EQ(welded.notes.size(), 1u);
+    EXPECT_THAT(welded.notes[0], HasSubstr("its 6 vertices, three a facet, were welded to 4"));
+
+    meshio::ReadOptions apart;
+    apart.weld = false;
+    const meshio::ReadResult kept = read(square, "a.stl", apart);
+    EXPECT_EQ(kept.mesh.positions.size(), 6u);
+    EXPECT_EQ(kept.mesh.normals.size(), 6u);
+    EXPECT_TRUE(kept.notes.empty());
+
+    const meshio::ReadResult alone = read(mesh_files::binary_stl_facet(), "a.stl");
+    EXPECT_TRUE(alone.notes.empty());
+    EXPECT_EQ(alone.mesh.normals.size(), 3u); // nothing to weld: nothing is lost
+}
+
+TEST(Obj, UnweldedMeshesAreHintedAt) {
+    const std::string vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+    const auto notes = read(vertices + "f 1 2 3\nf 4 5 6\n", "a.obj").notes;
+    ASSERT_EQ(notes.size(), 1u);
+    EXPECT_THAT(notes[0], HasSubstr("vertices of its own"));
+    EXPECT_TRUE(read(vertices + "f 1 2 3\nf 2 5 3\n", "a.obj").notes.empty());
+    EXPECT_TRUE(
+        read("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 0 0\nv 6 1 0\nv 5 1 0\nf 1 2 3\nf 4 5 6\n", "a.obj").notes.empty());
 }
 
 TEST(Stl, KeepsSolidsAsGroups) {

@@ -103,12 +103,16 @@ Result<meshio::ReadResult> read_textured_mesh(const fs::path& file, const LoadOp
                                               meshio::ReadOptions reading) {
     reading.images = options.texture.empty() && !options.without_textures;
     reading.drop = options.drop;
+    reading.skip_bad = options.skip_bad;
+    reading.weld = options.weld;
     reading.progress = options.messages.progress;
     auto read = meshio::read_mesh(file, reading);
     if (!read) return read;
     if (const auto laid = lay_texture(file, *read, options); !laid) return laid.error();
     if (options.messages.warning)
         for (const std::string& warning : read->warnings) options.messages.warning(file.string() + ": " + warning);
+    if (options.messages.note)
+        for (const std::string& note : read->notes) options.messages.note(file.string() + ": " + note);
     return read;
 }
 

@@ -500,8 +500,13 @@ private:
     void add_attribute(const std::string& attribute, int accessor, std::size_t first, const Placement& placement) {
         Mesh& mesh = result_.mesh;
         if (attribute == "POSITION") {
-            for (const glm::dvec4& p : accessors_.vectors(accessor, 3, "positions"))
+            for (const glm::dvec4& p : accessors_.vectors(accessor, 3, "positions")) {
                 mesh.positions.push_back(glm::dvec3(placement.matrix * glm::dvec4(p.x, p.y, p.z, 1.0)));
+                check_position(result_.bad, mesh.positions.back(), [&] {
+                    return numbered("vertex", mesh.positions.size() - 1 - first) + " of " +
+                           numbered("accessor", static_cast<std::size_t>(accessor));
+                });
+            }
             return;
         }
         const bool is_colour = attribute.starts_with("COLOR_"), is_normal = attribute == "NORMAL";
@@ -537,13 +542,24 @@ private:
         spend(index_count, bytes_per_index);
         std::vector<Index> indices;
         if (primitive.indices >= 0) indices = accessors_.indices(primitive.indices);
-        const auto vertex = [&](std::size_t i) {
-            const Index index = indices.empty() ? static_cast<Index>(i) : indices[i];
-            if (index >= count) {
-                fail("mesh " + in_quotes(mesh.name) + ": index " + std::to_string(i) + " names vertex " +
-                     std::to_string(index) + ", but there are " + std::to_string(count) + "; correct it.");
+        const auto number = [&](std::size_t i) { return indices.empty() ? static_cast<Index>(i) : indices[i]; };
+        // False where the triangle is to be left out.
+        const auto is_good = [&](const std::array<std::size_t, 3>& corners) {
+            for (const std::size_t i : corners) {
+                if (number(i) < count) continue;
+                leave_out_face(result_.bad, [&] {
+                    return "mesh " + in_quotes(mesh.name) + ": index " + std::to_string(i) + " names vertex " +
+                           std::to_string(number(i)) + ", but there are " + std::to_string(count);
+                });
+                return false;
             }
-            return first + index;
+            if (result_.bad.vertices == 0) return true;
+            for (const std::size_t i : corners) {
+                if (is_finite(result_.mesh.positions[first + number(i)])) continue;
+                ++result_.bad.left_out;
+                return false;
+            }
+            return true;
         };
         const bool is_list = primitive.mode == TINYGLTF_MODE_TRIANGLES;
         if (is_list && index_count % 3 != 0) {
@@ -552,14 +568,15 @@ private:
         }
         const std::uint64_t first_triangle = result_.mesh.triangles.size();
         for (std::size_t i = 2; i < index_count; i += is_list ? 3 : 1) {
-            Triangle triangle{vertex(i - 2), vertex(i - 1), vertex(i)};
-            if (primitive.mode == TINYGLTF_MODE_TRIANGLE_FAN) triangle[0] = vertex(0);
+            ++result_.source_faces;
+            const std::size_t start = primitive.mode == TINYGLTF_MODE_TRIANGLE_FAN ? 0 : i - 2;
+            if (!is_good({start, i - 1, i})) continue;
+            Triangle triangle{first + number(start), first + number(i - 1), first + number(i)};
             const bool is_odd_in_strip = primitive.mode == TINYGLTF_MODE_TRIANGLE_STRIP && i % 2 != 0;
             if (is_odd_in_strip != is_mirrored) std::swap(triangle[0], triangle[1]);
             result_.mesh.triangles.push_back(triangle);
         }
         const std::uint64_t added = result_.mesh.triangles.size() - first_triangle;
-        result_.source_faces += added;
         if (added == 0) return;
         if (primitive.material >= 0) {
             used_materials_.insert(static_cast<std::size_t>(primitive.material));

@@ -1,10 +1,11 @@
 // Finds out what a file is, has it read, and does what all formats share.
 #include <meshio/mesh_io.h>
 
+#include <meshio/examine.h>
+
 #include "file_output.h"
 #include "mesh_readers.h"
 #include "text_scanner.h"
-#include <vdtree/internal/finite.h>
 
 #include <algorithm>
 #include <cctype>
@@ -160,7 +161,39 @@ void finish_document(SourceDocument& document, const Mesh& mesh) {
             if (!std::isfinite(value)) value = 0;
 }
 
+// "vertex 3 has a NaN or infinite coordinate (the first of 7 such vertices); face 9 uses ...".
+std::string text_of(const BadParts& bad) {
+    const auto first_of = [](const std::string& first, std::uint64_t count, const char* such) {
+        return first + (count > 1 ? " (the first of " + std::to_string(count) + " such " + such + ")" : "");
+    };
+    const std::string vertices = first_of(bad.first_vertex, bad.vertices, "vertices");
+    if (bad.faces == 0) return vertices;
+    return vertices + (bad.vertices > 0 ? "; " : "") + first_of(bad.first_face, bad.faces, "faces");
+}
+
+// Bad vertices are in no triangle any more, and get a place that does not stretch the mesh.
+Result<void> settle_bad_parts(const MeshSource& source, ReadResult& result) {
+    if (!result.bad.any()) return {};
+    const std::string text = text_of(result.bad);
+    if (!source.options.skip_bad)
+        return malformed(source, text + ". Correct it, or leave out the faces concerned with read.skip_bad.");
+    if (result.mesh.triangles.empty()) return malformed(source, "no face is left without the bad ones: " + text + ".");
+    result.warnings.push_back(counted_were(result.bad.left_out, "face") + " left out: " + text + ".");
+    const glm::dvec3 place = result.mesh.positions[result.mesh.triangles.front().front()];
+    for (glm::dvec3& position : result.mesh.positions)
+        if (!is_finite(position)) position = place;
+    return {};
+}
+
+// STL files are welded where they are read.
+void hint_at_unwelded(const MeshSource& source, ReadResult& result) {
+    if (!source.options.weld || !is_unwelded(result.mesh.view())) return;
+    result.notes.push_back("every triangle has vertices of its own, at the places of others: it is simplified better "
+                           "and takes less memory where they are welded before.");
+}
+
 Result<ReadResult> finish(const MeshSource& source, ReadResult result) {
+    if (const Result<void> settled = settle_bad_parts(source, result); !settled) return settled.error();
     // Before the checks: they would accept a mesh without triangles.
     if (result.mesh.triangles.empty()) {
         return malformed(source, "it holds no triangles; give a file with faces.");
@@ -176,6 +209,7 @@ Result<ReadResult> finish(const MeshSource& source, ReadResult result) {
                                      " triangles use a vertex twice, so none is left; give a file with proper faces.");
     }
     if (const Result<void> valid = check_normals(source, result); !valid) return valid.error();
+    hint_at_unwelded(source, result);
     return result;
 }
 

@@ -13,6 +13,7 @@
 
 #include <meshio/mesh_io.h>
 #include <vdtree/colour.h>
+#include <vdtree/internal/finite.h>
 
 namespace unseen::meshio {
 
@@ -29,7 +30,8 @@ struct MeshSource {
     bool keep_going(std::uint64_t bytes_done, const char* stage) const;
 };
 
-// Readers check counts, sizes and indices themselves; read_mesh_bytes adds what all formats share.
+// Readers check counts, sizes and indices themselves, count bad vertices, and add no face that is bad or uses one;
+// read_mesh_bytes adds what all formats share.
 Result<ReadResult> read_ply(const MeshSource& source);
 Result<ReadResult> read_obj(const MeshSource& source);
 Result<ReadResult> read_off(const MeshSource& source);
@@ -61,6 +63,20 @@ Result<void> read_mtl(std::string_view bytes, const std::string& name, bool with
 
 // Reads a regular file whole; pipes and devices are refused.
 Result<std::string> read_whole_file(const std::filesystem::path& file);
+
+// Counts a vertex with a NaN or infinite coordinate. `where` names it if it is the first.
+template <class Where>
+void check_position(BadParts& bad, const glm::dvec3& position, Where&& where) {
+    if (is_finite(position)) return;
+    if (bad.vertices++ == 0) bad.first_vertex = where() + " has a NaN or infinite coordinate";
+}
+
+// Counts a face with corners that are not there, which its reader leaves out. `what` names the first.
+template <class What>
+void leave_out_face(BadParts& bad, What&& what) {
+    ++bad.left_out;
+    if (bad.faces++ == 0) bad.first_face = what();
+}
 
 // Where in the file, and the sentence: "bunny.ply: line 7: ...".
 Error malformed(const MeshSource& source, const std::string& what);

@@ -217,11 +217,10 @@ private:
             return bad(line, "vertex " + std::to_string(positions().size() + 1) +
                                  " needs 3 numbers, or 6 with a colour; correct " + in_quotes(trimmed(rest)) + ".");
         }
-        if (!std::isfinite(n[0]) || !std::isfinite(n[1]) || !std::isfinite(n[2])) {
-            return bad(line, "vertex " + std::to_string(positions().size() + 1) +
-                                 " has a NaN or infinite coordinate; remove it or give it a place.");
-        }
         positions().emplace_back(n[0], n[1], n[2]);
+        check_position(result_.bad, positions().back(), [&] {
+            return "line " + std::to_string(line) + ": vertex " + std::to_string(positions().size());
+        });
         if (count >= 6) {
             colours_.resize(positions().size() - 1, missing_colour);
             colours_.push_back(
@@ -287,6 +286,7 @@ private:
 
     Result<void> add_face(std::string_view rest, std::uint64_t line) {
         corners_.clear();
+        is_whole_ = true;
         const char* at = rest.data();
         const char* const end = at + rest.size();
         for (;;) {
@@ -297,12 +297,17 @@ private:
             corners_.push_back(corner);
         }
         ++result_.source_faces;
+        if (!is_whole_) return {};
         if (corners_.size() < 3) {
             ++small_faces_;
             return {};
         }
         points_.clear();
         for (const Corner& corner : corners_) points_.push_back(positions()[corner.position]);
+        if (result_.bad.vertices > 0 && !std::all_of(points_.begin(), points_.end(), is_finite<double>)) {
+            ++result_.bad.left_out;
+            return {};
+        }
         begin_triangle();
         auto& [has_normals, has_uvs] = part_attributes_[document_.runs.back().part];
         for (const Corner& corner : corners_) {
@@ -328,19 +333,14 @@ private:
         std::int64_t number = 0;
         at = parse_integer(at, word_end, number);
         if (at == nullptr) return bad_corner();
-        if (Result<void> done = resolve(number, positions_seen_, positions().size(), "vertex", line, corner.position);
-            !done) {
-            return done;
-        }
+        resolve(number, positions_seen_, positions().size(), "vertex", line, corner.position);
         for (int slash = 0; slash < 2 && at != word_end && *at == '/'; ++slash) {
             ++at;
             if (at == word_end || *at == '/') continue;
             at = parse_integer(at, word_end, number);
             if (at == nullptr) return bad_corner();
-            Result<void> done = slash == 0
-                                    ? resolve(number, uvs_seen_, uvs_.size(), "texture coordinate", line, corner.uv)
-                                    : resolve(number, normals_seen_, normals_.size(), "normal", line, corner.normal);
-            if (!done) return done;
+            if (slash == 0) resolve(number, uvs_seen_, uvs_.size(), "texture coordinate", line, corner.uv);
+            else resolve(number, normals_seen_, normals_.size(), "normal", line, corner.normal);
         }
         if (at != word_end) return bad_corner();
         if (corner.normal != none && !is_finite(normals_[corner.normal])) {
@@ -352,22 +352,25 @@ private:
         return {};
     }
 
-    // Positive numbers count from 1 in the file, negative ones back from the last that came before the face.
-    Result<void> resolve(std::int64_t number, std::size_t seen, std::size_t total, const char* what, std::uint64_t line,
-                         Index& index) {
+    // Positive numbers count from 1 in the file, negative ones back from the last that came before the face. What is
+    // not there leaves the face out.
+    void resolve(std::int64_t number, std::size_t seen, std::size_t total, const char* what, std::uint64_t line,
+                 Index& index) {
         const bool is_valid = number > 0 ? static_cast<std::uint64_t>(number) <= total
                                          : number < 0 && number >= -static_cast<std::int64_t>(seen);
-        if (!is_valid) {
-            return bad(line, "face " + std::to_string(result_.source_faces + 1) + " uses " + what + " " +
-                                 std::to_string(number) + ", but there are " +
-                                 std::to_string(number < 0 ? seen : total) +
-                                 (number == 0  ? ", numbered from 1"
-                                  : number < 0 ? " before it"
-                                               : "") +
-                                 "; correct or remove it.");
+        if (is_valid) {
+            index = static_cast<Index>(number > 0 ? number - 1 : static_cast<std::int64_t>(seen) + number);
+        } else if (is_whole_) {
+            is_whole_ = false;
+            leave_out_face(result_.bad, [&] {
+                return "line " + std::to_string(line) + ": face " + std::to_string(result_.source_faces + 1) +
+                       " uses " + what + " " + std::to_string(number) + ", but there are " +
+                       std::to_string(number < 0 ? seen : total) +
+                       (number == 0  ? ", numbered from 1"
+                        : number < 0 ? " before it"
+                                     : "");
+            });
         }
-        index = static_cast<Index>(number > 0 ? number - 1 : static_cast<std::int64_t>(seen) + number);
-        return {};
     }
 
     // ---- groups and materials ----
@@ -568,6 +571,7 @@ private:
     std::vector<Corner> corners_;          // of the present face
     std::vector<glm::dvec3> points_;       // their positions
     std::vector<Corner> triangle_corners_; // three a triangle
+    bool is_whole_ = true;                 // all that the face uses is there
     bool has_uvs_ = false;
     bool has_normals_ = false;
     bool has_index_overflow_ = false;

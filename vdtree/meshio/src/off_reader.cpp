@@ -102,6 +102,7 @@ private:
                 if (Result<void> done = to_real(words_.next(), i, p[axis]); !done) return done;
             }
             mesh.positions.push_back(p);
+            check_position(result_.bad, p, [&] { return line() + "vertex " + std::to_string(i); });
             if (keyword_.has_normals || keyword_.has_colours || keyword_.has_uvs) {
                 if (Result<void> done = read_attributes(i); !done) return done;
             }
@@ -163,6 +164,7 @@ private:
                                           " corners, more than the file can hold; correct it.");
             }
             corners_.resize(static_cast<std::size_t>(size));
+            is_whole_ = true;
             for (Index& corner : corners_) {
                 if (Result<void> done = read_corner(i, corner); !done) return done;
             }
@@ -175,24 +177,29 @@ private:
     Result<void> read_corner(std::uint64_t face, Index& corner) {
         std::int64_t index = 0;
         if (Result<void> done = to_index(words_.next(), face, index); !done) return done;
-        if (index < 0 || static_cast<std::uint64_t>(index) >= vertex_count_) {
-            return malformed_line(source_, words_.line(),
-                                  "face " + std::to_string(face) + " uses vertex " + std::to_string(index) +
-                                      ", but there are " + std::to_string(vertex_count_) +
-                                      ", numbered from 0; correct or remove it.");
-        }
         corner = static_cast<Index>(index);
+        if ((index >= 0 && static_cast<std::uint64_t>(index) < vertex_count_) || !is_whole_) return {};
+        is_whole_ = false;
+        leave_out_face(result_.bad, [&] {
+            return line() + "face " + std::to_string(face) + " uses vertex " + std::to_string(index) +
+                   ", but there are " + std::to_string(vertex_count_) + ", numbered from 0";
+        });
         return {};
     }
 
     void add_face() {
         ++result_.source_faces;
+        if (!is_whole_) return;
         if (corners_.size() < 3) {
             ++small_faces_;
             return;
         }
         points_.clear();
         for (const Index corner : corners_) points_.push_back(result_.mesh.positions[corner]);
+        if (result_.bad.vertices > 0 && !std::all_of(points_.begin(), points_.end(), is_finite<double>)) {
+            ++result_.bad.left_out;
+            return;
+        }
         polygons_.triangulate(points_, [&](const Triangle& t) {
             result_.mesh.triangles.push_back({corners_[t[0]], corners_[t[1]], corners_[t[2]]});
         });
@@ -219,6 +226,8 @@ private:
         return not_a_number("face " + std::to_string(face) + " of " + std::to_string(face_count_), word);
     }
 
+    std::string line() const { return "line " + std::to_string(words_.line()) + ": "; }
+
     Error not_a_number(const std::string& where, std::string_view word) const {
         if (word.empty()) return malformed(source_, "it ends within " + where + "; the file is cut short.");
         return malformed_line(source_, words_.line(),
@@ -237,6 +246,7 @@ private:
     std::uint64_t vertex_count_ = 0;
     std::uint64_t face_count_ = 0;
     std::uint64_t small_faces_ = 0;
+    bool is_whole_ = true; // all corners_ are there
     ReadResult result_;
     PolygonTriangulator polygons_;
     std::vector<Index> corners_;

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <limits>
 #include <optional>
+#include <span>
 #include <type_traits>
 #include <vector>
 
@@ -512,6 +513,8 @@ private:
                 if (!read) return broken(body, element, row);
             }
             mesh.positions.emplace_back(value[x], value[y], value[z]);
+            check_position(result_.bad, mesh.positions.back(),
+                           [&] { return body.where() + ": vertex " + std::to_string(row); });
             if (has_normals) mesh.normals.emplace_back(value[nx], value[ny], value[nz]);
             if (has_colours) mesh.colours.push_back(colour(layout, value));
             if (has_uvs) mesh.uvs.emplace_back(value[u], value[v]);
@@ -543,7 +546,8 @@ private:
                     continue;
                 }
                 if (Result<void> list = read_index_list(body, element, property, row); !list) return list;
-                if (is_strip_element(element)) add_strip();
+                if (!is_whole_) ++result_.source_faces;
+                else if (is_strip_element(element)) add_strip();
                 else add_face();
             }
         }
@@ -561,16 +565,18 @@ private:
         }
         const bool has_restarts = is_strip_element(element);
         corners_.resize(static_cast<std::size_t>(count));
+        is_whole_ = true;
         for (std::int64_t& corner : corners_) {
             if (!body.integer(property.type, corner)) return broken(body, element, row);
             const bool is_restart = has_restarts && corner == -1;
-            if (!is_restart && (corner < 0 || corner >= static_cast<std::int64_t>(vertices_->count))) {
-                return malformed(source_, body.where() + ": " + (has_restarts ? "strip " : "face ") +
-                                              std::to_string(row) + " uses vertex " + std::to_string(corner) +
-                                              ", but the vertices are numbered 0 to " +
-                                              std::to_string(static_cast<std::int64_t>(vertices_->count) - 1) +
-                                              "; correct or remove it.");
-            }
+            if (is_restart || (corner >= 0 && corner < static_cast<std::int64_t>(vertices_->count)) || !is_whole_)
+                continue;
+            is_whole_ = false;
+            leave_out_face(result_.bad, [&] {
+                return body.where() + ": " + (has_restarts ? "strip " : "face ") + std::to_string(row) +
+                       " uses vertex " + std::to_string(corner) + ", but the vertices are numbered 0 to " +
+                       std::to_string(static_cast<std::int64_t>(vertices_->count) - 1);
+            });
         }
         return {};
     }
@@ -581,6 +587,7 @@ private:
             ++small_faces_;
             return;
         }
+        if (!has_places(corners_)) return;
         if (corners_.size() == 3) {
             result_.mesh.triangles.push_back({corner(0), corner(1), corner(2)});
             return;
@@ -604,9 +611,20 @@ private:
             }
             if (i < start + 2) continue;
             ++result_.source_faces;
+            if (!has_places(std::span(corners_).subspan(i - 2, 3))) continue;
             if ((i - start) % 2 == 0) result_.mesh.triangles.push_back({corner(i - 2), corner(i - 1), corner(i)});
             else result_.mesh.triangles.push_back({corner(i - 1), corner(i - 2), corner(i)});
         }
+    }
+
+    // False where a corner is a bad vertex; then the face is left out.
+    bool has_places(std::span<const std::int64_t> corners) {
+        if (result_.bad.vertices == 0 || std::all_of(corners.begin(), corners.end(), [&](std::int64_t corner) {
+                return is_finite(result_.mesh.positions[static_cast<std::size_t>(corner)]);
+            }))
+            return true;
+        ++result_.bad.left_out;
+        return false;
     }
 
     Index corner(std::size_t i) const { return static_cast<Index>(corners_[i]); }
@@ -625,6 +643,7 @@ private:
     std::vector<std::int64_t> corners_;
     std::vector<glm::dvec3> points_;
     std::uint64_t small_faces_ = 0;
+    bool is_whole_ = true; // all corners_ are there
 };
 
 } // namespace

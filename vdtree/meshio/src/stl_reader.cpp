@@ -1,7 +1,7 @@
-// STL, ASCII and binary. Facets keep their own three vertices: nothing is welded.
+// STL, ASCII and binary. Facets have three vertices of their own, which are welded unless the options say no.
 #include "mesh_readers.h"
 #include "text_scanner.h"
-#include <vdtree/internal/finite.h>
+#include "weld.h"
 
 #include <algorithm>
 #include <array>
@@ -50,11 +50,16 @@ bool is_direction(const glm::vec3& n) { return is_finite(n) && n != glm::vec3(0.
 
 void add_facet(ReadResult& result, const glm::vec3& normal, const std::array<glm::dvec3, 3>& corners) {
     Mesh& mesh = result.mesh;
+    const std::uint64_t facet = result.source_faces++;
+    if (!std::all_of(corners.begin(), corners.end(), is_finite<double>)) {
+        leave_out_face(result.bad,
+                       [&] { return "facet " + std::to_string(facet) + " has a NaN or infinite coordinate"; });
+        return;
+    }
     const auto first = static_cast<Index>(mesh.positions.size());
     mesh.positions.insert(mesh.positions.end(), corners.begin(), corners.end());
     mesh.normals.insert(mesh.normals.end(), 3, normal);
     mesh.triangles.push_back({first, first + 1, first + 2});
-    ++result.source_faces;
 }
 
 // A facet's normal of zero means "compute it" in STL, and so does one that is not finite, which flat facets often have:
@@ -73,6 +78,35 @@ void settle_normals(ReadResult& result) {
                                   " not finite and computed from the corners.");
     }
     if (!any) mesh.normals = {};
+}
+
+// The normals are the facets', not those of a smooth surface: they go.
+void weld(ReadResult& result) {
+    Mesh& mesh = result.mesh;
+    const std::size_t before = mesh.positions.size();
+    std::vector<Index> number = find_first_at_place(mesh.positions);
+    std::size_t kept = 0;
+    for (std::size_t v = 0; v < before; ++v) {
+        if (number[v] == v) {
+            mesh.positions[kept] = mesh.positions[v];
+            number[v] = static_cast<Index>(kept++);
+        } else {
+            number[v] = number[number[v]]; // the first one has its new number already
+        }
+    }
+    if (kept == before) return;
+    mesh.positions.resize(kept);
+    mesh.positions.shrink_to_fit();
+    for (Triangle& t : mesh.triangles)
+        for (Index& v : t) v = number[v];
+    mesh.normals = {};
+    result.notes.push_back("its " + std::to_string(before) + " vertices, three a facet, were welded to " +
+                           std::to_string(kept) + "; with read.weld = false they and the facets' normals stay.");
+}
+
+void settle(const MeshSource& source, ReadResult& result) {
+    settle_normals(result);
+    if (source.options.weld) weld(result);
 }
 
 Error too_many_facets(const MeshSource& source) {
@@ -113,7 +147,7 @@ Result<ReadResult> read_binary(const MeshSource& source) {
     if (bytes.size() > preamble_bytes + count * facet_bytes) {
         result.warnings.push_back("data behind the last facet were ignored.");
     }
-    settle_normals(result);
+    settle(source, result);
     return result;
 }
 
@@ -127,7 +161,7 @@ public:
             if (!equals_ignoring_case(word, "solid")) return unexpected("solid", word);
             if (Result<void> solid = read_solid(); !solid) return solid.error();
         }
-        settle_normals(result_);
+        settle(source_, result_);
         return std::move(result_);
     }
 

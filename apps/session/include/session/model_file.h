@@ -16,6 +16,7 @@ struct LoadOptions {
     std::filesystem::path texture = {}; // an image that lies over a mesh instead of its materials' images; empty: none
     bool without_textures = false;      // look at no images; colours of materials count all the same
     meshio::LeftOut drop = {};          // what glTF files may have that trees cannot
+    bool skip_bad = false, weld = true; // see meshio::ReadOptions
     // A mesh's colours and textures are light that is baked in, not reflectance: see vdtree::BuildOptions. Not of trees.
     bool prelit = false;
     double unit_metres = 1; // world units (metres) a mesh unit; above 0. Of Scene::load()
@@ -28,7 +29,7 @@ struct LoadOptions {
 
 // A mesh with its texture: those of several materials become one, side by side, and materials' colours become those of
 // the vertices. Images are PNG, JPEG, PFM or EXR. Errors name the file, and what is wrong in it. The reader's warnings
-// are messages. `reading.images`, `reading.drop` and `reading.progress` are taken from the options.
+// and notes are messages. Of `reading`, only the colours are not taken from the options.
 Result<meshio::ReadResult> read_textured_mesh(const std::filesystem::path& file, const LoadOptions& options = {},
                                               meshio::ReadOptions reading = {});
 

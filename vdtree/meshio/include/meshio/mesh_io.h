@@ -35,8 +35,20 @@ struct ReadOptions {
     // How 8-bit and float colours of PLY, OBJ and OFF are encoded; glTF defines its own (linear).
     ColourEncoding colours = ColourEncoding::srgb;
     Progress progress = {};
-    bool images = true; // say where those of materials are; else materials have colours only
-    LeftOut drop = {};  // files with other such things are refused; messages call this field read.drop
+    bool images = true;    // say where those of materials are; else materials have colours only
+    LeftOut drop = {};     // files with other such things are refused; messages call this field read.drop
+    bool skip_bad = false; // leave out what BadParts counts; else it is an error. Messages: read.skip_bad
+    bool weld = true;      // vertices of STL files at equal places become one; else each facet keeps three. read.weld
+};
+
+// What no mesh can have.
+struct BadParts {
+    std::uint64_t vertices = 0;           // with a NaN or infinite coordinate, used or not
+    std::uint64_t faces = 0;              // with corners that are not there or, in STL, such coordinates
+    std::uint64_t left_out = 0;           // faces of both kinds: all that use any of those vertices, and `faces`
+    std::string first_vertex, first_face; // where, and what is wrong; empty where there is none
+
+    bool any() const { return vertices > 0 || faces > 0; }
 };
 
 // What a file says of the surface of a range of triangles. Images are named, or are there as they were in the file:
@@ -62,11 +74,14 @@ struct ReadResult {
     std::optional<SourceDocument> document = {}; // of glTF, and of OBJ with objects or materials; without vertex_parts
     bool uvs_from_top = false;                   // v grows downward in images (glTF), not upward (OBJ, PLY)
     std::optional<std::uint64_t> bad_uv =
-        {}; // the first vertex whose texture coordinates were not finite, and set to 0
+        {};                              // the first vertex whose texture coordinates were not finite, and set to 0
+    std::vector<std::string> notes = {}; // what is no repair and good to know, one sentence each
+    BadParts bad = {};                   // what was left out
 };
 
 // Polygons are triangulated (ear clipping in the plane of the polygon, so concave ones keep their area),
-// triangle strips unrolled with their orientation, glTF node transforms applied. Coincident vertices stay apart.
+// triangle strips unrolled with their orientation, glTF node transforms applied. Coincident vertices stay apart, but
+// for those of STL (ReadOptions::weld), whose facet normals go with them.
 // Fails on a mesh without triangles, and on vertex normals in use that are not finite; those of length 0 are told in
 // the warnings.
 Result<ReadResult> read_mesh(const std::filesystem::path& file, const ReadOptions& options = {});
