@@ -127,16 +127,18 @@ TEST_F(GazeFileTest, ReadsPupilCoreWhoseYPointsUp) {
 
 TEST_F(GazeFileTest, ReadsPupilNeon) {
     std::vector<std::string> notes;
-    EXPECT_THAT(
-        samples("section id,recording id,timestamp [ns],gaze x [px],gaze y [px],worn,fixation id,blink id,azimuth "
-                "[deg],elevation [deg]\n"
-                "a,b,1669211225123456000,800.5,600.25,1,1,,1,2\n"
-                "a,b,1669211225128456000,1,2,1,,7,1,2\n"
-                "a,b,1669211225133456000,3,4,0,,,1,2\n"
-                "a,b,1669211225138456000,801,600,1,2,,1,2\n",
-                &notes),
-        ElementsAre(GazeSample{0, {800.5, 600.25}}, GazeSample{0.005, {800.5, 600.25}},
-                    GazeSample{0.01, {800.5, 600.25}}, GazeSample{0.015, {801, 600}}));
+    const auto s = samples("section id,recording id,timestamp [ns],gaze x [px],gaze y [px],worn,fixation id,blink id,"
+                           "azimuth [deg],elevation [deg]\n"
+                           "a,b,1669211225123456000,800.5,600.25,1,1,,1,2\n"
+                           "a,b,1669211225128456000,1,2,1,,7,1,2\n"
+                           "a,b,1669211225133456000,3,4,0,,,1,2\n"
+                           "a,b,1669211225138456000,801,600,1,2,,1,2\n",
+                           &notes);
+    ASSERT_EQ(s.size(), 4u);
+    const glm::dvec2 seen(800.5, 600.25);
+    EXPECT_THAT((std::vector{s[0].px, s[1].px, s[2].px, s[3].px}), ElementsAre(seen, seen, seen, glm::dvec2(801, 600)));
+    constexpr double spacing_s = 256e-9; // of doubles at nanoseconds since 1970
+    for (std::size_t i = 0; i < s.size(); ++i) EXPECT_NEAR(s[i].time_s, 0.005 * static_cast<double>(i), spacing_s);
     EXPECT_THAT(notes, ElementsAre(HasSubstr("times count from its first row"), HasSubstr("the head's camera")));
 }
 
@@ -232,7 +234,7 @@ TEST_F(GazeFileTest, AnyBytesGiveATraceOrAnError) {
                                    "t\tleft x\tleft y\tright x\tright y\tvalidity left\n"};
     std::mt19937 random(1);
     int traces = 0;
-    for (int i = 0; i < 4000; ++i) {
+    for (int i = 0; i < 1000; ++i) {
         std::string text = headers[random() % std::size(headers)];
         for (auto n = random() % 40; n > 0; --n)
             text += random() % 8 == 0 ? std::string(1, static_cast<char>(random() % 256))
