@@ -106,11 +106,11 @@ private:
     // From near to far, from random directions; looked at and aside, with criteria that do for all directions.
     Result<void> look_from_all_around(JudgedModel& model) {
         std::vector<ViewOptions> views;
-        for (const double fill : {0.9, 0.3, 0.08}) { // of the window's height
+        for (const double share : {0.9, 0.3, 0.08}) { // of the window's height
             const double z = uniform(-1, 1), turn = uniform(0, 2 * std::numbers::pi), across = std::sqrt(1 - z * z);
             ViewOptions& view = views.emplace_back();
             view.direction = {across * std::cos(turn), across * std::sin(turn), z};
-            view.fill = fill * uniform(0.8, 1.2);
+            view.fill = share * uniform(0.8, 1.2);
         }
         if (options_.quick) views.resize(1);
         const auto session = model.session(FoldTest::error);
