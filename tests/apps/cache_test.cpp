@@ -75,6 +75,8 @@ TEST_F(CacheTest, WhatATreeDependsOnBuildsItAnew) {
     EXPECT_EQ(origin("plain.obj"), "built");
     EXPECT_EQ(origin("plain.obj"), "cache");
     EXPECT_EQ(origin("plain.obj", {"--prelit"}), "built") << "an option";
+    EXPECT_EQ(origin("plain.obj", {"--skip-bad"}), "built") << "an option";
+    EXPECT_EQ(origin("plain.obj", {"--no-weld"}), "built") << "an option";
     EXPECT_EQ(origin("plain.obj", {"--triangles", "50%"}), "cache") << "not of the tree";
     write_text(path("my paints.mtl"), "newmtl paint\nKd 0.6 0.5 0.5\n");
     EXPECT_EQ(origin("plain.obj"), "built") << "a library";

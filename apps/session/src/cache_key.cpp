@@ -142,7 +142,9 @@ std::optional<std::string> cache_key(const fs::path& file, const LoadOptions& op
                                      options.drop.skins,
                                      options.drop.morph_targets,
                                      options.drop.animations,
-                                     options.drop.extensions};
+                                     options.drop.extensions,
+                                     options.skip_bad,
+                                     options.weld};
     hash.add({reinterpret_cast<const char*>(numbers), sizeof numbers});
     hash.add(file.extension().string());
 

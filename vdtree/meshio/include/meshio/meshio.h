@@ -9,5 +9,6 @@
 //     const auto notes = meshio::write_cut("small.glb", cut);
 #pragma once
 
+#include <meshio/examine.h>
 #include <meshio/mesh_io.h>
 #include <meshio/source_document.h>
