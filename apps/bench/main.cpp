@@ -132,7 +132,7 @@ Command engine_command(CLI::App& app) {
     auto a = std::make_shared<EngineArguments>();
     CLI::App* verb = app.add_subcommand("engine", "Cuts, budgets, memory and building, against what is promised");
     verb->add_option("--mesh", a->options.mesh,
-                     "PLY, OBJ, OFF, STL or glTF (default: the dragon, as ./quickstart gets it; "
+                     "PLY, OBJ, OFF, STL or glTF (default: the dragon, as ./quickstart --dragon gets it; "
                      "without it a sphere with bumps)")
         ->type_name("MESH");
     CLI::Option* sizes =
@@ -203,10 +203,11 @@ Command perception_command(CLI::App& app) {
     PerceptionBenchOptions& o = a->options;
     CLI::App* verb = app.add_subcommand(
         "perception", "What fold tests save, whether it can be seen, and what it costs, against what is promised");
-    verb->add_option("--mesh", o.meshes,
-                     "Meshes or trees (default: the bunny and the dragon, as ./quickstart gets them; without them a "
-                     "sphere with bumps); "
-                     "of the dragon, unless it is named, only random views, from afar, and speed")
+    verb->add_option(
+            "--mesh", o.meshes,
+            "Meshes or trees (default: the bunny and the dragon, as ./quickstart --dragon gets them; without them a "
+            "sphere with bumps); "
+            "of the dragon, unless it is named, only random views, from afar, and speed")
         ->type_name("MESH");
     verb->add_option("--other", o.others, "More of them, for the random views and from afar")->type_name("MESH");
     verb->add_option("--only", a->only, "Groups: savings,random,far,hard,tolerance,csf,observers,speed (default: all)")
