@@ -255,7 +255,7 @@ TEST_F(GazeFileTest, AnyBytesGiveATraceOrAnError) {
         for (const GazeSample& s : recording->trace.samples())
             ASSERT_TRUE(std::isfinite(s.time_s + s.px.x + s.px.y)) << text;
     }
-    EXPECT_GT(traces, 20);
+    EXPECT_GT(traces, 5); // both happen
 }
 
 // data/README.md says how they were made.
