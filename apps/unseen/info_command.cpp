@@ -143,8 +143,9 @@ std::string text_of_extent(const meshio::Examination& mesh) {
            " m with --unit 0.001 (millimetres)";
 }
 
-// One sentence each; those that are fine only where asked for.
+// The size, then one sentence for each finding; those that are fine only where asked for.
 void print_findings(const meshio::ReadResult& read, const meshio::Examination& mesh, bool with_all) {
+    print_line("extent: " + text_of_extent(mesh));
     bool all_fine = !mesh.is_unwelded;
     if (mesh.is_unwelded)
         print_line("unwelded: no two triangles share a vertex: more memory, and more triangles for the same picture; "
@@ -197,8 +198,7 @@ Result<int> describe_mesh(const InfoArguments& a) {
                  {"materials with images", std::to_string(images)},
                  {"groups and materials", grouped(mesh.ranges.size())},
                  {"components", grouped(examined->components)},
-                 {"of them closed", grouped(examined->closed_components)},
-                 {"extent", text_of_extent(*examined)}};
+                 {"of them closed", grouped(examined->closed_components)}};
     if (a.verify) rows.push_back({"verified", "sound"});
     output(a.json, json, rows);
     if (!a.json) print_findings(*read, *examined, a.is_verbose);
