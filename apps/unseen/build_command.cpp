@@ -252,8 +252,8 @@ Command build_command(CLI::App& app) {
     CLI::Option* leave = verb->add_flag("--no-fold-errors", a->no_fold_errors,
                                         "Leave out the following: faster, and a smaller file; the default fold test "
                                         "measures then when it first needs to");
-    verb->add_flag(
-            "--fold-errors",
+    verb->add_flag_function(
+            "--fold-errors", [](std::int64_t) {}, // nothing to do
             "The default, where there is no texture: measure what every fold changes, for the fold test 'error', "
             "and give proxies the luminance that keeps the surface's light")
         ->excludes(leave);
