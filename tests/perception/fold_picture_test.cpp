@@ -41,16 +41,16 @@ TEST(FoldPicture, NothingDiffersFromItself) {
     FoldPicture picture = looking();
     const auto grey = [](const glm::vec3& p) { return 0.5f + 0.3f * p.x * p.y; };
     for (const Layer layer : {Layer::mesh, Layer::folded}) draw_plane(picture, layer, 0, grey);
-    for (const float amplitude : picture.amplitudes()) EXPECT_EQ(amplitude, 0);
-    EXPECT_EQ(picture.shift(), 0);
+    for (const float amplitude : picture.difference().amplitudes) EXPECT_EQ(amplitude, 0);
+    EXPECT_EQ(picture.difference().shift, 0);
     EXPECT_TRUE(picture.is_height_field());
 }
 
 TEST(FoldPicture, WhatOnlyOneShowsDoesNotDiffer) {
     FoldPicture picture = looking();
     draw_plane(picture, Layer::mesh, 0, even);
-    for (const float amplitude : picture.amplitudes()) EXPECT_EQ(amplitude, 0);
-    EXPECT_EQ(picture.shift(), 0);
+    for (const float amplitude : picture.difference().amplitudes) EXPECT_EQ(amplitude, 0);
+    EXPECT_EQ(picture.difference().shift, 0);
 }
 
 // Each band sees a grating of its own frequency as large as it is, wherever its phase; others see less of it.
@@ -62,7 +62,7 @@ TEST(FoldPicture, MeasuresGratings) {
             draw_plane(picture, Layer::mesh, 0, even);
             draw_plane(picture, Layer::folded, 0,
                        [&](const glm::vec3& p) { return 0.5f + 0.1f * std::cos(frequency * p.x + phase); });
-            const auto amplitudes = picture.amplitudes();
+            const auto amplitudes = picture.difference().amplitudes;
             // The finest has two cells a wave: what it sees depends on the phase. The coarser ones have a wave and a
             // half or more in the picture.
             if (band > 0) {
@@ -81,7 +81,7 @@ TEST(FoldPicture, SeesASpotInTheBandOfItsSize) {
         draw_plane(picture, Layer::folded, 0, [&](const glm::vec3& p) {
             return 0.5f + 0.2f * std::exp(-(p.x * p.x + p.y * p.y) / (radius * radius));
         });
-        return picture.amplitudes();
+        return picture.difference().amplitudes;
     };
     const auto narrow = of_spot(0.15f), wide = of_spot(0.6f);
     EXPECT_GT(narrow[1], 2 * narrow[3]);
@@ -94,7 +94,7 @@ TEST(FoldPicture, MeasuresShiftsAlongTheNormal) {
         FoldPicture picture = looking(normal);
         draw_plane(picture, Layer::mesh, 0, even);
         draw_plane(picture, Layer::folded, 0.125f, even);
-        EXPECT_NEAR(picture.shift(), 0.125f, 1e-5f);
+        EXPECT_NEAR(picture.difference().shift, 0.125f, 1e-5f);
         EXPECT_TRUE(picture.is_height_field());
     }
 }
@@ -104,8 +104,8 @@ TEST(FoldPicture, ShowsWhatLiesHighest) {
     draw_plane(picture, Layer::mesh, 0.25f, even);
     draw_plane(picture, Layer::mesh, -0.25f, [](const glm::vec3&) { return 0.9f; });
     draw_plane(picture, Layer::folded, 0.25f, even);
-    for (const float amplitude : picture.amplitudes()) EXPECT_EQ(amplitude, 0);
-    EXPECT_EQ(picture.shift(), 0);
+    for (const float amplitude : picture.difference().amplitudes) EXPECT_EQ(amplitude, 0);
+    EXPECT_EQ(picture.difference().shift, 0);
 }
 
 TEST(FoldPicture, KnowsWhetherASurfaceIsFolded) {
@@ -129,7 +129,7 @@ TEST(FoldPicture, SurvivesPlacesThatAreNoNumbers) {
     for (const float bad : {nan, infinity, -infinity, 1e38f, -1e38f})
         picture.draw(Layer::folded, {{bad, 0, 0}, 0.5f}, {{1, bad, 0}, 0.5f}, {{0, 1, bad}, bad});
     draw_plane(picture, Layer::mesh, 0, even);
-    for (const float amplitude : picture.amplitudes()) EXPECT_FALSE(amplitude > 1e37f);
+    for (const float amplitude : picture.difference().amplitudes) EXPECT_FALSE(amplitude > 1e37f);
 }
 
 } // namespace

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <numbers>
 #include <numeric>
@@ -27,6 +28,7 @@ using namespace measurement;
 constexpr std::size_t side = stage_side;
 constexpr std::size_t samples = side * cell_samples;
 constexpr float margin = stage_margin;
+constexpr float nothing = -std::numeric_limits<float>::infinity(); // is at a sample
 
 // From where a picture is taken: the mesh's sphere fills it, but for the margin. Lengths are in samples.
 struct Camera {
@@ -66,36 +68,103 @@ struct Picture {
     }
 };
 
-// The nearest surface at a sample.
-struct Surface {
-    float height = -std::numeric_limits<float>::infinity(); // towards the eye
-    float light = 0;
+// The nearest surface at each sample.
+struct Surfaces {
+    std::vector<float> height; // towards the eye; none: nothing is there
+    std::vector<float> light;
+
+    void clear() {
+        height.assign(samples * samples, nothing);
+        light.assign(samples * samples, 0.0f);
+    }
 };
+
+// A triangle over samples.
+struct Shown {
+    glm::vec3 a, b, c;      // samples; z: towards the eye
+    float of_a, of_b, of_c; // relative luminances
+    glm::vec2 v_by, w_by;   // how the shares of b and c grow, by sample
+    std::size_t first, end; // rows
+};
+
+// How many samples of a row, or rows, lie before a place: the rounding of floats that every processor has.
+UNSEEN_INLINE std::size_t count_before(float place) {
+    if (!(place > 0)) return 0;
+    if (place >= samples) return samples;
+    const int whole = static_cast<int>(place);
+    return static_cast<std::size_t>(whole + (static_cast<float>(whole) < place));
+}
+// Of a row's samples: edges that run up meet them one after the other, not all of a column at once.
+UNSEEN_INLINE float offset_of_row(std::size_t row) {
+    constexpr float golden_ratio = 0.618034f;
+    const float all = golden_ratio * static_cast<float>(row);
+    return all - static_cast<float>(static_cast<int>(all));
+}
+
+// Samples of a row are looked at by registers, `Floats`, whether they lie in the triangle or not.
+template <class Floats>
+UNSEEN_INLINE void draw_rows(const Shown& t, float* heights, float* lights) {
+    constexpr std::size_t width = sizeof(Floats) / sizeof(float);
+    static_assert(samples % width == 0);
+    Floats lane;
+    for (std::size_t i = 0; i < width; ++i) lane[i] = static_cast<float>(i);
+    const float left = std::min({t.a.x, t.b.x, t.c.x}), right = std::max({t.a.x, t.b.x, t.c.x});
+    for (std::size_t y = t.first; y < t.end; ++y) {
+        // Of a corner's weight, as it grows along the row: where it is no longer, or not yet, negative.
+        const float offset = offset_of_row(y), py = static_cast<float>(y) + 0.5f - t.a.y;
+        float low = left - t.a.x, high = right - t.a.x;
+        for (const auto& [at_start, by] : {std::pair(py * t.v_by.y, t.v_by.x), std::pair(py * t.w_by.y, t.w_by.x),
+                                           std::pair(1 - py * (t.v_by.y + t.w_by.y), -t.v_by.x - t.w_by.x)}) {
+            if (by > 0) low = std::max(low, -at_start / by);
+            else if (by < 0) high = std::min(high, -at_start / by);
+            else if (at_start < 0) high = low;
+        }
+        const std::size_t x0 = count_before(low + t.a.x - offset), x1 = count_before(high + t.a.x - offset);
+        const auto from = static_cast<float>(x0), to = static_cast<float>(x1);
+        for (std::size_t begin = x0 / width * width; begin < x1; begin += width) {
+            float *const height = heights + y * samples + begin, *const light = lights + y * samples + begin;
+            const Floats x = lane + static_cast<float>(begin), px = x + offset - t.a.x;
+            const Floats v = px * t.v_by.x + py * t.v_by.y, w = px * t.w_by.x + py * t.w_by.y, u = 1 - v - w;
+            const Floats h = u * t.a.z + v * t.b.z + w * t.c.z, l = u * t.of_a + v * t.of_b + w * t.of_c;
+            Floats old_height, old_light;
+            std::memcpy(&old_height, height, sizeof(Floats));
+            std::memcpy(&old_light, light, sizeof(Floats));
+            const auto is_seen = (x >= from) & (x < to) & (h > old_height);
+            const Floats new_height = is_seen ? h : old_height, new_light = is_seen ? l : old_light;
+            std::memcpy(height, &new_height, sizeof(Floats));
+            std::memcpy(light, &new_light, sizeof(Floats));
+        }
+    }
+}
+void draw_plain(const Shown& t, float* heights, float* lights) { draw_rows<Float4>(t, heights, lights); }
+#if defined(UNSEEN_EIGHT_WIDE)
+UNSEEN_AVX2 void draw_avx2(const Shown& t, float* heights, float* lights) { draw_rows<Float8>(t, heights, lights); }
+#else
+constexpr auto draw_avx2 = draw_plain;
+#endif
 
 class Painter {
 public:
     // The surfaces' memory is used again.
-    Painter(const VertexTree& tree, const Camera& camera, std::vector<Surface>& surfaces)
+    Painter(const VertexTree& tree, const Camera& camera, Surfaces& surfaces)
         : camera_(camera), positions_(tree.positions()), luminance_(tree.luminance()), closedness_(tree.closedness()),
           surfaces_(surfaces) {
-        surfaces_.assign(samples * samples, {});
+        surfaces_.clear();
     }
 
     // Triangles over nodes.
     Picture draw(std::span<const Triangle> triangles) {
-        for (const Triangle& t : triangles)
-            draw(t, camera_.place(positions_[t[0]]), camera_.place(positions_[t[1]]), camera_.place(positions_[t[2]]));
+        for (const Triangle& t : triangles) draw(t);
         Picture picture;
         constexpr float share = 1.0f / (cell_samples * cell_samples);
         for (std::size_t cell = 0; cell < side * side; ++cell) {
-            const Surface* const first =
-                surfaces_.data() + cell / side * cell_samples * samples + cell % side * cell_samples;
+            const std::size_t first = cell / side * cell_samples * samples + cell % side * cell_samples;
             float light = 0, covered = 0;
             for (std::size_t y = 0; y < cell_samples; ++y) {
                 for (std::size_t x = 0; x < cell_samples; ++x) {
-                    const Surface& at = first[y * samples + x];
-                    light += at.light;
-                    covered += at.height > Surface{}.height ? 1.0f : 0.0f;
+                    const std::size_t at = first + y * samples + x;
+                    light += surfaces_.light[at];
+                    covered += surfaces_.height[at] > nothing ? 1.0f : 0.0f;
                 }
             }
             picture.light.values[cell] = share * light;
@@ -105,58 +174,31 @@ public:
     }
 
 private:
-    // How many samples of a row, or rows, lie before a place: the rounding of floats that every processor has.
-    static std::size_t count_before(float place) {
-        if (!(place > 0)) return 0;
-        if (place >= samples) return samples;
-        const int whole = static_cast<int>(place);
-        return static_cast<std::size_t>(whole + (static_cast<float>(whole) < place));
-    }
-    // Of a row's samples: edges that run up meet them one after the other, not all of a column at once.
-    static float offset_of_row(std::size_t row) {
-        constexpr float golden_ratio = 0.618034f;
-        const float all = golden_ratio * static_cast<float>(row);
-        return all - static_cast<float>(static_cast<int>(all));
-    }
-
-    void draw(const Triangle& t, const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {
-        const std::size_t first = count_before(std::min({a.y, b.y, c.y}) - 0.5f),
-                          end = count_before(std::max({a.y, b.y, c.y}) - 0.5f);
-        if (first >= end) return; // many, of fine meshes
-        const float left = std::min({a.x, b.x, c.x}), right = std::max({a.x, b.x, c.x});
-        const float inverse = 1 / ((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x));
-        if (!std::isfinite(inverse) || (closedness_ == Closedness::closed_outward && inverse < 0) ||
-            (closedness_ == Closedness::closed_inward && inverse > 0)) // as renderers do
+    void draw(const Triangle& corners) {
+        Shown t;
+        t.a = camera_.place(positions_[corners[0]]);
+        t.b = camera_.place(positions_[corners[1]]);
+        t.c = camera_.place(positions_[corners[2]]);
+        const float area = (t.b.x - t.a.x) * (t.c.y - t.a.y) - (t.b.y - t.a.y) * (t.c.x - t.a.x);
+        if ((closedness_ == Closedness::closed_outward && area < 0) ||
+            (closedness_ == Closedness::closed_inward && area > 0)) // as renderers do
             return;
-        const float of_a = luminance_[t[0]], of_b = luminance_[t[1]], of_c = luminance_[t[2]];
-        const glm::vec2 v_by = inverse * glm::vec2(c.y - a.y, a.x - c.x),
-                        w_by = inverse * glm::vec2(a.y - b.y, b.x - a.x);
-        for (std::size_t y = first; y < end; ++y) {
-            // Of a corner's weight, as it grows along the row: where it is no longer, or not yet, negative.
-            const float offset = offset_of_row(y), py = static_cast<float>(y) + 0.5f - a.y;
-            float low = left - a.x, high = right - a.x;
-            for (const auto& [at_start, by] : {std::pair(py * v_by.y, v_by.x), std::pair(py * w_by.y, w_by.x),
-                                               std::pair(1 - py * (v_by.y + w_by.y), -v_by.x - w_by.x)}) {
-                if (by > 0) low = std::max(low, -at_start / by);
-                else if (by < 0) high = std::min(high, -at_start / by);
-                else if (at_start < 0) high = low;
-            }
-            Surface* const row = surfaces_.data() + y * samples;
-            const std::size_t last = count_before(high + a.x - offset);
-            for (std::size_t x = count_before(low + a.x - offset); x < last; ++x) {
-                const float px = static_cast<float>(static_cast<int>(x)) + offset - a.x;
-                const float v = px * v_by.x + py * v_by.y, w = px * w_by.x + py * w_by.y, u = 1 - v - w;
-                const float height = u * a.z + v * b.z + w * c.z;
-                if (height > row[x].height) row[x] = {height, u * of_a + v * of_b + w * of_c};
-            }
-        }
+        t.first = count_before(std::min({t.a.y, t.b.y, t.c.y}) - 0.5f);
+        t.end = count_before(std::max({t.a.y, t.b.y, t.c.y}) - 0.5f);
+        if (t.first >= t.end) return; // many, of fine meshes
+        const float inverse = 1 / area;
+        if (!std::isfinite(inverse)) return;
+        t.v_by = inverse * glm::vec2(t.c.y - t.a.y, t.a.x - t.c.x);
+        t.w_by = inverse * glm::vec2(t.a.y - t.b.y, t.b.x - t.a.x);
+        t.of_a = luminance_[corners[0]], t.of_b = luminance_[corners[1]], t.of_c = luminance_[corners[2]];
+        (has_avx2() ? draw_avx2 : draw_plain)(t, surfaces_.height.data(), surfaces_.light.data());
     }
 
     const Camera& camera_;
     std::span<const glm::vec3> positions_;
     std::span<const Unorm16> luminance_;
     Closedness closedness_;
-    std::vector<Surface>& surfaces_;
+    Surfaces& surfaces_;
 };
 
 // A picture in bands of frequency.
@@ -194,75 +236,67 @@ double share_in_cells(double frequency) {
     return std::sin(std::numbers::pi * frequency) / (std::numbers::pi * frequency);
 }
 
-using Floats = Float4; // four numbers at a time
-constexpr std::size_t width = sizeof(Floats) / sizeof(float);
-
-Floats absolute(Floats v) { return v < 0 ? -v : v; }
-
-// The largest contrasts of a band, of every fourth place on its own.
-class BandContrasts {
-public:
-    explicit BandContrasts(float inverse_gain) : inverse_gain_(inverse_gain) {}
-
-    void include(const Bands::Band& mesh, const Bands::Band& difference) {
-        std::size_t count = 0;
-        for (std::size_t i = 0; i < difference.light.values.size(); ++i) {
-            const float light = difference.light.values[i], cover = difference.cover.values[i];
-            if (light == 0 && cover == 0) continue;
-            light_[count] = light;
-            cover_[count] = cover;
-            own_light_[count] = mesh.light.values[i];
-            own_cover_[count] = mesh.cover.values[i];
-            mean_light_[count] = mesh.mean_light.values[i];
-            mean_cover_[count] = mesh.mean_cover.values[i];
-            if (++count < width) continue;
-            raise();
-            count = 0;
-        }
-        for (std::size_t i = count; i < width; ++i) light_[i] = cover_[i] = 0; // nothing where there are no more places
-        raise();
-    }
-
-    float largest(std::size_t background, std::size_t row) const {
-        float most = 0;
-        for (std::size_t i = 0; i < width; ++i) most = std::max(most, most_[background][row][i]);
-        return most;
-    }
-
-private:
-    void raise() {
-        constexpr auto& masks = FoldStage::masks;
-        for (std::size_t k = 0; k < FoldStage::backgrounds.size(); ++k) {
+// The largest contrasts of a band. `Floats`: a register's, each lane with places of its own.
+template <class Floats>
+UNSEEN_INLINE void find_contrasts(const Bands::Band& mesh, const Bands::Band& difference, float inverse_gain,
+                                  std::size_t band, FoldStage& stage) {
+    constexpr auto& masks = FoldStage::masks;
+    constexpr std::size_t backgrounds = FoldStage::backgrounds.size(), width = sizeof(Floats) / sizeof(float);
+    const auto magnitude = [](const Floats& v) UNSEEN_INLINE_LAMBDA { return v < 0 ? -v : v; };
+    Floats most[backgrounds][masks.size()] = {};
+    const std::size_t count = difference.light.values.size();
+    for (std::size_t first = 0; first < count; first += width) {
+        const auto load = [&](const Raster& from) UNSEEN_INLINE_LAMBDA {
+            Floats to{};
+            if (first + width <= count) std::memcpy(&to, from.values.data() + first, sizeof to);
+            else std::memcpy(&to, from.values.data() + first, (count - first) * sizeof(float));
+            return to;
+        };
+        const Floats light = load(difference.light), cover = load(difference.cover);
+        bool differs = false;
+        for (std::size_t i = 0; i < width; ++i) differs |= (light[i] != 0) | (cover[i] != 0);
+        if (!differs) continue;
+        const Floats own_light = load(mesh.light), own_cover = load(mesh.cover), mean_light = load(mesh.mean_light),
+                     mean_cover = load(mesh.mean_cover);
+        for (std::size_t k = 0; k < backgrounds; ++k) {
             const float background = FoldStage::backgrounds[k];
-            const Floats lit = mean_light_ + background * (1 - mean_cover_), mean = lit < 0 ? Floats{} : lit;
-            const Floats to_contrast = inverse_gain_ / (mean + FoldStage::black);
-            const Floats mask = absolute(own_light_ - background * own_cover_) * to_contrast;
-            const Floats contrast = absolute(light_ - background * cover_) * to_contrast;
+            const Floats lit = mean_light + background * (1 - mean_cover), mean = lit < 0 ? Floats{} : lit;
+            const Floats to_contrast = inverse_gain / (mean + FoldStage::black);
+            const Floats mask = magnitude(own_light - background * own_cover) * to_contrast;
+            const Floats contrast = magnitude(light - background * cover) * to_contrast;
             for (std::size_t row = 0; row < masks.size(); ++row) {
                 Floats here = contrast;
                 if (row > 0) here = mask >= masks[row] ? here : Floats{};
                 if (row + 1 < masks.size()) here = mask >= masks[row + 1] ? Floats{} : here;
-                Floats& most = most_[k][row];
-                most = most < here ? here : most;
+                most[k][row] = most[k][row] < here ? here : most[k][row];
             }
         }
     }
-
-    float inverse_gain_;
-    Floats light_{}, cover_{}, own_light_{}, own_cover_{}, mean_light_{}, mean_cover_{}; // at four places
-    Floats most_[FoldStage::backgrounds.size()][FoldStage::masks.size()] = {};
-};
+    for (std::size_t k = 0; k < backgrounds; ++k)
+        for (std::size_t row = 0; row < masks.size(); ++row)
+            for (std::size_t i = 0; i < width; ++i)
+                stage.contrast[k][band][row] = std::max(stage.contrast[k][band][row], most[k][row][i]);
+}
+void find_contrasts_plain(const Bands::Band& mesh, const Bands::Band& difference, float inverse_gain, std::size_t band,
+                          FoldStage& stage) {
+    find_contrasts<Float4>(mesh, difference, inverse_gain, band, stage);
+}
+#if defined(UNSEEN_EIGHT_WIDE)
+UNSEEN_AVX2 void find_contrasts_avx2(const Bands::Band& mesh, const Bands::Band& difference, float inverse_gain,
+                                     std::size_t band, FoldStage& stage) {
+    find_contrasts<Float8>(mesh, difference, inverse_gain, band, stage);
+}
+#else
+constexpr auto find_contrasts_avx2 = find_contrasts_plain;
+#endif
 
 // The contrasts of a difference of pictures.
 FoldStage contrasts(const Bands& mesh, const Bands& difference) {
     FoldStage stage;
-    for (std::size_t b = 0; b < FoldStage::band_count; ++b) {
-        BandContrasts band(1 / static_cast<float>(band_gain(b) * share_in_cells(nominal_frequency(b))));
-        band.include(mesh[b], difference[b]);
-        for (std::size_t k = 0; k < FoldStage::backgrounds.size(); ++k)
-            for (std::size_t row = 0; row < FoldStage::masks.size(); ++row)
-                stage.contrast[k][b][row] = band.largest(k, row);
-    }
+    for (std::size_t b = 0; b < FoldStage::band_count; ++b)
+        (has_avx2() ? find_contrasts_avx2 : find_contrasts_plain)(
+            mesh[b], difference[b], 1 / static_cast<float>(band_gain(b) * share_in_cells(nominal_frequency(b))), b,
+            stage);
     return stage;
 }
 
@@ -355,7 +389,7 @@ private:
     std::vector<Triangle> triangles_; // as folded, over nodes
     std::vector<NodeId> folded_;      // by interior node: where it has gone
     std::vector<Camera> cameras_;
-    tbb::enumerable_thread_specific<std::vector<Surface>> surfaces_;
+    tbb::enumerable_thread_specific<Surfaces> surfaces_;
 };
 
 } // namespace

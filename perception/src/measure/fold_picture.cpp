@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 #include <glm/geometric.hpp>
+
+#include <vdtree/internal/simd.h>
 
 #include "measure/pyramid.h"
 #include "pyramid_kernel.h"
@@ -13,47 +16,186 @@ namespace unseen::perception {
 namespace {
 
 constexpr float nothing = -std::numeric_limits<float>::infinity(); // seen in a cell
+constexpr std::size_t side = FoldPicture::side, bands = FoldPicture::bands;
+
+// ---- drawing
+
+// A triangle as a picture shows it.
+struct Shown {
+    float x, y, height, luminance;  // of a corner: cells, mesh units, relative
+    float vx, vy, wx, wy;           // by how much the shares of the other two grow from cell to cell
+    float height_v, height_w;       // their heights less the corner's
+    float luminance_v, luminance_w; // and their luminances
+    std::size_t x0, x1, y0, y1;     // cells whose middles may lie between the corners
+};
+
+// Cells of a row are looked at by registers, `Floats`, whether they lie in the triangle or not.
+template <class Floats>
+UNSEEN_INLINE void draw_rows(const Shown& t, float* heights, float* luminances) {
+    constexpr std::size_t width = sizeof(Floats) / sizeof(float);
+    static_assert(side % width == 0);
+    Floats lane;
+    for (std::size_t i = 0; i < width; ++i) lane[i] = static_cast<float>(i);
+    const auto from = static_cast<float>(t.x0), to = static_cast<float>(t.x1);
+    for (std::size_t y = t.y0; y < t.y1; ++y) {
+        const float dy = static_cast<float>(y) + 0.5f - t.y;
+        const float v_here = dy * t.vy, w_here = dy * t.wy;
+        for (std::size_t begin = t.x0 / width * width; begin < t.x1; begin += width) {
+            float *const height = heights + y * side + begin, *const luminance = luminances + y * side + begin;
+            const Floats x = lane + static_cast<float>(begin), dx = x + 0.5f - t.x;
+            const Floats v = dx * t.vx + v_here, w = dx * t.wx + w_here;
+            const Floats h = t.height + v * t.height_v + w * t.height_w;
+            const Floats l = t.luminance + v * t.luminance_v + w * t.luminance_w;
+            Floats old_height, old_luminance;
+            std::memcpy(&old_height, height, sizeof(Floats));
+            std::memcpy(&old_luminance, luminance, sizeof(Floats));
+            const auto is_seen = (x >= from) & (x < to) & (v >= 0) & (w >= 0) & (v + w <= 1) & (h > old_height);
+            const Floats new_height = is_seen ? h : old_height, new_luminance = is_seen ? l : old_luminance;
+            std::memcpy(height, &new_height, sizeof(Floats));
+            std::memcpy(luminance, &new_luminance, sizeof(Floats));
+        }
+    }
+}
+void draw_plain(const Shown& t, float* heights, float* luminances) {
+    draw_rows<vdtree::Float4>(t, heights, luminances);
+}
+#if defined(UNSEEN_EIGHT_WIDE)
+UNSEEN_AVX2 void draw_avx2(const Shown& t, float* heights, float* luminances) {
+    draw_rows<vdtree::Float8>(t, heights, luminances);
+}
+#else
+constexpr auto draw_avx2 = draw_plain;
+#endif
+
+// ---- bands of frequency
 
 // Of the pyramid, of which no cell is left out; by distance in steps.
 constexpr std::array<float, 3> kernel = {static_cast<float>(kernel_middle), static_cast<float>(kernel_near),
                                          static_cast<float>(kernel_far)};
-constexpr std::size_t longest_step = std::size_t{1} << (FoldPicture::bands - 1),
-                      margin = (kernel.size() - 1) * longest_step;
+constexpr std::size_t longest_step = std::size_t{1} << (bands - 1), margin = (kernel.size() - 1) * longest_step;
 
-// Outside of the picture all is 0.
-#if defined(__x86_64__) && defined(__GNUC__)
-[[gnu::target_clones("avx2", "default")]]
-#endif
-void smooth(const float* in, std::size_t step, float* out) {
-    constexpr std::size_t side = FoldPicture::side, padded = side + 2 * margin;
-    float rows[padded * side] = {}; // with a margin above and below
+// Cells with zeros around them, as far as the longest kernel reaches. Nothing writes on the zeros.
+struct Framed {
+    static constexpr std::size_t pitch = side + 2 * margin;
+    alignas(64) float cells[pitch * pitch] = {};
+
+    float* row(std::size_t y) { return cells + (y + margin) * pitch + margin; }
+};
+
+// What smoothing works on: made once a thread, for the zeros.
+struct Worktop {
+    Framed difference, seen, mean_seen, smooth, half_smooth;
+};
+thread_local Worktop worktop;
+
+UNSEEN_INLINE void smooth_along(const float* at, std::size_t step, float* out) {
+    for (std::size_t x = 0; x < side; ++x)
+        out[x] = kernel[0] * at[x] + kernel[1] * (*(at + x - step) + at[x + step]) +
+                 kernel[2] * (*(at + x - 2 * step) + at[x + 2 * step]);
+}
+
+UNSEEN_INLINE void smooth(Framed& in, std::size_t step, Framed& half_smooth, Framed& out) {
+    for (std::size_t y = 0; y < side; ++y) smooth_along(in.row(y), step, half_smooth.row(y));
+    for (std::size_t y = 0; y < side; ++y) smooth_along(half_smooth.row(y), step * Framed::pitch, out.row(y));
+}
+
+// One maximum for each column.
+struct Largest {
+    float of_column[side] = {};
+
+    float value() const { return *std::max_element(of_column, of_column + side); }
+};
+
+// The largest absolute value of the difference in the mean over some cells, of which most are seen.
+UNSEEN_INLINE float find_largest_mean(Worktop& on) {
+    smooth(on.difference, 1, on.half_smooth, on.smooth);
+    smooth(on.seen, 1, on.half_smooth, on.mean_seen);
+    Largest most;
     for (std::size_t y = 0; y < side; ++y) {
-        float line[padded] = {};
-        std::copy_n(in + y * side, side, line + margin);
-        const float* const at = line + margin;
-        float* const row = rows + (y + margin) * side;
-        for (std::size_t x = 0; x < side; ++x)
-            row[x] = kernel[0] * at[x] + kernel[1] * (*(at + x - step) + at[x + step]) +
-                     kernel[2] * (*(at + x - 2 * step) + at[x + 2 * step]);
+        const float *const sum = on.smooth.row(y), *const seen = on.mean_seen.row(y);
+        for (std::size_t x = 0; x < side; ++x) {
+            const float mean = std::abs(sum[x] / seen[x]);
+            most.of_column[x] = (seen[x] > 0.5f) & (most.of_column[x] < mean) ? mean : most.of_column[x];
+        }
     }
+    return most.value();
+}
+
+// The largest absolute values of the difference in each band.
+UNSEEN_INLINE void split(Worktop& on, float* largest) {
+    Framed *low = &on.difference, *lower = &on.seen; // take turns
+    for (std::size_t band = 0; band < bands; ++band, std::swap(low, lower)) {
+        const std::size_t step = std::size_t{1} << band;
+        smooth(*low, step, on.half_smooth, *lower);
+        smooth(*lower, step, on.half_smooth, on.smooth);
+        Largest most;
+        for (std::size_t y = 0; y < side; ++y) {
+            const float *const here = low->row(y), *const mean = on.smooth.row(y);
+            for (std::size_t x = 0; x < side; ++x) {
+                const float amplitude = std::abs(here[x] - mean[x]);
+                most.of_column[x] = most.of_column[x] < amplitude ? amplitude : most.of_column[x];
+            }
+        }
+        largest[band] = most.value();
+    }
+}
+
+// Puts by how much one differs from the other where both are seen on the worktop.
+UNSEEN_INLINE void subtract(const float* folded, const float* mesh, const float* folded_height,
+                            const float* mesh_height, Worktop& on) {
     for (std::size_t y = 0; y < side; ++y) {
-        const float* const at = rows + (y + margin) * side;
-        const float *const above = at - step * side, *const below = at + step * side,
-                           *const far_above = above - step * side, *const far_below = below + step * side;
-        for (std::size_t x = 0; x < side; ++x)
-            out[y * side + x] =
-                kernel[0] * at[x] + kernel[1] * (above[x] + below[x]) + kernel[2] * (far_above[x] + far_below[x]);
+        float *const difference = on.difference.row(y), *const seen = on.seen.row(y);
+        for (std::size_t x = 0; x < side; ++x) {
+            const std::size_t cell = y * side + x;
+            const bool are_seen = (folded_height[cell] > nothing) & (mesh_height[cell] > nothing);
+            const float by = folded[cell] - mesh[cell];
+            difference[x] = are_seen ? by : 0.0f;
+            seen[x] = are_seen ? 1.0f : 0.0f;
+        }
     }
+}
+
+// Of heights and luminances.
+struct Compared {
+    const float *mesh_height, *mesh_luminance, *folded_height, *folded_luminance;
+};
+UNSEEN_INLINE void compare_cells(const Compared& c, FoldPicture::Difference& difference) {
+    subtract(c.folded_height, c.mesh_height, c.folded_height, c.mesh_height, worktop);
+    difference.shift = find_largest_mean(worktop);
+    subtract(c.folded_luminance, c.mesh_luminance, c.folded_height, c.mesh_height, worktop);
+    split(worktop, difference.amplitudes.data());
+}
+void compare_plain(const Compared& c, FoldPicture::Difference& difference) { compare_cells(c, difference); }
+UNSEEN_AVX2 void compare_avx2(const Compared& c, FoldPicture::Difference& difference) { compare_cells(c, difference); }
+
+using vdtree::Float4;
+using vdtree::Int4;
+
+template <class T>
+Float4 load(const T& four) {
+    static_assert(sizeof(T) == sizeof(Float4));
+    Float4 to;
+    std::memcpy(&to, &four, sizeof to);
+    return to;
+}
+Float4 least(const Float4& a, const Float4& b) { return a < b ? a : b; }
+Float4 largest(const Float4& a, const Float4& b) { return a < b ? b : a; }
+
+// The first cell whose middle lies at these places or beyond.
+Int4 first_cell(const Float4& place) {
+    constexpr auto most = static_cast<float>(side);
+    const Float4 cell = least(largest(place - 0.5f, Float4{}), Float4{most, most, most, most});
+    const Int4 whole = __builtin_convertvector(cell, Int4);
+    return whole - (__builtin_convertvector(whole, Float4) < cell); // true is -1
 }
 
 } // namespace
 
 void FoldPicture::look(glm::vec3 centre, glm::vec3 normal, float half_width) {
     centre_ = centre;
-    normal_ = normal;
     const glm::vec3 axis = std::abs(normal.x) < 0.6f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
-    right_ = glm::normalize(glm::cross(axis, normal));
-    up_ = glm::cross(normal, right_);
+    const glm::vec3 right = glm::normalize(glm::cross(axis, normal));
+    axes_ = {right, glm::cross(normal, right), normal};
     cell_ = 2 * half_width / static_cast<float>(side);
     has_front_ = has_back_ = false;
     for (const Layer layer : {Layer::mesh, Layer::folded}) clear(layer);
@@ -61,86 +203,62 @@ void FoldPicture::look(glm::vec3 centre, glm::vec3 normal, float half_width) {
 
 void FoldPicture::clear(Layer layer) { pictures_[static_cast<std::size_t>(layer)].height.fill(nothing); }
 
-void FoldPicture::draw(Layer layer, const LitPoint& a, const LitPoint& b, const LitPoint& c) {
-    constexpr float half = static_cast<float>(side) / 2;
-    struct Corner {
-        float x, y, height, luminance; // cells, mesh units, relative
-    };
-    const auto seen = [&](const LitPoint& p) {
-        const glm::vec3 d = p.position - centre_;
-        return Corner{glm::dot(d, right_) / cell_ + half, glm::dot(d, up_) / cell_ + half, glm::dot(d, normal_),
-                      p.luminance};
-    };
-    const Corner p = seen(a), q = seen(b), r = seen(c);
-    const float area = (q.x - p.x) * (r.y - p.y) - (q.y - p.y) * (r.x - p.x);
-    if (!(std::abs(area) > 0)) return;
-    (area > 0 ? has_front_ : has_back_) = true;
-    // The cells whose middles lie between.
-    const auto first = [](float low) {
-        return static_cast<std::size_t>(std::ceil(std::clamp(low - 0.5f, 0.0f, static_cast<float>(side))));
-    };
-    const std::size_t x0 = first(std::min({p.x, q.x, r.x})), x1 = first(std::max({p.x, q.x, r.x}));
-    const std::size_t y0 = first(std::min({p.y, q.y, r.y})), y1 = first(std::max({p.y, q.y, r.y}));
-    // The shares of q and r grow linearly over the picture.
-    const float inverse = 1 / area;
-    const float vx = (r.y - p.y) * inverse, vy = -(r.x - p.x) * inverse, wx = -(q.y - p.y) * inverse,
-                wy = (q.x - p.x) * inverse;
-    Picture& picture = pictures_[static_cast<std::size_t>(layer)];
-    for (std::size_t y = y0; y < y1; ++y) {
-        const float dy = static_cast<float>(y) + 0.5f - p.y;
-        for (std::size_t x = x0; x < x1; ++x) {
-            const float dx = static_cast<float>(x) + 0.5f - p.x;
-            const float v = dx * vx + dy * vy, w = dx * wx + dy * wy;
-            if (!(v >= 0 && w >= 0 && v + w <= 1)) continue;
-            const std::size_t cell = y * side + x;
-            const float height = p.height + v * (q.height - p.height) + w * (r.height - p.height);
-            if (!(height > picture.height[cell])) continue;
-            picture.height[cell] = height;
-            picture.luminance[cell] = p.luminance + v * (q.luminance - p.luminance) + w * (r.luminance - p.luminance);
-        }
-    }
+FoldPicture::Place FoldPicture::place(const LitPoint& point) const {
+    const Float4 p = load(point);
+    const auto from = [&](int axis) { return p[axis] - centre_[axis]; };
+    const auto along = [&](int axis) { return Float4{axes_[0][axis], axes_[1][axis], axes_[2][axis], 0}; };
+    Float4 to = from(0) * along(0) + from(1) * along(1) + from(2) * along(2);
+    to[3] = p[3];
+    Place place;
+    std::memcpy(&place, &to, sizeof place);
+    return place;
 }
 
-bool FoldPicture::is_seen(std::size_t cell) const {
-    return pictures_[0].height[cell] > nothing && pictures_[1].height[cell] > nothing;
+void FoldPicture::draw(Layer layer, const Place& a, const Place& b, const Place& c) {
+    constexpr float half = static_cast<float>(side) / 2;
+    const Float4 size = {cell_, cell_, 1, 1}, middle = {half, half, 0, 0};
+    const Float4 p = load(a) / size + middle, q = load(b) / size + middle, r = load(c) / size + middle;
+    const Float4 pq = q - p, pr = r - p;
+    const float area = pq[0] * pr[1] - pq[1] * pr[0];
+    if (!(std::abs(area) > 0)) return;
+    (area > 0 ? has_front_ : has_back_) = true;
+    const Int4 first = first_cell(least(p, least(q, r))), end = first_cell(largest(p, largest(q, r)));
+    if (first[0] == end[0] || first[1] == end[1]) return; // many of what is far below the node
+    const float inverse = 1 / area;
+    const Shown t = {.x = p[0],
+                     .y = p[1],
+                     .height = p[2],
+                     .luminance = p[3],
+                     .vx = pr[1] * inverse,
+                     .vy = -pr[0] * inverse,
+                     .wx = -pq[1] * inverse,
+                     .wy = pq[0] * inverse,
+                     .height_v = pq[2],
+                     .height_w = pr[2],
+                     .luminance_v = pq[3],
+                     .luminance_w = pr[3],
+                     .x0 = static_cast<std::size_t>(first[0]),
+                     .x1 = static_cast<std::size_t>(end[0]),
+                     .y0 = static_cast<std::size_t>(first[1]),
+                     .y1 = static_cast<std::size_t>(end[1])};
+    Picture& picture = pictures_[static_cast<std::size_t>(layer)];
+    (vdtree::has_avx2() ? draw_avx2 : draw_plain)(t, picture.height.data(), picture.luminance.data());
 }
 
 float FoldPicture::wavelength(std::size_t band) const { return cell_ / static_cast<float>(nominal_frequency(band)); }
 
-std::array<float, FoldPicture::bands> FoldPicture::amplitudes() const {
+FoldPicture::Difference FoldPicture::difference() const {
     static const std::array<float, bands> gains = [] {
         std::array<float, bands> all;
         for (std::size_t band = 0; band < bands; ++band) all[band] = static_cast<float>(band_gain(band));
         return all;
     }();
-    Cells low, lower, back;
-    for (std::size_t i = 0; i < low.size(); ++i)
-        low[i] = is_seen(i) ? pictures_[1].luminance[i] - pictures_[0].luminance[i] : 0;
-    std::array<float, bands> largest{};
-    for (std::size_t band = 0; band < bands; ++band) {
-        const std::size_t step = std::size_t{1} << band;
-        smooth(low.data(), step, lower.data());
-        smooth(lower.data(), step, back.data());
-        float most = 0;
-        for (std::size_t i = 0; i < low.size(); ++i) most = std::max(most, std::abs(low[i] - back[i]));
-        largest[band] = most / gains[band];
-        low = lower;
-    }
-    return largest;
-}
-
-float FoldPicture::shift() const {
-    Cells shift, seen, mean_shift, mean_seen;
-    for (std::size_t i = 0; i < shift.size(); ++i) {
-        seen[i] = is_seen(i) ? 1 : 0;
-        shift[i] = is_seen(i) ? pictures_[1].height[i] - pictures_[0].height[i] : 0;
-    }
-    smooth(shift.data(), 1, mean_shift.data());
-    smooth(seen.data(), 1, mean_seen.data());
-    float most = 0;
-    for (std::size_t i = 0; i < shift.size(); ++i)
-        if (mean_seen[i] > 0.5f) most = std::max(most, std::abs(mean_shift[i] / mean_seen[i]));
-    return most;
+    const auto& [mesh, folded] = pictures_;
+    Difference difference;
+    (vdtree::has_avx2() ? compare_avx2 : compare_plain)(
+        {mesh.height.data(), mesh.luminance.data(), folded.height.data(), folded.luminance.data()}, difference);
+    for (std::size_t band = 0; band < bands; ++band) difference.amplitudes[band] /= gains[band];
+    return difference;
 }
 
 } // namespace unseen::perception

@@ -5,13 +5,14 @@
 #include <array>
 #include <cstddef>
 
+#include <glm/mat3x3.hpp>
 #include <glm/vec3.hpp>
 
 #include "measure/measurement.h"
 
 namespace unseen::perception {
 
-struct LitPoint {
+struct alignas(16) LitPoint { // one register
     glm::vec3 position;
     float luminance;
 };
@@ -25,31 +26,43 @@ public:
     // Nothing is seen yet.
     void look(glm::vec3 centre, glm::vec3 normal, float half_width);
 
+    // Where a point lies for this picture, and for others with its centre and normal.
+    struct alignas(16) Place {
+        float right, up, height; // from the centre, mesh units
+        float luminance;
+    };
+    Place place(const LitPoint& point) const;
+
     // Draws a triangle of one of the surfaces, whichever way it is turned; what lies highest along the normal is seen.
     enum class Layer { mesh, folded };
-    void draw(Layer layer, const LitPoint& a, const LitPoint& b, const LitPoint& c);
+    void draw(Layer layer, const Place& a, const Place& b, const Place& c);
+    void draw(Layer layer, const LitPoint& a, const LitPoint& b, const LitPoint& c) {
+        draw(layer, place(a), place(b), place(c));
+    }
     void clear(Layer layer);
 
     // Whether all that was drawn since look() is turned to one side: then nothing is hidden under something else.
     bool is_height_field() const { return !(has_front_ && has_back_); }
 
-    // The largest difference of the luminances in each band, as the amplitude of a grating of the band's own frequency;
-    // where only one surface is seen, they do not differ. Bands are those of a Laplacian pyramid: the lowest has waves
-    // longer than the picture.
-    std::array<float, bands> amplitudes() const;
+    // How the two differ where both are seen.
+    struct Difference {
+        // The largest difference of the luminances in each band, as the amplitude of a grating of the band's own
+        // frequency. Bands are those of a Laplacian pyramid: the lowest has waves longer than the picture.
+        std::array<float, bands> amplitudes;
+        // The largest difference of their heights, mesh units, in the mean over some cells, as outlines are seen.
+        float shift;
+    };
+    Difference difference() const;
     float wavelength(std::size_t band) const; // mesh units
-
-    // The largest difference of their heights, mesh units, in the mean over some cells, as outlines are seen.
-    float shift() const;
 
 private:
     using Cells = std::array<float, side * side>;
     struct Picture {
         Cells luminance, height; // no height: nothing is seen
     };
-    bool is_seen(std::size_t cell) const;
 
-    glm::vec3 centre_, right_, up_, normal_;
+    glm::vec3 centre_;
+    glm::mat3 axes_; // right, up, normal
     float cell_ = 1; // mesh units
     bool has_front_ = false, has_back_ = false;
     std::array<Picture, 2> pictures_; // by layer

@@ -5,6 +5,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <cstring>
 #include <iterator>
 #include <limits>
 #include <string>
@@ -15,6 +16,7 @@
 #include <tbb/task_arena.h>
 
 #include <vdtree/internal/scaled_geometry.h>
+#include <vdtree/internal/simd.h>
 #include <vdtree/internal/vertex_tree_data.h>
 
 #include "fold/fold_errors.h"
@@ -91,97 +93,142 @@ private:
     std::array<float, NormalSlabs::axis_count> low_{2, 2, 2, 2, 2, 2, 2}, high_{-2, -2, -2, -2, -2, -2, -2};
 };
 
-// Triangles by columns, so that one point is compared with several at once.
+// Points by columns, so that eight at once are compared with a surface, and the nearest points of that surface.
+class Points {
+public:
+    static constexpr std::size_t lanes = 8;
+
+    void clear() { points_.clear(); }
+    void add(const Point& p) { points_.push_back(p); }
+    std::size_t size() const { return points_.size(); }
+
+    // Columns of the points from `first` on; after the last point it is repeated.
+    struct alignas(32) Block {
+        float x[lanes], y[lanes], z[lanes];
+        float squared[lanes], luminance[lanes]; // the distance to the nearest point, and its luminance
+    };
+    std::span<Block> blocks() {
+        blocks_.resize((size() + lanes - 1) / lanes);
+        for (std::size_t i = 0; i < blocks_.size() * lanes; ++i) {
+            const glm::vec3& p = points_[std::min(i, size() - 1)].position;
+            Block& to = blocks_[i / lanes];
+            to.x[i % lanes] = p.x, to.y[i % lanes] = p.y, to.z[i % lanes] = p.z;
+        }
+        return blocks_;
+    }
+    // Once the blocks are compared.
+    Difference difference(std::size_t i) const {
+        const Block& at = blocks_[i / lanes];
+        return {std::sqrt(at.squared[i % lanes]), std::abs(points_[i].luminance - at.luminance[i % lanes])};
+    }
+
+private:
+    std::vector<Point> points_;
+    std::vector<Block> blocks_;
+};
+
 class Surface {
 public:
-    void assign(std::span<const RingTriangle> rings) {
-        size_ = rings.size();
-        for (auto* column : {&a_x_, &a_y_, &a_z_, &b_x_, &b_y_, &b_z_, &c_x_, &c_y_, &c_z_, &a_l_, &b_l_, &c_l_, &bb_,
-                             &bc_, &cc_, &inverse_, &squared_, &luminance_})
-            column->resize(size_);
-        for (std::size_t i = 0; i < size_; ++i) {
-            const auto& [a, b, c] = rings[i].corner;
+    void assign(std::span<const RingTriangle> ring) {
+        triangles_.clear();
+        for (const auto& [corner, inside] : ring) {
+            const auto& [a, b, c] = corner;
             const glm::vec3 ab = b.position - a.position, ac = c.position - a.position;
-            a_x_[i] = a.position.x, a_y_[i] = a.position.y, a_z_[i] = a.position.z, a_l_[i] = a.luminance;
-            b_x_[i] = ab.x, b_y_[i] = ab.y, b_z_[i] = ab.z, b_l_[i] = b.luminance - a.luminance;
-            c_x_[i] = ac.x, c_y_[i] = ac.y, c_z_[i] = ac.z, c_l_[i] = c.luminance - a.luminance;
-            bb_[i] = glm::dot(ab, ab), bc_[i] = glm::dot(ab, ac), cc_[i] = glm::dot(ac, ac);
-            const float determinant = bb_[i] * cc_[i] - bc_[i] * bc_[i];
-            inverse_[i] =
-                determinant > least_determinant * bb_[i] * cc_[i] ? 1 / determinant : 0; // 0: only its edges count
+            const float bb = glm::dot(ab, ab), bc = glm::dot(ab, ac), cc = glm::dot(ac, ac);
+            const float determinant = bb * cc - bc * bc;
+            const float inverse = determinant > least_determinant * bb * cc ? 1 / determinant : 0;
+            triangles_.push_back({a.position, ab, ac, a.luminance, b.luminance - a.luminance, c.luminance - a.luminance,
+                                  bb, bc, cc, divisor(bb), divisor(cc), divisor(bb - 2 * bc + cc), inverse});
         }
     }
-    bool empty() const { return size_ == 0; }
+    bool empty() const { return triangles_.empty(); }
 
-    // From the nearest of its points.
-    Difference compare(const Point& p) {
-        measure(p.position.x, p.position.y, p.position.z);
-        const auto nearest =
-            static_cast<std::size_t>(std::min_element(squared_.begin(), squared_.end()) - squared_.begin());
-        return {std::sqrt(squared_[nearest]), std::abs(p.luminance - luminance_[nearest])};
+    // How the points differ from the nearest ones of the surface; of equally near ones, those of the first triangle.
+    void compare(Points& points) const {
+        for (Points::Block& block : points.blocks()) (has_avx2() ? find_avx2 : find_plain)(triangles_, block);
     }
 
 private:
     // Triangles whose area is less than a thousandth of its edges' squares count by their edges.
     static constexpr float least_determinant = 1e-6f;
 
-    // The nearest point a + v ab + w ac of each triangle: of its inside, where the foot of the perpendicular lies
-    // there, or of an edge.
-#if defined(__x86_64__) && defined(__GNUC__)
-    [[gnu::target_clones("avx2", "default")]]
-#endif
-    void
-    measure(float x, float y, float z) {
-        const float *ax = a_x_.data(), *ay = a_y_.data(), *az = a_z_.data(), *bx = b_x_.data(), *by = b_y_.data(),
-                    *bz = b_z_.data();
-        const float *cx = c_x_.data(), *cy = c_y_.data(), *cz = c_z_.data(), *al = a_l_.data(), *bl = b_l_.data(),
-                    *cl = c_l_.data();
-        const float *bb = bb_.data(), *bc = bc_.data(), *cc = cc_.data(), *inverse = inverse_.data();
-        float *squared = squared_.data(), *luminance = luminance_.data();
-        const std::size_t count = size_;
-        const auto share = [](float part, float whole) {
-            const float s = whole > 0 ? part / whole : 0;
-            return s > 0 ? (s < 1 ? s : 1.0f) : 0.0f;
+    struct PreparedTriangle {
+        glm::vec3 a, b, c;                         // b and c from a
+        float luminance, luminance_b, luminance_c; // a's; the others' less that
+        float bb, bc, cc;                          // products
+        float along_b, along_c, along_bc;          // what lengths along the edges are divided by
+        float inverse;                             // of the determinant; 0: only its edges count
+    };
+    // Of edges without a length, the first end is as near as any.
+    static float divisor(float squared) { return squared > 0 ? squared : infinity; }
+
+    // The nearest point a + v b + w c of each triangle: of its inside, where the foot of the perpendicular lies there,
+    // or of an edge. `Floats`: a register's.
+    template <class Floats>
+    static UNSEEN_INLINE void find(std::span<const PreparedTriangle> triangles, Points::Block& points,
+                                   std::size_t first) {
+        const auto load = [&](const float* column, Floats& to)
+                              UNSEEN_INLINE_LAMBDA { std::memcpy(&to, column + first, sizeof(Floats)); };
+        const auto share = [](const Floats& part, float whole) UNSEEN_INLINE_LAMBDA {
+            const Floats s = part / whole, above = s > 0 ? s : Floats{};
+            return above < 1 ? above : Floats{} + 1;
         };
-#pragma GCC ivdep
-        for (std::size_t i = 0; i < count; ++i) {
-            const float px = x - ax[i], py = y - ay[i], pz = z - az[i];
-            const float pb = px * bx[i] + py * by[i] + pz * bz[i], pc = px * cx[i] + py * cy[i] + pz * cz[i];
-            const auto cost = [&](float v, float w) {
-                return v * (v * bb[i] + 2 * w * bc[i] - 2 * pb) + w * (w * cc[i] - 2 * pc);
-            };
-            const float v0 = (cc[i] * pb - bc[i] * pc) * inverse[i], w0 = (bb[i] * pc - bc[i] * pb) * inverse[i];
-            const float on_ab = share(pb, bb[i]), on_ac = share(pc, cc[i]);
-            const float on_bc = share(pc - pb - bc[i] + bb[i], bb[i] - 2 * bc[i] + cc[i]);
-            const float cost_ab = cost(on_ab, 0), cost_ac = cost(0, on_ac), cost_bc = cost(1 - on_bc, on_bc);
-            float v = cost_ab < cost_ac ? on_ab : 0, w = cost_ab < cost_ac ? 0 : on_ac;
-            const float least = cost_ab < cost_ac ? cost_ab : cost_ac;
-            v = cost_bc < least ? 1 - on_bc : v;
-            w = cost_bc < least ? on_bc : w;
-            const bool is_inside = (inverse[i] > 0) & (v0 >= 0) & (w0 >= 0) & (v0 + w0 <= 1);
+        Floats x, y, z, nearest = Floats{} + infinity, nearest_luminance{};
+        load(points.x, x), load(points.y, y), load(points.z, z);
+        for (const PreparedTriangle& t : triangles) {
+            const Floats px = x - t.a.x, py = y - t.a.y, pz = z - t.a.z;
+            const Floats pb = px * t.b.x + py * t.b.y + pz * t.b.z, pc = px * t.c.x + py * t.c.y + pz * t.c.z;
+            const Floats v0 = (t.cc * pb - t.bc * pc) * t.inverse, w0 = (t.bb * pc - t.bc * pb) * t.inverse;
+            const Floats on_ab = share(pb, t.along_b), on_ac = share(pc, t.along_c),
+                         on_bc = share(pc - pb - t.bc + t.bb, t.along_bc), off_bc = 1 - on_bc;
+            const Floats cost_ab = on_ab * (on_ab * t.bb - 2 * pb), cost_ac = on_ac * (on_ac * t.cc - 2 * pc),
+                         cost_bc =
+                             off_bc * (off_bc * t.bb + 2 * on_bc * t.bc - 2 * pb) + on_bc * (on_bc * t.cc - 2 * pc);
+            const auto is_ab = cost_ab < cost_ac;
+            const auto is_bc = cost_bc < (is_ab ? cost_ab : cost_ac);
+            const auto is_inside = (Floats{} + t.inverse > 0) & (v0 >= 0) & (w0 >= 0) & (v0 + w0 <= 1);
+            Floats v = is_ab ? on_ab : Floats{}, w = is_ab ? Floats{} : on_ac;
+            v = is_bc ? off_bc : v;
+            w = is_bc ? on_bc : w;
             v = is_inside ? v0 : v;
             w = is_inside ? w0 : w;
-            const float dx = px - v * bx[i] - w * cx[i], dy = py - v * by[i] - w * cy[i],
-                        dz = pz - v * bz[i] - w * cz[i];
-            squared[i] = dx * dx + dy * dy + dz * dz;
-            luminance[i] = al[i] + v * bl[i] + w * cl[i];
+            const Floats dx = px - v * t.b.x - w * t.c.x, dy = py - v * t.b.y - w * t.c.y,
+                         dz = pz - v * t.b.z - w * t.c.z;
+            const Floats squared = dx * dx + dy * dy + dz * dz;
+            const Floats luminance = t.luminance + v * t.luminance_b + w * t.luminance_c;
+            const auto is_nearer = squared < nearest;
+            nearest = is_nearer ? squared : nearest;
+            nearest_luminance = is_nearer ? luminance : nearest_luminance;
         }
+        std::memcpy(points.squared + first, &nearest, sizeof(Floats));
+        std::memcpy(points.luminance + first, &nearest_luminance, sizeof(Floats));
     }
+    static void find_plain(std::span<const PreparedTriangle> triangles, Points::Block& points) {
+        for (std::size_t first : {0, 4}) find<Float4>(triangles, points, first);
+    }
+#if defined(UNSEEN_EIGHT_WIDE)
+    UNSEEN_AVX2 static void find_avx2(std::span<const PreparedTriangle> triangles, Points::Block& points) {
+        find<Float8>(triangles, points, 0);
+    }
+#else
+    static constexpr auto find_avx2 = find_plain;
+#endif
 
-    std::size_t size_ = 0;
-    // The corner a; b and c from there; their products.
-    std::vector<float> a_x_, a_y_, a_z_, b_x_, b_y_, b_z_, c_x_, c_y_, c_z_, a_l_, b_l_, c_l_, bb_, bc_, cc_, inverse_;
-    std::vector<float> squared_, luminance_; // of the last comparison
+    std::vector<PreparedTriangle> triangles_;
 };
 
 class Measurer {
 public:
     Measurer(const SoundTree& tree, std::vector<FoldRecord>& records, std::vector<FoldFacing>& facing)
-        : tree_(tree), records_(records), facing_(facing), positions_(tree.positions()), luminance_(tree.luminance()),
-          support_luminance_(tree.support_luminance()), first_leaf_(tree.first_leaf()), leaf_end_(tree.leaf_end()),
-          parents_(tree.parents()), first_triangle_(tree.first_triangle()), triangles_(tree.triangles()),
-          support_(tree.support_spheres()), interior_(tree.interior_count()), of_leaf_(tree), crossing_(interior_),
-          contacts_(find_contacts(tree)), witnesses_(interior_) {}
+        : tree_(tree), records_(records), facing_(facing), support_luminance_(tree.support_luminance()),
+          first_leaf_(tree.first_leaf()), leaf_end_(tree.leaf_end()), parents_(tree.parents()),
+          first_triangle_(tree.first_triangle()), triangles_(tree.triangles()), support_(tree.support_spheres()),
+          interior_(tree.interior_count()), of_leaf_(tree), crossing_(interior_), contacts_(find_contacts(tree)),
+          witnesses_(interior_) {
+        points_.reserve(tree.node_count());
+        for (NodeId node = 0; node < tree.node_count(); ++node)
+            points_.push_back({tree.positions()[node], tree.luminance()[node]});
+    }
 
     // False where `progress` has cancelled; it is called on the calling thread only.
     bool run(const Progress& progress) {
@@ -241,9 +288,11 @@ private:
     struct Scratch {
         std::vector<RingTriangle> before, after, fine_before, fine_after;
         Surface before_surface, after_surface;
+        Points points;
         std::vector<Sample> samples;
         std::vector<Child> children;
-        FoldPicture picture;
+        std::array<FoldPicture, picture_sizes.size()> pictures;
+        bool compares_fine = false; // the fine ones are few enough, and others
 
         void clear() {
             for (auto* surface : {&before, &after, &fine_before, &fine_after}) surface->clear();
@@ -253,8 +302,8 @@ private:
     };
     using Witnesses = std::array<Index, witness_count>;
 
-    Point point(NodeId node) const { return {positions_[node], luminance_[node]}; }
-    Point leaf_point(Index leaf) const { return point(interior_ + leaf); }
+    const Point& point(NodeId node) const { return points_[node]; }
+    const Point& leaf_point(Index leaf) const { return point(interior_ + leaf); }
 
     // Triangles with a corner in the support that the children, folded, leave.
     std::vector<Index> crossing(NodeId node) {
@@ -370,23 +419,30 @@ private:
         scratch.after_surface.assign(scratch.after);
         add_samples(node, scratch);
         Mean over_leaves, over_before, over_after;
-        for (Sample& sample : scratch.samples) {
-            sample.error = scratch.after_surface.compare(sample.point);
+        scratch.points.clear();
+        for (const Sample& sample : scratch.samples) scratch.points.add(sample.point);
+        scratch.after_surface.compare(scratch.points);
+        for (std::size_t i = 0; i < scratch.samples.size(); ++i) {
+            Sample& sample = scratch.samples[i];
+            sample.error = scratch.points.difference(i);
             worst.include(sample.error);
             if (sample.is_typical) over_leaves.include(sample.error);
         }
         choose_witnesses(node, scratch.samples);
-        compare(scratch.before, scratch.after_surface, worst, over_before);
-        compare(scratch.after, scratch.before_surface, worst, over_after);
+        compare(scratch.before, scratch.after_surface, scratch.points, worst, over_before);
+        compare(scratch.after, scratch.before_surface, scratch.points, worst, over_after);
         Difference mean = over_leaves.value();
         mean.include(over_before.value());
         mean.include(over_after.value());
-        if (scratch.fine_before.size() <= most_fine_triangles) {
+        scratch.compares_fine =
+            scratch.fine_before.size() <= most_fine_triangles &&
+            !(are_equal(scratch.before, scratch.fine_before) && are_equal(scratch.after, scratch.fine_after));
+        if (scratch.compares_fine) {
             Mean over_fine_before, over_fine_after;
             scratch.before_surface.assign(scratch.fine_before);
             scratch.after_surface.assign(scratch.fine_after);
-            compare(scratch.fine_before, scratch.after_surface, worst, over_fine_before);
-            compare(scratch.fine_after, scratch.before_surface, worst, over_fine_after);
+            compare(scratch.fine_before, scratch.after_surface, scratch.points, worst, over_fine_before);
+            compare(scratch.fine_after, scratch.before_surface, scratch.points, worst, over_fine_after);
             mean.include(over_fine_before.value());
             mean.include(over_fine_after.value());
         }
@@ -403,44 +459,48 @@ private:
         }
         const float length = glm::length(normal);
         if (!(length > 0) || !(width > 0)) return false;
-        FoldPicture& picture = scratch.picture;
-        bool is_height_field = true;
-        for (std::size_t size = 0; size < picture_sizes.size(); ++size) {
-            const auto compare = [&](std::span<const RingTriangle> folded) {
-                picture.clear(FoldPicture::Layer::folded);
-                for (const RingTriangle& t : folded)
-                    picture.draw(FoldPicture::Layer::folded, t.corner[0], t.corner[1], t.corner[2]);
-                record.shift = std::max(record.shift, picture.shift());
-                const std::array<float, picture_bands> amplitudes = picture.amplitudes();
+        std::array<FoldPicture, picture_sizes.size()>& pictures = scratch.pictures;
+        for (std::size_t size = 0; size < pictures.size(); ++size)
+            pictures[size].look(points_[node].position, normal / length, picture_sizes[size] * width);
+        draw_mesh(node, scratch);
+        const auto compare = [&](std::span<const RingTriangle> folded) {
+            for (FoldPicture& picture : pictures) picture.clear(FoldPicture::Layer::folded);
+            for (const RingTriangle& t : folded) draw(FoldPicture::Layer::folded, t.corner, pictures);
+            for (std::size_t size = 0; size < pictures.size(); ++size) {
+                const FoldPicture::Difference difference = pictures[size].difference();
+                record.shift = std::max(record.shift, difference.shift);
                 for (std::size_t band = 0; band < picture_bands; ++band)
-                    record.amplitudes[size][band] = std::max(record.amplitudes[size][band], amplitudes[band]);
-            };
-            picture.look(positions_[node], normal / length, picture_sizes[size] * width);
-            draw_mesh(node, scratch, picture);
-            compare(scratch.after);
-            if (scratch.fine_before.size() <= most_fine_triangles) compare(scratch.fine_after);
-            is_height_field &= picture.is_height_field();
-        }
-        return is_height_field;
+                    record.amplitudes[size][band] =
+                        std::max(record.amplitudes[size][band], difference.amplitudes[band]);
+            }
+        };
+        compare(scratch.after);
+        if (scratch.compares_fine) compare(scratch.fine_after);
+        return std::all_of(pictures.begin(), pictures.end(),
+                           [](const FoldPicture& picture) { return picture.is_height_field(); });
+    }
+
+    static void draw(FoldPicture::Layer layer, const Point (&corner)[3], std::span<FoldPicture> pictures) {
+        const auto a = pictures[0].place(corner[0]), b = pictures[0].place(corner[1]), c = pictures[0].place(corner[2]);
+        for (FoldPicture& picture : pictures) picture.draw(layer, a, b, c);
     }
 
     // The mesh around the support.
-    void draw_mesh(NodeId node, const Scratch& scratch, FoldPicture& picture) const {
-        const auto draw = [&](Index t) {
+    void draw_mesh(NodeId node, Scratch& scratch) const {
+        const auto draw_own = [&](Index t) {
             const Triangle& corners = triangles_[t];
-            picture.draw(FoldPicture::Layer::mesh, leaf_point(corners[0]), leaf_point(corners[1]),
-                         leaf_point(corners[2]));
+            const Point own[3] = {leaf_point(corners[0]), leaf_point(corners[1]), leaf_point(corners[2])};
+            draw(FoldPicture::Layer::mesh, own, scratch.pictures);
         };
         const Index first = first_triangle_[node],
                     end = first_triangle_[tree_.subtree_end()[node]]; // those that vanish in the support
         if (end - first > most_triangles_drawn) {
-            for (const RingTriangle& t : scratch.before)
-                picture.draw(FoldPicture::Layer::mesh, t.corner[0], t.corner[1], t.corner[2]);
+            for (const RingTriangle& t : scratch.before) draw(FoldPicture::Layer::mesh, t.corner, scratch.pictures);
             return;
         }
-        for (Index t = first; t < end; ++t) draw(t);
+        for (Index t = first; t < end; ++t) draw_own(t);
         for (const Index t : crossing_[node])
-            if (t < first || t >= end) draw(t);
+            if (t < first || t >= end) draw_own(t);
     }
 
     // The mean distance of the ring's other corners from the proxy.
@@ -459,21 +519,35 @@ private:
 
     // Where two such surfaces differ most, they do so at a vertex or where two edges cross: looked at are the middles
     // of the edges that move, and of their halves. The vertices are among the samples.
-    static void compare(std::span<const RingTriangle> surface, Surface& with, Difference& worst, Mean& mean) {
+    static void compare(std::span<const RingTriangle> surface, const Surface& with, Points& points, Difference& worst,
+                        Mean& mean) {
         if (with.empty()) return;
+        points.clear();
         const std::size_t count = std::min(surface.size(), triangles_compared);
         for (std::size_t i = 0; i < count; ++i) {
             const RingTriangle& t = surface[i * surface.size() / count];
             for (std::size_t k = 0; k < 3; ++k) {
                 if (!((t.inside >> k) & 1)) continue;
                 const Point &a = t.corner[k], &b = t.corner[(k + 1) % 3], middle = middle_of(a, b);
-                const Difference here = with.compare(middle);
-                worst.include(here);
-                mean.include(here);
-                worst.include(with.compare(middle_of(a, middle)));
-                worst.include(with.compare(middle_of(middle, b)));
+                points.add(middle);
+                points.add(middle_of(a, middle));
+                points.add(middle_of(middle, b));
             }
         }
+        with.compare(points);
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            const Difference here = points.difference(i);
+            worst.include(here);
+            if (i % 3 == 0) mean.include(here);
+        }
+    }
+
+    static bool are_equal(std::span<const RingTriangle> a, std::span<const RingTriangle> b) {
+        return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const RingTriangle& s, const RingTriangle& t) {
+            return std::equal(s.corner, s.corner + 3, t.corner, [](const Point& p, const Point& q) {
+                return p.position == q.position && p.luminance == q.luminance;
+            });
+        });
     }
 
     static bool are_distinct(const std::array<NodeId, 3>& nodes) {
@@ -481,7 +555,13 @@ private:
     }
 
     static Point middle_of(const Point& a, const Point& b) {
-        return {(a.position + b.position) * 0.5f, (a.luminance + b.luminance) * 0.5f};
+        Float4 p, q;
+        std::memcpy(&p, &a, sizeof p);
+        std::memcpy(&q, &b, sizeof q);
+        p = (p + q) * 0.5f;
+        Point middle;
+        std::memcpy(&middle, &p, sizeof middle);
+        return middle;
     }
 
     void add_samples(NodeId node, Scratch& scratch) const {
@@ -523,8 +603,7 @@ private:
     const SoundTree& tree_;
     std::vector<FoldRecord>& records_;
     std::vector<FoldFacing>& facing_;
-    std::span<const glm::vec3> positions_;
-    std::span<const Unorm16> luminance_;
+    std::vector<Point> points_; // of nodes
     std::span<const PackedRange> support_luminance_;
     std::span<const Index> first_leaf_, leaf_end_;
     std::span<const NodeId> parents_;
