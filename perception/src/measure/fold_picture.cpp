@@ -88,85 +88,126 @@ struct Worktop {
 };
 thread_local Worktop worktop;
 
-UNSEEN_INLINE void smooth_along(const float* at, std::size_t step, float* out) {
-    for (std::size_t x = 0; x < side; ++x)
-        out[x] = kernel[0] * at[x] + kernel[1] * (*(at + x - step) + at[x + step]) +
-                 kernel[2] * (*(at + x - 2 * step) + at[x + 2 * step]);
+// What follows is written for registers, `Floats`.
+template <class Floats>
+inline constexpr std::size_t width_of = sizeof(Floats) / sizeof(float);
+
+template <class Floats>
+UNSEEN_INLINE Floats floats_at(const float* from) {
+    Floats to;
+    std::memcpy(&to, from, sizeof to);
+    return to;
+}
+template <class Floats>
+UNSEEN_INLINE void store(const Floats& values, float* to) {
+    std::memcpy(to, &values, sizeof values);
 }
 
+// Calls f(y, x) for the first cell of each register.
+template <class Floats, class F>
+UNSEEN_INLINE void for_each_register(F&& f) {
+    static_assert(side % width_of<Floats> == 0);
+    for (std::size_t y = 0; y < side; ++y)
+        for (std::size_t x = 0; x < side; x += width_of<Floats>) f(y, x);
+}
+
+template <class Floats>
+UNSEEN_INLINE Floats smooth_along(const float* at, std::size_t step) {
+    const auto both = [&](std::size_t steps) UNSEEN_INLINE_LAMBDA {
+        return floats_at<Floats>(at - steps * step) + floats_at<Floats>(at + steps * step);
+    };
+    return kernel[0] * floats_at<Floats>(at) + kernel[1] * both(1) + kernel[2] * both(2);
+}
+
+template <class Floats>
 UNSEEN_INLINE void smooth(Framed& in, std::size_t step, Framed& half_smooth, Framed& out) {
-    for (std::size_t y = 0; y < side; ++y) smooth_along(in.row(y), step, half_smooth.row(y));
-    for (std::size_t y = 0; y < side; ++y) smooth_along(half_smooth.row(y), step * Framed::pitch, out.row(y));
+    for_each_register<Floats>([&](std::size_t y, std::size_t x) UNSEEN_INLINE_LAMBDA {
+        store(smooth_along<Floats>(in.row(y) + x, step), half_smooth.row(y) + x);
+    });
+    for_each_register<Floats>([&](std::size_t y, std::size_t x) UNSEEN_INLINE_LAMBDA {
+        store(smooth_along<Floats>(half_smooth.row(y) + x, step * Framed::pitch), out.row(y) + x);
+    });
 }
 
-// One maximum for each column.
-struct Largest {
-    float of_column[side] = {};
-
-    float value() const { return *std::max_element(of_column, of_column + side); }
-};
+template <class Floats>
+UNSEEN_INLINE Floats magnitude(const Floats& v) {
+    return v < 0 ? -v : v;
+}
+template <class Floats>
+UNSEEN_INLINE float largest_of(const Floats& values) {
+    float most = 0;
+    for (std::size_t i = 0; i < width_of<Floats>; ++i) most = std::max(most, values[i]);
+    return most;
+}
 
 // The largest absolute value of the difference in the mean over some cells, of which most are seen.
+template <class Floats>
 UNSEEN_INLINE float find_largest_mean(Worktop& on) {
-    smooth(on.difference, 1, on.half_smooth, on.smooth);
-    smooth(on.seen, 1, on.half_smooth, on.mean_seen);
-    Largest most;
-    for (std::size_t y = 0; y < side; ++y) {
-        const float *const sum = on.smooth.row(y), *const seen = on.mean_seen.row(y);
-        for (std::size_t x = 0; x < side; ++x) {
-            const float mean = std::abs(sum[x] / seen[x]);
-            most.of_column[x] = (seen[x] > 0.5f) & (most.of_column[x] < mean) ? mean : most.of_column[x];
-        }
-    }
-    return most.value();
+    smooth<Floats>(on.difference, 1, on.half_smooth, on.smooth);
+    smooth<Floats>(on.seen, 1, on.half_smooth, on.mean_seen);
+    Floats most{};
+    for_each_register<Floats>([&](std::size_t y, std::size_t x) UNSEEN_INLINE_LAMBDA {
+        const Floats seen = floats_at<Floats>(on.mean_seen.row(y) + x),
+                     mean = magnitude(floats_at<Floats>(on.smooth.row(y) + x) / seen);
+        most = (seen > 0.5f) & (most < mean) ? mean : most;
+    });
+    return largest_of(most);
 }
 
 // The largest absolute values of the difference in each band.
+template <class Floats>
 UNSEEN_INLINE void split(Worktop& on, float* largest) {
     Framed *low = &on.difference, *lower = &on.seen; // take turns
     for (std::size_t band = 0; band < bands; ++band, std::swap(low, lower)) {
         const std::size_t step = std::size_t{1} << band;
-        smooth(*low, step, on.half_smooth, *lower);
-        smooth(*lower, step, on.half_smooth, on.smooth);
-        Largest most;
-        for (std::size_t y = 0; y < side; ++y) {
-            const float *const here = low->row(y), *const mean = on.smooth.row(y);
-            for (std::size_t x = 0; x < side; ++x) {
-                const float amplitude = std::abs(here[x] - mean[x]);
-                most.of_column[x] = most.of_column[x] < amplitude ? amplitude : most.of_column[x];
-            }
-        }
-        largest[band] = most.value();
+        smooth<Floats>(*low, step, on.half_smooth, *lower);
+        smooth<Floats>(*lower, step, on.half_smooth, on.smooth);
+        Floats most{};
+        for_each_register<Floats>([&](std::size_t y, std::size_t x) UNSEEN_INLINE_LAMBDA {
+            const Floats amplitude =
+                magnitude(floats_at<Floats>(low->row(y) + x) - floats_at<Floats>(on.smooth.row(y) + x));
+            most = most < amplitude ? amplitude : most;
+        });
+        largest[band] = largest_of(most);
     }
 }
 
-// Puts by how much one differs from the other where both are seen on the worktop.
-UNSEEN_INLINE void subtract(const float* folded, const float* mesh, const float* folded_height,
-                            const float* mesh_height, Worktop& on) {
-    for (std::size_t y = 0; y < side; ++y) {
-        float *const difference = on.difference.row(y), *const seen = on.seen.row(y);
-        for (std::size_t x = 0; x < side; ++x) {
-            const std::size_t cell = y * side + x;
-            const bool are_seen = (folded_height[cell] > nothing) & (mesh_height[cell] > nothing);
-            const float by = folded[cell] - mesh[cell];
-            difference[x] = are_seen ? by : 0.0f;
-            seen[x] = are_seen ? 1.0f : 0.0f;
-        }
-    }
-}
-
-// Of heights and luminances.
+// Cells of both surfaces.
 struct Compared {
     const float *mesh_height, *mesh_luminance, *folded_height, *folded_luminance;
 };
-UNSEEN_INLINE void compare_cells(const Compared& c, FoldPicture::Difference& difference) {
-    subtract(c.folded_height, c.mesh_height, c.folded_height, c.mesh_height, worktop);
-    difference.shift = find_largest_mean(worktop);
-    subtract(c.folded_luminance, c.mesh_luminance, c.folded_height, c.mesh_height, worktop);
-    split(worktop, difference.amplitudes.data());
+
+// Puts by how much one differs from the other where both are seen on the worktop.
+template <class Floats>
+UNSEEN_INLINE void subtract(const Compared& c, const float* folded, const float* mesh, Worktop& on) {
+    for_each_register<Floats>([&](std::size_t y, std::size_t x) UNSEEN_INLINE_LAMBDA {
+        const std::size_t cell = y * side + x;
+        const auto are_seen =
+            (floats_at<Floats>(c.folded_height + cell) > nothing) & (floats_at<Floats>(c.mesh_height + cell) > nothing);
+        const Floats by = floats_at<Floats>(folded + cell) - floats_at<Floats>(mesh + cell);
+        store<Floats>(are_seen ? by : Floats{}, on.difference.row(y) + x);
+        store<Floats>(are_seen ? Floats{} + 1 : Floats{}, on.seen.row(y) + x);
+    });
 }
-void compare_plain(const Compared& c, FoldPicture::Difference& difference) { compare_cells(c, difference); }
-UNSEEN_AVX2 void compare_avx2(const Compared& c, FoldPicture::Difference& difference) { compare_cells(c, difference); }
+
+template <class Floats>
+UNSEEN_INLINE void compare_cells(const Compared& c, FoldPicture::Difference& difference) {
+    Worktop& on = worktop;
+    subtract<Floats>(c, c.folded_height, c.mesh_height, on);
+    difference.shift = find_largest_mean<Floats>(on);
+    subtract<Floats>(c, c.folded_luminance, c.mesh_luminance, on);
+    split<Floats>(on, difference.amplitudes.data());
+}
+void compare_plain(const Compared& c, FoldPicture::Difference& difference) {
+    compare_cells<vdtree::Float4>(c, difference);
+}
+#if defined(UNSEEN_EIGHT_WIDE)
+UNSEEN_AVX2 void compare_avx2(const Compared& c, FoldPicture::Difference& difference) {
+    compare_cells<vdtree::Float8>(c, difference);
+}
+#else
+constexpr auto compare_avx2 = compare_plain;
+#endif
 
 using vdtree::Float4;
 using vdtree::Int4;
