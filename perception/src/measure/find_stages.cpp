@@ -155,25 +155,39 @@ public:
     // Triangles over nodes.
     Picture draw(std::span<const Triangle> triangles) {
         for (const Triangle& t : triangles) draw(t);
-        Picture picture;
+        return cells();
+    }
+
+private:
+    // The means of the samples, four cells at a time.
+    Picture cells() const {
+        static_assert(cell_samples == 4 && side % 4 == 0);
         constexpr float share = 1.0f / (cell_samples * cell_samples);
-        for (std::size_t cell = 0; cell < side * side; ++cell) {
+        Picture picture;
+        for (std::size_t cell = 0; cell < side * side; cell += 4) {
             const std::size_t first = cell / side * cell_samples * samples + cell % side * cell_samples;
-            float light = 0, covered = 0;
+            Float4 light{}, covered{};
             for (std::size_t y = 0; y < cell_samples; ++y) {
+                const auto columns_of = [&](const std::vector<float>& plane, Float4* columns) {
+                    load_columns(
+                        [&](std::size_t lane) { return plane.data() + first + y * samples + lane * cell_samples; },
+                        columns);
+                };
+                Float4 lights[cell_samples], heights[cell_samples];
+                columns_of(surfaces_.light, lights);
+                columns_of(surfaces_.height, heights);
                 for (std::size_t x = 0; x < cell_samples; ++x) {
-                    const std::size_t at = first + y * samples + x;
-                    light += surfaces_.light[at];
-                    covered += surfaces_.height[at] > nothing ? 1.0f : 0.0f;
+                    light += lights[x];
+                    covered += heights[x] > nothing ? Float4{1, 1, 1, 1} : Float4{};
                 }
             }
-            picture.light.values[cell] = share * light;
-            picture.cover.values[cell] = share * covered;
+            light *= share, covered *= share;
+            std::memcpy(picture.light.values.data() + cell, &light, sizeof light);
+            std::memcpy(picture.cover.values.data() + cell, &covered, sizeof covered);
         }
         return picture;
     }
 
-private:
     void draw(const Triangle& corners) {
         Shown t;
         t.a = camera_.place(positions_[corners[0]]);
