@@ -25,6 +25,7 @@ constexpr float near_share =
     0.25f; // of a triangle's size: no triangles of a smooth surface come so near but neighbours
 // Looked at for one triangle: amid more than these, it counts as touching one.
 constexpr int most_nodes = 4000;
+constexpr std::size_t most_listed = 100;      // triangles around a triangle's corners; amid more, pairs are looked at
 constexpr std::size_t most_triangles = 16000; // around corners: no vertex of very many triangles costs their square
 constexpr std::size_t most_boxes =
     std::size_t{1} << 32; // of all triangles together, in trees so flat that nodes have very many: some seconds
@@ -149,9 +150,9 @@ private:
         std::vector<Contact> contacts(triangles_.size());
         constexpr Index piece = 1024;
         tbb::parallel_for(Index{0}, static_cast<Index>((triangles_.size() + piece - 1) / piece), [&](Index i) {
-            std::vector<NodeId> waiting;
+            Scratch scratch;
             for (Index t = i * piece; t < std::min<std::size_t>(triangles_.size(), std::size_t{i + 1} * piece); ++t)
-                contacts[t] = find(t, waiting);
+                contacts[t] = find(t, scratch);
         });
         return contacts;
     }
@@ -166,6 +167,19 @@ private:
     }
     static Box box_of(const Corners& c) {
         return {glm::min(c[0], glm::min(c[1], c[2])), glm::max(c[0], glm::max(c[1], c[2]))};
+    }
+
+    // The corners of triangles around a triangle's corners; none where there are very many.
+    void find_neighbours(const Triangle& triangle, std::vector<Index>& neighbours) const {
+        neighbours.clear();
+        std::size_t count = 0;
+        for (const Index leaf : triangle) count += of_leaf_.around(leaf).size();
+        if (count > most_listed) return;
+        for (const Index leaf : triangle)
+            for (const Index t : of_leaf_.around(leaf))
+                for (const Index corner : triangles_[t])
+                    if (std::find(neighbours.begin(), neighbours.end(), corner) == neighbours.end())
+                        neighbours.push_back(corner);
     }
 
     // Whether a corner of the one is a corner of the other, or shares a triangle with one. Adds what it looked at.
@@ -187,7 +201,13 @@ private:
         return false;
     }
 
-    Contact find(Index triangle, std::vector<NodeId>& waiting) const {
+    struct Scratch {
+        std::vector<NodeId> waiting;
+        std::vector<Index> neighbours; // corners; none: not listed
+    };
+
+    Contact find(Index triangle, Scratch& scratch) const {
+        auto& [waiting, neighbours] = scratch;
         const Corners own = corners(triangle);
         const glm::vec3 centre = (own[0] + own[1] + own[2]) / 3.0f;
         const float near = near_share * std::max({glm::length(own[0] - centre), glm::length(own[1] - centre),
@@ -197,6 +217,12 @@ private:
         const Box around = box_of(own).wider(near);
         int nodes = 0;
         std::size_t looked_at = 0, boxes = 0;
+        find_neighbours(triangles_[triangle], neighbours);
+        const auto is_neighbour = [&](const Triangle& other) {
+            if (neighbours.empty()) return are_neighbours(triangles_[triangle], other, looked_at);
+            return std::any_of(neighbours.begin(), neighbours.end(),
+                               [&](Index leaf) { return leaf == other[0] || leaf == other[1] || leaf == other[2]; });
+        };
         waiting.assign(1, VertexTree::root());
         while (!waiting.empty()) {
             const NodeId node = waiting.back();
@@ -206,7 +232,7 @@ private:
                 const Triangle& t = triangles_[other];
                 const Corners its = corners(other);
                 if (++boxes > boxes_a_triangle_) return {0, 0};
-                if (!around.meets(box_of(its)) || are_neighbours(triangles_[triangle], t, looked_at)) continue;
+                if (!around.meets(box_of(its)) || is_neighbour(t)) continue;
                 if (looked_at > most_triangles) return {0, 0};
                 const glm::vec3 way = way_between(own, its);
                 const float gap = glm::length(way);

@@ -35,10 +35,14 @@ struct Camera {
     glm::vec3 centre, right, up, towards;
     float samples_per_length;
 
-    glm::vec3 place(const glm::vec3& p) const {
+    // To the right, up, and towards the eye.
+    Float4 place(const glm::vec3& p) const {
         const glm::vec3 q = (p - centre) * samples_per_length;
-        return {glm::dot(q, right) + samples / 2.0f, glm::dot(q, up) + samples / 2.0f, glm::dot(q, towards)};
+        return q.x * along(0) + q.y * along(1) + q.z * along(2) + Float4{samples / 2.0f, samples / 2.0f, 0, 0};
     }
+
+private:
+    Float4 along(int axis) const { return Float4{right[axis], up[axis], towards[axis], 0}; }
 };
 
 // Directions of a Fibonacci spiral over the sphere.
@@ -81,7 +85,7 @@ struct Surfaces {
 
 // A triangle over samples.
 struct Shown {
-    glm::vec3 a, b, c;      // samples; z: towards the eye
+    Float4 a, b, c;         // samples: to the right, up, towards the eye
     float of_a, of_b, of_c; // relative luminances
     glm::vec2 v_by, w_by;   // how the shares of b and c grow, by sample
     std::size_t first, end; // rows
@@ -108,24 +112,24 @@ UNSEEN_INLINE void draw_rows(const Shown& t, float* heights, float* lights) {
     static_assert(samples % width == 0);
     Floats lane;
     for (std::size_t i = 0; i < width; ++i) lane[i] = static_cast<float>(i);
-    const float left = std::min({t.a.x, t.b.x, t.c.x}), right = std::max({t.a.x, t.b.x, t.c.x});
+    const float left = std::min({t.a[0], t.b[0], t.c[0]}), right = std::max({t.a[0], t.b[0], t.c[0]});
     for (std::size_t y = t.first; y < t.end; ++y) {
         // Of a corner's weight, as it grows along the row: where it is no longer, or not yet, negative.
-        const float offset = offset_of_row(y), py = static_cast<float>(y) + 0.5f - t.a.y;
-        float low = left - t.a.x, high = right - t.a.x;
+        const float offset = offset_of_row(y), py = static_cast<float>(y) + 0.5f - t.a[1];
+        float low = left - t.a[0], high = right - t.a[0];
         for (const auto& [at_start, by] : {std::pair(py * t.v_by.y, t.v_by.x), std::pair(py * t.w_by.y, t.w_by.x),
                                            std::pair(1 - py * (t.v_by.y + t.w_by.y), -t.v_by.x - t.w_by.x)}) {
             if (by > 0) low = std::max(low, -at_start / by);
             else if (by < 0) high = std::min(high, -at_start / by);
             else if (at_start < 0) high = low;
         }
-        const std::size_t x0 = count_before(low + t.a.x - offset), x1 = count_before(high + t.a.x - offset);
+        const std::size_t x0 = count_before(low + t.a[0] - offset), x1 = count_before(high + t.a[0] - offset);
         const auto from = static_cast<float>(x0), to = static_cast<float>(x1);
         for (std::size_t begin = x0 / width * width; begin < x1; begin += width) {
             float *const height = heights + y * samples + begin, *const light = lights + y * samples + begin;
-            const Floats x = lane + static_cast<float>(begin), px = x + offset - t.a.x;
+            const Floats x = lane + static_cast<float>(begin), px = x + offset - t.a[0];
             const Floats v = px * t.v_by.x + py * t.v_by.y, w = px * t.w_by.x + py * t.w_by.y, u = 1 - v - w;
-            const Floats h = u * t.a.z + v * t.b.z + w * t.c.z, l = u * t.of_a + v * t.of_b + w * t.of_c;
+            const Floats h = u * t.a[2] + v * t.b[2] + w * t.c[2], l = u * t.of_a + v * t.of_b + w * t.of_c;
             Floats old_height, old_light;
             std::memcpy(&old_height, height, sizeof(Floats));
             std::memcpy(&old_light, light, sizeof(Floats));
@@ -193,17 +197,18 @@ private:
         t.a = camera_.place(positions_[corners[0]]);
         t.b = camera_.place(positions_[corners[1]]);
         t.c = camera_.place(positions_[corners[2]]);
-        const float area = (t.b.x - t.a.x) * (t.c.y - t.a.y) - (t.b.y - t.a.y) * (t.c.x - t.a.x);
+        const Float4 ab = t.b - t.a, ac = t.c - t.a;
+        const float area = ab[0] * ac[1] - ab[1] * ac[0];
         if ((closedness_ == Closedness::closed_outward && area < 0) ||
             (closedness_ == Closedness::closed_inward && area > 0)) // as renderers do
             return;
-        t.first = count_before(std::min({t.a.y, t.b.y, t.c.y}) - 0.5f);
-        t.end = count_before(std::max({t.a.y, t.b.y, t.c.y}) - 0.5f);
+        t.first = count_before(std::min({t.a[1], t.b[1], t.c[1]}) - 0.5f);
+        t.end = count_before(std::max({t.a[1], t.b[1], t.c[1]}) - 0.5f);
         if (t.first >= t.end) return; // many, of fine meshes
         const float inverse = 1 / area;
         if (!std::isfinite(inverse)) return;
-        t.v_by = inverse * glm::vec2(t.c.y - t.a.y, t.a.x - t.c.x);
-        t.w_by = inverse * glm::vec2(t.a.y - t.b.y, t.b.x - t.a.x);
+        t.v_by = inverse * glm::vec2(ac[1], -ac[0]);
+        t.w_by = inverse * glm::vec2(-ab[1], ab[0]);
         t.of_a = luminance_[corners[0]], t.of_b = luminance_[corners[1]], t.of_c = luminance_[corners[2]];
         (has_avx2() ? draw_avx2 : draw_plain)(t, surfaces_.height.data(), surfaces_.light.data());
     }

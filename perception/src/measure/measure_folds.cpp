@@ -64,25 +64,23 @@ public:
         const float squared = glm::dot(n, n);
         if (!(squared > 0)) return;
         n /= std::sqrt(squared);
-        const float along[NormalSlabs::axis_count] = {n.x,
-                                                      n.y,
-                                                      n.z,
-                                                      (n.x + n.y + n.z) * inverse_sqrt3,
-                                                      (-n.x + n.y + n.z) * inverse_sqrt3,
-                                                      (n.x - n.y + n.z) * inverse_sqrt3,
-                                                      (n.x + n.y - n.z) * inverse_sqrt3};
-        for (std::size_t i = 0; i < NormalSlabs::axis_count; ++i) {
-            low_[i] = std::min(low_[i], along[i]);
-            high_[i] = std::max(high_[i], along[i]);
-        }
+        const Float4 main = {n.x, n.y, n.z, 0};
+        const Float4 diagonal =
+            (n.x * Float4{1, -1, 1, 1} + n.y * Float4{1, 1, -1, 1} + n.z * Float4{1, 1, 1, -1}) * inverse_sqrt3;
+        low_main_ = low_main_ < main ? low_main_ : main, high_main_ = high_main_ > main ? high_main_ : main;
+        low_diagonal_ = low_diagonal_ < diagonal ? low_diagonal_ : diagonal;
+        high_diagonal_ = high_diagonal_ > diagonal ? high_diagonal_ : diagonal;
     }
 
     NormalSlabs slabs() const {
         NormalSlabs slabs;
-        if (low_[0] > high_[0]) return slabs;
+        if (low_main_[0] > high_main_[0]) return slabs;
+        static_assert(NormalSlabs::axis_count == 7); // three axes, four diagonals
         for (std::size_t i = 0; i < NormalSlabs::axis_count; ++i) {
-            slabs.lo[i] = static_cast<std::int8_t>(std::max(std::floor(low_[i] * units - margin), -units));
-            slabs.hi[i] = static_cast<std::int8_t>(std::min(std::ceil(high_[i] * units + margin), units));
+            const float low = i < 3 ? low_main_[i] : low_diagonal_[i - 3];
+            const float high = i < 3 ? high_main_[i] : high_diagonal_[i - 3];
+            slabs.lo[i] = static_cast<std::int8_t>(std::max(std::floor(low * units - margin), -units));
+            slabs.hi[i] = static_cast<std::int8_t>(std::min(std::ceil(high * units + margin), units));
         }
         return slabs;
     }
@@ -90,7 +88,8 @@ public:
 private:
     static constexpr float inverse_sqrt3 = 0.57735026918962576f, units = 127;
     static constexpr float margin = 1e-3f; // units; a hundred times the rounding of a normal
-    std::array<float, NormalSlabs::axis_count> low_{2, 2, 2, 2, 2, 2, 2}, high_{-2, -2, -2, -2, -2, -2, -2};
+    Float4 low_main_ = {2, 2, 2, 2}, high_main_ = -low_main_;
+    Float4 low_diagonal_ = low_main_, high_diagonal_ = -low_main_;
 };
 
 // Points by columns, so that eight at once are compared with a surface, and the nearest points of that surface.
