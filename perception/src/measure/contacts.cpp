@@ -8,6 +8,7 @@
 
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include "measure/leaf_triangles.h"
@@ -25,6 +26,8 @@ constexpr float near_share =
     0.25f; // of a triangle's size: no triangles of a smooth surface come so near but neighbours
 // Looked at for one triangle: amid more than these, it counts as touching one.
 constexpr int most_nodes = 4000;
+constexpr Index at_once = 16;                 // triangles looked at together,
+constexpr std::size_t most_candidates = 512;  // unless so many are near any of them
 constexpr std::size_t most_listed = 100;      // triangles around a triangle's corners; amid more, pairs are looked at
 constexpr std::size_t most_triangles = 16000; // around corners: no vertex of very many triangles costs their square
 constexpr std::size_t most_boxes =
@@ -148,12 +151,12 @@ public:
 private:
     std::vector<Contact> by_triangle() const {
         std::vector<Contact> contacts(triangles_.size());
-        constexpr Index piece = 1024;
-        tbb::parallel_for(Index{0}, static_cast<Index>((triangles_.size() + piece - 1) / piece), [&](Index i) {
-            Scratch scratch;
-            for (Index t = i * piece; t < std::min<std::size_t>(triangles_.size(), std::size_t{i + 1} * piece); ++t)
-                contacts[t] = find(t, scratch);
-        });
+        tbb::parallel_for(tbb::blocked_range<Index>(0, static_cast<Index>(triangles_.size()), 1024),
+                          [&](const auto& part) {
+                              Scratch scratch;
+                              for (Index t = part.begin(); t < part.end(); t += at_once)
+                                  find(t, std::min(t + at_once, part.end()), contacts, scratch);
+                          });
         return contacts;
     }
 
@@ -201,49 +204,84 @@ private:
         return false;
     }
 
+    struct Candidate {
+        Box box;
+        Index triangle;
+    };
     struct Scratch {
         std::vector<NodeId> waiting;
         std::vector<Index> neighbours; // corners; none: not listed
+        std::vector<Candidate> candidates;
     };
 
-    Contact find(Index triangle, Scratch& scratch) const {
-        auto& [waiting, neighbours] = scratch;
-        const Corners own = corners(triangle);
-        const glm::vec3 centre = (own[0] + own[1] + own[2]) / 3.0f;
-        const float near = near_share * std::max({glm::length(own[0] - centre), glm::length(own[1] - centre),
-                                                  glm::length(own[2] - centre)});
-        Contact contact;
-        if (!(near > 0)) return contact;
-        const Box around = box_of(own).wider(near);
+    float nearness(const Corners& c) const {
+        const glm::vec3 centre = (c[0] + c[1] + c[2]) / 3.0f;
+        return near_share *
+               std::max({glm::length(c[0] - centre), glm::length(c[1] - centre), glm::length(c[2] - centre)});
+    }
+
+    // Consecutive triangles are near each other, but for some: then one walk down the tree serves all of them.
+    void find(Index begin, Index end, std::span<Contact> contacts, Scratch& scratch) const {
+        Box around;
+        for (Index t = begin; t < end; ++t) {
+            const Corners own = corners(t);
+            if (const float near = nearness(own); near > 0) around.include(box_of(own).wider(near));
+        }
+        const bool is_for_all = look_around(around, most_candidates, scratch);
+        for (Index t = begin; t < end; ++t) {
+            const Corners own = corners(t);
+            const float near = nearness(own);
+            if (!(near > 0)) continue;
+            const Box own_around = box_of(own).wider(near);
+            const bool is_sparse = is_for_all || look_around(own_around, triangles_.size(), scratch);
+            contacts[t] = is_sparse ? find(t, near, own_around, scratch) : Contact{0, 0};
+        }
+    }
+
+    // Makes candidates of the triangles whose boxes meet one. False amid too many.
+    bool look_around(const Box& around, std::size_t most, Scratch& scratch) const {
+        scratch.candidates.clear();
         int nodes = 0;
-        std::size_t looked_at = 0, boxes = 0;
+        std::size_t boxes = 0;
+        scratch.waiting.assign(1, VertexTree::root());
+        while (!scratch.waiting.empty()) {
+            const NodeId node = scratch.waiting.back();
+            scratch.waiting.pop_back();
+            if (++nodes > most_nodes) return false;
+            for (Index t = first_triangle_[node]; t < first_triangle_[node + 1]; ++t) {
+                if (++boxes > boxes_a_triangle_) return false;
+                if (const Box box = box_of(corners(t)); around.meets(box)) scratch.candidates.push_back({box, t});
+            }
+            if (scratch.candidates.size() > most) return false;
+            tree_.for_each_child(node, [&](NodeId child) {
+                if (child < interior_ && around.meets(boxes_[child])) scratch.waiting.push_back(child);
+            });
+        }
+        return true;
+    }
+
+    // Among the candidates.
+    Contact find(Index triangle, float near, const Box& around, Scratch& scratch) const {
+        const Corners own = corners(triangle);
+        std::vector<Index>& neighbours = scratch.neighbours;
         find_neighbours(triangles_[triangle], neighbours);
+        std::size_t looked_at = 0;
         const auto is_neighbour = [&](const Triangle& other) {
             if (neighbours.empty()) return are_neighbours(triangles_[triangle], other, looked_at);
             return std::any_of(neighbours.begin(), neighbours.end(),
                                [&](Index leaf) { return leaf == other[0] || leaf == other[1] || leaf == other[2]; });
         };
-        waiting.assign(1, VertexTree::root());
-        while (!waiting.empty()) {
-            const NodeId node = waiting.back();
-            waiting.pop_back();
-            if (++nodes > most_nodes) return {0, 0};
-            for (Index other = first_triangle_[node]; other < first_triangle_[node + 1]; ++other) {
-                const Triangle& t = triangles_[other];
-                const Corners its = corners(other);
-                if (++boxes > boxes_a_triangle_) return {0, 0};
-                if (!around.meets(box_of(its)) || is_neighbour(t)) continue;
-                if (looked_at > most_triangles) return {0, 0};
-                const glm::vec3 way = way_between(own, its);
-                const float gap = glm::length(way);
-                if (!(gap < near) || is_beside(own, its, way)) continue;
-                const bool is_alike =
-                    face_alike(own, its) && std::abs(luminance(triangle) - luminance(other)) <= alike_luminance;
-                if (!is_alike) contact.include({gap, sine_between(own, its)});
-            }
-            tree_.for_each_child(node, [&](NodeId child) {
-                if (child < interior_ && around.meets(boxes_[child])) waiting.push_back(child);
-            });
+        Contact contact;
+        for (const auto& [box, other] : scratch.candidates) {
+            if (!around.meets(box) || is_neighbour(triangles_[other])) continue;
+            if (looked_at > most_triangles) return {0, 0};
+            const Corners its = corners(other);
+            const glm::vec3 way = way_between(own, its);
+            const float gap = glm::length(way);
+            if (!(gap < near) || is_beside(own, its, way)) continue;
+            const bool is_alike =
+                face_alike(own, its) && std::abs(luminance(triangle) - luminance(other)) <= alike_luminance;
+            if (!is_alike) contact.include({gap, sine_between(own, its)});
         }
         return contact;
     }
