@@ -23,7 +23,7 @@ namespace unseen::perception {
 // A measurement, not a bound over all cuts: neighbours may be folded in other ways, and the pictures' cells and the
 // points are few.
 //
-// Fails where check() does, and on trees with a texture, of which nothing is measured. Cost: some 50 us a node, and a
+// Fails where check() does, and on trees with a texture, of which nothing is measured. Cost: some 25 us a node, and a
 // second; in parallel. The result does not depend on the threads. `threads`: 0: all cores. Progress is told, and can
 // cancel, up to the whole mesh's pictures.
 Result<vdtree::VertexTree> measure_folds(const vdtree::VertexTree& tree, int threads = 0,
