@@ -70,7 +70,8 @@ std::vector<Variation> variations() {
                        return plain(session, options);
                    }});
     all.push_back({"dynamic light",
-                   "bounds over the normals in a ring in place of baked luminances: ambient 0.2, directional 0.8",
+                   "bounds over the normals in a ring in place of baked luminances: ambient 0.2, and two "
+                   "directional lights, 0.8 and 0.2",
                    nullptr, true, true, false, true});
     all.push_back({"luebke-hallen-safe", "rings of all cuts, and shifts of the mean",
                    [](const session::Session& session,
@@ -101,12 +102,15 @@ double thread_seconds() {
                : 0;
 }
 
-vdtree::Lighting one_light() {
+vdtree::Lighting default_lights() {
     vdtree::LightSource light;
     light.direction = glm::normalize(glm::dvec3(vdtree::Light().direction));
     light.intensity = 1 - static_cast<double>(vdtree::Light().ambient);
     vdtree::Lighting lighting;
-    lighting.lights = {light};
+    vdtree::LightSource opposite = light; // as weak as that of trees
+    opposite.direction = -light.direction;
+    opposite.intensity *= static_cast<double>(vdtree::Light().fill);
+    lighting.lights = {light, opposite};
     lighting.ambient = static_cast<double>(vdtree::Light().ambient);
     return lighting;
 }
@@ -128,7 +132,7 @@ Result<DistanceCriterion> criterion_of(const Variation& variation, const session
     if (!variation.is_lit) return variation.criterion(session, options);
     const auto bounds = vdtree::LightBounds::measure(session.tree());
     if (!bounds) return bounds.error();
-    viewpoint.lighting = one_light();
+    viewpoint.lighting = default_lights();
     options.scene =
         perception::lit_scene(session.tree(), *bounds, viewpoint.lighting, viewpoint.eye, session.background());
     return perception::lit_distances(session.tree(), std::make_shared<const vdtree::LightBounds>(*bounds),

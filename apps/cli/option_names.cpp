@@ -24,7 +24,7 @@ constexpr OptionName option_names[] = {
     {"request.threshold", "--threshold"},
     {"observer.csf", "--csf"},
     {"scene.lights", "--lights"},
-    {"Scene::relight()", "--light or --ambient"},
+    {"Scene::relight()", "--light, --ambient or --fill-light"},
     {"read.drop = ", "--drop "},
     {"read.skip_bad", "--skip-bad"},
     {"read.weld = false", "--no-weld"},

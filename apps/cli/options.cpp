@@ -60,10 +60,10 @@ void check(const ViewOptions& view) {
     if (view.target && !view.eye) refuse("--target needs --eye; without an eye the whole model is framed.");
     if (view.direction && *view.direction == glm::dvec3(0)) refuse("--direction must not be 0 0 0.");
     if (view.light && *view.light == glm::dvec3(0)) refuse("--light must not be 0 0 0.");
-    if (view.texture.is_prelit && (view.light || view.ambient || !view.lights.empty()))
-        refuse("--prelit excludes --light, --ambient and --lights, which light the colours.");
-    if (!view.lights.empty() && (view.light || view.ambient))
-        refuse("--lights excludes --light and --ambient: say all of it in the file.");
+    if (view.texture.is_prelit && (view.light || view.ambient || view.fill_light || !view.lights.empty()))
+        refuse("--prelit excludes --light, --ambient, --fill-light and --lights, which light the colours.");
+    if (!view.lights.empty() && (view.light || view.ambient || view.fill_light))
+        refuse("--lights excludes --light, --ambient and --fill-light: say all of it in the file.");
     if (view.up && *view.up == glm::dvec3(0)) refuse("--up must not be 0 0 0.");
     if (view.eye && view.target && *view.eye == *view.target) refuse("--eye and --target are the same point.");
 }
@@ -327,11 +327,14 @@ void add_view_options(CLI::App& verb, ViewOptions& o) {
         ->type_name("WxH");
     add_vector(group, "--light", o.light, "Direction towards the light (default: 0.4 0.7 0.6)");
     add_number(group, "--ambient", o.ambient, within(0, 1), "A", "Share of light from everywhere, 0..1 (default: 0.2)");
+    add_number(group, "--fill-light", o.fill_light, within(0, 1), "F",
+               "Share of the light that also comes from the opposite side, 0..1 (default: 0.25)");
     group
-        .add_option("--lights", o.lights,
-                    "Lights instead of these two: directional, point, spot, headlight, ambient, with highlights; with "
-                    "--path, and in the "
-                    "viewer, they may move (the keys: docs/getting-started.md, Lights)")
+        .add_option(
+            "--lights", o.lights,
+            "Lights instead of these three: directional, point, spot, headlight, ambient, with highlights; with "
+            "--path, and in the "
+            "viewer, they may move (the keys: docs/getting-started.md, Lights)")
         ->type_name("FILE.json");
     add_number(group, "--background", o.background_cdm2, not_negative(), "CDM2", "Background luminance (default: 20)");
     group.add_option("--unit", o.unit_metres, "Metres a mesh unit (default: 1)")

@@ -40,6 +40,7 @@ struct ViewOptions {
     int width = 1024, height = 1024;           // pixels
     std::optional<glm::dvec3> light;           // towards it
     std::optional<double> ambient;             // 0..1
+    std::optional<double> fill_light;          // 0..1
     std::string lights;                        // a file of lights instead
     std::optional<double> background_cdm2;
     double unit_metres = 1; // world units a mesh unit

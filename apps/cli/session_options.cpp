@@ -43,7 +43,7 @@ Result<Surroundings> read_surroundings(const ViewOptions& view, const DisplayOpt
 }
 
 Result<session::Session> assemble(session::Scene scene, Surroundings around, const ViewOptions& view) {
-    if (const auto lit = scene.relight(view.light, view.ambient); !lit) return lit.error();
+    if (const auto lit = scene.relight(view.light, view.ambient, view.fill_light); !lit) return lit.error();
     scene.background = background_of(view);
     scene.lights = std::move(around.lights);
     return session::Session::create(std::move(scene), std::move(around.observer), terminal_messages());

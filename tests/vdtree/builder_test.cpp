@@ -897,6 +897,26 @@ TEST(Relit, StaysWithinTheRangeOfLuminance) {
     }
 }
 
+// By the formula beside Light: faces turned away are lit from the opposite side, and those that see neither by no more
+// than what comes from everywhere.
+TEST(BuildTree, LightsFacesThatTurnAwayMoreWeakly) {
+    const Mesh mesh = shapes::icosphere(3);
+    const Light light{.direction = {0, 0, 1}, .ambient = 0.25f, .fill = 0.5f};
+    const auto tree = build_tree(mesh.view(), {.light = light});
+    ASSERT_TRUE(tree);
+    const auto expected = [](float facing) {
+        return default_albedo * (0.25f + 0.75f * (facing > 0 ? facing : -0.5f * facing));
+    };
+    float darkest = 1;
+    for (Index leaf = 0; leaf < tree->leaf_count(); ++leaf) {
+        const NodeId node = tree->interior_count() + leaf;
+        const float facing = glm::vec3(tree->normals()[node]).z, luminance = tree->luminance()[node];
+        EXPECT_NEAR(luminance, expected(facing), 1e-4f) << facing;
+        darkest = std::min(darkest, luminance);
+    }
+    EXPECT_NEAR(darkest, default_albedo * 0.25f, 0.02f);
+}
+
 // A light that would make luminances beyond 0..1, or none at all, is not taken.
 TEST(BuildTree, RefusesImpossibleLights) {
     const float nan = std::numeric_limits<float>::quiet_NaN();
@@ -906,6 +926,9 @@ TEST(BuildTree, RefusesImpossibleLights) {
         {"no ambient share", {.direction = {0, 0, 1}, .ambient = nan}},
         {"too much ambient", {.direction = {0, 0, 1}, .ambient = 2}},
         {"negative ambient", {.direction = {0, 0, 1}, .ambient = -1}},
+        {"no fill share", {.direction = {0, 0, 1}, .fill = nan}},
+        {"too much fill", {.direction = {0, 0, 1}, .fill = 1.5f}},
+        {"negative fill", {.direction = {0, 0, 1}, .fill = -0.1f}},
     };
     for (const auto& [what, light] : lights) EXPECT_FALSE(build_tree(mesh.view(), {.light = light})) << what;
     // A direction of another length counts by its direction alone, or is refused.

@@ -122,7 +122,7 @@ TEST_F(TreeIo, ReadsWhatWasWritten) {
 }
 
 TEST_F(TreeIo, KeepsAnotherLight) {
-    const VertexTree tree = *built(shapes::bumpy_sphere(2)).relit({.direction = {1, 0, 0}, .ambient = 0.5f});
+    const VertexTree tree = *built(shapes::bumpy_sphere(2)).relit({.direction = {1, 0, 0}, .ambient = 0.5f, .fill = 0.75f});
     ASSERT_TRUE(write_tree(file_, tree));
     const auto again = read_tree(file_);
     ASSERT_TRUE(again);

@@ -44,16 +44,20 @@ Scene Scene::of(vdtree::VertexTree tree, double unit_metres) {
     return scene;
 }
 
-Result<void> Scene::relight(std::optional<glm::dvec3> towards, std::optional<double> ambient) {
-    if (!towards && !ambient) return {};
+Result<void> Scene::relight(std::optional<glm::dvec3> towards, std::optional<double> ambient,
+                            std::optional<double> fill) {
+    if (!towards && !ambient && !fill) return {};
     if (towards && !is_direction(*towards))
         return invalid_argument("A light's direction must be finite and not 0 0 0.");
     if (ambient && !(*ambient >= 0 && *ambient <= 1))
         return invalid_argument("The share of light from everywhere must be from 0 to 1.");
+    if (fill && !(*fill >= 0 && *fill <= 1))
+        return invalid_argument("The share of light from the opposite side must be from 0 to 1.");
     for (Object& object : objects) {
         vdtree::Light light = object.tree.light();
         if (towards) light.direction = unit_vector(*towards);
         if (ambient) light.ambient = static_cast<float>(*ambient);
+        if (fill) light.fill = static_cast<float>(*fill);
         if (light == object.tree.light() && !object.tree.is_prelit()) continue;
         auto relit = object.tree.relit(light);
         if (!relit) return relit.error();

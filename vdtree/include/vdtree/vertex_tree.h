@@ -60,11 +60,12 @@ struct PackedRange {
     bool operator==(const PackedRange&) const = default;
 };
 
-// One directional light and ambient light, for meshes that are not pre-lit:
-// relative luminance = albedo * (ambient + (1 - ambient) * max(0, n.direction)).
+// One directional light, a weaker one from the opposite side, and ambient light, for meshes that are not pre-lit:
+// relative luminance = albedo * (ambient + (1 - ambient) * (max(0, n.direction) + fill * max(0, -n.direction))).
 struct Light {
     glm::vec3 direction = {0.39800623f, 0.69651091f, 0.59700935f}; // towards the light: (0.4, 0.7, 0.6) normalised
     float ambient = 0.2f;                                          // share of the luminance that needs no light, 0..1
+    float fill = 0.25f; // of the light, from the opposite side, 0..1: what the light does not reach keeps its shape
     bool operator==(const Light&) const = default;
 };
 

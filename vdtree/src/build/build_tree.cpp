@@ -193,9 +193,10 @@ Result<void> check(const Clustering& c, std::size_t vertices) {
 Result<void> check(const Light& light) {
     const float length = glm::length(light.direction);
     constexpr float unit_slack = 1e-3f; // directions given with three digits
-    if (!(std::abs(length - 1) <= unit_slack) || !(light.ambient >= 0 && light.ambient <= 1))
+    if (!(std::abs(length - 1) <= unit_slack) || !(light.ambient >= 0 && light.ambient <= 1) ||
+        !(light.fill >= 0 && light.fill <= 1))
         return Error{ErrorCode::invalid_argument,
-                     "The light needs a direction of length 1 and an ambient share from 0 to 1."};
+                     "The light needs a direction of length 1, and shares of ambient and fill light from 0 to 1."};
     return {};
 }
 

@@ -27,7 +27,7 @@ namespace unseen::vdtree {
 namespace {
 
 constexpr std::array<char, 8> magic = {'U', 'N', 'S', 'E', 'E', 'N', 'V', 'T'};
-constexpr std::uint32_t format_version = 4;
+constexpr std::uint32_t format_version = 5;
 constexpr std::uint64_t page_bytes = 1 << 20;
 constexpr std::uint32_t most_sections = 64;     // the tree's own, and most_attributes
 constexpr std::uint64_t section_alignment = 64; // bytes; a cache line, and what any mapped element needs
@@ -66,8 +66,10 @@ struct Facts {
     std::uint64_t dropped_triangles;
     std::uint32_t closedness;
     std::uint32_t prelit;
+    float fill;
+    std::uint32_t spare;
 };
-static_assert(sizeof(Facts) == 80);
+static_assert(sizeof(Facts) == 88);
 
 std::uint64_t checksum(const void* data, std::size_t bytes) { return XXH3_64bits(data, bytes); }
 
@@ -173,7 +175,9 @@ Facts facts_of(const TreeGeometry& g, const TreeLuminance& l) {
             {l.range.lo, l.range.hi},
             g.dropped_triangles,
             static_cast<std::uint32_t>(g.closedness),
-            l.prelit ? 1u : 0u};
+            l.prelit ? 1u : 0u,
+            l.light.fill,
+            0};
 }
 
 // ---- writing
@@ -563,13 +567,13 @@ Result<void> Reader::read_facts(TreeGeometry& g, TreeLuminance& l) {
     g.bounding_sphere = {{f.bounding_sphere[0], f.bounding_sphere[1], f.bounding_sphere[2]}, f.bounding_sphere[3]};
     g.dropped_triangles = f.dropped_triangles;
     g.closedness = static_cast<Closedness>(f.closedness);
-    l.light = {{f.light[0], f.light[1], f.light[2]}, f.light[3]};
+    l.light = {{f.light[0], f.light[1], f.light[2]}, f.light[3], f.fill};
     l.prelit = f.prelit != 0;
     l.range = {f.luminance_range[0], f.luminance_range[1]};
     const double sum = g.origin.x + g.origin.y + g.origin.z;
     const auto is_finite = [](glm::vec3 v, float w) { return std::isfinite(v.x + v.y + v.z + w); };
     const bool facts_finite = std::isfinite(sum) && is_finite(g.bounding_sphere.centre, g.bounding_sphere.radius) &&
-                              is_finite(l.light.direction, l.light.ambient) && l.range.lo >= 0 &&
+                              is_finite(l.light.direction, l.light.ambient + l.light.fill) && l.range.lo >= 0 &&
                               l.range.lo <= l.range.hi && l.range.hi <= 1 && g.bounding_sphere.radius >= 0;
     if (!facts_finite) return fail("Section facts has a value out of range.");
     return {};

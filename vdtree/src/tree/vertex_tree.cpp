@@ -149,7 +149,8 @@ float vertex_luminance(glm::vec3 normal, const glm::vec4* colour, const Light& l
                          : textured ? 1.0f
                                     : default_albedo;
     if (prelit) return albedo;
-    const float lit = light.ambient + (1 - light.ambient) * std::max(0.0f, glm::dot(normal, light.direction));
+    const float facing = glm::dot(normal, light.direction);
+    const float lit = light.ambient + (1 - light.ambient) * std::max(facing, light.fill * -facing);
     // Unit vectors in floats may be a little long; an impossible light must not lead out of 0..1 either.
     return std::max(0.0f, std::min(1.0f, albedo * lit));
 }

@@ -38,10 +38,11 @@ struct Scene {
     static Result<Scene> load(const std::filesystem::path& file, const LoadOptions& options = {});
     static Scene of(vdtree::VertexTree tree, double unit_metres = 1);
 
-    // Lights all objects anew, by one directional light and light from everywhere; what is not given stays. What
-    // was pre-lit is lit, too. `towards`: the direction of the light, not 0; `ambient`: 0..1. Fails where they are not,
-    // and on trees that cannot be lit anew. Cost: a pass over the trees.
-    Result<void> relight(std::optional<glm::dvec3> towards, std::optional<double> ambient);
+    // Lights all objects anew, as vdtree::Light says; what is not given stays. What was pre-lit is lit, too. `towards`:
+    // the direction of the light, not 0; `ambient` and `fill`: 0..1. Fails where they are not, and on trees that cannot
+    // be lit anew. Cost: a pass over the trees.
+    Result<void> relight(std::optional<glm::dvec3> towards, std::optional<double> ambient,
+                         std::optional<double> fill = {});
 };
 
 } // namespace unseen::session
