@@ -274,19 +274,25 @@ Result<std::vector<glm::u8vec4>> Drawing::layer_pixels() const {
     const unsigned char* row = cairo_image_surface_get_data(surface_.get());
     const int stride = cairo_image_surface_get_stride(surface_.get());
     const bool is_opaque = cairo_image_surface_get_format(surface_.get()) == CAIRO_FORMAT_RGB24;
-    std::vector<glm::u8vec4> pixels;
-    pixels.reserve(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+    // Cairo's codes are multiplied by alpha, and rounded.
+    const auto straight = [&](std::uint32_t pixel) {
+        const std::uint32_t alpha = is_opaque ? 255 : pixel >> 24;
+        const auto code = [&](int shift) {
+            const std::uint32_t part = pixel >> shift & 255;
+            return alpha == 0 ? 0U : std::min((part * 255 + alpha / 2) / alpha, 255U);
+        };
+        return glm::u8vec4(code(16), code(8), code(0), alpha);
+    };
+    std::vector<glm::u8vec4> pixels(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+    auto out = pixels.begin();
+    std::uint32_t last = 0; // most pixels are like the one before
+    glm::u8vec4 last_straight = straight(last);
     for (int y = 0; y < height_; ++y, row += stride) {
         for (int x = 0; x < width_; ++x) {
             std::uint32_t pixel = 0;
             std::memcpy(&pixel, row + sizeof pixel * static_cast<std::size_t>(x), sizeof pixel);
-            const std::uint32_t alpha = is_opaque ? 255 : pixel >> 24;
-            // Cairo's are multiplied by alpha, and rounded.
-            const auto code = [&](int shift) {
-                const std::uint32_t part = pixel >> shift & 255;
-                return alpha == 0 ? 0U : std::min((part * 255 + alpha / 2) / alpha, 255U);
-            };
-            pixels.emplace_back(code(16), code(8), code(0), alpha);
+            if (pixel != last) last_straight = straight(last = pixel);
+            *out++ = last_straight;
         }
     }
     return pixels;

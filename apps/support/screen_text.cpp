@@ -19,22 +19,27 @@ constexpr double letter_height = 0.84, padding = 0.55, corner_radius = 0.45, lea
 constexpr double width_step = 2; // panels keep their width while numbers in them change
 constexpr double least_line_px = 6;
 
+// In line heights, too: text scales with them.
 struct Layout {
-    double line_px = 0, lead_px = 0; // the column of leads, with its gap
+    double lead = 0; // the column of leads, with its gap
     glm::dvec2 size = glm::dvec2(0);
 };
 
-Layout layout_of(std::span<const TextLine> lines, double line_px) {
+Layout layout_of(std::span<const TextLine> lines) {
+    constexpr double unit_px = 100;
+    const auto width_of = [](const std::string& text) {
+        return text.empty() ? 0 : Drawing::text_width(text, letter_height * unit_px) / unit_px;
+    };
     double lead = 0, alone = 0, beside = 0;
     for (const TextLine& line : lines) {
-        const double width = Drawing::text_width(line.text, letter_height * line_px);
-        (line.lead.empty() ? alone : beside) = std::max(line.lead.empty() ? alone : beside, width);
-        if (!line.lead.empty()) lead = std::max(lead, Drawing::text_width(line.lead, letter_height * line_px));
+        double& widest = line.lead.empty() ? alone : beside;
+        widest = std::max(widest, width_of(line.text));
+        lead = std::max(lead, width_of(line.lead));
     }
-    Layout layout{line_px, lead > 0 ? lead + lead_gap * line_px : 0, {}};
-    const double step = width_step * line_px, width = std::max(alone, layout.lead_px + beside);
-    layout.size = {std::ceil(width / step) * step + 2 * padding * line_px,
-                   (static_cast<double>(lines.size()) + 2 * padding) * line_px};
+    Layout layout{lead > 0 ? lead + lead_gap : 0, {}};
+    const double width = std::max(alone, layout.lead + beside);
+    layout.size = {std::ceil(width / width_step) * width_step + 2 * padding,
+                   static_cast<double>(lines.size()) + 2 * padding};
     return layout;
 }
 
@@ -47,21 +52,20 @@ Result<Layer> layer_of(const Drawing& drawing, glm::ivec2 corner) {
 } // namespace
 
 Result<Layer> text_panel(std::span<const TextLine> lines, double line_px, glm::dvec2 most_px) {
-    if (lines.empty() || !(line_px > 0)) return Layer{};
-    const glm::dvec2 wanted = layout_of(lines, line_px).size;
-    const double shrunk = line_px * std::min({1.0, most_px.x / wanted.x, most_px.y / wanted.y});
-    if (!(shrunk >= least_line_px)) return Layer{};
-    const Layout layout = layout_of(lines, shrunk);
-    auto drawing =
-        Drawing::layer(static_cast<int>(std::ceil(layout.size.x)), static_cast<int>(std::ceil(layout.size.y)));
+    if (lines.empty()) return Layer{};
+    const Layout layout = layout_of(lines);
+    const double scale = std::min({line_px, most_px.x / layout.size.x, most_px.y / layout.size.y});
+    if (!(scale >= least_line_px)) return Layer{};
+    const glm::ivec2 size(glm::ceil(layout.size * scale));
+    auto drawing = Drawing::layer(size.x, size.y);
     if (!drawing) return drawing.error();
-    drawing->round_fill({0, 0}, {drawing->width(), drawing->height()}, corner_radius * layout.line_px, backing);
-    const double height = letter_height * layout.line_px;
-    glm::dvec2 at = glm::dvec2(padding * layout.line_px) + glm::dvec2(0, (layout.line_px - height) / 2);
+    drawing->round_fill({0, 0}, size, corner_radius * scale, backing);
+    const double height = letter_height * scale;
+    glm::dvec2 at(padding * scale, padding * scale + (scale - height) / 2);
     for (const TextLine& line : lines) {
         drawing->text(at, line.lead, leads, height);
-        drawing->text(at + glm::dvec2(line.lead.empty() ? 0 : layout.lead_px, 0), line.text, letters, height);
-        at.y += layout.line_px;
+        drawing->text({at.x + (line.lead.empty() ? 0 : layout.lead * scale), at.y}, line.text, letters, height);
+        at.y += scale;
     }
     return layer_of(*drawing, {0, 0});
 }

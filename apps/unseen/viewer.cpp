@@ -329,7 +329,7 @@ private:
         glfwGetWindowContentScale(window_, &scale, nullptr);
         OverlayContent content;
         content.line_px = std::max(text_line_px * static_cast<double>(scale), view_.height / lines_of_window);
-        content.message = message_;
+        if (shows_overlay_ || is_failure_) content.message = message_;
         if (!shows_overlay_) return content;
         content.status = viewer_lines(state);
         if (shows_keys_) content.keys = viewer_keys();
@@ -345,8 +345,9 @@ private:
     }
 
     // Over the picture, for a while; nothing: no more.
-    void say(std::string message) {
+    void say(std::string message, bool is_failure = false) {
         message_ = std::move(message);
+        is_failure_ = is_failure;
         message_end_ = Clock::now() + message_shown;
         needs_frame_ = true;
     }
@@ -388,7 +389,7 @@ private:
             say("Wrote " + file);
         } else {
             print_error(saved.error().message);
-            say("No screenshot: " + saved.error().message);
+            say("No screenshot: " + saved.error().message, true);
         }
     }
 
@@ -419,7 +420,8 @@ private:
     bool has_drawn_ = false;
     FrameTimes times_;
     bool shows_overlay_ = true, shows_keys_ = false;
-    std::string message_; // over the picture, until the time
+    std::string message_;     // over the picture, until the time
+    bool is_failure_ = false; // which is said even where text is hidden
     Clock::time_point message_end_;
     std::string title_;
     bool saves_window_ = false; // of the next frame

@@ -64,8 +64,9 @@ public:
         send(event, PointerMotionMask);
     }
 
-    void button(unsigned number, bool is_down, int x, int y) {
+    void button(unsigned number, bool is_down, int x, int y, unsigned modifiers = 0) {
         XEvent event{};
+        event.xbutton.state = modifiers;
         fill(event.xbutton, is_down ? ButtonPress : ButtonRelease);
         event.xbutton.button = number;
         event.xbutton.x = x;
