@@ -8,8 +8,8 @@
 namespace unseen::app {
 namespace {
 
-// Mixed as light, the backing over white has a relative luminance of 0.125. On it, white has a contrast of 1.05 / 0.175,
-// and the leads, of luminance 0.79, one of 0.84 / 0.175.
+// Mixed as light, the backing over white has a relative luminance of 0.125. On it, white has a contrast of
+// 1.05 / 0.175, and the leads, of luminance 0.79, one of 0.84 / 0.175.
 constexpr glm::vec4 backing(0.05f, 0.06f, 0.08f, 0.88f);
 constexpr glm::vec3 letters(1.0f), leads(1.0f, 0.9f, 0.5f);
 constexpr glm::vec3 mark(1.0f), rim(0.0f);

@@ -24,8 +24,8 @@ struct ViewerOptions {
     int frames = 0;                         // ends after so many; 0: when the user wants to
 };
 
-// Shows the window and runs until it is closed. On the main thread only. Screenshots that somebody asks for in the window
-// and that cannot be written are told of, and are no failure.
+// Shows the window and runs until it is closed. On the main thread only. Screenshots that somebody asks for in the
+// window and that cannot be written are told of, and are no failure.
 Result<void> run_viewer(render::Context& window, session::Session& session, session::GazePlayer gaze,
                         const ViewerOptions& options);
 

@@ -27,7 +27,7 @@ struct ViewerState {
 
 // "whole", "imperceptible", "gaze-directed", "budget of 10,000", "up to 5 pixels".
 std::string viewer_mode(const ViewerState& state);
-// "bunny.vdt - imperceptible: 34,294 of 69,666 triangles - Unseen". What still goes on stands before the program's name.
+// "bunny.vdt - imperceptible: 34,294 of 69,666 triangles - Unseen"; before the program's name what still goes on.
 std::string viewer_title(const ViewerState& state);
 std::vector<TextLine> viewer_lines(const ViewerState& state);
 
