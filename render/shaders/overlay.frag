@@ -1,6 +1,6 @@
 // An image's pixel over the target's. Two outputs, because the coverage is not what a target keeps in a.
 layout(binding = 0) uniform sampler2D image; // sRGB codes; a is the coverage
-layout(location = 0) uniform vec4 place; // left and top of the image in the target, its height, 1 if its first row is the top
+layout(location = 0) uniform vec4 place; // the image's left and top; the target's height, 1 if its first row is the top
 layout(location = 1) uniform uint kind;  // 0 linear with luminance in a, 1 for displays, 2 the same in codes
 
 layout(location = 0, index = 0) out vec4 colour; // times the coverage
