@@ -7,6 +7,13 @@
 #include "terminal.h"
 
 namespace unseen::app {
+namespace {
+
+bool is_whole(const session::Report& s) {
+    return s.stats.triangles == s.source_triangles && s.stats.max_fold_cost == 0;
+}
+
+} // namespace
 
 Json to_json(const session::Report& s, double draw_ms) {
     const double cost = vdtree::is_unbounded(s.stats.max_fold_cost) ? std::numeric_limits<double>::infinity()
@@ -23,32 +30,40 @@ Json to_json(const session::Report& s, double draw_ms) {
             {"effects", to_json(s.effects)}};
 }
 
-std::string kept_text(std::uint64_t triangles, std::uint64_t source_triangles) {
+std::string triangles_text(std::uint64_t triangles, std::uint64_t source_triangles) {
     const double percent = 100.0 * static_cast<double>(triangles) / static_cast<double>(source_triangles);
-    return "kept " + grouped(triangles) + " of " + grouped(source_triangles) + " triangles (" +
+    return grouped(triangles) + " of " + grouped(source_triangles) + " triangles (" +
            rounded(percent, percent > 99 ? 4 : 2) + "%)";
+}
+
+std::string kept_text(std::uint64_t triangles, std::uint64_t source_triangles) {
+    return "kept " + triangles_text(triangles, source_triangles);
+}
+
+std::string seen_from_text(const session::Report& s, const perception::Display& display) {
+    const double from_m = s.imperceptible_from_m;
+    if (is_whole(s)) return "nothing is folded";
+    if (std::isnan(from_m))
+        return "whether anybody sees a difference is not known: the fold test " +
+               session::name_of(s.fold_tests.front()) + " counts pixels";
+    constexpr double rounding = 1 + 1e-6;
+    if (from_m <= display.distance.value() * rounding)
+        return "nobody sees a difference, looked at from " + rounded(from_m, 3) + " m or more";
+    if (std::isfinite(from_m))
+        return "a difference can be seen; looked at from " + rounded(from_m, 3) + " m or more, nobody sees it";
+    return "a difference can be seen from any distance";
 }
 
 std::string visibility_text(const session::Report& s, const session::Observer& observer, const DisplayOptions& display,
                             const std::string& where) {
-    const double from_m = s.imperceptible_from_m;
-    const std::string test = session::name_of(s.fold_tests.front());
-    if (s.stats.triangles == s.source_triangles && s.stats.max_fold_cost == 0) return "nothing is folded";
-    if (std::isnan(from_m))
-        return "whether anybody sees a difference is not known: the fold test " + test + " counts pixels";
-
-    constexpr double rounding = 1 + 1e-6;
-    std::string text = "a difference can be seen from any distance";
-    if (from_m <= observer.display.distance.value() * rounding)
-        text = "nobody sees a difference, looked at from " + rounded(from_m, 3) + " m or more";
-    else if (std::isfinite(from_m))
-        text = "a difference can be seen; looked at from " + rounded(from_m, 3) + " m or more, nobody sees it";
+    std::string text = seen_from_text(s, observer.display);
+    if (is_whole(s) || std::isnan(s.imperceptible_from_m)) return text;
 
     const bool is_default_display =
         display.file.empty() && !display.pixels_per_degree && !display.peak_cdm2 && !display.black_cdm2;
     text += ": by the " +
             (display.csf.empty() ? "default observer (castleCSF, a typical person)" : "observer " + display.csf) +
-            " and judge (fold test " + test + "), " + where + ", on " +
+            " and judge (fold test " + session::name_of(s.fold_tests.front()) + "), " + where + ", on " +
             (is_default_display ? "the default display" : "this display") + ", ";
     if (!observer.gaze) return text + "wherever the gaze";
     const auto tenths = [](double px) { return shortest(std::round(10 * px) / 10); };

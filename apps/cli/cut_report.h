@@ -14,8 +14,11 @@ namespace unseen::app {
 // The keys that simplify and render report; draw_ms is NaN where nothing was drawn.
 Json to_json(const session::Report& report, double draw_ms);
 
-// "kept 36,458 of 69,666 triangles (52%)".
+// "36,458 of 69,666 triangles (52%)"; the same after "kept".
+std::string triangles_text(std::uint64_t triangles, std::uint64_t source_triangles);
 std::string kept_text(std::uint64_t triangles, std::uint64_t source_triangles);
+// Whether a difference is seen, and from where: "nobody sees a difference, looked at from 0.5 m or more".
+std::string seen_from_text(const session::Report& report, const perception::Display& display);
 // Who sees a difference, and from where: with the observer, the fold test that judges, and the conditions. `where`:
 // "in this view".
 std::string visibility_text(const session::Report& report, const session::Observer& observer,

@@ -111,28 +111,48 @@ std::uint32_t code_of(float value) {
 void Drawing::End::operator()(cairo_t* context) const { cairo_destroy(context); }
 void Drawing::End::operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
 
-Result<Drawing> Drawing::create(int width, int height, glm::vec3 background, Kind kind) {
-    if (width < 1 || height < 1 || width > largest_side || height > largest_side)
-        return Error{ErrorCode::invalid_argument, "Cannot draw " + shown_size(width, height) +
-                                                      " pixels: a picture with text has 1 to " +
-                                                      std::to_string(largest_side) + " a side."};
+Result<void> Drawing::check_size(int width, int height) {
+    if (width >= 1 && height >= 1 && width <= largest_side && height <= largest_side) return {};
+    return Error{ErrorCode::invalid_argument, "Cannot draw " + shown_size(width, height) +
+                                                  " pixels: a picture with text has 1 to " +
+                                                  std::to_string(largest_side) + " a side."};
+}
+
+Result<Drawing> Drawing::on(std::unique_ptr<cairo_surface_t, End> surface, int width, int height) {
     Drawing drawing;
     drawing.width_ = width;
     drawing.height_ = height;
-    if (kind == Kind::svg) {
-        drawing.svg_ = std::make_unique<std::string>();
-        drawing.surface_.reset(cairo_svg_surface_create_for_stream(append, drawing.svg_.get(), width, height));
-        cairo_svg_surface_set_document_unit(drawing.surface_.get(), CAIRO_SVG_UNIT_PX);
-    } else {
-        drawing.surface_.reset(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height));
-    }
+    drawing.surface_ = std::move(surface);
     drawing.context_.reset(cairo_create(drawing.surface_.get()));
     if (const auto status = cairo_status(drawing.context_.get()); status != CAIRO_STATUS_SUCCESS)
         return failure(status, shown_size(width, height) + " pixels");
     cairo_set_line_cap(drawing.context_.get(), CAIRO_LINE_CAP_ROUND);
     cairo_set_line_join(drawing.context_.get(), CAIRO_LINE_JOIN_ROUND);
-    drawing.fill({0, 0}, {width, height}, background);
     return drawing;
+}
+
+Result<Drawing> Drawing::create(int width, int height, glm::vec3 background, Kind kind) {
+    if (auto valid = check_size(width, height); !valid) return valid.error();
+    std::unique_ptr<std::string> svg;
+    std::unique_ptr<cairo_surface_t, End> surface;
+    if (kind == Kind::svg) {
+        svg = std::make_unique<std::string>();
+        surface.reset(cairo_svg_surface_create_for_stream(append, svg.get(), width, height));
+        cairo_svg_surface_set_document_unit(surface.get(), CAIRO_SVG_UNIT_PX);
+    } else {
+        surface.reset(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, height));
+    }
+    auto drawing = on(std::move(surface), width, height);
+    if (!drawing) return drawing;
+    drawing->svg_ = std::move(svg);
+    drawing->fill({0, 0}, {width, height}, background);
+    return drawing;
+}
+
+Result<Drawing> Drawing::layer(int width, int height) {
+    if (auto valid = check_size(width, height); !valid) return valid.error();
+    return on(std::unique_ptr<cairo_surface_t, End>(cairo_image_surface_create(CAIRO_FORMAT_ARGB32, width, height)),
+              width, height);
 }
 
 Result<Drawing> Drawing::for_file(const std::filesystem::path& file, int width, int height, glm::vec3 background) {
@@ -146,6 +166,21 @@ void Drawing::fill(glm::dvec2 corner, glm::dvec2 size, glm::vec3 colour) {
     set_colour(context_.get(), colour);
     cairo_rectangle(context_.get(), corner.x, corner.y, size.x, size.y);
     cairo_fill(context_.get());
+}
+
+void Drawing::round_fill(glm::dvec2 corner, glm::dvec2 size, double radius, glm::vec4 colour) {
+    constexpr double quarter = std::numbers::pi / 2;
+    const double r = std::min(radius, std::min(size.x, size.y) / 2);
+    const glm::dvec2 low = corner + r, high = corner + size - r;
+    cairo_t* const context = context_.get();
+    cairo_set_source_rgba(context, static_cast<double>(colour.r), static_cast<double>(colour.g),
+                          static_cast<double>(colour.b), static_cast<double>(colour.a));
+    cairo_new_path(context);
+    cairo_arc(context, high.x, low.y, r, -quarter, 0);
+    cairo_arc(context, high.x, high.y, r, 0, quarter);
+    cairo_arc(context, low.x, high.y, r, quarter, 2 * quarter);
+    cairo_arc(context, low.x, low.y, r, 2 * quarter, 3 * quarter);
+    cairo_fill(context);
 }
 
 void Drawing::line(std::span<const glm::dvec2> points, glm::vec3 colour, double width, bool dashed) {
@@ -210,11 +245,16 @@ void Drawing::clip(glm::dvec2 corner, glm::dvec2 size) {
 }
 void Drawing::end_clip() { cairo_restore(context_.get()); }
 
-Result<perception::Image> Drawing::image() const {
+Result<void> Drawing::check_pixels() const {
     if (svg_) return Error{ErrorCode::invalid_argument, "A drawing in SVG has no pixels."};
     if (const auto status = cairo_status(context_.get()); status != CAIRO_STATUS_SUCCESS)
         return failure(status, shown_size(width_, height_) + " pixels");
     cairo_surface_flush(surface_.get());
+    return {};
+}
+
+Result<perception::Image> Drawing::image() const {
+    if (auto valid = check_pixels(); !valid) return valid.error();
     const unsigned char* row = cairo_image_surface_get_data(surface_.get());
     const int stride = cairo_image_surface_get_stride(surface_.get());
     perception::Image image{width_, height_, 3, {}};
@@ -227,6 +267,35 @@ Result<perception::Image> Drawing::image() const {
         }
     }
     return image;
+}
+
+Result<std::vector<glm::u8vec4>> Drawing::layer_pixels() const {
+    if (auto valid = check_pixels(); !valid) return valid.error();
+    const unsigned char* row = cairo_image_surface_get_data(surface_.get());
+    const int stride = cairo_image_surface_get_stride(surface_.get());
+    const bool is_opaque = cairo_image_surface_get_format(surface_.get()) == CAIRO_FORMAT_RGB24;
+    // Cairo's codes are multiplied by alpha, and rounded.
+    const auto straight = [&](std::uint32_t pixel) {
+        const std::uint32_t alpha = is_opaque ? 255 : pixel >> 24;
+        const auto code = [&](int shift) {
+            const std::uint32_t part = pixel >> shift & 255;
+            return alpha == 0 ? 0U : std::min((part * 255 + alpha / 2) / alpha, 255U);
+        };
+        return glm::u8vec4(code(16), code(8), code(0), alpha);
+    };
+    std::vector<glm::u8vec4> pixels(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+    auto out = pixels.begin();
+    std::uint32_t last = 0; // most pixels are like the one before
+    glm::u8vec4 last_straight = straight(last);
+    for (int y = 0; y < height_; ++y, row += stride) {
+        for (int x = 0; x < width_; ++x) {
+            std::uint32_t pixel = 0;
+            std::memcpy(&pixel, row + sizeof pixel * static_cast<std::size_t>(x), sizeof pixel);
+            if (pixel != last) last_straight = straight(last = pixel);
+            *out++ = last_straight;
+        }
+    }
+    return pixels;
 }
 
 Result<void> Drawing::write(const std::filesystem::path& file) {

@@ -6,9 +6,12 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include <glm/gtc/type_precision.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <glm/vec4.hpp>
 
 #include <perception/image.h>
 
@@ -28,6 +31,8 @@ public:
 
     // Fails where a side is not in 1..32767 pixels, and where there is not enough memory.
     static Result<Drawing> create(int width, int height, glm::vec3 background, Kind kind = Kind::image);
+    // An image that is transparent where nothing is drawn, to be laid over others: see layer_pixels().
+    static Result<Drawing> layer(int width, int height);
     // Of the kind that the file's ending asks for: .svg, or else an image.
     static Result<Drawing> for_file(const std::filesystem::path& file, int width, int height, glm::vec3 background);
 
@@ -35,6 +40,8 @@ public:
     int height() const noexcept { return height_; }
 
     void fill(glm::dvec2 corner, glm::dvec2 size, glm::vec3 colour);
+    // With round corners; the share `colour.a` covers what is there.
+    void round_fill(glm::dvec2 corner, glm::dvec2 size, double radius, glm::vec4 colour);
     // From point to point, antialiased, with round ends.
     void line(std::span<const glm::dvec2> points, glm::vec3 colour, double width = 1, bool dashed = false);
     void line(glm::dvec2 from, glm::dvec2 to, glm::vec3 colour, double width = 1, bool dashed = false);
@@ -51,8 +58,10 @@ public:
     void clip(glm::dvec2 corner, glm::dvec2 size);
     void end_clip();
 
-    // What was drawn, of an image. Errors are those of drawing.
+    // What was drawn, of an image; of a layer, over black. Errors are those of drawing.
     Result<perception::Image> image() const;
+    // Codes, and how much of the pixel they cover, which is not multiplied in; row-major from the top left.
+    Result<std::vector<glm::u8vec4>> layer_pixels() const;
     // SVG, or an image of whatever kind the ending says. The file is replaced whole or not at all. Nothing may be drawn
     // afterwards.
     Result<void> write(const std::filesystem::path& file);
@@ -67,6 +76,9 @@ private:
         void operator()(_cairo_surface* surface) const;
     };
     Drawing() = default;
+    static Result<Drawing> on(std::unique_ptr<_cairo_surface, End> surface, int width, int height);
+    static Result<void> check_size(int width, int height);
+    Result<void> check_pixels() const;
 
     int width_ = 0, height_ = 0;
     std::unique_ptr<std::string> svg_; // what the surface writes to; null of an image

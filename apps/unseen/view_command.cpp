@@ -1,11 +1,14 @@
 // unseen view: a window in which the cut follows the eye.
+#include <filesystem>
 #include <memory>
 
 #include "options.h"
 #include "output_files.h"
 #include "session_options.h"
+#include "terminal.h"
 #include "verbs.h"
 #include "viewer.h"
+#include "viewer_text.h"
 
 namespace unseen::app {
 namespace {
@@ -24,15 +27,16 @@ Result<int> run(ViewArguments& a) {
     if (const auto ready = check_outputs(inputs, {a.viewer.screenshot}); !ready) return ready.error();
     auto gaze = session::GazePlayer::create(a.gaze);
     if (!gaze) return gaze.error();
+    a.viewer.model = printable(std::filesystem::path(a.model).filename().string());
     // Not to be seen before there is something to see.
-    auto window =
-        render::Context::window({.width = a.view.width, .height = a.view.height, .title = "Unseen", .visible = false});
+    auto window = render::Context::window(
+        {.width = a.view.width, .height = a.view.height, .title = a.viewer.model + " - Unseen", .visible = false});
     if (!window) return window.error();
     auto session = open_session(a.model, a.view, a.display);
     if (!session) return session.error();
     a.viewer.first_view = make_view(*session, a.view);
     a.viewer.has_fixed_field = a.view.fov_degrees.has_value();
-    a.viewer.gaze_follows_pointer = a.gaze.source == GazeSource::mouse;
+    a.viewer.gaze_source = a.gaze.source;
     if (auto ended = run_viewer(*window, *session, std::move(*gaze), a.viewer); !ended) return ended.error();
     return exit_done;
 }
@@ -47,7 +51,7 @@ Command view_command(CLI::App& app) {
     add_choice<render::Shading, render::Shading>(*verb, "--shading", a->viewer.draw.shading,
                                                  {{"smooth", render::Shading::smooth}, {"flat", render::Shading::flat}},
                                                  "smooth (default) or flat");
-    verb->add_option("--screenshot", a->viewer.screenshot, "Write a picture when the viewer ends")
+    verb->add_option("--screenshot", a->viewer.screenshot, "Write a picture of the model when the viewer ends")
         ->type_name("OUT.png")
         ->check(ending_in({".png"}));
     verb->add_option("--frames", a->viewer.frames, "End after so many frames, for scripts")
@@ -62,9 +66,9 @@ Command view_command(CLI::App& app) {
         check_gaze(o->viewer.what, o->gaze);
         check_geomorph(o->viewer.geomorph_seconds, o->view);
     });
-    verb->footer(std::string(viewer_help) + "\nExamples:\n  unseen view bunny.vdt\n"
-                                            "  unseen view bunny.vdt --triangles 5000 --wireframe\n"
-                                            "  unseen view dragon.vdt --milliseconds 2 --geomorph 0.25");
+    verb->footer(viewer_help() + "\nExamples:\n  unseen view bunny.vdt\n"
+                                 "  unseen view bunny.vdt --triangles 5000 --wireframe\n"
+                                 "  unseen view dragon.vdt --milliseconds 2 --geomorph 0.25");
     return {verb, [a] { return run(*a); }};
 }
 

@@ -4,7 +4,6 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <ctime>
 #include <utility>
 
@@ -12,22 +11,17 @@
 #include <GLFW/glfw3.h>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <glm/trigonometric.hpp>
 
 #include <perception/image.h>
 
 #include "frame_image.h"
 #include "session_options.h"
 #include "terminal.h"
+#include "viewer_overlay.h"
+#include "viewer_text.h"
 
 namespace unseen::app {
-
-const char* const viewer_help =
-    R"(Mouse: drag to turn the model, wheel to come nearer; in mode 4 you look at the pointer
-  1  full model          2  imperceptible       3  budget       4  gaze-directed
-  +  a larger budget     -  a smaller one
-  w  wireframe           f  flat or smooth      r  the first view again
-  s  screenshot          h  this help           q, Esc  quit
-)";
 
 namespace {
 
@@ -38,37 +32,55 @@ constexpr double zoom_per_notch = 0.9;                       // of the distance
 constexpr double nearest_radii = 1e-3, farthest_radii = 1e4; // distance to the target, in radii of the model
 constexpr double steepest_cosine = 0.999; // between line of sight and up: beyond, the picture would tumble
 constexpr double budget_step = 1.25;
-constexpr double idle_seconds = 0.25; // a look at the window's state even without events
+constexpr double idle_seconds = 0.25;                 // a look at the window's state even without events
+constexpr double text_line_px = 18;                   // where the screen's scale is 1 ...
+constexpr double lines_of_window = 56;                // ... and never less than this share of the window's height
+constexpr std::chrono::milliseconds times_shown{250}; // numbers that change faster cannot be read
+constexpr std::chrono::seconds message_shown{6};
+constexpr double most_margin_deg = 89; // beyond, a gaze may be anywhere on the screen, and its ring is none
 
 double milliseconds_since(Clock::time_point start) {
     return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
 }
 
+// The mean of the last frames, taken anew a few times a second.
+class FrameTimes {
+public:
+    void add(double frame_ms, double adapt_ms) {
+        frame_sum_ += frame_ms;
+        adapt_sum_ += adapt_ms;
+        ++frames_;
+        const auto now = Clock::now();
+        if (frame_ms_ && now - taken_ < times_shown) return;
+        frame_ms_ = std::exchange(frame_sum_, 0) / frames_;
+        adapt_ms_ = std::exchange(adapt_sum_, 0) / std::exchange(frames_, 0);
+        taken_ = now;
+    }
+    std::optional<double> frame_ms() const { return frame_ms_; }
+    std::optional<double> adapt_ms() const { return adapt_ms_; }
+
+private:
+    double frame_sum_ = 0, adapt_sum_ = 0;
+    int frames_ = 0;
+    Clock::time_point taken_;
+    std::optional<double> frame_ms_, adapt_ms_;
+};
+
 class Viewer {
 public:
     Viewer(session::Session& session, session::GazePlayer gaze, const ViewerOptions& options, render::Context& context,
            render::Renderer renderer)
-        : session_(session), options_(options), window_(context.glfw_window()), renderer_(std::move(renderer)),
-          follower_(session), view_(options.first_view),
+        : session_(session), options_(options), context_(context), window_(context.glfw_window()),
+          renderer_(std::move(renderer)), overlay_(context), follower_(session), view_(options.first_view),
           request_(options.what.request_for(session.tree().triangle_count())), gaze_px_(options.what.gaze_px),
-          draw_(options.draw), gaze_follows_pointer_(options.gaze_follows_pointer), gaze_(std::move(gaze)) {
+          draw_(options.draw), gaze_follows_pointer_(options.gaze_source == session::GazeSource::mouse),
+          gaze_(std::move(gaze)) {
         request_.purpose = session::Purpose::picture;
         request_.may_measure = false; // nobody waits for that here
         draw_.background = session.background();
         const Goal& goal = request_.goal;
         budget_ = goal.kind == Goal::Kind::budget ? goal.triangles : std::max(1U, session.tree().triangle_count() / 4);
-        glfwSetWindowUserPointer(window_, this);
-        glfwSetCharCallback(window_, [](GLFWwindow* w, unsigned c) { of(w).on_character(c); });
-        glfwSetKeyCallback(window_, [](GLFWwindow* w, int key, int, int action, int) {
-            if (key == GLFW_KEY_ESCAPE && action == GLFW_PRESS) glfwSetWindowShouldClose(w, GLFW_TRUE);
-        });
-        glfwSetMouseButtonCallback(window_, [](GLFWwindow* w, int button, int action, int) {
-            if (button == GLFW_MOUSE_BUTTON_LEFT) of(w).on_button(action == GLFW_PRESS);
-        });
-        glfwSetCursorPosCallback(window_, [](GLFWwindow* w, double x, double y) { of(w).on_pointer({x, y}); });
-        glfwSetScrollCallback(window_, [](GLFWwindow* w, double, double notches) { of(w).on_wheel(notches); });
-        glfwSetFramebufferSizeCallback(window_, [](GLFWwindow* w, int, int) { of(w).needs_frame_ = true; });
-        glfwSetWindowRefreshCallback(window_, [](GLFWwindow* w) { of(w).needs_frame_ = true; });
+        listen();
     }
     Viewer(const Viewer&) = delete;
     Viewer& operator=(const Viewer&) = delete;
@@ -92,7 +104,7 @@ public:
             } else {
                 glfwWaitEventsTimeout(idle_seconds);
             }
-            if (failure_) return *failure_;
+            if (!message_.empty() && Clock::now() > message_end_) say({});
         }
         return options_.screenshot.empty() ? Result<void>() : save_picture(options_.screenshot);
     }
@@ -101,6 +113,24 @@ private:
     static Viewer& of(GLFWwindow* window) { return *static_cast<Viewer*>(glfwGetWindowUserPointer(window)); }
 
     // ---- input ----
+
+    void listen() {
+        glfwSetWindowUserPointer(window_, this);
+        glfwSetCharCallback(window_, [](GLFWwindow* w, unsigned c) { of(w).on_character(c); });
+        glfwSetKeyCallback(window_, [](GLFWwindow* w, int key, int, int action, int) {
+            if (key == GLFW_KEY_ESCAPE && action == GLFW_PRESS) glfwSetWindowShouldClose(w, GLFW_TRUE);
+        });
+        glfwSetMouseButtonCallback(window_, [](GLFWwindow* w, int button, int action, int modifiers) {
+            of(w).on_button(button, action == GLFW_PRESS, (modifiers & GLFW_MOD_SHIFT) != 0);
+        });
+        glfwSetCursorPosCallback(window_, [](GLFWwindow* w, double x, double y) { of(w).on_pointer({x, y}); });
+        glfwSetScrollCallback(window_, [](GLFWwindow* w, double, double notches) { of(w).on_wheel(notches); });
+        glfwSetFramebufferSizeCallback(window_, [](GLFWwindow* w, int, int) { of(w).needs_frame_ = true; });
+        glfwSetWindowRefreshCallback(window_, [](GLFWwindow* w) { of(w).needs_frame_ = true; });
+        glm::dvec2 at(0);
+        glfwGetCursorPos(window_, &at.x, &at.y);
+        pointer_px_ = at * pixels_per_unit();
+    }
 
     void on_character(unsigned character) {
         needs_frame_ = true;
@@ -113,6 +143,7 @@ private:
             gaze_px_ = pointer_px_;
             gaze_follows_pointer_ = true;
             break;
+        case '=': // where + is on the same key
         case '+': scale_budget(budget_step); break;
         case '-': scale_budget(1 / budget_step); break;
         case 'w': draw_.wireframe = !draw_.wireframe; break;
@@ -123,10 +154,16 @@ private:
             view_ = options_.first_view;
             follow_window_size();
             break;
-        case 's': take_screenshot(); break;
+        case 's': {
+            const std::string file = screenshot_name();
+            tell_of(save_picture(file), file);
+            break;
+        }
+        case 'S': saves_window_ = true; break;
+        case 'i': shows_overlay_ = !shows_overlay_; break;
         case 'h':
-            std::fputs(viewer_help, stdout);
-            std::fflush(stdout);
+            shows_keys_ = !(shows_keys_ && shows_overlay_);
+            shows_overlay_ = true;
             break;
         case 'q': glfwSetWindowShouldClose(window_, GLFW_TRUE); break;
         default: break;
@@ -151,21 +188,42 @@ private:
         choose(Goal::budget(budget_));
     }
 
-    void on_button(bool is_down) { is_dragging_ = is_down; }
+    void on_button(int button, bool is_down, bool is_shifted) {
+        if (is_down) {
+            drag_ = button == GLFW_MOUSE_BUTTON_LEFT && !is_shifted ? Drag::turn : Drag::move;
+            drag_button_ = button;
+        } else if (button == drag_button_) {
+            drag_ = Drag::nothing;
+        }
+    }
 
-    void on_pointer(glm::dvec2 at) {
-        // GLFW's pointer is in screen coordinates, of which a pixel may have several or a share.
+    // GLFW's pointer is in screen coordinates, of which a pixel may have several or a share.
+    glm::dvec2 pixels_per_unit() const {
         int width = 0, height = 0;
         glfwGetWindowSize(window_, &width, &height);
-        const glm::dvec2 scale(view_.width / std::max(1.0, double(width)),
-                               view_.height / std::max(1.0, double(height)));
-        const glm::dvec2 moved = at * scale - pointer_px_;
-        pointer_px_ = at * scale;
-        if (is_dragging_) turn(moved * (turn_per_window / std::max(1, view_.height)));
+        return {view_.width / std::max(1.0, double(width)), view_.height / std::max(1.0, double(height))};
+    }
+
+    void on_pointer(glm::dvec2 at) {
+        const glm::dvec2 px = at * pixels_per_unit(), moved = px - pointer_px_;
+        pointer_px_ = px;
+        if (drag_ == Drag::turn) turn(moved * (turn_per_window / std::max(1, view_.height)));
+        if (drag_ == Drag::move) move(moved);
         if (gaze_follows_pointer_) {
             gaze_px_ = pointer_px_;
             needs_frame_ = true;
         }
+    }
+
+    // What is as far as the target stays under the pointer.
+    void move(glm::dvec2 px) {
+        const vdtree::CameraFrame frame = vdtree::camera_frame(view_);
+        const double half_height =
+            glm::length(view_.eye - view_.target) * std::tan(glm::radians(view_.fov_y_degrees) / 2);
+        const glm::dvec3 shift = (px.y * frame.up - px.x * frame.right) * (2 * half_height / std::max(1, view_.height));
+        view_.eye += shift;
+        view_.target += shift;
+        needs_frame_ = true;
     }
 
     // Around the target: across about the up vector, up and down about the camera's right.
@@ -220,34 +278,78 @@ private:
         const auto drawn = geomorph ? renderer_.draw_to_window(*geomorph, view_, draw_, placement())
                                     : renderer_.draw_to_window(follower_.cut(), view_, draw_, placement());
         if (!drawn) return drawn;
-        glfwSwapBuffers(window_);
+        if (auto done = context_.finish(); !done) return done;
+        // The first frame compiles and uploads: its time says nothing of those that follow.
+        if (has_drawn_) times_.add(milliseconds_since(start), result->adapt_ms);
+        if (auto shown = show(state_of(*result)); !shown) return shown;
         // What the time limit has left to do, and what glides, goes on in the next frame.
-        needs_frame_ = !result->stats.is_complete || result->gliding > 0 || (plays_gaze_ && gaze_.is_moving()) ||
-                       (session_.scene().lights && session_.scene().lights->moves());
-        show_title(*result, milliseconds_since(start));
+        if (!has_drawn_ || !result->stats.is_complete || result->gliding > 0 || (plays_gaze_ && gaze_.is_moving()) ||
+            (session_.scene().lights && session_.scene().lights->moves()))
+            needs_frame_ = true;
+        has_drawn_ = true;
         return {};
     }
 
-    std::string mode_name() const {
-        switch (request_.goal.kind) {
-        case Goal::Kind::full: return "full";
-        case Goal::Kind::budget: return "budget of " + grouped(budget_);
-        case Goal::Kind::pixels: return rounded(request_.goal.tolerance_px, 3) + " pixels";
-        case Goal::Kind::imperceptible: break;
-        }
-        return session_.observer().gaze ? "gaze-directed" : "imperceptible";
+    ViewerState state_of(const session::Report& report) const {
+        ViewerState state{.model = options_.model,
+                          .goal = request_.goal,
+                          .report = report,
+                          .display = display(),
+                          .window_px = {view_.width, view_.height}};
+        if (request_.goal.kind != Goal::Kind::full && session::is_perceptual(report.fold_tests.front()))
+            state.gaze = session_.observer().gaze;
+        state.gaze_source = gaze_follows_pointer_ ? session::GazeSource::mouse
+                            : plays_gaze_         ? options_.gaze_source
+                                                  : session::GazeSource::none;
+        state.limit_ms = request_.milliseconds;
+        state.frame_ms = times_.frame_ms();
+        state.adapt_ms = times_.adapt_ms();
+        return state;
     }
 
-    void show_title(const session::Report& s, double frame_ms) {
-        std::string title = "Unseen - " + mode_name() + ": " + grouped(s.stats.triangles) + " of " +
-                            grouped(s.source_triangles) + " triangles, " + rounded(s.adapt_ms, 2) + " ms to adapt, " +
-                            rounded(frame_ms, 2) + " ms a frame";
-        if (request_.goal.kind != Goal::Kind::full)
-            title += ", " + name_of(s.fold_tests.front()) + ", unseen from " + rounded(s.imperceptible_from_m, 2) +
-                     (std::isfinite(s.imperceptible_from_m) ? " m" : "");
-        if (!s.stats.is_complete) title += ", time is up: to be continued";
-        if (s.gliding > 0) title += ", " + grouped(s.gliding) + " vertices glide";
-        glfwSetWindowTitle(window_, title.c_str());
+    // What lies over the picture, and the frame as a whole.
+    Result<void> show(const ViewerState& state) {
+        auto window = render::Target::foreign(context_, view_.width, view_.height);
+        if (!window) return window.error();
+        if (auto drawn = overlay_.draw(*window, content_for(state)); !drawn) return drawn;
+        if (std::exchange(saves_window_, false)) {
+            const std::string file = screenshot_name();
+            tell_of(save_window(*window, file), file);
+        }
+        glfwSwapBuffers(window_);
+        if (const std::string title = viewer_title(state); title != title_) {
+            title_ = title;
+            glfwSetWindowTitle(window_, title_.c_str());
+        }
+        return {};
+    }
+
+    OverlayContent content_for(const ViewerState& state) const {
+        float scale = 1;
+        glfwGetWindowContentScale(window_, &scale, nullptr);
+        OverlayContent content;
+        content.line_px = std::max(text_line_px * static_cast<double>(scale), view_.height / lines_of_window);
+        if (shows_overlay_ || is_failure_) content.message = message_;
+        if (!shows_overlay_) return content;
+        content.status = viewer_lines(state);
+        if (shows_keys_) content.keys = viewer_keys();
+        if (!state.gaze) return content;
+        const auto ring = [&](double degrees) {
+            return session::gaze_circle(display(), view_, state.gaze->px, degrees);
+        };
+        const double margin = state.gaze->margin_deg;
+        if (state.gaze_source != session::GazeSource::head)
+            content.rings.push_back({ring(session::fovea_degrees), false});
+        if (margin > 0 && margin < most_margin_deg) content.rings.push_back({ring(margin), true});
+        return content;
+    }
+
+    // Over the picture, for a while; nothing: no more.
+    void say(std::string message, bool is_failure = false) {
+        message_ = std::move(message);
+        is_failure_ = is_failure;
+        message_end_ = Clock::now() + message_shown;
+        needs_frame_ = true;
     }
 
     void take_gaze(double now_s) {
@@ -265,15 +367,30 @@ private:
         return perception::write_image(file, code_image(*frame, display()));
     }
 
-    void take_screenshot() {
+    // With text and rings, as the window shows it.
+    static Result<void> save_window(const render::Target& window, const std::string& file) {
+        auto codes = render::read_colour(window);
+        if (!codes) return codes.error();
+        return perception::write_image(file, {window.width(), window.height(), 3, std::move(*codes)});
+    }
+
+    std::string screenshot_name() {
         std::array<char, 64> stamp;
         const std::time_t now = std::time(nullptr);
         std::tm local{};
         localtime_r(&now, &local);
         std::strftime(stamp.data(), stamp.size(), "unseen-%Y%m%d-%H%M%S", &local);
-        const std::string file = std::string(stamp.data()) + "-" + std::to_string(++screenshots_) + ".png";
-        if (auto saved = save_picture(file); !saved) failure_ = saved.error();
-        else print_note("wrote '" + file + "'.");
+        return std::string(stamp.data()) + "-" + std::to_string(++screenshots_) + ".png";
+    }
+
+    void tell_of(const Result<void>& saved, const std::string& file) {
+        if (saved) {
+            print_note("wrote '" + file + "'.");
+            say("Wrote " + file);
+        } else {
+            print_error(saved.error().message);
+            say("No screenshot: " + saved.error().message, true);
+        }
     }
 
     const perception::Display& display() const { return session_.observer().display; }
@@ -281,8 +398,10 @@ private:
 
     session::Session& session_;
     const ViewerOptions& options_;
+    const render::Context& context_;
     GLFWwindow* window_;
     render::Renderer renderer_;
+    ViewerOverlay overlay_;
     session::Follower follower_;
     vdtree::View view_;
     session::Request request_;
@@ -290,15 +409,23 @@ private:
     render::DrawOptions draw_;
     std::uint32_t budget_ = 1;
     glm::dvec2 pointer_px_ = glm::dvec2(0);
-    bool is_dragging_ = false;
+    enum class Drag { nothing, turn, move } drag_ = Drag::nothing;
+    int drag_button_ = 0;
     bool gaze_follows_pointer_;
     session::GazePlayer gaze_;
     bool plays_gaze_ = true; // until a mode is chosen
     Clock::time_point first_frame_ = Clock::now();
     bool needs_frame_ = true;
     Clock::time_point last_frame_ = Clock::now();
+    bool has_drawn_ = false;
+    FrameTimes times_;
+    bool shows_overlay_ = true, shows_keys_ = false;
+    std::string message_;     // over the picture, until the time
+    bool is_failure_ = false; // which is said even where text is hidden
+    Clock::time_point message_end_;
+    std::string title_;
+    bool saves_window_ = false; // of the next frame
     int screenshots_ = 0;
-    std::optional<Error> failure_; // of a callback, which cannot return it
 };
 
 } // namespace
@@ -311,6 +438,7 @@ Result<void> run_viewer(render::Context& window, session::Session& session, sess
     auto renderer = render::Renderer::create(window, session.tree());
     if (!renderer) return renderer.error();
     glfwShowWindow(window.glfw_window());
+    if (options.frames == 0) print_note("press h in the window to see its keys.");
     return Viewer(session, std::move(gaze), options, window, std::move(*renderer)).run();
 }
 

@@ -50,6 +50,13 @@ Result<Context> Context::adopt(std::unique_ptr<Platform> platform) {
 
 Result<void> Context::make_current() const { return impl_->platform->make_current(); }
 
+Result<void> Context::finish() const {
+    return in_context(*this, "Waiting for the GPU", []() -> Result<void> {
+        glFinish();
+        return {};
+    });
+}
+
 std::string Context::renderer_name() const { return impl_->renderer_name; }
 
 std::string Context::version() const { return impl_->version; }

@@ -8,6 +8,7 @@ namespace unseen::render::shaders {
 extern const std::string_view accumulate_frag;
 extern const std::string_view full_screen_vert;
 extern const std::string_view move_comp;
+extern const std::string_view overlay_frag;
 extern const std::string_view patch_comp;
 extern const std::string_view surface_vert;
 extern const std::string_view surface_geom;

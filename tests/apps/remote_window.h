@@ -16,7 +16,7 @@ namespace unseen::app::testing {
 inline constexpr std::chrono::seconds patience{60}; // software rendering on a busy machine
 inline constexpr std::chrono::milliseconds poll_pause{20};
 
-// The first window whose title begins with "Unseen".
+// The first window whose title begins or ends with "Unseen".
 class RemoteWindow {
 public:
     explicit RemoteWindow(Display* display) : display_(display) {}
@@ -64,8 +64,9 @@ public:
         send(event, PointerMotionMask);
     }
 
-    void button(unsigned number, bool is_down, int x, int y) {
+    void button(unsigned number, bool is_down, int x, int y, unsigned modifiers = 0) {
         XEvent event{};
+        event.xbutton.state = modifiers;
         fill(event.xbutton, is_down ? ButtonPress : ButtonRelease);
         event.xbutton.button = number;
         event.xbutton.x = x;
@@ -83,7 +84,8 @@ private:
     }
 
     Window search(Window window) const {
-        if (title_of(window).rfind("Unseen", 0) == 0) return window;
+        if (const std::string title = title_of(window); title.starts_with("Unseen") || title.ends_with("Unseen"))
+            return window;
         Window root = 0, parent = 0, found = 0;
         Window* children = nullptr;
         unsigned count = 0;

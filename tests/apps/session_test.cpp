@@ -1,7 +1,9 @@
 // The session library: requests that contradict themselves, plans, several objects.
 #include <cmath>
 #include <limits>
+#include <numbers>
 
+#include <glm/geometric.hpp>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -180,6 +182,33 @@ TEST(Follower, OutlivesItsSessionAndTakesUpMeasuredTrees) {
     EXPECT_EQ(folded->fold_tests.front(), FoldTest::error);
     EXPECT_TRUE(perception::has_fold_measurement(follower->cut().tree()));
     EXPECT_LT(folded->stats.triangles, whole->stats.triangles);
+}
+
+TEST(Observer, ACircleAroundTheGazeIsOneOfAngles) {
+    const perception::Display display;
+    vdtree::View view;
+    view.width = 800;
+    view.height = 600;
+    const double distance_px = display.distance / display.pixel_pitch;
+    const auto direction = [&](glm::dvec2 px) {
+        return glm::normalize(glm::dvec3(px - glm::dvec2(400, 300), distance_px));
+    };
+    for (const glm::dvec2 gaze : {glm::dvec2(400, 300), glm::dvec2(30, 580), glm::dvec2(2000, -700)}) {
+        for (const double degrees : {1.0, 15.0}) {
+            const auto circle = session::gaze_circle(display, view, gaze, degrees, 40);
+            ASSERT_EQ(circle.size(), 40u);
+            for (const glm::dvec2 px : circle) {
+                const double cosine = glm::dot(direction(px), direction(gaze));
+                EXPECT_NEAR(std::acos(cosine) * 180 / std::numbers::pi, degrees, 1e-9);
+            }
+        }
+    }
+    const auto middle = session::gaze_circle(display, view, {400, 300}, 1);
+    EXPECT_NEAR(middle.front().x - 400, std::tan(std::numbers::pi / 180) * distance_px, 1e-9) << "34 pixels a degree";
+    // A part of the circle is beside and behind the viewer, where no screen is.
+    for (const glm::dvec2 px : session::gaze_circle(display, view, {30000, 300}, 40)) {
+        EXPECT_TRUE(std::isfinite(px.x) && std::isfinite(px.y));
+    }
 }
 
 } // namespace

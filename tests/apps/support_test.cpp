@@ -9,6 +9,9 @@
 #include <limits>
 #include <set>
 #include <string>
+#include <vector>
+
+#include <glm/geometric.hpp>
 
 #include <vdtree/internal/number_format.h>
 
@@ -16,6 +19,7 @@
 #include "drawing.h"
 #include "log_log_plot.h"
 #include "panel_plot.h"
+#include "screen_text.h"
 #include "temp_folder.h"
 #include "visibility_map.h"
 
@@ -160,6 +164,135 @@ TEST(Drawing, CopiesPictures) {
     Drawing coloured = drawing(1, 1);
     coloured.picture({0, 0}, {1, 1, 3, {0.2f, 0.4f, 0.6f}});
     EXPECT_THAT(image_of(coloured).values, ::testing::Pointwise(::testing::FloatEq(), {0.2f, 0.4f, 0.6f}));
+}
+
+TEST(Drawing, LayersAreTransparentWhereNothingIsDrawn) {
+    auto layer = Drawing::layer(20, 10);
+    ASSERT_TRUE(layer);
+    layer->round_fill({2, 2}, {10, 6}, 2, {0.2f, 0.4f, 1.0f, 0.5f});
+    layer->fill({14, 4}, {3, 3}, white);
+    const auto pixels = *layer->layer_pixels();
+    const auto at = [&](std::size_t x, std::size_t y) { return glm::ivec4(pixels[20 * y + x]); };
+    EXPECT_EQ(at(0, 0), glm::ivec4(0));
+    EXPECT_EQ(at(15, 5), glm::ivec4(255));
+    EXPECT_EQ(at(7, 5).a, 128);
+    for (const int c : {0, 1, 2}) EXPECT_NEAR(at(7, 5)[c], 51 * (c == 2 ? 5 : c + 1), 1) << "not multiplied by alpha";
+    EXPECT_LT(at(2, 2).a, 64) << "a round corner";
+    EXPECT_EQ(at(2, 5).a, 128);
+    EXPECT_EQ((*drawing(2, 1, white).layer_pixels())[1], glm::u8vec4(255)) << "pictures are opaque";
+    EXPECT_FALSE(Drawing::layer(0, 5));
+    EXPECT_FALSE(Drawing::create(5, 5, black, Drawing::Kind::svg)->layer_pixels());
+}
+
+// Light that a pixel of a layer leaves over a background, both as luminance.
+double luminance_over(glm::u8vec4 pixel, double background) {
+    const auto linear = [](int code) {
+        const double c = code / 255.0;
+        return c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4);
+    };
+    const double share = pixel.a / 255.0;
+    const double own = 0.2126 * linear(pixel.r) + 0.7152 * linear(pixel.g) + 0.0722 * linear(pixel.b);
+    return share * own + (1 - share) * background;
+}
+
+TEST(ScreenText, IsReadableOverAnything) {
+    const std::vector<TextLine> lines = {{"MMMM", "MMMM"}};
+    const auto panel = text_panel(lines, 60, {2000, 2000}); // so large that strokes have whole pixels
+    ASSERT_TRUE(panel);
+    const auto at = [&](int x, int y) {
+        return panel->pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(panel->width) +
+                             static_cast<std::size_t>(x)];
+    };
+    const glm::u8vec4 backing = at(panel->width / 2, 5);
+    for (const double background : {0.0, 0.2, 1.0}) {
+        double leads = 0, letters = 0;
+        for (int y = 0; y < panel->height; ++y) {
+            for (int x = 0; x < panel->width; ++x) {
+                const glm::u8vec4 pixel = at(x, y);
+                double& most = pixel.r > pixel.b + 50 ? leads : letters; // leads are yellow
+                if (pixel.r > 250) most = std::max(most, luminance_over(pixel, background));
+            }
+        }
+        for (const double ink_luminance : {leads, letters})
+            EXPECT_GT((ink_luminance + 0.05) / (luminance_over(backing, background) + 0.05), 4.5) << background;
+    }
+    EXPECT_LT(backing.a, 250) << "something shines through";
+}
+
+TEST(ScreenText, PanelsShrinkIntoTheirRoom) {
+    const std::vector<TextLine> lines = {{"a line of some length"}, {"and another", "with a lead"}};
+    const auto free = text_panel(lines, 20, {2000, 2000}), narrow = text_panel(lines, 20, {140, 2000}),
+               low = text_panel(lines, 20, {2000, 30}), none = text_panel(lines, 20, {2000, 8});
+    ASSERT_TRUE(free && narrow && low && none);
+    EXPECT_NEAR(free->height, 2 * 20 + 2 * 0.55 * 20, 1.5);
+    EXPECT_GT(free->width, 140);
+    EXPECT_LE(narrow->width, 141);
+    EXPECT_LT(narrow->height, free->height);
+    EXPECT_LE(low->height, 31);
+    EXPECT_GT(low->height, 0);
+    EXPECT_EQ(none->width, 0) << "letters would be specks";
+    EXPECT_EQ(text_panel({}, 20, {2000, 2000})->width, 0);
+    EXPECT_EQ(text_panel(lines, NAN, {2000, 2000})->width, 0);
+    for (const auto& panel : {*free, *narrow, *low, *none})
+        EXPECT_EQ(panel.pixels.size(), static_cast<std::size_t>(panel.width) * static_cast<std::size_t>(panel.height));
+}
+
+TEST(ScreenText, PanelsKeepTheirWidthWhileANumberChanges) {
+    const auto width = [](const std::string& text) { return text_panel({{{text}}}, 20, {2000, 2000})->width; };
+    EXPECT_EQ(width("34,294 of 69,666 triangles"), width("34,111 of 69,666 triangles"));
+    EXPECT_LT(width("34"), width("34,294 of 69,666 triangles"));
+}
+
+TEST(ScreenText, BreaksLinesAtSpaces) {
+    const std::string text = "No screenshot: Cannot create 'a-very-long-name-of-a-file.png': No such file";
+    const auto lines = wrapped(text, 20, 200);
+    ASSERT_GT(lines.size(), 2u);
+    std::string joined;
+    for (const std::string& line : lines) {
+        joined += (joined.empty() ? "" : " ") + line;
+        if (line.find(' ') != std::string::npos) {
+            EXPECT_LE(Drawing::text_width(line, 0.84 * 20), 200.0) << line;
+        }
+    }
+    EXPECT_EQ(joined, text);
+    EXPECT_TRUE(wrapped("", 20, 200).empty());
+    EXPECT_THAT(wrapped("  two   words ", 20, 2000), ::testing::ElementsAre("two words"));
+}
+
+TEST(ScreenText, OutlinesLieWhereTheirPointsAre) {
+    std::vector<glm::dvec2> circle;
+    for (int i = 0; i < 60; ++i) circle.push_back({100 + 30 * std::cos(i * 0.10472), 50 + 30 * std::sin(i * 0.10472)});
+    const auto whole = outline(circle, 2, false, {400, 300}), dashed = outline(circle, 2, true, {400, 300}),
+               cut = outline(circle, 2, false, {100, 300}), outside = outline(circle, 2, false, {50, 300});
+    ASSERT_TRUE(whole && dashed && cut && outside);
+    const auto coverage = [](const Layer& layer) {
+        double sum = 0;
+        for (const glm::u8vec4 pixel : layer.pixels) sum += pixel.a / 255.0;
+        return sum;
+    };
+    // A ring six pixels wide: two of light between four of rim.
+    EXPECT_NEAR(coverage(*whole), 2 * 3.1416 * 30 * 6, 30);
+    for (int y = 0; y < whole->height; ++y) {
+        for (int x = 0; x < whole->width; ++x) {
+            const glm::u8vec4 pixel = whole->pixels[static_cast<std::size_t>(y * whole->width + x)];
+            const double off =
+                std::abs(glm::length(glm::dvec2(x, y) + 0.5 + glm::dvec2(whole->corner) - glm::dvec2(100, 50)) - 30);
+            if (off > 4) {
+                EXPECT_EQ(pixel.a, 0) << x << ", " << y;
+            }
+            if (off < 0.25) {
+                EXPECT_GT(pixel.r, 240) << x << ", " << y;
+            }
+            if (off > 1.8 && off < 2.2) {
+                EXPECT_LT(pixel.r, 10) << x << ", " << y;
+            }
+        }
+    }
+    EXPECT_LT(coverage(*dashed), 0.95 * coverage(*whole));
+    EXPECT_NEAR(coverage(*cut), coverage(*whole) / 2, 0.02 * coverage(*whole));
+    EXPECT_EQ(cut->corner.x + cut->width, 100);
+    EXPECT_EQ(outside->width, 0);
+    EXPECT_EQ(outline({}, 2, false, {400, 300})->width, 0);
 }
 
 TEST(Drawing, RefusesImpossibleSizes) {

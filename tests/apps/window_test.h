@@ -37,7 +37,12 @@ protected:
     // The command `words` with `more`. False where no window with OpenGL can be opened; errors() has the reason.
     bool open(std::vector<std::string> words, const std::vector<std::string>& more) {
         words.insert(words.end(), more.begin(), more.end());
-        process_ = start(words, path("out.txt"), path("err.txt"));
+        words.insert(words.begin(), UNSEEN_COMMAND);
+        return open_program(words);
+    }
+    // The same of a program that runs the command.
+    bool open_program(const std::vector<std::string>& words) {
+        process_ = start_program(words, path("out.txt"), path("err.txt"));
         window_ = std::make_unique<RemoteWindow>(display_);
         return process_ > 0 && window_->find();
     }

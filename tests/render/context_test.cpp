@@ -27,6 +27,16 @@ TEST_F(ContextTest, NamesItsRendererAndVersion) {
     EXPECT_EQ(context().glfw_window(), nullptr);
 }
 
+TEST_F(ContextTest, FinishWaitsForWhatWasAsked) {
+    const GLsync fence = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+    ASSERT_TRUE(context().finish());
+    EXPECT_EQ(glClientWaitSync(fence, 0, 0), static_cast<GLenum>(GL_ALREADY_SIGNALED));
+    glDeleteSync(fence);
+    raise_error();
+    EXPECT_TRUE(context().finish()) << "an older error is not its own";
+    EXPECT_NE(context().take_errors(), "");
+}
+
 TEST_F(ContextTest, ReportsErrorsOnceAndInWords) {
     raise_error();
     const std::string errors = context().take_errors();

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <numbers>
+
+#include <glm/geometric.hpp>
 
 #include <calibration/observer_profile.h>
 #include <vdtree/internal/errors.h>
@@ -12,6 +15,7 @@ namespace unseen::session {
 namespace {
 
 constexpr double default_background_cdm2 = 20;
+constexpr double least_depth = 1e-3; // of a direction of length 1, to lie on the screen: 89.94 degrees from its centre
 
 } // namespace
 
@@ -57,6 +61,23 @@ Result<float> relative_background(const perception::Display& display, std::optio
 glm::dvec2 gaze_aside(const perception::Display& display, const vdtree::View& view, double degrees) {
     const double tangent = std::tan(perception::to_radians(perception::Degrees(degrees)).value());
     return {view.width * 0.5 + tangent * (display.distance / display.pixel_pitch), view.height * 0.5};
+}
+
+std::vector<glm::dvec2> gaze_circle(const perception::Display& display, const vdtree::View& view, glm::dvec2 gaze_px,
+                                    double degrees, int count) {
+    const double distance_px = display.distance / display.pixel_pitch;
+    const glm::dvec2 centre = glm::dvec2(view.width, view.height) * 0.5;
+    const glm::dvec3 gaze = glm::normalize(glm::dvec3(gaze_px - centre, distance_px)); // right, down, into the screen
+    const glm::dvec3 right = glm::normalize(glm::cross(glm::dvec3(0, 1, 0), gaze)), down = glm::cross(gaze, right);
+    const double radius = perception::to_radians(perception::Degrees(degrees)).value();
+    std::vector<glm::dvec2> circle;
+    for (int i = 0; i < count; ++i) {
+        const double turn = 2 * std::numbers::pi * i / count;
+        const glm::dvec3 at =
+            std::cos(radius) * gaze + std::sin(radius) * (std::cos(turn) * right + std::sin(turn) * down);
+        circle.push_back(centre + glm::dvec2(at) * (distance_px / std::max(at.z, least_depth)));
+    }
+    return circle;
 }
 
 } // namespace unseen::session

@@ -40,6 +40,9 @@ public:
     // itself.
     Result<void> make_current() const;
 
+    // Waits until the GPU has done all that it was told to: for measuring times.
+    Result<void> finish() const;
+
     std::string renderer_name() const;        // GL_RENDERER
     std::string version() const;              // GL_VERSION
     GLFWwindow* glfw_window() const noexcept; // null when headless

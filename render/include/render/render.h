@@ -15,6 +15,7 @@
 #include <render/context.h>
 #include <render/draw.h>
 #include <render/gpu_tree.h>
+#include <render/overlay.h>
 #include <render/renderer.h>
 #include <render/sample_sum.h>
 #include <render/target.h>

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <glm/vec2.hpp>
 
@@ -45,5 +46,12 @@ Result<float> relative_background(const perception::Display& display, std::optio
 // The pixel so far to the right of the window's centre; it may lie outside of the window.
 glm::dvec2 gaze_aside(const perception::Display& display, const vdtree::View& view, double degrees);
 inline constexpr double usual_degrees_aside = 29; // well in the periphery
+
+// The pixels so far from a gaze for who looks from the display's distance: a circle on the retina, on the flat screen
+// an ellipse around about the gaze. `count` of them in order. What would lie beside or behind the viewer is put far
+// outside. Preconditions: finite, above 0 degrees and below 180, at least one.
+std::vector<glm::dvec2> gaze_circle(const perception::Display& display, const vdtree::View& view, glm::dvec2 gaze_px,
+                                    double degrees, int count = 72);
+inline constexpr double fovea_degrees = 1; // from its middle to its rim, about: where people see best
 
 } // namespace unseen::session

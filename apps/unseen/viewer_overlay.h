@@ -1,0 +1,64 @@
+// Text and rings over the viewer's picture, made again where they change.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include <render/overlay.h>
+
+#include "screen_text.h"
+
+namespace unseen::app {
+
+// A closed line through pixels of the window.
+struct Ring {
+    std::vector<glm::dvec2> points;
+    bool is_dashed = false;
+    bool operator==(const Ring&) const = default;
+};
+
+// What lies over a frame. What is empty is not there.
+struct OverlayContent {
+    std::vector<TextLine> status; // top left
+    std::vector<TextLine> keys;   // below it
+    std::string message;          // bottom left, above all else
+    std::vector<Ring> rings;
+    double line_px = 18; // of text
+};
+
+class ViewerOverlay {
+public:
+    explicit ViewerOverlay(const render::Context& context);
+
+    Result<void> draw(render::Target& window, const OverlayContent& content);
+
+private:
+    // A panel in a corner of the window.
+    struct Panel {
+        explicit Panel(const render::Context& context) : overlay(context) {}
+
+        render::Overlay overlay;
+        std::vector<TextLine> lines; // that the overlay shows, and how
+        double line_px = 0;
+        glm::dvec2 most_px = glm::dvec2(0);
+        glm::ivec2 size = glm::ivec2(0);
+    };
+    struct DrawnRing {
+        explicit DrawnRing(const render::Context& context) : overlay(context) {}
+
+        render::Overlay overlay;
+        Ring ring; // that the overlay shows, and where
+        double line_px = 0;
+        glm::ivec2 window = glm::ivec2(0), corner = glm::ivec2(0);
+    };
+    static Result<void> fill(Panel& panel, const std::vector<TextLine>& lines, double line_px, glm::dvec2 most_px);
+    static Result<void> fill(DrawnRing& drawn, const Ring& ring, double line_px, glm::ivec2 window);
+
+    render::Context context_;
+    Panel status_, keys_, message_;
+    std::vector<DrawnRing> rings_;
+};
+
+} // namespace unseen::app
