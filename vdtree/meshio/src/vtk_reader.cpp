@@ -48,7 +48,7 @@ public:
 
     ReadResult read() {
         read_header();
-        for (std::string_view word = next_word(); !word.empty(); word = next_word()) read_statement(lower_case(word));
+        for (std::string_view word = next_word(); !word.empty(); word = next_word()) read_statement(std::string(word));
         if (!has_points_) throw VtkFault{"it has no POINTS; the file is cut short."};
         polygons_.add(std::move(piece_));
         return polygons_.finish();
@@ -141,9 +141,9 @@ private:
     void read_header() {
         rest_of_line(); // the version, which nothing depends on
         rest_of_line(); // a title
-        const std::string mode = lower_case(word_of("ASCII or BINARY"));
+        const std::string word = word_of("ASCII or BINARY"), mode = lower_case(word);
         if (mode != "ascii" && mode != "binary")
-            fail("ASCII or BINARY should stand here, not " + in_quotes(mode) + "; the file is damaged.");
+            fail("ASCII or BINARY should stand here, not " + in_quotes(word) + "; the file is damaged.");
         if (!follows("dataset")) fail("DATASET should stand here; the file is damaged or holds no mesh.");
         const std::string kind = word_of("a kind of data set");
         is_binary_ = mode == "binary";
@@ -157,7 +157,8 @@ private:
 
     enum class Section { geometry, points, cells };
 
-    void read_statement(const std::string& keyword) {
+    void read_statement(const std::string& word) {
+        const std::string keyword = lower_case(word);
         if (keyword == "points") return read_points();
         if (keyword == "vertices") piece_.vertex_cells += skip_cells();
         else if (keyword == "lines") piece_.lines += skip_cells();
@@ -168,7 +169,7 @@ private:
         else if (keyword == "metadata") skip_metadata(3);
         else if (keyword == "field") read_field();
         else if (section_ == Section::geometry || !read_attribute(keyword))
-            fail(in_quotes(keyword) + " is no statement that can stand here; the file is damaged.");
+            fail(in_quotes(word) + " is no statement that can stand here; the file is damaged.");
     }
 
     void read_points() {

@@ -98,9 +98,10 @@ std::vector<std::byte> VtpDecoder::decode(std::string_view data, bool is_base64,
     Stream stream(data, is_base64);
     if (encoding_.compressor == "vtkZLibDataCompressor") return inflate(stream, bytes);
     if (!encoding_.compressor.empty())
-        throw VtkFault{"it is compressed by " + encoding_.compressor +
-                           ", which is not read; save the file with the compressor zlib or none, as ParaView offers them.",
-                       ErrorCode::unsupported};
+        throw VtkFault{
+            "it is compressed by " + encoding_.compressor +
+                ", which is not read; save the file with the compressor zlib or none, as ParaView offers them.",
+            ErrorCode::unsupported};
     if (const std::uint64_t found = header(stream); found != bytes) fail_length(found, bytes);
     if (bytes > stream.room()) fail_short();
     spend(bytes);

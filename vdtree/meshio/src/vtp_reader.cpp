@@ -141,7 +141,8 @@ private:
         VertexArray array{.name = node.attribute("Name").value(), .type = *type};
         if (components < 1 || components > std::numeric_limits<std::uint32_t>::max() ||
             tuples > std::numeric_limits<std::uint64_t>::max() / (components * byte_size(*type)))
-            throw VtkFault{"its " + std::to_string(components) + " components are no usable number."};
+            throw VtkFault{std::to_string(tuples) + " values of " + std::to_string(components) +
+                           " components are no usable numbers; the file is damaged."};
         array.components = static_cast<std::uint32_t>(components);
         const std::uint64_t values = tuples * components;
         const std::string_view format = node.attribute("format").value();
