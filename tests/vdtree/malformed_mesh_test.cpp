@@ -99,8 +99,8 @@ std::vector<std::pair<std::string, std::string>> all_samples() {
 
 // ---- cut short ----
 
-// How many bytes a sample can lose and still be whole: its last newline, an OFF's colour, an OBJ's optional indices, what
-// stands behind the data of a VTP.
+// How many bytes a sample can lose and still be whole: its last newline, an OFF's colour, an OBJ's optional indices,
+// what stands behind the data of a VTP.
 std::size_t dispensable_bytes(const std::string& name) {
     if (name == "ascii.ply") return 1;
     if (name == "quad.off") return std::string(" 255 0 0\n").size();

@@ -21,7 +21,7 @@
 #include "shapes.h"
 #include "temp_folder.h"
 #include "value_types.h"
-#include "vertex_arrays.h"
+#include "kept_arrays.h"
 
 namespace unseen::vdtree {
 namespace {

@@ -2,10 +2,10 @@
 #include "mesh_writers.h"
 
 #include "gltf_writer.h"
+#include "kept_arrays.h"
 #include "mesh_readers.h"
 #include "ply_slots.h"
 #include "value_types.h"
-#include "vertex_arrays.h"
 
 #include <algorithm>
 #include <array>
@@ -411,20 +411,25 @@ Result<void> write_mesh_with(const fs::path& file, const MeshView& mesh, std::sp
     if (is_gltf && mesh.triangles.empty()) {
         return cannot_write(file, "the mesh has no triangles, and glTF cannot hold such a mesh; write PLY.");
     }
+    if (ending == ".vtk" && !fits_legacy_vtk(mesh)) {
+        return cannot_write(file, "the mesh is too large for the 32-bit sizes of legacy VTK; write .vtp.");
+    }
     if (const auto names = names_of(arrays); !names.empty() && !holds_arrays(ending))
         notes.push_back("values of vertices were left out: " + listed(names) + "; .ply, .vtp and .vtk hold them.");
     if (is_gltf) return write_gltf(file, mesh);
     Result<AtomicFile> target = AtomicFile::create(file);
     if (!target) return target.error();
     FileOutput out(std::move(*target));
-    Result<void> written;
-    if (ending == ".ply") written = write_ply(out, mesh, PlyColumns(mesh, arrays, notes), progress);
-    else if (ending == ".vtp") write_vtp(out, mesh, arrays);
-    else if (ending == ".vtk") written = write_legacy_vtk(out, mesh, arrays);
-    else write_obj(out, mesh);
-    if (!written)
-        return written.error().code == ErrorCode::cancelled ? written
-                                                            : Result<void>(cannot_write(file, written.error().message));
+    if (ending == ".ply") {
+        const PlyColumns columns(mesh, arrays, notes);
+        if (const Result<void> written = write_ply(out, mesh, columns, progress); !written) return written;
+    } else if (ending == ".vtp") {
+        write_vtp(out, mesh, arrays);
+    } else if (ending == ".vtk") {
+        write_legacy_vtk(out, mesh, arrays);
+    } else {
+        write_obj(out, mesh);
+    }
     return out.finish();
 }
 

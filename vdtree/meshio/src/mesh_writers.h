@@ -23,9 +23,10 @@ Result<void> write_mesh_with(const std::filesystem::path& file, const vdtree::Me
                              const Progress& progress = {});
 
 // XML PolyData (.vtp): little-endian, raw behind the XML; legacy polydata (.vtk): binary, version 3.0. Points are
-// floats where that is exact and doubles otherwise. Fails where a mesh is too large for 32-bit sizes of legacy files.
+// floats where that is exact and doubles otherwise. Precondition of the second: the mesh fits.
 void write_vtp(FileOutput& out, const vdtree::MeshView& mesh, std::span<const VertexArray> arrays);
-Result<void> write_legacy_vtk(FileOutput& out, const vdtree::MeshView& mesh, std::span<const VertexArray> arrays);
+void write_legacy_vtk(FileOutput& out, const vdtree::MeshView& mesh, std::span<const VertexArray> arrays);
+bool fits_legacy_vtk(const vdtree::MeshView& mesh); // whose sizes have 32 bits
 
 // Whether all positions are floats.
 bool are_floats(const vdtree::MeshView& mesh);

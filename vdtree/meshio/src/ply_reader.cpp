@@ -1,10 +1,10 @@
 // PLY: G. Turk, The PLY polygon file format (1994). ASCII and both byte orders; any properties in any order.
 #include "face_collector.h"
+#include "kept_arrays.h"
 #include "mesh_readers.h"
 #include "ply_slots.h"
 #include "text_scanner.h"
 #include "value_types.h"
-#include "vertex_arrays.h"
 
 #include <algorithm>
 #include <array>

@@ -3,22 +3,19 @@
 #include <algorithm>
 #include <cctype>
 #include <limits>
+#include <map>
 #include <span>
+#include <string_view>
 
+#include "kept_arrays.h"
 #include "value_types.h"
-#include "vertex_arrays.h"
 
 namespace unseen::meshio {
 
 namespace {
 
-void add_new(std::vector<std::string>& names, const std::vector<std::string>& more) {
-    for (const std::string& name : more)
-        if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-}
-
-bool is_same_array(const VertexArray& a, const VertexArray& b) {
-    return a.name == b.name && a.type == b.type && a.components == b.components;
+bool is_same_kind(const VertexArray& a, const VertexArray& b) {
+    return a.type == b.type && a.components == b.components;
 }
 
 bool is_named(const VertexArray& array, std::initializer_list<std::string_view> lower) {
@@ -55,16 +52,21 @@ Error error_of(const MeshSource& source, const VtkFault& fault) {
     return {fault.code, source.name + ": " + fault.what};
 }
 
+void VtkPolygons::NameList::add(const std::vector<std::string>& more) {
+    for (const std::string& name : more)
+        if (known.insert(name).second) names.push_back(name);
+}
+
 void VtkPolygons::add(VtkPiece piece) {
     vertex_cells_ += piece.vertex_cells;
     lines_ += piece.lines;
-    add_new(cell_arrays_, piece.cell_arrays);
-    add_new(other_arrays_, piece.other_arrays);
+    cell_arrays_.add(piece.cell_arrays);
+    other_arrays_.add(piece.other_arrays);
     Mesh& mesh = result_.mesh;
     const std::size_t first = mesh.positions.size(), count = piece.points.size();
     if (count > std::numeric_limits<Index>::max() - first)
         throw VtkFault{"it has more points than 32-bit indices can number; split the mesh.", ErrorCode::unsupported};
-    mesh.positions.reserve(first + count);
+    if (first == 0) mesh.positions.reserve(count); // later ones let it grow: there may be very many
     for (std::size_t i = 0; i < count; ++i) {
         mesh.positions.emplace_back(piece.points.number(i, 0), piece.points.number(i, 1), piece.points.number(i, 2));
         check_position(result_.bad, mesh.positions.back(), [&] { return piece.name + "point " + std::to_string(i); });
@@ -103,18 +105,19 @@ void VtkPolygons::add_data(VtkPiece& piece) {
         scalars_ = piece.scalars, normals_ = piece.normals, uvs_ = piece.uvs;
         return;
     }
+    std::map<std::string_view, const VertexArray*> by_name;
+    for (const VertexArray& array : piece.data) by_name.try_emplace(array.name, &array);
     std::erase_if(data_, [&](VertexArray& array) {
-        const auto found = std::find_if(piece.data.begin(), piece.data.end(),
-                                        [&](const VertexArray& other) { return is_same_array(array, other); });
-        if (found == piece.data.end()) {
-            add_new(partial_arrays_, {array.name});
-            return true;
-        }
-        array.values.insert(array.values.end(), found->values.begin(), found->values.end());
-        piece.data.erase(found);
-        return false;
+        const auto found = by_name.find(array.name);
+        const bool is_there = found != by_name.end() && is_same_kind(array, *found->second);
+        if (is_there) {
+            const auto& more = found->second->values;
+            array.values.insert(array.values.end(), more.begin(), more.end());
+            by_name.erase(found);
+        } else partial_arrays_.add({array.name});
+        return !is_there;
     });
-    for (const VertexArray& array : piece.data) add_new(partial_arrays_, {array.name});
+    for (const auto& rest : by_name) partial_arrays_.add({std::string(rest.first)});
 }
 
 void VtkPolygons::give_roles() {
@@ -164,15 +167,15 @@ ReadResult VtkPolygons::finish() {
     if (vertex_cells_ + lines_ > 0)
         result_.warnings.push_back(counted(vertex_cells_, "vertex cell") + " and " + counted(lines_, "line") +
                                    " were left out: only polygons and triangle strips are kept.");
-    if (!cell_arrays_.empty())
-        result_.notes.push_back("values of cells were left out: " + listed(cell_arrays_) +
+    if (!cell_arrays_.names.empty())
+        result_.notes.push_back("values of cells were left out: " + listed(cell_arrays_.names) +
                                 "; those of points are kept.");
-    if (!other_arrays_.empty())
+    if (!other_arrays_.names.empty())
         result_.notes.push_back("arrays of text, of bits and of other lengths than the points' were left out: " +
-                                listed(other_arrays_) + ".");
-    if (!partial_arrays_.empty())
-        result_.notes.push_back("arrays that not all pieces have alike were left out: " + listed(partial_arrays_) +
-                                ".");
+                                listed(other_arrays_.names) + ".");
+    if (!partial_arrays_.names.empty())
+        result_.notes.push_back(
+            "arrays that not all pieces have alike were left out: " + listed(partial_arrays_.names) + ".");
     give_roles();
     keep_arrays(result_, std::move(data_));
     return std::move(result_);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -42,6 +43,14 @@ public:
     ReadResult finish();
 
 private:
+    // In their order, each once.
+    struct NameList {
+        std::vector<std::string> names;
+        std::set<std::string> known;
+
+        void add(const std::vector<std::string>& more);
+    };
+
     void add_cells(const VtkPiece& piece, const VtkCells& cells, const FaceVertices& vertices, bool are_strips);
     void add_data(VtkPiece& piece);
     void give_roles();
@@ -56,7 +65,7 @@ private:
     std::uint64_t vertex_cells_ = 0, lines_ = 0;
     std::vector<VertexArray> data_;
     std::string scalars_, normals_, uvs_;
-    std::vector<std::string> cell_arrays_, other_arrays_, partial_arrays_;
+    NameList cell_arrays_, other_arrays_, partial_arrays_;
 };
 
 } // namespace unseen::meshio

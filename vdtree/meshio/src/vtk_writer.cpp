@@ -11,10 +11,10 @@
 
 #include <vdtree/colour.h>
 
+#include "kept_arrays.h"
 #include "mesh_readers.h"
 #include "mesh_writers.h"
 #include "value_types.h"
-#include "vertex_arrays.h"
 #include "vtk_types.h"
 
 namespace unseen::meshio {
@@ -196,6 +196,8 @@ private:
 
 // ---- legacy
 
+constexpr std::size_t numbers_a_triangle = 4; // how many corners, and these
+
 // As VTK does: a name is one word.
 std::string percent_encoded(std::string_view name) {
     constexpr const char* digits = "0123456789ABCDEF";
@@ -243,10 +245,11 @@ void write_vtp(FileOutput& out, const MeshView& mesh, std::span<const VertexArra
     VtpWriter(out, mesh).write(point_data_of(mesh, arrays));
 }
 
-Result<void> write_legacy_vtk(FileOutput& out, const MeshView& mesh, std::span<const VertexArray> arrays) {
-    constexpr std::size_t numbers_a_triangle = 4;
-    if (mesh.triangles.size() > INT32_MAX / numbers_a_triangle || mesh.positions.size() > INT32_MAX)
-        return Error{ErrorCode::unsupported, "the mesh is too large for 32-bit sizes; write .vtp."};
+bool fits_legacy_vtk(const MeshView& mesh) {
+    return mesh.triangles.size() <= INT32_MAX / numbers_a_triangle && mesh.positions.size() <= INT32_MAX;
+}
+
+void write_legacy_vtk(FileOutput& out, const MeshView& mesh, std::span<const VertexArray> arrays) {
     VtkNumbers numbers(out, std::endian::big);
     const bool has_floats = are_floats(mesh);
     out.text("# vtk DataFile Version 3.0\nwritten by unseen\nBINARY\nDATASET POLYDATA\nPOINTS " +
@@ -260,7 +263,6 @@ Result<void> write_legacy_vtk(FileOutput& out, const MeshView& mesh, std::span<c
     }
     out.text("\n");
     write_legacy_data(out, numbers, mesh, point_data_of(mesh, arrays));
-    return {};
 }
 
 } // namespace unseen::meshio

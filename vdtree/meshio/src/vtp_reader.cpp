@@ -1,5 +1,5 @@
-// VTK's XML format for polygons: VTK File Formats, https://docs.vtk.org, "XML File Formats". What lies raw behind the XML
-// makes the file no XML, so it is cut off first.
+// VTK's XML format for polygons: VTK File Formats, https://docs.vtk.org, "XML File Formats". What lies raw behind the
+// XML makes the file no XML, so it is cut off first.
 #include <algorithm>
 #include <cstdint>
 #include <limits>
@@ -10,10 +10,10 @@
 
 #include <pugixml.hpp>
 
+#include "kept_arrays.h"
 #include "mesh_readers.h"
 #include "text_scanner.h"
 #include "value_types.h"
-#include "vertex_arrays.h"
 #include "vtk_polygons.h"
 #include "vtk_types.h"
 #include "vtp_data.h"

@@ -16,11 +16,11 @@
 #include "gltf_data.h"
 #include "gltf_document.h"
 #include "gltf_writer.h"
+#include "kept_arrays.h"
 #include "material_formats.h"
 #include "mesh_readers.h"
 #include "mesh_writers.h"
 #include "restore.h"
-#include "vertex_arrays.h"
 
 namespace unseen::meshio {
 

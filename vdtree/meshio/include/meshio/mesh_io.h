@@ -1,8 +1,8 @@
 // Mesh files as triangle soups of any topology.
 //
 // Read: PLY (ASCII, both endians, face lists and triangle strips), OBJ, OFF, STL (ASCII and binary), glTF 2.0 (.gltf,
-// .glb) and VTK's polygons (.vtp: ASCII, base64 and raw, plain or by zlib; legacy .vtk: ASCII and binary), told apart by
-// their content where it is unambiguous, else by the file name's ending.
+// .glb) and VTK's polygons (.vtp: ASCII, base64, raw, also with zlib; legacy .vtk: ASCII, binary), told apart by their
+// content where it is unambiguous, else by the file name's ending.
 // Write: PLY, OBJ, glTF (.gltf, .glb), VTK (.vtp, .vtk), by ending.
 //
 // Nothing in a file is believed: every count is checked against the bytes that are there before memory is

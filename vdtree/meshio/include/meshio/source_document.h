@@ -1,6 +1,6 @@
 // What a mesh file says beyond its triangles: nodes, materials, textures, images, what its vertices had before
-// materials were laid over them, and values that they have besides. It goes with the mesh and its tree as bytes (MeshView::document), so that a cut can be
-// written with all of it.
+// materials were laid over them, and values that they have besides. It goes with the mesh and its tree as bytes
+// (MeshView::document), so that a cut can be written with all of it.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-#include "vertex_arrays.h"
+#include "kept_arrays.h"
 
 #include <algorithm>
 #include <array>
@@ -29,7 +29,7 @@ public:
         high_ = std::max(high_, value);
     }
     bool is_there() const { return count_ > 0; }
-    // Within the values, so that equal ones stay what they are. A sum beyond all numbers has no better mean than theirs.
+    // Within the values, so that equal ones stay what they are. For sums beyond all numbers the middle has to do.
     double value() const {
         const double mean = std::isfinite(sum_) ? sum_ / static_cast<double>(count_) : low_ / 2 + high_ / 2;
         return std::clamp(mean, low_, high_);
