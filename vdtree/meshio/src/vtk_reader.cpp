@@ -1,6 +1,6 @@
 // VTK's legacy format: VTK File Formats, https://docs.vtk.org, "Simple Legacy Formats", with what versions 4.1
-// (METADATA) and 5.1 (OFFSETS and CONNECTIVITY) added. Statements are text, and so are numbers after ASCII; after BINARY
-// they are big-endian and begin behind the newline of their statement.
+// (METADATA) and 5.1 (OFFSETS and CONNECTIVITY) added. Statements are text, and so are numbers after ASCII; after
+// BINARY they are big-endian and begin behind the newline of their statement.
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -313,7 +313,7 @@ private:
                "LOOKUP_TABLE");
     }
 
-    // "FIELD NAME N", then N times "NAME COMPONENTS TUPLES TYPE" and the values. Before other data it is the file's own.
+    // "FIELD NAME N", then N times "NAME COMPONENTS TUPLES TYPE" and the values. Before other data it is the file's.
     void read_field() {
         word_of("a name");
         const std::uint64_t arrays = count_of("the number of arrays");
