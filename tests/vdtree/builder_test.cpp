@@ -869,7 +869,7 @@ TEST(Relit, ShadesColoursByTheLight) {
     const auto tree = build_tree(mesh.view(), {.prelit = true});
     ASSERT_TRUE(tree);
     EXPECT_TRUE(tree->is_prelit());
-    const Light light{.direction = {0, 0, 1}, .ambient = 0.3f};
+    const Light light{.direction = {0, 0, 1}, .ambient = 0.3f, .fill = 0};
     const VertexTree lit = *tree->relit(light);
     EXPECT_FALSE(lit.is_prelit());
     EXPECT_TRUE(verify(lit));
