@@ -15,13 +15,13 @@
 #include <vdtree/builder.h>
 #include <vdtree/tree_io.h>
 
+#include "kept_arrays.h"
 #include "mesh_files.h"
 #include "mesh_readers.h"
 #include "mesh_writers.h"
 #include "shapes.h"
 #include "temp_folder.h"
 #include "value_types.h"
-#include "kept_arrays.h"
 
 namespace unseen::vdtree {
 namespace {
