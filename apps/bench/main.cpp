@@ -133,7 +133,7 @@ Command engine_command(CLI::App& app) {
     auto a = std::make_shared<EngineArguments>();
     CLI::App* verb = app.add_subcommand("engine", "Cuts, budgets, memory and building, against what is promised");
     verb->add_option("--mesh", a->options.mesh,
-                     "PLY, OBJ, OFF, STL or glTF (default: the dragon, as ./quickstart --dragon gets it; "
+                     "PLY, OBJ, OFF, STL, glTF or VTK (default: the dragon, as ./quickstart --dragon gets it; "
                      "without it a sphere with bumps)")
         ->type_name("MESH");
     CLI::Option* sizes =

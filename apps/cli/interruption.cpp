@@ -4,7 +4,11 @@
 #include <csignal>
 #include <cstdio>
 
+#include <unistd.h>
+
 #include <vdtree/internal/atomic_file.h>
+
+#include "command.h"
 
 namespace unseen::app {
 namespace {
@@ -25,6 +29,15 @@ void on_signal(int signal) {
     end_by(signal);
 }
 
+// What a mapped file's pages raise when the file has become shorter than it was.
+void on_lost_page(int) {
+    static constexpr char sentence[] = "unseen: A file that is read in place was cut short while it was read. Write it "
+                                       "anew under another name and rename it.\n";
+    [[maybe_unused]] const auto written = ::write(STDERR_FILENO, sentence, sizeof sentence - 1);
+    vdtree::AtomicFile::remove_all();
+    ::_exit(exit_failed);
+}
+
 } // namespace
 
 void clean_up_on_signals() {
@@ -36,6 +49,9 @@ void clean_up_on_signals() {
         action.sa_flags = SA_RESTART;
         ::sigaction(signal, &action, nullptr);
     }
+    struct sigaction action {};
+    action.sa_handler = on_lost_page;
+    ::sigaction(SIGBUS, &action, nullptr);
 }
 
 Interruptible::Interruptible() { is_interruptible = true; }

@@ -241,7 +241,7 @@ Result<int> run(const BuildArguments& a) {
 Command build_command(CLI::App& app) {
     auto a = std::make_shared<BuildArguments>();
     CLI::App* verb = app.add_subcommand("build", "Build the vertex tree of a mesh");
-    verb->add_option("MESH", a->mesh, "PLY, OBJ, OFF, STL or glTF")->required()->type_name("FILE");
+    verb->add_option("MESH", a->mesh, "PLY, OBJ, OFF, STL, glTF or VTK (.vtp, .vtk)")->required()->type_name("FILE");
     verb->add_option("-o,--output", a->out, "The tree")->type_name("TREE.vdt")->required()->check(ending_in({".vdt"}));
     add_choice<vdtree::ClustererKind, vdtree::ClustererKind>(
         *verb, "--clusterer", a->clusterer,

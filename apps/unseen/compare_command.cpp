@@ -7,6 +7,7 @@
 
 #include <perception/image.h>
 #include <perception/judge.h>
+#include <perception/summing_judge.h>
 
 #include "output_files.h"
 #include "report.h"
@@ -24,11 +25,12 @@ using perception::Judgement;
 
 constexpr const char* perceptualdiff = "perceptualdiff";
 
-enum class Model { modern, rpg99 };
+enum class Model { modern, summing, rpg99 };
 
 struct CompareArguments {
-    std::string reference, test, map, threshold_map, json, profile, model_name = "modern";
+    std::string reference, test, map, threshold_map, json, profile, observer_name, model_name = "modern";
     Model model = Model::modern;
+    perception::Person observer = perception::default_person; // of the judge that sums
     DisplayOptions display;
     std::optional<glm::dvec2> gaze_px;
     std::optional<double> field_degrees;
@@ -62,7 +64,8 @@ struct Verdict {
     std::optional<Image> threshold_map;
 };
 
-Result<Verdict> judge_modern(const CompareArguments& a, const Pair& pair, const perception::Display& display) {
+// The judges modern and summing.
+Result<Verdict> judge_by_bands(const CompareArguments& a, const Pair& pair, const perception::Display& display) {
     const Image reference = perception::to_luminance(pair.reference, display);
     const Image test = perception::to_luminance(pair.test, display);
     perception::JudgeOptions options;
@@ -73,6 +76,13 @@ Result<Verdict> judge_modern(const CompareArguments& a, const Pair& pair, const 
         if (!chosen) return chosen.error();
         if (chosen->model) options.csf = *chosen->model;
         if (chosen->table) options.csf_table = std::make_shared<const perception::CsfTable>(*std::move(chosen->table));
+    }
+    if (a.model == Model::summing) {
+        const auto judge = perception::SummingJudge::create(reference, options, a.observer.gain);
+        if (!judge) return judge.error();
+        auto judgement = judge->judge(test);
+        if (!judgement) return judgement.error();
+        return Verdict{std::move(*judgement), {}};
     }
     auto judgement = perception::judge_modern(reference, test, options);
     if (!judgement) return judgement.error();
@@ -133,8 +143,16 @@ Result<void> write_maps(const CompareArguments& a, const Verdict& verdict) {
 std::string judged_by(const CompareArguments& a, const perception::Display& display) {
     if (a.model == Model::rpg99)
         return "by the judge rpg99" + (a.profile.empty() ? "" : ", as " + a.profile + " does it");
-    std::string text = "by the judge modern and the ";
-    text += a.display.csf.empty() ? "default observer (castleCSF, a typical person)" : "observer " + a.display.csf;
+    std::string text;
+    if (a.model == Model::summing) {
+        text = "by the judge summing and the observer ";
+        text += a.display.csf.empty() ? std::string(a.observer.name) + " (of measured people, " +
+                                            rounded(100 * a.observer.share_above, 2) + "% see more)"
+                                      : a.display.csf;
+    } else {
+        text = "by the judge modern and the ";
+        text += a.display.csf.empty() ? "default observer (castleCSF, a typical person)" : "observer " + a.display.csf;
+    }
     text += ", looked at from " + rounded(display.distance.value(), 3) + " m, ";
     if (!a.gaze_px) return text + "wherever the gaze";
     return text + "with the gaze at pixel " + shortest(a.gaze_px->x) + " " + shortest(a.gaze_px->y);
@@ -151,7 +169,7 @@ Result<int> run(const CompareArguments& a) {
     if (!display) return display.error();
     const auto pair = read_pair(a);
     if (!pair) return pair.error();
-    const auto verdict = a.model == Model::modern ? judge_modern(a, *pair, *display) : judge_rpg99(a, *pair, *display);
+    const auto verdict = a.model == Model::rpg99 ? judge_rpg99(a, *pair, *display) : judge_by_bands(a, *pair, *display);
     if (!verdict) return verdict.error();
 
     const Judgement& judgement = verdict->judgement;
@@ -181,11 +199,18 @@ void check(CompareArguments& a) {
         a.display.file.clear();
         a.profile = perceptualdiff;
     }
-    a.model = a.model_name == "rpg99" ? Model::rpg99 : Model::modern;
-    if (a.model == Model::modern && !a.profile.empty()) refuse("--profile perceptualdiff needs --model rpg99.");
-    if (a.model == Model::modern && a.field_degrees) refuse("--field needs --model rpg99; modern takes the display's.");
-    if (a.model == Model::rpg99 && a.gaze_px) refuse("--gaze needs --model modern: rpg99 knows no eccentricity.");
-    if (a.model == Model::rpg99 && !a.display.csf.empty()) refuse("--csf needs --model modern.");
+    a.model = a.model_name == "rpg99" ? Model::rpg99 : a.model_name == "summing" ? Model::summing : Model::modern;
+    const bool is_rpg99 = a.model == Model::rpg99;
+    if (!is_rpg99 && !a.profile.empty()) refuse("--profile perceptualdiff needs --model rpg99.");
+    if (!is_rpg99 && a.field_degrees) refuse("--field needs --model rpg99; the others take the display's.");
+    if (is_rpg99 && a.gaze_px) refuse("--gaze needs --model modern or summing: rpg99 knows no eccentricity.");
+    if (is_rpg99 && !a.display.csf.empty()) refuse("--csf needs --model modern or summing.");
+    if (a.model == Model::summing && !a.threshold_map.empty())
+        refuse("--threshold-map needs --model modern or rpg99: what a sum over space just sees is no map of steps.");
+    if (a.observer_name.empty()) return;
+    if (a.model != Model::summing) refuse("--observer needs --model summing.");
+    if (!a.display.csf.empty()) refuse("--observer excludes --csf, which is an observer of its own.");
+    a.observer = *perception::person(a.observer_name);
 }
 
 } // namespace
@@ -197,9 +222,16 @@ Command compare_command(CLI::App& app) {
         ->required()
         ->type_name("IMAGE");
     verb->add_option("TEST", a->test, "The image to judge")->required()->type_name("IMAGE");
-    verb->add_option("--model", a->model_name, "modern (default) or rpg99 (of 1999, blind to fine detail)")
+    verb->add_option(
+            "--model", a->model_name,
+            "modern (default), summing (sees more of what is larger), or rpg99 (of 1999, blind to fine detail)")
         ->type_name("NAME")
-        ->check(one_of({"modern", "rpg99"}));
+        ->check(one_of({"modern", "summing", "rpg99"}));
+    verb->add_option("--observer", a->observer_name,
+                     "With summing: median, default (one in twelve of measured people sees more) or strict (one in "
+                     "twenty)")
+        ->type_name("NAME")
+        ->check(one_of({"median", "default", "strict"}));
     verb->add_option("--profile", a->profile,
                      "With rpg99: perceptualdiff, which does all as that program does (gamma 2.2, AdobeRGB, black 0)")
         ->type_name("NAME")
@@ -227,6 +259,7 @@ Command compare_command(CLI::App& app) {
     verb->callback([o = a.get()] { check(*o); });
     verb->footer("Examples:\n  unseen compare full.pfm simplified.pfm --gaze 1603 512 --fail-above 0\n"
                  "  unseen compare a.png b.png --map map.png --json -\n"
+                 "  unseen compare a.pfm b.pfm --model summing --observer strict\n"
                  "  unseen compare a.png b.png --model rpg99 --profile perceptualdiff --field 45");
     return {verb, [a] { return run(*a); }};
 }

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include <meshio/examine.h>
+#include <meshio/mesh_io.h>
 
 #include "model_file.h"
 #include "options.h"
@@ -52,6 +53,60 @@ std::uint64_t file_bytes_of(const std::string& file) {
     return code ? 0 : size;
 }
 
+// Values of vertices: those that cuts are written with.
+using Arrays = std::vector<meshio::VertexArray>;
+
+Arrays values_among(Arrays arrays) {
+    std::erase_if(arrays, [](const meshio::VertexArray& a) { return a.role != meshio::VertexArray::Role::value; });
+    return arrays;
+}
+
+Json arrays_json(const Arrays& arrays) {
+    Json json = Json::array();
+    for (const meshio::VertexArray& array : arrays) {
+        Json ranges = Json::array();
+        std::uint64_t not_finite = 0;
+        for (std::uint32_t c = 0; c < array.components; ++c) {
+            const meshio::ValueRange range = meshio::range_of(array, c);
+            ranges.push_back(range.low <= range.high ? Json{range.low, range.high} : Json());
+            not_finite += range.not_finite;
+        }
+        json.push_back({{"name", array.name},
+                        {"type", meshio::name_of(array.type)},
+                        {"components", array.components},
+                        {"ranges", std::move(ranges)},
+                        {"not_finite", not_finite}});
+    }
+    return json;
+}
+
+// "values 'pressure': float32, 0.1 to 5", one line an array.
+void print_arrays(const Arrays& arrays) {
+    for (const Json& array : arrays_json(arrays)) {
+        std::string name = array["name"], text;
+        for (char& c : name)
+            if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) c = '?'; // nothing that a terminal obeys
+        for (const Json& range : array["ranges"]) {
+            text += text.empty() ? ", " : "; ";
+            text += range.is_null() ? "none finite"
+                                    : rounded(range[0].get<double>(), 6) + " to " + rounded(range[1].get<double>(), 6);
+        }
+        const auto not_finite = array["not_finite"].get<std::uint64_t>();
+        const auto components = array["components"].get<std::uint32_t>();
+        print_line("values '" + name + "': " + array["type"].get<std::string>() +
+                   (components > 1 ? " x " + std::to_string(components) : "") + text +
+                   (not_finite > 0 ? "; " + grouped(not_finite) + " NaN or infinite" : ""));
+    }
+}
+
+// Of what the mesh's file said.
+Result<Arrays> arrays_of(const vdtree::VertexTree& tree) {
+    if (tree.document().empty()) return Arrays();
+    auto document = meshio::unpack(tree.document());
+    if (!document) return document.error();
+    return values_among(std::move(document->arrays));
+}
+
 Result<int> describe_tree(const InfoArguments& a) {
     auto tree = load_tree(a.file);
     if (!tree) return tree.error();
@@ -59,6 +114,8 @@ Result<int> describe_tree(const InfoArguments& a) {
         if (auto sound = vdtree::verify(*tree); !sound)
             return Error{sound.error().code, a.file + ": " + sound.error().message};
     }
+    const auto arrays = arrays_of(*tree);
+    if (!arrays) return Error{arrays.error().code, a.file + ": " + arrays.error().message};
     const std::uint64_t file_bytes = file_bytes_of(a.file);
     const vdtree::LuminanceRange range = tree->luminance_range();
     Json json = {{"kind", "tree"},
@@ -71,6 +128,7 @@ Result<int> describe_tree(const InfoArguments& a) {
                  {"closed", tree->closedness() != vdtree::Closedness::open},
                  {"prelit", tree->is_prelit()},
                  {"texture", texture_json(*tree)},
+                 {"arrays", arrays_json(*arrays)},
                  {"ranges", tree->ranges().size()}};
     if (a.verify) json["verified"] = true;
     Rows rows = {
@@ -88,6 +146,7 @@ Result<int> describe_tree(const InfoArguments& a) {
         {"groups and materials", grouped(tree->ranges().size())}};
     if (a.verify) rows.push_back({"verified", "sound"});
     output(a.json, json, rows);
+    if (!a.json) print_arrays(*arrays);
     return exit_done;
 }
 
@@ -170,6 +229,7 @@ Result<int> describe_mesh(const InfoArguments& a) {
     const std::uint64_t bytes = bytes_of(mesh.positions) + bytes_of(mesh.triangles) + bytes_of(mesh.normals) +
                                 bytes_of(mesh.colours) + bytes_of(mesh.uvs);
     const std::uint64_t file_bytes = file_bytes_of(a.file);
+    const Arrays arrays = read->document ? values_among(std::move(read->document->arrays)) : Arrays();
     const auto images = std::count_if(read->materials.begin(), read->materials.end(),
                                       [](const meshio::Material& m) { return m.has_image(); });
     Json json = {{"kind", "mesh"},
@@ -181,6 +241,7 @@ Result<int> describe_mesh(const InfoArguments& a) {
                  {"file_bytes", file_bytes},
                  {"faces", read->source_faces},
                  {"images", images},
+                 {"arrays", arrays_json(arrays)},
                  {"examination", examination_json(*read, *examined)},
                  {"ranges", mesh.ranges.size()}};
     if (a.verify) json["verified"] = true;
@@ -201,6 +262,7 @@ Result<int> describe_mesh(const InfoArguments& a) {
                  {"of them closed", grouped(examined->closed_components)}};
     if (a.verify) rows.push_back({"verified", "sound"});
     output(a.json, json, rows);
+    if (!a.json) print_arrays(arrays);
     if (!a.json) print_findings(*read, *examined, a.is_verbose);
     return exit_done;
 }
@@ -219,7 +281,7 @@ Command info_command(CLI::App& app) {
     verb->footer(
         "A mesh is examined: holes, non-manifold and inconsistent edges, duplicates, parts that are inside out, size;\n"
         "what is unusual is said with what it means for simplification. Bad vertices and faces are counted and left\n"
-        "out, but for --verify.\n\n"
+        "out, but for --verify. Values of vertices are listed: name, type, components, range of each.\n\n"
         "Examples:\n  unseen info bunny.ply\n  unseen info bunny.vdt --verify --json");
     return {verb, [a] { return run(*a); }};
 }

@@ -42,6 +42,8 @@ Result<int> run(const SubdivideArguments& a) {
     if (!report) return report.error();
     auto read = read_mesh_file(a.mesh, a.skips_bad);
     if (!read) return read.error();
+    if (read->document && !read->document->arrays.empty())
+        print_note(a.mesh + ": values of vertices are left out of what is made.");
     const std::uint64_t before = read->mesh.triangles.size();
     const auto mesh = subdivide_with_progress(std::move(read->mesh), a);
     if (!mesh) return mesh.error();
@@ -62,7 +64,7 @@ Command subdivide_command(CLI::App& make) {
     auto a = std::make_shared<SubdivideArguments>();
     CLI::App* verb =
         make.add_subcommand("subdivide", "Split the triangles of a mesh into smaller ones, a little rough");
-    verb->add_option("MESH", a->mesh, "PLY, OBJ, OFF, STL or glTF")->required()->type_name("FILE");
+    verb->add_option("MESH", a->mesh, "PLY, OBJ, OFF, STL, glTF or VTK (.vtp, .vtk)")->required()->type_name("FILE");
     verb->add_option("-o,--output", a->out, "The larger mesh")
         ->type_name("OUT.ply|.obj|.glb")
         ->required()

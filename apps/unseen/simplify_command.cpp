@@ -69,9 +69,9 @@ Command simplify_command(CLI::App& app) {
     CLI::App* verb = app.add_subcommand("simplify", "Write a simplified mesh for a view");
     verb->add_option("TREE", a->model, "A tree, or a mesh")->required()->type_name("TREE.vdt|MESH");
     verb->add_option("-o,--output", a->out, "The mesh")
-        ->type_name("OUT.ply|.obj|.glb|.gltf")
+        ->type_name("OUT.ply|.obj|.glb|.gltf|.vtp|.vtk")
         ->required()
-        ->check(ending_in({".ply", ".obj", ".glb", ".gltf"}));
+        ->check(ending_in({".ply", ".obj", ".glb", ".gltf", ".vtp", ".vtk"}));
     add_json_option(*verb, a->json);
     add_verbose_option(*verb, a->is_verbose);
     add_view_options(*verb, a->view);
@@ -81,10 +81,13 @@ Command simplify_command(CLI::App& app) {
         "OUT.glb, .gltf (with its data in OUT.bin) and .obj have what the model's glTF or OBJ file had: nodes, names,\n"
         "materials, texture coordinates. Images in the file stay in it; images and .mtl files beside it are copied\n"
         "to the folder of OUT under their names, where no other file of that name may be.\n\n"
+        "OUT.ply, .vtp and .vtk have the values of vertices that the model's PLY or VTK file had: vertices that stay\n"
+        "keep theirs, others have the mean of those that they stand for, of whole numbers the nearest one's.\n\n"
         "Examples:\n  unseen simplify bunny.vdt -o seen-from-the-right.ply --direction 1 0 0\n"
         "  unseen simplify bunny.vdt -o small.obj --triangles 5000 --json report.json\n"
         "  unseen simplify bunny.vdt -o half.ply --triangles 50%\n"
         "  unseen simplify house.gltf -o small.glb --pixels 2 --drop animations\n"
+        "  unseen simplify flow.vtp -o small.vtp --triangles 20%\n"
         "  unseen simplify bunny.vdt -o rough.glb --pixels 4 --fold-test displacement");
     return {verb, [a] { return run(*a); }};
 }

@@ -786,4 +786,19 @@ TEST_F(SignalTest, NothingHalfDoneIsLeft) {
     }
 }
 
+// As the system does where a mapped file has lost the page that is read.
+TEST_F(SignalTest, ALostPageIsSaidAndLeavesNothing) {
+    write_ball("ball.obj");
+    const fs::path log = folder().string() + ".log";
+    const pid_t process = start({"make", "subdivide", "ball.obj", "-o", "large.ply", "--times", "6"}, log, log);
+    ASSERT_GT(process, 0);
+    for (int i = 0; i < 6000 && temporaries().empty(); ++i) usleep(10'000);
+    kill(process, SIGBUS);
+    EXPECT_EQ(wait_for(process), 1);
+    EXPECT_THAT(read_text(log), HasSubstr("was cut short while it was read"));
+    EXPECT_THAT(files(), ElementsAre("ball.obj"));
+    fs::remove(log);
+    fs::remove(log.string() + ".in");
+}
+
 } // namespace

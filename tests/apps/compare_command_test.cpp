@@ -1,4 +1,4 @@
-// unseen compare: counts, maps, and the two judges.
+// unseen compare: counts, maps, and the judges.
 #include "run_command.h"
 
 #include <perception/image.h>
@@ -42,7 +42,7 @@ TEST_F(CompareTest, IdenticalImagesShowNothing) {
     write("a.pfm", disc(30, 20));
     write("a.exr", disc(30, 20));
     write("a.png", disc(0.6f, 0.5f));
-    for (const std::string model : {"modern", "rpg99"}) {
+    for (const std::string model : {"modern", "summing", "rpg99"}) {
         for (const std::string name : {"a.pfm", "a.exr", "a.png"}) {
             const Json report = compare({name, name, "--model", model});
             EXPECT_EQ(report["visible_pixels"], 0) << name << model;
@@ -69,6 +69,26 @@ TEST_F(CompareTest, ItIsLessVisibleAside) {
     write("b.pfm", disc(22, 20));
     const Json beside = compare({"a.pfm", "b.pfm", "--gaze", "-2000", "64"});
     EXPECT_LT(beside["max_ratio"], compare({"a.pfm", "b.pfm"})["max_ratio"]);
+}
+
+TEST_F(CompareTest, SumsForAnObserver) {
+    write("a.pfm", disc(20, 20));
+    write("b.pfm", disc(20.1f, 20));
+    const auto seen = [&](const std::string& observer) {
+        return compare({"a.pfm", "b.pfm", "--model", "summing", "--observer", observer})["max_ratio"].get<double>();
+    };
+    const double median = seen("median");
+    EXPECT_GT(median, 0);
+    EXPECT_NEAR(seen("default") / median, 2, 1e-3);
+    EXPECT_NEAR(seen("strict") / median, 2.7, 1e-3);
+    EXPECT_EQ(compare({"a.pfm", "b.pfm", "--model", "summing"})["max_ratio"].get<double>(), seen("default"));
+    EXPECT_THAT(run({"compare", "a.pfm", "b.pfm", "--model", "summing"}).out, HasSubstr("8.7% see more"));
+
+    EXPECT_THAT(run({"compare", "a.pfm", "b.pfm", "--observer", "strict"}).err, HasSubstr("needs --model summing"));
+    EXPECT_THAT(run({"compare", "a.pfm", "b.pfm", "--model", "summing", "--threshold-map", "t.pfm"}).err,
+                HasSubstr("--threshold-map needs"));
+    EXPECT_THAT(run({"compare", "a.pfm", "b.pfm", "--model", "summing", "--observer", "strict", "--csf", "castle"}).err,
+                HasSubstr("--observer excludes --csf"));
 }
 
 TEST_F(CompareTest, PngIsDecodedByTheDisplay) {

@@ -172,6 +172,7 @@ TEST(Follower, OutlivesItsSessionAndTakesUpMeasuredTrees) {
     {
         auto session = Session::create(session::Scene::of(tree_of(shapes::bumpy_sphere(3, 0.03))));
         view = session->default_view();
+        view.eye = view.target + 20.0 * (view.eye - view.target);
         follower.emplace(*session);
     }
     const auto whole = follower->follow(view, {.goal = Goal::full()});

@@ -13,6 +13,7 @@
 
 #include "built.h"
 #include "shapes.h"
+#include "vtk_files.h"
 
 namespace {
 
@@ -39,7 +40,8 @@ void write_for_reader(const fs::path& file, char reader, const fs::path& mesh) {
 
 void make_meshes(const fs::path& folder) {
     const Mesh mesh = shapes::with_attributes(shapes::icosphere(1));
-    for (const auto& [ending, reader] : {std::pair(".ply", '\0'), std::pair(".obj", '\1'), std::pair(".glb", '\5')}) {
+    for (const auto& [ending, reader] : {std::pair(".ply", '\0'), std::pair(".obj", '\1'), std::pair(".glb", '\5'),
+                                         std::pair(".vtp", '\6'), std::pair(".vtk", '\7')}) {
         const fs::path plain = folder / ("plain" + std::string(ending));
         expect(meshio::write_mesh(plain, mesh.view()));
         write_for_reader(folder / ("mesh" + std::string(ending)), reader, plain);
@@ -61,6 +63,31 @@ void make_meshes(const fs::path& folder) {
           "\"nodes\":[0]}]}");
 }
 
+void make_vtk(const fs::path& folder) {
+    for (const auto& [name, bytes] : vtk_files::samples())
+        write(folder / name, (name.ends_with(".vtp") ? '\6' : '\7') + bytes);
+    // The statements of legacy files.
+    write(folder / "statements.vtk",
+          '\7' + vtk_files::vtk_quad(false, false,
+                                     "METADATA\nCOMPONENT_NAMES\nx\n\n\n\nCELL_DATA 1\nSCALARS q float 1\n"
+                                     "LOOKUP_TABLE t\n1\nLOOKUP_TABLE t 1\n0 0 0 1\nPOINT_DATA 4\nNORMALS n float\n"
+                                     "0 0 1 0 0 1 0 0 1 0 0 1\nTEXTURE_COORDINATES t 2 float\n0 0 1 0 1 1 0 1\n"
+                                     "COLOR_SCALARS c 1\n0 0 1 1\nFIELD f 3\nNULL_ARRAY\nw 1 2 string\na\nb\n"
+                                     "b 1 4 bit\n0 1 1 0\n"));
+    write(folder / "strings.vtk", '\7' + vtk_files::vtk_quad(true, true,
+                                                             std::string("POINT_DATA 4\nFIELD f 2\nw 1 2 string\n\xC1"
+                                                                         "a\x80\1b\nb 3 4 bit\nxy\n")));
+}
+
+Mesh with_values(Mesh mesh) {
+    std::vector<std::byte> values(4 * mesh.positions.size());
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<std::byte>(i * 31);
+    const meshio::VertexArray numbers{.name = "n", .type = meshio::ValueType::int32, .values = values};
+    const meshio::VertexArray reals{.name = "r", .type = meshio::ValueType::float32, .values = values};
+    mesh.document = meshio::pack({.format = meshio::SourceDocument::Format::table, .arrays = {numbers, reals}});
+    return mesh;
+}
+
 Mesh with_document(Mesh mesh) {
     mesh.ranges = {{"part", MeshRange::Kind::primitive, 0, mesh.triangles.size()}};
     const std::size_t vertices = mesh.positions.size();
@@ -78,7 +105,8 @@ void make_trees(const fs::path& folder) {
                                                    {"open", shapes::grid(4)},
                                                    {"triangle", shapes::single_triangle()},
                                                    {"attributes", shapes::with_attributes(shapes::icosphere(1))},
-                                                   {"document", with_document(shapes::icosphere(1))}};
+                                                   {"document", with_document(shapes::icosphere(1))},
+                                                   {"values", with_values(shapes::icosphere(1))}};
     for (const auto& [name, mesh] : meshes) {
         const auto tree = build_tree(mesh.view());
         if (!tree) throw std::runtime_error(tree.error().message);
@@ -106,6 +134,7 @@ int main(int count, char** arguments) try {
     const fs::path folder = arguments[1];
     for (const char* target : {"mesh", "tree", "follow"}) fs::create_directories(folder / target);
     make_meshes(folder / "mesh");
+    make_vtk(folder / "mesh");
     make_trees(folder / "tree");
     make_drives(folder / "follow");
 } catch (const std::exception& error) {

@@ -13,7 +13,8 @@
 namespace {
 
 // Formats without a signature go by the name's ending; the first byte chooses it.
-constexpr const char* names[] = {"fuzz.ply", "fuzz.obj", "fuzz.off", "fuzz.stl", "fuzz.gltf", "fuzz"};
+constexpr const char* names[] = {"fuzz.ply",  "fuzz.obj", "fuzz.off", "fuzz.stl",
+                                 "fuzz.gltf", "fuzz",     "fuzz.vtp", "fuzz.vtk"};
 
 } // namespace
 

@@ -12,6 +12,7 @@
 
 #include <vdtree/tree_io.h>
 
+#include "kept_arrays.h"
 #include "restore.h"
 #include "tree_file.h"
 #include "tree_use.h"
@@ -45,7 +46,9 @@ void restore_document(const unseen::vdtree::VertexTree& tree) {
     if (!document) return;
     unseen::vdtree::Cut cut(tree);
     cut.unfold_all();
-    (void)unseen::meshio::restore(cut, extract_with_sources(cut), *document).has_value();
+    const auto extracted = extract_with_sources(cut);
+    (void)unseen::meshio::restore(cut, extracted, *document).has_value();
+    (void)unseen::meshio::arrays_of_cut(cut, extracted, document->arrays).has_value();
 }
 
 void read_and_use(const std::string& bytes) {

@@ -234,8 +234,8 @@ TEST(Chroma, GrowsUpTheTreeWithAGazeToo) {
 // Colours are drawn at the luminance that the light gives them, and their chroma is that of what is drawn.
 TEST(Chroma, FollowsTheLight) {
     const VertexTree tree = red_green_checkerboard(0.3);
-    const VertexTree dim = *tree.relit({.direction = {0, 0, 1}, .ambient = 0.5f}),
-                     dark = *tree.relit({.direction = {0, 0, -1}, .ambient = 0.25f});
+    const VertexTree dim = *tree.relit({.direction = {0, 0, 1}, .ambient = 0.5f, .fill = 0}),
+                     dark = *tree.relit({.direction = {0, 0, -1}, .ambient = 0.25f, .fill = 0});
     ASSERT_TRUE(vdtree::verify(dark));
     const auto red = [](const VertexTree& t) { return (*ring_chroma(t))[0].hi.x; };
     EXPECT_NEAR(red(dim), red(tree), 1e-4f);

@@ -4,6 +4,7 @@
 #include "mesh_files.h"
 #include "mesh_readers.h"
 #include "text_scanner.h"
+#include "vtk_files.h"
 
 #include <atomic>
 #include <cstdlib>
@@ -90,18 +91,27 @@ std::string replaced(std::string text, const std::string& from, const std::strin
     return at == std::string::npos ? text : text.replace(at, from.size(), to);
 }
 
+std::vector<std::pair<std::string, std::string>> all_samples() {
+    auto samples = mesh_files::samples();
+    for (auto& sample : vtk_files::samples()) samples.push_back(std::move(sample));
+    return samples;
+}
+
 // ---- cut short ----
 
-// How many bytes a sample can lose and still be whole: its last newline, an OFF's colour, an OBJ's optional indices.
+// How many bytes a sample can lose and still be whole: its last newline, an OFF's colour, an OBJ's optional indices,
+// what stands behind the data of a VTP.
 std::size_t dispensable_bytes(const std::string& name) {
     if (name == "ascii.ply") return 1;
     if (name == "quad.off") return std::string(" 255 0 0\n").size();
     if (name == "ascii.stl") return std::string(" part one\n").size();
+    if (name.starts_with("raw") || name.starts_with("base64"))
+        return (vtk_files::VtpFile::tail_of_appended() + "</VTKFile>").size();
     return 0;
 }
 
 TEST(MalformedMesh, CutShortAtAnyByteIsAnError) {
-    for (const auto& [name, bytes] : mesh_files::samples()) {
+    for (const auto& [name, bytes] : all_samples()) {
         ASSERT_TRUE(is_read_or_refused(bytes, name)) << name;
         for (std::size_t size = 0; size < bytes.size(); ++size) {
             const bool is_read = is_read_or_refused(bytes.substr(0, size), name);
@@ -114,7 +124,7 @@ TEST(MalformedMesh, CutShortAtAnyByteIsAnError) {
 }
 
 TEST(MalformedMesh, CutShortAtTheFrontIsNoCrash) {
-    for (const auto& [name, bytes] : mesh_files::samples()) {
+    for (const auto& [name, bytes] : all_samples()) {
         for (std::size_t start = 1; start < bytes.size(); ++start) is_read_or_refused(bytes.substr(start), name);
     }
 }
@@ -123,7 +133,7 @@ TEST(MalformedMesh, CutShortAtTheFrontIsNoCrash) {
 
 TEST(MalformedMesh, DamagedAnywhereIsNoCrash) {
     constexpr int rounds = 4000;
-    for (const auto& [name, original] : mesh_files::samples()) {
+    for (const auto& [name, original] : all_samples()) {
         std::mt19937 random(1234); // the same damage in every run
         int read = 0;
         for (int round = 0; round < rounds; ++round) {
@@ -148,7 +158,7 @@ TEST(MalformedMesh, WordsInWrongPlacesAreNoCrash) {
                                  "{",     "]",   "2147483648", "-2147483648",
                                  "f",     "v",   "\\\n",       "\"",
                                  "#",     "1.5", "list",       "\0"s};
-    for (const auto& [name, original] : mesh_files::samples()) {
+    for (const auto& [name, original] : all_samples()) {
         std::mt19937 random(99);
         for (int round = 0; round < 3000; ++round) {
             std::string bytes = original;

@@ -799,7 +799,7 @@ TEST(MeshIo, TrustsTheContentMoreThanTheEnding) {
     EXPECT_EQ(read(mesh_files::binary_stl_facet(), "nothing").mesh.triangles.size(), 1u);
     EXPECT_EQ(read(mesh_files::ascii_stl_facet(), "nothing").mesh.triangles.size(), 1u);
     EXPECT_EQ(read("\xEF\xBB\xBF" + mesh_files::obj_quad(), "a.OBJ").mesh.triangles.size(), 2u);
-    EXPECT_THAT(error_of("hello", "a.txt"), HasSubstr("neither PLY, OBJ, OFF, STL nor glTF"));
+    EXPECT_THAT(error_of("hello", "a.txt"), HasSubstr("neither PLY, OBJ, OFF, STL, glTF nor VTK"));
     EXPECT_THAT(error_of("\x28\xB5\x2F\xFD....", "a.ply.zst"), HasSubstr("compressed with zstd"));
 }
 

@@ -122,7 +122,8 @@ TEST_F(TreeIo, ReadsWhatWasWritten) {
 }
 
 TEST_F(TreeIo, KeepsAnotherLight) {
-    const VertexTree tree = *built(shapes::bumpy_sphere(2)).relit({.direction = {1, 0, 0}, .ambient = 0.5f, .fill = 0.75f});
+    const VertexTree tree =
+        *built(shapes::bumpy_sphere(2)).relit({.direction = {1, 0, 0}, .ambient = 0.5f, .fill = 0.75f});
     ASSERT_TRUE(write_tree(file_, tree));
     const auto again = read_tree(file_);
     ASSERT_TRUE(again);
@@ -209,14 +210,14 @@ TEST_F(TreeIo, SaysWhatIsWrongWithTheHeader) {
     EXPECT_FALSE(is_tree_file(file_));
 
     std::string bad = good;
-    for (const std::uint32_t version : {5u, ~0u}) {
+    for (const std::uint32_t version : {6u, ~0u}) {
         support::store(bad, TreeFile::version_at, version);
         TreeFile::seal(bad);
         expect_refused(bad, "version " + std::to_string(version) + " of the format");
         expect_refused(bad, "Build the tree again from its mesh");
         EXPECT_EQ(read_bytes(bad).error().code, ErrorCode::unsupported);
     }
-    for (const std::uint32_t version : {0u, 2u, 3u}) {
+    for (const std::uint32_t version : {0u, 2u, 3u, 4u}) {
         support::store(bad, TreeFile::version_at, version);
         TreeFile::seal(bad);
         expect_refused(bad,

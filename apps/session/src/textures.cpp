@@ -234,7 +234,8 @@ Result<void> lay_materials(const std::filesystem::path& mesh_file, meshio::ReadR
 void keep_document(meshio::ReadResult& read) {
     if (!read.document) return;
     meshio::SourceDocument& document = *read.document;
-    document.vertex_parts.assign(read.mesh.positions.size(), 0);
+    if (document.format != meshio::SourceDocument::Format::table)
+        document.vertex_parts.assign(read.mesh.positions.size(), 0);
     for (std::size_t i = 0; i < document.runs.size(); ++i) {
         const std::size_t end =
             i + 1 < document.runs.size() ? document.runs[i + 1].first_triangle : read.mesh.triangles.size();

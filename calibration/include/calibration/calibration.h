@@ -17,6 +17,7 @@
 #include <calibration/display_profile.h>
 #include <calibration/light_rig.h>
 #include <calibration/observer_profile.h>
+#include <calibration/people.h>
 
 // Measuring.
 #include <calibration/display_fit.h>

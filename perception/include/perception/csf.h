@@ -85,6 +85,10 @@ double castle_visibility(const OpponentContrast& contrast, const Stimulus& stimu
 // The set-up of the fold test and of the judge: a patch of 1.5 cycles radius, area pi (1.5 / frequency)^2.
 SquareDegrees patch_area(CyclesPerDegree frequency);
 
+// The law of area: patches of area A are seen sqrt(A / (A + Ac)) times as well as unlimited ones, with this Ac.
+SquareDegrees castle_summation_area(CyclesPerDegree frequency);
+SquareDegrees barten_summation_area(CyclesPerDegree frequency); // of Barten 1999
+
 // What a table holds constant; as in Stimulus.
 struct CsfConditions {
     Hertz temporal{0};
@@ -123,8 +127,12 @@ public:
     // the model's domain. Cost: 20 to 400 ms, 1 to 30 MB; daly's is the largest.
     static Result<CsfTable> from_model(CsfModel model, const CsfConditions& conditions);
     static CsfTable from_model(CsfModel model); // static gratings, the worst field
-    // The default table, built once.
+    // The default table, built once: castle's.
     static const CsfTable& standard();
+
+    // Of someone who sees so many times as well, 0.001 to 1000 (person.h). Fails where sensitivities leave the bounds
+    // above.
+    Result<CsfTable> scaled(double gain) const;
 
     const CsfSamples& samples() const noexcept;
 

@@ -30,3 +30,5 @@
 // Pictures, and judges of them.
 #include <perception/image.h>
 #include <perception/judge.h>
+#include <perception/person.h>
+#include <perception/summing_judge.h>

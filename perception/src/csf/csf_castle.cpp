@@ -106,14 +106,18 @@ double evaluate(const SaturatingLaw& law, double luminance) {
 // p4/L is below the spacing of doubles around 1 for bright stimuli: never written as 1 - (1 + x)^-p5.
 double evaluate(const GlareLaw& law, double luminance) { return -std::expm1(-law.p5 * std::log1p(law.p4 / luminance)); }
 
+double summation_area(const BandShape& shape, double freq_cpd) {
+    const double relative = freq_cpd / shape.frequency0;
+    return shape.area0 / (1 + relative * relative);
+}
+
 // Smax P(rho) rho sqrt(Ac / (1 + Ac / A)) without Smax.
 double channel(const BandShape& shape, double freq_cpd, double peak_cpd, double area_deg2) {
     const double octaves10 = std::log10(freq_cpd / peak_cpd);
     double parabola = std::pow(10.0, -octaves10 * octaves10 / std::exp2(shape.log2_bandwidth));
     if (freq_cpd < peak_cpd) parabola = std::max(parabola, 1 - shape.truncation);
-    const double relative = freq_cpd / shape.frequency0;
-    const double summation_area = shape.area0 / (1 + relative * relative);
-    return parabola * freq_cpd * std::sqrt(summation_area / (1 + summation_area / area_deg2));
+    const double area0 = summation_area(shape, freq_cpd);
+    return parabola * freq_cpd * std::sqrt(area0 / (1 + area0 / area_deg2));
 }
 
 double foveal_sensitivity(const ModelConstants& k, double freq_cpd, double lum, double omega_hz, double area_deg2) {
@@ -193,6 +197,10 @@ Decays decays(CsfModel model) {
 
 bool is_castle_family(CsfModel model) {
     return model == CsfModel::castle || model == CsfModel::stela || is_chromatic(model);
+}
+
+SquareDegrees castle_summation_area(CyclesPerDegree frequency) {
+    return SquareDegrees(summation_area(castle_constants.sustained, frequency.value()));
 }
 
 double castle_family_at_fovea(CsfModel model, const Stimulus& s) {

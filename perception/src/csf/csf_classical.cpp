@@ -78,11 +78,12 @@ double retinal_illuminance(double pupil, double cdm2) {
     return std::numbers::pi * pupil * pupil / 4 * cdm2 * (1 - rim * rim + std::pow(far_rim, 4));
 }
 
+constexpr double barten_greatest_field = 12;  // Xmax, degrees
+constexpr double barten_greatest_cycles = 15; // Nmax
+
 double barten_1999(double cpd, double cdm2, double area_deg2) {
     constexpr double signal_to_noise = 3;        // k
     constexpr double integration_time = 0.1;     // T, s
-    constexpr double greatest_field = 12;        // Xmax, degrees
-    constexpr double greatest_cycles = 15;       // Nmax
     constexpr double quantum_efficiency = 0.03;  // eta
     constexpr double photons = 1.2274e6;         // p, per s, deg2 and troland
     constexpr double neural_noise = 3e-8;        // Phi0, s deg2
@@ -94,14 +95,19 @@ double barten_1999(double cpd, double cdm2, double area_deg2) {
     const double sigma_deg = std::hypot(line_spread_deg, aberration_deg * pupil);
     const double blur = std::numbers::pi * sigma_deg * cpd;
     const double optics = std::exp(-2 * blur * blur);
-    const double cycles = cpd / greatest_cycles, inhibited = cpd / inhibition_cpd;
-    const double integration = 1 / area_deg2 + 1 / (greatest_field * greatest_field) + cycles * cycles;
+    const double inhibited = cpd / inhibition_cpd;
+    const double integration = 1 / area_deg2 + 1 / barten_summation_area(CyclesPerDegree(cpd)).value();
     const double photon_noise = 1 / (quantum_efficiency * photons * retinal_illuminance(pupil, cdm2));
     const double noise = photon_noise + neural_noise / rising(inhibited * inhibited);
     return optics / signal_to_noise / std::sqrt(2 / integration_time * integration * noise);
 }
 
 } // namespace
+
+SquareDegrees barten_summation_area(CyclesPerDegree frequency) {
+    const double cycles = frequency.value() / barten_greatest_cycles;
+    return SquareDegrees(1 / (1 / (barten_greatest_field * barten_greatest_field) + cycles * cycles));
+}
 
 Barten1989::Barten1989(double cdm2)
     : amplitude_(440 * std::pow(1 + 0.7 / cdm2, -0.2)), width_(0.3 * std::pow(1 + 100 / cdm2, 0.15)) {}

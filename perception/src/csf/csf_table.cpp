@@ -418,6 +418,15 @@ CsfTable CsfTable::from_model(CsfModel model) {
     return *std::move(table);
 }
 
+Result<CsfTable> CsfTable::scaled(double gain) const {
+    if (!(gain >= 1e-3 && gain <= 1e3)) return bad("the gain must be from 0.001 to 1000");
+    CsfSamples samples = state_->samples;
+    Branches branches = state_->branches;
+    for (auto* values : {&samples.sensitivity, &branches.sensitivity, &branches.ceiling})
+        for (double& s : *values) s *= gain;
+    return State::make_table(std::move(samples), std::move(branches));
+}
+
 const CsfTable& CsfTable::standard() {
     static const CsfTable table = from_model(CsfModel::castle);
     return table;

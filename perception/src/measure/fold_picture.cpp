@@ -149,7 +149,7 @@ UNSEEN_INLINE float find_largest_mean(Worktop& on) {
     for_each_register<Floats>([&](std::size_t y, std::size_t x) UNSEEN_INLINE_LAMBDA {
         const Floats seen = floats_at<Floats>(on.mean_seen.row(y) + x),
                      mean = magnitude(floats_at<Floats>(on.smooth.row(y) + x) / seen);
-        most = (seen > 0.5f) & (most < mean) ? mean : most;
+        most = ((seen > 0.5f) & (most < mean)) ? mean : most;
     });
     return largest_of(most);
 }

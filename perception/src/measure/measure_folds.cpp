@@ -203,7 +203,7 @@ private:
         std::memcpy(points.luminance + first, &nearest_luminance, sizeof(Floats));
     }
     static void find_plain(std::span<const PreparedTriangle> triangles, Points::Block& points) {
-        for (std::size_t first : {0, 4}) find<Float4>(triangles, points, first);
+        for (const std::size_t first : {std::size_t{0}, std::size_t{4}}) find<Float4>(triangles, points, first);
     }
 #if defined(UNSEEN_EIGHT_WIDE)
     UNSEEN_AVX2 static void find_avx2(std::span<const PreparedTriangle> triangles, Points::Block& points) {

@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "base64.h"
 #include "text_scanner.h"
 
 namespace unseen::meshio::gltf {
@@ -17,15 +18,6 @@ namespace fs = std::filesystem;
 // ---- buffers ----
 
 namespace {
-
-int base64_value(char c) {
-    if (c >= 'A' && c <= 'Z') return c - 'A';
-    if (c >= 'a' && c <= 'z') return c - 'a' + 26;
-    if (c >= '0' && c <= '9') return c - '0' + 52;
-    if (c == '+' || c == '-') return 62; // the second of each pair: RFC 4648's alphabet for URLs
-    if (c == '/' || c == '_') return 63;
-    return -1;
-}
 
 std::optional<std::string> decode_base64(std::string_view text) {
     while (text.ends_with('=')) text.remove_suffix(1);

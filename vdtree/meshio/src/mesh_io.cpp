@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-enum class Format { ply, obj, off, stl, gltf };
+enum class Format { ply, obj, off, stl, gltf, vtp, legacy_vtk };
 
 constexpr std::string_view utf8_mark = "\xEF\xBB\xBF";
 // Longer than any word of the formats; the rest of a longer one helps nobody.
@@ -38,12 +38,16 @@ std::optional<Format> format_by_ending(const fs::path& name) {
     if (ending == ".off") return Format::off;
     if (ending == ".stl") return Format::stl;
     if (ending == ".gltf" || ending == ".glb") return Format::gltf;
+    if (ending == ".vtp") return Format::vtp;
+    if (ending == ".vtk") return Format::legacy_vtk;
     return std::nullopt;
 }
 
 std::optional<Format> format_by_signature(std::string_view bytes) {
     if (bytes.starts_with("glTF")) return Format::gltf;
     if (bytes.starts_with("ply") && bytes.size() > 3 && is_space(bytes[3])) return Format::ply;
+    if (is_vtk_xml(bytes)) return Format::vtp;
+    if (is_legacy_vtk(bytes)) return Format::legacy_vtk;
     if (starts_with_off_keyword(bytes)) return Format::off;
     return std::nullopt;
 }
@@ -81,6 +85,8 @@ Result<ReadResult> read_as(Format format, const MeshSource& source) {
     case Format::off: return read_off(source);
     case Format::stl: return read_stl(source);
     case Format::gltf: return read_gltf(source);
+    case Format::vtp: return read_vtp(source);
+    case Format::legacy_vtk: return read_legacy_vtk(source);
     }
     return malformed(source, "unknown format.");
 }
@@ -300,7 +306,7 @@ Result<ReadResult> read_mesh_bytes(std::string_view bytes, const fs::path& name,
     }
     const std::optional<Format> format = find_format(bytes, name);
     if (!format) {
-        return malformed(source, "it is neither PLY, OBJ, OFF, STL nor glTF; convert it to one of them.");
+        return malformed(source, "it is neither PLY, OBJ, OFF, STL, glTF nor VTK; convert it to one of them.");
     }
     try {
         Result<ReadResult> result = read_as(*format, source);

@@ -37,6 +37,8 @@ Result<ReadResult> read_obj(const MeshSource& source);
 Result<ReadResult> read_off(const MeshSource& source);
 Result<ReadResult> read_stl(const MeshSource& source);
 Result<ReadResult> read_gltf(const MeshSource& source);
+Result<ReadResult> read_vtp(const MeshSource& source);
+Result<ReadResult> read_legacy_vtk(const MeshSource& source);
 
 // read_mesh without a file system: finds the format, reads, checks coordinates, drops triangles that use a vertex
 // twice. The name's ending decides where the content does not. glTF files with external buffers need `folder`.
@@ -47,6 +49,9 @@ Result<ReadResult> read_mesh_bytes(std::string_view bytes, const std::filesystem
 bool is_binary_stl(std::string_view bytes);
 // Whether the bytes start with one of the keywords of OFF (COFF, STOFF, ...), after comments.
 bool starts_with_off_keyword(std::string_view bytes);
+// Whether the bytes start as a file of VTK does: XML with an element VTKFile, or the first line of legacy files.
+bool is_vtk_xml(std::string_view bytes);
+bool is_legacy_vtk(std::string_view bytes);
 
 // A name in a mesh file as a path below its folder, or nothing: a mesh must not be able to name any file of the
 // machine.

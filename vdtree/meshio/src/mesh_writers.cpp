@@ -1,9 +1,11 @@
-// Writes meshes as PLY, OBJ and glTF.
-#include <meshio/mesh_io.h>
+// Writes meshes as PLY, OBJ and glTF, and has others written.
+#include "mesh_writers.h"
 
-#include "file_output.h"
 #include "gltf_writer.h"
+#include "kept_arrays.h"
 #include "mesh_readers.h"
+#include "ply_slots.h"
+#include "value_types.h"
 
 #include <algorithm>
 #include <array>
@@ -11,6 +13,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -24,22 +27,109 @@ namespace {
 
 bool is_float(double value) { return static_cast<double>(static_cast<float>(value)) == value; }
 
-bool are_floats(const MeshView& mesh) {
-    return std::all_of(mesh.positions.begin(), mesh.positions.end(),
-                       [](const glm::dvec3& p) { return is_float(p.x) && is_float(p.y) && is_float(p.z); });
-}
-
 // ---- PLY ----
-
-std::uint8_t to_byte(float channel) {
-    return static_cast<std::uint8_t>(std::lround(std::clamp(channel, 0.0f, 1.0f) * 255.0f));
-}
-
-constexpr std::size_t items_a_report = std::size_t{1} << 18; // some milliseconds
 
 Error cancelled() { return {ErrorCode::cancelled, "Writing was cancelled."}; }
 
-void write_ply_header(FileOutput& out, const MeshView& mesh, bool has_floats) {
+// One component of an array, as a property of PLY.
+struct PlyColumn {
+    std::string name;
+    ValueType type = ValueType::float32; // one of PLY's
+    const VertexArray* array = nullptr;
+    std::uint32_t component = 0;
+};
+
+// PLY has no integers of 64 bits.
+ValueType ply_type(const VertexArray& array, std::uint32_t component) {
+    if (array.type != ValueType::int64 && array.type != ValueType::uint64) return array.type;
+    const ValueRange range = range_of(array, component);
+    const auto fits = [&](double low, double high) { return range.low >= low && range.high <= high; };
+    if (fits(INT32_MIN, INT32_MAX)) return ValueType::int32;
+    return fits(0, UINT32_MAX) ? ValueType::uint32 : ValueType::float64;
+}
+
+class PlyColumns {
+public:
+    PlyColumns(const MeshView& mesh, std::span<const VertexArray> arrays, std::vector<std::string>& notes) {
+        std::vector<std::string> parted, rounded;
+        for (const VertexArray& array : arrays) {
+            if (array.role != VertexArray::Role::value) continue;
+            if (array.components > 1) parted.push_back(array.name);
+            for (std::uint32_t c = 0; c < array.components; ++c) {
+                const std::string name = array.components > 1 ? array.name + "_" + std::to_string(c) : array.name;
+                columns_.push_back({one_word(name), ply_type(array, c), &array, c});
+                if (columns_.back().type == ValueType::float64 && is_integer(array.type)) rounded.push_back(name);
+            }
+        }
+        rename(mesh, notes);
+        if (!parted.empty())
+            notes.push_back("PLY has single values: each component of " + listed(parted) +
+                            " is a property, with _0, _1 and so on behind its name.");
+        if (!rounded.empty())
+            notes.push_back("PLY has no integers of 64 bits: " + listed(rounded) +
+                            " became double, which is exact up to 2^53.");
+    }
+
+    void write_header(FileOutput& out) const {
+        constexpr const char* names[] = {"char", "uchar", "short", "ushort", "int", "uint", "", "", "float", "double"};
+        for (const PlyColumn& column : columns_)
+            out.text(std::string("property ") + names[static_cast<std::size_t>(column.type) - 1] + " " + column.name +
+                     "\n");
+    }
+    void write_row(FileOutput& out, std::size_t vertex) const {
+        for (const PlyColumn& column : columns_) {
+            const std::byte* const from = column.array->values.data() + vertex * column.array->tuple_bytes() +
+                                          column.component * byte_size(column.array->type);
+            with_type(column.array->type, [&](auto tag) {
+                const auto value = load_value<typename decltype(tag)::type>(from);
+                if (column.type == column.array->type) return out.binary(value);
+                with_type(column.type, [&](auto to) { out.binary(static_cast<typename decltype(to)::type>(value)); });
+            });
+        }
+    }
+
+private:
+    static std::string one_word(std::string name) {
+        for (char& c : name)
+            if (!std::isgraph(static_cast<unsigned char>(c)) && static_cast<unsigned char>(c) < 0x80) c = '_';
+        return name.empty() ? "_" : name;
+    }
+
+    // Those that would be read as positions, normals, colours or texture coordinates, and those of one name.
+    void rename(const MeshView& mesh, std::vector<std::string>& notes) {
+        using namespace ply;
+        std::array<bool, slot_count> present{};
+        for (const PlyColumn& column : columns_) present[slot_of(column.name)] = true;
+        const auto mean = [&](bool has, std::initializer_list<Slot> group, std::initializer_list<Slot> more = {}) {
+            const bool is_meant =
+                has || std::all_of(group.begin(), group.end(), [&](Slot slot) { return present[slot]; });
+            for (const Slot slot : group) present[slot] = is_meant;
+            for (const Slot slot : more) present[slot] = is_meant;
+        };
+        mean(true, {x, y, z});
+        mean(!mesh.normals.empty(), {nx, ny, nz});
+        mean(!mesh.colours.empty(), {red, green, blue}, {alpha});
+        mean(!mesh.uvs.empty(), {u, v});
+        std::set<std::string> used;
+        std::vector<std::string> renamed;
+        for (PlyColumn& column : columns_) {
+            const std::string before = column.name;
+            const auto is_taken = [&] {
+                const Slot slot = slot_of(column.name);
+                return (slot != ignored && present[slot]) || used.contains(column.name);
+            };
+            while (is_taken()) column.name += '_';
+            used.insert(column.name);
+            if (column.name != before) renamed.push_back(before);
+        }
+        if (!renamed.empty())
+            notes.push_back("in PLY these names are taken, and got a _ behind them: " + listed(renamed) + ".");
+    }
+
+    std::vector<PlyColumn> columns_;
+};
+
+void write_ply_header(FileOutput& out, const MeshView& mesh, const PlyColumns& columns, bool has_floats) {
     const std::string real = has_floats ? "float" : "double";
     // Few programs read unsigned indices, so they are used only where needed.
     const bool needs_unsigned =
@@ -52,13 +142,14 @@ void write_ply_header(FileOutput& out, const MeshView& mesh, bool has_floats) {
             out.text(std::string("property uchar ") + name + "\n");
     }
     if (!mesh.uvs.empty()) out.text("property float s\nproperty float t\n");
+    columns.write_header(out);
     out.text("element face " + std::to_string(mesh.triangles.size()) + "\nproperty list uchar " +
              (needs_unsigned ? "uint" : "int") + " vertex_indices\nend_header\n");
 }
 
-Result<void> write_ply(FileOutput& out, const MeshView& mesh, const Progress& progress) {
+Result<void> write_ply(FileOutput& out, const MeshView& mesh, const PlyColumns& columns, const Progress& progress) {
     const bool has_floats = are_floats(mesh);
-    write_ply_header(out, mesh, has_floats);
+    write_ply_header(out, mesh, columns, has_floats);
     const auto vertex_count = static_cast<double>(mesh.positions.size());
     const auto item_count = vertex_count + static_cast<double>(mesh.triangles.size());
     const auto goes_on = [&](double items_done) { return !progress || progress(items_done / item_count, "writing"); };
@@ -81,6 +172,7 @@ Result<void> write_ply(FileOutput& out, const MeshView& mesh, const Progress& pr
             out.binary(mesh.uvs[i].x);
             out.binary(mesh.uvs[i].y);
         }
+        columns.write_row(out, i);
     }
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
         if (i % items_a_report == 0 && !goes_on(vertex_count + static_cast<double>(i))) return cancelled();
@@ -296,26 +388,54 @@ std::string lower_ending(const fs::path& file) {
     return ending;
 }
 
-Result<void> write_mesh(const fs::path& file, const MeshView& mesh, const Progress& progress) {
+bool are_floats(const MeshView& mesh) {
+    return std::all_of(mesh.positions.begin(), mesh.positions.end(),
+                       [](const glm::dvec3& p) { return is_float(p.x) && is_float(p.y) && is_float(p.z); });
+}
+
+std::uint8_t to_byte(float channel) {
+    return static_cast<std::uint8_t>(std::lround(std::clamp(channel, 0.0f, 1.0f) * 255.0f));
+}
+
+bool holds_arrays(const std::string& ending) { return ending == ".ply" || ending == ".vtp" || ending == ".vtk"; }
+
+Result<void> write_mesh_with(const fs::path& file, const MeshView& mesh, std::span<const VertexArray> arrays,
+                             std::vector<std::string>& notes, const Progress& progress) {
     const std::string ending = lower_ending(file);
     const bool is_gltf = ending == ".glb" || ending == ".gltf";
-    if (ending != ".ply" && ending != ".obj" && !is_gltf) {
-        return cannot_write(file, "its name does not end in .ply, .obj, .glb or .gltf; choose one of these.");
+    if (!holds_arrays(ending) && ending != ".obj" && !is_gltf) {
+        return cannot_write(file,
+                            "its name does not end in .ply, .obj, .glb, .gltf, .vtp or .vtk; choose one of these.");
     }
     if (const Result<void> valid = validate(mesh); !valid) return cannot_write(file, valid.error().message);
     if (is_gltf && mesh.triangles.empty()) {
         return cannot_write(file, "the mesh has no triangles, and glTF cannot hold such a mesh; write PLY.");
     }
+    if (ending == ".vtk" && !fits_legacy_vtk(mesh)) {
+        return cannot_write(file, "the mesh is too large for the 32-bit sizes of legacy VTK; write .vtp.");
+    }
+    if (const auto names = names_of(arrays); !names.empty() && !holds_arrays(ending))
+        notes.push_back("values of vertices were left out: " + listed(names) + "; .ply, .vtp and .vtk hold them.");
     if (is_gltf) return write_gltf(file, mesh);
     Result<AtomicFile> target = AtomicFile::create(file);
     if (!target) return target.error();
     FileOutput out(std::move(*target));
     if (ending == ".ply") {
-        if (const Result<void> written = write_ply(out, mesh, progress); !written) return written;
+        const PlyColumns columns(mesh, arrays, notes);
+        if (const Result<void> written = write_ply(out, mesh, columns, progress); !written) return written;
+    } else if (ending == ".vtp") {
+        write_vtp(out, mesh, arrays);
+    } else if (ending == ".vtk") {
+        write_legacy_vtk(out, mesh, arrays);
     } else {
         write_obj(out, mesh);
     }
     return out.finish();
+}
+
+Result<void> write_mesh(const fs::path& file, const MeshView& mesh, const Progress& progress) {
+    std::vector<std::string> no_notes; // without arrays there is nothing to tell
+    return write_mesh_with(file, mesh, {}, no_notes, progress);
 }
 
 } // namespace unseen::meshio

@@ -1,7 +1,10 @@
 // PLY: G. Turk, The PLY polygon file format (1994). ASCII and both byte orders; any properties in any order.
+#include "face_collector.h"
+#include "kept_arrays.h"
 #include "mesh_readers.h"
-#include "polygon_triangulator.h"
+#include "ply_slots.h"
 #include "text_scanner.h"
+#include "value_types.h"
 
 #include <algorithm>
 #include <array>
@@ -16,16 +19,17 @@
 
 namespace unseen::meshio {
 
+using namespace ply;
+
 namespace {
 
-enum class Type : std::uint8_t { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
 enum class Encoding : std::uint8_t { ascii, little_endian, big_endian };
 
 struct Property {
     std::string name;
-    Type type = Type::float32;
+    ValueType type = ValueType::float32;
     bool is_list = false;
-    Type count_type = Type::uint8;
+    ValueType count_type = ValueType::uint8;
 };
 
 struct Element {
@@ -40,26 +44,19 @@ struct Header {
     std::size_t body = 0; // where the data start
 };
 
-std::size_t byte_size(Type type) {
-    constexpr std::array<std::size_t, 8> sizes{1, 1, 2, 2, 4, 4, 4, 8};
-    return sizes[static_cast<std::size_t>(type)];
-}
-
-bool is_integer(Type type) { return type != Type::float32 && type != Type::float64; }
-
-std::optional<Type> to_type(std::string_view name) {
+std::optional<ValueType> to_type(std::string_view name) {
     struct Name {
         std::string_view classic, sized;
-        Type type;
+        ValueType type;
     };
-    static constexpr std::array<Name, 8> names{{{"char", "int8", Type::int8},
-                                                {"uchar", "uint8", Type::uint8},
-                                                {"short", "int16", Type::int16},
-                                                {"ushort", "uint16", Type::uint16},
-                                                {"int", "int32", Type::int32},
-                                                {"uint", "uint32", Type::uint32},
-                                                {"float", "float32", Type::float32},
-                                                {"double", "float64", Type::float64}}};
+    static constexpr std::array<Name, 8> names{{{"char", "int8", ValueType::int8},
+                                                {"uchar", "uint8", ValueType::uint8},
+                                                {"short", "int16", ValueType::int16},
+                                                {"ushort", "uint16", ValueType::uint16},
+                                                {"int", "int32", ValueType::int32},
+                                                {"uint", "uint32", ValueType::uint32},
+                                                {"float", "float32", ValueType::float32},
+                                                {"double", "float64", ValueType::float64}}};
     for (const Name& candidate : names) {
         if (name == candidate.classic || name == candidate.sized) return candidate.type;
     }
@@ -178,13 +175,13 @@ public:
     AsciiBody(std::string_view bytes, std::size_t position) : bytes_(bytes), words_(bytes, false, position) {}
 
     // The fewest bytes a value can take: a digit and the space before the next.
-    static std::size_t min_size(Type) { return 2; }
+    static std::size_t min_size(ValueType) { return 2; }
 
-    bool real(Type, double& value) {
+    bool real(ValueType, double& value) {
         const std::string_view word = words_.next();
         return accept(word, to_number(word, value));
     }
-    bool integer(Type type, std::int64_t& value) {
+    bool integer(ValueType type, std::int64_t& value) {
         if (!is_integer(type)) {
             double number = 0.0;
             if (!real(type, number)) return false;
@@ -193,7 +190,7 @@ public:
         const std::string_view word = words_.next();
         return accept(word, to_integer(word, value));
     }
-    bool skip(Type, std::uint64_t count) {
+    bool skip(ValueType, std::uint64_t count) {
         for (; count > 0; --count) {
             if (words_.next().empty()) return accept({}, false);
         }
@@ -232,10 +229,10 @@ class BinaryBody {
 public:
     BinaryBody(std::string_view bytes, std::size_t position) : bytes_(bytes), position_(position) {}
 
-    static std::size_t min_size(Type type) { return byte_size(type); }
+    static std::size_t min_size(ValueType type) { return byte_size(type); }
 
-    bool real(Type type, double& value) { return any(type, value); }
-    bool integer(Type type, std::int64_t& value) {
+    bool real(ValueType type, double& value) { return any(type, value); }
+    bool integer(ValueType type, std::int64_t& value) {
         if (is_integer(type)) return any(type, value);
         double number = 0.0;
         if (!any(type, number)) return false;
@@ -247,7 +244,7 @@ public:
         value = static_cast<std::int64_t>(number);
         return true;
     }
-    bool skip(Type type, std::uint64_t count) {
+    bool skip(ValueType type, std::uint64_t count) {
         if (count > remaining() / byte_size(type)) return ended();
         position_ += count * byte_size(type);
         return true;
@@ -260,18 +257,8 @@ public:
 
 private:
     template <class Value>
-    bool any(Type type, Value& value) {
-        switch (type) {
-        case Type::int8: return get<std::int8_t>(value);
-        case Type::uint8: return get<std::uint8_t>(value);
-        case Type::int16: return get<std::int16_t>(value);
-        case Type::uint16: return get<std::uint16_t>(value);
-        case Type::int32: return get<std::int32_t>(value);
-        case Type::uint32: return get<std::uint32_t>(value);
-        case Type::float32: return get<float>(value);
-        case Type::float64: return get<double>(value);
-        }
-        return false;
+    bool any(ValueType type, Value& value) {
+        return with_type(type, [&](auto tag) { return this->template get<typename decltype(tag)::type>(value); });
     }
     template <class Stored, class Value>
     bool get(Value& value) {
@@ -298,59 +285,22 @@ private:
 
 // ---- vertices ----
 
-// Where a vertex property goes. `ignored` must be last: it is a slot like the others.
-enum Slot : std::uint8_t { x, y, z, nx, ny, nz, red, green, blue, alpha, u, v, ignored, slot_count };
-
-Slot slot_of(const Property& property) {
-    if (property.is_list) return ignored;
-    struct Name {
-        std::string_view name;
-        Slot slot;
-    };
-    static constexpr Name names[] = {{"x", x},
-                                     {"y", y},
-                                     {"z", z},
-                                     {"nx", nx},
-                                     {"ny", ny},
-                                     {"nz", nz},
-                                     {"red", red},
-                                     {"green", green},
-                                     {"blue", blue},
-                                     {"alpha", alpha},
-                                     {"r", red},
-                                     {"g", green},
-                                     {"b", blue},
-                                     {"diffuse_red", red},
-                                     {"diffuse_green", green},
-                                     {"diffuse_blue", blue},
-                                     {"s", u},
-                                     {"t", v},
-                                     {"u", u},
-                                     {"v", v},
-                                     {"texture_u", u},
-                                     {"texture_v", v},
-                                     {"texture_s", u},
-                                     {"texture_t", v}};
-    for (const Name& candidate : names) {
-        if (property.name == candidate.name) return candidate.slot;
-    }
-    return ignored;
-}
+Slot slot_of(const Property& property) { return property.is_list ? ignored : ply::slot_of(property.name); }
 
 // What a colour channel of full strength is stored as.
-double full_channel(Type type) {
+double full_channel(ValueType type) {
     switch (type) {
-    case Type::float32:
-    case Type::float64: return 1.0;
-    case Type::uint16: return 65535.0;
-    case Type::int16: return 32767.0;
-    case Type::int8: return 127.0;
+    case ValueType::float32:
+    case ValueType::float64: return 1.0;
+    case ValueType::uint16: return 65535.0;
+    case ValueType::int16: return 32767.0;
+    case ValueType::int8: return 127.0;
     default: return 255.0; // also the four-byte integers, in which some writers store bytes
     }
 }
 
 struct VertexLayout {
-    std::vector<Slot> slots;                // for each property
+    std::vector<Slot> slots;                // for each property; ignored: its values are kept as they are
     std::array<double, slot_count> scale{}; // colour channels to 0..1
     std::array<bool, slot_count> present{};
 
@@ -368,8 +318,76 @@ VertexLayout vertex_layout(const Element& element) {
         layout.present[slot] = true;
         layout.scale[slot] = 1.0 / full_channel(property.type);
     }
+    // A lone nx is no normal.
+    const auto keep_if = [&](bool is_whole, std::initializer_list<Slot> group) {
+        for (const Slot slot : group) {
+            if (is_whole || !layout.present[slot]) continue;
+            std::replace(layout.slots.begin(), layout.slots.end(), slot, ignored);
+            layout.present[slot] = false;
+        }
+    };
+    keep_if(layout.has({nx, ny, nz}), {nx, ny, nz});
+    keep_if(layout.has({red, green, blue}), {red, green, blue, alpha});
+    keep_if(layout.has({u, v}), {u, v});
     return layout;
 }
+
+// Values of vertices that the mesh has no place for.
+class PlyArrays {
+public:
+    PlyArrays(const Element& element, const VertexLayout& layout) {
+        for (std::size_t i = 0; i < element.properties.size(); ++i) {
+            const Property& property = element.properties[i];
+            of_property_.push_back(arrays_.size());
+            if (layout.slots[i] != ignored) continue;
+            if (property.is_list) {
+                lists_.push_back(property.name);
+                continue;
+            }
+            arrays_.push_back({.name = property.name, .type = property.type});
+            arrays_.back().values.reserve(element.count * byte_size(property.type));
+        }
+        misfits_.resize(arrays_.size());
+    }
+
+    // The next value of a property that is no list. Texts may hold numbers that the property's type cannot.
+    void add(std::size_t property, double value) {
+        const std::size_t number = of_property_[property];
+        VertexArray& array = arrays_[number];
+        with_type(array.type, [&](auto tag) {
+            using T = typename decltype(tag)::type;
+            if (std::is_integral_v<T> &&
+                !(value >= static_cast<double>(std::numeric_limits<T>::lowest()) &&
+                  value <= static_cast<double>(std::numeric_limits<T>::max()) && value == std::floor(value))) {
+                if (!misfits_[number]) misfits_[number] = array.size();
+                value = 0;
+            }
+            append_value(array.values, static_cast<T>(value));
+        });
+    }
+
+    void hand_over(ReadResult& result) {
+        std::vector<VertexArray> kept;
+        for (std::size_t i = 0; i < arrays_.size(); ++i) {
+            if (!misfits_[i]) {
+                kept.push_back(std::move(arrays_[i]));
+                continue;
+            }
+            result.warnings.push_back("the property " + in_quotes(arrays_[i].name) + " was left out: that of vertex " +
+                                      std::to_string(*misfits_[i]) + " is no " + name_of(arrays_[i].type) +
+                                      ", as the header says.");
+        }
+        if (!lists_.empty())
+            result.notes.push_back("lists of vertices were left out: " + listed(lists_) + "; single values are kept.");
+        keep_arrays(result, std::move(kept));
+    }
+
+private:
+    std::vector<std::size_t> of_property_; // the number of its array
+    std::vector<VertexArray> arrays_;
+    std::vector<std::optional<std::size_t>> misfits_; // by array: the first vertex whose value does not fit
+    std::vector<std::string> lists_;
+};
 
 // ---- the file ----
 
@@ -392,10 +410,10 @@ public:
     Result<ReadResult> read() {
         if (Result<void> plan = check_elements(); !plan) return plan.error();
         if (Result<void> done = read_elements(); !done) return done.error();
-        if (small_faces_ > 0) warn(counted_were(small_faces_, "face") + " left out for having fewer than 3 corners.");
-        if (const auto fanned = polygons_.fanned_concave(); fanned > 0) {
-            warn(counted_were(fanned, "intricate concave polygon") + " cut into a fan.");
-        }
+        faces_.warn();
+        if (!face_values_.empty())
+            result_.notes.push_back("values of faces were left out: " + listed(face_values_) +
+                                    "; those of vertices are kept.");
         return std::move(result_);
     }
 
@@ -503,6 +521,7 @@ private:
         if (has_normals) mesh.normals.reserve(element.count);
         if (has_colours) mesh.colours.reserve(element.count);
         if (has_uvs) mesh.uvs.reserve(element.count);
+        PlyArrays arrays(element, layout);
         std::array<double, slot_count> value{};
         for (std::uint64_t row = 0; row < element.count; ++row) {
             if (!pulse(body, row)) return cancelled(source_);
@@ -511,6 +530,7 @@ private:
                 const bool read =
                     property.is_list ? skip_property(body, property) : body.real(property.type, value[layout.slots[i]]);
                 if (!read) return broken(body, element, row);
+                if (layout.slots[i] == ignored && !property.is_list) arrays.add(i, value[ignored]);
             }
             mesh.positions.emplace_back(value[x], value[y], value[z]);
             check_position(result_.bad, mesh.positions.back(),
@@ -519,6 +539,7 @@ private:
             if (has_colours) mesh.colours.push_back(colour(layout, value));
             if (has_uvs) mesh.uvs.emplace_back(value[u], value[v]);
         }
+        arrays.hand_over(result_);
         return {};
     }
 
@@ -538,6 +559,9 @@ private:
         const std::size_t smallest = Body::min_size(indices->count_type) + 3 * Body::min_size(indices->type);
         result_.mesh.triangles.reserve(result_.mesh.triangles.size() +
                                        std::min<std::uint64_t>(element.count, body.remaining() / smallest));
+        for (const Property& property : element.properties)
+            if (&property != indices) face_values_.push_back(property.name);
+        const FaceVertices vertices{0, vertices_->count};
         for (std::uint64_t row = 0; row < element.count; ++row) {
             if (!pulse(body, row)) return cancelled(source_);
             for (const Property& property : element.properties) {
@@ -546,9 +570,12 @@ private:
                     continue;
                 }
                 if (Result<void> list = read_index_list(body, element, property, row); !list) return list;
-                if (!is_whole_) ++result_.source_faces;
-                else if (is_strip_element(element)) add_strip();
-                else add_face();
+                const bool is_strip = is_strip_element(element);
+                const auto where = [&] {
+                    return body.where() + ": " + (is_strip ? "strip " : "face ") + std::to_string(row);
+                };
+                if (is_strip) faces_.add_strip(corners_, vertices, true, where);
+                else faces_.add_polygon(corners_, vertices, where);
             }
         }
         return {};
@@ -563,71 +590,11 @@ private:
                                           std::to_string(body.remaining()) +
                                           " bytes are left; the file is damaged or cut short.");
         }
-        const bool has_restarts = is_strip_element(element);
         corners_.resize(static_cast<std::size_t>(count));
-        is_whole_ = true;
-        for (std::int64_t& corner : corners_) {
+        for (std::int64_t& corner : corners_)
             if (!body.integer(property.type, corner)) return broken(body, element, row);
-            const bool is_restart = has_restarts && corner == -1;
-            if (is_restart || (corner >= 0 && corner < static_cast<std::int64_t>(vertices_->count)) || !is_whole_)
-                continue;
-            is_whole_ = false;
-            leave_out_face(result_.bad, [&] {
-                return body.where() + ": " + (has_restarts ? "strip " : "face ") + std::to_string(row) +
-                       " uses vertex " + std::to_string(corner) + ", but the vertices are numbered 0 to " +
-                       std::to_string(static_cast<std::int64_t>(vertices_->count) - 1);
-            });
-        }
         return {};
     }
-
-    void add_face() {
-        ++result_.source_faces;
-        if (corners_.size() < 3) {
-            ++small_faces_;
-            return;
-        }
-        if (!has_places(corners_)) return;
-        if (corners_.size() == 3) {
-            result_.mesh.triangles.push_back({corner(0), corner(1), corner(2)});
-            return;
-        }
-        points_.clear();
-        for (const std::int64_t index : corners_) {
-            points_.push_back(result_.mesh.positions[static_cast<std::size_t>(index)]);
-        }
-        polygons_.triangulate(points_, [&](const Triangle& t) {
-            result_.mesh.triangles.push_back({corner(t[0]), corner(t[1]), corner(t[2])});
-        });
-    }
-
-    // Every second triangle of a strip runs the other way round; -1 starts a new strip.
-    void add_strip() {
-        std::size_t start = 0;
-        for (std::size_t i = 0; i < corners_.size(); ++i) {
-            if (corners_[i] == -1) {
-                start = i + 1;
-                continue;
-            }
-            if (i < start + 2) continue;
-            ++result_.source_faces;
-            if (!has_places(std::span(corners_).subspan(i - 2, 3))) continue;
-            if ((i - start) % 2 == 0) result_.mesh.triangles.push_back({corner(i - 2), corner(i - 1), corner(i)});
-            else result_.mesh.triangles.push_back({corner(i - 1), corner(i - 2), corner(i)});
-        }
-    }
-
-    // False where a corner is a bad vertex; then the face is left out.
-    bool has_places(std::span<const std::int64_t> corners) {
-        if (result_.bad.vertices == 0 || std::all_of(corners.begin(), corners.end(), [&](std::int64_t corner) {
-                return is_finite(result_.mesh.positions[static_cast<std::size_t>(corner)]);
-            }))
-            return true;
-        ++result_.bad.left_out;
-        return false;
-    }
-
-    Index corner(std::size_t i) const { return static_cast<Index>(corners_[i]); }
 
     bool pulse(const Body& body, std::uint64_t row) const {
         return row % rows_per_progress != 0 || source_.keep_going(body.position(), "reading PLY");
@@ -639,11 +606,9 @@ private:
     const Header& header_;
     const Element* vertices_ = nullptr;
     ReadResult result_;
-    PolygonTriangulator polygons_;
+    FaceCollector faces_{result_};
     std::vector<std::int64_t> corners_;
-    std::vector<glm::dvec3> points_;
-    std::uint64_t small_faces_ = 0;
-    bool is_whole_ = true; // all corners_ are there
+    std::vector<std::string> face_values_; // names of what faces have beside corners
 };
 
 } // namespace

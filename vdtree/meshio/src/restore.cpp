@@ -28,12 +28,19 @@ class Restorer {
 public:
     Restorer(const Cut& cut, const ExtractedMesh& extracted, const SourceDocument& document,
              const std::vector<std::string>& uvs)
-        : tree_(cut.tree()), extracted_(extracted), document_(document), uvs_(uvs) {
-        find_sources(cut);
+        : tree_(cut.tree()), extracted_(extracted), document_(document), uvs_(uvs),
+          supports_(supports_of(cut, extracted)) {
         find_kinds();
     }
 
-    bool is_sound() const { return is_sound_; }
+    // Whether the vertices of the input that the tree names are there.
+    bool is_sound() const {
+        return std::all_of(supports_.begin(), supports_.end(), [&](const LeafRange& support) {
+            for (Index leaf = support.first; leaf < support.end; ++leaf)
+                if (tree_.source_vertices()[leaf] >= document_.vertex_parts.size()) return false;
+            return true;
+        });
+    }
 
     std::vector<RestoredPart> run() {
         std::map<std::uint32_t, RestoredPart> parts;
@@ -54,31 +61,6 @@ public:
     }
 
 private:
-    // The input's vertices that each vertex of the cut stands for.
-    void find_sources(const Cut& cut) {
-        std::vector<Index> vertex_of_node(tree_.node_count(), no_node);
-        for (std::size_t v = 0; v < extracted_.nodes.size(); ++v)
-            vertex_of_node[extracted_.nodes[v]] = static_cast<Index>(v);
-        first_source_.assign(extracted_.nodes.size() + 1, 0);
-        const auto for_each = [&](auto&& f) {
-            for (Index leaf = 0; leaf < tree_.leaf_count(); ++leaf) {
-                const Index vertex = vertex_of_node[cut.proxy_of_leaf(leaf)];
-                if (vertex != no_node) f(vertex, tree_.source_vertices()[leaf]);
-            }
-        };
-        for_each([&](Index vertex, Index source) {
-            ++first_source_[vertex + 1];
-            is_sound_ = is_sound_ && source < document_.vertex_parts.size();
-        });
-        for (std::size_t v = 1; v < first_source_.size(); ++v) first_source_[v] += first_source_[v - 1];
-        sources_.resize(first_source_.back());
-        std::vector<std::size_t> next(first_source_.begin(), first_source_.end() - 1);
-        for_each([&](Index vertex, Index source) { sources_[next[vertex]++] = source; });
-    }
-    std::span<const Index> sources_of(Index vertex) const {
-        return std::span(sources_).subspan(first_source_[vertex], first_source_[vertex + 1] - first_source_[vertex]);
-    }
-
     // Parts of one kind have the same attributes, drawn in the same way.
     void find_kinds() {
         std::map<std::tuple<std::uint32_t, std::string, std::array<double, 10>>, std::uint32_t> kinds;
@@ -122,7 +104,8 @@ private:
 
     // What speaks for a vertex in a part.
     void gather(Index vertex, std::uint32_t part) {
-        const std::span<const Index> all = sources_of(vertex);
+        const LeafRange support = supports_[vertex];
+        const auto all = tree_.source_vertices().subspan(support.first, support.end - support.first);
         like_.clear();
         for (const Index source : all)
             if (kinds_[document_.vertex_parts[source]] == kinds_[part]) like_.push_back(source);
@@ -168,17 +151,30 @@ private:
     const VertexTree& tree_;
     const ExtractedMesh& extracted_;
     const SourceDocument& document_;
-    const std::vector<std::string>& uvs_;   // by part
-    std::vector<std::size_t> first_source_; // by vertex of the extracted mesh, one longer
-    std::vector<Index> sources_;            // vertices of the input
-    std::vector<std::uint32_t> kinds_;      // by part
-    bool is_sound_ = true;
-    std::vector<Index> numbers_; // by vertex of the extracted mesh: its number in the part at hand
-    std::vector<Index> like_;    // what speaks for the vertex at hand
-    bool is_pure_ = false;       // all that it stands for
+    const std::vector<std::string>& uvs_; // by part
+    std::vector<LeafRange> supports_;     // by vertex of the extracted mesh
+    std::vector<std::uint32_t> kinds_;    // by part
+    std::vector<Index> numbers_;          // by vertex of the extracted mesh: its number in the part at hand
+    std::vector<Index> like_;             // what speaks for the vertex at hand
+    bool is_pure_ = false;                // all that it stands for
 };
 
 } // namespace
+
+std::vector<LeafRange> supports_of(const Cut& cut, const ExtractedMesh& extracted) {
+    const VertexTree& tree = cut.tree();
+    std::vector<Index> vertex_of_node(tree.node_count(), no_node);
+    for (std::size_t v = 0; v < extracted.nodes.size(); ++v) vertex_of_node[extracted.nodes[v]] = static_cast<Index>(v);
+    std::vector<LeafRange> supports(extracted.nodes.size());
+    for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf) {
+        const Index vertex = vertex_of_node[cut.proxy_of_leaf(leaf)];
+        if (vertex == no_node) continue;
+        LeafRange& support = supports[vertex];
+        if (support.end == 0) support.first = leaf;
+        support.end = leaf + 1;
+    }
+    return supports;
+}
 
 NodeFrame frame_of(const glm::dmat4& to_world) {
     NodeFrame frame;

@@ -12,6 +12,13 @@
 
 namespace unseen::meshio {
 
+// The leaves that a vertex of an extracted cut stands for: its own, or all below its node.
+struct LeafRange {
+    vdtree::Index first = 0, end = 0;
+};
+// By vertex. Cost: the tree's leaves.
+std::vector<LeafRange> supports_of(const vdtree::Cut& cut, const vdtree::ExtractedMesh& extracted);
+
 struct RestoredPart {
     std::uint32_t part = 0;
     std::vector<vdtree::Triangle> triangles;  // over the following

@@ -5,16 +5,22 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <optional>
+#include <set>
 #include <string_view>
 #include <type_traits>
+
+#include "mesh_readers.h"
+#include "value_types.h"
 
 namespace unseen::meshio {
 
 namespace {
 
 constexpr std::string_view magic = "UNSEENSD";
-constexpr std::uint32_t version = 1;
-constexpr std::uint32_t most_channels = 32; // bits of Part::channels
+constexpr std::uint32_t version = 1, table_version = 2; // without arrays, and with them
+constexpr std::uint32_t most_channels = 32;             // bits of Part::channels
+constexpr std::size_t array_bytes = 28;                 // of an array without name and values
 
 template <class Value>
 Value in_file_order(Value value) {
@@ -28,6 +34,8 @@ Value in_file_order(Value value) {
 
 class Packer {
 public:
+    explicit Packer(std::size_t room) { bytes_.reserve(magic.size() + 16 + room); }
+
     template <class Value>
     requires std::is_arithmetic_v<Value>
     void put(Value value) {
@@ -55,6 +63,13 @@ public:
 private:
     std::vector<std::byte> bytes_;
 };
+
+// Of values whose type is told beside them.
+std::vector<std::byte> values_in_file_order(const VertexArray& array) {
+    std::vector<std::byte> values = array.values;
+    change_order(values, byte_size(array.type), std::endian::little);
+    return values;
+}
 
 // Reads nothing once something was missing.
 class Unpacker {
@@ -109,8 +124,27 @@ private:
     bool good_ = true;
 };
 
+std::string fault_in_arrays(const SourceDocument& document) {
+    std::set<std::string> names;
+    std::optional<std::size_t> vertices;
+    for (const VertexArray& array : document.arrays) {
+        const std::string which = "its array " + in_quotes(array.name);
+        if (!names.insert(array.name).second) return which + " is there twice";
+        if (array.components < 1) return which + " has no components";
+        if (array.role != VertexArray::Role::value) {
+            if (!array.values.empty()) return which + " has values of its own";
+            continue;
+        }
+        if (array.values.size() % array.tuple_bytes() != 0 || array.size() != vertices.value_or(array.size()))
+            return which + " has the wrong length";
+        vertices = array.size();
+    }
+    return {};
+}
+
 // Empty: none.
 std::string fault_in(const SourceDocument& document) {
+    if (document.format == SourceDocument::Format::table) return fault_in_arrays(document);
     const std::size_t vertices = document.vertex_parts.size(), parts = document.parts.size();
     for (const auto& channel : document.channels)
         if (channel.components < 1 || channel.components > 4 ||
@@ -132,6 +166,38 @@ std::string fault_in(const SourceDocument& document) {
     return {};
 }
 
+void pack_arrays(const std::vector<VertexArray>& arrays, Packer& out) {
+    out.put(std::uint64_t{arrays.size()});
+    for (const VertexArray& array : arrays) {
+        out.put(array.name);
+        out.put(static_cast<std::uint32_t>(array.type));
+        out.put(array.components);
+        out.put(static_cast<std::uint32_t>(array.role));
+        out.put(std::uint64_t{array.values.size()});
+        if constexpr (std::endian::native == std::endian::little)
+            out.put_bytes(array.values.data(), array.values.size());
+        else out.put_bytes(values_in_file_order(array).data(), array.values.size());
+    }
+}
+
+bool unpack_arrays(Unpacker& in, std::vector<VertexArray>& arrays) {
+    arrays.resize(in.counted(array_bytes));
+    for (VertexArray& array : arrays) {
+        array.name = in.text();
+        const auto type = in.get<std::uint32_t>();
+        array.components = in.get<std::uint32_t>();
+        const auto role = in.get<std::uint32_t>();
+        if (type < 1 || type > static_cast<std::uint32_t>(ValueType::float64) ||
+            role > static_cast<std::uint32_t>(VertexArray::Role::uvs))
+            return false;
+        array.type = static_cast<ValueType>(type);
+        array.role = static_cast<VertexArray::Role>(role);
+        array.values = in.array<std::byte>();
+        change_order(array.values, byte_size(array.type), std::endian::little);
+    }
+    return in.is_at_end();
+}
+
 } // namespace
 
 std::uint32_t SourceDocument::part_of(std::uint64_t triangle) const {
@@ -141,10 +207,17 @@ std::uint32_t SourceDocument::part_of(std::uint64_t triangle) const {
 }
 
 std::vector<std::byte> pack(const SourceDocument& document) {
-    Packer out;
+    std::size_t room = 0; // so that tables are not copied while they grow
+    for (const VertexArray& array : document.arrays) room += array_bytes + array.name.size() + array.values.size();
+    Packer out(room);
     out.put_bytes(magic.data(), magic.size());
-    out.put(version);
+    const bool is_table = document.format == SourceDocument::Format::table;
+    out.put(is_table ? table_version : version);
     out.put(static_cast<std::uint32_t>(document.format));
+    if (is_table) {
+        pack_arrays(document.arrays, out);
+        return out.take();
+    }
     out.put(document.json);
     out.put(std::uint64_t{document.files.size()});
     for (const auto& file : document.files) {
@@ -186,14 +259,21 @@ Result<SourceDocument> unpack(std::span<const std::byte> bytes) {
     const bool is_known = bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
     if (!is_known) return fail("it does not begin as one");
     Unpacker in(bytes.subspan(magic.size()));
-    if (const auto found = in.get<std::uint32_t>(); found != version)
+    const auto found = in.get<std::uint32_t>();
+    if (found != version && found != table_version)
         return Error{ErrorCode::unsupported, "The source document of the tree has version " + std::to_string(found) +
-                                                 ", and only " + std::to_string(version) +
-                                                 " is read; build the tree again from its mesh."};
+                                                 ", and only " + std::to_string(version) + " and " +
+                                                 std::to_string(table_version) +
+                                                 " are read; build the tree again from its mesh."};
     SourceDocument document;
     const auto format = in.get<std::uint32_t>();
-    if (format != 1 && format != 2) return fail("its format is unknown");
+    if (found == table_version ? format != 3 : format != 1 && format != 2) return fail("its format is unknown");
     document.format = static_cast<SourceDocument::Format>(format);
+    if (found == table_version) {
+        if (!unpack_arrays(in, document.arrays)) return fail("its lengths contradict each other");
+        if (const std::string fault = fault_in(document); !fault.empty()) return fail(fault);
+        return document;
+    }
     document.json = in.text();
     constexpr std::size_t file_bytes = 24, part_bytes = 16 + 26 * 8 + 24, run_bytes = 12, channel_bytes = 20;
     document.files.resize(in.counted(file_bytes));

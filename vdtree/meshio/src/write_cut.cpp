@@ -16,8 +16,10 @@
 #include "gltf_data.h"
 #include "gltf_document.h"
 #include "gltf_writer.h"
+#include "kept_arrays.h"
 #include "material_formats.h"
 #include "mesh_readers.h"
+#include "mesh_writers.h"
 #include "restore.h"
 
 namespace unseen::meshio {
@@ -293,8 +295,9 @@ Result<void> write_document(const fs::path& file, const Cut& cut, SourceDocument
         return failed_to_write(file, "the cut has no triangles, and no format holds materials of nothing.");
     auto parts = restore(cut, extracted, *converted, uvs);
     if (!parts) return parts.error();
-    if (ending == ".ply") {
-        notes.assign(1, "PLY holds no materials, images and nodes; write glTF or OBJ to keep them.");
+    if (holds_arrays(ending)) {
+        notes.assign(1, (ending == ".ply" ? "PLY" : "VTK") +
+                            std::string(" holds no materials, images and nodes; write glTF or OBJ to keep them."));
         for (std::size_t c = 0; c < converted->channels.size(); ++c)
             for (const RestoredPart& part : *parts)
                 if (converted->channels[c].name == part.uvs)
@@ -312,6 +315,16 @@ Result<void> write_document(const fs::path& file, const Cut& cut, SourceDocument
     return out.finish();
 }
 
+Result<void> write_table(const fs::path& file, const Cut& cut, const SourceDocument& document,
+                         std::vector<std::string>& notes) {
+    const ExtractedMesh extracted = extract_with_sources(cut);
+    const bool is_held = holds_arrays(lower_ending(file));
+    const auto arrays =
+        is_held ? arrays_of_cut(cut, extracted, document.arrays) : Result<std::vector<VertexArray>>(document.arrays);
+    if (!arrays) return arrays.error();
+    return write_mesh_with(file, extracted.mesh.view(), *arrays, notes);
+}
+
 } // namespace
 
 Result<std::vector<std::string>> write_cut(const fs::path& file, const Cut& cut) {
@@ -327,7 +340,10 @@ Result<std::vector<std::string>> write_cut(const fs::path& file, const Cut& cut)
         };
         try {
             auto document = unpack(bytes);
-            written = document ? write_document(file, cut, std::move(*document), notes) : document.error();
+            if (!document) written = document.error();
+            else if (document->format == SourceDocument::Format::table)
+                written = write_table(file, cut, *document, notes);
+            else written = write_document(file, cut, std::move(*document), notes);
         } catch (const gltf::Broken& broken) {
             written = damaged(broken.what);
         } catch (const json::exception& error) {

@@ -1,11 +1,13 @@
 // Mesh files as triangle soups of any topology.
 //
-// Read: PLY (ASCII, both endians, face lists and triangle strips), OBJ, OFF, STL (ASCII and binary) and
-// glTF 2.0 (.gltf, .glb), told apart by their content where it is unambiguous, else by the file name's ending.
-// Write: PLY, OBJ, glTF (.gltf, .glb), by ending.
+// Read: PLY (ASCII, both endians, face lists and triangle strips), OBJ, OFF, STL (ASCII and binary), glTF 2.0 (.gltf,
+// .glb) and VTK's polygons (.vtp: ASCII, base64, raw, also with zlib; legacy .vtk: ASCII, binary), told apart by their
+// content where it is unambiguous, else by the file name's ending.
+// Write: PLY, OBJ, glTF (.gltf, .glb), VTK (.vtp, .vtk), by ending.
 //
 // Nothing in a file is believed: every count is checked against the bytes that are there before memory is
-// allocated for it, so memory stays proportional to the file. Errors name file, and line, byte or index.
+// allocated for it, so memory stays proportional to the file; what VTK files compress may become 100 times the file, or
+// 1 GiB. Errors name file, and line, byte or index.
 #pragma once
 
 #include <cstdint>
@@ -32,7 +34,7 @@ struct LeftOut {
 };
 
 struct ReadOptions {
-    // How 8-bit and float colours of PLY, OBJ and OFF are encoded; glTF defines its own (linear).
+    // How 8-bit and float colours of PLY, OBJ, OFF and VTK are encoded; glTF defines its own (linear).
     ColourEncoding colours = ColourEncoding::srgb;
     Progress progress = {};
     bool images = true;    // say where those of materials are; else materials have colours only
@@ -67,12 +69,13 @@ struct Material {
 
 struct ReadResult {
     vdtree::Mesh mesh;
-    std::uint64_t source_faces = 0;              // faces of the file before triangulation
-    std::uint64_t dropped_triangles = 0;         // triangles that used a vertex twice
-    std::vector<std::string> warnings;           // repairs that were made, one sentence each
-    std::vector<Material> materials = {};        // of OBJ and glTF
-    std::optional<SourceDocument> document = {}; // of glTF, and of OBJ with objects or materials; without vertex_parts
-    bool uvs_from_top = false;                   // v grows downward in images (glTF), not upward (OBJ, PLY)
+    std::uint64_t source_faces = 0;       // faces of the file before triangulation
+    std::uint64_t dropped_triangles = 0;  // triangles that used a vertex twice
+    std::vector<std::string> warnings;    // repairs that were made, one sentence each
+    std::vector<Material> materials = {}; // of OBJ and glTF
+    // Of glTF, and of OBJ with objects or materials; without vertex_parts. Of PLY and VTK with values of vertices.
+    std::optional<SourceDocument> document = {};
+    bool uvs_from_top = false; // v grows downward in images (glTF), not upward (OBJ, PLY)
     std::optional<std::uint64_t> bad_uv =
         {};                              // the first vertex whose texture coordinates were not finite, and set to 0
     std::vector<std::string> notes = {}; // what is no repair and good to know, one sentence each
@@ -89,7 +92,8 @@ Result<ReadResult> read_mesh(const std::filesystem::path& file, const ReadOption
 // Writes to a temporary name in the same folder, then renames; an existing file is replaced only by a whole one.
 // PLY: binary little-endian, float positions where they are exact and double otherwise; normals, colours (sRGB
 // 8 bit), UVs where present. OBJ: text with as many digits as needed to read the same values again.
-// glTF: one primitive for each material range; of OUT.gltf the data lie in OUT.bin.
+// glTF: one primitive for each material range; of OUT.gltf the data lie in OUT.bin. VTK: .vtp with raw data behind the
+// XML, .vtk in binary, version 3.0; positions, normals, colours and UVs as in PLY.
 // Progress is told, and can cancel, while a PLY is written.
 Result<void> write_mesh(const std::filesystem::path& file, const vdtree::MeshView& mesh, const Progress& progress = {});
 
@@ -97,6 +101,9 @@ Result<void> write_mesh(const std::filesystem::path& file, const vdtree::MeshVie
 // coordinates and colours as they were there. Images and libraries that lay beside that file are written beside this
 // one, under the same names; fails where one is there with other contents. Returns what the format cannot keep, one
 // sentence each. Trees without a document are written like extract_mesh(). Fails on damaged documents, too.
+// Values of vertices (VertexArray), to PLY and VTK: vertices of the input keep theirs. Those of proxies are the mean of
+// the finite values of the vertices that they stand for, component by component; of integers, and where none is finite,
+// the value of the nearest of these vertices. Memory: the values of the input, and those of the cut.
 Result<std::vector<std::string>> write_cut(const std::filesystem::path& file, const vdtree::Cut& cut);
 
 } // namespace unseen::meshio

@@ -1,7 +1,7 @@
 // meshio: mesh files. The header to include first.
 //
-// read_mesh() reads PLY, OBJ, OFF, STL and glTF into a vdtree::Mesh; write_mesh() writes meshes, and write_cut() a cut
-// with everything that its mesh file said beyond triangles: nodes, names, materials, images.
+// read_mesh() reads PLY, OBJ, OFF, STL, glTF and VTK into a vdtree::Mesh; write_mesh() writes meshes, and write_cut() a
+// cut with everything that its mesh file said beyond triangles: nodes, names, materials, images, values of vertices.
 //
 //     const auto read = meshio::read_mesh("house.glb");
 //     const auto tree = vdtree::build_tree(read->mesh.view());
@@ -12,3 +12,4 @@
 #include <meshio/examine.h>
 #include <meshio/mesh_io.h>
 #include <meshio/source_document.h>
+#include <meshio/vertex_array.h>

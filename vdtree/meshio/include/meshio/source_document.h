@@ -1,6 +1,6 @@
-// What a mesh file says beyond its triangles: nodes, materials, textures, images, and what its vertices had before
-// materials were laid over them. It goes with the mesh and its tree as bytes (MeshView::document), so that a cut can be
-// written with all of it.
+// What a mesh file says beyond its triangles: nodes, materials, textures, images, what its vertices had before
+// materials were laid over them, and values that they have besides. It goes with the mesh and its tree as bytes
+// (MeshView::document), so that a cut can be written with all of it.
 #pragma once
 
 #include <cstddef>
@@ -15,6 +15,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec4.hpp>
 
+#include <meshio/vertex_array.h>
 #include <vdtree/result.h>
 
 namespace unseen::meshio {
@@ -29,7 +30,11 @@ struct UvMap {
 };
 
 struct SourceDocument {
-    enum class Format : std::uint32_t { gltf = 1, obj = 2 };
+    enum class Format : std::uint32_t {
+        gltf = 1,
+        obj = 2,
+        table = 3 // of PLY and VTK: `arrays`, and nothing else
+    };
 
     // What lies in the mesh file, or beside it: of glTF its images, in their order; of OBJ the images and libraries
     // that it names.
@@ -72,6 +77,7 @@ struct SourceDocument {
     std::vector<Run> runs = {}; // ascending, from triangle 0 on
     std::vector<Channel> channels = {};
     std::vector<std::uint32_t> vertex_parts = {}; // by vertex of the mesh: a part that uses it
+    std::vector<VertexArray> arrays = {};         // all as long as the mesh has vertices; names are unique
 
     // The part of a triangle of the mesh. Precondition: there are runs.
     std::uint32_t part_of(std::uint64_t triangle) const;

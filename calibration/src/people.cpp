@@ -1,0 +1,141 @@
+#include <calibration/people.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+#include <vdtree/internal/errors.h>
+#include <vdtree/internal/number_text.h>
+#include <vdtree/internal/text_file.h>
+
+namespace unseen::calibration {
+namespace {
+
+using perception::Stimulus;
+
+std::vector<std::string_view> fields_of(std::string_view line) {
+    std::vector<std::string_view> fields;
+    while (true) {
+        const std::size_t comma = line.find(',');
+        fields.push_back(line.substr(0, comma));
+        if (comma == std::string_view::npos) return fields;
+        line.remove_prefix(comma + 1);
+    }
+}
+
+enum Column { dataset, frequency, temporal, eccentricity, luminance, area, sensitivity, column_count };
+constexpr std::array<std::string_view, column_count> column_names = {
+    "dataset", "frequency_cpd", "temporal_hz", "eccentricity_deg", "luminance_cdm2", "area_deg2", "sensitivity"};
+
+// Decibels and the weight of each sensitivity.
+struct Weighted {
+    double decibels, weight;
+};
+std::vector<Weighted> compared(std::span<const MeasuredSensitivity> people, const Model& model) {
+    std::map<std::string_view, int> counts;
+    for (const MeasuredSensitivity& m : people) ++counts[m.study];
+    std::vector<Weighted> all;
+    for (const MeasuredSensitivity& m : people)
+        all.push_back({20 * std::log10(m.sensitivity / model(m.stimulus)),
+                       1.0 / counts[m.study] / static_cast<double>(counts.size())});
+    std::sort(all.begin(), all.end(), [](const Weighted& a, const Weighted& b) { return a.decibels > b.decibels; });
+    return all;
+}
+
+// The decibels above which the share lies.
+double quantile(std::span<const Weighted> all, double share_above) {
+    double above = 0;
+    for (const auto& [decibels, weight] : all)
+        if ((above += weight) >= share_above) return decibels;
+    return all.empty() ? 0 : all.back().decibels;
+}
+
+} // namespace
+
+Result<std::vector<MeasuredSensitivity>> parse_sensitivities(std::string_view text, const std::string& name) {
+    std::vector<MeasuredSensitivity> all;
+    std::array<std::size_t, column_count> columns{};
+    bool has_header = false;
+    for (int number = 1; !text.empty(); ++number) {
+        const std::size_t end = std::min(text.find('\n'), text.size());
+        std::string_view line = text.substr(0, end);
+        text.remove_prefix(std::min(end + 1, text.size()));
+        if (line.ends_with('\r')) line.remove_suffix(1);
+        if (line.empty() || line.front() == '#') continue;
+        const std::string where = name + ":" + std::to_string(number) + ": ";
+        const std::vector<std::string_view> fields = fields_of(line);
+        if (!has_header) {
+            for (std::size_t c = 0; c < column_count; ++c) {
+                const auto found = std::find(fields.begin(), fields.end(), column_names[c]);
+                if (found == fields.end())
+                    return invalid_argument(where + "there is no column " + std::string(column_names[c]) + ".");
+                columns[c] = static_cast<std::size_t>(found - fields.begin());
+            }
+            has_header = true;
+            continue;
+        }
+        std::array<double, column_count> values{};
+        for (std::size_t c = dataset; c < column_count; ++c) {
+            if (columns[c] >= fields.size())
+                return invalid_argument(where + "there are only " + std::to_string(fields.size()) + " fields.");
+            if (c == dataset) continue;
+            const std::string_view field = trimmed(fields[columns[c]]);
+            const auto value = finite_from(field);
+            const bool may_be_zero = c == temporal || c == eccentricity;
+            if (!value || !(may_be_zero ? *value >= 0 : *value > 0))
+                return invalid_argument(where + std::string(column_names[c]) + " must be a number " +
+                                        (may_be_zero ? "of 0 or more" : "above 0") + ", but is '" + std::string(field) +
+                                        "'.");
+            values[c] = *value;
+        }
+        Stimulus stimulus;
+        stimulus.frequency = perception::CyclesPerDegree(values[frequency]);
+        stimulus.temporal = perception::Hertz(values[temporal]);
+        stimulus.eccentricity = perception::Degrees(values[eccentricity]);
+        stimulus.luminance = perception::Luminance(values[luminance]);
+        stimulus.area = perception::SquareDegrees(values[area]);
+        stimulus.field = perception::VisualField::worst;
+        all.push_back({std::string(fields[columns[dataset]]), stimulus, values[sensitivity]});
+    }
+    if (!has_header) return invalid_argument(name + ": there is no line with the columns' names.");
+    return all;
+}
+
+Result<std::vector<MeasuredSensitivity>> read_sensitivities(const std::filesystem::path& file) {
+    const auto text = read_text_file(file);
+    if (!text) return text.error();
+    return parse_sensitivities(*text, file.string());
+}
+
+std::vector<MeasuredSensitivity> within_domain(std::span<const MeasuredSensitivity> all) {
+    std::vector<MeasuredSensitivity> inside;
+    std::copy_if(all.begin(), all.end(), std::back_inserter(inside), [](const MeasuredSensitivity& m) {
+        const Stimulus& s = m.stimulus;
+        return s.eccentricity.value() <= 30 && s.area.value() <= 100 && s.luminance.value() >= 1 &&
+               s.luminance.value() <= 500 && s.temporal.value() <= 1; // slower than 1 Hz counts as still
+    });
+    return inside;
+}
+
+Comparison compare(std::span<const MeasuredSensitivity> people, const Model& model) {
+    const std::vector<Weighted> all = compared(people, model);
+    Comparison c;
+    c.count = all.size();
+    if (all.empty()) return c;
+    c.median_db = quantile(all, 0.5);
+    double mean = 0, squares = 0;
+    for (const auto& [decibels, weight] : all) {
+        if (decibels > 0) c.share_above += weight;
+        mean += weight * decibels;
+    }
+    for (const auto& [decibels, weight] : all) squares += weight * (decibels - mean) * (decibels - mean);
+    c.deviation_db = std::sqrt(squares);
+    return c;
+}
+
+double gain_for_share(std::span<const MeasuredSensitivity> people, const Model& model, double share_above) {
+    return std::pow(10.0, quantile(compared(people, model), share_above) / 20);
+}
+
+} // namespace unseen::calibration

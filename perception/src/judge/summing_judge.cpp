@@ -1,0 +1,261 @@
+// The judge that sums over space. Its bands, their weights and masking are those of judge_modern(); but sensitivity is
+// that to unlimited gratings, and what there is of one decides how well it is seen: squares of contrasts in thresholds
+// are summed over a window whose form is the law of area (judge/summation.h). A grating's squares are half its
+// amplitude's square in the mean, hence the factor of 2.
+#include <perception/summing_judge.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "judge/band_weights.h"
+#include "judge/judge_input.h"
+#include "judge/masking.h"
+#include "judge/summation.h"
+#include "pyramid_kernel.h"
+
+namespace unseen::perception {
+namespace {
+
+constexpr float most_thresholds = 1e8f; // of one band: far beyond all that is visible; its power is a float
+constexpr double least_gain = 1e-3, largest_gain = 1e3;
+
+// ---- images -------------------------------------------------------------------------------------------------------
+
+// Mirrored about the outermost pixels; an image narrower than the kernel repeats its last one.
+int mirrored(int i, int n) {
+    if (i < 0) i = -i;
+    if (i >= n) i = 2 * (n - 1) - i;
+    return std::clamp(i, 0, n - 1);
+}
+
+constexpr auto middle = static_cast<float>(kernel_middle), near = static_cast<float>(kernel_near),
+               far = static_cast<float>(kernel_far);
+
+// A line with `margin` mirrored samples to each side, which the kernels below reach.
+constexpr int margin = 2;
+void mirror(const float* line, int count, std::vector<float>& padded) {
+    padded.resize(static_cast<std::size_t>(count + 2 * margin));
+    std::copy_n(line, count, padded.begin() + margin);
+    for (int i = 1; i <= margin; ++i) {
+        padded[static_cast<std::size_t>(margin - i)] = line[mirrored(-i, count)];
+        padded[static_cast<std::size_t>(margin + count - 1 + i)] = line[mirrored(count - 1 + i, count)];
+    }
+}
+
+// Smoothed by the pyramid's kernel, every second sample of each axis.
+Plane reduce(const Plane& in) {
+    Plane rows(in.width, (in.height + 1) / 2), out((in.width + 1) / 2, rows.height);
+    for (int y = 0; y < rows.height; ++y) {
+        const auto line = [&](int offset) { return in.row(mirrored(2 * y + offset, in.height)); };
+        const float *a = line(-2), *b = line(-1), *c = line(0), *d = line(1), *e = line(2);
+        float* const to = rows.row(y);
+        for (int x = 0; x < in.width; ++x) to[x] = middle * c[x] + near * (b[x] + d[x]) + far * (a[x] + e[x]);
+    }
+    std::vector<float> padded;
+    for (int y = 0; y < out.height; ++y) {
+        mirror(rows.row(y), rows.width, padded);
+        const float* const at = padded.data() + margin;
+        float* const to = out.row(y);
+        for (int x = 0; x < out.width; ++x) {
+            const float* const c = at + 2 * x;
+            to[x] = middle * c[0] + near * (c[-1] + c[1]) + far * (c[-2] + c[2]);
+        }
+    }
+    return out;
+}
+
+// Between samples of a coarse level at even places; a coarse line ends with its last sample.
+Plane expand(const Plane& coarse, int width, int height) {
+    Plane rows(coarse.width, height), out(width, height);
+    for (int y = 0; y < height; ++y) {
+        const int at = y / 2;
+        const float *above = coarse.row(std::max(at - 1, 0)), *here = coarse.row(at),
+                    *below = coarse.row(std::min(at + 1, coarse.height - 1));
+        float* const to = rows.row(y);
+        if (y % 2 == 1)
+            for (int x = 0; x < coarse.width; ++x) to[x] = 2 * near * (here[x] + below[x]);
+        else
+            for (int x = 0; x < coarse.width; ++x) to[x] = 2 * (middle * here[x] + far * (above[x] + below[x]));
+    }
+    std::vector<float> padded(static_cast<std::size_t>(coarse.width + 2));
+    for (int y = 0; y < height; ++y) {
+        std::copy_n(rows.row(y), coarse.width, padded.begin() + 1);
+        padded.front() = padded[1];
+        padded.back() = padded[static_cast<std::size_t>(coarse.width)];
+        const float* const at = padded.data() + 1;
+        float* const to = out.row(y);
+        for (int x = 0; 2 * x < width; ++x) to[2 * x] = 2 * (middle * at[x] + far * (at[x - 1] + at[x + 1]));
+        for (int x = 0; 2 * x + 1 < width; ++x) to[2 * x + 1] = 2 * near * (at[x] + at[x + 1]);
+    }
+    return out;
+}
+
+// The binomial filter (1 2 1)/4 along both axes, whose response the tilt uses.
+Plane smooth(const Plane& in) {
+    Plane rows(in.width, in.height), out(in.width, in.height);
+    std::vector<float> padded;
+    for (int y = 0; y < in.height; ++y) {
+        mirror(in.row(y), in.width, padded);
+        const float* const at = padded.data() + margin;
+        float* const to = rows.row(y);
+        for (int x = 0; x < in.width; ++x) to[x] = 0.5f * at[x] + 0.25f * (at[x - 1] + at[x + 1]);
+    }
+    for (int y = 0; y < in.height; ++y) {
+        const float *above = rows.row(mirrored(y - 1, in.height)), *here = rows.row(y),
+                    *below = rows.row(mirrored(y + 1, in.height));
+        float* const to = out.row(y);
+        for (int x = 0; x < in.width; ++x) to[x] = 0.5f * here[x] + 0.25f * (above[x] + below[x]);
+    }
+    return out;
+}
+
+// ---- bands ----------------------------------------------------------------------------------------------------------
+
+// What the reference makes of one band, at its own resolution.
+struct Band {
+    int level = 0;
+    bool is_base = false;
+    // Of differences in cd/m2: contrasts in thresholds of unlimited gratings, masked, are
+    //   own x + smoothed (h*x).
+    Plane own, smoothed;
+    SummationWindow window{1};
+};
+
+// The reference's luminance at a band, floored, and its contrast there; leaves the next level in `reference`.
+struct ReferenceBand {
+    Plane luminance, contrast;
+};
+ReferenceBand split_reference(Plane& reference, bool is_base, float floor_cdm2) {
+    ReferenceBand band;
+    if (is_base) { // what the pyramid did not split; a base does not mask itself
+        band.luminance = std::move(reference);
+        band.contrast = Plane(band.luminance.width, band.luminance.height);
+    } else {
+        Plane next = reduce(reference);
+        band.luminance = expand(next, reference.width, reference.height);
+        band.contrast = std::move(reference);
+        for (std::size_t i = 0; i < band.luminance.values.size(); ++i)
+            band.contrast.values[i] -= band.luminance.values[i];
+        reference = std::move(next);
+    }
+    for (std::size_t i = 0; i < band.luminance.values.size(); ++i) {
+        float& luminance = band.luminance.values[i];
+        luminance = std::max(luminance, floor_cdm2);
+        band.contrast.values[i] /= luminance;
+    }
+    return band;
+}
+
+Band prepare_band(const ReferenceBand& reference, const BandConditions& conditions, const Eccentricity& eccentricity,
+                  int level, bool is_base) {
+    const BandTable table(conditions, level, is_base);
+    const Plane& luminance = reference.luminance;
+    const Plane smooth_contrast = smooth(reference.contrast);
+    const double step = std::exp2(level);
+    const double samples_a_degree = conditions.ppd / step;
+    Band band{level, is_base, Plane(luminance.width, luminance.height), Plane(luminance.width, luminance.height),
+              SummationWindow(summation_area(conditions, nominal_frequency(conditions.ppd, level)) * samples_a_degree *
+                              samples_a_degree)};
+    for (int y = 0; y < luminance.height; ++y) {
+        for (int x = 0; x < luminance.width; ++x) {
+            const std::size_t i =
+                static_cast<std::size_t>(y) * static_cast<std::size_t>(luminance.width) + static_cast<std::size_t>(x);
+            const double here = luminance.values[i];
+            const BandWeight weight = table.at(std::log10(here), eccentricity.at_pixel(x * step, y * step));
+            const double untilted = 1 - weight.tilt * table.smooth_at_nominal();
+            const double mask =
+                std::abs(untilted * reference.contrast.values[i] + weight.tilt * smooth_contrast.values[i]) /
+                table.gain();
+            const double of_patch = weight.sensitivity * table.of_patch(), elevation = daly_elevation(mask * of_patch);
+            const double to_thresholds = weight.sensitivity / (here * elevation * table.gain());
+            band.own.values[i] = static_cast<float>(to_thresholds * untilted);
+            band.smoothed.values[i] = static_cast<float>(to_thresholds * weight.tilt);
+        }
+    }
+    return band;
+}
+
+// An energy to the power of beta / 2, beta the exponent of amplitudes; the usual one by square roots.
+float raised(float energy, float beta) {
+    if (beta == 3.5f) {
+        const float root = std::sqrt(energy);
+        return energy * root * std::sqrt(root);
+    }
+    return std::pow(energy, beta / 2);
+}
+
+} // namespace
+
+struct SummingJudge::State {
+    Image reference;
+    JudgeOptions options;
+    std::vector<Band> bands; // from fine to coarse
+};
+
+SummingJudge::SummingJudge(std::shared_ptr<const State> state) : state_(std::move(state)) {}
+
+Result<SummingJudge> SummingJudge::create(Image reference, const JudgeOptions& options, double gain) {
+    if (auto ok = check(options); !ok) return ok.error();
+    if (!(gain >= least_gain && gain <= largest_gain))
+        return judge_argument_error("judge", "the observer's gain must lie between 0.001 and 1000");
+    if (auto ok = check_luminance("judge", reference, "reference"); !ok) return ok.error();
+    const Eccentricity eccentricity(reference, options);
+    const BandConditions conditions = conditions_for(Stimuli::unlimited, gain, reference, options, eccentricity);
+    const int base = base_level(reference, conditions.ppd);
+    const auto floor_cdm2 = static_cast<float>(contrast_floor(options.display));
+
+    auto state = std::make_shared<State>();
+    Plane rest(reference.width, reference.height);
+    rest.values = reference.values;
+    for (int level = 0; level <= base; ++level) {
+        const bool is_base = level == base;
+        state->bands.push_back(
+            prepare_band(split_reference(rest, is_base, floor_cdm2), conditions, eccentricity, level, is_base));
+    }
+    state->reference = std::move(reference);
+    state->options = options;
+    return SummingJudge(std::move(state));
+}
+
+Result<Judgement> SummingJudge::judge(const Image& test) const {
+    const Image& reference = state_->reference;
+    if (auto ok = check_luminance_pair("judge", reference, test); !ok) return ok.error();
+    const float beta = static_cast<float>(state_->options.beta);
+    Plane difference(reference.width, reference.height), sum(reference.width, reference.height);
+    for (std::size_t i = 0; i < difference.values.size(); ++i)
+        difference.values[i] = test.values[i] - reference.values[i];
+    for (const Band& band : state_->bands) {
+        Plane here = std::move(difference);
+        if (!band.is_base) {
+            difference = reduce(here);
+            const Plane back = expand(difference, here.width, here.height);
+            for (std::size_t i = 0; i < back.values.size(); ++i) here.values[i] -= back.values[i];
+        }
+        const Plane smoothed = smooth(here);
+        for (std::size_t i = 0; i < here.values.size(); ++i) {
+            const float thresholds =
+                std::min(std::abs(band.own.values[i] * here.values[i] + band.smoothed.values[i] * smoothed.values[i]),
+                         most_thresholds);
+            here.values[i] = 2 * thresholds * thresholds;
+        }
+        Plane powers = band.window.sums(here);
+        for (float& p : powers.values) p = p > 0 ? raised(p, beta) : 0;
+        spread(powers, band.level, sum, [](float& to, float from) { to += from; });
+    }
+
+    Judgement judgement;
+    judgement.pixels = sum.values.size();
+    judgement.visibility = {reference.width, reference.height, 1, std::move(sum.values)};
+    float largest = 0;
+    for (float& v : judgement.visibility.values) {
+        if (v != 0) v = std::pow(v, 1 / beta);
+        judgement.visible_pixels += !(v < 1);
+        largest = std::max(largest, v);
+    }
+    judgement.max_ratio = static_cast<double>(largest);
+    return judgement;
+}
+
+} // namespace unseen::perception

@@ -1,0 +1,167 @@
+#include "kept_arrays.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <set>
+
+#include <glm/geometric.hpp>
+
+#include "mesh_readers.h"
+#include "restore.h"
+#include "value_types.h"
+
+namespace unseen::meshio {
+
+namespace {
+
+// Sums of a proxy's values, one component at a time.
+class FiniteMean {
+public:
+    void add(double value) {
+        if (!std::isfinite(value)) return;
+        ++count_;
+        sum_ += value;
+        low_ = std::min(low_, value);
+        high_ = std::max(high_, value);
+    }
+    bool is_there() const { return count_ > 0; }
+    // Within the values, so that equal ones stay what they are. For sums beyond all numbers the middle has to do.
+    double value() const {
+        const double mean = std::isfinite(sum_) ? sum_ / static_cast<double>(count_) : low_ / 2 + high_ / 2;
+        return std::clamp(mean, low_, high_);
+    }
+
+private:
+    std::uint64_t count_ = 0;
+    double sum_ = 0, low_ = std::numeric_limits<double>::infinity(), high_ = -low_;
+};
+
+class ArraysOfCut {
+public:
+    ArraysOfCut(const Cut& cut, const ExtractedMesh& extracted)
+        : tree_(cut.tree()), extracted_(extracted), supports_(supports_of(cut, extracted)) {
+        find_nearest();
+    }
+
+    bool are_below(std::size_t vertices) const {
+        return std::all_of(supports_.begin(), supports_.end(), [&](const LeafRange& support) {
+            for (Index leaf = support.first; leaf < support.end; ++leaf)
+                if (tree_.source_vertices()[leaf] >= vertices) return false;
+            return true;
+        });
+    }
+
+    VertexArray gather(const VertexArray& array) const {
+        VertexArray out{array.name, array.type, array.components, array.role, {}};
+        const std::size_t bytes = array.tuple_bytes();
+        out.values.resize(supports_.size() * bytes);
+        for (std::size_t v = 0; v < supports_.size(); ++v) {
+            std::byte* const to = out.values.data() + v * bytes;
+            std::memcpy(to, array.values.data() + tree_.source_vertices()[nearest_[v]] * bytes, bytes);
+            if (supports_[v].end - supports_[v].first < 2 || is_integer(array.type)) continue;
+            for (std::uint32_t c = 0; c < array.components; ++c) {
+                FiniteMean mean;
+                for (Index leaf = supports_[v].first; leaf < supports_[v].end; ++leaf)
+                    mean.add(array.number(tree_.source_vertices()[leaf], c));
+                if (!mean.is_there()) continue;
+                if (array.type == ValueType::float64) store(to, c, mean.value());
+                else store(to, c, static_cast<float>(mean.value()));
+            }
+        }
+        return out;
+    }
+
+private:
+    template <class T>
+    static void store(std::byte* tuple, std::uint32_t component, T value) {
+        std::memcpy(tuple + component * sizeof value, &value, sizeof value);
+    }
+
+    // By vertex of the cut, the leaf that stands for it where one has to.
+    void find_nearest() {
+        nearest_.resize(supports_.size());
+        for (std::size_t v = 0; v < supports_.size(); ++v) {
+            const glm::dvec3 place(tree_.positions()[extracted_.nodes[v]]);
+            double least = std::numeric_limits<double>::infinity();
+            nearest_[v] = supports_[v].first;
+            for (Index leaf = supports_[v].first; leaf < supports_[v].end; ++leaf) {
+                const glm::dvec3 apart = glm::dvec3(tree_.positions()[tree_.interior_count() + leaf]) - place;
+                const double distance = glm::dot(apart, apart);
+                const bool is_first =
+                    distance == least && tree_.source_vertices()[leaf] < tree_.source_vertices()[nearest_[v]];
+                if (!(distance < least) && !is_first) continue;
+                least = distance;
+                nearest_[v] = leaf;
+            }
+        }
+    }
+
+    const VertexTree& tree_;
+    const ExtractedMesh& extracted_;
+    std::vector<LeafRange> supports_; // by vertex of the cut, like the next
+    std::vector<Index> nearest_;
+};
+
+} // namespace
+
+void keep_arrays(ReadResult& result, std::vector<VertexArray> arrays) {
+    std::set<std::string> names;
+    std::vector<std::string> doubled;
+    std::erase_if(arrays, [&](const VertexArray& array) {
+        const bool is_new = names.insert(array.name).second;
+        if (!is_new) doubled.push_back(array.name);
+        return !is_new;
+    });
+    if (!doubled.empty())
+        result.notes.push_back("of several arrays of one name the first was kept: " + listed(doubled) + ".");
+    if (arrays.empty()) return;
+    result.document = SourceDocument{.format = SourceDocument::Format::table, .arrays = std::move(arrays)};
+}
+
+std::string listed(const std::vector<std::string>& names) {
+    constexpr std::size_t most = 6;
+    std::string list;
+    for (std::size_t i = 0; i < std::min(names.size(), most); ++i) {
+        if (i > 0) list += i + 1 == names.size() ? " and " : ", ";
+        list += in_quotes(names[i]);
+    }
+    return names.size() > most ? list + " and " + std::to_string(names.size() - most) + " more" : list;
+}
+
+std::vector<std::string> names_of(std::span<const VertexArray> arrays) {
+    std::vector<std::string> names;
+    for (const VertexArray& array : arrays)
+        if (array.role == VertexArray::Role::value) names.push_back(array.name);
+    return names;
+}
+
+bool is_colour_name(std::string_view name) {
+    constexpr std::string_view usual[] = {"rgb", "rgba", "color", "colors", "colour", "colours"};
+    std::string lower(name);
+    std::transform(lower.begin(), lower.end(), lower.begin(),
+                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    return std::find(std::begin(usual), std::end(usual), lower) != std::end(usual);
+}
+
+Result<std::vector<VertexArray>> arrays_of_cut(const Cut& cut, const ExtractedMesh& extracted,
+                                               std::span<const VertexArray> arrays) {
+    const ArraysOfCut source(cut, extracted);
+    std::vector<VertexArray> out;
+    for (const VertexArray& array : arrays) {
+        if (array.role != VertexArray::Role::value) {
+            out.push_back(array);
+            continue;
+        }
+        if (!source.are_below(array.size()))
+            return Error{ErrorCode::malformed_data,
+                         "The source document is not that of the tree's mesh. Build the tree again."};
+        out.push_back(source.gather(array));
+    }
+    return out;
+}
+
+} // namespace unseen::meshio

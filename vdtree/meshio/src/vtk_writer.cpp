@@ -1,0 +1,268 @@
+// VTK's polygons, in its XML format (VTK File Formats, kitware) and the legacy one.
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <vdtree/colour.h>
+
+#include "kept_arrays.h"
+#include "mesh_readers.h"
+#include "mesh_writers.h"
+#include "value_types.h"
+#include "vtk_types.h"
+
+namespace unseen::meshio {
+
+namespace {
+
+// What stands in a file's point data, and under which names.
+struct VtkPointData {
+    std::vector<const VertexArray*> values;
+    std::string normals = "Normals", colours, uvs = "TCoords"; // empty: there are none
+    std::uint32_t colour_components = 3;                       // 4: with alpha
+};
+
+VtkPointData point_data_of(const MeshView& mesh, std::span<const VertexArray> arrays) {
+    using Role = VertexArray::Role;
+    VtkPointData data;
+    std::set<std::string> used;
+    for (const VertexArray& array : arrays) {
+        if (array.role == Role::value) data.values.push_back(&array), used.insert(array.name);
+        if (array.role == Role::normals) data.normals = array.name;
+        if (array.role == Role::uvs) data.uvs = array.name;
+        if (array.role == Role::colours) data.colours = array.name, data.colour_components = array.components;
+    }
+    const bool has_alpha =
+        std::any_of(mesh.colours.begin(), mesh.colours.end(), [](glm::vec4 c) { return to_byte(c.a) < 255; });
+    if (has_alpha || data.colour_components != 3) data.colour_components = 4;
+    if (data.colours.empty()) data.colours = has_alpha ? "RGBA" : "RGB";
+    const auto settle = [&](std::string& name, bool is_there) {
+        if (!is_there) return name.clear();
+        while (!used.insert(name).second) name += '_';
+    };
+    settle(data.normals, !mesh.normals.empty());
+    settle(data.colours, !mesh.colours.empty());
+    settle(data.uvs, !mesh.uvs.empty());
+    return data;
+}
+
+// Numbers in the byte order of the format.
+class VtkNumbers {
+public:
+    VtkNumbers(FileOutput& out, std::endian order) : out_(out), order_(order) {}
+
+    template <class T>
+    void put(T value) {
+        auto raw = std::bit_cast<std::array<char, sizeof(T)>>(value);
+        if (order_ != std::endian::native) std::reverse(raw.begin(), raw.end());
+        out_.text({raw.data(), raw.size()});
+    }
+    void put(const VertexArray& array) {
+        with_type(array.type, [&](auto tag) {
+            using T = typename decltype(tag)::type;
+            for (std::size_t at = 0; at < array.values.size(); at += sizeof(T))
+                put(load_value<T>(array.values.data() + at));
+        });
+    }
+    template <class Vector>
+    void put_all(std::span<const Vector> vectors) {
+        for (const Vector& vector : vectors)
+            for (int k = 0; k < Vector::length(); ++k) put(vector[k]);
+    }
+    void put_positions(const MeshView& mesh, bool has_floats) {
+        if (!has_floats) return put_all(mesh.positions);
+        for (const glm::dvec3& p : mesh.positions)
+            for (int k = 0; k < 3; ++k) put(static_cast<float>(p[k]));
+    }
+    void put_colours(const MeshView& mesh, std::uint32_t components) {
+        for (const glm::vec4& colour : mesh.colours) {
+            for (int k = 0; k < 3; ++k) put(to_byte(linear_to_srgb(colour[k])));
+            if (components == 4) put(to_byte(colour.a));
+        }
+    }
+
+private:
+    FileOutput& out_;
+    std::endian order_;
+};
+
+// ---- XML
+
+std::string xml_text(std::string_view text) {
+    std::string escaped;
+    for (const char c : text) {
+        if (c == '&') escaped += "&amp;";
+        else if (c == '<') escaped += "&lt;";
+        else if (c == '>') escaped += "&gt;";
+        else if (c == '"') escaped += "&quot;";
+        else escaped += static_cast<unsigned char>(c) < 0x20 ? '_' : c; // XML has no place for these
+    }
+    return escaped;
+}
+
+// Collects what stands behind the XML, for it begins with where everything lies.
+class VtpWriter {
+public:
+    VtpWriter(FileOutput& out, const MeshView& mesh) : out_(out), numbers_(out, std::endian::little), mesh_(mesh) {}
+
+    void write(const VtkPointData& data) {
+        const std::string point_data = describe(data);
+        const bool has_floats = are_floats(mesh_);
+        const auto vertices = mesh_.positions.size(), triangles = mesh_.triangles.size();
+        const ValueType index =
+            3 * triangles > static_cast<std::size_t>(INT32_MAX) || vertices > static_cast<std::size_t>(INT32_MAX)
+                ? ValueType::int64
+                : ValueType::int32;
+        const std::string points = array(has_floats ? ValueType::float32 : ValueType::float64, "Points", 3, vertices,
+                                         [=, this] { numbers_.put_positions(mesh_, has_floats); });
+        const std::string corners = array(index, "connectivity", 1, 3 * triangles, [=, this] {
+            for (const Triangle& triangle : mesh_.triangles)
+                for (const Index corner : triangle) put_index(corner, index);
+        });
+        const std::string ends = array(index, "offsets", 1, triangles, [=, this] {
+            for (std::size_t t = 1; t <= triangles; ++t) put_index(3 * t, index);
+        });
+        out_.text("<?xml version=\"1.0\"?>\n"
+                  "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n"
+                  "  <PolyData>\n    <Piece NumberOfPoints=\"" +
+                  std::to_string(vertices) +
+                  "\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"" +
+                  std::to_string(triangles) + "\">\n" + point_data + "      <Points>\n" + points +
+                  "      </Points>\n      <Polys>\n" + corners + ends +
+                  "      </Polys>\n    </Piece>\n  </PolyData>\n  <AppendedData encoding=\"raw\">\n   _");
+        for (const Block& block : blocks_) {
+            numbers_.put(block.bytes);
+            block.write();
+        }
+        out_.text("\n  </AppendedData>\n</VTKFile>\n");
+    }
+
+private:
+    struct Block {
+        std::uint64_t bytes;
+        std::function<void()> write;
+    };
+
+    std::string describe(const VtkPointData& data) {
+        // Colours of an unusual name are known as such by being the scalars.
+        std::string scalars = data.colours;
+        if (!data.values.empty() && (scalars.empty() || is_colour_name(scalars))) scalars = data.values.front()->name;
+        std::string xml = "      <PointData";
+        for (const auto& [what, name] :
+             {std::pair("Scalars", scalars), std::pair("Normals", data.normals), std::pair("TCoords", data.uvs)})
+            if (!name.empty()) xml += std::string(" ") + what + "=\"" + xml_text(name) + "\"";
+        xml += ">\n";
+        for (const VertexArray* values : data.values)
+            xml += array(values->type, values->name, values->components, values->size(),
+                         [=, this] { numbers_.put(*values); });
+        const std::size_t vertices = mesh_.positions.size();
+        if (!data.normals.empty())
+            xml += array(ValueType::float32, data.normals, 3, vertices, [this] { numbers_.put_all(mesh_.normals); });
+        if (!data.colours.empty())
+            xml += array(ValueType::uint8, data.colours, data.colour_components, vertices,
+                         [this, k = data.colour_components] { numbers_.put_colours(mesh_, k); });
+        if (!data.uvs.empty())
+            xml += array(ValueType::float32, data.uvs, 2, vertices, [this] { numbers_.put_all(mesh_.uvs); });
+        return xml + "      </PointData>\n";
+    }
+
+    std::string array(ValueType type, const std::string& name, std::uint32_t components, std::size_t tuples,
+                      std::function<void()> write) {
+        const std::string xml = std::string("        <DataArray type=\"") + vtp_name(type) + "\" Name=\"" +
+                                xml_text(name) + "\" NumberOfComponents=\"" + std::to_string(components) +
+                                "\" format=\"appended\" offset=\"" + std::to_string(offset_) + "\"/>\n";
+        blocks_.push_back({tuples * components * byte_size(type), std::move(write)});
+        offset_ += sizeof(std::uint64_t) + blocks_.back().bytes;
+        return xml;
+    }
+
+    void put_index(std::uint64_t value, ValueType type) {
+        if (type == ValueType::int64) numbers_.put(static_cast<std::int64_t>(value));
+        else numbers_.put(static_cast<std::int32_t>(value));
+    }
+
+    FileOutput& out_;
+    VtkNumbers numbers_;
+    const MeshView& mesh_;
+    std::vector<Block> blocks_;
+    std::uint64_t offset_ = 0; // of the next block
+};
+
+// ---- legacy
+
+constexpr std::size_t numbers_a_triangle = 4; // how many corners, and these
+
+// As VTK does: a name is one word.
+std::string percent_encoded(std::string_view name) {
+    constexpr const char* digits = "0123456789ABCDEF";
+    std::string encoded;
+    for (const char c : name) {
+        const auto byte = static_cast<unsigned char>(c);
+        if (byte > 32 && byte < 127 && c != '"' && c != '%') encoded += c;
+        else (encoded += '%') += {digits[byte >> 4], digits[byte & 15]};
+    }
+    return encoded.empty() ? "_" : encoded;
+}
+
+void write_legacy_data(FileOutput& out, VtkNumbers& numbers, const MeshView& mesh, const VtkPointData& data) {
+    if (data.values.empty() && data.normals.empty() && data.colours.empty() && data.uvs.empty()) return;
+    out.text("POINT_DATA " + std::to_string(mesh.positions.size()) + "\n");
+    if (!data.colours.empty()) {
+        out.text("COLOR_SCALARS " + percent_encoded(data.colours) + " " + std::to_string(data.colour_components) +
+                 "\n");
+        numbers.put_colours(mesh, data.colour_components);
+        out.text("\n");
+    }
+    if (!data.normals.empty()) {
+        out.text("NORMALS " + percent_encoded(data.normals) + " float\n");
+        numbers.put_all(mesh.normals);
+        out.text("\n");
+    }
+    if (!data.uvs.empty()) {
+        out.text("TEXTURE_COORDINATES " + percent_encoded(data.uvs) + " 2 float\n");
+        numbers.put_all(mesh.uvs);
+        out.text("\n");
+    }
+    if (data.values.empty()) return;
+    out.text("FIELD FieldData " + std::to_string(data.values.size()) + "\n");
+    for (const VertexArray* values : data.values) {
+        out.text(percent_encoded(values->name) + " " + std::to_string(values->components) + " " +
+                 std::to_string(values->size()) + " " + legacy_name(values->type) + "\n");
+        numbers.put(*values);
+        out.text("\n");
+    }
+}
+
+} // namespace
+
+void write_vtp(FileOutput& out, const MeshView& mesh, std::span<const VertexArray> arrays) {
+    VtpWriter(out, mesh).write(point_data_of(mesh, arrays));
+}
+
+bool fits_legacy_vtk(const MeshView& mesh) {
+    return mesh.triangles.size() <= INT32_MAX / numbers_a_triangle && mesh.positions.size() <= INT32_MAX;
+}
+
+void write_legacy_vtk(FileOutput& out, const MeshView& mesh, std::span<const VertexArray> arrays) {
+    VtkNumbers numbers(out, std::endian::big);
+    const bool has_floats = are_floats(mesh);
+    out.text("# vtk DataFile Version 3.0\nwritten by unseen\nBINARY\nDATASET POLYDATA\nPOINTS " +
+             std::to_string(mesh.positions.size()) + (has_floats ? " float\n" : " double\n"));
+    numbers.put_positions(mesh, has_floats);
+    out.text("\nPOLYGONS " + std::to_string(mesh.triangles.size()) + " " +
+             std::to_string(numbers_a_triangle * mesh.triangles.size()) + "\n");
+    for (const Triangle& triangle : mesh.triangles) {
+        numbers.put(std::int32_t{3});
+        for (const Index corner : triangle) numbers.put(static_cast<std::int32_t>(corner));
+    }
+    out.text("\n");
+    write_legacy_data(out, numbers, mesh, point_data_of(mesh, arrays));
+}
+
+} // namespace unseen::meshio
