@@ -20,6 +20,7 @@
 #include "perception_bench.h"
 #include "program.h"
 #include "report.h"
+#include "requests_bench.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -299,6 +300,29 @@ Command budget_command(CLI::App& app) {
     return {verb, [a] { return run(*a); }};
 }
 
+struct RequestsArguments {
+    std::string model;
+    ReportArguments report;
+};
+
+Result<int> run(RequestsArguments& a) {
+    auto bench = BenchRun::open({a.model}, {}, a.report);
+    if (!bench) return bench.error();
+    const auto result = bench_requests(a.model);
+    if (!result) return result.error();
+    return bench->close({{"requests", result->requests}}, {result->table});
+}
+
+Command requests_command(CLI::App& app) {
+    auto a = std::make_shared<RequestsArguments>();
+    CLI::App* verb =
+        app.add_subcommand("requests", "What usual requests keep of a model, take, and show: the table of README.md");
+    verb->add_option("MODEL", a->model, "A mesh or a tree")->required()->type_name("TREE.vdt|MESH");
+    add_report_options(*verb, a->report);
+    verb->footer("Examples:\n  unseen-bench requests bunny.vdt");
+    return {verb, [a] { return run(*a); }};
+}
+
 struct FitArguments {
     FitBenchOptions options;
     ReportArguments report;
@@ -340,6 +364,6 @@ int main(int argc, char** argv) {
     using namespace unseen::app;
     return run_program(argc, argv, {"unseen-bench", about, examples, UNSEEN_VERSION, {}}, [](CLI::App& app) {
         return std::vector<Command>{engine_command(app), perception_command(app), effects_command(app),
-                                    budget_command(app), fit_command(app)};
+                                    budget_command(app), requests_command(app),   fit_command(app)};
     });
 }

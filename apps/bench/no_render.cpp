@@ -2,6 +2,7 @@
 #include "budget_bench.h"
 #include "fit_bench.h"
 #include "perception_bench.h"
+#include "requests_bench.h"
 
 namespace unseen::app {
 namespace {
@@ -16,6 +17,7 @@ Error no_pictures() {
 
 Result<PerceptionBenchResult> bench_perception(const PerceptionBenchOptions&) { return no_pictures(); }
 Result<BudgetBenchResult> bench_budget(const BudgetBenchOptions&) { return no_pictures(); }
+Result<RequestsBenchResult> bench_requests(const std::string&) { return no_pictures(); }
 Result<FitBenchResult> bench_fit(const FitBenchOptions&) { return no_pictures(); }
 std::vector<std::string> fit_factors() { return {}; }
 

@@ -55,7 +55,10 @@ void print_table(std::vector<std::vector<std::string>> rows) {
 Json texture_json(const vdtree::VertexTree& tree) {
     const vdtree::TextureView texture = tree.texture();
     if (texture.empty()) return nullptr;
-    const auto wrap = [](vdtree::Wrap w) { return w == vdtree::Wrap::repeat ? "repeat" : "clamp"; };
+    const auto wrap = [](vdtree::Wrap w) {
+        if (w == vdtree::Wrap::clamp) return "clamp";
+        return w == vdtree::Wrap::mirror ? "mirror" : "repeat";
+    };
     return {{"width", texture.width},
             {"height", texture.height},
             {"wrap_u", wrap(texture.wrap_u)},

@@ -7,6 +7,7 @@ namespace {
 constexpr const char* about =
     "Unseen simplifies meshes where nobody can see it: view-dependent, by what a human eye perceives on a display.";
 constexpr const char* examples = R"(Examples:
+  unseen demo
   unseen build bunny.ply -o bunny.vdt
   unseen render bunny.vdt -o bunny.png
   unseen simplify bunny.vdt --triangles 5000 -o small.ply
@@ -25,6 +26,6 @@ int main(int argc, char** argv) {
         return std::vector<Command>{build_command(app),  info_command(app),      simplify_command(app),
                                     render_command(app), sheet_command(app),     compare_command(app),
                                     csf_command(app),    calibrate_command(app), view_command(app),
-                                    make_command(app),   cache_command(app)};
+                                    demo_command(app),   make_command(app),      cache_command(app)};
     });
 }

@@ -29,6 +29,7 @@ Result<void> run_calibration_window(calibration::Procedure&, const CalibrationWi
 Result<std::vector<GammaMatch>> match_gamma(const CalibrationWindowOptions&) { return no_window(); }
 Result<void> show_chart(const CalibrationWindowOptions&, const std::string&) { return no_window(); }
 
+Command demo_command(CLI::App& app) { return absent(app, "demo"); }
 Command render_command(CLI::App& app) { return absent(app, "render"); }
 Command sheet_command(CLI::App& app) { return absent(app, "sheet"); }
 Command view_command(CLI::App& app) { return absent(app, "view"); }

@@ -6,6 +6,7 @@
 namespace unseen::app {
 
 Command build_command(CLI::App& app);
+Command demo_command(CLI::App& app);
 Command info_command(CLI::App& app);
 Command make_command(CLI::App& app);
 Command simplify_command(CLI::App& app);

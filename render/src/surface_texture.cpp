@@ -90,7 +90,14 @@ void upload_all(const Texture2d& image, const vdtree::TextureView& texture, int 
     }
 }
 
-GLint gl_wrap(vdtree::Wrap wrap) { return wrap == vdtree::Wrap::repeat ? GL_REPEAT : GL_CLAMP_TO_EDGE; }
+GLint gl_wrap(vdtree::Wrap wrap) {
+    switch (wrap) {
+    case vdtree::Wrap::clamp: return GL_CLAMP_TO_EDGE;
+    case vdtree::Wrap::mirror: return GL_MIRRORED_REPEAT;
+    case vdtree::Wrap::repeat: break;
+    }
+    return GL_REPEAT;
+}
 
 } // namespace
 

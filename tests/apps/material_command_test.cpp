@@ -5,6 +5,7 @@
 #include <perception/image.h>
 
 #include "gltf_scene.h"
+#include "obj_file.h"
 
 namespace {
 
@@ -16,6 +17,7 @@ using unseen::perception::Image;
 using unseen::support::GltfContents;
 using unseen::support::GltfScene;
 using unseen::support::read_gltf;
+using unseen::support::read_obj;
 
 class MaterialCommandTest : public CommandTest {
 protected:
@@ -54,21 +56,11 @@ protected:
         f("way.vdt");
     }
 
-    // Whether nobody sees a difference between two models from where the scene is seen; yes where nothing can be drawn.
+    // From where the scene is seen.
     ::testing::AssertionResult look_the_same(const std::string& a, const std::string& b) const {
-        for (const auto& [model, picture] : {std::pair(a, "a.pfm"), std::pair(b, "b.pfm")}) {
-            const Outcome drawn =
-                run({"render",   model, "-o", picture, "--full",    "--size", "400x200", "--eye", "0", "0.5", "6",
-                     "--target", "0",   "0",  "0",     "--samples", "4",      "--light", "1",     "1", "1"});
-            if (drawn.err.find("No OpenGL") != std::string::npos) return ::testing::AssertionSuccess();
-            if (drawn.status != 0) return ::testing::AssertionFailure() << drawn.err;
-        }
-        const auto picture = unseen::perception::read_image(path("a.pfm"));
-        const auto [least, most] = std::minmax_element(picture->image.values.begin(), picture->image.values.end());
-        if (!(*most > 2 * *least)) return ::testing::AssertionFailure() << "there is nothing to be seen";
-        const Outcome compared = run({"compare", "a.pfm", "b.pfm", "--json", "-"});
-        if (compared.json()["visible_pixels"] == 0) return ::testing::AssertionSuccess();
-        return ::testing::AssertionFailure() << a << " and " << b << " differ: " << compared.out;
+        return CommandTest::look_the_same(a, b,
+                                          {"--size", "400x200", "--eye", "0", "0.5", "6", "--target", "0", "0", "0",
+                                           "--samples", "4", "--light", "1", "1", "1"});
     }
 };
 
@@ -259,39 +251,9 @@ protected:
         write_text(path("in/bumps.png"), images()[1]);
     }
 
-    // Triangles by object, group and material, as text; quads as the two triangles that they become.
+    // Corners by object, group and material.
     std::map<std::string, std::multiset<std::string>> contents(const std::string& file) const {
-        std::map<std::string, std::multiset<std::string>> out;
-        std::map<std::string, std::vector<std::string>> lists;
-        std::map<std::string, std::string> names;
-        std::istringstream in(read_text(path(file)));
-        for (std::string line; std::getline(in, line);) {
-            std::istringstream words(line);
-            std::string keyword, word;
-            words >> keyword;
-            if (keyword == "v" || keyword == "vt" || keyword == "vn") {
-                std::ostringstream values;
-                for (double value = 0; words >> value;) values << value << ' ';
-                lists[keyword].push_back(values.str());
-            } else if (keyword == "o" || keyword == "g" || keyword == "usemtl") {
-                words >> names[keyword];
-            } else if (keyword == "f") {
-                std::vector<std::string> corners;
-                while (words >> word) {
-                    std::istringstream numbers(word);
-                    std::string corner;
-                    for (const char* list : {"v", "vt", "vn"}) {
-                        std::getline(numbers, word, '/');
-                        corner += word.empty() ? "-" : lists[list].at(std::stoul(word) - 1);
-                    }
-                    corners.push_back(corner);
-                }
-                EXPECT_GE(corners.size(), 3u);
-                for (const std::string& corner : corners)
-                    out[names["o"] + " " + names["g"] + " " + names["usemtl"]].insert(corner);
-            }
-        }
-        return out;
+        return read_obj(read_text(path(file))).corners();
     }
     template <class Set>
     static std::set<typename Set::value_type> as_set(const Set& values) {

@@ -450,14 +450,29 @@ TEST_F(RenderCommandTest, MapsShowWhatFoldsCost) {
     EXPECT_EQ(run({"render", "ball.vdt", "-o", "map.pfm", "--show", "cost"}).status, 2) << "no luminance";
     EXPECT_EQ(run({"render", "ball.vdt", "-o", "map.png", "--show", "beauty"}).status, 2);
     EXPECT_EQ(run({"render", "ball.vdt", "--path", "orbit:10", "--show", "cost"}).status, 2);
+}
 
-    const Outcome outcome = run({"sheet", "ball.vdt", "-o", "maps.png", "--maps", "--size", "256x256", "--samples", "4",
-                                 "--cell", "64", "--json", "-"});
-    ASSERT_EQ(outcome.status, 0) << outcome.err;
-    EXPECT_EQ(outcome.json()["cuts"].size(), 3u);
-    const auto sheet = read_image(path("maps.png"));
-    ASSERT_TRUE(sheet) << sheet.error().message;
-    EXPECT_GT(sheet->image.height, 6 * 64);
+// Both sheets of one drawing are those that are asked for one by one.
+TEST_F(RenderCommandTest, MapsComeOnASheetOfTheirOwn) {
+    const auto sheet = [&](std::vector<std::string> outputs) {
+        outputs.insert(outputs.begin(), {"sheet", "ball.vdt"});
+        outputs.insert(outputs.end(), {"--size", "256x256", "--samples", "4", "--cell", "64", "--json", "-"});
+        const Outcome outcome = run(outputs);
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        return outcome.json()["cuts"];
+    };
+    EXPECT_EQ(sheet({"--maps", "maps.png"}).size(), 3u) << "a budget has no map";
+    EXPECT_EQ(sheet({"-o", "sheet.png"}).size(), 4u);
+    const Json both = sheet({"-o", "both.png", "--maps", "both_maps.png"});
+    EXPECT_EQ(both.size(), 4u);
+    EXPECT_TRUE(read_text(path("maps.png")) == read_text(path("both_maps.png")));
+    EXPECT_TRUE(read_text(path("sheet.png")) == read_text(path("both.png")));
+    const auto maps = read_image(path("maps.png"));
+    ASSERT_TRUE(maps) << maps.error().message;
+    EXPECT_GT(maps->image.height, 6 * 64);
+    EXPECT_EQ(run({"sheet", "ball.vdt"}).status, 2);
+    EXPECT_EQ(run({"sheet", "ball.vdt", "--maps", "same.png", "-o", "same.png"}).status, 1);
+    EXPECT_EQ(run({"sheet", "ball.vdt", "--maps", "m.png", "--triangles", "9"}).status, 2);
 }
 
 TEST_F(RenderCommandTest, WrongUsageIsStatusTwo) {

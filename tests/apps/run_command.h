@@ -21,6 +21,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <perception/image.h>
 
 extern char** environ;
 
@@ -158,6 +159,25 @@ protected:
     }
     static constexpr int ball_triangles = 2 * 32 * 23;
     static constexpr int ball_vertices = 2 + 32 * 23;
+
+    // Whether the judge sees no pixel change between two models, both whole, drawn with these options; yes where nothing
+    // can be drawn. Leaves a.pfm and b.pfm.
+    ::testing::AssertionResult look_the_same(const std::string& a, const std::string& b,
+                                             const std::vector<std::string>& view) const {
+        for (const auto& [model, picture] : {std::pair(a, "a.pfm"), std::pair(b, "b.pfm")}) {
+            std::vector<std::string> words = {"render", model, "-o", picture, "--full"};
+            words.insert(words.end(), view.begin(), view.end());
+            const Outcome drawn = run(words);
+            if (drawn.err.find("No OpenGL") != std::string::npos) return ::testing::AssertionSuccess();
+            if (drawn.status != 0) return ::testing::AssertionFailure() << drawn.err;
+        }
+        const auto picture = perception::read_image(path("a.pfm"));
+        const auto [least, most] = std::minmax_element(picture->image.values.begin(), picture->image.values.end());
+        if (!(*most > 2 * *least)) return ::testing::AssertionFailure() << "there is nothing to be seen";
+        const Outcome compared = run({"compare", "a.pfm", "b.pfm", "--json", "-"});
+        if (compared.json()["visible_pixels"] == 0) return ::testing::AssertionSuccess();
+        return ::testing::AssertionFailure() << a << " and " << b << " differ: " << compared.out << compared.err;
+    }
 
     // The ball's tree, as ball.vdt.
     void build_ball() const {

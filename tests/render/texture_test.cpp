@@ -148,7 +148,8 @@ TEST_F(Textured, KeepTheirLightWhereTheyAreSmall) {
 }
 
 TEST_F(Textured, RepeatOrEndWhereTheySaySo) {
-    for (const auto wrap : {vdtree::Wrap::repeat, vdtree::Wrap::clamp}) {
+    using vdtree::Wrap;
+    for (const Wrap wrap : {Wrap::repeat, Wrap::clamp, Wrap::mirror}) {
         Mesh mesh = textures::textured_grid(4, four_colours());
         mesh.texture.wrap_u = mesh.texture.wrap_v = wrap;
         for (glm::vec2& uv : mesh.uvs) uv = uv * 2.0f;
@@ -157,8 +158,8 @@ TEST_F(Textured, RepeatOrEndWhereTheySaySo) {
             return glm::dvec3(vdtree::linear_colour(mesh.texture.texels[static_cast<std::size_t>(i)]));
         };
         expect_near(colour(frame, 8, 56), texel(0), 0.08);
-        expect_near(colour(frame, 40, 24), texel(wrap == vdtree::Wrap::repeat ? 0 : 3),
-                    wrap == vdtree::Wrap::repeat ? 0.08 : code_step);
+        expect_near(colour(frame, 40, 24), texel(wrap == Wrap::repeat ? 0 : 3), wrap == Wrap::clamp ? code_step : 0.08);
+        expect_near(colour(frame, 56, 8), texel(wrap == Wrap::mirror ? 0 : 3), wrap == Wrap::clamp ? code_step : 0.08);
     }
 }
 

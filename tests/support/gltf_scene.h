@@ -2,10 +2,12 @@
 // holds, read back by code of its own, for comparison.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <set>
@@ -150,11 +152,25 @@ private:
 using Row = std::vector<float>;
 using TriangleRows = std::array<Row, 3>;
 
+// Of each component, over the vertices that triangles use.
+struct ValueBox {
+    Row lo, hi;
+
+    void include(const Row& values) {
+        if (lo.empty()) lo = hi = values;
+        for (std::size_t k = 0; k < values.size(); ++k) {
+            lo[k] = std::min(lo[k], values[k]);
+            hi[k] = std::max(hi[k], values[k]);
+        }
+    }
+};
+
 struct GltfContents {
     json rest;                                                    // without geometry
     std::vector<std::string> images;                              // as bytes; of those beside the file, their names
     std::map<std::string, std::multiset<TriangleRows>> triangles; // by node's name and material's number
     std::map<std::string, std::set<std::string>> attributes;      // likewise
+    std::map<std::string, std::map<std::string, ValueBox>> boxes; // likewise, then by attribute
 };
 
 inline TriangleRows rotated(TriangleRows t) {
@@ -181,14 +197,35 @@ inline GltfContents read_gltf(const std::filesystem::path& file) {
         const json& view = document["bufferViews"].at(number);
         return data.substr(view.value("byteOffset", std::size_t{0}), view["byteLength"]);
     };
+    // Elements may lie apart (byteStride); normalised integers stand for 0..1, or -1..1.
     const auto values = [&]<class Value>(std::size_t number, Value) {
         const json& accessor = document["accessors"].at(number);
         const std::string type = accessor["type"];
         const std::size_t components = type == "SCALAR" ? 1 : static_cast<std::size_t>(type[3] - '0');
-        const std::string bytes = bytes_of(accessor["bufferView"]).substr(accessor.value("byteOffset", std::size_t{0}));
+        const std::size_t view = accessor["bufferView"];
+        const std::string bytes = bytes_of(view).substr(accessor.value("byteOffset", std::size_t{0}));
         std::vector<std::vector<Value>> rows(accessor["count"], std::vector<Value>(components));
-        for (std::size_t i = 0; i < rows.size(); ++i)
-            std::memcpy(rows[i].data(), bytes.data() + i * components * sizeof(Value), components * sizeof(Value));
+        const auto read_as = [&]<class Stored>(Stored) {
+            const std::size_t stride =
+                document["bufferViews"].at(view).value("byteStride", components * sizeof(Stored));
+            const bool is_share = accessor.value("normalized", false);
+            for (std::size_t i = 0; i < rows.size(); ++i)
+                for (std::size_t k = 0; k < components; ++k) {
+                    Stored stored{};
+                    std::memcpy(&stored, &bytes.at(i * stride + k * sizeof stored), sizeof stored);
+                    if (is_share)
+                        rows[i][k] = static_cast<Value>(static_cast<double>(stored) /
+                                                        static_cast<double>(std::numeric_limits<Stored>::max()));
+                    else rows[i][k] = static_cast<Value>(stored);
+                }
+        };
+        switch (accessor["componentType"].get<int>()) {
+        case 5121: read_as(std::uint8_t{}); break;
+        case 5123: read_as(std::uint16_t{}); break;
+        case 5125: read_as(std::uint32_t{}); break;
+        case 5126: read_as(float{}); break;
+        default: throw std::runtime_error("a type of components that no test writes");
+        }
         return rows;
     };
     for (json& node : document["nodes"]) {
@@ -197,14 +234,15 @@ inline GltfContents read_gltf(const std::filesystem::path& file) {
             const std::string key =
                 node.value("name", std::string()) + " " + std::to_string(primitive.value("material", -1));
             std::vector<Row> rows;
+            const auto indices = values(primitive["indices"].get<std::size_t>(), std::uint32_t{});
             for (const auto& [name, accessor] : primitive["attributes"].items()) {
                 out.attributes[key].insert(name);
                 const auto of_vertices = values(accessor.get<std::size_t>(), float{});
                 rows.resize(of_vertices.size());
                 for (std::size_t i = 0; i < rows.size(); ++i)
                     rows[i].insert(rows[i].end(), of_vertices[i].begin(), of_vertices[i].end());
+                for (const auto& index : indices) out.boxes[key][name].include(of_vertices.at(index[0]));
             }
-            const auto indices = values(primitive["indices"].get<std::size_t>(), std::uint32_t{});
             for (std::size_t i = 0; i + 2 < indices.size(); i += 3)
                 out.triangles[key].insert(
                     rotated({rows.at(indices[i][0]), rows.at(indices[i + 1][0]), rows.at(indices[i + 2][0])}));

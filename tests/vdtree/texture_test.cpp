@@ -30,8 +30,10 @@ double bilinear(const Texture& texture, double u, double v) {
     const double x = u * texture.width - 0.5, y = v * texture.height - 0.5;
     const auto wrapped = [](double i, std::uint32_t n, Wrap wrap) {
         const double size = n;
-        return static_cast<std::size_t>(wrap == Wrap::clamp ? std::clamp(i, 0.0, size - 1)
-                                                            : i - size * std::floor(i / size));
+        if (wrap == Wrap::clamp) return static_cast<std::size_t>(std::clamp(i, 0.0, size - 1));
+        const double copy = std::floor(i / size), along = i - size * copy;
+        const bool is_mirrored = wrap == Wrap::mirror && std::fmod(copy, 2) != 0;
+        return static_cast<std::size_t>(is_mirrored ? size - 1 - along : along);
     };
     const auto at = [&](double i, double j) {
         return linear_luminance(texture.texels[wrapped(j, texture.height, texture.wrap_v) * texture.width +
@@ -46,7 +48,7 @@ TEST(TexturePyramid, HoldsWhatFilteringReturns) {
     int tight = 0, looked = 0;
     for (const auto& [width, height] :
          {std::pair(64u, 64u), std::pair(37u, 19u), std::pair(1u, 1u), std::pair(100u, 3u)}) {
-        for (const Wrap wrap : {Wrap::repeat, Wrap::clamp}) {
+        for (const Wrap wrap : {Wrap::repeat, Wrap::clamp, Wrap::mirror}) {
             Texture texture = textures::noise(width, height, 7);
             texture.wrap_u = wrap;
             const TexturePyramid pyramid(texture.view());
@@ -66,18 +68,23 @@ TEST(TexturePyramid, HoldsWhatFilteringReturns) {
                     least = std::min(least, y), most = std::max(most, y);
                 }
                 // Nothing that is not near: a seventh of the longer side, and the texel that filters reach for.
-                if (wrap == Wrap::repeat) {
+                if (wrap != Wrap::clamp) {
                     const float w = static_cast<float>(width), h = static_cast<float>(height),
                                 longer = std::max((hi.x - lo.x) * w, (hi.y - lo.y) * h);
                     const glm::vec2 around((longer / 7 + 2) / w, (longer / 7 + 2) / h);
-                    const auto lies_near = [](double at, float first, float last) {
-                        return at - std::floor(at - static_cast<double>(first)) <= static_cast<double>(last);
+                    const auto is_within = [](double at, double period, float first, float last) {
+                        return at - period * std::floor((at - static_cast<double>(first)) / period) <=
+                               static_cast<double>(last);
+                    };
+                    const auto lies_near = [&](double at, float first, float last, Wrap along) {
+                        if (along != Wrap::mirror) return is_within(at, 1, first, last);
+                        return is_within(at, 2, first, last) || is_within(-at, 2, first, last);
                     };
                     double least_near = 1, most_near = 0;
                     for (std::uint32_t y = 0; y < height; ++y)
                         for (std::uint32_t x = 0; x < width; ++x) {
-                            if (!lies_near((x + 0.5) / width, lo.x - around.x, hi.x + around.x) ||
-                                !lies_near((y + 0.5) / height, lo.y - around.y, hi.y + around.y))
+                            if (!lies_near((x + 0.5) / width, lo.x - around.x, hi.x + around.x, wrap) ||
+                                !lies_near((y + 0.5) / height, lo.y - around.y, hi.y + around.y, Wrap::repeat))
                                 continue;
                             const double luminance = linear_luminance(texture.texels[y * width + x]);
                             least_near = std::min(least_near, luminance), most_near = std::max(most_near, luminance);
@@ -96,6 +103,7 @@ TEST(TexturePyramid, HoldsWhatFilteringReturns) {
 TEST(TexturePyramid, OfABoxWithinAnotherLiesWithinTheOthers) {
     std::mt19937_64 random(4);
     Texture texture = textures::noise(90, 70, 2);
+    texture.wrap_v = Wrap::mirror;
     const TexturePyramid pyramid(texture.view());
     for (int trial = 0; trial < 5000; ++trial) {
         UvBox inner, outer;

@@ -67,13 +67,10 @@ std::int64_t place_in_rows(std::vector<Tile>& tiles, std::int64_t width) {
 }
 
 void lay(const Tile& tile, const Texture& from, Texture& to) {
-    const auto source = [](std::int64_t i, std::int64_t n, Wrap wrap) {
-        return wrap == Wrap::clamp ? std::clamp<std::int64_t>(i, 0, n - 1) : ((i % n) + n) % n;
-    };
     for (std::int64_t y = -border; y < tile.height + border; ++y) {
-        const std::int64_t row = source(y + tile.first_v * from.height, from.height, from.wrap_v);
+        const std::int64_t row = vdtree::wrapped_texel(y + tile.first_v * from.height, from.height, from.wrap_v);
         for (std::int64_t x = -border; x < tile.width + border; ++x) {
-            const std::int64_t column = source(x + tile.first_u * from.width, from.width, from.wrap_u);
+            const std::int64_t column = vdtree::wrapped_texel(x + tile.first_u * from.width, from.width, from.wrap_u);
             to.texels[static_cast<std::size_t>((tile.y + y) * to.width + tile.x + x)] =
                 from.texels[static_cast<std::size_t>(row * from.width + column)];
         }

@@ -19,8 +19,11 @@ namespace unseen::vdtree {
 // RGB encoded as sRGB, and alpha.
 using Texel = std::array<std::uint8_t, 4>;
 
-// What lies beyond the coordinates 0..1.
-enum class Wrap : std::uint32_t { repeat, clamp };
+// What lies beyond the coordinates 0..1: the image again, its border, or the image mirrored at every border.
+enum class Wrap : std::uint32_t { repeat, clamp, mirror };
+
+// The texel that stands for the i-th of an axis of `size` texels, where i may be any number.
+std::int64_t wrapped_texel(std::int64_t i, std::int64_t size, Wrap wrap) noexcept;
 
 // Row-major. Row 0 is where v is 0 and texel (x, y) covers u from x / width to (x + 1) / width, v likewise: images of
 // formats whose v runs upward (OBJ, PLY) are stored from the bottom row, others (glTF) from the top.

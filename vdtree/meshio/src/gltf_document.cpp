@@ -127,6 +127,21 @@ std::int64_t to_integer_in_range(const json& value, std::int64_t largest, const 
     return static_cast<std::int64_t>(as_double);
 }
 
+std::optional<std::uint32_t> colour_uv_set(const json& material) {
+    const auto within = [](const json* object, const char* key) {
+        return object != nullptr && object->is_object() ? member(*object, key) : nullptr;
+    };
+    const json* texture = within(within(&material, "pbrMetallicRoughness"), "baseColorTexture");
+    const json* set = within(within(within(texture, "extensions"), "KHR_texture_transform"), "texCoord");
+    if (set == nullptr) set = within(texture, "texCoord");
+    if (set == nullptr) return 0;
+    for (std::uint32_t known = 0; known <= last_uv_set; ++known)
+        if (*set == known) return known;
+    return std::nullopt;
+}
+
+std::string uv_attribute(std::uint32_t set) { return "TEXCOORD_" + std::to_string(set); }
+
 namespace {
 
 // Copies what describes triangles, element by element; what is not copied cannot do harm.

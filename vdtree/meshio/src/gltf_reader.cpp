@@ -142,7 +142,12 @@ public:
         const json* mode = member(of_file, "alphaMode");
         if (mode == nullptr || *mode == "OPAQUE") material.colour.a = 1;
         const json* texture = optional_object(*surface, "baseColorTexture");
-        if (images_ != nullptr && texture != nullptr) add_texture(*texture, material);
+        if (images_ != nullptr && texture != nullptr) {
+            if (!colour_uv_set(of_file))
+                fail(where_ + ": its texture lies by texture coordinates that are not read, which are 0 to " +
+                     std::to_string(last_uv_set) + "; correct it, or leave the textures out.");
+            add_texture(*texture, material);
+        }
         return material;
     }
 
@@ -178,17 +183,9 @@ private:
     }
 
     void add_texture(const json& info, Material& material) {
-        const json* set = member(info, "texCoord");
         const json* extensions = optional_object(info, "extensions");
         const json* transform = extensions ? optional_object(*extensions, "KHR_texture_transform") : nullptr;
-        if (transform != nullptr) {
-            material.uv_map = uv_map(*transform);
-            if (const json* other = member(*transform, "texCoord")) set = other;
-        }
-        if (set != nullptr && *set != 0) {
-            fail(where_ + ": its texture lies by the texture coordinates " + set->dump() +
-                 ", and only 0 is read; export it without, or leave the textures out.");
-        }
+        if (transform != nullptr) material.uv_map = uv_map(*transform);
         const json& texture = element("textures", info, "index");
         if (member(texture, "sampler") != nullptr) {
             const std::string of_texture = where_;
@@ -222,14 +219,11 @@ private:
         return {glm::dmat2(scale.x * c, -scale.x * s, scale.y * s, scale.y * c), numbers("offset", glm::dvec2(0))};
     }
 
-    Wrap wrap(const json& sampler, const char* key) const {
+    static Wrap wrap(const json& sampler, const char* key) {
         constexpr int clamps = 33071, mirrors = 33648;
         const json* value = member(sampler, key);
         if (value == nullptr) return Wrap::repeat;
-        if (*value == mirrors)
-            fail(where_ + ": a texture that is repeated in a mirror is not read; export it otherwise, or leave the "
-                          "textures out.");
-        return *value == clamps ? Wrap::clamp : Wrap::repeat;
+        return *value == clamps ? Wrap::clamp : *value == mirrors ? Wrap::mirror : Wrap::repeat;
     }
 
     const json& document_;
@@ -298,11 +292,16 @@ glm::vec3 placed_normal(const Placement& placement, const glm::dvec3& normal) {
 
 class SceneReader {
 public:
-    SceneReader(const MeshSource& source, const tinygltf::Model& model, const Buffers& buffers)
+    SceneReader(const MeshSource& source, const json& document, const tinygltf::Model& model, const Buffers& buffers)
         : source_(source), model_(model), accessors_(model, buffers),
           bytes_left_(
               std::max(min_bytes_out, max_bytes_out_per_byte_in * (source.bytes.size() + buffers.external_bytes()))) {
         for (std::size_t i = 0; i < model.materials.size(); ++i) first_of_name_.try_emplace(model.materials[i].name, i);
+        const json::json_pointer texture("/pbrMetallicRoughness/baseColorTexture");
+        for (const json& material : array_of(document, "materials")) {
+            uv_sets_.push_back(colour_uv_set(material).value_or(0));
+            is_textured_.push_back(material.contains(texture));
+        }
     }
 
     // Empty where the caller cancelled.
@@ -317,6 +316,11 @@ public:
         if (skipped_primitives_ > 0) {
             result_.warnings.push_back(counted_were(skipped_primitives_, "primitive") +
                                        " left out for having no triangles or no positions.");
+        }
+        if (primitives_without_uvs_ > 0) {
+            result_.warnings.push_back(counted_were(primitives_without_uvs_, "primitive") +
+                                       " without the texture coordinates that their texture lies by and drawn in its "
+                                       "colour at 0, 0.");
         }
         std::uint64_t hidden = 0;
         for (std::size_t i = 0; i < reached_.size(); ++i) hidden += !reached_[i] && model_.nodes[i].mesh >= 0;
@@ -409,13 +413,19 @@ private:
         stack.push_back({index, depth, parent});
     }
 
-    // Accessors of a primitive's vertices, by attribute. Primitives of one mesh with the same ones share their
-    // vertices.
+    // Accessors of a primitive's vertices, by attribute. Primitives of one mesh with the same ones, of which the same
+    // are drawn, share their vertices.
     using VertexSource = std::map<std::string, int>;
+
+    // The coordinates by which the texture of a primitive lies.
+    std::string uvs_of(const tinygltf::Primitive& primitive) const {
+        const auto material = static_cast<std::size_t>(primitive.material); // -1: there is none of that number
+        return uv_attribute(material < uv_sets_.size() ? uv_sets_[material] : 0);
+    }
 
     void add_mesh(std::size_t index, std::int32_t node, const Placement& placement) {
         const tinygltf::Mesh& mesh = model_.meshes[index];
-        std::map<VertexSource, Index> first_vertices;
+        std::map<std::pair<VertexSource, std::string>, Index> first_vertices;
         for (std::size_t i = 0; i < mesh.primitives.size(); ++i) {
             const tinygltf::Primitive& primitive = mesh.primitives[i];
             spend(1, bytes_per_visit);
@@ -427,9 +437,13 @@ private:
                 ++skipped_primitives_;
                 continue;
             }
+            const std::string uvs = uvs_of(primitive);
+            const auto material = static_cast<std::size_t>(primitive.material);
+            primitives_without_uvs_ +=
+                material < is_textured_.size() && is_textured_[material] && !vertices.contains(uvs);
             const auto [first, is_new] =
-                first_vertices.try_emplace(vertices, static_cast<Index>(result_.mesh.positions.size()));
-            if (is_new) add_vertices(vertices, placement);
+                first_vertices.try_emplace({vertices, uvs}, static_cast<Index>(result_.mesh.positions.size()));
+            if (is_new) add_vertices(vertices, uvs, placement);
             const std::uint64_t first_triangle = result_.mesh.triangles.size();
             add_triangles(mesh, primitive, first->second, accessors_.count_of(vertices.at("POSITION")),
                           placement.is_mirrored);
@@ -476,7 +490,7 @@ private:
         result_.document = std::move(document_);
     }
 
-    void add_vertices(const VertexSource& from, const Placement& placement) {
+    void add_vertices(const VertexSource& from, const std::string& uvs, const Placement& placement) {
         Mesh& mesh = result_.mesh;
         const std::size_t first = mesh.positions.size();
         const std::size_t count = accessors_.count_of(from.at("POSITION"));
@@ -491,13 +505,14 @@ private:
         if (count >= std::numeric_limits<Index>::max() - first) {
             fail("it has more vertices than 32-bit indices can number; split the scene.");
         }
-        for (const auto& [attribute, accessor] : from) add_attribute(attribute, accessor, first, placement);
+        for (const auto& [attribute, accessor] : from) add_attribute(attribute, accessor, first, uvs, placement);
         if (!mesh.normals.empty()) mesh.normals.resize(mesh.positions.size(), missing_normal);
         if (!mesh.uvs.empty()) mesh.uvs.resize(mesh.positions.size(), glm::vec2(0.0f));
         if (!mesh.colours.empty()) mesh.colours.resize(mesh.positions.size(), missing_colour);
     }
 
-    void add_attribute(const std::string& attribute, int accessor, std::size_t first, const Placement& placement) {
+    void add_attribute(const std::string& attribute, int accessor, std::size_t first, const std::string& uvs,
+                       const Placement& placement) {
         Mesh& mesh = result_.mesh;
         if (attribute == "POSITION") {
             for (const glm::dvec4& p : accessors_.vectors(accessor, 3, "positions")) {
@@ -526,7 +541,7 @@ private:
                 }
                 mesh.normals.push_back(placed_normal(placement, glm::dvec3(n)));
             }
-        } else if (attribute == "TEXCOORD_0") {
+        } else if (attribute == uvs) {
             mesh.uvs.resize(first, glm::vec2(0.0f));
             for (const glm::dvec4& uv : values) mesh.uvs.emplace_back(uv.x, uv.y);
         } else if (attribute == "COLOR_0") {
@@ -608,10 +623,12 @@ private:
     ReadResult result_;
     std::vector<bool> reached_;
     std::set<std::size_t> used_materials_;
+    std::vector<std::uint32_t> uv_sets_;                         // by material
+    std::vector<bool> is_textured_;                              // by material
     std::unordered_map<std::string, std::size_t> first_of_name_; // of materials
     SourceDocument document_;
     std::uint64_t bytes_left_;
-    std::uint64_t skipped_primitives_ = 0;
+    std::uint64_t skipped_primitives_ = 0, primitives_without_uvs_ = 0;
 };
 
 Result<ReadResult> read_document(const MeshSource& source) {
@@ -626,7 +643,7 @@ Result<ReadResult> read_document(const MeshSource& source) {
     if (reduced.has_tangents) warnings.push_back("tangents were left out; they follow from normals and coordinates.");
     if (reduced.has_other_attributes) warnings.push_back("vertex attributes that are not known were left out.");
     const Buffers buffers(source, document, container.bin);
-    SceneReader scene(source, reduced.model, buffers);
+    SceneReader scene(source, document, reduced.model, buffers);
     std::optional<ReadResult> result = scene.read();
     if (!result) return cancelled(source);
     result->uvs_from_top = true;

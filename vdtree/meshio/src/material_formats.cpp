@@ -174,6 +174,7 @@ public:
         for (std::size_t i = 0; i < materials.size(); ++i) write(materials[i], names[i]);
         return text_.str();
     }
+    bool lost_mirrors() const { return lost_mirrors_; }
 
 private:
     void write(const json& material, const std::string& name) {
@@ -205,8 +206,9 @@ private:
         File& image = images_[source.get<std::size_t>()];
         if (image.uri.empty())
             image.uri = stem_ + "_image" + source.dump() + (image.bytes ? ending_of(*image.bytes) : "");
-        constexpr int clamps = 33071;
+        constexpr int clamps = 33071, mirrors = 33648;
         const json& sampler = at(document_, "samplers", within(texture, {"sampler"}));
+        lost_mirrors_ |= within(sampler, {"wrapS"}) == mirrors || within(sampler, {"wrapT"}) == mirrors;
         text_ << keyword << (within(sampler, {"wrapS"}) == clamps ? " -clamp on " : " ") << one_line(image.uri) << '\n';
     }
 
@@ -214,6 +216,7 @@ private:
     const std::string& stem_;
     std::vector<File>& images_;
     std::ostringstream text_;
+    bool lost_mirrors_ = false;
 };
 
 // Of all materials, no two the same.
@@ -240,7 +243,10 @@ Result<SourceDocument> as_obj(SourceDocument document, const std::string& librar
     for (File& image : document.files)
         if (!image.uri.empty())
             if (const auto path = path_beside(gltf::decode_percent(image.uri))) image.uri = path->generic_string();
-    const std::string text = MtlWriter(source, library, document.files).write(names);
+    MtlWriter writer(source, library, document.files);
+    const std::string text = writer.write(names);
+    if (writer.lost_mirrors())
+        notes.push_back("OBJ knows no textures that are mirrored at their borders: they are repeated.");
     std::erase_if(document.files, [](const File& file) { return file.uri.empty(); }); // no material of OBJ names it
     if (!names.empty()) {
         document.files.push_back(

@@ -6,11 +6,13 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <tuple>
 
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 
+#include "gltf_document.h"
 #include "mesh_readers.h"
 
 namespace unseen::meshio {
@@ -24,8 +26,10 @@ constexpr double least_determinant = 1e-12;
 
 class Restorer {
 public:
-    Restorer(const Cut& cut, const ExtractedMesh& extracted, const SourceDocument& document)
-        : tree_(cut.tree()), extracted_(extracted), document_(document), supports_(supports_of(cut, extracted)) {
+    Restorer(const Cut& cut, const ExtractedMesh& extracted, const SourceDocument& document,
+             const std::vector<std::string>& uvs)
+        : tree_(cut.tree()), extracted_(extracted), document_(document), uvs_(uvs),
+          supports_(supports_of(cut, extracted)) {
         find_kinds();
     }
 
@@ -59,14 +63,15 @@ public:
 private:
     // Parts of one kind have the same attributes, drawn in the same way.
     void find_kinds() {
-        std::map<std::pair<std::uint32_t, std::array<double, 10>>, std::uint32_t> kinds;
-        for (const Part& part : document_.parts) {
+        std::map<std::tuple<std::uint32_t, std::string, std::array<double, 10>>, std::uint32_t> kinds;
+        for (std::size_t i = 0; i < document_.parts.size(); ++i) {
+            const Part& part = document_.parts[i];
             const UvMap& uv = part.drawn_uv;
             const glm::dvec4 colour(part.colour);
             const std::array drawing{uv.linear[0][0], uv.linear[0][1], uv.linear[1][0], uv.linear[1][1], uv.offset.x,
                                      uv.offset.y,     colour.r,        colour.g,        colour.b,        colour.a};
             const auto next = static_cast<std::uint32_t>(kinds.size());
-            kinds_.push_back(kinds.try_emplace({part.channels, drawing}, next).first->second);
+            kinds_.push_back(kinds.try_emplace({part.channels, uvs_[i], drawing}, next).first->second);
         }
     }
 
@@ -85,6 +90,7 @@ private:
             }
             if (frame.is_mirrored) std::swap(triangle[0], triangle[1]);
         }
+        out.uvs = uvs_[out.part];
         out.channels.resize(document_.channels.size());
         for (const Index v : out.vertices) {
             numbers_[v] = no_node;
@@ -92,7 +98,7 @@ private:
             out.positions.emplace_back(frame.from_world * glm::dvec4(p, 1.0));
             gather(v, out.part);
             for (std::size_t c = 0; c < out.channels.size(); ++c)
-                if (part.channels >> c & 1) append(out.channels[c], document_.channels[c], v, part, frame);
+                if (part.channels >> c & 1) append(out.channels[c], document_.channels[c], v, out, frame);
         }
     }
 
@@ -107,8 +113,9 @@ private:
         if (like_.empty()) like_.assign(all.begin(), all.end());
     }
 
-    void append(std::vector<float>& to, const SourceDocument::Channel& channel, Index vertex, const Part& part,
+    void append(std::vector<float>& to, const SourceDocument::Channel& channel, Index vertex, const RestoredPart& of,
                 const NodeFrame& frame) const {
+        const Part& part = document_.parts[of.part];
         const std::size_t size = channel.components;
         const bool is_normal = channel.name == "NORMAL" && size == 3;
         if (tree_.is_leaf(extracted_.nodes[vertex]) && (frame.has_inverse || !is_normal)) { // as it was
@@ -125,7 +132,7 @@ private:
             const glm::dvec3 n = frame.normal_from_world * glm::dvec3(mesh.normals[vertex]);
             const double length = glm::length(n);
             for (int k = 0; k < 3; ++k) values[static_cast<std::size_t>(k)] = length > 0 ? n[k] / length : 0.0;
-        } else if (channel.name == "TEXCOORD_0" && is_pure_ && size == 2 && !mesh.uvs.empty()) {
+        } else if (channel.name == of.uvs && is_pure_ && size == 2 && !mesh.uvs.empty()) {
             const double determinant = glm::determinant(part.drawn_uv.linear);
             if (determinant != 0 && std::isfinite(1 / determinant)) {
                 const glm::dvec2 uv =
@@ -144,11 +151,12 @@ private:
     const VertexTree& tree_;
     const ExtractedMesh& extracted_;
     const SourceDocument& document_;
-    std::vector<LeafRange> supports_;  // by vertex of the extracted mesh
-    std::vector<std::uint32_t> kinds_; // by part
-    std::vector<Index> numbers_;       // by vertex of the extracted mesh: its number in the part at hand
-    std::vector<Index> like_;          // what speaks for the vertex at hand
-    bool is_pure_ = false;             // all that it stands for
+    const std::vector<std::string>& uvs_; // by part
+    std::vector<LeafRange> supports_;     // by vertex of the extracted mesh
+    std::vector<std::uint32_t> kinds_;    // by part
+    std::vector<Index> numbers_;          // by vertex of the extracted mesh: its number in the part at hand
+    std::vector<Index> like_;             // what speaks for the vertex at hand
+    bool is_pure_ = false;                // all that it stands for
 };
 
 } // namespace
@@ -188,9 +196,26 @@ NodeFrame frame_of(const glm::dmat4& to_world) {
     return frame;
 }
 
+std::vector<std::string> drawn_uvs(const SourceDocument& document) {
+    std::vector<std::string> uvs(document.parts.size(), gltf::uv_attribute(0));
+    if (document.format != SourceDocument::Format::gltf) return uvs;
+    const gltf::json source = gltf::parse_json(document.json);
+    const gltf::json& meshes = gltf::array_of(source, "meshes");
+    const gltf::json& materials = gltf::array_of(source, "materials");
+    for (std::size_t i = 0; i < uvs.size(); ++i) {
+        const gltf::json& primitive = meshes.at(static_cast<std::size_t>(document.parts[i].mesh))
+                                          .at("primitives")
+                                          .at(static_cast<std::size_t>(document.parts[i].primitive));
+        const gltf::json* material = gltf::member(primitive, "material");
+        if (material == nullptr) continue;
+        uvs[i] = gltf::uv_attribute(gltf::colour_uv_set(materials.at(material->get<std::size_t>())).value_or(0));
+    }
+    return uvs;
+}
+
 Result<std::vector<RestoredPart>> restore(const Cut& cut, const ExtractedMesh& extracted,
-                                          const SourceDocument& document) {
-    Restorer restorer(cut, extracted, document);
+                                          const SourceDocument& document, const std::vector<std::string>& uvs) {
+    Restorer restorer(cut, extracted, document, uvs);
     if (!restorer.is_sound() || extracted.source_triangles.size() != extracted.mesh.triangles.size())
         return Error{ErrorCode::malformed_data,
                      "The source document is not that of the tree's mesh. Build the tree again."};

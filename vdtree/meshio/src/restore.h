@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include <glm/vec3.hpp>
@@ -25,14 +26,18 @@ struct RestoredPart {
     std::vector<glm::vec3> positions;         // in the frame of the part's node ...
     bool is_in_world = false;                 // ... or, where that cannot be turned back, in the world's
     std::vector<std::vector<float>> channels; // like those of the document; empty: the part has it not
+    std::string uvs;                          // the channel of the texture coordinates that it is drawn by
 };
+
+// By part of a document as it was packed: the channel of the texture coordinates that are drawn.
+std::vector<std::string> drawn_uvs(const SourceDocument& document);
 
 // Parts of which nothing is left are left out. Vertices of the mesh come with the values that they had; those of
 // proxies follow from the mesh that was drawn, and else are the means of the vertices that they stand for, of those
-// with the same attributes. Fails where tree and document contradict each other. Cost: the cut's triangles, and the
-// tree's leaves.
+// with the same attributes. `uvs`: by part, as by drawn_uvs(). Fails where tree and document contradict each other.
+// Cost: the cut's triangles, and the tree's leaves.
 Result<std::vector<RestoredPart>> restore(const vdtree::Cut& cut, const vdtree::ExtractedMesh& extracted,
-                                          const SourceDocument& document);
+                                          const SourceDocument& document, const std::vector<std::string>& uvs);
 
 // The inverse of a matrix from a node to the world, or nothing where it has none.
 struct NodeFrame {

@@ -188,7 +188,7 @@ public:
         const SourceDocument::Part* before = nullptr;
         for (const RestoredPart& restored : parts_) {
             const SourceDocument::Part& part = document_.parts[restored.part];
-            const std::uint64_t first_uv = write_vectors("vt", "TEXCOORD_0", restored, uvs_);
+            const std::uint64_t first_uv = write_vectors("vt", restored.uvs, restored, uvs_);
             const std::uint64_t first_normal = write_vectors("vn", "NORMAL", restored, normals_);
             write_name("o", part.object, before ? before->object : std::string());
             write_name("g", part.group, before ? before->group : std::string());
@@ -210,7 +210,8 @@ public:
     }
 
 private:
-    const std::vector<float>* channel(const char* name, const RestoredPart& restored, std::size_t& components) const {
+    const std::vector<float>* channel(const std::string& name, const RestoredPart& restored,
+                                      std::size_t& components) const {
         for (std::size_t c = 0; c < restored.channels.size(); ++c) {
             if (document_.channels[c].name != name || restored.channels[c].empty()) continue;
             components = document_.channels[c].components;
@@ -252,7 +253,7 @@ private:
     }
 
     // The number of the first, or 0: there are none.
-    std::uint64_t write_vectors(const char* keyword, const char* name, const RestoredPart& restored,
+    std::uint64_t write_vectors(const char* keyword, const std::string& name, const RestoredPart& restored,
                                 std::uint64_t& count) {
         std::size_t components = 0;
         const std::vector<float>* values = channel(name, restored, components);
@@ -285,20 +286,21 @@ Result<void> write_document(const fs::path& file, const Cut& cut, SourceDocument
                             std::vector<std::string>& notes) {
     const std::string ending = lower_ending(file);
     const bool is_gltf = ending == ".glb" || ending == ".gltf";
+    const std::vector<std::string> uvs = drawn_uvs(document);
     auto converted =
         is_gltf ? as_gltf(std::move(document), notes) : as_obj(std::move(document), file.stem().string(), notes);
     if (!converted) return converted.error();
     ExtractedMesh extracted = extract_with_sources(cut);
     if (extracted.mesh.triangles.empty())
         return failed_to_write(file, "the cut has no triangles, and no format holds materials of nothing.");
-    auto parts = restore(cut, extracted, *converted);
+    auto parts = restore(cut, extracted, *converted, uvs);
     if (!parts) return parts.error();
     if (holds_arrays(ending)) {
         notes.assign(1, (ending == ".ply" ? "PLY" : "VTK") +
                             std::string(" holds no materials, images and nodes; write glTF or OBJ to keep them."));
         for (std::size_t c = 0; c < converted->channels.size(); ++c)
-            if (converted->channels[c].name == "TEXCOORD_0")
-                for (const RestoredPart& part : *parts)
+            for (const RestoredPart& part : *parts)
+                if (converted->channels[c].name == part.uvs)
                     for (std::size_t i = 0; 2 * i < part.channels[c].size(); ++i)
                         extracted.mesh.uvs.at(part.vertices[i]) = {part.channels[c][2 * i],
                                                                    part.channels[c][2 * i + 1]};

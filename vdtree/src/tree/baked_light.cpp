@@ -27,8 +27,9 @@ using Samples = std::vector<Sample>;
 
 double texel_luminance(const TextureView& texture, glm::vec2 uv) {
     const auto texel = [](float at, std::uint32_t size, Wrap wrap) {
-        const double share = wrap == Wrap::repeat ? at - std::floor(at) : std::clamp(at, 0.0f, 1.0f);
-        return std::min(static_cast<std::size_t>(share * size), std::size_t{size - 1});
+        const double place = std::floor(static_cast<double>(at) * size);
+        const bool is_far = !(std::abs(place) < 1e15); // then any texel is as good
+        return static_cast<std::size_t>(wrapped_texel(is_far ? 0 : static_cast<std::int64_t>(place), size, wrap));
     };
     return linear_luminance(texture.texels[texel(uv.y, texture.height, texture.wrap_v) * texture.width +
                                            texel(uv.x, texture.width, texture.wrap_u)]);

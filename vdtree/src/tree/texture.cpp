@@ -64,9 +64,19 @@ Result<void> validate(const TextureView& texture) {
         return invalid("The texture of " + size + " texels holds " + std::to_string(texture.texels.size()) +
                        "; give as many as it says.");
     for (const Wrap wrap : {texture.wrap_u, texture.wrap_v})
-        if (wrap != Wrap::repeat && wrap != Wrap::clamp)
+        if (wrap != Wrap::repeat && wrap != Wrap::clamp && wrap != Wrap::mirror)
             return invalid("The texture repeats in a way that is not known.");
     return {};
+}
+
+std::int64_t wrapped_texel(std::int64_t i, std::int64_t size, Wrap wrap) noexcept {
+    const auto modulo = [i](std::int64_t n) { return (i % n + n) % n; };
+    switch (wrap) {
+    case Wrap::clamp: return std::clamp<std::int64_t>(i, 0, size - 1);
+    case Wrap::mirror: return std::min(modulo(2 * size), 2 * size - 1 - modulo(2 * size));
+    case Wrap::repeat: break;
+    }
+    return modulo(size);
 }
 
 glm::vec4 linear_colour(Texel texel) noexcept {
@@ -128,11 +138,20 @@ TexturePyramid::Cells TexturePyramid::texels_of(double lo, double hi, std::uint3
     if (!(std::abs(first) < farthest_coordinate) || !(std::abs(last) < farthest_coordinate)) return {0, n - 1, -1};
     const auto begin = static_cast<std::int64_t>(std::floor(first - 0.5 - slack)),
                end = static_cast<std::int64_t>(std::floor(last + 0.5 + slack));
-    if (wrap == Wrap::clamp)
-        return {std::clamp<std::int64_t>(begin, 0, n - 1), std::clamp<std::int64_t>(end, 0, n - 1), -1};
+    const std::int64_t first_texel = wrapped_texel(begin, n, wrap), last_texel = wrapped_texel(end, n, wrap);
+    if (wrap == Wrap::clamp) return {first_texel, last_texel, -1};
+    if (wrap == Wrap::mirror) { // what lies on both sides of a border is one run up to it
+        const std::int64_t copy = (begin - wrapped_texel(begin, n, Wrap::repeat)) / n,
+                           last_copy = (end - wrapped_texel(end, n, Wrap::repeat)) / n;
+        const bool has_both_borders = last_copy - copy > 1, has_one = last_copy - copy == 1;
+        const bool has_first = has_both_borders || (has_one && last_copy % 2 == 0),
+                   has_last = has_both_borders || (has_one && last_copy % 2 != 0);
+        return {has_first ? 0 : std::min(first_texel, last_texel), has_last ? n - 1 : std::max(first_texel, last_texel),
+                -1};
+    }
     if (end - begin + 1 >= n) return {0, n - 1, -1};
-    const std::int64_t wrapped = ((begin % n) + n) % n, wrapped_end = wrapped + (end - begin);
-    return wrapped_end < n ? Cells{wrapped, wrapped_end, -1} : Cells{wrapped, n - 1, wrapped_end - n};
+    const std::int64_t wrapped_end = first_texel + (end - begin);
+    return wrapped_end < n ? Cells{first_texel, wrapped_end, -1} : Cells{first_texel, n - 1, wrapped_end - n};
 }
 
 TexturePyramid::Range TexturePyramid::range(const UvBox& box) const {
@@ -158,11 +177,8 @@ TexturePyramid::Range TexturePyramid::range(const UvBox& box) const {
 }
 
 float TexturePyramid::texel_mean(const Level& level, std::int64_t x, std::int64_t y) const {
-    const auto wrapped = [](std::int64_t i, std::int64_t n, Wrap wrap) {
-        return wrap == Wrap::clamp ? std::clamp<std::int64_t>(i, 0, n - 1) : ((i % n) + n) % n;
-    };
-    const auto column = static_cast<std::size_t>(wrapped(x, level.width, wrap_u_)),
-               row = static_cast<std::size_t>(wrapped(y, level.height, wrap_v_));
+    const auto column = static_cast<std::size_t>(wrapped_texel(x, level.width, wrap_u_)),
+               row = static_cast<std::size_t>(wrapped_texel(y, level.height, wrap_v_));
     return level.means[row * level.width + column];
 }
 

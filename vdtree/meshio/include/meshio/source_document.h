@@ -51,8 +51,9 @@ struct SourceDocument {
         std::int32_t node = -1, mesh = -1, primitive = -1;  // of glTF; -1: none
         std::string object = {}, group = {}, material = {}; // of OBJ; empty: none
         glm::dmat4 to_world = glm::dmat4(1);
-        std::uint32_t channels = 0;      // bit i: its vertices have channel i
-        UvMap drawn_uv = {};             // from TEXCOORD_0 to the mesh's own coordinates
+        std::uint32_t channels = 0; // bit i: its vertices have channel i
+        UvMap drawn_uv = {};        // from its texture coordinates to the mesh's own; of glTF, those of the set that
+                                    // the colour texture of its material lies by
         glm::vec4 colour = glm::vec4(1); // what COLOR_0 was multiplied with for the mesh's own colours
     };
 

@@ -10,10 +10,10 @@
 #include <glm/geometric.hpp>
 
 #include <perception/criterion.h>
+#include <vdtree/internal/number_format.h>
 #include <vdtree/normal_mask.h>
 
 #include "colour_bar.h"
-#include "terminal.h"
 
 namespace unseen::app {
 namespace {

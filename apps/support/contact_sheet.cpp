@@ -1,0 +1,252 @@
+#include "contact_sheet.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include <render/renderer.h>
+#include <vdtree/internal/number_format.h>
+
+#include "drawing.h"
+#include "fold_map.h"
+#include "frame_image.h"
+
+namespace unseen::app {
+namespace {
+
+using perception::Image;
+
+// The pictures of a cut on one of the sheets, one below the other; code values, of a cell's size.
+using Pictures = std::vector<Image>;
+
+struct Column {
+    SheetCut cut;
+    Image luminance; // cd/m2, of the whole window
+    Pictures pictures, maps;
+};
+
+// By one fold test, in four ways. Maps know no budget.
+std::vector<Column> wishes(const session::Session& session, const vdtree::View& view, const SheetOptions& o) {
+    std::vector<Column> columns;
+    const auto add = [&](const char* name, session::Goal goal) -> SheetCut& {
+        SheetCut& cut = columns.emplace_back().cut;
+        cut.name = name;
+        cut.request.goal = goal;
+        cut.request.fold_test = o.fold_test;
+        cut.request.purpose = session::Purpose::picture;
+        return cut;
+    };
+    add("full", session::Goal::full());
+    add("imperceptible", session::Goal::imperceptible());
+    const auto usual = std::max<vdtree::Index>(1, (session.tree().triangle_count() + 2) / 4); // a quarter
+    if (o.has_cuts) add("budget", session::Goal::budget(o.budget.value_or(usual)));
+    add("gaze-directed", session::Goal::imperceptible()).gaze = session::Gaze{
+        o.gaze_px.value_or(session::gaze_aside(session.observer().display, view, session::usual_degrees_aside))};
+    return columns;
+}
+
+bool is_on_maps(const SheetCut& cut) { return cut.request.goal.kind != session::Goal::Kind::budget; }
+
+// The same camera in a window that fits a cell. Pixels are coarser there, so nothing is measured in it.
+vdtree::View small_view(const vdtree::View& view, int cell_px) {
+    vdtree::View small = view;
+    const double shrink = std::min(1.0, static_cast<double>(cell_px) / std::max(view.width, view.height));
+    small.width = std::max(1, static_cast<int>(std::lround(view.width * shrink)));
+    small.height = std::max(1, static_cast<int>(std::lround(view.height * shrink)));
+    return small;
+}
+
+class SheetMaker {
+public:
+    SheetMaker(session::Session& session, const vdtree::View& view, render::Renderer& renderer, const SheetOptions& o)
+        : session_(session), view_(view), renderer_(renderer), o_(o) {}
+
+    // Makes the cut, draws and judges it.
+    Result<void> fill(Column& column, const Image& full) {
+        SheetCut& made = column.cut;
+        session_.set_gaze(made.gaze);
+        auto simplified = session_.simplify(view_, made.request);
+        if (!simplified) return simplified.error();
+        const vdtree::Cut& cut = simplified->cuts.front();
+        if (auto ok = draw(column, cut); !ok) return ok.error();
+        made.pixels = column.luminance.values.size();
+        made.report = std::move(*simplified);
+        return full.values.empty() ? Result<void>() : judge(column, full);
+    }
+
+private:
+    Result<void> draw(Column& column, const vdtree::Cut& cut) {
+        auto lighting = session_.lighting(view_);
+        if (!lighting) return lighting.error();
+        render::DrawOptions options;
+        options.samples = o_.samples;
+        options.background = session_.background();
+        options.lighting = std::move(*lighting);
+        const auto whole = draw(cut, view_, options);
+        if (!whole) return whole.error();
+        column.cut.draw_ms = whole->draw_ms;
+        column.luminance = luminance_image(*whole, session_.observer().display);
+        if (o_.has_cuts) {
+            const vdtree::View small = small_view(view_, o_.cell_px.value_or(usual_cell_px));
+            if (auto ok = draw_twice(column.pictures, cut, small, options); !ok) return ok;
+        }
+        if (!o_.has_maps || !is_on_maps(column.cut)) return {};
+        const vdtree::View small = small_view(view_, o_.cell_px.value_or(usual_maps_cell_px));
+        if (auto ok = draw_twice(column.maps, cut, small, options); !ok) return ok;
+        return draw_maps(column, cut, small);
+    }
+
+    Result<render::Frame> draw(const vdtree::Cut& cut, const vdtree::View& view, const render::DrawOptions& options) {
+        return renderer_.draw(cut, view, options, session_.scene().objects.front().placement);
+    }
+
+    // Shaded, and with the triangles' edges.
+    Result<void> draw_twice(Pictures& pictures, const vdtree::Cut& cut, const vdtree::View& small,
+                            render::DrawOptions options) {
+        for (const bool has_edges : {false, true}) {
+            options.wireframe = has_edges;
+            const auto frame = draw(cut, small, options);
+            if (!frame) return frame.error();
+            pictures.push_back(code_image(*frame, session_.observer().display));
+        }
+        return {};
+    }
+
+    // Where there is none, as that of the cost in the full model, nothing: such columns are shorter.
+    Result<void> draw_maps(Column& column, const vdtree::Cut& cut, const vdtree::View& small) {
+        if (column.cut.request.goal.kind == session::Goal::Kind::full) return {};
+        for (const FoldMap map : {FoldMap::cost, FoldMap::frequency, FoldMap::contrast, FoldMap::eccentricity}) {
+            if (map == FoldMap::eccentricity && !column.cut.gaze) continue;
+            auto drawn = draw_fold_map(cut, session_, view_, column.cut.request, map, small);
+            if (!drawn) return drawn.error();
+            column.maps.push_back(std::move(*drawn));
+        }
+        return {};
+    }
+
+    Result<void> judge(Column& column, const Image& full) {
+        perception::JudgeOptions options;
+        options.display = session_.observer().display;
+        if (column.cut.gaze) options.gaze_px = column.cut.gaze->px;
+        options.csf_table = session_.observer().csf;
+        auto judgement = perception::judge_modern(full, column.luminance, options);
+        if (!judgement) return judgement.error();
+        column.cut.judgement = std::move(*judgement);
+        return {};
+    }
+
+    session::Session& session_;
+    const vdtree::View& view_;
+    render::Renderer& renderer_;
+    const SheetOptions& o_;
+};
+
+// The lines above a column of pictures.
+struct Caption {
+    std::string name, verdict;
+
+    explicit Caption(const SheetCut& cut) : name(cut.name + ": " + grouped(cut.report.stats.triangles) + " triangles") {
+        const double from = cut.report.imperceptible_from_m;
+        if (cut.judgement)
+            verdict = grouped(cut.judgement->visible_pixels) + " pixels visible; from " + rounded(from, 3) +
+                      (std::isfinite(from) ? " m none" : " none");
+    }
+};
+
+// Columns beside each other: those that have pictures of the kind.
+Result<Image> compose(const std::vector<Column>& columns, Pictures Column::*kind, const session::Session& session,
+                      const vdtree::View& view, const std::string& model) {
+    constexpr int gap = 12, text_height = 17, line_height = 22; // pixels
+    constexpr glm::vec3 paper{0.12f}, ink{0.95f}, weak{0.7f};
+    struct Shown {
+        Caption caption;
+        const Pictures& pictures;
+    };
+    int height = 0, cell_width = 0; // of the tallest column, and of the widest picture or line of text
+    std::vector<Shown> shown;
+    for (const Column& column : columns) {
+        if ((column.*kind).empty()) continue;
+        const Caption& caption = shown.emplace_back(Shown{Caption(column.cut), column.*kind}).caption;
+        for (const std::string& line : {caption.name, caption.verdict})
+            cell_width = std::max(cell_width, static_cast<int>(std::ceil(Drawing::text_width(line, text_height))));
+        int below = 0;
+        for (const Image& picture : column.*kind) {
+            cell_width = std::max(cell_width, picture.width);
+            below += picture.height + gap;
+        }
+        height = std::max(height, below);
+    }
+    const int count = static_cast<int>(shown.size());
+    const int header = 2 * gap + line_height, above = 2 * line_height + gap;
+    auto drawing = Drawing::create(gap + count * (cell_width + gap), header + above + height, paper);
+    if (!drawing) return drawing.error();
+
+    const perception::Display& display = session.observer().display;
+    const std::string title = model + "   " + std::to_string(view.width) + "x" + std::to_string(view.height) +
+                              " pixels, " + rounded(perception::pixels_per_degree(display).value(), 4) +
+                              " per degree, seen from " + rounded(display.distance.value(), 3) + " m";
+    drawing->text({gap, gap}, title, ink, Drawing::fitting_height(title, text_height, drawing->width() - 2 * gap));
+    for (int i = 0; i < count; ++i) {
+        const int left = gap + i * (cell_width + gap);
+        const Shown& column = shown[static_cast<std::size_t>(i)];
+        drawing->text({left, header}, column.caption.name, ink, text_height);
+        drawing->text({left, header + line_height}, column.caption.verdict, weak, text_height);
+        int top = header + above;
+        for (const Image& picture : column.pictures) {
+            drawing->picture({left, top}, picture);
+            top += picture.height + gap;
+        }
+    }
+    return drawing->image();
+}
+
+// The first is the full model.
+Result<void> fill_all(std::vector<Column>& columns, session::Session& session, const vdtree::View& view,
+                      render::Context& context, const SheetOptions& o) {
+    // Before anything is made of the tree, which may change.
+    for (const Column& column : columns)
+        if (const auto ready = session.prepare(view, column.cut.request); !ready) return ready.error();
+    auto renderer = render::Renderer::create(context, session.tree());
+    if (!renderer) return renderer.error();
+    SheetMaker maker(session, view, *renderer, o);
+    Image full;
+    for (Column& column : columns) {
+        const double share = static_cast<double>(&column - columns.data()) / static_cast<double>(columns.size());
+        if (o.progress && !o.progress(share, column.cut.name.c_str()))
+            return Error{ErrorCode::cancelled, "The drawing was cancelled."};
+        if (auto ok = maker.fill(column, full); !ok) return ok;
+        if (full.values.empty()) full = std::move(column.luminance);
+    }
+    return {};
+}
+
+} // namespace
+
+Result<void> judge_cuts(session::Session& session, const vdtree::View& view, render::Context& context,
+                        std::vector<SheetCut>& cuts) {
+    std::vector<Column> columns;
+    for (SheetCut& cut : cuts) columns.emplace_back().cut = std::move(cut);
+    SheetOptions options;
+    options.has_cuts = false;
+    const auto filled = fill_all(columns, session, view, context, options);
+    for (std::size_t i = 0; i < cuts.size(); ++i) cuts[i] = std::move(columns[i].cut);
+    return filled;
+}
+
+Result<ContactSheet> draw_contact_sheet(session::Session& session, const vdtree::View& view, render::Context& context,
+                                        const SheetOptions& o) {
+    std::vector<Column> columns = wishes(session, view, o);
+    if (auto filled = fill_all(columns, session, view, context, o); !filled) return filled.error();
+    ContactSheet out;
+    for (const auto& [is_wanted, kind, image] :
+         {std::tuple(o.has_cuts, &Column::pictures, &out.sheet), std::tuple(o.has_maps, &Column::maps, &out.maps)}) {
+        if (!is_wanted) continue;
+        auto composed = compose(columns, kind, session, view, o.model);
+        if (!composed) return composed.error();
+        *image = std::move(*composed);
+    }
+    for (Column& column : columns) out.cuts.push_back(std::move(column.cut));
+    return out;
+}
+
+} // namespace unseen::app

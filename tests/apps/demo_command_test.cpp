@@ -1,0 +1,46 @@
+// unseen demo: without a file, with a display and without one.
+#include "run_command.h"
+#include "virtual_display.h"
+
+namespace {
+
+using namespace unseen::app::testing;
+using ::testing::HasSubstr;
+
+class DemoCommandTest : public CommandTest {
+protected:
+    void SetUp() override {
+        CommandTest::SetUp();
+        ::setenv("UNSEEN_CACHE", path("cache").c_str(), 1); // in the test's own folder
+    }
+};
+
+TEST_F(DemoCommandTest, MakesAndShowsAModel) {
+    const unseen::render::testing::VirtualDisplay display;
+    if (!display.reason().empty()) GTEST_SKIP() << "no display: " << display.reason();
+    const Outcome shown = run({"demo", "--made", "-o", "look", "--frames", "3"});
+    ASSERT_EQ(shown.status, 0) << shown.err;
+    if (shown.err.find("pictures are left out") != std::string::npos) GTEST_SKIP() << shown.err;
+    EXPECT_EQ(shown.err.find("no viewer"), std::string::npos) << shown.err;
+    EXPECT_THAT(shown.out, HasSubstr("the viewer is open"));
+    EXPECT_THAT(shown.out, HasSubstr("of 40,000 triangles"));
+    for (const std::string file : {"ball.vdt", "ball_small.ply", "ball_sheet.png", "ball_maps.png"}) {
+        EXPECT_TRUE(fs::exists(path("look") / file)) << file;
+        EXPECT_THAT(shown.out, HasSubstr("look/" + file));
+    }
+    // The mesh is what simplify writes of the tree.
+    EXPECT_EQ(run({"simplify", "look/ball.vdt", "-o", "again.ply"}).status, 0);
+    EXPECT_TRUE(read_text(path("again.ply")) == read_text(path("look/ball_small.ply")));
+
+    // The same a second time, and how to look at it where no window can be opened.
+    unsetenv("DISPLAY");
+    const std::string sheet = read_text(path("look/ball_sheet.png"));
+    const Outcome unseen = run({"demo", "--made", "-o", "look"});
+    ASSERT_EQ(unseen.status, 0) << unseen.err;
+    EXPECT_THAT(unseen.out, HasSubstr("where there is a display:  unseen view look/ball.vdt"));
+    EXPECT_TRUE(read_text(path("look/ball_sheet.png")) == sheet);
+    write_text(path("file"), "");
+    EXPECT_THAT(run({"demo", "--made", "-o", "file"}).err, IsAnErrorForPeople());
+}
+
+} // namespace
