@@ -1,4 +1,6 @@
 // Meshes of scanners and CAD programs: PLY with colours, STL, OFF, in other units, and with what goes wrong in them.
+#include <map>
+
 #include "mesh_files.h"
 #include "user_file.h"
 
@@ -70,34 +72,31 @@ protected:
         return text;
     }
 
-    // Vertices and their colours of a PLY as we write it: floats, then codes somewhere behind them.
-    struct PlyVertex {
-        std::array<float, 3> at;
-        std::array<int, 3> colour;
-    };
-    std::vector<PlyVertex> read_ply(const std::string& file) const {
+    // The properties of the vertices of a PLY as we write it, by name.
+    std::vector<std::map<std::string, double>> read_ply(const std::string& file) const {
         const std::string text = read_text(path(file));
         std::istringstream header(text);
-        std::size_t count = 0, row = 0, colour_at = 0;
+        std::size_t count = 0;
         bool is_of_vertices = false;
+        std::vector<std::pair<std::string, std::string>> properties; // type and name
         for (std::string line; std::getline(header, line) && line != "end_header";) {
             std::istringstream words(line);
             std::string keyword, type, name;
             words >> keyword >> type >> name;
             if (keyword == "element") is_of_vertices = type == "vertex";
             if (keyword == "element" && is_of_vertices) count = std::stoul(name);
-            if (keyword != "property" || !is_of_vertices) continue;
-            EXPECT_TRUE(type == "float" || type == "uchar") << line;
-            if (name == "red") colour_at = row;
-            row += type == "float" ? 4 : 1;
+            if (keyword == "property" && is_of_vertices) properties.emplace_back(type, name);
         }
-        const char* const data = text.data() + header.tellg();
-        std::vector<PlyVertex> out(count);
-        for (std::size_t v = 0; v < count; ++v) {
-            std::memcpy(out[v].at.data(), data + v * row, 12);
-            for (std::size_t k = 0; k < 3; ++k)
-                out[v].colour[k] = static_cast<unsigned char>(data[v * row + colour_at + k]);
-        }
+        std::vector<std::map<std::string, double>> out(count);
+        auto at = static_cast<std::size_t>(header.tellg());
+        const auto read = [&]<class Value>(Value value) {
+            std::memcpy(&value, text.data() + at, sizeof value);
+            at += sizeof value;
+            return static_cast<double>(value);
+        };
+        for (auto& vertex : out)
+            for (const auto& [type, name] : properties)
+                vertex[name] = type == "float" ? read(0.0f) : type == "double" ? read(0.0) : read(std::uint8_t{});
         return out;
     }
 
@@ -127,11 +126,12 @@ TEST_F(ScanUsers, ColoursOfVertices) {
     for (const std::string out : {"out/small.ply", "out/whole.ply"}) {
         const auto vertices = read_ply(out);
         EXPECT_GT(vertices.size(), 300u);
-        for (const PlyVertex& vertex : vertices) {
-            const auto there = colour({vertex.at[0], vertex.at[1], vertex.at[2]});
+        for (const auto& vertex : vertices) {
+            const auto there = colour({vertex.at("x"), vertex.at("y"), vertex.at("z")});
             // A vertex that stands for others lies among them, where colours are mixed as light.
             const int slack = out == "out/whole.ply" ? 1 : 8;
-            for (std::size_t k = 0; k < 3; ++k) ASSERT_NEAR(vertex.colour[k], there[k], slack) << out;
+            for (std::size_t k = 0; k < 3; ++k)
+                ASSERT_NEAR(vertex.at(std::array{"red", "green", "blue"}[k]), there[k], slack) << out;
         }
     }
 }
@@ -272,6 +272,50 @@ TEST_F(ScanUsers, HolesAndDuplicates) {
     EXPECT_THAT(succeed({"info", "in.ply"}),
                 AllOf(HasSubstr("boundary edges: "), HasSubstr("duplicate triangles: " + std::to_string(twice))));
     expect_invisible("in.ply", "ply");
+}
+
+// As ParaView writes the surface of a simulation: raw data behind the XML, and a value of each vertex.
+TEST_F(ScanUsers, ParaViewsPolygons) {
+    const Patch mesh = bumpy_ball(40, 20);
+    const auto pressure = [](double x, double y, double z) { return 1000 + 300 * x + 200 * y - 100 * z; };
+    std::string data;
+    const auto block = [&](const std::string& bytes) {
+        const std::size_t offset = data.size();
+        data += little(std::uint64_t{bytes.size()}) + bytes;
+        return std::to_string(offset);
+    };
+    std::string points, values, connectivity, offsets;
+    for (const auto& p : mesh.positions) {
+        for (const float x : as_floats(p)) points += little(x);
+        values += little(pressure(p[0], p[1], p[2]));
+    }
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+        for (const int corner : mesh.triangles[t]) connectivity += little(std::int64_t{corner});
+        offsets += little(static_cast<std::int64_t>(3 * t + 3));
+    }
+    const auto array = [](const std::string& type, const std::string& name, const std::string& more,
+                          const std::string& offset) {
+        return "<DataArray type=\"" + type + "\" Name=\"" + name + "\" " + more + "format=\"appended\" offset=\"" +
+               offset + "\"/>\n";
+    };
+    const std::string head =
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" "
+        "header_type=\"UInt64\">\n<PolyData>\n<Piece NumberOfPoints=\"" +
+        std::to_string(mesh.positions.size()) +
+        "\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"" +
+        std::to_string(mesh.triangles.size()) + "\">\n<PointData Scalars=\"Pressure\">\n" +
+        array("Float64", "Pressure", "", block(values)) + "</PointData>\n<Points>\n" +
+        array("Float32", "Points", "NumberOfComponents=\"3\" ", block(points)) + "</Points>\n<Polys>\n" +
+        array("Int64", "connectivity", "", block(connectivity)) + array("Int64", "offsets", "", block(offsets)) +
+        "</Polys>\n</Piece>\n</PolyData>\n<AppendedData encoding=\"raw\">\n_";
+    write_text(path("flow.vtp"), head + data + "\n</AppendedData>\n</VTKFile>\n");
+    expect_invisible("flow.vtp", "vtp");
+    expect_invisible("flow.vtp", "ply");
+    for (const std::string out : {"out/small.ply", "out/whole.ply"})
+        for (const auto& vertex : read_ply(out))
+            ASSERT_NEAR(vertex.at("Pressure"), pressure(vertex.at("x"), vertex.at("y"), vertex.at("z")),
+                        out == "out/whole.ply" ? 1e-3 : 25)
+                << out;
 }
 
 } // namespace
