@@ -209,6 +209,7 @@ Result<void> fill_all(std::vector<Column>& columns, session::Session& session, c
     auto renderer = render::Renderer::create(context, session.tree());
     if (!renderer) return renderer.error();
     SheetMaker maker(session, view, *renderer, o);
+    const std::optional<session::Gaze> gaze_before = session.observer().gaze;
     Image full;
     for (Column& column : columns) {
         const double share = static_cast<double>(&column - columns.data()) / static_cast<double>(columns.size());
@@ -217,6 +218,7 @@ Result<void> fill_all(std::vector<Column>& columns, session::Session& session, c
         if (auto ok = maker.fill(column, full); !ok) return ok;
         if (full.values.empty()) full = std::move(column.luminance);
     }
+    session.set_gaze(gaze_before);
     return {};
 }
 

@@ -46,8 +46,7 @@ struct ContactSheet {
     perception::Image sheet, maps;
 };
 
-// Of the session's only object, seen by `view`. Each cut is made, drawn and judged once, whatever sheets are wanted; the
-// session's gaze is that of the last one afterwards. Cost: some seconds for each cut of a megapixel, most of it for the
+// Of the session's only object, seen by `view`. Each cut is made, drawn and judged once, whatever sheets are wanted. Cost: some seconds for each cut of a megapixel, most of it for the
 // judge and, in software, for drawing.
 Result<ContactSheet> draw_contact_sheet(session::Session& session, const vdtree::View& view, render::Context& context,
                                         const SheetOptions& options);
