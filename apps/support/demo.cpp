@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* bunny = "/usr/share/glmark2/models/bunny.obj";
-constexpr int ball_rows = 150; // 90,000 triangles
+constexpr int ball_rows = 120; // 57,600 triangles
 
 } // namespace
 
