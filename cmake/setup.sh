@@ -1,7 +1,7 @@
 # What ./quickstart and ./check share. Sourced from the source folder.
 
-# Without this ccache passes over files that are compiled with precompiled headers.
-export CCACHE_SLOPPINESS="${CCACHE_SLOPPINESS:-pch_defines,time_macros}"
+# What ccache keeps serves the same sources in any folder: paths count from this one on.
+export CCACHE_BASEDIR="${CCACHE_BASEDIR:-$PWD}" CCACHE_NOHASHDIR="${CCACHE_NOHASHDIR:-1}"
 
 say() { printf '\n== %s\n' "$*"; }
 die() { printf '%s: %s\n' "$(basename "$0")" "$*" >&2; exit 1; }
