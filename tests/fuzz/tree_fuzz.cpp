@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include <sys/mman.h>
 #include <unistd.h>
@@ -47,7 +48,8 @@ void restore_document(const unseen::vdtree::VertexTree& tree) {
     unseen::vdtree::Cut cut(tree);
     cut.unfold_all();
     const auto extracted = extract_with_sources(cut);
-    (void)unseen::meshio::restore(cut, extracted, *document).has_value();
+    const std::vector<std::string> uvs(document->parts.size(), "TEXCOORD_0");
+    (void)unseen::meshio::restore(cut, extracted, *document, uvs).has_value();
     (void)unseen::meshio::arrays_of_cut(cut, extracted, document->arrays).has_value();
 }
 
