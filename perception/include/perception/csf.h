@@ -89,6 +89,11 @@ SquareDegrees patch_area(CyclesPerDegree frequency);
 SquareDegrees castle_summation_area(CyclesPerDegree frequency);
 SquareDegrees barten_summation_area(CyclesPerDegree frequency); // of Barten 1999
 
+// How much better a grating is seen in a disc so wide than in a patch of patch_area(): 1 where the disc is three waves
+// wide, less in a smaller one, up to 3.4 in a larger one. By castleCSF's law of area. Grows with both. Preconditions:
+// above 0.
+double gain_of_extent(CyclesPerDegree frequency, Degrees width);
+
 // What a table holds constant; as in Stimulus.
 struct CsfConditions {
     Hertz temporal{0};

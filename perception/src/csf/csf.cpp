@@ -99,6 +99,12 @@ SquareDegrees patch_area(CyclesPerDegree frequency) {
     return SquareDegrees(std::numbers::pi * radius_deg * radius_deg);
 }
 
+double gain_of_extent(CyclesPerDegree frequency, Degrees width) {
+    const double summation = castle_summation_area(frequency).value(), patch = patch_area(frequency).value();
+    const double area = std::numbers::pi * width.value() * width.value() / 4;
+    return std::sqrt(area / (area + summation) * ((patch + summation) / patch));
+}
+
 Stimulus stimulus_of(const CsfConditions& conditions, CyclesPerDegree frequency, Degrees eccentricity,
                      Luminance luminance) {
     return {.frequency = frequency,
