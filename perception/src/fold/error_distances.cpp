@@ -472,7 +472,7 @@ bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors
                               .is_strip = true};
             strip.pattern = above(strip.pattern, own);
         }
-        strip.length = errors[node].distance;
+        strip.length = errors[node].outline;
         strip.row = switch_distances.row(strip.pattern);
         cover(switch_distances, strip, strips[node]);
         strips[node] = strip;
