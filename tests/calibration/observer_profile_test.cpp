@@ -76,7 +76,7 @@ TEST_F(ObserverProfileTest, RoundTripOfOddNumbersIsExact) {
     samples.frequency_cpd = {1e-300, 1.0 / 3, 1e4 / 3};
     samples.eccentricity_deg = {0, 0.1 + 0.2};
     samples.luminance_cdm2 = {std::numeric_limits<double>::denorm_min(), 0.1};
-    samples.sensitivity = {1e6 / 3, 2.0 / 3, 1e-308, 5e-324, 1e-300, 1, 2, 3, 4, 5, 6, 7};
+    samples.sensitivity = {1e6 / 3, 2.0 / 3, 1e-308, 5e-324, 1e-300, 4, 2, 3, 4, 1.5, 0.1, 7};
     const auto table = CsfTable::create(samples);
     ASSERT_TRUE(table) << table.error().message;
     const auto file = folder() / "odd.json";
@@ -115,6 +115,7 @@ TEST_F(ObserverProfileTest, ErrorsNameTheFileAndThePlace) {
         {"[3, 100]", "[3]", "\"sensitivity[0]\" must be an array of 1"},
         {"[3, 100]", "[100, 3]", "luminance_cdm2[1]"},
         {"[3, 100]", "[-3, 100]", "luminance_cdm2[0]"},
+        {"[30, 15, 0.5]", "[200, 15, 0.5]", "sensitivity[1][0][0] is 200 (10 degrees, 3 cd/m2, 1 cpd)"},
         {"[30, 15, 0.5]", "[30, 15]", "\"sensitivity[1][0]\" must have 3 values, but has 2"},
         {"[30, 15, 0.5]", "[30, 15, 0.5, 0.1]", "\"sensitivity[1][0]\" must have 3 values, but has 4"},
         {"[30, 15, 0.5]", "[30, 0, 0.5]", "sensitivity[1][0][1]"},
