@@ -89,6 +89,14 @@ SquareDegrees patch_area(CyclesPerDegree frequency);
 SquareDegrees castle_summation_area(CyclesPerDegree frequency);
 SquareDegrees barten_summation_area(CyclesPerDegree frequency); // of Barten 1999
 
+// How many times as well a patch of `area` is seen as one of patch_area(frequency), A15:
+//   R own^t,   R = sqrt(A / (A + Ac) (A15 + Ac) / A15),   t = ln R / ln R(unlimited), and 0 for smaller patches than A15
+// with castle's law for `own` = 1. People sum more or less than that: `own` says how many times as well as by castle's
+// law somebody sees an unlimited grating, of whom it is known how well they see patches of A15 (calibration's
+// ObserverProfile::summation). NaN where frequency, area or own are not above 0; the area may be infinite.
+double summation_gain(CyclesPerDegree frequency, SquareDegrees area, double own = 1);
+double summation_share(CyclesPerDegree frequency, SquareDegrees area); // t
+
 // What a table holds constant; as in Stimulus.
 struct CsfConditions {
     Hertz temporal{0};
