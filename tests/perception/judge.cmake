@@ -8,3 +8,4 @@ unseen_add_test(NAME perception_judge_rpg99 SOURCES judge_rpg99_test.cpp DEPENDS
 unseen_add_test(NAME perception_ssim SOURCES ssim_test.cpp DEPENDS unseen::perception LABELS unit)
 unseen_add_test(NAME perception_summation SOURCES summation_test.cpp
                 DEPENDS unseen::perception PRIVATE_HEADERS perception LABELS unit)
+unseen_add_test(NAME perception_change SOURCES change_test.cpp DEPENDS unseen::perception LABELS unit)

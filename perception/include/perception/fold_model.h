@@ -57,7 +57,7 @@ struct FoldModel {
     // ---- sensitivity
 
     // Patches lie among others like them, and what they come to is summed over space, whatever their signs. So a patch
-    // is seen as well as a grating in a disc of so many times its width, by the law of area (gain_of_extent()). Fitted:
+    // is seen as well as a grating in a disc of so many times its width, by the law of area (summation_gain()). Fitted:
     // the least with which nothing is seen where it is looked at.
     double neighbourhood = 5;
     // How much of the observer's sensitivity the test needs, by eccentricity; linear between, beyond as at the last.

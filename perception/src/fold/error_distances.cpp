@@ -110,6 +110,7 @@ Pattern rounded(Pattern p, int coarseness) {
 // Of patterns, from far below any width that can be seen up to the lowest frequency's.
 constexpr double widest_deg = 1 / lowest_table_cpd, width_step = 0.91700404320467122; // an eighth of an octave
 constexpr std::size_t width_count = 160;
+SquareDegrees disc(double width_deg) { return SquareDegrees(std::numbers::pi * width_deg * width_deg / 4); }
 double width_deg(std::size_t i) { return widest_deg * std::pow(width_step, static_cast<double>(i)); }
 
 // What bands of frequency see of patterns of all widths, as shares of their contrast: of this, eyes that see patterns
@@ -124,13 +125,13 @@ struct Bands {
         for (double low = lowest_table_cpd; low < highest_cpd; low *= frequency_step) lowest_cpd.push_back(low);
         for (std::size_t i = 0; i < width_count; ++i) {
             const double width = width_deg(i);
-            const Degrees neighbourhood(width * model.neighbourhood);
+            const SquareDegrees area = disc(width), neighbourhood = disc(width * model.neighbourhood);
             for (const double low : lowest_cpd) {
                 const double high = std::min(low * frequency_step, highest_cpd), waves = width * high;
                 const CyclesPerDegree cpd(high);
                 of_patches.push_back(share_of_patches(waves, model.most_side_by_side) *
-                                     gain_of_extent(cpd, neighbourhood));
-                of_areas.push_back(share_of_area(waves) * gain_of_extent(cpd, Degrees(width)));
+                                     summation_gain(cpd, neighbourhood));
+                of_areas.push_back(share_of_area(waves) * summation_gain(cpd, area));
                 of_strips.push_back(std::min(1.0, waves)); // half as wide
             }
         }
@@ -430,7 +431,7 @@ bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors
     const vdtree::LuminanceRange all = tree.ring_luminance()[vdtree::VertexTree::root()];
     const int whole = levels.luminance_level(levels.in_cdm2(static_cast<double>(all.lo + all.hi) / 2));
     const double whole_peak = csf.peak_sensitivity(Degrees(0), Luminance(levels.luminance(whole))) *
-                              gain_of_extent(CyclesPerDegree(highest_cpd), Degrees(180));
+                              summation_gain(CyclesPerDegree(highest_cpd), disc(180));
     patches.assign(tree.interior_count(), {});
     strips.assign(tree.interior_count(), {});
     for (NodeId node = tree.interior_count(); node-- > 0;) { // children before parents
