@@ -115,12 +115,11 @@ Result<perception::Judgement> JudgedModel::judge(const Picture& picture, const s
                                                  Judge judge) {
     const auto reference = full();
     if (!reference) return reference.error();
-    perception::JudgeOptions options;
-    options.display = plain_.session->observer().display;
-    options.gaze_px = gaze_px;
+    const perception::Display& display = plain_.session->observer().display;
+    perception::JudgeOptions options{.display = display, .gaze_px = gaze_px};
     if (judge == Judge::second) {
-        options.csf = second_;
-        options.beta = 2;
+        options = perception::second_judge_options(perception::default_person, display, gaze_px);
+        if (second_ != usual_second) options.csf = second_, options.gain = perception::default_person.gain;
     }
     return perception::judge_modern(**reference, picture.luminance, options);
 }

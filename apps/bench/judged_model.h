@@ -15,8 +15,8 @@
 
 namespace unseen::app {
 
-// The judges. The first shares castleCSF with the fold tests; the second has another model of contrast sensitivity and
-// adds its bands up as squares.
+// The judges, of the default observer. The first shares castleCSF with the fold tests; the second has another model of
+// contrast sensitivity and adds its bands up as squares: perception::second_judge_options().
 enum class Judge { modern, second };
 inline constexpr std::array judges = {Judge::modern, Judge::second};
 inline constexpr perception::CsfModel usual_second =

@@ -273,7 +273,7 @@ void simulate(Procedure& procedure, const SimulatedObserver& observer) {
 
 Result<perception::CsfTable> expected_table(const CalibrateArguments& a, const perception::Display& display) {
     if (a.display.csf.empty()) return perception::CsfTable::standard();
-    const auto table = session::read_csf_table(a.display.csf, display);
+    const auto table = session::read_csf_table(a.display.csf, display, perception::median_person);
     if (!table) return table.error();
     return **table;
 }

@@ -9,8 +9,8 @@
 #include <gtest/gtest.h>
 
 #include <perception/change.h>
+#include <perception/judge.h>
 #include <perception/person.h>
-#include <perception/summing_judge.h>
 
 namespace unseen::calibration {
 namespace {
@@ -76,8 +76,8 @@ double seen_at_threshold(const MeasuredSensitivity& measured) {
             grating.at(x, y) *= static_cast<float>(1 + envelope * wave / measured.sensitivity);
         }
     }
-    const auto judge = perception::SummingJudge::create(flat, options, perception::median_person.gain);
-    return judge->judge(grating)->max_ratio;
+    options.gain = perception::median_person.gain;
+    return judge_modern(flat, grating, options)->max_ratio;
 }
 
 TEST(People, AtTheirThresholdsAreWhereTheMedianJudgeIs) {

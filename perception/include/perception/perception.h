@@ -32,4 +32,3 @@
 #include <perception/image.h>
 #include <perception/judge.h>
 #include <perception/person.h>
-#include <perception/summing_judge.h>

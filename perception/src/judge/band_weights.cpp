@@ -17,6 +17,8 @@ constexpr double lowest_frequency = 1.0 / 16; // cpd, end of the CSF's domain; t
 constexpr int smallest_base_side = 4;         // pixels; a smaller base would be all edge
 constexpr double luminance_floor = 0.01;      // cd/m2, where the display's black level does not say more
 constexpr double sensitivity_floor = 1e-60;   // keeps logarithms and squares finite; 1e-57 times below visibility
+constexpr double least_gain = 1e-3, largest_gain = 1e3;
+constexpr SquareDegrees barten_field{100}; // 10 x 10 degrees, for which Barten gives his curves
 // Steps of the sensitivity tables. log S is linear in eccentricity, so only luminance errs: by less than 5e-4 of S,
 // most where castleCSF's peak frequency crosses the band's.
 constexpr double eccentricity_step = 1.0;    // degrees
@@ -55,38 +57,6 @@ double band_response(double freq_cpd, double ppd, int level, Orientation orienta
     return response * (1 - back * back);
 }
 
-// ---- sensitivity ---------------------------------------------------------------------------------------------------
-
-// To a patch of patch_area(), as in the table of a viewer.
-double patch_sensitivity(const BandConditions& c, double freq_cpd, double luminance, double eccentricity) {
-    Stimulus stimulus;
-    stimulus.frequency = CyclesPerDegree(freq_cpd);
-    stimulus.luminance = Luminance(luminance);
-    stimulus.eccentricity = Degrees(eccentricity);
-    stimulus.area = patch_area(stimulus.frequency);
-    stimulus.field = VisualField::worst;
-    stimulus.distance = c.distance;
-    double s = 0;
-    if (c.table) {
-        s = c.table->sensitivity(stimulus.frequency, stimulus.eccentricity, stimulus.luminance);
-    } else if (c.model == CsfModel::barten_1999 && c.stimuli == Stimuli::unlimited) {
-        // Its own fall with eccentricity is refuted by people's thresholds: castleCSF's is taken.
-        const double aside = sensitivity(CsfModel::castle, stimulus);
-        stimulus.eccentricity = Degrees(0);
-        s = sensitivity(c.model, stimulus) * aside / sensitivity(CsfModel::castle, stimulus);
-    } else {
-        s = sensitivity(c.model, stimulus);
-    }
-    return std::max(c.table ? s : c.gain * s, sensitivity_floor); // of NaN, too: 0 / 0 far aside
-}
-
-double sensitivity_to(const BandConditions& c, double freq_cpd, double luminance, double eccentricity) {
-    if (c.stimuli == Stimuli::patches) return patch_sensitivity(c, freq_cpd, luminance, eccentricity);
-    const double patch = patch_area(CyclesPerDegree(freq_cpd)).value();
-    return patch_sensitivity(c, freq_cpd, luminance, eccentricity) *
-           std::sqrt((summation_area(c, freq_cpd) + patch) / patch);
-}
-
 } // namespace
 
 double nominal_frequency(double ppd, int level) {
@@ -106,6 +76,32 @@ double summation_area(const BandConditions& c, double freq_cpd) {
     return (c.model == CsfModel::barten_1999 && !c.table ? barten_summation_area
                                                          : castle_summation_area)(CyclesPerDegree(freq_cpd))
         .value();
+}
+
+double sensitivity_of(const BandConditions& c, double freq_cpd, double luminance, double eccentricity) {
+    Stimulus stimulus;
+    stimulus.frequency = CyclesPerDegree(freq_cpd);
+    stimulus.luminance = Luminance(luminance);
+    stimulus.eccentricity = Degrees(eccentricity);
+    stimulus.area = patch_area(stimulus.frequency);
+    stimulus.field = VisualField::worst;
+    stimulus.distance = c.distance;
+    double s = 0;
+    if (c.table) {
+        s = c.table->sensitivity(stimulus.frequency, stimulus.eccentricity, stimulus.luminance);
+    } else if (c.model == CsfModel::barten_1999) {
+        // Its own fall with eccentricity is refuted by people's thresholds: castleCSF's is taken.
+        const double aside = sensitivity(CsfModel::castle, stimulus);
+        stimulus.eccentricity = Degrees(0);
+        s = aside / sensitivity(CsfModel::castle, stimulus);
+        stimulus.area = barten_field; // decides on the pupil, too, which is the screen's business and no patch's
+        s *= sensitivity(c.model, stimulus);
+    } else {
+        s = sensitivity(c.model, stimulus);
+    }
+    const double area = stimulus.area.value();
+    const double unlimited = std::sqrt((summation_area(c, freq_cpd) + area) / area);
+    return std::max(c.gain * s * unlimited, sensitivity_floor); // of NaN, too: 0 / 0 far aside
 }
 
 // ---- weights of a band ---------------------------------------------------------------------------------------------
@@ -150,12 +146,12 @@ BandTable::Node BandTable::mix(const Node& a, const Node& b, double t) {
 
 BandTable::Node BandTable::node(const BandConditions& c, double luminance, double eccentricity) const {
     const double nominal = nominal_frequency(c.ppd, level_);
-    double s = sensitivity_to(c, nominal, luminance, eccentricity);
+    double s = sensitivity_of(c, nominal, luminance, eccentricity);
     if (!is_base_) return {std::log(s), fit_tilt(c, luminance, eccentricity, s)};
     // The base band holds every lower frequency too. Where the pyramid is short (a small image), its own frequency
     // lies right of the peak of S, and the band would be blind to what is plain at a lower frequency.
     for (double f = nominal / std::numbers::sqrt2; f >= lowest_frequency; f /= std::numbers::sqrt2) {
-        s = std::max(s, sensitivity_to(c, f, luminance, eccentricity));
+        s = std::max(s, sensitivity_of(c, f, luminance, eccentricity));
     }
     return {std::log(s), 0};
 }
@@ -168,10 +164,8 @@ double BandTable::fit_tilt(const BandConditions& c, double luminance, double ecc
     double numerator = 0, denominator = 0;
     for (const double ratio : level_ == 0 ? first_band_fit_ratios : fit_ratios) {
         const double f = ratio * nominal;
-        const double wanted = share * sensitivity_to(c, f, luminance, eccentricity) / nominal_s;
+        const double wanted = share * sensitivity_of(c, f, luminance, eccentricity) / nominal_s;
         for (const Orientation o : {Orientation::axis, Orientation::diagonal}) {
-            // One place on its own is judged by the largest band there, a sum by all of it.
-            if (o == Orientation::diagonal && c.stimuli == Stimuli::patches) continue;
             const double answer = band_response(f, c.ppd, level_, o) / gain_ / wanted;
             const double slope =
                 answer * (smooth_response(angular_frequency(f, c.ppd, level_), o) - smooth_at_nominal_);
@@ -216,6 +210,8 @@ Result<void> check(const JudgeOptions& options) {
     if (!options.csf_table && !is_achromatic(options.csf))
         return judge_argument_error("judge", std::string(name(options.csf)) +
                                                  " is sensitivity to colour, not to luminance contrast");
+    if (!(options.gain >= least_gain && options.gain <= largest_gain))
+        return judge_argument_error("judge", "the observer's gain must lie between 0.001 and 1000");
     if (!(options.beta >= 1 && options.beta <= 20))
         return judge_argument_error("judge", "beta must lie between 1 and 20");
     if (options.gaze_px && !(std::isfinite(options.gaze_px->x) && std::isfinite(options.gaze_px->y))) {
@@ -226,17 +222,15 @@ Result<void> check(const JudgeOptions& options) {
 
 double contrast_floor(const Display& display) { return std::max(black_level(display).value(), luminance_floor); }
 
-BandConditions conditions_for(Stimuli stimuli, double gain, const Image& reference, const JudgeOptions& options,
-                              const Eccentricity& eccentricity) {
+BandConditions conditions_for(const Image& reference, const JudgeOptions& options, const Eccentricity& eccentricity) {
     const auto [low, high] = std::minmax_element(reference.values.begin(), reference.values.end());
     const double floor_cdm2 = contrast_floor(options.display);
-    return {stimuli,
-            options.csf,
+    return {options.csf,
             options.csf_table,
             options.display.distance,
             pixels_per_degree(options.display).value(),
             options.beta,
-            gain,
+            options.gain,
             {std::log10(std::max(static_cast<double>(*low), floor_cdm2)),
              std::log10(std::max(static_cast<double>(*high), floor_cdm2))},
             eccentricity.largest()};

@@ -46,39 +46,33 @@ private:
     double largest_ = 0;
 };
 
-// To what the weights say how sensitive an eye is.
-enum class Stimuli {
-    patches,  // of patch_area()
-    unlimited // gratings
-};
-
 // What the weights of all bands depend on.
 struct BandConditions {
-    Stimuli stimuli = Stimuli::patches;
     CsfModel model = CsfModel::castle;
     std::shared_ptr<const CsfTable> table; // in the model's place; or null
     Metres distance{0.5};                  // of the screen
     double ppd = 0;
     double beta = 0;
-    double gain = 1; // of the model's sensitivity
+    double gain = 1; // of the model's sensitivity, or the table's
     Range log10_luminance;
     double largest_eccentricity = 0; // degrees
 };
-BandConditions conditions_for(Stimuli stimuli, double gain, const Image& reference, const JudgeOptions& options,
-                              const Eccentricity& eccentricity);
+BandConditions conditions_for(const Image& reference, const JudgeOptions& options, const Eccentricity& eccentricity);
 // What the screen cannot show cannot be a reference luminance either.
 double contrast_floor(const Display& display);
-// Errors of all options but the gain.
 Result<void> check(const JudgeOptions& options);
 
 // The area at which patches of a frequency are seen half as well, in power, as unlimited gratings; square degrees.
 double summation_area(const BandConditions& c, double freq_cpd);
 
+// To unlimited gratings.
+double sensitivity_of(const BandConditions& c, double freq_cpd, double luminance, double eccentricity);
+
 double nominal_frequency(double ppd, int level); // cpd
 int base_level(const Image& image, double ppd);
 
 struct BandWeight {
-    double sensitivity = 0; // to `stimuli`
+    double sensitivity = 0; // to unlimited gratings
     double tilt = 0;
 };
 
