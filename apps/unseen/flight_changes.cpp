@@ -32,9 +32,6 @@ void spread_line(const float* from, float* to, int count, std::ptrdiff_t step, i
     }
 }
 
-// Somebody whose sensitivity was measured is that table; else it is the default observer's.
-double gain_of(const session::Observer& observer) { return observer.csf ? 1 : perception::default_person.gain; }
-
 std::vector<float> largest_near(const std::vector<float>& values, int width, int height, int reach) {
     std::vector<float> rows(values.size()), near(values.size());
     for (int y = 0; y < height; ++y) {
@@ -61,7 +58,7 @@ bool is_limited(const session::Request& request) {
 
 FlightChanges::FlightChanges(const session::Session& session, Renderers renderers)
     : session_(session), renderers_(std::move(renderers)), full_cut_(session.tree()), follower_(session),
-      watch_(judge_options(), gain_of(session.observer())) {
+      watch_(judge_options()) {
     full_cut_.unfold_all();
 }
 
@@ -81,6 +78,7 @@ perception::JudgeOptions FlightChanges::judge_options() const {
     const session::Observer& observer = session_.observer();
     perception::JudgeOptions options{.display = observer.display};
     options.csf_table = observer.csf;
+    options.gain = observer.csf ? 1 : observer.person.gain;
     if (observer.gaze) options.gaze_px = observer.gaze->px;
     return options;
 }
@@ -134,7 +132,7 @@ Result<FrameChange> FlightChanges::after(const session::Follower& flight, const 
     if (!drawn) return drawn.error();
     const perception::Image full = luminance_image(*drawn, display), now = luminance_image(frame, display);
     const perception::JudgeOptions judging = judge_options();
-    const auto judge = perception::SummingJudge::create(full, judging, gain_of(session_.observer()));
+    const auto judge = perception::Judge::create(full, judging);
     if (!judge) return judge.error();
     const auto judged = judge->judge(now);
     if (!judged) return judged.error();

@@ -5,7 +5,6 @@
 
 #include <perception/change.h>
 #include <perception/image.h>
-#include <perception/summing_judge.h>
 #include <render/renderer.h>
 #include <session/follower.h>
 #include <session/session.h>

@@ -9,8 +9,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <perception/summing_judge.h>
-
 namespace unseen::perception {
 namespace {
 
@@ -127,7 +125,7 @@ Image blob(int side, double ppd, double sigma_deg, double contrast) {
 }
 
 ChangeJudgement judged(const Image& before, const Image& after, double seconds, double ppd, double gain = 1) {
-    const auto judgement = judge_change(before, after, seconds, {.display = display_of(ppd)}, gain);
+    const auto judgement = judge_change(before, after, seconds, {.display = display_of(ppd), .gain = gain});
     EXPECT_TRUE(judgement) << judgement.error().message;
     return *judgement;
 }
@@ -145,14 +143,15 @@ TEST(ChangeJudge, ADiscThatPopsIsSeenByTheLawOfFlicker) {
         return grey_cdm2 * (1 + (std::hypot(x, y) < radius_deg * ppd ? contrast : 0));
     });
     // In the middle of the window, without a gaze, everything is looked at: give one.
-    const JudgeOptions options{.display = display_of(ppd), .gaze_px = glm::dvec2(side * 0.5)};
-    const auto popped = judge_change(grey(side), disc, 0, options, 1);
+    JudgeOptions options{.display = display_of(ppd), .gaze_px = glm::dvec2(side * 0.5), .gain = 1};
+    const auto popped = judge_change(grey(side), disc, 0, options);
     ASSERT_TRUE(popped) << popped.error().message;
     EXPECT_NEAR(decibels(popped->flicker / (contrast * 0.753 * best)), 0, 1);
     EXPECT_GT(popped->visibility, popped->flicker);
     EXPECT_GT(popped->visibility, popped->lasting);
     // Twice the contrast or twice the eye: twice the flicker.
-    const auto sharper = judge_change(grey(side), disc, 0, options, 2);
+    options.gain = 2;
+    const auto sharper = judge_change(grey(side), disc, 0, options);
     EXPECT_NEAR(sharper->flicker / popped->flicker, 2, 1e-3);
 }
 
@@ -194,7 +193,7 @@ TEST(ChangeJudge, OfFineChangesOnlyTheLastingPartIsSeen) {
     EXPECT_GT(fine.lasting, 0.5);
     EXPECT_LT(fine.flicker, 0.5 * fine.lasting);
     EXPECT_LT(fine.visibility, 1.05 * fine.lasting);
-    const auto still = SummingJudge::create(grey(side), {.display = display_of(ppd)}, 1);
+    const auto still = Judge::create(grey(side), {.display = display_of(ppd), .gain = 1});
     EXPECT_NEAR(fine.lasting, still->judge(gabor(side, ppd, 10, 0.15, 0.05))->max_ratio, 1e-4);
 }
 
@@ -205,20 +204,20 @@ TEST(ChangeJudge, NothingIsSeenOfNoChange) {
 
 TEST(ChangeJudge, AViewersTableCountsForFlickerToo) {
     constexpr double ppd = 8;
-    JudgeOptions options{.display = display_of(ppd)};
+    JudgeOptions options{.display = display_of(ppd), .gain = 1};
     const Image before = grey(128), after = blob(128, ppd, 2, 0.01);
-    const double plain = judge_change(before, after, 0, options, 1)->flicker;
+    const double plain = judge_change(before, after, 0, options)->flicker;
     options.csf_table = std::make_shared<const CsfTable>(*CsfTable::standard().scaled(3));
-    EXPECT_NEAR(judge_change(before, after, 0, options, 1)->flicker / plain, 3, 1e-4);
+    EXPECT_NEAR(judge_change(before, after, 0, options)->flicker / plain, 3, 1e-4);
 }
 
 // A glide in frames is the same as a ramp, and a pop the same in a sequence as alone.
 TEST(ChangeWatch, FramesOfAGlideAddUp) {
     constexpr int side = 128;
     constexpr double ppd = 8, frame_s = 1.0 / 60;
-    const JudgeOptions options{.display = display_of(ppd)};
+    const JudgeOptions options{.display = display_of(ppd), .gain = 1};
     for (const int frames : {1, 15}) {
-        ChangeWatch watch(options, 1);
+        ChangeWatch watch(options);
         double flicker = 0, lasting = 0;
         for (int i = 1; i <= frames; ++i) {
             const auto step =
@@ -241,7 +240,7 @@ TEST(ChangeWatch, FramesOfAGlideAddUp) {
 }
 
 TEST(ChangeWatch, AnotherWindowBeginsAnew) {
-    ChangeWatch watch({.display = display_of(8)}, 1);
+    ChangeWatch watch({.display = display_of(8), .gain = 1});
     ASSERT_TRUE(watch.next(grey(64), blob(64, 8, 1, 0.02), 0));
     const auto other = watch.next(grey(80), blob(80, 8, 1, 0.02), 0);
     ASSERT_TRUE(other);

@@ -1,12 +1,10 @@
-// The judge of changes: what lasts by SummingJudge, and the flicker of the moment by elaTCSF over the whole field.
+// The judge of changes: what lasts by the Judge, and the flicker of the moment by elaTCSF over the whole field.
 #include <perception/change.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <span>
-
-#include <perception/summing_judge.h>
 
 #include "change/flicker.h"
 #include "judge/band_weights.h"
@@ -92,9 +90,18 @@ struct Change {
     double age_s = 0, ramp_s = 0;
 };
 
+// How much better than by elaTCSF flicker is seen: as still pictures are than by castleCSF.
+double flicker_gain(const JudgeOptions& options) {
+    if (!options.csf_table) return options.gain;
+    const Luminance middle(to_luminance(options.display, 0.5));
+    return options.gain * options.csf_table->peak_sensitivity(Degrees(0), middle) /
+           CsfTable::standard().peak_sensitivity(Degrees(0), middle);
+}
+
 // V of all changes together, over the whole field.
-double flicker_of(std::span<const Change> changes, const Image& before, const JudgeOptions& options, double gain) {
+double flicker_of(std::span<const Change> changes, const Image& before, const JudgeOptions& options) {
     const double ppd = pixels_per_degree(options.display).value();
+    const double gain = flicker_gain(options);
     const Values luminance = adaptation(before, ppd, contrast_floor(options.display));
     const Eccentricity eccentricity(before, options);
     double sum = 0;
@@ -115,14 +122,6 @@ double flicker_of(std::span<const Change> changes, const Image& before, const Ju
     return std::pow(sum / (ppd * ppd) / flicker_pooling_deg2, 1 / flicker_pooling);
 }
 
-// How much better than by castleCSF somebody sees whose sensitivity is a table.
-double gain_of(const JudgeOptions& options, double gain) {
-    if (!options.csf_table) return gain;
-    const Luminance middle(to_luminance(options.display, 0.5));
-    return gain * options.csf_table->peak_sensitivity(Degrees(0), middle) /
-           CsfTable::standard().peak_sensitivity(Degrees(0), middle);
-}
-
 Values difference_of(const Image& before, const Image& after, double share) {
     Values difference(before.values.size());
     for (std::size_t i = 0; i < difference.size(); ++i)
@@ -135,8 +134,8 @@ bool is_zero(const Values& values) {
 }
 
 // V of what is different where the light of a picture has changed by so much.
-Result<double> lasting_of(const Image& before, const Values& difference, const JudgeOptions& options, double gain) {
-    const auto judge = SummingJudge::create(before, options, gain);
+Result<double> lasting_of(const Image& before, const Values& difference, const JudgeOptions& options) {
+    const auto judge = Judge::create(before, options);
     if (!judge) return judge.error();
     Image after = before;
     // Sums of differences of several frames need not be those of two pictures.
@@ -164,16 +163,16 @@ Result<void> check_change(const Image& before, const Image& after, double second
 } // namespace
 
 Result<ChangeJudgement> judge_change(const Image& before, const Image& after, double seconds,
-                                     const JudgeOptions& options, double gain) {
+                                     const JudgeOptions& options) {
     if (auto ok = check_change(before, after, seconds, options); !ok) return ok.error();
     const double ramp_s = std::min(seconds, remembered_s);
     const Values difference = difference_of(before, after, seconds > 0 ? ramp_s / seconds : 1);
-    auto lasting = lasting_of(before, difference, options, gain);
+    auto lasting = lasting_of(before, difference, options);
     if (!lasting) return lasting.error();
     const Values coarse =
         coarse_part(difference, before.width, before.height, pixels_per_degree(options.display).value());
     const Change change{coarse, 0, ramp_s};
-    return pooled(*lasting, flicker_of({&change, 1}, before, options, gain_of(options, gain)), options.beta);
+    return pooled(*lasting, flicker_of({&change, 1}, before, options), options.beta);
 }
 
 void ChangeWatch::pass(double seconds) {
@@ -193,7 +192,7 @@ Result<ChangeJudgement> ChangeWatch::next(const Image& before, const Image& afte
     Values all = difference;
     for (const Step& step : steps_)
         for (std::size_t i = 0; i < all.size(); ++i) all[i] += step.difference[i];
-    auto lasting = lasting_of(before, all, options_, gain_);
+    auto lasting = lasting_of(before, all, options_);
     if (!lasting) return lasting.error();
 
     const double ppd = pixels_per_degree(options_.display).value();
@@ -201,7 +200,7 @@ Result<ChangeJudgement> ChangeWatch::next(const Image& before, const Image& afte
     steps_.back().coarse = coarse_part(steps_.back().difference, width_, height_, ppd);
     std::vector<Change> changes;
     for (const Step& step : steps_) changes.push_back({step.coarse, step.age_s, 0});
-    return pooled(*lasting, flicker_of(changes, before, options_, gain_of(options_, gain_)), options_.beta);
+    return pooled(*lasting, flicker_of(changes, before, options_), options_.beta);
 }
 
 } // namespace unseen::perception
