@@ -427,6 +427,7 @@ Result<void> fly_through(const std::string& model, const ViewOptions& view, cons
     }
     auto session = open_session(model, view, display);
     if (!session) return session.error();
+    session->set_velocity(options.what.velocity());
     const vdtree::View first_view = make_view(*session, view);
     session::Request request = options.what.request_for(session->tree().triangle_count());
     request.purpose = session::Purpose::picture;

@@ -58,6 +58,7 @@ Result<int> run(RenderArguments& a) {
     if (!session) return session.error();
     const vdtree::View view = make_view(*session, a.view);
     session->set_gaze(gaze->at(0, view, a.what.gaze_px));
+    session->set_velocity(a.what.velocity());
     session::Request request = a.what.request_for(session->tree().triangle_count());
     request.purpose = session::Purpose::picture;
     const auto result = session->simplify(view, request);
