@@ -153,7 +153,7 @@ public:
         for (std::size_t i = 0; i < width_count; ++i) {
             patches_[i] = 1 / (needed * visibility(sensitivities, bands.of_patches, i));
             areas_[i] = 1 / visibility(sensitivities, bands.of_areas, i);
-            strips_[i] = 1 / (needed * model.needed_by_outlines * visibility(sensitivities, bands.of_strips, i));
+            strips_[i] = 1 / (model.needed_by_outlines * visibility(sensitivities, bands.of_strips, i));
         }
     }
 
