@@ -176,7 +176,7 @@ TEST(SecondJudge, SeesWhatBartenSays) {
             g.contrast = std::sqrt((1 + share) / (1 + wide_share)) / closed_form(wide, 0, CsfModel::barten_1999);
             const int side = side_for(g);
             JudgeOptions options = second_judge_options(median_person);
-            options.gain = 1, options.beta = 3.5;
+            options.gain = 1;
             const auto judged = judge_modern(flat(side, side, 20), draw(g, side), options);
             EXPECT_NEAR(20 * std::log10(judged->max_ratio), 0, 3) << freq << " cpd, " << radius_cycles;
         }

@@ -42,7 +42,7 @@ class Judge {
 public:
     // Prepares the reference: some 0.1 us and 20 bytes a pixel. A NaN, infinite or negative luminance is an error, and
     // so are options that are none: a display that validate() refuses, a gaze that is not finite, a sensitivity to
-    // colour, a gain outside of its range, a beta outside of 1 to 20.
+    // colour, a gain outside of its range, a beta outside of 1 to 8.
     static Result<Judge> create(Image reference, const JudgeOptions& options);
 
     // Of a picture of the reference's size. Cost: some 50 ns a pixel. Errors: a NaN, infinite or negative luminance, and
