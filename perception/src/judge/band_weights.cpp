@@ -98,7 +98,7 @@ std::vector<double> sensitivities(const BandConditions& c, double freq_cpd, cons
     for (const double l : nodes.luminances) looked_at.push_back(sensitivity_of(c, freq_cpd, l, 0));
     for (const double e : nodes.eccentricities) {
         const double kept = e > 0 ? sensitivity_of(c, freq_cpd, nodes.luminances.front(), e) / looked_at.front() : 1.0;
-        for (const double s : looked_at) all.push_back(std::max(kept * s, sensitivity_floor));
+        for (const double s : looked_at) all.push_back(std::max(sensitivity_floor, kept * s));
     }
     return all;
 }
@@ -188,7 +188,7 @@ double sensitivity_of(const BandConditions& c, double freq_cpd, double luminance
     if (c.table) {
         s = c.table->sensitivity(stimulus.frequency, stimulus.eccentricity, stimulus.luminance);
     } else if (c.model == CsfModel::barten_1999) {
-        // Its own fall with eccentricity is refuted by people's thresholds: castleCSF's is taken.
+        // Beyond 15 degrees people see a quarter of what Geisler and Perry's fall leaves: castleCSF's is taken.
         const double aside = sensitivity(CsfModel::castle, stimulus);
         stimulus.eccentricity = Degrees(0);
         s = aside / sensitivity(CsfModel::castle, stimulus);
@@ -199,7 +199,7 @@ double sensitivity_of(const BandConditions& c, double freq_cpd, double luminance
     }
     const double area = stimulus.area.value();
     const double unlimited = std::sqrt((summation_area(c, freq_cpd) + area) / area);
-    return std::max(c.gain * s * unlimited, sensitivity_floor); // of NaN, too: 0 / 0 far aside
+    return std::max(sensitivity_floor, c.gain * s * unlimited); // in this order of NaN, too: where all is 0 or infinite
 }
 
 // ---- weights of a band ---------------------------------------------------------------------------------------------
@@ -284,11 +284,13 @@ void BandTable::weigh(std::span<const float> luminance, std::span<const float> e
 Plane eccentricities(const Image& window, const JudgeOptions& options) {
     if (!options.gaze_px) return {};
     Plane degrees(window.width, window.height);
-    // Directions (x, y, 1) from the eye, the distance to the screen being 1.
+    // Directions (x, y, 1) from the eye, the distance to the screen being 1; that of the gaze has length 1.
     const double pixel = options.display.pixel_pitch.value() / options.display.distance.value();
     const auto from_centre = [&](double px, int size) { return (px - 0.5 * size) * pixel; };
-    const auto gaze_x = static_cast<float>(from_centre(options.gaze_px->x, window.width)),
-               gaze_y = static_cast<float>(from_centre(options.gaze_px->y, window.height));
+    const double right = from_centre(options.gaze_px->x, window.width),
+                 down = from_centre(options.gaze_px->y, window.height), length = std::hypot(right, down, 1.0);
+    const auto gaze_x = static_cast<float>(right / length), gaze_y = static_cast<float>(down / length),
+               gaze_z = static_cast<float>(1 / length);
     std::vector<float> xs;
     for (int x = 0; x < window.width; ++x) xs.push_back(static_cast<float>(from_centre(x + 0.5, window.width)));
     constexpr auto per_radian = static_cast<float>(180 / std::numbers::pi);
@@ -296,9 +298,9 @@ Plane eccentricities(const Image& window, const JudgeOptions& options) {
         const auto y = static_cast<float>(from_centre(row + 0.5, window.height));
         float* const to = degrees.row(row);
         for (std::size_t i = 0; i < xs.size(); ++i) {
-            const float dx = xs[i] - gaze_x, dy = y - gaze_y, turn = gaze_x * dy - gaze_y * dx;
-            const float cross = std::sqrt(dx * dx + dy * dy + turn * turn), dot = gaze_x * xs[i] + gaze_y * y + 1;
-            to[i] = fast_angle(cross, dot) * per_radian;
+            const float x = xs[i], a = gaze_y - gaze_z * y, b = gaze_z * x - gaze_x, c = gaze_x * y - gaze_y * x;
+            const float dot = gaze_x * x + gaze_y * y + gaze_z;
+            to[i] = fast_angle(std::sqrt(a * a + b * b + c * c), dot) * per_radian;
         }
     }
     return degrees;
