@@ -176,7 +176,7 @@ TEST(SecondJudge, SeesWhatBartenSays) {
             g.contrast = std::sqrt((1 + share) / (1 + wide_share)) / closed_form(wide, 0, CsfModel::barten_1999);
             const int side = side_for(g);
             JudgeOptions options = second_judge_options(median_person);
-            options.gain = 1, options.beta = 3.5;
+            options.gain = 1;
             const auto judged = judge_modern(flat(side, side, 20), draw(g, side), options);
             EXPECT_NEAR(20 * std::log10(judged->max_ratio), 0, 3) << freq << " cpd, " << radius_cycles;
         }
@@ -414,15 +414,27 @@ TEST(ThresholdMapModern, RisesWhereTheReferenceMasks) {
 
 TEST(JudgeModern, StaysFiniteInTheDarkAndInFullContrast) {
     const Image black = flat(128, 128, 0);
-    Image dots = black;
-    for (int y = 0; y < 128; y += 2) {
-        for (int x = 0; x < 128; x += 2) dots.at(x, y) = 10000;
-    }
-    for (const auto& options : {JudgeOptions{}, second_judge_options(strict_person), looking_aside(20, 128)}) {
-        for (const auto& [a, b] : {std::pair(black, dots), std::pair(dots, black)}) {
-            const auto judged = judge_modern(a, b, options);
-            EXPECT_TRUE(std::isfinite(judged->max_ratio));
-            EXPECT_EQ(judged->visible_pixels, judged->pixels);
+    const auto dotted = [&](float cdm2) {
+        Image dots = black;
+        for (int y = 0; y < 128; y += 2)
+            for (int x = 0; x < 128; x += 2) dots.at(x, y) = cdm2;
+        return dots;
+    };
+    JudgeOptions steep, opposite = looking_aside(20, 128);
+    steep.beta = 8, steep.gain = 1000;
+    opposite.gaze_px = glm::dvec2(-1e300, 1e300);
+    for (const float cdm2 : {1e4f, 1e30f}) {
+        const Image dots = dotted(cdm2);
+        for (const auto& options :
+             {JudgeOptions{}, second_judge_options(strict_person), steep, looking_aside(20, 128), opposite}) {
+            for (const auto& [a, b] : {std::pair(black, dots), std::pair(dots, black)}) {
+                const auto judged = judge_modern(a, b, options);
+                EXPECT_TRUE(std::isfinite(judged->max_ratio));
+                // Nobody sees in light of 1e30 cd/m2, nor behind the head.
+                if (cdm2 == 1e4f && options.gaze_px != opposite.gaze_px) {
+                    EXPECT_EQ(judged->visible_pixels, judged->pixels);
+                }
+            }
         }
     }
 }

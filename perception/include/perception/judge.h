@@ -36,16 +36,16 @@ struct Judgement {
 // sqrt(A / (A + Ac)) times as well as an unlimited one, and many small differences beside each other better than one.
 //
 // Calibrated: a Gabor patch of any area reaches V = 1 within 3 dB of contrast 1 / S, between 0.5 cpd and the display's
-// limit, where gain S is the observer's. So a difference of half a degree across is seen as far as half a degree from
-// it. With the model barten_1999 the law of area is Barten's own and the fall with eccentricity castleCSF's.
+// limit, S with the gain. V of a pixel tells of what is around it, up to a degree and more at low frequencies. With the
+// model barten_1999 the law of area is Barten's own, and the fall with eccentricity castleCSF's.
 class Judge {
 public:
-    // Prepares the reference: some 0.1 us and 20 bytes a pixel. A NaN, infinite or negative luminance is an error, and
+    // Prepares the reference: some 50 ns and 15 bytes a pixel. A NaN, infinite or negative luminance is an error, and
     // so are options that are none: a display that validate() refuses, a gaze that is not finite, a sensitivity to
-    // colour, a gain outside of its range, a beta outside of 1 to 20.
+    // colour, a gain outside of its range, a beta outside of 1 to 8.
     static Result<Judge> create(Image reference, const JudgeOptions& options);
 
-    // Of a picture of the reference's size. Cost: some 50 ns a pixel. Errors: a NaN, infinite or negative luminance, and
+    // Of a picture of the reference's size. Cost: some 40 ns a pixel. Errors: a NaN, infinite or negative luminance, and
     // another size. Any number of threads may judge at once.
     Result<Judgement> judge(const Image& test) const;
 

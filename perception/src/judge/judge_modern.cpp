@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "judge/band_weights.h"
+#include "judge/fast_math.h"
 #include "judge/judge_input.h"
 #include "judge/masking.h"
 #include "judge/summation.h"
@@ -19,7 +20,8 @@
 namespace unseen::perception {
 namespace {
 
-constexpr float most_thresholds = 1e8f; // of one band: far beyond all that is visible; its power is a float
+// Of one band: far beyond all that is visible, and its power is a float.
+float most_thresholds(float beta) { return std::min(1e8f, std::exp2(120 / beta)); }
 
 // ---- images -------------------------------------------------------------------------------------------------------
 
@@ -144,44 +146,63 @@ ReferenceBand split_reference(Plane& reference, int level, bool is_base, float f
     return band;
 }
 
-// Calls `use(band)` for each from fine to coarse; only one is held at a time.
-template <class Use>
-void for_each_band(const Image& reference, double ppd, float floor_cdm2, Use use) {
-    Plane rest(reference.width, reference.height);
-    rest.values = reference.values;
-    const int base = base_level(reference, ppd);
-    for (int level = 0; level <= base; ++level) use(split_reference(rest, level, level == base, floor_cdm2));
-}
-
-// How a sample is seen.
-struct Sight {
-    BandWeight weight;    // to unlimited gratings
-    double elevation = 1; // of thresholds, by the reference
-    double untilted = 1;  // of a contrast, what counts of itself; of its neighbourhood, weight.tilt does
-    double luminance = 0; // cd/m2
+// How a row of samples is seen.
+struct RowSight {
+    BandWeights weights;
+    std::vector<float> elevation; // of thresholds, by the reference
 };
 
-// `use(index, sight)` for each sample of a band.
-template <class Use>
-void for_each_sample(const ReferenceBand& band, const BandTable& table, const Eccentricity& eccentricity, Use use) {
-    const Plane smooth_contrast = smooth(band.contrast);
-    const double step = std::exp2(band.level);
-    std::size_t i = 0;
-    for (int y = 0; y < band.luminance.height; ++y) {
-        for (int x = 0; x < band.luminance.width; ++x, ++i) {
-            Sight sight;
-            sight.luminance = band.luminance.values[i];
-            sight.weight = table.at(std::log10(sight.luminance), eccentricity.at_pixel(x * step, y * step));
-            sight.untilted = 1 - sight.weight.tilt * table.smooth_at_nominal();
-            const double mask =
-                std::abs(sight.untilted * band.contrast.values[i] + sight.weight.tilt * smooth_contrast.values[i]) /
-                table.gain();
-            // Maskers work where they are: their contrasts count in thresholds of patches.
-            sight.elevation = daly_elevation(mask * sight.weight.sensitivity * table.of_patch());
-            use(i, sight);
+// The reference, band by band.
+class Reference {
+public:
+    Reference(const Image& image, const JudgeOptions& options)
+        : eccentricities_(eccentricities(image, options)), conditions_(conditions_for(image, options, eccentricities_)),
+          floor_cdm2_(static_cast<float>(contrast_floor(options.display))), rest_(image.width, image.height) {
+        rest_.values = image.values;
+    }
+
+    const BandConditions& conditions() const { return conditions_; }
+
+    // Calls `use(band)` for each from fine to coarse; only one is held at a time. Once.
+    template <class Use>
+    void for_each_band(Use use) {
+        for (int level = 0; level <= conditions_.base_level; ++level)
+            use(split_reference(rest_, level, level == conditions_.base_level, floor_cdm2_));
+    }
+
+    // `use(y, sight)` for each row of a band.
+    template <class Use>
+    void for_each_row(const ReferenceBand& band, const BandTable& table, Use use) const {
+        const Plane smooth_contrast = smooth(band.contrast);
+        const auto width = static_cast<std::size_t>(band.luminance.width);
+        const auto of_patch = static_cast<float>(table.of_patch());
+        std::vector<float> eccentricity;
+        RowSight sight;
+        sight.elevation.resize(width);
+        for (int y = 0; y < band.luminance.height; ++y) {
+            if (!eccentricities_.values.empty()) {
+                const float* const degrees = eccentricities_.row(y << band.level);
+                eccentricity.resize(width);
+                for (std::size_t x = 0; x < width; ++x) eccentricity[x] = degrees[x << band.level];
+            }
+            table.weigh({band.luminance.row(y), width}, eccentricity, sight.weights);
+            const auto& [sensitivity, own, smoothed] = sight.weights;
+            const float *const contrast = band.contrast.row(y), *const around = smooth_contrast.row(y);
+            for (std::size_t x = 0; x < width; ++x) {
+                // Maskers work where they are: their contrasts count in thresholds of patches.
+                const float masker = std::abs(own[x] * contrast[x] + smoothed[x] * around[x]);
+                sight.elevation[x] = fast_daly_elevation(masker * sensitivity[x] * of_patch);
+            }
+            use(y, sight);
         }
     }
-}
+
+private:
+    Plane eccentricities_;
+    BandConditions conditions_;
+    float floor_cdm2_;
+    Plane rest_; // what is not split into bands yet
+};
 
 // What the reference makes of one band of differences.
 struct Band {
@@ -193,28 +214,41 @@ struct Band {
     SummationWindow window{1};
 };
 
-Band prepare_band(const ReferenceBand& reference, const BandConditions& conditions, const Eccentricity& eccentricity) {
-    const BandTable table(conditions, reference.level, reference.is_base);
-    const int width = reference.luminance.width, height = reference.luminance.height;
-    const double samples_a_degree = conditions.ppd / std::exp2(reference.level);
-    const double area_deg2 = summation_area(conditions, nominal_frequency(conditions.ppd, reference.level));
-    Band band{reference.level, reference.is_base, Plane(width, height), Plane(width, height),
+Band prepare_band(const Reference& reference, const ReferenceBand& from) {
+    const BandConditions& conditions = reference.conditions();
+    const BandTable table(conditions, from.level);
+    const int width = from.luminance.width, height = from.luminance.height;
+    const double samples_a_degree = conditions.ppd / std::exp2(from.level);
+    const double area_deg2 = summation_area(conditions, nominal_frequency(conditions.ppd, from.level));
+    Band band{from.level, from.is_base, Plane(width, height), Plane(width, height),
               SummationWindow(area_deg2 * samples_a_degree * samples_a_degree)};
-    for_each_sample(reference, table, eccentricity, [&](std::size_t i, const Sight& sight) {
-        const double to_thresholds = sight.weight.sensitivity / (sight.luminance * sight.elevation * table.gain());
-        band.own.values[i] = static_cast<float>(to_thresholds * sight.untilted);
-        band.smoothed.values[i] = static_cast<float>(to_thresholds * sight.weight.tilt);
+    reference.for_each_row(from, table, [&](int y, const RowSight& sight) {
+        const float* const luminance = from.luminance.row(y);
+        float *const own = band.own.row(y), *const smoothed = band.smoothed.row(y);
+        const auto& weights = sight.weights;
+        for (std::size_t x = 0; x < sight.elevation.size(); ++x) {
+            const float to_thresholds = weights.sensitivity[x] / (luminance[x] * sight.elevation[x]);
+            own[x] = to_thresholds * weights.own[x];
+            smoothed[x] = to_thresholds * weights.smoothed[x];
+        }
     });
     return band;
 }
 
-// An energy to the power of beta / 2, beta the exponent of amplitudes; the usual one by square roots.
-float raised(float energy, float beta) {
-    if (beta == 3.5f) {
-        const float root = std::sqrt(energy);
-        return energy * root * std::sqrt(root);
-    }
-    return std::pow(energy, beta / 2);
+// Energies to the power of beta / 2, beta the exponent of amplitudes; the usual ones without logarithms.
+void raise(std::vector<float>& energies, float beta) {
+    constexpr float least = std::numeric_limits<float>::min();
+    if (beta == 2) return;
+    if (beta == 3.5f)
+        for (float& e : energies) e = e * std::sqrt(e) * std::sqrt(std::sqrt(e));
+    else
+        for (float& e : energies) e = e > 0 ? fast_exp2(beta / 2 * fast_log2(std::max(e, least))) : 0;
+}
+
+// The sums of powers to V.
+void take_root(std::vector<float>& powers, float beta) {
+    constexpr float least = std::numeric_limits<float>::min();
+    for (float& p : powers) p = p > 0 ? fast_exp2(fast_log2(std::max(p, least)) / beta) : 0;
 }
 
 } // namespace
@@ -230,12 +264,9 @@ Judge::Judge(std::shared_ptr<const State> state) : state_(std::move(state)) {}
 Result<Judge> Judge::create(Image reference, const JudgeOptions& options) {
     if (auto ok = check(options); !ok) return ok.error();
     if (auto ok = check_luminance("judge", reference, "reference"); !ok) return ok.error();
-    const Eccentricity eccentricity(reference, options);
-    const BandConditions conditions = conditions_for(reference, options, eccentricity);
     auto state = std::make_shared<State>();
-    for_each_band(
-        reference, conditions.ppd, static_cast<float>(contrast_floor(options.display)),
-        [&](const ReferenceBand& band) { state->bands.push_back(prepare_band(band, conditions, eccentricity)); });
+    Reference bands(reference, options);
+    bands.for_each_band([&](const ReferenceBand& band) { state->bands.push_back(prepare_band(bands, band)); });
     state->reference = std::move(reference);
     state->options = options;
     return Judge(std::move(state));
@@ -244,7 +275,8 @@ Result<Judge> Judge::create(Image reference, const JudgeOptions& options) {
 Result<Judgement> Judge::judge(const Image& test) const {
     const Image& reference = state_->reference;
     if (auto ok = check_luminance_pair("judge", reference, test); !ok) return ok.error();
-    const float beta = static_cast<float>(state_->options.beta);
+    const auto beta = static_cast<float>(state_->options.beta);
+    const float most = most_thresholds(beta);
     Plane difference(reference.width, reference.height), sum(reference.width, reference.height);
     for (std::size_t i = 0; i < difference.values.size(); ++i)
         difference.values[i] = test.values[i] - reference.values[i];
@@ -257,26 +289,22 @@ Result<Judgement> Judge::judge(const Image& test) const {
         }
         const Plane smoothed = smooth(here);
         for (std::size_t i = 0; i < here.values.size(); ++i) {
-            const float thresholds =
-                std::min(std::abs(band.own.values[i] * here.values[i] + band.smoothed.values[i] * smoothed.values[i]),
-                         most_thresholds);
+            const float thresholds = std::min(
+                std::abs(band.own.values[i] * here.values[i] + band.smoothed.values[i] * smoothed.values[i]), most);
             here.values[i] = 2 * thresholds * thresholds;
         }
         Plane powers = band.window.sums(here);
-        for (float& p : powers.values) p = p > 0 ? raised(p, beta) : 0;
+        raise(powers.values, beta);
         spread(powers, band.level, sum, [](float& to, float from) { to += from; });
     }
 
+    take_root(sum.values, beta);
     Judgement judgement;
     judgement.pixels = sum.values.size();
+    judgement.visible_pixels = static_cast<std::uint64_t>(
+        std::count_if(sum.values.begin(), sum.values.end(), [](float v) { return !(v < 1); }));
+    judgement.max_ratio = static_cast<double>(*std::max_element(sum.values.begin(), sum.values.end()));
     judgement.visibility = {reference.width, reference.height, 1, std::move(sum.values)};
-    float largest = 0;
-    for (float& v : judgement.visibility.values) {
-        if (v != 0) v = std::pow(v, 1 / beta);
-        judgement.visible_pixels += !(v < 1);
-        largest = std::max(largest, v);
-    }
-    judgement.max_ratio = static_cast<double>(largest);
     return judgement;
 }
 
@@ -295,17 +323,17 @@ JudgeOptions second_judge_options(const Person& person, const Display& display,
 Result<Image> threshold_map_modern(const Image& reference, const JudgeOptions& options) {
     if (auto ok = check(options); !ok) return ok.error();
     if (auto ok = check_luminance("judge", reference, "reference"); !ok) return ok.error();
-    const Eccentricity eccentricity(reference, options);
-    const BandConditions conditions = conditions_for(reference, options, eccentricity);
     Plane threshold(reference.width, reference.height);
     std::fill(threshold.values.begin(), threshold.values.end(), std::numeric_limits<float>::max());
-    const auto floor_cdm2 = static_cast<float>(contrast_floor(options.display));
-    for_each_band(reference, conditions.ppd, floor_cdm2, [&](const ReferenceBand& band) {
-        const BandTable table(conditions, band.level, band.is_base);
+    Reference bands(reference, options);
+    bands.for_each_band([&](const ReferenceBand& band) {
+        const BandTable table(bands.conditions(), band.level);
+        const auto of_patch = static_cast<float>(table.of_patch());
         Plane steps(band.luminance.width, band.luminance.height);
-        for_each_sample(band, table, eccentricity, [&](std::size_t i, const Sight& sight) {
-            const double step = sight.luminance * sight.elevation / (sight.weight.sensitivity * table.of_patch());
-            steps.values[i] = static_cast<float>(std::min<double>(step, std::numeric_limits<float>::max()));
+        bands.for_each_row(band, table, [&](int y, const RowSight& sight) {
+            const float* const luminance = band.luminance.row(y);
+            for (std::size_t x = 0; x < sight.elevation.size(); ++x)
+                steps.row(y)[x] = luminance[x] * sight.elevation[x] / (sight.weights.sensitivity[x] * of_patch);
         });
         spread(steps, band.level, threshold, [](float& to, float from) { to = std::min(to, from); });
     });
