@@ -20,7 +20,7 @@ namespace unseen::app {
 enum class Judge { modern, second };
 inline constexpr std::array judges = {Judge::modern, Judge::second};
 inline constexpr perception::CsfModel usual_second =
-    perception::CsfModel::barten_1999; // of the eye's physics, not fitted to castleCSF's data
+    perception::CsfModel::barten_fitted; // of the eye's physics, by its own laws of area and of frequency
 
 struct Verdicts {
     vdtree::Index triangles = 0;

@@ -220,7 +220,7 @@ Command perception_command(CLI::App& app) {
     verb->add_option("--pictures", o.pictures, "A picture of each group: the worst views, and what the judge saw")
         ->type_name("FOLDER");
     verb->add_option("--second-judge", o.second_judge,
-                     "Its model of contrast sensitivity: barten-1999 (default), stela, daly, ...")
+                     "Its model of contrast sensitivity: barten-fitted (default), stela, daly, ...")
         ->type_name("MODEL")
         ->check(one_of(achromatic_models()));
     verb->add_option("--window", o.window_px, "Its side; promises are about 1024 (default)")

@@ -164,16 +164,12 @@ TEST(JudgeModern, MayBeAskedAgain) {
 
 // ---- the second judge
 
-// Barten's law of area and sensitivity, at the fovea; the pupil is that of 10 x 10 degrees.
+// Of patches of any size.
 TEST(SecondJudge, SeesWhatBartenSays) {
     for (const double freq : {2.0, 5.5}) {
         for (const double radius_cycles : {2.0, 6.0}) {
             Gabor g{freq, 0, 20, 0, 0, radius_cycles};
-            const double share = barten_summation_area(CyclesPerDegree(freq)).value() / g.area().value();
-            Gabor wide = g;
-            wide.radius_cycles = freq * 10 / std::sqrt(std::numbers::pi);
-            const double wide_share = barten_summation_area(CyclesPerDegree(freq)).value() / wide.area().value();
-            g.contrast = std::sqrt((1 + share) / (1 + wide_share)) / closed_form(wide, 0, CsfModel::barten_1999);
+            g.contrast = 1 / closed_form(g, 0, CsfModel::barten_fitted);
             const int side = side_for(g);
             JudgeOptions options = second_judge_options(median_person);
             options.gain = 1;

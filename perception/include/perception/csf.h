@@ -38,6 +38,7 @@ enum class CsfModel {
     daly,             // Daly 1993, the Visible Differences Predictor's
     barten_1989,      // Barten 1989, the short form that Ramasubramanian et al. 1999 and PerceptualDiff use
     barten_1999,      // Barten 1999, the physical model in full, both eyes
+    barten_fitted,    // the same with constants fitted to people's thresholds, and castle's fall with eccentricity
     barten_2004,      // Barten 2003/04, the short form
     mannos_sakrison,  // Mannos and Sakrison 1974; relative
     rushmeier,        // Rushmeier et al. 1995, a simplification of Daly's; relative
@@ -49,6 +50,7 @@ inline constexpr std::array csf_models = {CsfModel::castle,
                                           CsfModel::daly,
                                           CsfModel::barten_1989,
                                           CsfModel::barten_1999,
+                                          CsfModel::barten_fitted,
                                           CsfModel::barten_2004,
                                           CsfModel::mannos_sakrison,
                                           CsfModel::rushmeier,
@@ -88,6 +90,7 @@ SquareDegrees patch_area(CyclesPerDegree frequency);
 // The law of area: patches of area A are seen sqrt(A / (A + Ac)) times as well as unlimited ones, with this Ac.
 SquareDegrees castle_summation_area(CyclesPerDegree frequency);
 SquareDegrees barten_summation_area(CyclesPerDegree frequency); // of Barten 1999
+SquareDegrees barten_fitted_summation_area(CyclesPerDegree frequency);
 
 // How many times as well a patch of `area` is seen as one of patch_area(frequency), A15:
 //   R own^t,   R = sqrt(A / (A + Ac) (A15 + Ac) / A15),   t = ln R / ln R(unlimited), and 0 for smaller patches than A15

@@ -36,8 +36,8 @@ struct Judgement {
 // sqrt(A / (A + Ac)) times as well as an unlimited one, and many small differences beside each other better than one.
 //
 // Calibrated: a Gabor patch of any area reaches V = 1 within 3 dB of contrast 1 / S, between 0.5 cpd and the display's
-// limit, S with the gain. V of a pixel tells of what is around it, up to a degree and more at low frequencies. With the
-// model barten_1999 the law of area is Barten's own, and the fall with eccentricity castleCSF's.
+// limit, S with the gain. V of a pixel tells of what is around it, up to a degree and more at low frequencies. Barten's
+// models have a law of area of their own.
 class Judge {
 public:
     // Prepares the reference: some 50 ns and 15 bytes a pixel. A NaN, infinite or negative luminance is an error, and
@@ -62,9 +62,9 @@ Result<Judgement> judge_modern(const Image& reference, const Image& test, const 
 // patch_area(), in the band that is most sensitive there, given the reference's masking.
 Result<Image> threshold_map_modern(const Image& reference, const JudgeOptions& options);
 
-// What makes of the judge the second one, another model of the same observer: Barten 1999, of the eye's physics, in
-// place of castleCSF, with Barten's law of area; squares over the bands in place of powers of 3.5. It is held against
-// the same people: Person::barten_gain.
+// What makes of the judge the second one, another model of the same observer: CsfModel::barten_fitted, of the eye's
+// physics, in place of castleCSF, with Barten's law of area; squares over the bands in place of powers of 3.5. It is
+// held against the same people: Person::barten_gain.
 JudgeOptions second_judge_options(const Person& person, const Display& display = {},
                                   const std::optional<glm::dvec2>& gaze_px = {});
 

@@ -18,7 +18,7 @@ struct Person {
     std::string_view name;
     double gain;        // of sensitivity over castleCSF's
     double share_above; // of measured sensitivities, that lie above this person's: who might see more
-    double barten_gain; // of sensitivity over Barten's of 1999, so that as many lie above: see second_judge_options()
+    double barten_gain; // of sensitivity over barten_fitted's, so that as many lie above: see second_judge_options()
     bool operator==(const Person&) const = default;
 };
 

@@ -103,14 +103,15 @@ double flicker_of(std::span<const Change> changes, const Image& before, const Ju
     const double ppd = pixels_per_degree(options.display).value();
     const double gain = flicker_gain(options);
     const Values luminance = adaptation(before, ppd, contrast_floor(options.display));
-    const Eccentricity eccentricity(before, options);
+    const Plane aside = eccentricities(before, options);
     double sum = 0;
     for (int y = 0; y < before.height; ++y)
         for (int x = 0; x < before.width; ++x) {
             const std::size_t i = before.index(x, y, 0);
             const auto is_changed = [&](const Change& c) { return c.coarse[i] != 0; };
             if (std::none_of(changes.begin(), changes.end(), is_changed)) continue;
-            const double degrees = eccentricity.at_pixel(x, y), cdm2 = static_cast<double>(luminance[i]);
+            const double degrees = aside.values.empty() ? 0 : static_cast<double>(aside.values[i]),
+                         cdm2 = static_cast<double>(luminance[i]);
             const double speed = flicker_speed(degrees, cdm2);
             double response = 0;
             for (const Change& c : changes)

@@ -23,6 +23,7 @@ constexpr std::array<std::pair<CsfModel, std::string_view>, csf_models.size()> n
     {CsfModel::daly, "daly"},
     {CsfModel::barten_1989, "barten-1989"},
     {CsfModel::barten_1999, "barten-1999"},
+    {CsfModel::barten_fitted, "barten-fitted"},
     {CsfModel::barten_2004, "barten-2004"},
     {CsfModel::mannos_sakrison, "mannos-sakrison"},
     {CsfModel::rushmeier, "rushmeier"},
@@ -69,6 +70,7 @@ bool is_achromatic(CsfModel model) {
 
 double decay_per_degree(CsfModel model, CyclesPerDegree frequency, VisualField field) {
     if (is_castle_family(model)) return castle_family_decay(model, frequency, field);
+    if (model == CsfModel::barten_fitted) return castle_family_decay(CsfModel::castle, frequency, field);
     return geisler_perry_decay * frequency.value();
 }
 

@@ -21,7 +21,6 @@ constexpr double luminance_floor = 0.01;      // cd/m2, where the display's blac
 constexpr double sensitivity_floor = 1e-60;   // keeps logarithms and squares finite; 1e-57 times below visibility
 constexpr double least_gain = 1e-3, largest_gain = 1e3;
 constexpr double least_beta = 1, largest_beta = 8; // beyond, powers of what is hardly seen are no floats
-constexpr SquareDegrees barten_field{100};         // 10 x 10 degrees, for which Barten gives his curves
 
 // Steps of the tables. Between them log S and the weights are linear, over luminance and over eccentricity. log S is
 // linear in eccentricity. In luminance it errs by less than 1e-3 of S, most where castleCSF's peak crosses the band's
@@ -171,9 +170,13 @@ int base_level(int width, int height, double ppd) {
 }
 
 double summation_area(const BandConditions& c, double freq_cpd) {
-    return (c.model == CsfModel::barten_1999 && !c.table ? barten_summation_area
-                                                         : castle_summation_area)(CyclesPerDegree(freq_cpd))
-        .value();
+    const CyclesPerDegree frequency(freq_cpd);
+    if (c.table) return castle_summation_area(frequency).value();
+    switch (c.model) {
+    case CsfModel::barten_1999: return barten_summation_area(frequency).value();
+    case CsfModel::barten_fitted: return barten_fitted_summation_area(frequency).value();
+    default: return castle_summation_area(frequency).value();
+    }
 }
 
 double sensitivity_of(const BandConditions& c, double freq_cpd, double luminance, double eccentricity) {
@@ -184,19 +187,8 @@ double sensitivity_of(const BandConditions& c, double freq_cpd, double luminance
     stimulus.area = patch_area(stimulus.frequency);
     stimulus.field = VisualField::worst;
     stimulus.distance = c.distance;
-    double s = 0;
-    if (c.table) {
-        s = c.table->sensitivity(stimulus.frequency, stimulus.eccentricity, stimulus.luminance);
-    } else if (c.model == CsfModel::barten_1999) {
-        // Beyond 15 degrees people see a quarter of what Geisler and Perry's fall leaves: castleCSF's is taken.
-        const double aside = sensitivity(CsfModel::castle, stimulus);
-        stimulus.eccentricity = Degrees(0);
-        s = aside / sensitivity(CsfModel::castle, stimulus);
-        stimulus.area = barten_field; // decides on the pupil, too, which is the screen's business and no patch's
-        s *= sensitivity(c.model, stimulus);
-    } else {
-        s = sensitivity(c.model, stimulus);
-    }
+    const double s = c.table ? c.table->sensitivity(stimulus.frequency, stimulus.eccentricity, stimulus.luminance)
+                             : sensitivity(c.model, stimulus);
     const double area = stimulus.area.value();
     const double unlimited = std::sqrt((summation_area(c, freq_cpd) + area) / area);
     return std::max(sensitivity_floor, c.gain * s * unlimited); // in this order of NaN, too: where all is 0 or infinite

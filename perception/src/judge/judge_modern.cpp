@@ -317,7 +317,7 @@ Result<Judgement> judge_modern(const Image& reference, const Image& test, const 
 JudgeOptions second_judge_options(const Person& person, const Display& display,
                                   const std::optional<glm::dvec2>& gaze_px) {
     return {
-        .display = display, .gaze_px = gaze_px, .csf = CsfModel::barten_1999, .gain = person.barten_gain, .beta = 2};
+        .display = display, .gaze_px = gaze_px, .csf = CsfModel::barten_fitted, .gain = person.barten_gain, .beta = 2};
 }
 
 Result<Image> threshold_map_modern(const Image& reference, const JudgeOptions& options) {
