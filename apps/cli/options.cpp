@@ -354,8 +354,14 @@ void add_display_options(CLI::App& verb, DisplayOptions& o) {
     add_number(group, "--peak", o.peak_cdm2, positive(), "CDM2", "Luminance of white");
     add_number(group, "--black", o.black_cdm2, positive(), "CDM2", "Luminance of black");
     group
+        .add_option("--observer", o.observer,
+                    "Who looks: median (half of all people see more), default (one in twelve does), strict (one in "
+                    "twenty), or the table of a viewer whom unseen calibrate measured")
+        ->type_name("NAME|FILE");
+    group
         .add_option("--csf", o.csf,
-                    "Contrast sensitivity: a model of unseen csf (default: castle), or a viewer's table")
+                    "Contrast sensitivity: a model of unseen csf (default: castle) for the observer, or a viewer's "
+                    "table")
         ->type_name("MODEL|FILE");
 }
 

@@ -52,7 +52,8 @@ struct ViewOptions {
 struct DisplayOptions {
     std::string file;
     std::optional<double> pixels_per_degree, distance_m, peak_cdm2, black_cdm2;
-    std::string csf; // a model's name or a file's
+    std::string observer; // a person's name or a file's
+    std::string csf;      // a model's name or a file's
 };
 
 // A number of triangles, or a share of the model's.

@@ -129,6 +129,57 @@ Result<vdtree::Clustering> cluster_to_darkest(const vdtree::ClusterInput& input)
     return clustering;
 }
 
+// A square net from -1 to 1, waved along both sides.
+Mesh waved_sheet(int side, double height, double waves) {
+    return net(side, side, false, [=](double down, double across) {
+        const double x = 2 * across - 1, y = 2 * down - 1, k = waves * std::numbers::pi;
+        return glm::dvec3(x, y, height * std::sin(k * x) * std::sin(k * y));
+    });
+}
+
+// The same triangles in a random order, and the vertices in the order in which they are first used.
+Mesh shuffled(const Mesh& mesh, unsigned seed) {
+    constexpr Index unused = ~Index{0};
+    std::mt19937_64 random(seed);
+    std::vector<vdtree::Triangle> triangles = mesh.triangles;
+    for (std::size_t i = triangles.size(); i-- > 1;) std::swap(triangles[i], triangles[random() % (i + 1)]);
+    Mesh out;
+    std::vector<Index> number(mesh.positions.size(), unused);
+    for (vdtree::Triangle& triangle : triangles) {
+        for (Index& corner : triangle) {
+            Index& to = number[corner];
+            if (to == unused) {
+                to = static_cast<Index>(out.positions.size());
+                out.positions.push_back(mesh.positions[corner]);
+                if (!mesh.colours.empty()) out.colours.push_back(mesh.colours[corner]);
+            }
+            corner = to;
+        }
+        out.triangles.push_back(triangle);
+    }
+    return out;
+}
+
+// As STL files have it: three vertices a facet.
+Mesh unwelded(const Mesh& mesh) {
+    Mesh out;
+    for (const vdtree::Triangle& triangle : mesh.triangles) {
+        const auto first = static_cast<Index>(out.positions.size());
+        for (const Index corner : triangle) out.positions.push_back(mesh.positions[corner]);
+        out.triangles.push_back({first, first + 1, first + 2});
+    }
+    return out;
+}
+
+// A net without the triangles whose middles `is_hole` says lie in one.
+template <class IsHole>
+Mesh without(Mesh mesh, const IsHole& is_hole) {
+    std::erase_if(mesh.triangles, [&](const vdtree::Triangle& t) {
+        return is_hole((mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]]) / 3.0);
+    });
+    return mesh;
+}
+
 } // namespace
 
 std::vector<HardMesh> hard_meshes(int triangles) {
@@ -195,7 +246,94 @@ std::vector<HardMesh> tuning_meshes(int triangles) {
     meshes.push_back({"lenses", std::move(lenses)});
     meshes.push_back({"column", net(8, triangles / 16, true, column)}); // of long triangles
     meshes.push_back({"boxes", std::move(boxes)});
+    // Regular patterns, whose errors are alike everywhere.
+    meshes.push_back({"waves", waved_sheet(2 * rows, 0.0015, 14)});
+    meshes.push_back({"dimples", moved(sphere, [](glm::dvec3 p) {
+                          const double turn = std::atan2(p.z, p.x), tilt = std::asin(std::clamp(p.y, -1.0, 1.0));
+                          return p * (1 + 0.0015 * std::cos(tilt) * std::sin(36 * turn) * std::sin(36 * tilt));
+                      })});
     return meshes;
+}
+
+std::vector<HardMesh> open_sheets(int triangles) {
+    const int side = std::max(24, static_cast<int>(std::sqrt(triangles / 2.0))), half = side / 2;
+    // Two rectangles that meet along the y axis.
+    const auto plate = [&](double sign) {
+        return net(side, half, false, [=](double down, double across) {
+            const double x = (sign > 0 ? across : across - 1);
+            return glm::dvec3(x, 2 * down - 1, 0.4 * std::abs(x));
+        });
+    };
+    const Mesh crease = net(side, 2 * half, false, [](double down, double across) {
+        const double x = 2 * across - 1;
+        return glm::dvec3(x, 2 * down - 1, 0.4 * std::abs(x));
+    });
+    Mesh halves = plate(-1);
+    append(halves, plate(1));
+    // Around the middle, out to a border of many lengths.
+    const Mesh jagged = net(half, 4 * half, true, [](double down, double around) {
+        const double turn = 2 * std::numbers::pi * around;
+        const double out = 1 + 0.15 * std::sin(7 * turn) + 0.05 * std::sin(23 * turn + 1) + 0.02 * std::sin(61 * turn);
+        const double r = (0.05 + 0.95 * down) * out;
+        return glm::dvec3(r * std::cos(turn), r * std::sin(turn), 0.02 * std::sin(3 * turn) * down);
+    });
+    const auto is_hole = [](glm::dvec3 p) {
+        const double x = p.x * 4 - std::floor(p.x * 4) - 0.5, y = p.y * 4 - std::floor(p.y * 4) - 0.5;
+        return x * x + y * y < 0.05;
+    };
+    const Mesh spiral = net(4 * half, half / 2, false, [](double down, double across) {
+        const double turn = 6 * std::numbers::pi * down, r = 0.3 + 0.7 * down;
+        return glm::dvec3(r * std::cos(turn), 0.6 * across - 0.3, r * std::sin(turn));
+    });
+    std::vector<HardMesh> sheets;
+    for (const double waves : {3.0, 10.0, 20.0}) {
+        const auto name = std::to_string(static_cast<int>(waves)) + " waves";
+        sheets.push_back({"low " + name, waved_sheet(side, 0.001, waves)});
+        sheets.push_back({"high " + name, waved_sheet(side, 0.02, waves)});
+    }
+    sheets.push_back({"shuffled waves", shuffled(waved_sheet(side, 0.001, 20), 5)});
+    sheets.push_back({"plate", waved_sheet(side, 0, 1)});
+    sheets.push_back({"crease", crease});
+    sheets.push_back({"crease in halves", std::move(halves)});
+    sheets.push_back({"crease of facets", unwelded(crease)});
+    sheets.push_back({"jagged", jagged});
+    sheets.push_back({"holes", without(waved_sheet(side, 0.01, 2), is_hole)});
+    sheets.push_back({"spiral", spiral});
+    return sheets;
+}
+
+std::vector<HardMesh> ship_hulls(int triangles) {
+    const int along = std::max(8, triangles / 96);
+    // Around the section: up the one side, over the deck, down the other.
+    const auto section = [](double around, double width) {
+        const double t = 4 * around;
+        const double x = t < 1.5 ? -width : t < 2.5 ? width * (2 * (t - 1.5) - 1) : width;
+        const double y = t < 1.5 ? -1 + t / 1.5 : t < 2.5 ? 0 : -(t - 2.5) / 1.5;
+        return glm::dvec2(x * (1 + 0.3 * std::min(y, 0.0)), y);
+    };
+    const auto hull = [&](int around, double ridges) {
+        Mesh mesh = net(along, around, false, [&](double down, double across) {
+            const double z = 12 * down - 6, width = 1.2 * std::sqrt(std::max(0.02, 1 - std::pow(z / 6.2, 4)));
+            glm::dvec2 at = section(across, width);
+            at.x *= 1 + ridges * std::sin(60 * across);
+            return glm::dvec3(at, z);
+        });
+        return painted(std::move(mesh), [](const glm::dvec3& p) { return p.y > -1e-3 ? 0.85 : 0.06; });
+    };
+    Mesh railed = hull(24, 0);
+    for (int i = 0; i < 2; ++i)
+        append(railed, painted(net(along, 2, false,
+                                   [&](double down, double across) {
+                                       const double z = 12 * down - 6;
+                                       const double width = 1.15 * std::sqrt(std::max(0.02, 1 - std::pow(z / 6.2, 4)));
+                                       return glm::dvec3(i == 0 ? -width : width, 0.02 + 0.1 * across, z);
+                                   }),
+                               [](const glm::dvec3&) { return 0.4; }));
+    std::vector<HardMesh> hulls;
+    hulls.push_back({"hull", hull(48, 0)});
+    hulls.push_back({"ridged hull", hull(48, 0.02)});
+    hulls.push_back({"railed hull", std::move(railed)});
+    return hulls;
 }
 
 Result<vdtree::VertexTree> build_hard_tree(const HardMesh& hard) {

@@ -24,6 +24,15 @@ std::vector<HardMesh> hard_meshes(int triangles);
 // terrain, flat lenses and boxes that pass through each other, a column of long triangles. Of about so many triangles each; at least a thousand.
 std::vector<HardMesh> tuning_meshes(int triangles);
 
+// Open sheets, whose borders are all that a flat sheet shows of its folds: regular waves of various heights and lengths,
+// one with its faces in another order; two plates that meet in a crease, welded, with a border each, and with vertices
+// of each facet's own; a jagged outline, holes, a spiral. Of about so many triangles each; at least a thousand.
+std::vector<HardMesh> open_sheets(int triangles);
+
+// Hulls of a ship, of long thin quads, as CAD programs write them: a bright deck beside a dark side, with ridges, and
+// with a railing of separate strips above it. Of about so many triangles each; at least a thousand.
+std::vector<HardMesh> ship_hulls(int triangles);
+
 Result<vdtree::VertexTree> build_hard_tree(const HardMesh& hard);
 
 } // namespace unseen::app

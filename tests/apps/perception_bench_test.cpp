@@ -139,8 +139,9 @@ TEST_F(PerceptionBenchTest, FactorsOfTheFoldModelAreVaried) {
     for (std::size_t i = 0; i < rows.size(); ++i) {
         EXPECT_EQ(rows[i]["factor"], "peak_of_shift");
         EXPECT_EQ(rows[i]["is_own"], rows[i]["value"] == 1.2);
-        EXPECT_GT(rows[i]["looked_at"]["largest_v"], 0);
-        EXPECT_LT(rows[i]["aside"]["largest_v"], 1);
+        ASSERT_EQ(rows[i]["seen"].size(), 4u); // looked at, and aside
+        EXPECT_GT(rows[i]["seen"][0]["largest_v"], 0);
+        EXPECT_LT(rows[i]["seen"][3]["largest_v"], 1);
         if (i == 0) continue;
         EXPECT_GT(rows[i]["value"], rows[i - 1]["value"]);
         EXPECT_GE(rows[i]["triangles"], rows[i - 1]["triangles"]);

@@ -10,3 +10,4 @@ unseen_add_test(NAME perception_fast_math SOURCES fast_math_test.cpp
                 DEPENDS unseen::perception PRIVATE_HEADERS perception LABELS unit)
 unseen_add_test(NAME perception_summation SOURCES summation_test.cpp
                 DEPENDS unseen::perception PRIVATE_HEADERS perception LABELS unit)
+unseen_add_test(NAME perception_change SOURCES change_test.cpp DEPENDS unseen::perception LABELS unit)

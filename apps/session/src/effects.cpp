@@ -63,9 +63,7 @@ Effect silhouette_effect(const Sight& sight, const Decision& decision) {
 
 Effect csf_effect(const Sight& sight, const Decision& decision) {
     if (!is_perceptual(decision)) return {"csf table", false, "only the perceptual fold test looks sensitivity up"};
-    return {"csf table", sight.observer.csf != nullptr,
-            sight.observer.csf ? "by observer.csf: " + sight.observer.csf->samples().source
-                               : "the standard observer is used, castleCSF"};
+    return {"csf table", sight.observer.csf != nullptr, describe(sight.observer)};
 }
 
 Effect prelit_effect(const Sight& sight) {

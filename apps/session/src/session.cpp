@@ -103,12 +103,10 @@ perception::SceneLuminance Session::State::luminance_of(const std::vector<Sight>
 }
 
 void Session::State::set_gaze_of(Sight& sight) {
-    sight.csf = observer.csf;
+    sight.csf = observer.csf ? observer.csf : perception::csf_of(observer.person);
     if (!observer.gaze) return;
     if (observer.gaze->margin_deg != 0) {
-        if (!widened_)
-            widened_ = std::make_unique<perception::WidenedTables>(observer.csf ? *observer.csf
-                                                                                : perception::CsfTable::standard());
+        if (!widened_) widened_ = std::make_unique<perception::WidenedTables>(*sight.csf);
         auto around_gaze = widened_->at(perception::Degrees(observer.gaze->margin_deg));
         if (!around_gaze) return; // anything may be looked at
         sight.csf = std::move(around_gaze);

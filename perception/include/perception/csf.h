@@ -89,6 +89,14 @@ SquareDegrees patch_area(CyclesPerDegree frequency);
 SquareDegrees castle_summation_area(CyclesPerDegree frequency);
 SquareDegrees barten_summation_area(CyclesPerDegree frequency); // of Barten 1999
 
+// How many times as well a patch of `area` is seen as one of patch_area(frequency), A15:
+//   R own^t,   R = sqrt(A / (A + Ac) (A15 + Ac) / A15),   t = ln R / ln R(unlimited), and 0 for smaller patches than A15
+// with castle's law for `own` = 1. People sum more or less than that: `own` says how many times as well as by castle's
+// law somebody sees an unlimited grating, of whom it is known how well they see patches of A15 (calibration's
+// ObserverProfile::summation). NaN where frequency, area or own are not above 0; the area may be infinite.
+double summation_gain(CyclesPerDegree frequency, SquareDegrees area, double own = 1);
+double summation_share(CyclesPerDegree frequency, SquareDegrees area); // t
+
 // What a table holds constant; as in Stimulus.
 struct CsfConditions {
     Hertz temporal{0};
@@ -100,7 +108,7 @@ Stimulus stimulus_of(const CsfConditions& conditions, CyclesPerDegree frequency,
                      Luminance luminance); // of patch_area(frequency)
 
 // Sensitivity over frequency x eccentricity x luminance, interpolated linearly in log S over log frequency,
-// eccentricity and log luminance; outside of the axes clamped to their ends.
+// eccentricity and log luminance; outside of the axes clamped to their ends: see CsfReach.
 struct CsfSamples {
     std::string source;                   // what filled it: model and conditions, or observer and date
     std::vector<double> frequency_cpd;    // two or more, ascending, > 0 and at most 1e4
@@ -109,15 +117,38 @@ struct CsfSamples {
     std::vector<double> sensitivity;      // > 0 and at most 1e6; [(e * luminances + l) * frequencies + f]
 };
 
+// Where a table has samples. Beyond them it goes on by these rules; the third is of the conservative form alone:
+// - farther aside sensitivity is as at the last eccentricity, and in dimmer light as at the lowest luminance. Both take
+//   the eye for better than it is, for it sees less there;
+// - in brighter light it is as at the highest luminance. Eyes may see more there: up to some 100 cd/m2 sensitivity
+//   grows with the light, so give a table that reaches as far as the display does;
+// - coarser gratings are seen as well as the best of all that are finer, and finer ones fall on with the shallowest slope
+//   at which any column ends.
+struct CsfReach {
+    CyclesPerDegree coarsest, finest;
+    Degrees eccentricity;
+    Luminance darkest, brightest;
+};
+
 // Copies are cheap and share their data; any number of threads may look up at once.
 class CsfTable {
 public:
     CsfTable(const CsfTable&) = default; // and no move: there is no empty table
     CsfTable& operator=(const CsfTable&) = default;
 
-    // Checks the samples: the ranges above, and that each axis rises by `smallest_spacing` at least from sample to
-    // sample. The error names the field and the index. Then prepares the conservative form below.
+    // Checks the samples: the ranges above, that each axis rises by `smallest_spacing` at least from sample to sample,
+    // and that sensitivity does not grow with eccentricity by more than `noise_db`. The error names the field and the
+    // index, with the values. Then prepares the conservative form below.
     static Result<CsfTable> create(CsfSamples samples);
+    // What measured sensitivities may grow by from any eccentricity to a larger one, in decibels (20 log10): a table that
+    // grows by more has its rows or columns out of order, or a slip. It is the standard deviation of the difference of
+    // two measurements by different studies, each of which strays by 4.4 dB (person.h): root 2 times that. Thresholds by
+    // `unseen calibrate` stray by 2.3 dB at the worst, so two of them differ by so much in one case of twenty.
+    // Sensitivities below 1 count as 1, for nothing that can be shown is seen there.
+    static constexpr double noise_db = 6.2;
+    // Below this luminance only rods see, of which the fovea has none: there sensitivity may grow. (CIE 191:2010: where
+    // mesopic vision begins.)
+    static constexpr Luminance rods_alone_below{0.005};
     // Of neighbours on an axis, in octaves or degrees: closer ones are no measurement but a slip, and would make the
     // slope between them meaningless in float.
     static constexpr double smallest_spacing = 1e-4;
@@ -135,6 +166,7 @@ public:
     Result<CsfTable> scaled(double gain) const;
 
     const CsfSamples& samples() const noexcept;
+    CsfReach reach() const noexcept;
 
     // The samples, interpolated.
     double sensitivity(CyclesPerDegree frequency, Degrees eccentricity, Luminance luminance) const;
@@ -157,10 +189,18 @@ public:
                                         std::span<const float> luminance_cdm2, std::span<float> log2_frequency) const;
 
 private:
+    friend CsfTable widened(const CsfTable& table, Degrees margin);
+    // Of another table's columns, which need not be measured again: all checks of create() but that of growth.
+    static Result<CsfTable> derived(CsfSamples samples);
+
     struct State;
     explicit CsfTable(std::shared_ptr<const State> state);
 
     std::shared_ptr<const State> state_; // the samples and what look-ups need; never changes, so copies share it
 };
+
+// What of a request lies outside of a table's samples, and how it is taken, for reports; empty where nothing does.
+// "beyond the table's 20 degrees sensitivity is taken as there".
+std::string beyond_reach(const CsfTable& table, Degrees farthest, Luminance darkest, Luminance brightest);
 
 } // namespace unseen::perception

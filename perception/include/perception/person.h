@@ -6,8 +6,10 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <string_view>
 
+#include <perception/csf.h>
 #include <vdtree/result.h>
 
 namespace unseen::perception {
@@ -29,5 +31,8 @@ inline constexpr std::array people = {median_person, default_person, strict_pers
 
 // By name; the error lists them.
 Result<Person> person(std::string_view name);
+
+// castleCSF times the gain, of still gratings. Those of `people` are made once. Precondition: a gain of 0.001 to 1000.
+std::shared_ptr<const CsfTable> csf_of(const Person& person);
 
 } // namespace unseen::perception

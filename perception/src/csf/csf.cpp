@@ -99,6 +99,30 @@ SquareDegrees patch_area(CyclesPerDegree frequency) {
     return SquareDegrees(std::numbers::pi * radius_deg * radius_deg);
 }
 
+namespace {
+
+// R squared.
+double castle_area_gain(CyclesPerDegree frequency, SquareDegrees area) {
+    const double whole = castle_summation_area(frequency).value(), usual = patch_area(frequency).value();
+    return (1 + whole / usual) / (1 + whole / area.value());
+}
+
+bool is_patch(CyclesPerDegree frequency, SquareDegrees area) { return frequency.value() > 0 && area.value() > 0; }
+
+} // namespace
+
+double summation_share(CyclesPerDegree frequency, SquareDegrees area) {
+    if (!is_patch(frequency, area)) return std::numeric_limits<double>::quiet_NaN();
+    const SquareDegrees unlimited(std::numeric_limits<double>::infinity());
+    const double all = std::log(castle_area_gain(frequency, unlimited));
+    return std::max(0.0, std::log(castle_area_gain(frequency, area)) / all);
+}
+
+double summation_gain(CyclesPerDegree frequency, SquareDegrees area, double own) {
+    if (!is_patch(frequency, area) || !(own > 0)) return std::numeric_limits<double>::quiet_NaN();
+    return std::sqrt(castle_area_gain(frequency, area)) * std::pow(own, summation_share(frequency, area));
+}
+
 Stimulus stimulus_of(const CsfConditions& conditions, CyclesPerDegree frequency, Degrees eccentricity,
                      Luminance luminance) {
     return {.frequency = frequency,

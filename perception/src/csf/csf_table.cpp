@@ -91,6 +91,36 @@ Result<void> check_axis(std::string_view field, std::span<const double> values, 
     return {};
 }
 
+// What grows with eccentricity is no contrast sensitivity: see CsfTable::noise_db. `s` has valid axes and values.
+Result<void> check_decline(const CsfSamples& s) {
+    // A contrast above 1 that is needed to see anything is not shown by any grating, and nobody can have measured it.
+    constexpr double least_measurable = 1;
+    const double tolerance = std::pow(10.0, CsfTable::noise_db / 20);
+    const std::size_t frequencies = s.frequency_cpd.size(), plane = s.luminance_cdm2.size() * frequencies;
+    for (std::size_t i = 0; i < plane; ++i) {
+        const std::size_t l = i / frequencies, f = i % frequencies;
+        if (s.luminance_cdm2[l] < CsfTable::rods_alone_below.value()) continue;
+        std::size_t least = 0;
+        for (std::size_t e = 1; e < s.eccentricity_deg.size(); ++e) {
+            const double before = s.sensitivity[least * plane + i], here = s.sensitivity[e * plane + i];
+            const double growth = std::max(here, least_measurable) / std::max(before, least_measurable);
+            if (growth > tolerance) {
+                return bad(indexed("sensitivity", {e, l, f}) + " is " + number_text(here) + " (" +
+                           number_text(s.eccentricity_deg[e]) + " degrees, " + number_text(s.luminance_cdm2[l]) +
+                           " cd/m2, " + number_text(s.frequency_cpd[f]) + " cpd), but nearer to the gaze " +
+                           indexed("sensitivity", {least, l, f}) + " is " + number_text(before) + " (" +
+                           number_text(s.eccentricity_deg[least]) + " degrees): it grows by " +
+                           number_text(std::round(200 * std::log10(growth)) / 10) +
+                           " dB with eccentricity, and noise explains " + number_text(CsfTable::noise_db) +
+                           " dB at most. Check that rows and columns are in the order of the axes, or measure these "
+                           "two again");
+            }
+            if (here < before) least = e;
+        }
+    }
+    return {};
+}
+
 // From `first` to `last` in steps of equal ratio, at least `per_unit` to each factor of `unit`.
 void append_ladder(std::vector<double>& values, double first, double last, double unit, double per_unit) {
     const int steps = static_cast<int>(std::ceil(std::log(last / first) / std::log(unit) * per_unit - 1e-9));
@@ -342,7 +372,14 @@ struct CsfTable::State {
 
 CsfTable::CsfTable(std::shared_ptr<const State> state) : state_(std::move(state)) {}
 
-Result<CsfTable> CsfTable::create(CsfSamples samples) { return State::make_table(std::move(samples), {}); }
+Result<CsfTable> CsfTable::create(CsfSamples samples) {
+    auto table = State::make_table(std::move(samples), {});
+    if (!table) return table;
+    if (auto ok = check_decline(table->samples()); !ok) return ok.error();
+    return table;
+}
+
+Result<CsfTable> CsfTable::derived(CsfSamples samples) { return State::make_table(std::move(samples), {}); }
 
 Result<CsfTable> CsfTable::State::make_table(CsfSamples samples, Branches branches) {
     const CsfSamples& s = samples;
@@ -490,6 +527,27 @@ void CsfTable::State::prepare_extrapolation() {
 }
 
 const CsfSamples& CsfTable::samples() const noexcept { return state_->samples; }
+
+CsfReach CsfTable::reach() const noexcept {
+    const CsfSamples& s = state_->samples;
+    return {CyclesPerDegree(s.frequency_cpd.front()), CyclesPerDegree(s.frequency_cpd.back()),
+            Degrees(s.eccentricity_deg.back()), Luminance(s.luminance_cdm2.front()),
+            Luminance(s.luminance_cdm2.back())};
+}
+
+std::string beyond_reach(const CsfTable& table, Degrees farthest, Luminance darkest, Luminance brightest) {
+    const CsfReach reach = table.reach();
+    std::string text;
+    const auto add = [&](bool is_inside, const char* beyond, double end, const char* unit, const char* and_so) {
+        if (is_inside) return; // NaN is not
+        text += (text.empty() ? "" : "; ") + std::string(beyond) + " the table's " + number_text(end) + " " + unit +
+                " sensitivity is taken as there" + and_so;
+    };
+    add(farthest <= reach.eccentricity, "beyond", reach.eccentricity.value(), "degrees", "");
+    add(darkest >= reach.darkest, "below", reach.darkest.value(), "cd/m2", "");
+    add(brightest <= reach.brightest, "above", reach.brightest.value(), "cd/m2", ", though eyes may see more");
+    return text;
+}
 
 double CsfTable::sensitivity(CyclesPerDegree frequency, Degrees eccentricity, Luminance luminance) const {
     const double log2_cpd = std::log2(frequency.value()), log2_cdm2 = std::log2(luminance.value());

@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "fold/error_distances.h"
@@ -109,6 +110,7 @@ Pattern rounded(Pattern p, int coarseness) {
 // Of patterns, from far below any width that can be seen up to the lowest frequency's.
 constexpr double widest_deg = 1 / lowest_table_cpd, width_step = 0.91700404320467122; // an eighth of an octave
 constexpr std::size_t width_count = 160;
+SquareDegrees disc(double width_deg) { return SquareDegrees(std::numbers::pi * width_deg * width_deg / 4); }
 double width_deg(std::size_t i) { return widest_deg * std::pow(width_step, static_cast<double>(i)); }
 
 // What bands of frequency see of patterns of all widths, as shares of their contrast: of this, eyes that see patterns
@@ -123,10 +125,13 @@ struct Bands {
         for (double low = lowest_table_cpd; low < highest_cpd; low *= frequency_step) lowest_cpd.push_back(low);
         for (std::size_t i = 0; i < width_count; ++i) {
             const double width = width_deg(i);
+            const SquareDegrees area = disc(width), neighbourhood = disc(width * model.neighbourhood);
             for (const double low : lowest_cpd) {
-                const double waves = width * std::min(low * frequency_step, highest_cpd);
-                of_patches.push_back(share_of_patches(waves, model.most_side_by_side));
-                of_areas.push_back(share_of_area(waves));
+                const double high = std::min(low * frequency_step, highest_cpd), waves = width * high;
+                const CyclesPerDegree cpd(high);
+                of_patches.push_back(share_of_patches(waves, model.most_side_by_side) *
+                                     summation_gain(cpd, neighbourhood));
+                of_areas.push_back(share_of_area(waves) * summation_gain(cpd, area));
                 of_strips.push_back(std::min(1.0, waves)); // half as wide
             }
         }
@@ -144,10 +149,11 @@ public:
         for (const double low : bands.lowest_cpd)
             sensitivities.push_back(
                 csf.monotone_sensitivity(CyclesPerDegree(low), Degrees(eccentricity_deg), Luminance(luminance_cdm2)));
+        const double needed = needed_sensitivity(model, Degrees(eccentricity_deg));
         for (std::size_t i = 0; i < width_count; ++i) {
-            patches_[i] = 1 / visibility(sensitivities, bands.of_patches, i);
+            patches_[i] = 1 / (needed * visibility(sensitivities, bands.of_patches, i));
             areas_[i] = 1 / visibility(sensitivities, bands.of_areas, i);
-            strips_[i] = 1 / visibility(sensitivities, bands.of_strips, i);
+            strips_[i] = 1 / (model.needed_by_outlines * visibility(sensitivities, bands.of_strips, i));
         }
     }
 
@@ -418,13 +424,14 @@ void cover(SwitchDistances& switch_distances, Shown& a, const Shown& b) {
 // What nodes show, no less than their children: patches, and strips where they are outlines. False where the rows do
 // not suffice.
 bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors, const FoldTestOptions& options,
-                const Levels& levels, const CsfTable& csf, SwitchDistances& switch_distances,
+                const Levels& levels, const CsfTable& csf, double highest_cpd, SwitchDistances& switch_distances,
                 std::vector<Shown>& patches, std::vector<Shown>& strips) {
     const double darkest = levels.in_cdm2(options.scene.darkest), brightest = levels.in_cdm2(options.scene.brightest);
     const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
     const vdtree::LuminanceRange all = tree.ring_luminance()[vdtree::VertexTree::root()];
     const int whole = levels.luminance_level(levels.in_cdm2(static_cast<double>(all.lo + all.hi) / 2));
-    const double whole_peak = csf.peak_sensitivity(Degrees(0), Luminance(levels.luminance(whole)));
+    const double whole_peak = csf.peak_sensitivity(Degrees(0), Luminance(levels.luminance(whole))) *
+                              summation_gain(CyclesPerDegree(highest_cpd), disc(180));
     patches.assign(tree.interior_count(), {});
     strips.assign(tree.interior_count(), {});
     for (NodeId node = tree.interior_count(); node-- > 0;) { // children before parents
@@ -466,7 +473,7 @@ bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors
                               .is_strip = true};
             strip.pattern = above(strip.pattern, own);
         }
-        strip.length = errors[node].distance;
+        strip.length = errors[node].outline;
         strip.row = switch_distances.row(strip.pattern);
         cover(switch_distances, strip, strips[node]);
         strips[node] = strip;
@@ -506,7 +513,7 @@ Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const Fold
     const NodeId nodes = tree.interior_count();
     const Screen screen(view, options);
     const Levels levels(options.display);
-    const CsfTable& csf = options.csf ? *options.csf : CsfTable::standard();
+    const CsfTable& csf = csf_of(options);
 
     DistanceCriterion::Parts parts;
     parts.spheres = DistanceCriterion::Spheres::ring;
@@ -520,7 +527,7 @@ Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const Fold
     SwitchDistances switch_distances(levels, screen, csf, options.model, parts.eccentricity_bins,
                                      measured.stages.size());
     std::vector<Shown> patches, strips;
-    while (!find_shown(tree, errors, options, levels, csf, switch_distances, patches, strips))
+    while (!find_shown(tree, errors, options, levels, csf, screen.highest_cpd, switch_distances, patches, strips))
         switch_distances.coarsen();
     const std::vector<float> distances =
         stage_distances(tree, measured.stages, screen, options, parts.eccentricity_bins);
@@ -544,12 +551,28 @@ Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const Fold
     return DistanceCriterion::create(tree, std::move(parts));
 }
 
+double needed_sensitivity(const FoldModel& model, Degrees eccentricity) {
+    const auto& at = FoldModel::needed_at_degrees;
+    const double e = std::clamp(eccentricity.value(), at.front(), at.back());
+    std::size_t i = 0;
+    while (i + 2 < at.size() && e > at[i + 1]) ++i;
+    return std::lerp(model.needed[i], model.needed[i + 1], (e - at[i]) / (at[i + 1] - at[i]));
+}
+
 Result<void> validate(const FoldModel& m) {
-    for (const double factor :
-         {m.peak_of_shift, m.moved_by_neighbours, m.contact_reach, m.least_sine, m.sampled_shift_px,
-          m.amplitude_of_point_mean, m.amplitude_of_shift_mean, m.longest_ring, m.between_directions})
+    for (const double factor : {m.neighbourhood, m.needed_by_outlines, m.peak_of_shift, m.moved_by_neighbours,
+                                m.contact_reach, m.least_sine, m.sampled_shift_px, m.amplitude_of_point_mean,
+                                m.amplitude_of_shift_mean, m.longest_ring, m.between_directions})
         if (!(factor >= 0 && std::isfinite(factor)))
             return Error{ErrorCode::invalid_argument, "fold test: the model's factors must be finite, and 0 or more"};
+    for (std::size_t i = 0; i < m.needed.size(); ++i)
+        if (!(m.needed[i] > 0 && m.needed[i] <= (i > 0 ? m.needed[i - 1] : 1e3)))
+            return Error{ErrorCode::invalid_argument, "fold test: the sensitivity needed, model.needed[" +
+                                                          std::to_string(i) +
+                                                          "], must be above 0 and not rise with the eccentricity"};
+    if (m.neighbourhood == 0 || m.needed_by_outlines == 0)
+        return Error{ErrorCode::invalid_argument,
+                     "fold test: the model's neighbourhood and needed_by_outlines must be above 0"};
     if (m.most_side_by_side < 1 || m.most_side_by_side > FoldModel::largest_side_by_side)
         return Error{ErrorCode::invalid_argument, "fold test: the model's most_side_by_side must be from 1 to 64"};
     return {};

@@ -41,7 +41,7 @@ struct Sensitivities {
 };
 
 Sensitivities sensitivities_for(const FoldTestOptions& options, bool has_chroma) {
-    Sensitivities all{options.csf ? *options.csf : CsfTable::standard()};
+    Sensitivities all{csf_of(options)};
     if (!has_chroma) return all;
     static const CsfTable red_green = CsfTable::from_model(CsfModel::castle_red_green);
     static const CsfTable yellow_violet = CsfTable::from_model(CsfModel::castle_yellow_violet);

@@ -82,6 +82,7 @@ std::vector<FoldError> nested_errors(const SoundTree& tree, std::span<const Fold
             error.wide_luminance = std::max(error.wide_luminance, amplitude_of_point_mean * record.mean_luminance);
         }
         error.extent = std::max(error.extent, record.extent);
+        error.outline = std::max(error.outline, record.border);
         error.facing |= facing[node].facing;
         error.bias = record.bias, error.fading = facing[node].fading;
         // Where parts meet, a fold moves the line along which the one hides the other, like an outline, whatever they
@@ -91,9 +92,11 @@ std::vector<FoldError> nested_errors(const SoundTree& tree, std::span<const Fold
             error.facing = NormalSlabs::everything();
             error.distance = std::max(moved, std::min(moved / std::max(record.sine, least_sine), ring));
         }
+        error.outline = std::max(error.outline, error.distance);
         if (node == 0) break;
         FoldError& parent = errors[tree.parents()[node]];
         parent.distance = std::max(parent.distance, error.distance);
+        parent.outline = std::max(parent.outline, error.outline);
         parent.extent = std::max(parent.extent, error.extent);
         parent.facing |= error.facing;
     }
@@ -131,7 +134,7 @@ Result<FoldErrors> fold_errors_of(const SoundTree& tree, const FoldModel& model)
         if (node > 0)
             all.of_nodes[tree.parents()[node]].stage = std::max(all.of_nodes[tree.parents()[node]].stage, error.stage);
         // Factors may lead beyond all numbers.
-        for (const float value : {error.distance, error.luminance, error.wide_luminance})
+        for (const float value : {error.distance, error.outline, error.luminance, error.wide_luminance})
             if (!std::isfinite(value)) return refused("an error of node " + std::to_string(node) + " is too large.");
     }
     return all;

@@ -17,6 +17,8 @@ namespace unseen::perception {
 struct FoldError {
     // Mesh units. By how far an outline moves, no less than the children's; and the mean distance of points.
     float distance = 0, mean_distance = 0;
+    // Likewise, by how far an outline moves where open borders count, too; no less than the distance.
+    float outline = 0;
     // Relative, 0..1: what bands of spatial frequency see, as the amplitude of a grating. A band sees no more than of a
     // patch as wide as the node of the amplitude `wide_luminance`, side by side with others like it of random signs,
     // and of parts 2^-k as wide of 4^k times that, up to `luminance`.

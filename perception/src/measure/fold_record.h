@@ -40,10 +40,13 @@ struct FoldRecord {
     // that of an area 2^k times as wide as the node by at most bias / 2^(k fading / 2), for any k from 1 up to the
     // whole mesh. What is folded together, the model's errors decide.
     float bias = 0;
+    // The largest distance between the surface's open border and what the fold makes of it; 0 where there is none. Seen
+    // along the normal such a border moves as far as it does, whatever the heights.
+    float border = 0;
 
     bool operator==(const FoldRecord&) const = default;
 };
-static_assert(sizeof(FoldRecord) == 17 * sizeof(float));
+static_assert(sizeof(FoldRecord) == 18 * sizeof(float));
 
 struct FoldFacing {
     using Component = std::uint8_t;
@@ -63,8 +66,8 @@ inline constexpr std::uint8_t most_fading = 3;
 // Whether all of it are numbers that a measurement can give.
 inline bool is_sound(const FoldRecord& r) {
     bool sound = r.gap >= 0 && r.sine <= 1;
-    for (const float value :
-         {r.shift, r.farthest, r.mean_distance, r.largest_luminance, r.mean_luminance, r.extent, r.sine, r.bias})
+    for (const float value : {r.shift, r.farthest, r.mean_distance, r.largest_luminance, r.mean_luminance, r.extent,
+                              r.sine, r.bias, r.border})
         sound &= value >= 0 && std::isfinite(value);
     for (const auto& of_size : r.amplitudes)
         for (const float amplitude : of_size) sound &= amplitude >= 0 && std::isfinite(amplitude);

@@ -11,7 +11,7 @@
 
 namespace unseen::perception::measurement {
 
-inline constexpr int revision = 1; // one more where the same settings give other numbers
+inline constexpr int revision = 2; // one more where the same settings give other numbers
 
 // ---- points
 // Leaves of a node for its parent: the worst in distance, the worst in luminance.
@@ -24,6 +24,7 @@ inline constexpr int much_more = 2;
 // Trees are some tens of nodes deep. Up deeper ones, as only made-up ones are, neighbours are folded no farther than
 // this, so that no tree costs the square of its depth.
 inline constexpr int most_steps = 1024;
+inline constexpr std::size_t most_border_ends = 4096; // of the mesh's own border; in place of more, the children's
 
 // ---- pictures of a fold
 inline constexpr std::size_t picture_side = 16;           // cells
@@ -65,6 +66,7 @@ inline constexpr auto settings = std::to_array<float>({revision,
                                                        most_fine_triangles,
                                                        much_more,
                                                        most_steps,
+                                                       most_border_ends,
                                                        picture_side,
                                                        picture_bands,
                                                        most_triangles_drawn,

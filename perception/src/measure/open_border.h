@@ -1,0 +1,48 @@
+// Where the surface ends, and by how far a fold moves that.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include <vdtree/vertex_tree.h>
+
+#include "measure/leaf_triangles.h"
+
+namespace unseen::perception {
+
+// Edges of an odd number of triangles, of one mostly. Vertices at one position are one vertex here: triangles that have
+// two corners there have no edges, and triangles with the same corners count once. Folded, the border is what becomes
+// of these edges: it goes with the triangles' corners.
+class OpenBorder {
+public:
+    // Cost: nothing where the surface is closed; some 100 ns for each triangle of a place where it is not.
+    OpenBorder(const vdtree::SoundTree& tree, const LeafTriangles& of_leaf);
+
+    // A bit for each edge, from corner k to the next.
+    unsigned edges_of(vdtree::Index triangle) const { return edges_of_.empty() ? 0 : edges_of_[triangle]; }
+
+    // By the leaf at the one end; each edge is there twice.
+    struct End {
+        vdtree::Index leaf, other;
+        auto operator<=>(const End&) const = default;
+    };
+    std::span<const End> at(vdtree::Index first_leaf, vdtree::Index leaf_end) const;
+
+private:
+    void find_edges(const vdtree::SoundTree& tree, const LeafTriangles& of_leaf);
+
+    std::vector<std::uint8_t> edges_of_; // by triangle; empty: there is no border
+    std::vector<End> ends_;
+};
+
+struct Segment {
+    glm::vec3 a, b;
+};
+
+// The largest distance of a point from the nearest one of the segments; infinite where there are none.
+float farthest_from(std::span<const Segment> segments, std::span<const glm::vec3> points);
+
+} // namespace unseen::perception
