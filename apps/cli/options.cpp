@@ -10,6 +10,7 @@
 #include <memory>
 
 #include <perception/criterion.h>
+#include <perception/motion.h>
 #include <vdtree/internal/number_text.h>
 
 #include "option_names.h"
@@ -399,6 +400,9 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
     group.add_flag("--chroma", o.request.chroma,
                    "Keep changes of colour that can be seen, too, not only those of luminance");
     add_gaze_option(group, o.gaze_px);
+    add_number(
+        group, "--velocity", o.velocity_deg_s, within(0, perception::fastest_velocity.value()), "DEG/S",
+        "How fast everything moves on the retina: what is fine blurs, what is coarse is seen better (default: 0)");
     group.callback([=, &o] {
         Goal::Kind& kind = o.request.goal.kind;
         const std::size_t given =

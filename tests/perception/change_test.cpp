@@ -9,8 +9,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <perception/judge.h>
-
 namespace unseen::perception {
 namespace {
 
@@ -145,16 +143,15 @@ TEST(ChangeJudge, ADiscThatPopsIsSeenByTheLawOfFlicker) {
         return grey_cdm2 * (1 + (std::hypot(x, y) < radius_deg * ppd ? contrast : 0));
     });
     // In the middle of the window, without a gaze, everything is looked at: give one.
-    const JudgeOptions options{.display = display_of(ppd), .gaze_px = glm::dvec2(side * 0.5), .gain = 1};
+    JudgeOptions options{.display = display_of(ppd), .gaze_px = glm::dvec2(side * 0.5), .gain = 1};
     const auto popped = judge_change(grey(side), disc, 0, options);
     ASSERT_TRUE(popped) << popped.error().message;
     EXPECT_NEAR(decibels(popped->flicker / (contrast * 0.753 * best)), 0, 1);
     EXPECT_GT(popped->visibility, popped->flicker);
     EXPECT_GT(popped->visibility, popped->lasting);
     // Twice the contrast or twice the eye: twice the flicker.
-    JudgeOptions sharp = options;
-    sharp.gain = 2;
-    const auto sharper = judge_change(grey(side), disc, 0, sharp);
+    options.gain = 2;
+    const auto sharper = judge_change(grey(side), disc, 0, options);
     EXPECT_NEAR(sharper->flicker / popped->flicker, 2, 1e-3);
 }
 

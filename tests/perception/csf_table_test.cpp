@@ -1,6 +1,7 @@
 // The table: how near it comes to the closed form, how it interpolates, and that its conservative form is monotone and
 // inverted exactly.
 #include <perception/csf.h>
+#include <perception/motion.h>
 
 #include <algorithm>
 #include <cmath>
@@ -566,6 +567,66 @@ TEST(CsfTable, WhatIsMadeOfATableIsNotRefused) {
     s.sensitivity = {16, 4, 1e-3, 64, 16, 4, 1.6, 0.4, 0.5, 6.4, 1.6, 0.4};
     const auto scaled = create(s).scaled(100);
     ASSERT_TRUE(scaled) << scaled.error().message;
+}
+
+TEST(CsfTable, OfWhatMovesIsAsFromTheModel) {
+    RandomPlaces random(21);
+    for (const CsfModel model : {CsfModel::castle, CsfModel::daly, CsfModel::barten_2004}) {
+        for (const double velocity : {0.5, 10.0}) {
+            const auto moving = CsfTable::from_model(model).moving(DegreesPerSecond(velocity));
+            ASSERT_TRUE(moving) << moving.error().message;
+            const auto direct = CsfTable::from_model(model, {.velocity = DegreesPerSecond(velocity)});
+            for (int i = 0; i < 500; ++i) {
+                const Place p = random.next();
+                if (!(interpolated(*direct, p) > 1e-3)) continue;
+                EXPECT_NEAR(interpolated(*moving, p) / interpolated(*direct, p), 1, 1e-9) << name(model);
+            }
+        }
+    }
+    const CsfTable& still = CsfTable::standard();
+    EXPECT_EQ(&still.moving(least_velocity)->samples(), &still.samples()) << "the eye is never at rest";
+    for (const double bad : {-1.0, 81.0, not_a_number, infinity}) {
+        const auto refused = still.moving(DegreesPerSecond(bad));
+        ASSERT_FALSE(refused);
+        EXPECT_THAT(refused.error().message, HasSubstr("0 to 80 degrees/s"));
+    }
+}
+
+// The factor is above 1 for coarse gratings: the form must hold what is coarser than the peak of stationary ones, and
+// where nothing was sampled.
+TEST(CsfTable, ConservativeFormHoldsWhatMoves) {
+    RandomPlaces random(22);
+    for (const double velocity : {0.3, 2.0, 10.0, 40.0, 80.0}) {
+        const DegreesPerSecond v(velocity);
+        const CsfTable moving = *CsfTable::standard().moving(v);
+        double highest = 0; // of the closed form, also far below the table's first frequency
+        for (double cpd = 1.0 / 1024; cpd < 64; cpd *= 1.02)
+            highest = std::max(highest, sensitivity(CsfModel::castle, stimulus_of({.velocity = v}, CyclesPerDegree(cpd),
+                                                                                  Degrees(0), Luminance(50))));
+        EXPECT_GE(monotone(moving, {0.001, 0, 50}), highest * (1 - table_accuracy)) << velocity;
+        if (velocity >= 2) {
+            EXPECT_GT(highest, 1.5 * CsfTable::standard().peak_sensitivity(Degrees(0), Luminance(50))) << velocity;
+        }
+        for (int i = 0; i < 3000; ++i) {
+            const Place p = random.next();
+            const double s = sensitivity(CsfModel::castle, stimulus_of({.velocity = v}, CyclesPerDegree(p.cpd),
+                                                                       Degrees(p.degrees), Luminance(p.cdm2)));
+            if (s > 1) {
+                ASSERT_GT(monotone(moving, p), s * (1 - table_accuracy)) << velocity;
+            }
+            Place other = p;
+            other.cpd *= 2;
+            ASSERT_LE(monotone(moving, other), monotone(moving, p) * (1 + rounding));
+        }
+    }
+    // A viewer's table with few samples, none of them coarse.
+    const CsfTable few = create(small_samples()), moving = *few.moving(DegreesPerSecond(10));
+    for (double cpd = 1.0 / 16; cpd < 16; cpd *= 1.1) {
+        const double wanted =
+            interpolated(few, {cpd, 5, 10}) * velocity_factor(CyclesPerDegree(cpd), DegreesPerSecond(10));
+        EXPECT_GE(monotone(moving, {cpd, 5, 10}), wanted * (1 - table_accuracy)) << cpd;
+        EXPECT_NEAR(interpolated(moving, {cpd, 5, 10}) / wanted, 1, table_accuracy) << cpd;
+    }
 }
 
 TEST(CsfTable, SaysHowFarItsSamplesReach) {

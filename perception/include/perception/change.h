@@ -1,7 +1,7 @@
 // Changes over time: whether one sees that a picture changes, although the pictures before and after may each pass.
 //
 // Two things are seen of a change:
-// - What *lasts*: the picture after it differs from the one before. That is what a Judge tells.
+// - What *lasts*: the picture after it differs from the one before. That is what the Judge tells.
 // - The *flicker* of the moment. Coarse changes are seen best while they happen: below 1 cpd people see gratings that
 //   flicker at 4 to 10 Hz some 10 dB better than those that stand still. elaTCSF [1] knows that, by its formula for the
 //   eye's response to luminance over time; space comes in by a low-pass and by summation over all of the field.
@@ -51,9 +51,9 @@ struct ChangeJudgement {
     double flicker = 0;    // of all the field
 };
 
-// options.gain is the observer's, over castleCSF's and elaTCSF's; where options.csf_table is given, which is the
-// observer's own, flicker is seen as much better as the table's peak is above castleCSF's. Cost: of 1024 x 1024 pixels about 0.7 s. Errors:
-// those of Judge::create(), and a time that is below 0 or not finite.
+// The observer's gain counts over elaTCSF, too; where options.csf_table is given, which is the observer's own, flicker is
+// seen as much better as the table's peak is above castleCSF's. Cost: of 1024 x 1024 pixels about 0.7 s. Errors: those of
+// the Judge, and a time that is below 0 or not finite.
 //
 // The change from one picture to another of the same view, in so many seconds: a pop in none, a geomorph in its own
 // time.

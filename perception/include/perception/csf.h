@@ -165,6 +165,13 @@ public:
     // above.
     Result<CsfTable> scaled(double gain) const;
 
+    // Of what moves over the retina at this velocity: S times velocity_factor() of motion.h, as from_model() has it under
+    // CsfConditions::velocity. Coarse gratings are seen better then, so a table that begins at a higher frequency goes on
+    // down to 1/16 cpd as at its first one, and columns are sampled densely, for the factor bends. Fails where the
+    // velocity is not within 0 to fastest_velocity, or sensitivities leave the bounds above. The same up to
+    // least_velocity.
+    Result<CsfTable> moving(DegreesPerSecond velocity) const;
+
     const CsfSamples& samples() const noexcept;
     CsfReach reach() const noexcept;
 

@@ -1,12 +1,10 @@
-// The judge of changes: what lasts by Judge, and the flicker of the moment by elaTCSF over the whole field.
+// The judge of changes: what lasts by the Judge, and the flicker of the moment by elaTCSF over the whole field.
 #include <perception/change.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <span>
-
-#include <perception/judge.h>
 
 #include "change/flicker.h"
 #include "judge/band_weights.h"
@@ -92,9 +90,18 @@ struct Change {
     double age_s = 0, ramp_s = 0;
 };
 
+// How much better than by elaTCSF flicker is seen: as still pictures are than by castleCSF.
+double flicker_gain(const JudgeOptions& options) {
+    if (!options.csf_table) return options.gain;
+    const Luminance middle(to_luminance(options.display, 0.5));
+    return options.gain * options.csf_table->peak_sensitivity(Degrees(0), middle) /
+           CsfTable::standard().peak_sensitivity(Degrees(0), middle);
+}
+
 // V of all changes together, over the whole field.
-double flicker_of(std::span<const Change> changes, const Image& before, const JudgeOptions& options, double gain) {
+double flicker_of(std::span<const Change> changes, const Image& before, const JudgeOptions& options) {
     const double ppd = pixels_per_degree(options.display).value();
+    const double gain = flicker_gain(options);
     const Values luminance = adaptation(before, ppd, contrast_floor(options.display));
     const Plane eccentricity = eccentricities(before, options);
     double sum = 0;
@@ -114,14 +121,6 @@ double flicker_of(std::span<const Change> changes, const Image& before, const Ju
             sum += std::pow(thresholds, flicker_pooling);
         }
     return std::pow(sum / (ppd * ppd) / flicker_pooling_deg2, 1 / flicker_pooling);
-}
-
-// How much better than by castleCSF somebody sees whose sensitivity is a table.
-double flicker_gain(const JudgeOptions& options) {
-    if (!options.csf_table) return options.gain;
-    const Luminance middle(to_luminance(options.display, 0.5));
-    return options.gain * options.csf_table->peak_sensitivity(Degrees(0), middle) /
-           CsfTable::standard().peak_sensitivity(Degrees(0), middle);
 }
 
 Values difference_of(const Image& before, const Image& after, double share) {
@@ -174,7 +173,7 @@ Result<ChangeJudgement> judge_change(const Image& before, const Image& after, do
     const Values coarse =
         coarse_part(difference, before.width, before.height, pixels_per_degree(options.display).value());
     const Change change{coarse, 0, ramp_s};
-    return pooled(*lasting, flicker_of({&change, 1}, before, options, flicker_gain(options)), options.beta);
+    return pooled(*lasting, flicker_of({&change, 1}, before, options), options.beta);
 }
 
 void ChangeWatch::pass(double seconds) {
@@ -202,7 +201,7 @@ Result<ChangeJudgement> ChangeWatch::next(const Image& before, const Image& afte
     steps_.back().coarse = coarse_part(steps_.back().difference, width_, height_, ppd);
     std::vector<Change> changes;
     for (const Step& step : steps_) changes.push_back({step.coarse, step.age_s, 0});
-    return pooled(*lasting, flicker_of(changes, before, options_, flicker_gain(options_)), options_.beta);
+    return pooled(*lasting, flicker_of(changes, before, options_), options_.beta);
 }
 
 } // namespace unseen::perception

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include <perception/csf.h>
+#include <perception/motion.h>
 
 #include "csf/csf_model.h"
 #include <vdtree/internal/number_text.h>
@@ -461,6 +462,51 @@ Result<CsfTable> CsfTable::scaled(double gain) const {
     Branches branches = state_->branches;
     for (auto* values : {&samples.sensitivity, &branches.sensitivity, &branches.ceiling})
         for (double& s : *values) s *= gain;
+    return State::make_table(std::move(samples), std::move(branches));
+}
+
+namespace {
+
+// With samples between those that lie farther apart than moving tables may have, and down to the lowest frequency.
+CsfSamples densely_sampled(const CsfTable& table) {
+    constexpr double per_octave = smooth_model.per_octave;
+    constexpr double wide_enough = 1.0 / 16; // octaves: models' tables stay as they are
+    CsfSamples samples = table.samples();
+    const std::vector<double> given = samples.frequency_cpd;
+    std::vector<double> cpd;
+    if (given.front() > lowest_frequency_cpd * std::exp2(wide_enough))
+        append_ladder(cpd, lowest_frequency_cpd, given.front(), 2, per_octave);
+    for (std::size_t f = 0; f + 1 < given.size(); ++f) {
+        if (given[f + 1] > given[f] * std::exp2(wide_enough)) append_ladder(cpd, given[f], given[f + 1], 2, per_octave);
+        else cpd.push_back(given[f]);
+    }
+    cpd.push_back(given.back());
+    if (cpd == given) return samples;
+    samples.frequency_cpd = std::move(cpd);
+    samples.sensitivity.clear();
+    for (const double degrees : samples.eccentricity_deg)
+        for (const double cdm2 : samples.luminance_cdm2)
+            for (const double frequency : samples.frequency_cpd)
+                samples.sensitivity.push_back(
+                    table.sensitivity(CyclesPerDegree(frequency), Degrees(degrees), Luminance(cdm2)));
+    return samples;
+}
+
+} // namespace
+
+Result<CsfTable> CsfTable::moving(DegreesPerSecond velocity) const {
+    if (!(velocity.value() >= 0 && velocity <= fastest_velocity))
+        return bad("the velocity on the retina must lie in 0 to " + number_text(fastest_velocity.value()) +
+                   " degrees/s, but is " + number_text(velocity.value()));
+    if (velocity <= least_velocity) return *this;
+    Branches branches = state_->branches; // of a model's table, which is dense
+    CsfSamples samples = branches.sensitivity.empty() ? densely_sampled(*this) : state_->samples;
+    samples.source += "; moving at " + number_text(velocity.value()) + " degrees/s";
+    std::vector<double> factors;
+    for (const double cpd : samples.frequency_cpd) factors.push_back(velocity_factor(CyclesPerDegree(cpd), velocity));
+    for (auto* values : {&samples.sensitivity, &branches.sensitivity, &branches.ceiling})
+        for (std::size_t i = 0; i < values->size(); ++i)
+            (*values)[i] = floored((*values)[i] * factors[i % factors.size()]);
     return State::make_table(std::move(samples), std::move(branches));
 }
 

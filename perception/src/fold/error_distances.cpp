@@ -67,6 +67,7 @@ struct Pattern {
     int bias = no_contrast;       // of what many such nodes shift together
     int fading = 0, quarters = 0; // of octaves, from the node's width to the mesh's
     bool is_strip = false;
+    bool is_all = false; // of strips: all of it moves one way
 
     auto operator<=>(const Pattern&) const = default;
     bool is_nothing() const { return largest == no_contrast && bias == no_contrast; }
@@ -82,7 +83,8 @@ Pattern above(const Pattern& a, const Pattern& b) {
                 std::max(a.bias, b.bias),
                 0,
                 std::max(a.quarters, b.quarters),
-                a.is_strip};
+                a.is_strip,
+                a.is_all || b.is_all};
     all.fading = a.bias == no_contrast ? b.fading : b.bias == no_contrast ? a.fading : std::min(a.fading, b.fading);
     return all;
 }
@@ -153,7 +155,7 @@ public:
         for (std::size_t i = 0; i < width_count; ++i) {
             patches_[i] = 1 / (needed * visibility(sensitivities, bands.of_patches, i));
             areas_[i] = 1 / visibility(sensitivities, bands.of_areas, i);
-            strips_[i] = 1 / (model.needed_by_outlines * visibility(sensitivities, bands.of_strips, i));
+            strips_[i] = 1 / visibility(sensitivities, bands.of_strips, i);
         }
     }
 
@@ -162,8 +164,9 @@ public:
     double area_distance(double contrast) const { return switch_distance(areas_, contrast); }
 
     // The distance, in widths, from which a long strip is invisible.
-    double strip_distance(double contrast) const {
-        const double invisible_deg = 0.5 * least_visible_width(strips_, contrast);
+    double strip_distance(double contrast, bool is_all) const {
+        const double invisible_deg =
+            0.5 * least_visible_width(strips_, contrast * (is_all ? 1 : model_.needed_by_outlines));
         if (!std::isfinite(invisible_deg)) return 0;
         const double counted_deg =
             std::max(invisible_deg - model_.sampled_shift_px * screen_.pixel_deg, invisible_deg / 2);
@@ -338,7 +341,7 @@ private:
         const std::size_t first = switch_distance_.size();
         for (std::size_t bin = 0; bin < bins_; ++bin)
             switch_distance_.push_back(
-                static_cast<float>(eye(p.luminance, bin).strip_distance(Levels::contrast(p.largest))));
+                static_cast<float>(eye(p.luminance, bin).strip_distance(Levels::contrast(p.largest), p.is_all)));
         make_monotone(first);
     }
 
@@ -452,7 +455,8 @@ bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors
         if (patch.pattern.largest != no_contrast)
             patch.pattern.typical =
                 std::clamp(typical, std::max(patch.pattern.largest - steepest_spike, 0), patch.pattern.largest);
-        patch.length = std::max(tree.support_spheres()[node].radius, errors[node].extent);
+        const float patch_radius = std::max(tree.support_spheres()[node].radius, errors[node].extent);
+        patch.length = patch_radius;
         const int bias = levels.contrast_level(static_cast<double>(errors[node].bias), 1);
         if (bias != no_contrast && Levels::contrast(bias) * whole_peak > 1) {
             patch.pattern.luminance = std::max(patch.pattern.luminance, whole);
@@ -474,6 +478,7 @@ bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors
             strip.pattern = above(strip.pattern, own);
         }
         strip.length = errors[node].outline;
+        strip.pattern.is_all = 2 * strip.length >= patch_radius;
         strip.row = switch_distances.row(strip.pattern);
         cover(switch_distances, strip, strips[node]);
         strips[node] = strip;

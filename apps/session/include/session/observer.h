@@ -27,6 +27,9 @@ struct Observer {
     // This very viewer's contrast sensitivity, in the person's place; null: the person's.
     std::shared_ptr<const perception::CsfTable> csf = {};
     std::optional<Gaze> gaze = {}; // none: everything counts as looked at
+    // How fast everything moves over the retina, 0 to perception::fastest_velocity. Fine things blur, coarse ones are
+    // seen better. What the eye follows hardly moves there: give what is left of it (perception/motion.h).
+    perception::DegreesPerSecond velocity{0};
 };
 
 // Whose eyes, in words: "the default observer (castleCSF x 2: of measured people, 8.7% see more)".
