@@ -80,7 +80,7 @@ inline perception::Judgement judge(const perception::Image& whole, const percept
                                            {.display = look.options.display,
                                             .gaze_px = look.options.gaze_px,
                                             .csf = judge,
-                                            .gain = perception::median_person.gain}); // as of the fold tests' tables
+                                            .gain = perception::default_person.gain}); // as of the fold tests' tables
     if (!judged) throw std::runtime_error(judged.error().message);
     return std::move(*judged);
 }
