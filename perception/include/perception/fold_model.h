@@ -65,10 +65,10 @@ struct FoldModel {
     // lies at the lowest frequencies there; a node counts as where it is nearest to the gaze; and fewer folds have their
     // chance of being the worst, for nodes are larger. Fitted. Areas that shift together need all of it everywhere.
     static constexpr std::array<double, 4> needed_at_degrees = {0, 12, 29, 50};
-    std::array<double, 4> needed = {1, 1, 0.75, 0.5}; // must not rise
+    std::array<double, 4> needed = {1, 1, 0.65, 0.45}; // must not rise
     // By outlines, wherever they are. They count as long straight strips, all of which move by the largest shift and
     // towards the darkest or brightest that may be behind. Along a true outline shifts change their signs from node to
-    // node. Where it moves by a quarter of the node's width and more, as where a part vanishes, all is needed. Fitted.
+    // node. Where it moves by an eighth of the mesh's radius and more, as where a part vanishes, all is needed. Fitted.
     double needed_by_outlines = 0.3;
 
     static constexpr int largest_side_by_side = 64;

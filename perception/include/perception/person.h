@@ -24,9 +24,9 @@ struct Person {
 
 // Each study counts alike. Measured were still gratings, up to 30 degrees aside, of up to 100 square degrees, and from
 // 1 to 500 cd/m2; beyond, castleCSF goes on by its own formulas, and so do the shares.
-inline constexpr Person median_person{"median", 1, 0.649, 0.524};
-inline constexpr Person default_person{"default", 2, 0.087, 1.325};
-inline constexpr Person strict_person{"strict", 2.7, 0.0487, 1.4};
+inline constexpr Person median_person{"median", 1, 0.649, 0.843};
+inline constexpr Person default_person{"default", 2, 0.087, 1.917};
+inline constexpr Person strict_person{"strict", 2.7, 0.0487, 2.129};
 inline constexpr std::array people = {median_person, default_person, strict_person};
 
 // By name; the error lists them.

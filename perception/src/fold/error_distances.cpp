@@ -36,6 +36,9 @@ constexpr double frequency_step = 1.0905077326652577; // an eighth of an octave
 // the width. They are rare, and each octave is more rows.
 constexpr int steepest_spike = 8 * contrasts_per_octave;
 
+// An outline that moves by such a share of the mesh's radius is that of a part, which vanishes as a whole.
+constexpr float whole_part = 0.125f;
+
 // The widest mesh there can be, in widths of a node: also where nodes have none.
 constexpr float widest = 1e9f;
 
@@ -455,8 +458,7 @@ bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors
         if (patch.pattern.largest != no_contrast)
             patch.pattern.typical =
                 std::clamp(typical, std::max(patch.pattern.largest - steepest_spike, 0), patch.pattern.largest);
-        const float patch_radius = std::max(tree.support_spheres()[node].radius, errors[node].extent);
-        patch.length = patch_radius;
+        patch.length = std::max(tree.support_spheres()[node].radius, errors[node].extent);
         const int bias = levels.contrast_level(static_cast<double>(errors[node].bias), 1);
         if (bias != no_contrast && Levels::contrast(bias) * whole_peak > 1) {
             patch.pattern.luminance = std::max(patch.pattern.luminance, whole);
@@ -478,7 +480,7 @@ bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors
             strip.pattern = above(strip.pattern, own);
         }
         strip.length = errors[node].outline;
-        strip.pattern.is_all = 2 * strip.length >= patch_radius;
+        strip.pattern.is_all = strip.length >= whole_part * object_radius;
         strip.row = switch_distances.row(strip.pattern);
         cover(switch_distances, strip, strips[node]);
         strips[node] = strip;
