@@ -130,6 +130,31 @@ TEST_F(PerceptionBenchTest, EffectsAreComparedWithoutEach) {
     EXPECT_THAT(people.out, HasSubstr("no silhouettes"));
 }
 
+TEST_F(PerceptionBenchTest, PeopleAreComparedWithModels) {
+    const Outcome outcome = bench({"people", "--json", "-"});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    std::map<std::string, double> above;
+    for (const Json& row : outcome.json()["rows"])
+        if (row.contains("model")) above[row["model"]] = row["share_above"];
+    EXPECT_NEAR(above["castle times 2: observer default"], 0.087, 5e-4);
+    EXPECT_NEAR(above["castle times 1: observer median"], 0.649, 5e-4);
+    EXPECT_EQ(bench({"people", "--table", "nowhere.csv"}).status, 2);
+}
+
+// By eccentricity, on a mesh of its own beside the regular waves: nothing is visible to either judge.
+TEST_F(PerceptionBenchTest, NothingIsSeenWhereverTheViewerLooks) {
+    const Outcome outcome =
+        bench({"perception", "--quick", "--only", "aside", "--window", "128", "--mesh", "ball.vdt", "--json", "-"});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const Json views = outcome.json()["views"];
+    ASSERT_EQ(views.size(), 16u); // two meshes, eight eccentricities
+    for (const Json& view : views) {
+        EXPECT_EQ(view["visible_pixels"], 0) << view;
+        EXPECT_EQ(view["second_visible_pixels"], 0) << view;
+    }
+    EXPECT_LT(views[7]["triangles"], views[0]["triangles"]);
+}
+
 // A factor cut to a quarter keeps fewer triangles; the more it is, the more are kept.
 TEST_F(PerceptionBenchTest, FactorsOfTheFoldModelAreVaried) {
     const Outcome outcome = bench({"fit", "--quick", "--factor", "peak_of_shift", "--json", "-"});

@@ -78,6 +78,15 @@ TEST(People, SeeMoreThanEachObserverOfBartensAsOften) {
     EXPECT_GT(usual.deviation_db, 5.2);
 }
 
+TEST(People, FitBartensConstants) {
+    const perception::BartenConstants fit = fit_barten(people()), &used = perception::fitted_barten;
+    constexpr double close = 0.01; // of each: the valley is flat
+    EXPECT_NEAR(fit.signal_to_noise / used.signal_to_noise, 1, close);
+    EXPECT_NEAR(fit.line_spread / used.line_spread, 1, close);
+    EXPECT_NEAR(fit.inhibition / used.inhibition, 1, close);
+    EXPECT_NEAR(fit.greatest_cycles / used.greatest_cycles, 1, close);
+}
+
 // The fall with eccentricity that sensitivity() gives Barten's model, Geisler and Perry's, keeps four times too much far
 // aside. So the judge takes castleCSF's.
 TEST(People, FarAsideSeeAsCastleFallsAndNotAsGeislerAndPerrySay) {

@@ -11,6 +11,7 @@
 #include <glm/geometric.hpp>
 
 #include <perception/criterion.h>
+#include <perception/person.h>
 #include <vdtree/cut.h>
 #include <vdtree/normal_mask.h>
 

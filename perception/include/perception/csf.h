@@ -89,8 +89,22 @@ SquareDegrees patch_area(CyclesPerDegree frequency);
 
 // The law of area: patches of area A are seen sqrt(A / (A + Ac)) times as well as unlimited ones, with this Ac.
 SquareDegrees castle_summation_area(CyclesPerDegree frequency);
-SquareDegrees barten_summation_area(CyclesPerDegree frequency); // of Barten 1999
-SquareDegrees barten_fitted_summation_area(CyclesPerDegree frequency);
+
+// What Barten leaves to be chosen by observer; by default what he takes for the usual one.
+struct BartenConstants {
+    double signal_to_noise = 3;    // k
+    Degrees line_spread{0.5 / 60}; // sigma0: half a minute of arc
+    CyclesPerDegree inhibition{7}; // u0
+    double greatest_cycles = 15;   // Nmax: over more of a grating the eye does not sum
+};
+// Of CsfModel::barten_fitted: by least squares of decibels to people's thresholds, each study counting alike
+// (calibration::fit_barten()).
+inline constexpr BartenConstants fitted_barten{4.9936, Degrees(0.4597 / 60), CyclesPerDegree(4.3221), 7.8149};
+// At the fovea; `area` of the pattern, `field` of all that is lit, which decides on the pupil. Preconditions: above 0.
+double barten_sensitivity(const BartenConstants& constants, CyclesPerDegree frequency, Luminance luminance,
+                          SquareDegrees area, SquareDegrees field);
+SquareDegrees barten_summation_area(const BartenConstants& constants, CyclesPerDegree frequency);
+inline constexpr SquareDegrees barten_fitted_field{100}; // of barten_fitted: the screen's business, and no patch's
 
 // How many times as well a patch of `area` is seen as one of patch_area(frequency), A15:
 //   R own^t,   R = sqrt(A / (A + Ac) (A15 + Ac) / A15),   t = ln R / ln R(unlimited), and 0 for smaller patches than A15

@@ -80,52 +80,30 @@ double retinal_illuminance(double pupil, double cdm2) {
 
 constexpr double barten_greatest_field = 12; // Xmax, degrees
 
-// What Barten leaves to be chosen by observer, and what he takes for the usual one.
-struct BartenConstants {
-    double signal_to_noise = 3;        // k
-    double line_spread_deg = 0.5 / 60; // sigma0; half a minute of arc
-    double inhibition_cpd = 7;         // u0
-    double greatest_cycles = 15;       // Nmax
-};
-constexpr BartenConstants usual_barten;
-// By least squares of decibels to people's thresholds, each study counting alike: `unseen-bench people`.
-constexpr BartenConstants fitted_barten{4.9936, 0.4597 / 60, 4.3221, 7.8149};
+} // namespace
 
-double summation_area_of(const BartenConstants& constants, double cpd) {
-    const double cycles = cpd / constants.greatest_cycles;
-    return 1 / (1 / (barten_greatest_field * barten_greatest_field) + cycles * cycles);
+SquareDegrees barten_summation_area(const BartenConstants& constants, CyclesPerDegree frequency) {
+    const double cycles = frequency.value() / constants.greatest_cycles;
+    return SquareDegrees(1 / (1 / (barten_greatest_field * barten_greatest_field) + cycles * cycles));
 }
 
-// `pupil_area_deg2` decides on the pupil.
-double barten_1999(const BartenConstants& constants, double cpd, double cdm2, double area_deg2,
-                   double pupil_area_deg2) {
+double barten_sensitivity(const BartenConstants& constants, CyclesPerDegree frequency, Luminance luminance,
+                          SquareDegrees area, SquareDegrees field) {
     constexpr double integration_time = 0.1;     // T, s
     constexpr double quantum_efficiency = 0.03;  // eta
     constexpr double photons = 1.2274e6;         // p, per s, deg2 and troland
     constexpr double neural_noise = 3e-8;        // Phi0, s deg2
     constexpr double aberration_deg = 0.08 / 60; // Cab, per mm of the pupil
 
-    const double pupil = pupil_mm(cdm2, pupil_area_deg2);
-    const double sigma_deg = std::hypot(constants.line_spread_deg, aberration_deg * pupil);
-    const double blur = std::numbers::pi * sigma_deg * cpd;
+    const double pupil = pupil_mm(luminance.value(), field.value());
+    const double sigma_deg = std::hypot(constants.line_spread.value(), aberration_deg * pupil);
+    const double blur = std::numbers::pi * sigma_deg * frequency.value();
     const double optics = std::exp(-2 * blur * blur);
-    const double inhibited = cpd / constants.inhibition_cpd;
-    const double integration = 1 / area_deg2 + 1 / summation_area_of(constants, cpd);
-    const double photon_noise = 1 / (quantum_efficiency * photons * retinal_illuminance(pupil, cdm2));
+    const double inhibited = frequency / constants.inhibition;
+    const double integration = 1 / area.value() + 1 / barten_summation_area(constants, frequency).value();
+    const double photon_noise = 1 / (quantum_efficiency * photons * retinal_illuminance(pupil, luminance.value()));
     const double noise = photon_noise + neural_noise / rising(inhibited * inhibited);
     return optics / constants.signal_to_noise / std::sqrt(2 / integration_time * integration * noise);
-}
-
-// The screen decides on the pupil, and no patch on it: one of 10 x 10 degrees.
-constexpr double screen_deg2 = 100;
-
-} // namespace
-
-SquareDegrees barten_summation_area(CyclesPerDegree frequency) {
-    return SquareDegrees(summation_area_of(usual_barten, frequency.value()));
-}
-SquareDegrees barten_fitted_summation_area(CyclesPerDegree frequency) {
-    return SquareDegrees(summation_area_of(fitted_barten, frequency.value()));
 }
 
 Barten1989::Barten1989(double cdm2)
@@ -147,8 +125,9 @@ double classical_at_fovea(CsfModel model, const Stimulus& s) {
     const double cpd = s.frequency.value(), cdm2 = s.luminance.value(), area_deg2 = s.area.value();
     switch (model) {
     case CsfModel::barten_1989: return Barten1989(cdm2)(cpd);
-    case CsfModel::barten_1999: return barten_1999(usual_barten, cpd, cdm2, area_deg2, area_deg2);
-    case CsfModel::barten_fitted: return barten_1999(fitted_barten, cpd, cdm2, area_deg2, screen_deg2);
+    case CsfModel::barten_1999: return barten_sensitivity({}, s.frequency, s.luminance, s.area, s.area);
+    case CsfModel::barten_fitted:
+        return barten_sensitivity(fitted_barten, s.frequency, s.luminance, s.area, barten_fitted_field);
     case CsfModel::barten_2004: return barten_2004(cpd, cdm2, area_deg2);
     case CsfModel::mannos_sakrison: return mannos_sakrison(cpd) * (relative_models_peak / mannos_sakrison_peak);
     case CsfModel::rushmeier: return rushmeier(cpd) * (relative_models_peak / rushmeier_peak);

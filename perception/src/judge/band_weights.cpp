@@ -173,8 +173,8 @@ double summation_area(const BandConditions& c, double freq_cpd) {
     const CyclesPerDegree frequency(freq_cpd);
     if (c.table) return castle_summation_area(frequency).value();
     switch (c.model) {
-    case CsfModel::barten_1999: return barten_summation_area(frequency).value();
-    case CsfModel::barten_fitted: return barten_fitted_summation_area(frequency).value();
+    case CsfModel::barten_1999: return barten_summation_area({}, frequency).value();
+    case CsfModel::barten_fitted: return barten_summation_area(fitted_barten, frequency).value();
     default: return castle_summation_area(frequency).value();
     }
 }
