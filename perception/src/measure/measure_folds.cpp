@@ -225,6 +225,8 @@ public:
           first_triangle_(tree.first_triangle()), triangles_(tree.triangles()), support_(tree.support_spheres()),
           interior_(tree.interior_count()), of_leaf_(tree), border_(tree, of_leaf_), crossing_(interior_),
           contacts_(find_contacts(tree)), witnesses_(interior_) {
+        most_changed_.reserve(interior_);
+        for (NodeId node = 0; node < interior_; ++node) most_changed_.push_back(most_changed(node));
         points_.reserve(tree.node_count());
         for (NodeId node = 0; node < tree.node_count(); ++node)
             points_.push_back({tree.positions()[node], tree.luminance()[node]});
@@ -333,15 +335,38 @@ private:
         return support_[a].radius != support_[b].radius ? support_[a].radius > support_[b].radius : a < b;
     }
 
+    // What a fold inside the surface can change at most, but for a factor: luminance times area, and heights. Neither
+    // falls from a node to its parent.
+    struct Change {
+        float light = 0, height = 0;
+    };
+    Change most_changed(NodeId node) const {
+        const PackedRange luminance = tree_.ring_luminance()[node];
+        const NormalSlabs& normals = tree_.bounds()[node].slabs;
+        int turn = 0; // by which the normals differ
+        for (std::size_t i = 0; i < NormalSlabs::axis_count; ++i) turn = std::max(turn, normals.hi[i] - normals.lo[i]);
+        const float radius = support_[node].radius;
+        return {static_cast<float>(luminance.hi.value - luminance.lo.value) * radius * radius,
+                static_cast<float>(turn) * radius};
+    }
+    bool changes_much_less(NodeId a, NodeId node) const {
+        const Change &less = most_changed_[a], &more = most_changed_[node];
+        return much_less * less.light <= more.light && much_less * less.height <= more.height &&
+               !(tree_.bounds()[a].flags & irregular_ring); // whose border may move as far as it likes
+    }
+    bool supports(NodeId a, NodeId b) const { return first_leaf_[a] <= first_leaf_[b] && leaf_end_[b] <= leaf_end_[a]; }
+
     // What stands for a leaf outside the node when it folds: nodes up to its size are folded, as far as they have no
-    // more to hide.
+    // more to hide, and those that are hardly seen to fold at any size, as the faces beside an edge.
     NodeId stand_in(Index leaf, NodeId node) const {
         NodeId at = interior_ + leaf;
         const int most = much_more * luminance_span(node);
+        const auto folds_earlier = [&](NodeId up) {
+            return (is_larger(node, up) && luminance_span(up) <= most) ||
+                   (changes_much_less(up, node) && !supports(up, node));
+        };
         int steps = 0;
-        for (NodeId up = parents_[at];
-             up != no_node && is_larger(node, up) && luminance_span(up) <= most && ++steps <= most_steps;
-             up = parents_[at])
+        for (NodeId up = parents_[at]; up != no_node && folds_earlier(up) && ++steps <= most_steps; up = parents_[at])
             at = up;
         return at;
     }
@@ -667,6 +692,7 @@ private:
     std::vector<std::vector<Index>> crossing_; // of nodes whose parent has not been measured yet
     std::vector<Contact> contacts_;
     std::vector<Witnesses> witnesses_;
+    std::vector<Change> most_changed_; // by interior node
 };
 
 // Lengths in the tree's own units again. False where they are beyond all numbers.

@@ -21,6 +21,9 @@ inline constexpr std::size_t triangles_compared = 16;  // of each surface, at eq
 inline constexpr std::size_t most_fine_triangles = 64; // in rings of more, some neighbours are folded
 // Neighbours with more than so many times the node's luminance range fold later than it: they are not folded with it.
 inline constexpr int much_more = 2;
+// Neighbours fold earlier, however large they are, where all that they can change is this many times less than all that
+// the node can: both luminance times area, and heights.
+inline constexpr float much_less = 4;
 // Trees are some tens of nodes deep. Up deeper ones, as only made-up ones are, neighbours are folded no farther than
 // this, so that no tree costs the square of its depth.
 inline constexpr int most_steps = 1024;
@@ -65,6 +68,7 @@ inline constexpr auto settings = std::to_array<float>({revision,
                                                        triangles_compared,
                                                        most_fine_triangles,
                                                        much_more,
+                                                       much_less,
                                                        most_steps,
                                                        most_border_ends,
                                                        picture_side,
