@@ -464,7 +464,7 @@ private:
     // The largest distance between the border as it was, the mesh's own, and the folded one.
     float border_shift(NodeId node, Scratch& scratch) const {
         const std::span<const OpenBorder::End> ends = border_.at(first_leaf_[node], leaf_end_[node]);
-        if (ends.empty()) return 0;
+        if (ends.empty() || !(support_[node].radius > 0)) return 0; // nothing moves where all is at one point
         const glm::vec3 proxy = point(node).position;
         std::vector<Segment>& own = scratch.border_own;
         std::vector<glm::vec3>& points = scratch.border_points;
