@@ -298,6 +298,7 @@ private:
         // and the mesh's own. Segments begin in the support.
         std::vector<Segment> border_before, border_after, border_fine, border_own;
         std::vector<glm::vec3> border_points;
+        std::array<std::vector<NodeId>, 2> stand_ins;
         bool compares_fine = false; // the fine ones are few enough, and others
 
         void clear() {
@@ -385,7 +386,7 @@ private:
         record.farthest = worst.distance, record.mean_distance = mean.distance;
         record.largest_luminance = worst.luminance, record.mean_luminance = mean.luminance;
         record.extent = mean_reach(scratch.after, proxy) / 2;
-        record.border = border_shift(node, scratch);
+        record.border = turned_reach(node, border_shift(node, scratch), scratch);
         record.gap = contacts_[node].gap, record.sine = contacts_[node].sine;
         facing_[node].is_height_field = draw(node, scratch, std::max(support_[node].radius, record.extent), record);
     }
@@ -461,6 +462,11 @@ private:
         }
     }
 
+    Segment segment_of(const OpenBorder::End& at) const {
+        return {leaf_point(at.leaf).position, leaf_point(at.other).position};
+    }
+    glm::vec3 opposite_of(const OpenBorder::End& at) const { return leaf_point(at.opposite).position; }
+
     // The largest distance between the border as it was, the mesh's own, and the folded one.
     float border_shift(NodeId node, Scratch& scratch) const {
         const std::span<const OpenBorder::End> ends = border_.at(first_leaf_[node], leaf_end_[node]);
@@ -470,8 +476,8 @@ private:
         std::vector<glm::vec3>& points = scratch.border_points;
         own.clear(), points.clear();
         if (ends.size() <= most_border_ends) {
-            for (const auto& [leaf, other] : ends) {
-                own.push_back({leaf_point(leaf).position, leaf_point(other).position});
+            for (const OpenBorder::End& at : ends) {
+                own.push_back(segment_of(at));
                 if (points.empty() || points.back() != own.back().a) points.push_back(own.back().a);
             }
         } else {
@@ -487,6 +493,60 @@ private:
         points.assign(1, proxy);
         for (const auto& [a, b] : scratch.border_fine) points.push_back((a + b) * 0.5f);
         return std::max(shift, farthest_from(own, points));
+    }
+
+    // How far beyond the border triangles reach that turn over, in any cut in which the node is the largest of their
+    // corners. Whatever else of a folded sheet lies beyond its folded border is covered from both sides equally often:
+    // what does not turn over reaches no farther than they.
+    float turned_reach(NodeId node, float least, Scratch& scratch) const {
+        if (!(tree_.bounds()[node].flags & irregular_ring)) return least;
+        const glm::vec3 proxy = point(node).position;
+        const Index begin = first_leaf_[node], end = leaf_end_[node];
+        const auto is_inside = [&](Index leaf) { return leaf - begin < end - begin; };
+        const auto find_stand_ins = [&](Index leaf, std::vector<NodeId>& nodes) {
+            nodes.assign(1, interior_ + leaf);
+            for (NodeId up = parents_[nodes.back()];
+                 up != no_node && is_larger(node, up) && nodes.size() < most_stand_ins; up = parents_[up])
+                nodes.push_back(up);
+        };
+        for (const Index t : crossing_[node]) {
+            const Triangle& corners = triangles_[t];
+            std::size_t k = 0;
+            while (!is_inside(corners[k])) ++k;
+            const Index next = corners[(k + 1) % 3], last = corners[(k + 2) % 3];
+            if (is_inside(next) || is_inside(last)) continue; // vanishes
+            const glm::vec3 a = leaf_point(corners[k]).position;
+            const glm::vec3 normal = glm::cross(leaf_point(next).position - a, leaf_point(last).position - a);
+            find_stand_ins(next, scratch.stand_ins[0]);
+            find_stand_ins(last, scratch.stand_ins[1]);
+            for (const NodeId second : scratch.stand_ins[0]) {
+                for (const NodeId third : scratch.stand_ins[1]) {
+                    const glm::vec3 b = point(second).position, c = point(third).position;
+                    const glm::vec3 turned = glm::cross(b - proxy, c - proxy);
+                    if (!(glm::dot(turned, normal) < 0)) continue;
+                    // No point of a triangle is farther from its border than a third of its least height.
+                    const float longest = std::max(
+                        {glm::dot(b - proxy, b - proxy), glm::dot(c - proxy, c - proxy), glm::dot(c - b, c - b)});
+                    const float height = glm::length(turned) / std::sqrt(longest);
+                    if (!(height > least)) continue;
+                    const glm::vec3 looked_at[] = {(proxy + b) * 0.5f, (b + c) * 0.5f, (c + proxy) * 0.5f,
+                                                   (proxy + b + c) / 3.0f};
+                    float reach = 0;
+                    for (const glm::vec3& p : looked_at) {
+                        BorderSide side(p);
+                        for (const NodeId at : {node, second, third}) {
+                            const Index first_leaf = at < interior_ ? first_leaf_[at] : at - interior_;
+                            const Index leaf_end = at < interior_ ? leaf_end_[at] : first_leaf + 1;
+                            for (const OpenBorder::End& e : border_.at(first_leaf, leaf_end))
+                                side.look_at(segment_of(e), opposite_of(e));
+                        }
+                        reach = std::max(reach, side.outside());
+                    }
+                    least = std::max(least, std::min(reach, height));
+                }
+            }
+        }
+        return least;
     }
 
     // Raises the worst errors to those between the surfaces; returns the mean ones.

@@ -27,6 +27,7 @@ inline constexpr float much_less = 4;
 // Trees are some tens of nodes deep. Up deeper ones, as only made-up ones are, neighbours are folded no farther than
 // this, so that no tree costs the square of its depth.
 inline constexpr int most_steps = 1024;
+inline constexpr std::size_t most_stand_ins = 16;
 inline constexpr std::size_t most_border_ends = 4096; // of the mesh's own border; in place of more, the children's
 
 // ---- pictures of a fold

@@ -11,12 +11,22 @@ namespace unseen::perception {
 
 using namespace vdtree;
 
+namespace {
+
+glm::vec3 nearest_of(const Segment& segment, const glm::vec3& point) {
+    const glm::vec3 ab = segment.b - segment.a;
+    const float squared = glm::dot(ab, ab), along = glm::dot(point - segment.a, ab);
+    return segment.a + (squared > 0 ? std::clamp(along / squared, 0.0f, 1.0f) : 0.0f) * ab;
+}
+
+} // namespace
+
 OpenBorder::OpenBorder(const SoundTree& tree, const LeafTriangles& of_leaf) {
     if (tree.bounds()[VertexTree::root()].flags & irregular_ring) find_edges(tree, of_leaf);
 }
 
 std::span<const OpenBorder::End> OpenBorder::at(Index first_leaf, Index leaf_end) const {
-    const auto from = [&](Index leaf) { return std::lower_bound(ends_.begin(), ends_.end(), End{leaf, 0}); };
+    const auto from = [&](Index leaf) { return std::lower_bound(ends_.begin(), ends_.end(), End{leaf, 0, 0}); };
     const auto begin = from(first_leaf), end = from(leaf_end);
     return std::span(ends_).subspan(static_cast<std::size_t>(begin - ends_.begin()),
                                     static_cast<std::size_t>(end - begin));
@@ -88,23 +98,35 @@ void OpenBorder::find_edges(const SoundTree& tree, const LeafTriangles& of_leaf)
         for (unsigned k = 0; k < 3; ++k) {
             if (!((edges_of_[triangle] >> k) & 1)) continue;
             const Index a = triangles[triangle][k], b = triangles[triangle][(k + 1) % 3];
-            ends_.push_back({a, b});
-            ends_.push_back({b, a});
+            const Index opposite = triangles[triangle][(k + 2) % 3];
+            ends_.push_back({a, b, opposite});
+            ends_.push_back({b, a, opposite});
         }
     }
     std::sort(ends_.begin(), ends_.end());
     if (ends_.empty()) edges_of_ = {};
 }
 
+void BorderSide::look_at(const Segment& edge, const glm::vec3& inside) {
+    const glm::vec3 nearest = nearest_of(edge, point_), way = point_ - nearest, along = edge.b - edge.a;
+    const float squared = glm::dot(way, way), length = glm::dot(along, along);
+    // Edges that meet in the nearest point count together: which side it is, neither tells alone.
+    constexpr float rounding = 1e-5f;
+    if (!(squared <= (1 + rounding) * squared_)) return;
+    if (squared < (1 - rounding) * squared_) squared_ = squared, nearest_ = nearest, inward_ = glm::vec3(0);
+    const glm::vec3 beside = inside - edge.a;
+    const glm::vec3 across = length > 0 ? beside - glm::dot(beside, along) / length * along : beside;
+    if (const float width = glm::length(across); width > 0) inward_ += across / width;
+}
+
+float BorderSide::outside() const { return glm::dot(point_ - nearest_, inward_) < 0 ? std::sqrt(squared_) : 0; }
+
 float farthest_from(std::span<const Segment> segments, std::span<const glm::vec3> points) {
     float farthest = 0;
     for (const glm::vec3& p : points) {
         float nearest = std::numeric_limits<float>::infinity();
-        for (const auto& [a, b] : segments) {
-            const glm::vec3 ab = b - a, ap = p - a;
-            const float squared = glm::dot(ab, ab), along = glm::dot(ap, ab);
-            const float share = squared > 0 ? std::clamp(along / squared, 0.0f, 1.0f) : 0.0f;
-            const glm::vec3 way = ap - share * ab;
+        for (const Segment& segment : segments) {
+            const glm::vec3 way = p - nearest_of(segment, p);
             nearest = std::min(nearest, glm::dot(way, way));
         }
         farthest = std::max(farthest, nearest);

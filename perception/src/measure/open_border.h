@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -26,7 +27,7 @@ public:
 
     // By the leaf at the one end; each edge is there twice.
     struct End {
-        vdtree::Index leaf, other;
+        vdtree::Index leaf, other, opposite; // the third corner of the triangle
         auto operator<=>(const End&) const = default;
     };
     std::span<const End> at(vdtree::Index first_leaf, vdtree::Index leaf_end) const;
@@ -40,6 +41,22 @@ private:
 
 struct Segment {
     glm::vec3 a, b;
+};
+
+// On which side of a border a point lies that is near to it.
+class BorderSide {
+public:
+    explicit BorderSide(const glm::vec3& point) : point_(point) {}
+
+    // `inside`: a point of the surface beside the edge.
+    void look_at(const Segment& edge, const glm::vec3& inside);
+
+    // The distance from the nearest edge of those that were looked at; 0 where the surface is on this side of it.
+    float outside() const;
+
+private:
+    glm::vec3 point_, nearest_ = glm::vec3(0), inward_ = glm::vec3(0);
+    float squared_ = std::numeric_limits<float>::infinity(); // the nearest point's distance
 };
 
 // The largest distance of a point from the nearest one of the segments; infinite where there are none.
