@@ -299,6 +299,7 @@ private:
         std::vector<Segment> border_before, border_after, border_fine, border_own;
         std::vector<glm::vec3> border_points;
         std::array<std::vector<NodeId>, 2> stand_ins;
+        std::vector<NodeId> waiting;
         bool compares_fine = false; // the fine ones are few enough, and others
 
         void clear() {
@@ -495,6 +496,29 @@ private:
         return std::max(shift, farthest_from(own, points));
     }
 
+    std::span<const OpenBorder::End> border_of(NodeId node) const {
+        if (node >= interior_) return border_.at(node - interior_, node - interior_ + 1);
+        return border_.at(first_leaf_[node], leaf_end_[node]);
+    }
+
+    // Down the tree, where the ring may be nearer than what was seen.
+    void look_at_border(NodeId top, BorderSide& side, std::vector<NodeId>& waiting) const {
+        constexpr std::size_t few = 16; // edges, which are looked at one by one
+        waiting.assign(1, top);
+        while (!waiting.empty()) {
+            const NodeId node = waiting.back();
+            waiting.pop_back();
+            const std::span<const OpenBorder::End> ends = border_of(node);
+            if (ends.size() <= few || node >= interior_) {
+                for (const OpenBorder::End& at : ends) side.look_at(segment_of(at), opposite_of(at));
+                continue;
+            }
+            const Sphere& ring = tree_.bounds()[node].ring;
+            if (side.may_be_nearer(ring.centre, ring.radius))
+                tree_.for_each_child(node, [&](NodeId child) { waiting.push_back(child); });
+        }
+    }
+
     // How far beyond the border triangles reach that turn over, in any cut in which the node is the largest of their
     // corners. Whatever else of a folded sheet lies beyond its folded border is covered from both sides equally often:
     // what does not turn over reaches no farther than they.
@@ -529,17 +553,13 @@ private:
                         {glm::dot(b - proxy, b - proxy), glm::dot(c - proxy, c - proxy), glm::dot(c - b, c - b)});
                     const float height = glm::length(turned) / std::sqrt(longest);
                     if (!(height > least)) continue;
+                    if (border_of(node).empty() && border_of(second).empty() && border_of(third).empty()) continue;
                     const glm::vec3 looked_at[] = {(proxy + b) * 0.5f, (b + c) * 0.5f, (c + proxy) * 0.5f,
                                                    (proxy + b + c) / 3.0f};
                     float reach = 0;
                     for (const glm::vec3& p : looked_at) {
                         BorderSide side(p);
-                        for (const NodeId at : {node, second, third}) {
-                            const Index first_leaf = at < interior_ ? first_leaf_[at] : at - interior_;
-                            const Index leaf_end = at < interior_ ? leaf_end_[at] : first_leaf + 1;
-                            for (const OpenBorder::End& e : border_.at(first_leaf, leaf_end))
-                                side.look_at(segment_of(e), opposite_of(e));
-                        }
+                        for (const NodeId at : {node, second, third}) look_at_border(at, side, scratch.waiting);
                         reach = std::max(reach, side.outside());
                     }
                     least = std::max(least, std::min(reach, height));

@@ -11,25 +11,8 @@ namespace unseen::perception {
 
 using namespace vdtree;
 
-namespace {
-
-glm::vec3 nearest_of(const Segment& segment, const glm::vec3& point) {
-    const glm::vec3 ab = segment.b - segment.a;
-    const float squared = glm::dot(ab, ab), along = glm::dot(point - segment.a, ab);
-    return segment.a + (squared > 0 ? std::clamp(along / squared, 0.0f, 1.0f) : 0.0f) * ab;
-}
-
-} // namespace
-
 OpenBorder::OpenBorder(const SoundTree& tree, const LeafTriangles& of_leaf) {
     if (tree.bounds()[VertexTree::root()].flags & irregular_ring) find_edges(tree, of_leaf);
-}
-
-std::span<const OpenBorder::End> OpenBorder::at(Index first_leaf, Index leaf_end) const {
-    const auto from = [&](Index leaf) { return std::lower_bound(ends_.begin(), ends_.end(), End{leaf, 0, 0}); };
-    const auto begin = from(first_leaf), end = from(leaf_end);
-    return std::span(ends_).subspan(static_cast<std::size_t>(begin - ends_.begin()),
-                                    static_cast<std::size_t>(end - begin));
 }
 
 void OpenBorder::find_edges(const SoundTree& tree, const LeafTriangles& of_leaf) {
@@ -103,18 +86,21 @@ void OpenBorder::find_edges(const SoundTree& tree, const LeafTriangles& of_leaf)
             ends_.push_back({b, a, opposite});
         }
     }
+    if (ends_.empty()) {
+        edges_of_ = {};
+        return;
+    }
     std::sort(ends_.begin(), ends_.end());
-    if (ends_.empty()) edges_of_ = {};
+    first_end_.assign(std::size_t{tree.leaf_count()} + 1, 0);
+    for (const End& end : ends_) ++first_end_[end.leaf + 1];
+    for (std::size_t i = 1; i < first_end_.size(); ++i) first_end_[i] += first_end_[i - 1];
 }
 
-void BorderSide::look_at(const Segment& edge, const glm::vec3& inside) {
-    const glm::vec3 nearest = nearest_of(edge, point_), way = point_ - nearest, along = edge.b - edge.a;
-    const float squared = glm::dot(way, way), length = glm::dot(along, along);
-    // Edges that meet in the nearest point count together: which side it is, neither tells alone.
-    constexpr float rounding = 1e-5f;
-    if (!(squared <= (1 + rounding) * squared_)) return;
+void BorderSide::take(const Segment& edge, const glm::vec3& inside, const glm::vec3& nearest, float squared) {
     if (squared < (1 - rounding) * squared_) squared_ = squared, nearest_ = nearest, inward_ = glm::vec3(0);
-    const glm::vec3 beside = inside - edge.a;
+    // Which side it is, none of the edges that meet there tells alone.
+    const glm::vec3 along = edge.b - edge.a, beside = inside - edge.a;
+    const float length = glm::dot(along, along);
     const glm::vec3 across = length > 0 ? beside - glm::dot(beside, along) / length * along : beside;
     if (const float width = glm::length(across); width > 0) inward_ += across / width;
 }
@@ -126,7 +112,7 @@ float farthest_from(std::span<const Segment> segments, std::span<const glm::vec3
     for (const glm::vec3& p : points) {
         float nearest = std::numeric_limits<float>::infinity();
         for (const Segment& segment : segments) {
-            const glm::vec3 way = p - nearest_of(segment, p);
+            const glm::vec3 way = p - segment.nearest_to(p);
             nearest = std::min(nearest, glm::dot(way, way));
         }
         farthest = std::max(farthest, nearest);

@@ -1,11 +1,13 @@
 // Where the surface ends, and by how far a fold moves that.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <span>
 #include <vector>
 
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
 #include <vdtree/vertex_tree.h>
@@ -30,17 +32,27 @@ public:
         vdtree::Index leaf, other, opposite; // the third corner of the triangle
         auto operator<=>(const End&) const = default;
     };
-    std::span<const End> at(vdtree::Index first_leaf, vdtree::Index leaf_end) const;
+    std::span<const End> at(vdtree::Index first_leaf, vdtree::Index leaf_end) const {
+        if (ends_.empty()) return {};
+        return std::span(ends_).subspan(first_end_[first_leaf], first_end_[leaf_end] - first_end_[first_leaf]);
+    }
 
 private:
     void find_edges(const vdtree::SoundTree& tree, const LeafTriangles& of_leaf);
 
     std::vector<std::uint8_t> edges_of_; // by triangle; empty: there is no border
     std::vector<End> ends_;
+    std::vector<vdtree::Index> first_end_; // by leaf, one more
 };
 
 struct Segment {
     glm::vec3 a, b;
+
+    glm::vec3 nearest_to(const glm::vec3& point) const {
+        const glm::vec3 ab = b - a;
+        const float squared = glm::dot(ab, ab), along = glm::dot(point - a, ab);
+        return a + (squared > 0 ? std::clamp(along / squared, 0.0f, 1.0f) : 0.0f) * ab;
+    }
 };
 
 // On which side of a border a point lies that is near to it.
@@ -49,12 +61,25 @@ public:
     explicit BorderSide(const glm::vec3& point) : point_(point) {}
 
     // `inside`: a point of the surface beside the edge.
-    void look_at(const Segment& edge, const glm::vec3& inside);
+    void look_at(const Segment& edge, const glm::vec3& inside) {
+        const glm::vec3 nearest = edge.nearest_to(point_), way = point_ - nearest;
+        if (const float squared = glm::dot(way, way); squared <= (1 + rounding) * squared_)
+            take(edge, inside, nearest, squared);
+    }
+
+    // Whether edges within a sphere can be nearer than those that were looked at.
+    bool may_be_nearer(const glm::vec3& centre, float radius) const {
+        const float distance = glm::length(point_ - centre) - radius;
+        return !(distance > 0 && distance * distance > squared_);
+    }
 
     // The distance from the nearest edge of those that were looked at; 0 where the surface is on this side of it.
     float outside() const;
 
 private:
+    static constexpr float rounding = 1e-5f; // edges that meet in the nearest point are equally near
+    void take(const Segment& edge, const glm::vec3& inside, const glm::vec3& nearest, float squared);
+
     glm::vec3 point_, nearest_ = glm::vec3(0), inward_ = glm::vec3(0);
     float squared_ = std::numeric_limits<float>::infinity(); // the nearest point's distance
 };
