@@ -20,6 +20,7 @@
 #include <vdtree/internal/vertex_tree_data.h>
 
 #include "fold/fold_errors.h"
+#include "measure/border_shifts.h"
 #include "measure/contacts.h"
 #include "measure/find_stages.h"
 #include "measure/fold_picture.h"
@@ -27,7 +28,6 @@
 #include "measure/leaf_triangles.h"
 #include "measure/luminance_bias.h"
 #include "measure/measurement.h"
-#include "measure/open_border.h"
 
 namespace unseen::perception {
 
@@ -294,17 +294,10 @@ private:
         std::vector<Sample> samples;
         std::vector<Child> children;
         std::array<FoldPicture, picture_sizes.size()> pictures;
-        // The border where it touches the support: before and after the fold, with folded neighbours, and with none;
-        // and the mesh's own. Segments begin in the support.
-        std::vector<Segment> border_before, border_after, border_fine, border_own;
-        std::vector<glm::vec3> border_points;
-        std::array<std::vector<NodeId>, 2> stand_ins;
-        std::vector<NodeId> waiting;
         bool compares_fine = false; // the fine ones are few enough, and others
 
         void clear() {
             for (auto* surface : {&before, &after, &fine_before, &fine_after}) surface->clear();
-            for (auto* border : {&border_before, &border_after, &border_fine}) border->clear();
             samples.clear();
             children.clear();
         }
@@ -387,7 +380,7 @@ private:
         record.farthest = worst.distance, record.mean_distance = mean.distance;
         record.largest_luminance = worst.luminance, record.mean_luminance = mean.luminance;
         record.extent = mean_reach(scratch.after, proxy) / 2;
-        record.border = turned_reach(node, border_shift(node, scratch), scratch);
+        record.border = border_.shift(node, crossing_[node], [&](Index leaf) { return stand_in(leaf, node); });
         record.gap = contacts_[node].gap, record.sine = contacts_[node].sine;
         facing_[node].is_height_field = draw(node, scratch, std::max(support_[node].radius, record.extent), record);
     }
@@ -427,7 +420,6 @@ private:
                 before.corner[k] = point(shown_before[k]);
                 after.corner[k] = point(shown[k]);
             }
-            if (border_.edges_of(t) != 0) lay_out_border(t, node, whole.inside, shown_before, shown, scratch);
             turned.insert(whole);
             if (are_distinct(shown_before)) add(scratch.before, before);
             RingTriangle fine_before = whole;
@@ -445,128 +437,6 @@ private:
             if (are_distinct(shown)) add(scratch.after, after);
         }
         return turned;
-    }
-
-    // What becomes of the border edges of a triangle.
-    void lay_out_border(Index triangle, NodeId node, unsigned inside, const std::array<NodeId, 3>& before,
-                        const std::array<NodeId, 3>& after, Scratch& scratch) const {
-        for (std::size_t k = 0; k < 3; ++k) {
-            std::size_t in = k, out = (k + 1) % 3;
-            if (!((border_.edges_of(triangle) >> k) & 1)) continue;
-            if (!((inside >> in) & 1)) std::swap(in, out);
-            if (!((inside >> in) & 1)) continue;
-            const auto place = [&](NodeId at) { return point(at).position; };
-            if (before[in] != before[out]) scratch.border_before.push_back({place(before[in]), place(before[out])});
-            if ((inside >> out) & 1) continue; // vanishes
-            scratch.border_after.push_back({place(node), place(after[out])});
-            scratch.border_fine.push_back({place(node), place(interior_ + triangles_[triangle][out])});
-        }
-    }
-
-    Segment segment_of(const OpenBorder::End& at) const {
-        return {leaf_point(at.leaf).position, leaf_point(at.other).position};
-    }
-    glm::vec3 opposite_of(const OpenBorder::End& at) const { return leaf_point(at.opposite).position; }
-
-    // The largest distance between the border as it was, the mesh's own, and the folded one.
-    float border_shift(NodeId node, Scratch& scratch) const {
-        const std::span<const OpenBorder::End> ends = border_.at(first_leaf_[node], leaf_end_[node]);
-        if (ends.empty() || !(support_[node].radius > 0)) return 0; // nothing moves where all is at one point
-        const glm::vec3 proxy = point(node).position;
-        std::vector<Segment>& own = scratch.border_own;
-        std::vector<glm::vec3>& points = scratch.border_points;
-        own.clear(), points.clear();
-        if (ends.size() <= most_border_ends) {
-            for (const OpenBorder::End& at : ends) {
-                own.push_back(segment_of(at));
-                if (points.empty() || points.back() != own.back().a) points.push_back(own.back().a);
-            }
-        } else {
-            own = scratch.border_before;
-            for (const Segment& segment : own) points.push_back(segment.a);
-        }
-        // A border of the support alone shrinks to the proxy.
-        for (auto* folded : {&scratch.border_after, &scratch.border_fine})
-            if (folded->empty()) folded->push_back({proxy, proxy});
-        float shift = std::max(farthest_from(scratch.border_after, points), farthest_from(scratch.border_fine, points));
-        if (own.empty()) return shift;
-        // The other way round: where the fold puts the border's vertex, and half-way to the neighbours.
-        points.assign(1, proxy);
-        for (const auto& [a, b] : scratch.border_fine) points.push_back((a + b) * 0.5f);
-        return std::max(shift, farthest_from(own, points));
-    }
-
-    std::span<const OpenBorder::End> border_of(NodeId node) const {
-        if (node >= interior_) return border_.at(node - interior_, node - interior_ + 1);
-        return border_.at(first_leaf_[node], leaf_end_[node]);
-    }
-
-    // Down the tree, where the ring may be nearer than what was seen.
-    void look_at_border(NodeId top, BorderSide& side, std::vector<NodeId>& waiting) const {
-        constexpr std::size_t few = 16; // edges, which are looked at one by one
-        waiting.assign(1, top);
-        while (!waiting.empty()) {
-            const NodeId node = waiting.back();
-            waiting.pop_back();
-            const std::span<const OpenBorder::End> ends = border_of(node);
-            if (ends.size() <= few || node >= interior_) {
-                for (const OpenBorder::End& at : ends) side.look_at(segment_of(at), opposite_of(at));
-                continue;
-            }
-            const Sphere& ring = tree_.bounds()[node].ring;
-            if (side.may_be_nearer(ring.centre, ring.radius))
-                tree_.for_each_child(node, [&](NodeId child) { waiting.push_back(child); });
-        }
-    }
-
-    // How far beyond the border triangles reach that turn over, in any cut in which the node is the largest of their
-    // corners. Whatever else of a folded sheet lies beyond its folded border is covered from both sides equally often:
-    // what does not turn over reaches no farther than they.
-    float turned_reach(NodeId node, float least, Scratch& scratch) const {
-        if (!(tree_.bounds()[node].flags & irregular_ring)) return least;
-        const glm::vec3 proxy = point(node).position;
-        const Index begin = first_leaf_[node], end = leaf_end_[node];
-        const auto is_inside = [&](Index leaf) { return leaf - begin < end - begin; };
-        const auto find_stand_ins = [&](Index leaf, std::vector<NodeId>& nodes) {
-            nodes.assign(1, interior_ + leaf);
-            for (NodeId up = parents_[nodes.back()];
-                 up != no_node && is_larger(node, up) && nodes.size() < most_stand_ins; up = parents_[up])
-                nodes.push_back(up);
-        };
-        for (const Index t : crossing_[node]) {
-            const Triangle& corners = triangles_[t];
-            std::size_t k = 0;
-            while (!is_inside(corners[k])) ++k;
-            const Index next = corners[(k + 1) % 3], last = corners[(k + 2) % 3];
-            if (is_inside(next) || is_inside(last)) continue; // vanishes
-            const glm::vec3 a = leaf_point(corners[k]).position;
-            const glm::vec3 normal = glm::cross(leaf_point(next).position - a, leaf_point(last).position - a);
-            find_stand_ins(next, scratch.stand_ins[0]);
-            find_stand_ins(last, scratch.stand_ins[1]);
-            for (const NodeId second : scratch.stand_ins[0]) {
-                for (const NodeId third : scratch.stand_ins[1]) {
-                    const glm::vec3 b = point(second).position, c = point(third).position;
-                    const glm::vec3 turned = glm::cross(b - proxy, c - proxy);
-                    if (!(glm::dot(turned, normal) < 0)) continue;
-                    // No point of a triangle is farther from its border than a third of its least height.
-                    const float longest = std::max(
-                        {glm::dot(b - proxy, b - proxy), glm::dot(c - proxy, c - proxy), glm::dot(c - b, c - b)});
-                    const float height = glm::length(turned) / std::sqrt(longest);
-                    if (!(height > least)) continue;
-                    if (border_of(node).empty() && border_of(second).empty() && border_of(third).empty()) continue;
-                    const glm::vec3 looked_at[] = {(proxy + b) * 0.5f, (b + c) * 0.5f, (c + proxy) * 0.5f,
-                                                   (proxy + b + c) / 3.0f};
-                    float reach = 0;
-                    for (const glm::vec3& p : looked_at) {
-                        BorderSide side(p);
-                        for (const NodeId at : {node, second, third}) look_at_border(at, side, scratch.waiting);
-                        reach = std::max(reach, side.outside());
-                    }
-                    least = std::max(least, std::min(reach, height));
-                }
-            }
-        }
-        return least;
     }
 
     // Raises the worst errors to those between the surfaces; returns the mean ones.
@@ -768,7 +638,7 @@ private:
     std::span<const Sphere> support_;
     NodeId interior_;
     LeafTriangles of_leaf_;
-    OpenBorder border_;
+    BorderShifts border_;
     std::vector<std::vector<Index>> crossing_; // of nodes whose parent has not been measured yet
     std::vector<Contact> contacts_;
     std::vector<Witnesses> witnesses_;

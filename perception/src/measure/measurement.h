@@ -27,8 +27,9 @@ inline constexpr float much_less = 4;
 // Trees are some tens of nodes deep. Up deeper ones, as only made-up ones are, neighbours are folded no farther than
 // this, so that no tree costs the square of its depth.
 inline constexpr int most_steps = 1024;
-inline constexpr std::size_t most_stand_ins = 16;
-inline constexpr std::size_t most_border_ends = 4096; // of the mesh's own border; in place of more, the children's
+inline constexpr std::size_t most_stand_ins = 16; // nodes, each above the last, that may stand for a leaf
+inline constexpr std::size_t most_border_ends =
+    4096; // of edges of the mesh's own border; of more, these at equal steps
 
 // ---- pictures of a fold
 inline constexpr std::size_t picture_side = 16;           // cells
@@ -71,6 +72,7 @@ inline constexpr auto settings = std::to_array<float>({revision,
                                                        much_more,
                                                        much_less,
                                                        most_steps,
+                                                       most_stand_ins,
                                                        most_border_ends,
                                                        picture_side,
                                                        picture_bands,

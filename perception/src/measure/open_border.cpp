@@ -105,7 +105,9 @@ void BorderSide::take(const Segment& edge, const glm::vec3& inside, const glm::v
     if (const float width = glm::length(across); width > 0) inward_ += across / width;
 }
 
-float BorderSide::outside() const { return glm::dot(point_ - nearest_, inward_) < 0 ? std::sqrt(squared_) : 0; }
+float BorderSide::distance() const { return std::sqrt(squared_); }
+
+float BorderSide::outside() const { return glm::dot(point_ - nearest_, inward_) < 0 ? distance() : 0; }
 
 float farthest_from(std::span<const Segment> segments, std::span<const glm::vec3> points) {
     float farthest = 0;

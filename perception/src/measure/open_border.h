@@ -24,6 +24,8 @@ public:
     // Cost: nothing where the surface is closed; some 100 ns for each triangle of a place where it is not.
     OpenBorder(const vdtree::SoundTree& tree, const LeafTriangles& of_leaf);
 
+    bool is_empty() const { return ends_.empty(); }
+
     // A bit for each edge, from corner k to the next.
     unsigned edges_of(vdtree::Index triangle) const { return edges_of_.empty() ? 0 : edges_of_[triangle]; }
 
@@ -73,7 +75,9 @@ public:
         return !(distance > 0 && distance * distance > squared_);
     }
 
-    // The distance from the nearest edge of those that were looked at; 0 where the surface is on this side of it.
+    // From the nearest edge of those that were looked at; infinite where none was.
+    float distance() const;
+    // The same where the point lies beyond that edge, and 0 where it lies on the surface's side.
     float outside() const;
 
 private:
