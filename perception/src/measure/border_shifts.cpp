@@ -77,21 +77,23 @@ float BorderShifts::distance_of_borders(NodeId node, std::span<const Index> cros
         if (folded->empty()) folded->push_back({proxy, proxy}); // a border of the support alone shrinks to the proxy
         largest = std::max(largest, farthest_from(*folded, scratch.points));
     }
-    // The other way round: the proxy, and points half-way to the neighbours.
+    // The other way round: the proxy, and points between it and the neighbours.
     const auto look_from = [&](const glm::vec3& p) {
         BorderSide side(p);
         look_at_border(node, side, scratch.waiting);
         largest = std::max(largest, side.distance());
     };
     look_from(proxy);
-    for (const Segment& folded : scratch.folded_alone) look_from((folded.a + folded.b) * 0.5f);
+    for (const auto& [a, b] : scratch.folded_alone)
+        for (const float share : {0.25f, 0.5f, 0.75f}) look_from(a + share * (b - a));
     return largest;
 }
 
-// The nodes that may stand for a leaf while they are no larger than the node.
-void BorderShifts::find_stand_ins(Index leaf, NodeId node, std::vector<NodeId>& nodes) const {
+// The nodes that may stand for a leaf while they are no larger than the node, and not for another leaf, too.
+void BorderShifts::find_stand_ins(Index leaf, NodeId node, Index without, std::vector<NodeId>& nodes) const {
     nodes.assign(1, interior_ + leaf);
-    for (NodeId up = parents_[nodes.back()]; up != no_node && is_larger(node, up) && nodes.size() < most_stand_ins;
+    for (NodeId up = parents_[nodes.back()];
+         up != no_node && is_larger(node, up) && !supports(up, without) && nodes.size() < most_stand_ins;
          up = parents_[up])
         nodes.push_back(up);
 }
@@ -108,8 +110,8 @@ float BorderShifts::turned_reach(NodeId node, std::span<const Index> crossing, f
         if (supports(node, next) || supports(node, last)) continue; // vanishes
         const glm::vec3 a = leaf_place(corners[k]);
         const glm::vec3 normal = glm::cross(leaf_place(next) - a, leaf_place(last) - a);
-        find_stand_ins(next, node, scratch.second);
-        find_stand_ins(last, node, scratch.third);
+        find_stand_ins(next, node, last, scratch.second);
+        find_stand_ins(last, node, next, scratch.third);
         for (const NodeId second : scratch.second) {
             for (const NodeId third : scratch.third) {
                 const glm::vec3 b = place(second) - proxy, c = place(third) - proxy, turned = glm::cross(b, c);

@@ -44,7 +44,8 @@ private:
     void look_at_border(vdtree::NodeId top, BorderSide& side, std::vector<vdtree::NodeId>& waiting) const;
     float distance_of_borders(vdtree::NodeId node, std::span<const vdtree::Index> crossing,
                               const FunctionRef<vdtree::NodeId(vdtree::Index)>& stand_in, Scratch& scratch) const;
-    void find_stand_ins(vdtree::Index leaf, vdtree::NodeId node, std::vector<vdtree::NodeId>& nodes) const;
+    void find_stand_ins(vdtree::Index leaf, vdtree::NodeId node, vdtree::Index without,
+                        std::vector<vdtree::NodeId>& nodes) const;
     float turned_reach(vdtree::NodeId node, std::span<const vdtree::Index> crossing, float least,
                        Scratch& scratch) const;
     float reach_of(vdtree::NodeId a, vdtree::NodeId b, vdtree::NodeId c, Scratch& scratch) const;
