@@ -111,6 +111,17 @@ Mesh cut_out() {
     return mesh;
 }
 
+// A square with rows of holes.
+Mesh sieve() {
+    constexpr int holes = 4, side = 8 * holes - 1;
+    Mesh mesh = shapes::placed(shapes::grid(side), 1.0 / side);
+    std::erase_if(mesh.triangles, [&](const Triangle& t) {
+        const glm::dvec3 p = (mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]]) / 3.0 * double{holes};
+        return std::hypot(p.x - std::floor(p.x) - 0.5, p.y - std::floor(p.y) - 0.5) < 0.22;
+    });
+    return mesh;
+}
+
 // Points of a polyline, so dense that nothing is missed.
 std::vector<glm::vec3> points_of(std::span<const Segment> segments) {
     std::vector<glm::vec3> points;
@@ -191,7 +202,7 @@ TEST(FoldedBorders, AreNotMovedFromInside) {
 // Two triangles of a sheet's ragged border whose vertices fold one by one: whatever the state of the others, what turns
 // over beyond the border counts.
 TEST(FoldedBorders, CountWhatTurnsOverBeyondThem) {
-    const BorderFolds folds(cut_out());
+    const BorderFolds folds(sieve());
     const VertexTree& tree = folds.tree();
     const SoundTree sound = support::sound(tree);
     const OpenBorder border(sound, LeafTriangles(sound));
