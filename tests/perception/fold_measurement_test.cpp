@@ -131,7 +131,7 @@ TEST(FoldErrors, NestWhateverWasMeasured) {
     std::vector<FoldFacing> facing(tree.interior_count());
     for (NodeId node = 0; node < records.size(); ++node) {
         FoldRecord& r = records[node];
-        r = {any(), any(), any(), any(), any(), any(), any(), any(), {}, any()};
+        r = {any(), any(), any(), any(), any(), any(), any(), any(), {}, any(), any()};
         for (auto& of_size : r.amplitudes)
             for (float& amplitude : of_size) amplitude = any();
         facing[node].is_height_field = random() % 2;
@@ -141,12 +141,15 @@ TEST(FoldErrors, NestWhateverWasMeasured) {
     for (NodeId node = 0; node < errors.size(); ++node) {
         const FoldError& e = errors[node];
         EXPECT_GE(e.distance, records[node].shift);
+        EXPECT_GE(e.outline, e.distance);
+        EXPECT_GE(e.outline, records[node].border);
         EXPECT_GE(e.extent, records[node].extent);
         EXPECT_GE(e.luminance, records[node].amplitudes[1][3]);
         EXPECT_TRUE(e.facing.includes(facing[node].facing));
         if (node == 0) continue;
         const FoldError& above = errors[sound.parents()[node]];
         EXPECT_GE(above.distance, e.distance);
+        EXPECT_GE(above.outline, e.outline);
         EXPECT_GE(above.extent, e.extent);
         EXPECT_TRUE(above.facing.includes(e.facing));
     }
@@ -294,15 +297,17 @@ TEST(FoldErrors, DoNotDependOnTheUnit) {
             power < -100; // lengths near the least numbers: what is multiplied with them is rounded
         for (NodeId node = 0; node < tree.interior_count(); ++node) {
             FoldRecord record = records[node];
-            for (float* length : {&record.shift, &record.farthest, &record.mean_distance, &record.extent, &record.gap})
+            for (float* length :
+                 {&record.shift, &record.farthest, &record.mean_distance, &record.extent, &record.gap, &record.border})
                 *length = std::ldexp(*length, power);
             ASSERT_EQ(scaled_records[node], record) << "2^" << power << ", node " << node;
             FoldError expected = errors[node];
-            for (float* length : {&expected.distance, &expected.mean_distance, &expected.extent})
+            for (float* length : {&expected.distance, &expected.mean_distance, &expected.outline, &expected.extent})
                 *length = std::ldexp(*length, power);
             if (has_few_digits) {
                 EXPECT_NEAR(scaled_errors[node].distance, expected.distance, 1e-3f * expected.distance) << node;
-                expected.distance = scaled_errors[node].distance;
+                EXPECT_NEAR(scaled_errors[node].outline, expected.outline, 1e-3f * expected.outline) << node;
+                expected.distance = scaled_errors[node].distance, expected.outline = scaled_errors[node].outline;
             }
             ASSERT_EQ(scaled_errors[node], expected) << "2^" << power << ", node " << node;
         }
@@ -327,7 +332,8 @@ TEST(FoldErrors, AreRefusedWhereTheyAreNone) {
     for (const float wrong : {nan, -1.0f, infinity}) {
         for (float FoldRecord::*const value :
              {&FoldRecord::shift, &FoldRecord::farthest, &FoldRecord::mean_distance, &FoldRecord::largest_luminance,
-              &FoldRecord::mean_luminance, &FoldRecord::extent, &FoldRecord::sine, &FoldRecord::bias})
+              &FoldRecord::mean_luminance, &FoldRecord::extent, &FoldRecord::sine, &FoldRecord::bias,
+              &FoldRecord::border})
             EXPECT_NE(with([&](FoldRecord& r) { r.*value = wrong; }).find("node 1"), std::string::npos);
         EXPECT_NE(with([&](FoldRecord& r) { r.amplitudes[1][2] = wrong; }), "");
     }

@@ -20,6 +20,7 @@
 #include <vdtree/internal/vertex_tree_data.h>
 
 #include "fold/fold_errors.h"
+#include "measure/border_shifts.h"
 #include "measure/contacts.h"
 #include "measure/find_stages.h"
 #include "measure/fold_picture.h"
@@ -27,7 +28,6 @@
 #include "measure/leaf_triangles.h"
 #include "measure/luminance_bias.h"
 #include "measure/measurement.h"
-#include "measure/open_border.h"
 
 namespace unseen::perception {
 
@@ -225,6 +225,8 @@ public:
           first_triangle_(tree.first_triangle()), triangles_(tree.triangles()), support_(tree.support_spheres()),
           interior_(tree.interior_count()), of_leaf_(tree), border_(tree, of_leaf_), crossing_(interior_),
           contacts_(find_contacts(tree)), witnesses_(interior_) {
+        most_changed_.reserve(interior_);
+        for (NodeId node = 0; node < interior_; ++node) most_changed_.push_back(most_changed(node));
         points_.reserve(tree.node_count());
         for (NodeId node = 0; node < tree.node_count(); ++node)
             points_.push_back({tree.positions()[node], tree.luminance()[node]});
@@ -292,15 +294,10 @@ private:
         std::vector<Sample> samples;
         std::vector<Child> children;
         std::array<FoldPicture, picture_sizes.size()> pictures;
-        // The border where it touches the support: before and after the fold, with folded neighbours, and with none;
-        // and the mesh's own. Segments begin in the support.
-        std::vector<Segment> border_before, border_after, border_fine, border_own;
-        std::vector<glm::vec3> border_points;
         bool compares_fine = false; // the fine ones are few enough, and others
 
         void clear() {
             for (auto* surface : {&before, &after, &fine_before, &fine_after}) surface->clear();
-            for (auto* border : {&border_before, &border_after, &border_fine}) border->clear();
             samples.clear();
             children.clear();
         }
@@ -333,15 +330,38 @@ private:
         return support_[a].radius != support_[b].radius ? support_[a].radius > support_[b].radius : a < b;
     }
 
+    // What a fold inside the surface can change at most, but for a factor: luminance times area, and heights. Neither
+    // falls from a node to its parent.
+    struct Change {
+        float light = 0, height = 0;
+    };
+    Change most_changed(NodeId node) const {
+        const PackedRange luminance = tree_.ring_luminance()[node];
+        const NormalSlabs& normals = tree_.bounds()[node].slabs;
+        int turn = 0; // by which the normals differ
+        for (std::size_t i = 0; i < NormalSlabs::axis_count; ++i) turn = std::max(turn, normals.hi[i] - normals.lo[i]);
+        const float radius = support_[node].radius;
+        return {static_cast<float>(luminance.hi.value - luminance.lo.value) * radius * radius,
+                static_cast<float>(turn) * radius};
+    }
+    bool changes_much_less(NodeId a, NodeId node) const {
+        const Change &less = most_changed_[a], &more = most_changed_[node];
+        return much_less * less.light <= more.light && much_less * less.height <= more.height &&
+               !(tree_.bounds()[a].flags & irregular_ring); // whose border may move as far as it likes
+    }
+    bool supports(NodeId a, NodeId b) const { return first_leaf_[a] <= first_leaf_[b] && leaf_end_[b] <= leaf_end_[a]; }
+
     // What stands for a leaf outside the node when it folds: nodes up to its size are folded, as far as they have no
-    // more to hide.
+    // more to hide, and those that are hardly seen to fold at any size, as the faces beside an edge.
     NodeId stand_in(Index leaf, NodeId node) const {
         NodeId at = interior_ + leaf;
         const int most = much_more * luminance_span(node);
+        const auto folds_earlier = [&](NodeId up) {
+            return (is_larger(node, up) && luminance_span(up) <= most) ||
+                   (changes_much_less(up, node) && !supports(up, node));
+        };
         int steps = 0;
-        for (NodeId up = parents_[at];
-             up != no_node && is_larger(node, up) && luminance_span(up) <= most && ++steps <= most_steps;
-             up = parents_[at])
+        for (NodeId up = parents_[at]; up != no_node && folds_earlier(up) && ++steps <= most_steps; up = parents_[at])
             at = up;
         return at;
     }
@@ -360,7 +380,7 @@ private:
         record.farthest = worst.distance, record.mean_distance = mean.distance;
         record.largest_luminance = worst.luminance, record.mean_luminance = mean.luminance;
         record.extent = mean_reach(scratch.after, proxy) / 2;
-        record.border = border_shift(node, scratch);
+        record.border = border_.shift(node, crossing_[node], [&](Index leaf) { return stand_in(leaf, node); });
         record.gap = contacts_[node].gap, record.sine = contacts_[node].sine;
         facing_[node].is_height_field = draw(node, scratch, std::max(support_[node].radius, record.extent), record);
     }
@@ -400,7 +420,6 @@ private:
                 before.corner[k] = point(shown_before[k]);
                 after.corner[k] = point(shown[k]);
             }
-            if (border_.edges_of(t) != 0) lay_out_border(t, node, whole.inside, shown_before, shown, scratch);
             turned.insert(whole);
             if (are_distinct(shown_before)) add(scratch.before, before);
             RingTriangle fine_before = whole;
@@ -418,50 +437,6 @@ private:
             if (are_distinct(shown)) add(scratch.after, after);
         }
         return turned;
-    }
-
-    // What becomes of the border edges of a triangle.
-    void lay_out_border(Index triangle, NodeId node, unsigned inside, const std::array<NodeId, 3>& before,
-                        const std::array<NodeId, 3>& after, Scratch& scratch) const {
-        for (std::size_t k = 0; k < 3; ++k) {
-            std::size_t in = k, out = (k + 1) % 3;
-            if (!((border_.edges_of(triangle) >> k) & 1)) continue;
-            if (!((inside >> in) & 1)) std::swap(in, out);
-            if (!((inside >> in) & 1)) continue;
-            const auto place = [&](NodeId at) { return point(at).position; };
-            if (before[in] != before[out]) scratch.border_before.push_back({place(before[in]), place(before[out])});
-            if ((inside >> out) & 1) continue; // vanishes
-            scratch.border_after.push_back({place(node), place(after[out])});
-            scratch.border_fine.push_back({place(node), place(interior_ + triangles_[triangle][out])});
-        }
-    }
-
-    // The largest distance between the border as it was, the mesh's own, and the folded one.
-    float border_shift(NodeId node, Scratch& scratch) const {
-        const std::span<const OpenBorder::End> ends = border_.at(first_leaf_[node], leaf_end_[node]);
-        if (ends.empty()) return 0;
-        const glm::vec3 proxy = point(node).position;
-        std::vector<Segment>& own = scratch.border_own;
-        std::vector<glm::vec3>& points = scratch.border_points;
-        own.clear(), points.clear();
-        if (ends.size() <= most_border_ends) {
-            for (const auto& [leaf, other] : ends) {
-                own.push_back({leaf_point(leaf).position, leaf_point(other).position});
-                if (points.empty() || points.back() != own.back().a) points.push_back(own.back().a);
-            }
-        } else {
-            own = scratch.border_before;
-            for (const Segment& segment : own) points.push_back(segment.a);
-        }
-        // A border of the support alone shrinks to the proxy.
-        for (auto* folded : {&scratch.border_after, &scratch.border_fine})
-            if (folded->empty()) folded->push_back({proxy, proxy});
-        float shift = std::max(farthest_from(scratch.border_after, points), farthest_from(scratch.border_fine, points));
-        if (own.empty()) return shift;
-        // The other way round: where the fold puts the border's vertex, and half-way to the neighbours.
-        points.assign(1, proxy);
-        for (const auto& [a, b] : scratch.border_fine) points.push_back((a + b) * 0.5f);
-        return std::max(shift, farthest_from(own, points));
     }
 
     // Raises the worst errors to those between the surfaces; returns the mean ones.
@@ -663,10 +638,11 @@ private:
     std::span<const Sphere> support_;
     NodeId interior_;
     LeafTriangles of_leaf_;
-    OpenBorder border_;
+    BorderShifts border_;
     std::vector<std::vector<Index>> crossing_; // of nodes whose parent has not been measured yet
     std::vector<Contact> contacts_;
     std::vector<Witnesses> witnesses_;
+    std::vector<Change> most_changed_; // by interior node
 };
 
 // Lengths in the tree's own units again. False where they are beyond all numbers.

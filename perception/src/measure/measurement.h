@@ -21,10 +21,15 @@ inline constexpr std::size_t triangles_compared = 16;  // of each surface, at eq
 inline constexpr std::size_t most_fine_triangles = 64; // in rings of more, some neighbours are folded
 // Neighbours with more than so many times the node's luminance range fold later than it: they are not folded with it.
 inline constexpr int much_more = 2;
+// Neighbours fold earlier, however large they are, where all that they can change is this many times less than all that
+// the node can: both luminance times area, and heights.
+inline constexpr float much_less = 4;
 // Trees are some tens of nodes deep. Up deeper ones, as only made-up ones are, neighbours are folded no farther than
 // this, so that no tree costs the square of its depth.
 inline constexpr int most_steps = 1024;
-inline constexpr std::size_t most_border_ends = 4096; // of the mesh's own border; in place of more, the children's
+inline constexpr std::size_t most_stand_ins = 16; // nodes, each above the last, that may stand for a leaf
+inline constexpr std::size_t most_border_ends =
+    4096; // of edges of the mesh's own border; of more, these at equal steps
 
 // ---- pictures of a fold
 inline constexpr std::size_t picture_side = 16;           // cells
@@ -65,7 +70,9 @@ inline constexpr auto settings = std::to_array<float>({revision,
                                                        triangles_compared,
                                                        most_fine_triangles,
                                                        much_more,
+                                                       much_less,
                                                        most_steps,
+                                                       most_stand_ins,
                                                        most_border_ends,
                                                        picture_side,
                                                        picture_bands,

@@ -1,10 +1,13 @@
 // Where the surface ends, and by how far a fold moves that.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
 #include <vdtree/vertex_tree.h>
@@ -21,25 +24,68 @@ public:
     // Cost: nothing where the surface is closed; some 100 ns for each triangle of a place where it is not.
     OpenBorder(const vdtree::SoundTree& tree, const LeafTriangles& of_leaf);
 
+    bool is_empty() const { return ends_.empty(); }
+
     // A bit for each edge, from corner k to the next.
     unsigned edges_of(vdtree::Index triangle) const { return edges_of_.empty() ? 0 : edges_of_[triangle]; }
 
     // By the leaf at the one end; each edge is there twice.
     struct End {
-        vdtree::Index leaf, other;
+        vdtree::Index leaf, other, opposite; // the third corner of the triangle
         auto operator<=>(const End&) const = default;
     };
-    std::span<const End> at(vdtree::Index first_leaf, vdtree::Index leaf_end) const;
+    std::span<const End> at(vdtree::Index first_leaf, vdtree::Index leaf_end) const {
+        if (ends_.empty()) return {};
+        return std::span(ends_).subspan(first_end_[first_leaf], first_end_[leaf_end] - first_end_[first_leaf]);
+    }
 
 private:
     void find_edges(const vdtree::SoundTree& tree, const LeafTriangles& of_leaf);
 
     std::vector<std::uint8_t> edges_of_; // by triangle; empty: there is no border
     std::vector<End> ends_;
+    std::vector<vdtree::Index> first_end_; // by leaf, one more
 };
 
 struct Segment {
     glm::vec3 a, b;
+
+    glm::vec3 nearest_to(const glm::vec3& point) const {
+        const glm::vec3 ab = b - a;
+        const float squared = glm::dot(ab, ab), along = glm::dot(point - a, ab);
+        return a + (squared > 0 ? std::clamp(along / squared, 0.0f, 1.0f) : 0.0f) * ab;
+    }
+};
+
+// On which side of a border a point lies that is near to it.
+class BorderSide {
+public:
+    explicit BorderSide(const glm::vec3& point) : point_(point) {}
+
+    // `inside`: a point of the surface beside the edge.
+    void look_at(const Segment& edge, const glm::vec3& inside) {
+        const glm::vec3 nearest = edge.nearest_to(point_), way = point_ - nearest;
+        if (const float squared = glm::dot(way, way); squared <= (1 + rounding) * squared_)
+            take(edge, inside, nearest, squared);
+    }
+
+    // Whether edges within a sphere can be nearer than those that were looked at.
+    bool may_be_nearer(const glm::vec3& centre, float radius) const {
+        const float distance = glm::length(point_ - centre) - radius;
+        return !(distance > 0 && distance * distance > squared_);
+    }
+
+    // From the nearest edge of those that were looked at; infinite where none was.
+    float distance() const;
+    // The same where the point lies beyond that edge, and 0 where it lies on the surface's side.
+    float outside() const;
+
+private:
+    static constexpr float rounding = 1e-5f; // edges that meet in the nearest point are equally near
+    void take(const Segment& edge, const glm::vec3& inside, const glm::vec3& nearest, float squared);
+
+    glm::vec3 point_, nearest_ = glm::vec3(0), inward_ = glm::vec3(0);
+    float squared_ = std::numeric_limits<float>::infinity(); // the nearest point's distance
 };
 
 // The largest distance of a point from the nearest one of the segments; infinite where there are none.

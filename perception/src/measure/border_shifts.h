@@ -1,0 +1,63 @@
+// By how far folds move the border of an open surface.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include <vdtree/function_ref.h>
+#include <vdtree/vertex_tree.h>
+
+#include "measure/leaf_triangles.h"
+#include "measure/open_border.h"
+
+namespace unseen::perception {
+
+class BorderShifts {
+public:
+    // Keeps references to both.
+    BorderShifts(const vdtree::SoundTree& tree, const LeafTriangles& of_leaf);
+
+    // The largest distance, mesh units, between the mesh's own border and the one that the node's fold leaves: with no
+    // neighbour folded, and with those that `stand_in` gives for leaves outside of the support. And how far triangles
+    // that turn over reach beyond the border, in any state of the neighbours that are no larger than the node.
+    // `crossing`: triangles with a corner in the support, among them all with one outside. 0 where the node is nowhere
+    // near a border. Threads may ask at once. Cost: some products for each edge of the border below the node.
+    float shift(vdtree::NodeId node, std::span<const vdtree::Index> crossing,
+                const FunctionRef<vdtree::NodeId(vdtree::Index leaf)>& stand_in) const;
+
+private:
+    struct Scratch {
+        std::vector<Segment> folded, folded_alone; // with neighbours, and without
+        std::vector<glm::vec3> points;
+        std::vector<vdtree::NodeId> waiting, second, third;
+    };
+
+    bool supports(vdtree::NodeId node, vdtree::Index leaf) const {
+        return leaf - first_leaf_[node] < leaf_end_[node] - first_leaf_[node];
+    }
+    bool is_larger(vdtree::NodeId a, vdtree::NodeId b) const { // ancestors are larger than their descendants
+        return support_[a].radius != support_[b].radius ? support_[a].radius > support_[b].radius : a < b;
+    }
+    const glm::vec3& place(vdtree::NodeId node) const { return positions_[node]; }
+    const glm::vec3& leaf_place(vdtree::Index leaf) const { return positions_[interior_ + leaf]; }
+    std::span<const OpenBorder::End> border_of(vdtree::NodeId node) const;
+    void look_at_border(vdtree::NodeId top, BorderSide& side, std::vector<vdtree::NodeId>& waiting) const;
+    float distance_of_borders(vdtree::NodeId node, std::span<const vdtree::Index> crossing,
+                              const FunctionRef<vdtree::NodeId(vdtree::Index)>& stand_in, Scratch& scratch) const;
+    void find_stand_ins(vdtree::Index leaf, vdtree::NodeId node, vdtree::Index without,
+                        std::vector<vdtree::NodeId>& nodes) const;
+    float turned_reach(vdtree::NodeId node, std::span<const vdtree::Index> crossing, float least,
+                       Scratch& scratch) const;
+    float reach_of(vdtree::NodeId a, vdtree::NodeId b, vdtree::NodeId c, Scratch& scratch) const;
+
+    const vdtree::SoundTree& tree_;
+    OpenBorder border_;
+    vdtree::NodeId interior_;
+    std::span<const glm::vec3> positions_; // of nodes
+    std::span<const vdtree::Index> first_leaf_, leaf_end_;
+    std::span<const vdtree::NodeId> parents_;
+    std::span<const vdtree::Triangle> triangles_;
+    std::span<const vdtree::Sphere> support_;
+};
+
+} // namespace unseen::perception
