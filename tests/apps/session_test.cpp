@@ -139,8 +139,9 @@ TEST(Session, FoldsObjectsBeforeTheLuminanceOfAll) {
     };
     session::Scene both = session::Scene::of(tree_of(grey, prelit));
     both.objects.push_back({tree_of(white, prelit), {.translation = {0, 0, -5}}});
-    auto alone = Session::create(session::Scene::of(tree_of(grey, prelit)));
-    auto together = Session::create(std::move(both));
+    const session::Observer median{.person = perception::median_person};
+    auto alone = Session::create(session::Scene::of(tree_of(grey, prelit)), median);
+    auto together = Session::create(std::move(both), median);
     EXPECT_GT(triangles_of_grey(*together), triangles_of_grey(*alone));
 }
 
@@ -246,7 +247,7 @@ TEST(Follower, OutlivesItsSessionAndTakesUpMeasuredTrees) {
     {
         auto session = Session::create(session::Scene::of(tree_of(shapes::bumpy_sphere(3, 0.03))));
         view = session->default_view();
-        view.eye = view.target + 20.0 * (view.eye - view.target);
+        view.eye = view.target + 100.0 * (view.eye - view.target);
         follower.emplace(*session);
     }
     const auto whole = follower->follow(view, {.goal = Goal::full()});

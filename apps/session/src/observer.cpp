@@ -21,7 +21,10 @@ constexpr double least_depth = 1e-3; // of a direction of length 1, to lie on th
 } // namespace
 
 std::string describe(const Observer& observer) {
-    if (observer.csf) return "the observer of " + observer.csf->samples().source;
+    if (observer.csf) {
+        const std::string& source = observer.csf->samples().source;
+        return "the observer of " + source.substr(0, source.find(',')); // then come the conditions
+    }
     const perception::Person& person = observer.person;
     return "the " + std::string(person.name) + " observer (castleCSF x " + shortest(person.gain) +
            ": of measured people, " + rounded(100 * person.share_above, 2) + "% see more)";

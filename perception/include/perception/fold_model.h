@@ -58,14 +58,14 @@ struct FoldModel {
 
     // Patches lie among others like them, and what they come to is summed over space, whatever their signs. So a patch
     // is seen as well as a grating in a disc of so many times its width, by the law of area (summation_gain()). Fitted:
-    // the least with which nothing is seen where it is looked at.
-    double neighbourhood = 5;
+    // the least with which nothing is seen, regular patterns included.
+    double neighbourhood = 6;
     // How much of the observer's sensitivity the test needs, by eccentricity; linear between, beyond as at the last.
     // Less than all is enough aside: the table takes frequencies below the peak to be seen as well as the peak, which
     // lies at the lowest frequencies there; a node counts as where it is nearest to the gaze; and fewer folds have their
     // chance of being the worst, for nodes are larger. Fitted. Areas that shift together need all of it everywhere.
     static constexpr std::array<double, 4> needed_at_degrees = {0, 12, 29, 50};
-    std::array<double, 4> needed = {1, 1, 0.65, 0.45}; // must not rise
+    std::array<double, 4> needed = {1, 1, 0.72, 0.68}; // must not rise
     // By outlines, wherever they are. They count as long straight strips, all of which move by the largest shift and
     // towards the darkest or brightest that may be behind. Along a true outline shifts change their signs from node to
     // node. Where it moves by an eighth of the mesh's radius and more, as where a part vanishes, all is needed. Fitted.

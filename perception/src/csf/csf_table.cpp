@@ -459,6 +459,7 @@ CsfTable CsfTable::from_model(CsfModel model) {
 Result<CsfTable> CsfTable::scaled(double gain) const {
     if (!(gain >= 1e-3 && gain <= 1e3)) return bad("the gain must be from 0.001 to 1000");
     CsfSamples samples = state_->samples;
+    if (gain != 1) samples.source = number_text(gain) + " x " + samples.source;
     Branches branches = state_->branches;
     for (auto* values : {&samples.sensitivity, &branches.sensitivity, &branches.ceiling})
         for (double& s : *values) s *= gain;
