@@ -580,13 +580,13 @@ TEST_F(SimplifyTest, ASingleTriangleIsValid) {
 TEST_F(SimplifyTest, AnswersInThreeLines) {
     const Outcome plain = run({"simplify", "ball.vdt", "-o", "small.glb"});
     ASSERT_EQ(plain.status, 0) << plain.err;
-    EXPECT_THAT(plain.out,
-                ::testing::MatchesRegex(
-                    "kept [0-9,]+ of 1,472 triangles \\([0-9.]+%\\)\n"
-                    "nobody sees a difference, looked at from 0.5 m or more: by the default observer "
-                    "\\(castleCSF x 2: of measured people, 8.7% see more\\) and the judge \\(fold test error\\), in this view, on the "
-                    "default display, wherever the gaze\n"
-                    "wrote small.glb \\([0-9.]+ kB\\)\n"));
+    EXPECT_THAT(plain.out, ::testing::MatchesRegex(
+                               "kept [0-9,]+ of 1,472 triangles \\([0-9.]+%\\)\n"
+                               "nobody sees a difference, looked at from 0.5 m or more: by the default observer "
+                               "\\(castleCSF x 2: of measured people, 8.7% see more\\) and the judge \\(fold test "
+                               "error\\), in this view, on the "
+                               "default display, wherever the gaze\n"
+                               "wrote small.glb \\([0-9.]+ kB\\)\n"));
     const auto second_line = [&](std::vector<std::string> more) {
         more.insert(more.begin(), {"simplify", "ball.vdt", "-o", "small.glb"});
         const std::string out = run(more).out;

@@ -134,7 +134,8 @@ TEST_F(PerceptionBenchTest, PeopleAreComparedWithModels) {
     const Outcome outcome = bench({"people", "--json", "-"});
     ASSERT_EQ(outcome.status, 0) << outcome.err;
     std::map<std::string, double> above;
-    for (const Json& row : outcome.json()["rows"])
+    const Json all = outcome.json();
+    for (const Json& row : all["rows"])
         if (row.contains("model")) above[row["model"]] = row["share_above"];
     EXPECT_NEAR(above["castle times 2: observer default"], 0.087, 5e-4);
     EXPECT_NEAR(above["castle times 1: observer median"], 0.649, 5e-4);

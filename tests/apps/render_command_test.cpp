@@ -159,8 +159,8 @@ TEST_F(RenderCommandTest, PathsComeFromFiles) {
 
 TEST_F(RenderCommandTest, GazesArePlayedAndRepeat) {
     const auto triangles = [&](std::vector<std::string> more) {
-        more.insert(more.begin(), {"render", "ball.vdt", "--path", "orbit:0:40", "--size", "800x640", "--fold-test",
-                                   "error", "--csv", "out.csv", "--no-draw"});
+        more.insert(more.begin(), {"render", "ball.vdt", "--path", "orbit:0:40", "--size", "800x640", "--observer",
+                                   "median", "--fold-test", "error", "--csv", "out.csv", "--no-draw"});
         const Outcome flown = run(more);
         EXPECT_EQ(flown.status, 0) << flown.err;
         std::vector<double> column;
