@@ -44,6 +44,7 @@ const std::vector<Factor>& factors() {
         {"needed_at_12_degrees", set_needed<1>, {0.6, 0.8, 0.9, 1}},
         {"needed_at_29_degrees", set_needed<2>, {0.4, 0.5, 0.6, 0.72, 1}},
         {"needed_at_50_degrees", set_needed<3>, {0.25, 0.35, 0.5, 0.68, 1}},
+        {"needed_by_borders", [](FoldModel& m, double v) { m.needed_by_borders = v; }, {0.1, 0.2, 0.3, 0.5, 1}},
         {"needed_by_outlines", [](FoldModel& m, double v) { m.needed_by_outlines = v; }, {0.1, 0.2, 0.3, 0.4, 1}},
         {"peak_of_shift", [](FoldModel& m, double v) { m.peak_of_shift = v; }, {0.3, 0.6, 0.9, 1.2, 1.8}},
         {"moved_by_neighbours", [](FoldModel& m, double v) { m.moved_by_neighbours = v; }, {0.35, 0.7, 1, 1.4, 2}},

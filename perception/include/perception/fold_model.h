@@ -70,6 +70,8 @@ struct FoldModel {
     // towards the darkest or brightest that may be behind. Along a true outline shifts change their signs from node to
     // node. Where it moves by an eighth of the mesh's radius and more, as where a part vanishes, all is needed. Fitted.
     double needed_by_outlines = 0.3;
+    // By open borders: a border may be made so that all of it shifts alike, as that of many equal holes. Fitted.
+    double needed_by_borders = 0.5;
 
     static constexpr int largest_side_by_side = 64;
 

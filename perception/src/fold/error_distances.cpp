@@ -61,6 +61,13 @@ private:
     LuminanceClasses luminances_;
 };
 
+// How a strip shifts along its length; what is later is seen better.
+enum class Course {
+    to_and_fro, // an outline of a surface
+    as_made,    // an open border, which may be as regular as holes in a grid
+    one_way     // of a part that vanishes
+};
+
 // What a node's fold shows, as far as that decides from where it can be seen: levels of contrast at widths relative to
 // the node's.
 struct Pattern {
@@ -70,7 +77,7 @@ struct Pattern {
     int bias = no_contrast;       // of what many such nodes shift together
     int fading = 0, quarters = 0; // of octaves, from the node's width to the mesh's
     bool is_strip = false;
-    bool is_all = false; // of strips: all of it moves one way
+    Course course = Course::to_and_fro; // of strips
 
     auto operator<=>(const Pattern&) const = default;
     bool is_nothing() const { return largest == no_contrast && bias == no_contrast; }
@@ -87,7 +94,7 @@ Pattern above(const Pattern& a, const Pattern& b) {
                 0,
                 std::max(a.quarters, b.quarters),
                 a.is_strip,
-                a.is_all || b.is_all};
+                std::max(a.course, b.course)};
     all.fading = a.bias == no_contrast ? b.fading : b.bias == no_contrast ? a.fading : std::min(a.fading, b.fading);
     return all;
 }
@@ -167,9 +174,11 @@ public:
     double area_distance(double contrast) const { return switch_distance(areas_, contrast); }
 
     // The distance, in widths, from which a long strip is invisible.
-    double strip_distance(double contrast, bool is_all) const {
-        const double invisible_deg =
-            0.5 * least_visible_width(strips_, contrast * (is_all ? 1 : model_.needed_by_outlines));
+    double strip_distance(double contrast, Course course) const {
+        const double needed = course == Course::to_and_fro ? model_.needed_by_outlines
+                              : course == Course::as_made  ? model_.needed_by_borders
+                                                           : 1;
+        const double invisible_deg = 0.5 * least_visible_width(strips_, contrast * needed);
         if (!std::isfinite(invisible_deg)) return 0;
         const double counted_deg =
             std::max(invisible_deg - model_.sampled_shift_px * screen_.pixel_deg, invisible_deg / 2);
@@ -344,7 +353,7 @@ private:
         const std::size_t first = switch_distance_.size();
         for (std::size_t bin = 0; bin < bins_; ++bin)
             switch_distance_.push_back(
-                static_cast<float>(eye(p.luminance, bin).strip_distance(Levels::contrast(p.largest), p.is_all)));
+                static_cast<float>(eye(p.luminance, bin).strip_distance(Levels::contrast(p.largest), p.course)));
         make_monotone(first);
     }
 
@@ -480,7 +489,9 @@ bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors
             strip.pattern = above(strip.pattern, own);
         }
         strip.length = errors[node].outline;
-        strip.pattern.is_all = strip.length >= whole_part * object_radius;
+        strip.pattern.course = strip.length >= whole_part * object_radius           ? Course::one_way
+                               : tree.bounds()[node].flags & vdtree::irregular_ring ? Course::as_made
+                                                                                    : Course::to_and_fro;
         strip.row = switch_distances.row(strip.pattern);
         cover(switch_distances, strip, strips[node]);
         strips[node] = strip;
@@ -567,9 +578,10 @@ double needed_sensitivity(const FoldModel& model, Degrees eccentricity) {
 }
 
 Result<void> validate(const FoldModel& m) {
-    for (const double factor : {m.neighbourhood, m.needed_by_outlines, m.peak_of_shift, m.moved_by_neighbours,
-                                m.contact_reach, m.least_sine, m.sampled_shift_px, m.amplitude_of_point_mean,
-                                m.amplitude_of_shift_mean, m.longest_ring, m.between_directions})
+    for (const double factor :
+         {m.neighbourhood, m.needed_by_outlines, m.needed_by_borders, m.peak_of_shift, m.moved_by_neighbours,
+          m.contact_reach, m.least_sine, m.sampled_shift_px, m.amplitude_of_point_mean, m.amplitude_of_shift_mean,
+          m.longest_ring, m.between_directions})
         if (!(factor >= 0 && std::isfinite(factor)))
             return Error{ErrorCode::invalid_argument, "fold test: the model's factors must be finite, and 0 or more"};
     for (std::size_t i = 0; i < m.needed.size(); ++i)
@@ -577,9 +589,9 @@ Result<void> validate(const FoldModel& m) {
             return Error{ErrorCode::invalid_argument, "fold test: the sensitivity needed, model.needed[" +
                                                           std::to_string(i) +
                                                           "], must be above 0 and not rise with the eccentricity"};
-    if (m.neighbourhood == 0 || m.needed_by_outlines == 0)
+    if (m.neighbourhood == 0 || m.needed_by_outlines == 0 || m.needed_by_borders == 0)
         return Error{ErrorCode::invalid_argument,
-                     "fold test: the model's neighbourhood and needed_by_outlines must be above 0"};
+                     "fold test: the model's neighbourhood, needed_by_outlines and needed_by_borders must be above 0"};
     if (m.most_side_by_side < 1 || m.most_side_by_side > FoldModel::largest_side_by_side)
         return Error{ErrorCode::invalid_argument, "fold test: the model's most_side_by_side must be from 1 to 64"};
     return {};
