@@ -392,11 +392,9 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
     add_fold_test_option(group, o.request.fold_test,
                          std::array{FoldTest::error, FoldTest::luebke_hallen, FoldTest::luebke_hallen_safe,
                                     FoldTest::extent, FoldTest::displacement},
-                         "error (perceptual: what folds change in fact; default), luebke-hallen (perceptual: what they "
-                         "could change at most), "
-                         "luebke-hallen-safe (the same with its known holes closed, more triangles), extent or "
-                         "displacement (in pixels; of --pixels: "
-                         "extent)");
+                         "error (perceptual: what folds change in fact; default), luebke-hallen-safe (perceptual: what "
+                         "they could change at most, more triangles), luebke-hallen (as published, unsafe: some folds "
+                         "can be seen), extent or displacement (in pixels; of --pixels: extent)");
     group.add_flag("--chroma", o.request.chroma,
                    "Keep changes of colour that can be seen, too, not only those of luminance");
     add_gaze_option(group, o.gaze_px);

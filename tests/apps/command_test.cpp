@@ -437,7 +437,7 @@ TEST_F(SimplifyTest, TheDefaultTestGoesByErrorsWhereTheseKnowTheScene) {
     };
     EXPECT_THAT(fold_test(simplify({})), StartsWith("error"));
     EXPECT_THAT(fold_test(simplify({"--chroma"})),
-                AllOf(StartsWith("luebke-hallen:"), HasSubstr("does not know colours")));
+                AllOf(StartsWith("luebke-hallen-safe:"), HasSubstr("does not know colours")));
     write_text(path("lights.json"),
                R"({"ambient": 0.2, "lights": [{"type": "directional", "direction": [0, 0, 1], "intensity": 0.8}]})");
     EXPECT_THAT(fold_test(simplify({"--lights", "lights.json"})),
