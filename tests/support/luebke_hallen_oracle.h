@@ -22,7 +22,7 @@ namespace unseen::support {
 inline std::vector<float> luebke_hallen_costs(const vdtree::VertexTree& tree, const vdtree::Viewpoint& viewpoint,
                                               const perception::FoldTestOptions& options) {
     using namespace perception;
-    constexpr double degrees = 180 / std::numbers::pi; // in a radian
+    constexpr double degrees = 180 / std::numbers::pi;                          // in a radian
     const CsfTable& csf = options.csf ? *options.csf : *csf_of(default_person); // which is kept
     const double pixel_deg = 1 / coarsest_pixels_per_degree(options.display).value();
     const std::size_t count = tree.interior_count();
