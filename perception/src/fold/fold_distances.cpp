@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <unordered_map>
 #include <vector>
 
@@ -35,18 +36,23 @@ constexpr Bins coarse_bins{degrees_per_bin, bin_count}, fine_bins{degrees_per_bi
 
 // The sensitivities that a test uses: to colour only where it looks at colour.
 struct Sensitivities {
-    const CsfTable& luminance;
-    const CsfTable* red_green = nullptr;
-    const CsfTable* yellow_violet = nullptr;
+    CsfTable luminance;
+    std::optional<CsfTable> red_green, yellow_violet;
 };
 
-Sensitivities sensitivities_for(const FoldTestOptions& options, bool has_chroma) {
-    Sensitivities all{options.csf ? *options.csf : CsfTable::standard()};
+// Whether patches are taken for gratings alone, as published, or for what else half a wave holds.
+enum class Patches { gratings, half_waves };
+
+Sensitivities sensitivities_for(const FoldTestOptions& options, bool has_chroma, Patches patches) {
+    const auto seen = [&](const CsfTable& table) {
+        return patches == Patches::half_waves ? table.of_half_waves() : table;
+    };
+    Sensitivities all{options.csf ? seen(*options.csf) : seen(CsfTable::standard()), {}, {}};
     if (!has_chroma) return all;
     static const CsfTable red_green = CsfTable::from_model(CsfModel::castle_red_green);
     static const CsfTable yellow_violet = CsfTable::from_model(CsfModel::castle_yellow_violet);
-    all.red_green = &red_green;
-    all.yellow_violet = &yellow_violet;
+    all.red_green = seen(red_green);
+    all.yellow_violet = seen(yellow_violet);
     return all;
 }
 
@@ -313,7 +319,7 @@ bool classify(const vdtree::SoundTree& tree, const Rings& rings, const FoldTestO
 }
 
 Result<DistanceCriterion> make_criterion(const vdtree::SoundTree& tree, const Rings& rings, std::vector<float> lengths,
-                                         const vdtree::View& view, const FoldTestOptions& options) {
+                                         Patches patches, const vdtree::View& view, const FoldTestOptions& options) {
     if (const auto valid = check_arguments(view, options); !valid) return valid.error();
     const Screen screen(view, options);
     const bool has_chroma = !rings.chroma.empty();
@@ -333,7 +339,7 @@ Result<DistanceCriterion> make_criterion(const vdtree::SoundTree& tree, const Ri
     for (std::size_t coarseness = 1;; coarseness *= 2) {
         Rows rows(!has_chroma && rings.vertices.empty(), classes.contrasts(), coarseness);
         if (!classify(tree, rings, options, classes, rows, parts.classes)) continue;
-        fill_table(parts, rows, classes, bins, screen, sensitivities_for(options, has_chroma));
+        fill_table(parts, rows, classes, bins, screen, sensitivities_for(options, has_chroma, patches));
         return DistanceCriterion::create(tree, std::move(parts));
     }
 }
@@ -352,7 +358,7 @@ Result<DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTree& tree
         chroma = std::move(*found);
     }
     rings.chroma = chroma;
-    return make_criterion(*sound, rings, {}, view, options);
+    return make_criterion(*sound, rings, {}, Patches::gratings, view, options);
 }
 
 Result<DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree& tree, const CutRings& cut_rings,
@@ -385,7 +391,7 @@ Result<DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree&
     const std::vector<float> own_lengths =
         rings.vertices.empty() ? std::vector<float>() : lengths; // which the criterion takes
     rings.lengths = own_lengths;
-    return make_criterion(*sound, rings, std::move(lengths), view, options);
+    return make_criterion(*sound, rings, std::move(lengths), Patches::half_waves, view, options);
 }
 
 vdtree::Viewpoint viewpoint_of(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options,
