@@ -34,8 +34,33 @@ Result<JudgedModel> JudgedModel::create(const render::Context& context, std::str
     return model;
 }
 
+Result<session::Session> JudgedModel::make_session(vdtree::VertexTree tree) const {
+    session::Scene scene = session::Scene::of(std::move(tree));
+    scene.background = background_;
+    session::Observer observer;
+    observer.display = display_;
+    return session::Session::create(std::move(scene), std::move(observer));
+}
+
+Result<void> JudgedModel::put(const perception::Display& display, std::optional<perception::Luminance> background) {
+    const auto is_same = [](const perception::Display& a, const perception::Display& b) { // of flat ones
+        return a.pixel_pitch == b.pixel_pitch && a.distance == b.distance && a.peak == b.peak && a.black == b.black;
+    };
+    if (is_same(display, display_) && background == background_) return {};
+    display_ = display;
+    background_ = background;
+    full_.reset();
+    for (Stand* const stand : {&plain_, &measured_}) {
+        if (!stand->session) continue;
+        auto made = make_stand(stand->session->tree().share());
+        if (!made) return made.error();
+        *stand = std::move(*made);
+    }
+    return {};
+}
+
 Result<JudgedModel::Stand> JudgedModel::make_stand(vdtree::VertexTree tree) {
-    auto session = session::Session::create(session::Scene::of(std::move(tree)));
+    auto session = make_session(std::move(tree));
     if (!session) return session.error();
     auto renderer = render::Renderer::create(*context_, session->tree());
     if (!renderer) return renderer.error();
@@ -115,12 +140,11 @@ Result<perception::Judgement> JudgedModel::judge(const Picture& picture, const s
                                                  Judge judge) {
     const auto reference = full();
     if (!reference) return reference.error();
-    perception::JudgeOptions options;
-    options.display = plain_.session->observer().display;
-    options.gaze_px = gaze_px;
+    const perception::Display& display = plain_.session->observer().display;
+    perception::JudgeOptions options{.display = display, .gaze_px = gaze_px};
     if (judge == Judge::second) {
-        options.csf = second_;
-        options.beta = 2;
+        options = perception::second_judge_options(perception::default_person, display, gaze_px);
+        if (second_ != usual_second) options.csf = second_, options.gain = perception::default_person.gain;
     }
     return perception::judge_modern(**reference, picture.luminance, options);
 }

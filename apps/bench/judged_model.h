@@ -15,12 +15,12 @@
 
 namespace unseen::app {
 
-// The judges. The first shares castleCSF with the fold tests; the second has another model of contrast sensitivity and
-// adds its bands up as squares.
+// The judges, of the default observer. The first shares castleCSF with the fold tests; the second has another model of
+// contrast sensitivity and adds its bands up as squares: perception::second_judge_options().
 enum class Judge { modern, second };
 inline constexpr std::array judges = {Judge::modern, Judge::second};
 inline constexpr perception::CsfModel usual_second =
-    perception::CsfModel::barten_1999; // of the eye's physics, not fitted to castleCSF's data
+    perception::CsfModel::barten_fitted; // of the eye's physics, by its own laws of area and of frequency
 
 struct Verdicts {
     vdtree::Index triangles = 0;
@@ -42,6 +42,8 @@ public:
     Result<session::Session*> session(FoldTest test);
     const vdtree::View& view() const { return view_; }
 
+    // From now on it is seen on such a flat screen, before this background (none: the usual one). Look anew then.
+    Result<void> put(const perception::Display& display, std::optional<perception::Luminance> background);
     // From now on everything is seen so. Of the options, the window's size is the model's own.
     Result<void> look(ViewOptions view);
 
@@ -68,6 +70,7 @@ private:
     JudgedModel() = default;
     Result<Stand*> stand(FoldTest test);
     Result<Stand> make_stand(vdtree::VertexTree tree);
+    Result<session::Session> make_session(vdtree::VertexTree tree) const;
     Result<session::Simplification> simplify(Stand& stand, const WhatOptions& what);
     Result<Picture> draw(Stand& stand, const WhatOptions& what, bool wireframe);
     Result<Picture> draw(Stand& stand, const vdtree::Cut& cut, bool wireframe);
@@ -76,6 +79,8 @@ private:
 
     std::optional<render::Context> context_;
     std::string name_;
+    perception::Display display_;
+    std::optional<perception::Luminance> background_;
     perception::CsfModel second_ = usual_second;
     vdtree::View view_;
     Stand plain_, measured_; // the second with the errors of folds; made when it is first asked for

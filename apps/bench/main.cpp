@@ -17,6 +17,7 @@
 #include "fit_bench.h"
 #include "options.h"
 #include "output_files.h"
+#include "people_bench.h"
 #include "perception_bench.h"
 #include "program.h"
 #include "report.h"
@@ -211,7 +212,8 @@ Command perception_command(CLI::App& app) {
             "of the dragon, unless it is named, only random views, from afar, and speed")
         ->type_name("MESH");
     verb->add_option("--other", o.others, "More of them, for the random views and from afar")->type_name("MESH");
-    verb->add_option("--only", a->only, "Groups: savings,random,far,hard,tolerance,csf,observers,speed (default: all)")
+    verb->add_option("--only", a->only,
+                     "Groups: savings,aside,random,far,hard,tolerance,csf,observers,speed (default: all)")
         ->type_name("LIST");
     verb->add_option("--reference", o.reference,
                      "Published sensitivities, as CSV (default: tests/data in the checkout)")
@@ -220,12 +222,17 @@ Command perception_command(CLI::App& app) {
     verb->add_option("--pictures", o.pictures, "A picture of each group: the worst views, and what the judge saw")
         ->type_name("FOLDER");
     verb->add_option("--second-judge", o.second_judge,
-                     "Its model of contrast sensitivity: barten-1999 (default), stela, daly, ...")
+                     "Its model of contrast sensitivity: barten-fitted (default), stela, daly, ...")
         ->type_name("MODEL")
         ->check(one_of(achromatic_models()));
     verb->add_option("--window", o.window_px, "Its side; promises are about 1024 (default)")
         ->type_name("PIXELS")
         ->check(whole(64, 4096));
+    verb->add_option("--views", o.random_views, "Random views (default: 72)")->type_name("N")->check(whole(1, 100000));
+    verb->add_option_function<std::uint64_t>(
+            "--seed", [&o](const std::uint64_t& seed) { o.seed = seed; },
+            "Of the random views, displays and backgrounds (default: drawn anew, and told)")
+        ->type_name("N");
     verb->add_flag("--quick", o.quick, "Few views: rough figures");
     add_targets_option(*verb, a->targets);
     add_report_options(*verb, a->report);
@@ -349,6 +356,32 @@ Command fit_command(CLI::App& app) {
     return {verb, [a] { return run(*a); }};
 }
 
+struct PeopleArguments {
+    std::string table;
+    ReportArguments report;
+};
+
+Result<int> run(PeopleArguments& a) {
+    auto bench = BenchRun::open({}, {}, a.report);
+    if (!bench) return bench.error();
+    const auto result =
+        bench_people(a.table.empty() ? find_in_checkout("data/people/achromatic_thresholds.csv").string() : a.table);
+    if (!result) return result.error();
+    return bench->close({{"rows", result->rows}}, result->tables);
+}
+
+Command people_command(CLI::App& app) {
+    auto a = std::make_shared<PeopleArguments>();
+    CLI::App* verb = app.add_subcommand(
+        "people", "How observers and models of sight compare with people's thresholds, and their fit");
+    verb->add_option("--table", a->table, "The thresholds (default: data/people in the checkout)")
+        ->type_name("FILE.csv")
+        ->check(CLI::Validator(CLI::ExistingFile).description(""));
+    add_report_options(*verb, a->report);
+    verb->footer("Examples:\n  unseen-bench people\n  unseen-bench people --table mine.csv --json -");
+    return {verb, [a] { return run(*a); }};
+}
+
 constexpr const char* about =
     "unseen-bench measures how fast, how small and how invisible Unseen is on this machine, against what is promised.";
 constexpr const char* examples = R"(Examples:
@@ -364,6 +397,7 @@ int main(int argc, char** argv) {
     using namespace unseen::app;
     return run_program(argc, argv, {"unseen-bench", about, examples, UNSEEN_VERSION, {}}, [](CLI::App& app) {
         return std::vector<Command>{engine_command(app), perception_command(app), effects_command(app),
-                                    budget_command(app), requests_command(app),   fit_command(app)};
+                                    budget_command(app), requests_command(app),   fit_command(app),
+                                    people_command(app)};
     });
 }

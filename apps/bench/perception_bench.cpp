@@ -6,6 +6,7 @@
 #include <iterator>
 #include <memory>
 #include <random>
+#include <span>
 
 #include <glm/geometric.hpp>
 
@@ -40,7 +41,8 @@ constexpr Index large_mesh = 50'000;          // triangles, of the meshes that a
 constexpr Index huge_mesh = 400'000;          // triangles, whose pictures take a minute each in software
 constexpr std::size_t huge_views = 6;         // random ones, of each such mesh
 constexpr Index lit_active = 100'000;         // triangles, under moving lights
-constexpr std::uint64_t random_seed = 20;
+// Of the group `aside`: where the viewer looks, from the window's centre, in degrees; 0: at everything.
+constexpr double eccentricities[] = {0, 6, 12, 20, 29, 40, 50, 70};
 
 const glm::dvec3 directions[] = {{0, 0, 1}, {1, 0, 0}, {1, 1, 1}};
 
@@ -57,7 +59,18 @@ struct Look {
     ViewOptions view;
     std::optional<glm::dvec2> gaze_px;
     std::string text;
+    struct Surroundings {
+        perception::Display display;
+        std::optional<perception::Luminance> background;
+    };
+    std::optional<Surroundings> around = {}; // none: the usual ones
 };
+
+Result<void> look(JudgedModel& model, const Look& how) {
+    const Look::Surroundings around = how.around.value_or(Look::Surroundings());
+    if (auto put = model.put(around.display, around.background); !put) return put;
+    return model.look(how.view);
+}
 
 // What was seen of one cut.
 struct Judged {
@@ -145,7 +158,7 @@ std::string words(const Judged& judged, const JudgedModel& model) {
 
 // The full model, the cut, its triangles, and what the judge sees.
 Result<void> add_exhibit(Sheet& sheet, JudgedModel& model, const Judged& judged) {
-    if (auto looked = model.look(judged.look.view); !looked) return looked;
+    if (auto looked = look(model, judged.look); !looked) return looked;
     WhatOptions full, what = what_of(judged.test, judged.look);
     full.request.goal = Goal::full();
     std::vector<Image> pictures;
@@ -203,10 +216,15 @@ public:
         const struct {
             const char* group;
             Result<void> (PerceptionBench::*measure)();
-        } steps[] = {{"savings", &PerceptionBench::savings},     {"random", &PerceptionBench::random_views},
-                     {"far", &PerceptionBench::far_away},        {"hard", &PerceptionBench::hard},
-                     {"tolerance", &PerceptionBench::tolerance}, {"csf", &PerceptionBench::csf},
-                     {"observers", &PerceptionBench::observers}, {"speed", &PerceptionBench::speed}};
+        } steps[] = {{"savings", &PerceptionBench::savings},
+                     {"aside", &PerceptionBench::aside},
+                     {"random", &PerceptionBench::random_views},
+                     {"far", &PerceptionBench::far_away},
+                     {"hard", &PerceptionBench::hard},
+                     {"tolerance", &PerceptionBench::tolerance},
+                     {"csf", &PerceptionBench::csf},
+                     {"observers", &PerceptionBench::observers},
+                     {"speed", &PerceptionBench::speed}};
         for (const auto& [group, measure] : steps)
             if (is_wanted(group))
                 if (auto measured = (this->*measure)(); !measured) return measured.error();
@@ -220,8 +238,8 @@ private:
     }
     Target target(std::string_view figure) const { return options_.targets.of("perception", figure); }
     bool needs_models() const {
-        return is_wanted("savings") || is_wanted("random") || is_wanted("far") || is_wanted("tolerance") ||
-               is_wanted("speed");
+        return is_wanted("savings") || is_wanted("aside") || is_wanted("random") || is_wanted("far") ||
+               is_wanted("tolerance") || is_wanted("speed");
     }
 
     // ---- models
@@ -293,11 +311,11 @@ private:
         return options_.quick ? std::vector{0.9, 0.2} : std::vector(std::begin(fills), std::end(fills));
     }
 
-    // Judges a look by all tests; what was found goes into `found`.
+    // Judges a look by all tests, or those asked for; what was found goes into `found`.
     Result<void> judge(const std::string& group, Models& models, std::size_t model, const Look& how,
-                       std::vector<Judged>& found) {
-        if (auto looked = models[model]->look(how.view); !looked) return looked;
-        for (const FoldTest test : tests) {
+                       std::vector<Judged>& found, std::span<const FoldTest> by = tests) {
+        if (auto looked = app::look(*models[model], how); !looked) return looked;
+        for (const FoldTest test : by) {
             const auto verdicts = models[model]->judge(what_of(test, how));
             if (!verdicts) return verdicts.error();
             found.push_back({group, model, how, test, *verdicts});
@@ -330,6 +348,7 @@ private:
         for (const FoldTest test : tests) {
             for (std::size_t j = 0; j < judges.size(); ++j) {
                 const Totals t = total(found, test, j);
+                if (t.views == 0) continue;
                 const std::string where = t.worst ? models[t.worst->model]->name() + ", " + t.worst->look.text : "";
                 BenchRow row{"visible pixels, " + what + ", " + name_of(test),
                              "",
@@ -456,10 +475,12 @@ private:
         return order;
     }
 
+    // On all kinds of displays, before anything from black to white, at all sizes, looked at and aside.
     Result<void> random_views() {
-        const std::size_t count = options_.quick ? std::min<std::size_t>(models_.size(), 6) : 72;
+        const std::size_t count = options_.quick ? std::min<std::size_t>(models_.size(), 6) : options_.random_views;
         const std::vector<std::size_t> order = models_of_random_views(count);
-        std::mt19937_64 random(random_seed);
+        const std::uint64_t seed = options_.seed ? *options_.seed : std::random_device()();
+        std::mt19937_64 random(seed);
         const auto uniform = [&](double low, double high) {
             return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
         };
@@ -473,17 +494,87 @@ private:
                 how.view.fov_degrees = uniform(10, 70);
                 how.text += ", field " + rounded(*how.view.fov_degrees, 3);
             }
+            perception::Display display;
+            std::optional<perception::Luminance> background;
+            if (i % 4 >= 2) {
+                const double ppd = 20 * std::pow(6.0, uniform(0, 1)); // to 120
+                set_pixels_per_degree(display, perception::PixelsPerDegree(ppd));
+                if (uniform(0, 1) < 0.5) display.peak = perception::Luminance(1000);
+                background = to_luminance(display, std::pow(uniform(0, 1), 3));
+                how.text += ", " + rounded(ppd, 3) + " pixels per degree, " + rounded(display.peak.value(), 4) +
+                            " cd/m2, before " + rounded(background->value(), 3);
+            }
+            how.around = {display, background};
             if (i % 2) {
-                const double aside = uniform(0, 40), where = uniform(0, 2 * std::numbers::pi);
+                const double degrees = uniform(0, 70), where = uniform(0, 2 * std::numbers::pi);
                 const glm::dvec2 centre(options_.window_px * 0.5);
-                const double px = session::gaze_aside({}, window(), aside).x - centre.x;
+                const double px = session::gaze_aside(display, window(), degrees).x - centre.x;
                 how.gaze_px = centre + px * glm::dvec2(std::cos(where), std::sin(where));
-                how.text.replace(how.text.rfind("fovea"), 5, "gaze " + rounded(aside, 3) + " degrees aside");
+                how.text.replace(how.text.rfind("fovea"), 5, "gaze " + rounded(degrees, 3) + " degrees aside");
             }
             if (auto ok = judge("random", models_, order[i], how, found); !ok) return ok;
         }
-        add_visibility_rows(std::to_string(count) + " random views", found, models_);
+        add_visibility_rows(std::to_string(count) + " random views, seed " + std::to_string(seed), found, models_);
         return write_worst(found, models_, "random.png");
+    }
+
+    // ---- where the viewer looks
+
+    // The promised test by eccentricity: of the models, and of regular patterns, whose errors are alike everywhere.
+    Result<void> aside() {
+        Models models;
+        for (std::size_t m = 0; m < main_models_; ++m) models.push_back(std::move(models_[m]));
+        for (const HardMesh& mesh : open_sheets(options_.quick ? 3'000 : 60'000)) {
+            if (mesh.name.find("waves") == mesh.name.npos) continue;
+            auto tree = build_hard_tree(mesh);
+            if (!tree) return tree.error();
+            auto model = JudgedModel::create(*context_, mesh.name, std::move(*tree), options_.window_px, second_);
+            if (!model) return model.error();
+            models.push_back(std::make_unique<JudgedModel>(std::move(*model)));
+            if (options_.quick) break;
+        }
+        const double near_and_far[] = {0.9, 0.3}; // of the window's height
+        std::vector<Judged> found;
+        const std::size_t fill_count = options_.quick ? 1 : std::size(near_and_far);
+        const std::size_t all = models.size() * fill_count * direction_count();
+        std::size_t done = 0;
+        for (std::size_t m = 0; m < models.size(); ++m)
+            for (std::size_t f = 0; f < fill_count; ++f)
+                for (std::size_t d = 0; d < direction_count(); ++d) {
+                    progress(done++, all, "aside");
+                    for (const double degrees : eccentricities)
+                        if (auto ok = judge("aside", models, m, look(directions[d], near_and_far[f], degrees), found,
+                                            {&promised, 1});
+                            !ok)
+                            return ok;
+                }
+        BenchTable details{
+            "By where the viewer looks, degrees from the window's centre; " + std::to_string(all) + " views each, of " +
+                std::to_string(models.size()) + " meshes: V of the default observer by both judges, median and largest",
+            {{"degrees aside", "triangles of the models", "V", "largest", "second: V", "largest", "visible pixels"}}};
+        for (std::size_t e = 0; e < std::size(eccentricities); ++e) {
+            std::vector<double> v[judges.size()];
+            std::uint64_t pixels = 0, kept = 0;
+            for (std::size_t i = e; i < found.size(); i += std::size(eccentricities)) {
+                for (std::size_t j = 0; j < judges.size(); ++j) {
+                    v[j].push_back(found[i].verdicts.largest[j]);
+                    pixels += found[i].verdicts.visible_pixels[j];
+                }
+                if (found[i].model < main_models_) kept += found[i].verdicts.triangles;
+            }
+            std::vector<std::string> row = {eccentricities[e] > 0 ? rounded(eccentricities[e], 2) : "looked at",
+                                            grouped(kept)};
+            for (auto& of_judge : v) {
+                row.push_back(rounded(median(of_judge), 2));
+                row.push_back(rounded(*std::max_element(of_judge.begin(), of_judge.end()), 3));
+            }
+            row.push_back(grouped(pixels));
+            details.rows.push_back(std::move(row));
+        }
+        result_.details.push_back(std::move(details));
+        add_visibility_rows(std::to_string(found.size()) + " views by where the viewer looks", found, models);
+        for (std::size_t m = 0; m < main_models_; ++m) models_[m] = std::move(models[m]);
+        return {};
     }
 
     // ---- far away

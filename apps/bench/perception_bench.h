@@ -2,6 +2,8 @@
 // are, and what they cost; against what was promised.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,8 +11,8 @@
 
 namespace unseen::app {
 
-inline constexpr const char* perception_groups[] = {"savings",   "random", "far",       "hard",
-                                                    "tolerance", "csf",    "observers", "speed"};
+inline constexpr const char* perception_groups[] = {"savings",   "aside", "random",    "far",  "hard",
+                                                    "tolerance", "csf",   "observers", "speed"};
 
 struct PerceptionBenchOptions {
     std::vector<std::string>
@@ -19,9 +21,11 @@ struct PerceptionBenchOptions {
     std::vector<std::string> only;   // of perception_groups; empty: all
     std::string pictures;            // a folder for a picture of each group; empty: none
     std::string reference;           // a folder of published sensitivities; empty: the checkout's own
-    std::string second_judge;        // its model of contrast sensitivity; empty: Barten's of 1999
+    std::string second_judge;        // its model of contrast sensitivity; empty: Barten's, fitted
     int window_px = 1024;
-    bool quick = false; // few views
+    std::size_t random_views = 72;
+    std::optional<std::uint64_t> seed; // of random views; none: drawn anew
+    bool quick = false;                // few views
     Targets targets = Targets::built_in();
 };
 

@@ -373,6 +373,7 @@ Result<std::vector<BenchRow>> bench_observers(const SensitivityBenchOptions& opt
         ObserverErrors of_few{description, 0, 0}, of_many{description, 0, 0};
         for (int run = 1; run <= runs; ++run) {
             calibration::CalibrationPlan plan = calibration::plan_for(display, CsfTable::standard());
+            std::erase_if(plan.places, [](const calibration::GratingPlace& p) { return p.is_wide(); });
             plan.trials = many;
             plan.seed = static_cast<std::uint64_t>(run);
             auto procedure = calibration::Procedure::create(plan, CsfTable::standard());

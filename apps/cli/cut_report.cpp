@@ -61,10 +61,8 @@ std::string visibility_text(const session::Report& s, const session::Observer& o
 
     const bool is_default_display =
         display.file.empty() && !display.pixels_per_degree && !display.peak_cdm2 && !display.black_cdm2;
-    text += ": by the " +
-            (display.csf.empty() ? "default observer (castleCSF, a typical person)" : "observer " + display.csf) +
-            " and judge (fold test " + session::name_of(s.fold_tests.front()) + "), " + where + ", on " +
-            (is_default_display ? "the default display" : "this display") + ", ";
+    text += ": by " + describe(observer) + " and the judge (fold test " + session::name_of(s.fold_tests.front()) +
+            "), " + where + ", on " + (is_default_display ? "the default display" : "this display") + ", ";
     if (!observer.gaze) return text + "wherever the gaze";
     const auto tenths = [](double px) { return shortest(std::round(10 * px) / 10); };
     return text + "with the gaze at pixel " + tenths(observer.gaze->px.x) + " " + tenths(observer.gaze->px.y);

@@ -23,6 +23,8 @@ constexpr OptionName option_names[] = {
     {"request.milliseconds", "--milliseconds"},
     {"request.threshold", "--threshold"},
     {"observer.csf", "--csf"},
+    {"observer.velocity", "--velocity"},
+    {"observer.person", "--observer"},
     {"scene.lights", "--lights"},
     {"Scene::relight()", "--light, --ambient or --fill-light"},
     {"read.drop = ", "--drop "},

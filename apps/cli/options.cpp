@@ -10,6 +10,7 @@
 #include <memory>
 
 #include <perception/criterion.h>
+#include <perception/motion.h>
 #include <vdtree/internal/number_text.h>
 
 #include "option_names.h"
@@ -354,8 +355,14 @@ void add_display_options(CLI::App& verb, DisplayOptions& o) {
     add_number(group, "--peak", o.peak_cdm2, positive(), "CDM2", "Luminance of white");
     add_number(group, "--black", o.black_cdm2, positive(), "CDM2", "Luminance of black");
     group
+        .add_option("--observer", o.observer,
+                    "Who looks: median (half of all people see more), default (one in twelve does), strict (one in "
+                    "twenty), or the table of a viewer whom unseen calibrate measured")
+        ->type_name("NAME|FILE");
+    group
         .add_option("--csf", o.csf,
-                    "Contrast sensitivity: a model of unseen csf (default: castle), or a viewer's table")
+                    "Contrast sensitivity: a model of unseen csf (default: castle) for the observer, or a viewer's "
+                    "table")
         ->type_name("MODEL|FILE");
 }
 
@@ -393,6 +400,9 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
     group.add_flag("--chroma", o.request.chroma,
                    "Keep changes of colour that can be seen, too, not only those of luminance");
     add_gaze_option(group, o.gaze_px);
+    add_number(
+        group, "--velocity", o.velocity_deg_s, within(0, perception::fastest_velocity.value()), "DEG/S",
+        "How fast everything moves on the retina: what is fine blurs, what is coarse is seen better (default: 0)");
     group.callback([=, &o] {
         Goal::Kind& kind = o.request.goal.kind;
         const std::size_t given =

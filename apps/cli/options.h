@@ -13,6 +13,7 @@
 #include <glm/vec3.hpp>
 
 #include <meshio/mesh_io.h>
+#include <perception/units.h>
 #include <session/gaze_player.h>
 #include <session/request.h>
 
@@ -52,7 +53,8 @@ struct ViewOptions {
 struct DisplayOptions {
     std::string file;
     std::optional<double> pixels_per_degree, distance_m, peak_cdm2, black_cdm2;
-    std::string csf; // a model's name or a file's
+    std::string observer; // a person's name or a file's
+    std::string csf;      // a model's name or a file's
 };
 
 // A number of triangles, or a share of the model's.
@@ -73,6 +75,8 @@ struct WhatOptions {
     // For a model with so many triangles.
     session::Request request_for(std::uint64_t source_triangles) const;
     std::optional<glm::dvec2> gaze_px;
+    std::optional<double> velocity_deg_s; // of everything, on the retina
+    perception::DegreesPerSecond velocity() const { return perception::DegreesPerSecond(velocity_deg_s.value_or(0)); }
 };
 
 // Where gazes come from; a fixed one is WhatOptions::gaze_px.

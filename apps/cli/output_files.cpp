@@ -41,7 +41,7 @@ Result<void> make_folder(const fs::path& folder) {
 } // namespace
 
 std::vector<std::string> inputs_of(const std::string& model, const ViewOptions& view, const DisplayOptions& display) {
-    return {model, view.lights, view.texture.file, display.file, display.csf};
+    return {model, view.lights, view.texture.file, display.file, display.observer, display.csf};
 }
 
 Result<void> check_outputs(const std::vector<std::string>& inputs, const std::vector<std::string>& outputs) {

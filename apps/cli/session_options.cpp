@@ -28,12 +28,9 @@ Result<Surroundings> read_surroundings(const ViewOptions& view, const DisplayOpt
     if (const auto background = session::relative_background(*shown_on, background_of(view)); !background)
         return background.error();
     Surroundings around;
-    if (!display.csf.empty()) {
-        auto table = session::read_csf_table(display.csf, *shown_on);
-        if (!table) return table.error();
-        around.observer.csf = std::move(*table);
-    }
-    around.observer.display = std::move(*shown_on);
+    auto observer = make_observer(display, *shown_on);
+    if (!observer) return observer.error();
+    around.observer = std::move(*observer);
     if (!view.lights.empty()) {
         auto read = calibration::LightRig::read(view.lights);
         if (!read) return read.error();
@@ -73,6 +70,27 @@ Result<perception::Display> make_display(const DisplayOptions& options) {
     if (options.black_cdm2) display.black = perception::Luminance(*options.black_cdm2);
     if (auto valid = perception::validate(display); !valid) return valid.error();
     return display;
+}
+
+Result<session::Observer> make_observer(const DisplayOptions& options, const perception::Display& display) {
+    session::Observer observer;
+    observer.display = display;
+    if (!options.observer.empty()) {
+        auto chosen = session::choose_observer(options.observer);
+        if (!chosen) return chosen.error();
+        observer.person = chosen->person;
+        observer.csf = std::move(chosen->csf);
+    }
+    if (options.csf.empty()) return observer;
+    const auto chosen = session::choose_csf(options.csf);
+    if (!chosen) return chosen.error();
+    if (observer.csf || (chosen->table && !options.observer.empty()))
+        return Error{ErrorCode::invalid_argument,
+                     "--observer and --csf exclude each other where one of them is a viewer's table: give that alone."};
+    auto table = session::read_csf_table(options.csf, display, observer.person);
+    if (!table) return table.error();
+    observer.csf = std::move(*table);
+    return observer;
 }
 
 Result<session::Session> open_session(const std::filesystem::path& model, const ViewOptions& view,

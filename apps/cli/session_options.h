@@ -14,6 +14,8 @@ session::Messages terminal_messages();
 
 // The display that the options describe; ranges are checked.
 Result<perception::Display> make_display(const DisplayOptions& options);
+// Who looks at that display, without a gaze.
+Result<session::Observer> make_observer(const DisplayOptions& options, const perception::Display& display);
 
 // Fails on a file that cannot be read, and on options that contradict the model or the display. What is quickly read is
 // read first.

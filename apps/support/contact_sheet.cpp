@@ -129,6 +129,7 @@ private:
         options.display = session_.observer().display;
         if (column.cut.gaze) options.gaze_px = column.cut.gaze->px;
         options.csf_table = session_.observer().csf;
+        options.gain = options.csf_table ? 1 : session_.observer().person.gain;
         auto judgement = perception::judge_modern(full, column.luminance, options);
         if (!judgement) return judgement.error();
         column.cut.judgement = std::move(*judgement);

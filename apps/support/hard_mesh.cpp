@@ -246,6 +246,12 @@ std::vector<HardMesh> tuning_meshes(int triangles) {
     meshes.push_back({"lenses", std::move(lenses)});
     meshes.push_back({"column", net(8, triangles / 16, true, column)}); // of long triangles
     meshes.push_back({"boxes", std::move(boxes)});
+    // Regular patterns, whose errors are alike everywhere.
+    meshes.push_back({"waves", waved_sheet(2 * rows, 0.0015, 14)});
+    meshes.push_back({"dimples", moved(sphere, [](glm::dvec3 p) {
+                          const double turn = std::atan2(p.z, p.x), tilt = std::asin(std::clamp(p.y, -1.0, 1.0));
+                          return p * (1 + 0.0015 * std::cos(tilt) * std::sin(36 * turn) * std::sin(36 * tilt));
+                      })});
     return meshes;
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -40,6 +41,7 @@ struct CalibrateArguments {
     std::optional<Method> method;
     std::optional<double> seed, trials, settings, luminance;
     std::vector<double> frequencies, eccentricities;
+    std::optional<bool> wide; // patches among the places; default: where the places are not named
     DisplayOptions display;
     CalibrationWindowOptions window;
 };
@@ -76,9 +78,23 @@ Result<CalibrationPlan> make_plan(const CalibrateArguments& a, const perception:
     CalibrationPlan plan = calibration::plan_for(display, expected, luminance);
     if (a.method) plan.method = *a.method;
     if (a.seed) plan.seed = static_cast<std::uint64_t>(*a.seed);
-    if (a.trials) plan.trials = static_cast<int>(*a.trials);
     if (a.settings) plan.settings = static_cast<int>(*a.settings);
-    if (std::vector<GratingPlace> named = places_named(a); !named.empty()) plan.places = std::move(named);
+    if (std::vector<GratingPlace> named = places_named(a); !named.empty() || a.wide) {
+        std::erase_if(plan.places, std::mem_fn(&GratingPlace::is_wide));
+        if (!named.empty()) plan.places = std::move(named);
+        plan.trials = CalibrationPlan().trials;
+        if (a.wide.value_or(false)) {
+            for (const GratingPlace& place : calibration::wide_places(plan, display, expected)) {
+                plan.places.push_back(place);
+                plan.trials += calibration::trials_of_wide_place;
+            }
+            if (!plan.places.empty() && !plan.places.back().is_wide())
+                return invalid_argument("No wide patch fits the display '" + display.name +
+                                        "' at these frequencies and eccentricities: leave --wide away, or add lower "
+                                        "--frequencies.");
+        }
+    }
+    if (a.trials) plan.trials = static_cast<int>(*a.trials);
     if (plan.places.empty())
         return invalid_argument("No grating fits the display '" + display.name +
                                 "': give --frequencies and --eccentricities.");
@@ -101,9 +117,12 @@ Result<void> check_resumed(const CalibrateArguments& a, const CalibrationPlan& p
     compare("--settings", a.settings, plan.settings);
     compare("--seed", a.seed, static_cast<double>(plan.seed));
     compare("--luminance", a.luminance, plan.luminance.value());
+    std::vector<GratingPlace> small = plan.places;
+    std::erase_if(small, std::mem_fn(&GratingPlace::is_wide));
     const std::vector<GratingPlace> named = places_named(a);
-    if (!named.empty() && !std::is_permutation(named.begin(), named.end(), plan.places.begin(), plan.places.end()))
+    if (!named.empty() && !std::is_permutation(named.begin(), named.end(), small.begin(), small.end()))
         add("--frequencies and --eccentricities", "");
+    if (a.wide && *a.wide != (small.size() < plan.places.size())) add(*a.wide ? "--wide" : "--no-wide", "");
     if (differing.empty()) return {};
     return invalid_argument("'" + a.state + "' was not begun so: leave away " + differing +
                             ", or begin anew with another file.");
@@ -122,7 +141,9 @@ Result<void> check_display(const CalibrationPlan& plan, const perception::Displa
         if (!calibration::fits(display, place))
             return invalid_argument("The display '" + display.name + "' has no room for a grating of " +
                                     shortest(place.frequency_cpd) + " cpd at " + shortest(place.eccentricity_deg) +
-                                    " degrees: choose other --frequencies and --eccentricities.");
+                                    " degrees" +
+                                    (place.is_wide() ? " over " + shortest(place.area_deg2) + " deg2" : "") +
+                                    ": choose other --frequencies and --eccentricities.");
     return {};
 }
 
@@ -157,13 +178,17 @@ Json to_json(const Procedure& procedure, const SimulatedObserver* truth) {
     const CalibrationPlan& plan = procedure.plan();
     Json measured = Json::array();
     for (const PlaceEstimate& e : procedure.estimates()) {
-        Json row = {{"frequency_cpd", e.place.frequency_cpd},
-                    {"eccentricity_deg", e.place.eccentricity_deg},
-                    {"sensitivity", e.sensitivity()},
-                    {"low", e.low()},
-                    {"high", e.high()},
-                    {"answers", e.answers},
-                    {"off_shape_db", 20 * e.local.mean}};
+        Json row = {
+            {"frequency_cpd", e.place.frequency_cpd},
+            {"eccentricity_deg", e.place.eccentricity_deg},
+            {"sensitivity", e.sensitivity()},
+            {"low", e.low()},
+            {"high", e.high()},
+            {"answers", e.answers},
+            {"area_deg2", e.place.is_wide()
+                              ? e.place.area_deg2
+                              : perception::patch_area(perception::CyclesPerDegree(e.place.frequency_cpd)).value()},
+            {"off_shape_db", 20 * e.local.mean}};
         if (truth) {
             const double value = truth->sensitivity(e.place, plan.luminance);
             row["true_sensitivity"] = value;
@@ -175,16 +200,21 @@ Json to_json(const Procedure& procedure, const SimulatedObserver* truth) {
                  {"answers", procedure.answers().size()},    {"done", procedure.is_done()},
                  {"luminance_cdm2", plan.luminance.value()}, {"highest_contrast", plan.highest_contrast},
                  {"misfit_db", misfit_db(procedure)},        {"measured", measured}};
+    if (const auto summation = procedure.summation()) {
+        json["summation"] = {{"own", summation->own}, {"low", summation->low}, {"high", summation->high}};
+        if (truth) json["summation"]["true"] = truth->summation;
+    }
     if (truth) json["rms_error_db"] = number_or_null(rms_db(procedure, *truth));
     return json;
 }
 
 void print(const Procedure& procedure, const SimulatedObserver* truth) {
     std::vector<std::vector<std::string>> rows = {
-        {"eccentricity", "frequency", "sensitivity", "95% from", "to", "answers", "off shape"}};
+        {"eccentricity", "frequency", "patch", "sensitivity", "95% from", "to", "answers", "off shape"}};
     if (truth) rows.front().insert(rows.front().end(), {"true", "error"});
     for (const PlaceEstimate& e : procedure.estimates()) {
         rows.push_back({rounded(e.place.eccentricity_deg, 3) + " deg", rounded(e.place.frequency_cpd, 3) + " cpd",
+                        e.place.is_wide() ? rounded(e.place.area_deg2, 3) + " deg2" : "1.5 cycles",
                         rounded(e.sensitivity(), 3), rounded(e.low(), 3), rounded(e.high(), 3),
                         std::to_string(e.answers), rounded(20 * e.local.mean, 2) + " dB"});
         if (!truth) continue;
@@ -197,6 +227,12 @@ void print(const Procedure& procedure, const SimulatedObserver* truth) {
     std::printf("%zu answers at %s cd/m2, contrasts up to %s; off the fitted shape by %s dB (rms)\n",
                 procedure.answers().size(), rounded(procedure.plan().luminance.value(), 4).c_str(),
                 rounded(procedure.plan().highest_contrast, 3).c_str(), rounded(misfit_db(procedure), 2).c_str());
+    if (const auto summation = procedure.summation())
+        std::printf(
+            "wide patches: unlimited ones are seen %s times as well as castleCSF's law of area says (95%%: %s to "
+            "%s)%s\n",
+            rounded(summation->own, 3).c_str(), rounded(summation->low, 3).c_str(), rounded(summation->high, 3).c_str(),
+            truth ? ("; the truth is " + rounded(truth->summation, 3)).c_str() : "");
     if (!truth) return;
     if (const double error_db = rms_db(procedure, *truth); std::isnan(error_db))
         std::printf("this observer can see none of it: no error to tell\n");
@@ -216,6 +252,7 @@ Result<calibration::ObserverProfile> profile_of(const Procedure& procedure, cons
     profile.measured_at_cdm2 = procedure.plan().luminance.value();
     for (const PlaceEstimate& e : procedure.estimates())
         profile.measured.push_back({e.place, e.sensitivity(), e.low(), e.high(), e.answers});
+    profile.summation = procedure.summation().value_or(calibration::Summation());
     auto table = procedure.table(profile.observer + ", " + profile.date + ", " + profile.method);
     if (!table) return table.error();
     profile.table = std::move(*table);
@@ -236,7 +273,7 @@ void simulate(Procedure& procedure, const SimulatedObserver& observer) {
 
 Result<perception::CsfTable> expected_table(const CalibrateArguments& a, const perception::Display& display) {
     if (a.display.csf.empty()) return perception::CsfTable::standard();
-    const auto table = session::read_csf_table(a.display.csf, display);
+    const auto table = session::read_csf_table(a.display.csf, display, perception::median_person);
     if (!table) return table.error();
     return **table;
 }
@@ -283,6 +320,8 @@ Result<int> calibrate_observer(CalibrateArguments& a, const perception::Display&
             return a.out.empty() && a.json.empty() ? exit_done : exit_failed; // nothing is written
         }
     }
+    if (const auto summation = procedure->summation())
+        if (auto ok = calibration::check(*summation, procedure->plan()); !ok) return ok.error();
     const SimulatedObserver* truth = observer ? &*observer : nullptr;
     if (auto ok = report->prepare(to_json(*procedure, truth)); !ok) return ok.error();
     if (!a.out.empty()) {
@@ -363,10 +402,11 @@ void check(const CalibrateArguments& a) {
     if (!a.photometer.empty() && a.out.empty()) refuse("--photometer needs -o DISPLAY.json for what was measured.");
     const bool is_of_display = a.chart || a.gamma || !a.photometer.empty();
     if (is_of_display && !a.json.empty()) refuse("--json is for observers.");
-    const bool has_plan = a.method || a.seed || a.trials || a.settings || a.luminance || !a.frequencies.empty();
+    const bool has_plan =
+        a.method || a.seed || a.trials || a.settings || a.luminance || !a.frequencies.empty() || a.wide;
     if (is_of_display && (has_plan || !a.state.empty()))
-        refuse("--method, --seed, --trials, --settings, --luminance, --frequencies, --eccentricities and --resume are "
-               "for observers.");
+        refuse("--method, --seed, --trials, --settings, --luminance, --frequencies, --eccentricities, --wide and "
+               "--resume are for observers.");
     if (a.trials && a.method == Method::adjustment)
         refuse("--trials is for --method 2ifc: with adjustment, say --settings.");
     const bool may_be_adjustment = a.method ? *a.method == Method::adjustment : !a.state.empty(); // of a file, its own
@@ -385,15 +425,15 @@ Command calibrate_command(CLI::App& app) {
     add_choice<std::optional<Method>, Method>(
         *verb, "--method", a->method, {{"2ifc", Method::two_interval}, {"adjustment", Method::adjustment}},
         "2ifc (default): in which of two intervals was a grating? adjustment: gratings fade in and out");
-    add_number(*verb, "--trials", a->trials, whole(1, 1e5), "N", "Of 2ifc (default: 200)");
+    add_number(*verb, "--trials", a->trials, whole(1, 1e5), "N", "Of 2ifc (default: 200, and 10 for each wide patch)");
     add_number(*verb, "--settings", a->settings, whole(2, 1000), "N",
                "Of adjustment, at each place; the first does not count (default: 7)");
     constexpr double most_seed = 9007199254740992.0; // 2^53, which JSON keeps
     add_number(*verb, "--seed", a->seed, whole(0, most_seed), "N",
                "Of the order of trials, and of simulated observers (default: 1)");
     verb->add_option("--simulate", a->simulate,
-                     "Without a person: a CSF model or a profile, with gain=, frequency=, eccentricity=, slope=, "
-                     "lapse=, scatter=, delay=")
+                     "Without a person: a CSF model or a profile, with gain=, frequency=, eccentricity=, "
+                     "summation=, slope=, lapse=, scatter=, delay=")
         ->type_name("NAME|FILE.json[:key=value,...]");
     verb->add_option("--resume", a->state,
                      "Keep all answers in this file, and go on with those that are there, by the plan that is there")
@@ -404,6 +444,10 @@ Command calibrate_command(CLI::App& app) {
     verb->add_option("--eccentricities", a->eccentricities, "To measure at (default: 0, 5, 10, 20 as far as they fit)")
         ->type_name("DEG")
         ->check(not_negative());
+    // Not by its address: the parser takes an optional<bool> for a count and begins with 0.
+    verb->add_flag_function(
+        "--wide,!--no-wide", [o = a.get()](std::int64_t count) { o->wide = count > 0; },
+        "Measure wide patches, too, or not (default: unless places are named)");
     add_number(*verb, "--luminance", a->luminance, positive(), "CDM2",
                "Mean of the gratings (default: midway from black to white)");
     verb->add_option("--observer", a->observer, "Who it is, for the profile")->type_name("NAME");

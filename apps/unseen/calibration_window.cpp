@@ -137,7 +137,8 @@ public:
         trial_ = procedure_.next();
         stage_.set_title("Unseen - calibration, " + std::to_string(trial_.number + 1) + " of " +
                          std::to_string(procedure_.trials()) + ": " + rounded(trial_.grating.frequency_cpd, 3) +
-                         " cpd, " + rounded(trial_.grating.eccentricity_deg, 3) + " deg");
+                         " cpd, " + rounded(trial_.grating.eccentricity_deg, 3) + " deg" +
+                         (trial_.grating.is_wide() ? ", wide" : ""));
         aim();
         return procedure_.plan().method == Method::two_interval ? two_intervals() : adjustment();
     }
@@ -146,14 +147,14 @@ private:
     // The cross in the middle where the patch fits beside it, else as far to the left as need be.
     void aim() {
         const double half = perception::physical_field(options_.display, options_.display.width_px).value() / 2;
-        const double reach = 3 / trial_.grating.frequency_cpd; // two standard deviations of the patch
+        const double reach = 2 * trial_.grating.sigma_deg(); // of the patch
         const double at = std::max(0.0, std::min(trial_.grating.eccentricity_deg, half - reach));
         stage_.cross = std::tan((at - trial_.grating.eccentricity_deg) / perception::degrees_per_radian);
         pattern_.kind = TestPattern::Kind::grating;
         pattern_.tangent_per_pixel = options_.display.pixel_pitch / options_.display.distance;
         pattern_.mean = procedure_.plan().luminance.value();
         pattern_.frequency_cpd = trial_.grating.frequency_cpd;
-        pattern_.sigma_deg = 1.5 / trial_.grating.frequency_cpd;
+        pattern_.sigma_deg = trial_.grating.sigma_deg();
         pattern_.phase_deg = trial_.phase_deg;
         pattern_.centre = {std::tan(at / perception::degrees_per_radian), 0};
         pattern_.contrast = 0;

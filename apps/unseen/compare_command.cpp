@@ -7,7 +7,6 @@
 
 #include <perception/image.h>
 #include <perception/judge.h>
-#include <perception/summing_judge.h>
 
 #include "output_files.h"
 #include "report.h"
@@ -25,12 +24,12 @@ using perception::Judgement;
 
 constexpr const char* perceptualdiff = "perceptualdiff";
 
-enum class Model { modern, summing, rpg99 };
+enum class Model { modern, second, rpg99 };
 
 struct CompareArguments {
     std::string reference, test, map, threshold_map, json, profile, observer_name, model_name = "modern";
     Model model = Model::modern;
-    perception::Person observer = perception::default_person; // of the judge that sums
+    perception::Person observer = perception::default_person;
     DisplayOptions display;
     std::optional<glm::dvec2> gaze_px;
     std::optional<double> field_degrees;
@@ -64,31 +63,34 @@ struct Verdict {
     std::optional<Image> threshold_map;
 };
 
-// The judges modern and summing.
-Result<Verdict> judge_by_bands(const CompareArguments& a, const Pair& pair, const perception::Display& display) {
-    const Image reference = perception::to_luminance(pair.reference, display);
-    const Image test = perception::to_luminance(pair.test, display);
+Result<perception::JudgeOptions> judge_options(const CompareArguments& a, const perception::Display& display) {
+    if (a.model == Model::second) return perception::second_judge_options(a.observer, display, a.gaze_px);
     perception::JudgeOptions options;
     options.display = display;
     options.gaze_px = a.gaze_px;
-    if (!a.display.csf.empty()) {
-        auto chosen = session::choose_csf(a.display.csf);
-        if (!chosen) return chosen.error();
-        if (chosen->model) options.csf = *chosen->model;
-        if (chosen->table) options.csf_table = std::make_shared<const perception::CsfTable>(*std::move(chosen->table));
+    options.gain = a.observer.gain;
+    if (a.display.csf.empty()) return options;
+    auto chosen = session::choose_csf(a.display.csf);
+    if (!chosen) return chosen.error();
+    if (chosen->model) options.csf = *chosen->model;
+    if (chosen->table) {
+        options.csf_table = std::make_shared<const perception::CsfTable>(*std::move(chosen->table));
+        options.gain = 1; // a viewer is one observer
     }
-    if (a.model == Model::summing) {
-        const auto judge = perception::SummingJudge::create(reference, options, a.observer.gain);
-        if (!judge) return judge.error();
-        auto judgement = judge->judge(test);
-        if (!judgement) return judgement.error();
-        return Verdict{std::move(*judgement), {}};
-    }
-    auto judgement = perception::judge_modern(reference, test, options);
+    return options;
+}
+
+// The judges modern and second.
+Result<Verdict> judge_by_bands(const CompareArguments& a, const Pair& pair, const perception::Display& display) {
+    const Image reference = perception::to_luminance(pair.reference, display);
+    const Image test = perception::to_luminance(pair.test, display);
+    const auto options = judge_options(a, display);
+    if (!options) return options.error();
+    auto judgement = perception::judge_modern(reference, test, *options);
     if (!judgement) return judgement.error();
     Verdict verdict{std::move(*judgement), {}};
     if (!a.threshold_map.empty()) {
-        auto map = perception::threshold_map_modern(reference, options);
+        auto map = perception::threshold_map_modern(reference, *options);
         if (!map) return map.error();
         verdict.threshold_map = std::move(*map);
     }
@@ -139,20 +141,19 @@ Result<void> write_maps(const CompareArguments& a, const Verdict& verdict) {
     return ok;
 }
 
+std::string observer_of(const CompareArguments& a) {
+    const std::string& csf = a.display.csf;
+    if (!csf.empty() && !perception::csf_model(csf)) return csf; // a viewer's file
+    const std::string name(a.observer.name);
+    if (csf.empty()) return name + " (of measured people, " + rounded(100 * a.observer.share_above, 2) + "% see more)";
+    return name + " (" + rounded(a.observer.gain, 3) + " times " + csf + ")";
+}
+
 // Whose verdict it is, and under which conditions.
 std::string judged_by(const CompareArguments& a, const perception::Display& display) {
     if (a.model == Model::rpg99)
         return "by the judge rpg99" + (a.profile.empty() ? "" : ", as " + a.profile + " does it");
-    std::string text;
-    if (a.model == Model::summing) {
-        text = "by the judge summing and the observer ";
-        text += a.display.csf.empty() ? std::string(a.observer.name) + " (of measured people, " +
-                                            rounded(100 * a.observer.share_above, 2) + "% see more)"
-                                      : a.display.csf;
-    } else {
-        text = "by the judge modern and the ";
-        text += a.display.csf.empty() ? "default observer (castleCSF, a typical person)" : "observer " + a.display.csf;
-    }
+    std::string text = "by the judge " + a.model_name + " and the observer " + observer_of(a);
     text += ", looked at from " + rounded(display.distance.value(), 3) + " m, ";
     if (!a.gaze_px) return text + "wherever the gaze";
     return text + "with the gaze at pixel " + shortest(a.gaze_px->x) + " " + shortest(a.gaze_px->y);
@@ -199,17 +200,17 @@ void check(CompareArguments& a) {
         a.display.file.clear();
         a.profile = perceptualdiff;
     }
-    a.model = a.model_name == "rpg99" ? Model::rpg99 : a.model_name == "summing" ? Model::summing : Model::modern;
+    a.model = a.model_name == "rpg99" ? Model::rpg99 : a.model_name == "second" ? Model::second : Model::modern;
     const bool is_rpg99 = a.model == Model::rpg99;
     if (!is_rpg99 && !a.profile.empty()) refuse("--profile perceptualdiff needs --model rpg99.");
     if (!is_rpg99 && a.field_degrees) refuse("--field needs --model rpg99; the others take the display's.");
-    if (is_rpg99 && a.gaze_px) refuse("--gaze needs --model modern or summing: rpg99 knows no eccentricity.");
-    if (is_rpg99 && !a.display.csf.empty()) refuse("--csf needs --model modern or summing.");
-    if (a.model == Model::summing && !a.threshold_map.empty())
-        refuse("--threshold-map needs --model modern or rpg99: what a sum over space just sees is no map of steps.");
+    if (is_rpg99 && a.gaze_px) refuse("--gaze needs --model modern or second: rpg99 knows no eccentricity.");
+    if (a.model != Model::modern && !a.display.csf.empty())
+        refuse("--csf needs --model modern: the others have a sensitivity of their own.");
     if (a.observer_name.empty()) return;
-    if (a.model != Model::summing) refuse("--observer needs --model summing.");
-    if (!a.display.csf.empty()) refuse("--observer excludes --csf, which is an observer of its own.");
+    if (is_rpg99) refuse("--observer needs --model modern or second.");
+    if (!a.display.csf.empty() && !perception::csf_model(a.display.csf))
+        refuse("--observer excludes --csf FILE, which is an observer of its own.");
     a.observer = *perception::person(a.observer_name);
 }
 
@@ -222,13 +223,12 @@ Command compare_command(CLI::App& app) {
         ->required()
         ->type_name("IMAGE");
     verb->add_option("TEST", a->test, "The image to judge")->required()->type_name("IMAGE");
-    verb->add_option(
-            "--model", a->model_name,
-            "modern (default), summing (sees more of what is larger), or rpg99 (of 1999, blind to fine detail)")
+    verb->add_option("--model", a->model_name,
+                     "modern (default), second (by another model of sight), or rpg99 (of 1999, blind to fine detail)")
         ->type_name("NAME")
-        ->check(one_of({"modern", "summing", "rpg99"}));
+        ->check(one_of({"modern", "second", "rpg99"}));
     verb->add_option("--observer", a->observer_name,
-                     "With summing: median, default (one in twelve of measured people sees more) or strict (one in "
+                     "Not of rpg99: median, default (one in twelve of measured people sees more) or strict (one in "
                      "twenty)")
         ->type_name("NAME")
         ->check(one_of({"median", "default", "strict"}));
@@ -259,7 +259,7 @@ Command compare_command(CLI::App& app) {
     verb->callback([o = a.get()] { check(*o); });
     verb->footer("Examples:\n  unseen compare full.pfm simplified.pfm --gaze 1603 512 --fail-above 0\n"
                  "  unseen compare a.png b.png --map map.png --json -\n"
-                 "  unseen compare a.pfm b.pfm --model summing --observer strict\n"
+                 "  unseen compare a.pfm b.pfm --model second --observer strict\n"
                  "  unseen compare a.png b.png --model rpg99 --profile perceptualdiff --field 45");
     return {verb, [a] { return run(*a); }};
 }

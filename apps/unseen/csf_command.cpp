@@ -97,6 +97,12 @@ public:
     }
 
     const CsfTable& table() const { return *table_; }
+    // What of the stimulus lies outside of the table's samples.
+    std::string beyond(const StimulusOptions& s) const {
+        if (!table_) return {};
+        const Luminance luminance(*s.luminance);
+        return beyond_reach(*table_, Degrees(s.eccentricity.value_or(0)), luminance, luminance);
+    }
     std::string name() const {
         return table_ ? "table: " + table_->samples().source : std::string(perception::name(model_));
     }
@@ -286,11 +292,14 @@ Result<int> run(const CsfArguments& a) {
     if (!a.plot.empty()) return run_plot(a, *observer);
     const auto value = (*observer)(a.stimulus);
     if (!value) return value.error();
-    const Json json = {{"observer", observer->name()}, {"sensitivity", *value}, {"least_visible_contrast", 1 / *value}};
+    Json json = {{"observer", observer->name()}, {"sensitivity", *value}, {"least_visible_contrast", 1 / *value}};
+    const std::string beyond = observer->beyond(a.stimulus);
+    if (!beyond.empty()) json["beyond_table"] = beyond;
     if (auto ok = report->prepare(json); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
     if (report->is_on_stdout()) return exit_done;
     print_table({{"sensitivity", rounded(*value, 3)}, {"least visible contrast", rounded(100 / *value, 3) + "%"}});
+    if (!beyond.empty()) print_note(beyond + ".");
     print_written({a.json});
     return exit_done;
 }

@@ -14,6 +14,7 @@
 
 #include "camera_path.h"
 #include "cut_report.h"
+#include "flight_changes.h"
 #include "frame_image.h"
 #include "interruption.h"
 #include "output_files.h"
@@ -36,7 +37,8 @@ struct FrameRecord {
     double cut_ms = 0, index_ms = 0; // the cut with its patches, and gathering where patches did not do
     double draw_ms = not_drawn, frame_ms = 0;
     double uploaded_bytes = not_drawn;
-    double drawn_triangles = not_drawn, gliding = not_drawn; // of geomorphs
+    double drawn_triangles = not_drawn, gliding = not_drawn;                   // of geomorphs
+    double change_v = not_drawn, flicker_v = not_drawn, picture_v = not_drawn; // where changes are judged
 
     std::uint64_t changes() const { return stats.folds + stats.unfolds; }
 };
@@ -106,14 +108,15 @@ std::string cell(double value) { return std::isfinite(value) ? shortest(value) :
 std::string to_csv(const std::vector<FrameRecord>& frames) {
     std::string text =
         "frame,triangles,folds,unfolds,changes,node_tests,cut_ms,index_ms,uploaded_bytes,draw_ms,frame_ms,"
-        "drawn_triangles,gliding\n";
+        "drawn_triangles,gliding,change_v,flicker_v,picture_v\n";
     for (std::size_t i = 0; i < frames.size(); ++i) {
         const FrameRecord& f = frames[i];
         text += std::to_string(i) + "," + std::to_string(f.stats.triangles) + "," + std::to_string(f.stats.folds) +
                 "," + std::to_string(f.stats.unfolds) + "," + std::to_string(f.changes()) + "," +
                 std::to_string(f.stats.node_tests) + "," + cell(f.cut_ms) + "," + cell(f.index_ms) + "," +
                 cell(f.uploaded_bytes) + "," + cell(f.draw_ms) + "," + cell(f.frame_ms) + "," +
-                cell(f.drawn_triangles) + "," + cell(f.gliding) + "\n";
+                cell(f.drawn_triangles) + "," + cell(f.gliding) + "," + cell(f.change_v) + "," + cell(f.flicker_v) +
+                "," + cell(f.picture_v) + "\n";
     }
     return text;
 }
@@ -183,12 +186,53 @@ std::vector<Measure> measures_of(const std::vector<FrameRecord>& frames) {
             {"gliding", "gliding vertices", column(later, [](auto& f) { return f.gliding; })}};
 }
 
+// What was seen of the cut's changes. A picture passes where it shows no visible difference from the full model.
+struct SeenChanges {
+    std::size_t judged = 0, seen = 0, although_pictures_pass = 0, failing_pictures = 0;
+    double largest_v = 0, largest_flicker = 0;
+    std::size_t frame = 0; // of the largest
+
+    static std::optional<SeenChanges> of(const std::vector<FrameRecord>& frames) {
+        if (frames.empty() || std::isnan(frames.front().picture_v)) return std::nullopt;
+        SeenChanges s;
+        for (std::size_t i = 0; i < frames.size(); ++i) {
+            const FrameRecord& f = frames[i];
+            s.failing_pictures += !(f.picture_v < 1);
+            if (i == 0) continue; // makes the cut
+            ++s.judged;
+            if (!(f.change_v <= s.largest_v)) s.largest_v = f.change_v, s.frame = i;
+            s.largest_flicker = std::fmax(s.largest_flicker, f.flicker_v);
+            if (f.change_v < 1) continue;
+            ++s.seen;
+            s.although_pictures_pass += f.picture_v < 1 && frames[i - 1].picture_v < 1;
+        }
+        return s;
+    }
+};
+
+std::string to_text(const SeenChanges& s, bool glides) {
+    const std::string what = glides ? "glides of the cut" : "changes of the cut";
+    const std::string most = "V up to " + rounded(s.largest_v, 3) +
+                             (s.largest_v > 0 ? " in frame " + std::to_string(s.frame) : std::string());
+    if (s.seen == 0) return "no " + what + " could be seen from frame to frame (" + most + ")";
+    return what + " could be seen in " + grouped(s.seen) + " of " + grouped(s.judged) + " frames (" + most + "), in " +
+           grouped(s.although_pictures_pass) + " of them although the pictures before and after pass";
+}
+
 Json to_json(const session::Session& session, const std::vector<FrameRecord>& frames, const session::Report& last) {
     Json json = {{"source_triangles", session.tree().triangle_count()},
                  {"frames", frames.size()},
                  {"first_cut_ms", number_or_null(frames.front().cut_ms + frames.front().index_ms)}};
     for (const Measure& m : measures_of(frames))
         json[m.key] = {{"median", number_or_null(median(m.values))}, {"largest", number_or_null(largest(m.values))}};
+    if (const auto seen = SeenChanges::of(frames))
+        json["changes_seen"] = {{"judged", seen->judged},
+                                {"seen", seen->seen},
+                                {"although_pictures_pass", seen->although_pictures_pass},
+                                {"failing_pictures", seen->failing_pictures},
+                                {"largest_v", number_or_null(seen->largest_v)},
+                                {"largest_flicker", number_or_null(seen->largest_flicker)},
+                                {"frame", seen->frame}};
     json["imperceptible_from_m"] = number_or_null(last.imperceptible_from_m);
     json["effects"] = app::to_json(last.effects);
     return json;
@@ -210,6 +254,7 @@ void print(const session::Session& session, const std::vector<FrameRecord>& fram
                     ? ", and nothing was drawn"
                     : " and drawing " + middle_and_most(column(frames, [](auto& f) { return f.draw_ms; }))));
     print_line(visibility_text(last, session.observer(), display, "in the last frame"));
+    if (const auto seen = SeenChanges::of(frames)) print_line(to_text(*seen, !std::isnan(frames.back().gliding)));
 }
 
 void print_details(const std::vector<FrameRecord>& frames, const session::Report& last) {
@@ -232,6 +277,11 @@ public:
 
     Result<void> run(const std::vector<CameraPose>& poses, session::GazePlayer gaze,
                      std::optional<render::Context> context, Pictures& pictures) {
+        if (options_.judges_changes) {
+            auto made = FlightChanges::create(session_, *context, options_.geomorph_seconds);
+            if (!made) return made.error();
+            changes_.emplace(std::move(*made));
+        }
         auto drawing = make_drawing(session_, std::move(context));
         if (!drawing) return drawing.error();
         if (options_.geomorph_seconds)
@@ -268,8 +318,28 @@ private:
         if (pose.gaze_px) gaze_px_ = pose.gaze_px;
     }
 
+    Result<render::DrawOptions> draw_options() const {
+        render::DrawOptions draw = options_.draw;
+        draw.background = session_.background();
+        auto lighting = session_.lighting(view_);
+        if (!lighting) return lighting.error();
+        draw.lighting = std::move(*lighting);
+        return draw;
+    }
+
     Result<render::Frame> next(std::optional<Drawing>& drawing) {
         if (options_.geomorph_seconds) follower_.let_pass(1 / options_.frames_a_second);
+        const auto draw_cut = [&](const vdtree::View& view, const render::DrawOptions& draw) {
+            const vdtree::Similarity& placement = session_.scene().objects.front().placement;
+            render::Renderer& renderer = drawing->renderer;
+            return follower_.geomorph() ? renderer.draw(*follower_.geomorph(), view, draw, placement)
+                                        : renderer.draw(follower_.cut(), view, draw, placement);
+        };
+        if (changes_) {
+            const auto draw = draw_options();
+            if (!draw) return draw.error();
+            if (auto drawn = changes_->before(follower_, request_, view_, *draw); !drawn) return drawn.error();
+        }
         const auto start = Clock::now();
         auto simplified = follower_.follow(view_, request_);
         if (!simplified) return simplified.error();
@@ -284,20 +354,24 @@ private:
         }
         Result<render::Frame> frame = render::Frame{};
         if (drawing) {
-            render::DrawOptions draw = options_.draw;
-            draw.background = session_.background();
-            auto lighting = session_.lighting(view_);
-            if (!lighting) return lighting.error();
-            draw.lighting = std::move(*lighting);
-            const vdtree::Similarity& placement = session_.scene().objects.front().placement;
-            render::Renderer& renderer = drawing->renderer;
-            frame = follower_.geomorph() ? renderer.draw(*follower_.geomorph(), view_, draw, placement)
-                                         : renderer.draw(follower_.cut(), view_, draw, placement);
+            const auto draw = draw_options();
+            if (!draw) return draw.error();
+            frame = draw_cut(view_, *draw);
             if (!frame) return frame;
             record.draw_ms = frame->draw_ms;
-            record.uploaded_bytes = static_cast<double>(renderer.uploaded_bytes());
+            record.uploaded_bytes = static_cast<double>(drawing->renderer.uploaded_bytes());
         }
         record.frame_ms = std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+        if (changes_) {
+            const auto draw = draw_options();
+            if (!draw) return draw.error();
+            const auto judged =
+                changes_->after(follower_, request_, view_, *draw, *frame, 1 / options_.frames_a_second);
+            if (!judged) return judged.error();
+            record.change_v = judged->change.visibility;
+            record.flicker_v = judged->change.flicker;
+            record.picture_v = judged->picture;
+        }
         records_.push_back(record);
         return frame;
     }
@@ -308,6 +382,7 @@ private:
     session::Request request_;
     std::optional<glm::dvec2> gaze_px_; // of the options, or of the path
     session::Follower follower_;
+    std::optional<FlightChanges> changes_; // where they are judged
     std::vector<FrameRecord> records_;
     session::Report last_;
 };
@@ -345,13 +420,14 @@ Result<void> fly_through(const std::string& model, const ViewOptions& view, cons
         csv = std::move(*file);
     }
     std::optional<render::Context> context;
-    if (options.draws.value_or(!options.pictures.empty())) {
+    if (options.draws.value_or(!options.pictures.empty() || options.judges_changes)) {
         auto made = render::Context::headless();
         if (!made) return made.error();
         context = std::move(*made);
     }
     auto session = open_session(model, view, display);
     if (!session) return session.error();
+    session->set_velocity(options.what.velocity());
     const vdtree::View first_view = make_view(*session, view);
     session::Request request = options.what.request_for(session->tree().triangle_count());
     request.purpose = session::Purpose::picture;

@@ -17,6 +17,7 @@ struct FlyThroughOptions {
     double threshold = 1;      // fold costs up to it
     std::optional<bool> draws; // default: where there are pictures to write
     bool is_verbose = false;
+    bool judges_changes = false; // whether one sees the cut change, frame by frame: draws, see flight_changes.h
     std::optional<double> geomorph_seconds; // that vertices glide for; none: they do not
     double frames_a_second = 60;            // of the glides, moving gazes and moving lights
     WhatOptions what;

@@ -58,6 +58,7 @@ Result<int> run(RenderArguments& a) {
     if (!session) return session.error();
     const vdtree::View view = make_view(*session, a.view);
     session->set_gaze(gaze->at(0, view, a.what.gaze_px));
+    session->set_velocity(a.what.velocity());
     session::Request request = a.what.request_for(session->tree().triangle_count());
     request.purpose = session::Purpose::picture;
     const auto result = session->simplify(view, request);
@@ -117,10 +118,13 @@ void add_path_options(CLI::App& verb, FlyThroughOptions& o) {
             "Fold up to this cost: 1 (default) what cannot be seen, 2 what cannot be seen from twice the distance")
         ->type_name("X")
         ->check(positive());
+    group.add_flag("--changes", o.judges_changes,
+                   "Say whether the cut could be seen changing from frame to frame, although each picture passes; some "
+                   "seconds a frame");
     add_geomorph_option(group, o.geomorph_seconds);
     group
         .add_option("--fps", o.frames_a_second,
-                    "With --geomorph, --lights and moving gazes: frames a second of the path (default: 60)")
+                    "With --geomorph, --changes, --lights and moving gazes: frames a second of the path (default: 60)")
         ->type_name("N")
         ->check(within(1, 1e6));
     // Not by its address: the parser takes an optional<bool> for a count and begins with 0.
@@ -152,11 +156,13 @@ void check(const RenderArguments& a) {
             refuse("--show contrast is of the mesh's own light, and excludes --lights.");
         if (a.map == FoldMap::eccentricity && !a.what.gaze_px && o.gaze.source == GazeSource::none)
             refuse("--show eccentricity needs --gaze: without one all counts as looked at.");
-        if (!o.csv.empty() || !o.plot.empty() || o.threshold != 1 || o.draws || o.geomorph_seconds)
-            refuse("--csv, --plot, --threshold, --geomorph and --draw need --path.");
+        if (!o.csv.empty() || !o.plot.empty() || o.threshold != 1 || o.draws || o.geomorph_seconds || o.judges_changes)
+            refuse("--csv, --plot, --threshold, --geomorph, --changes and --draw need --path.");
         return;
     }
     if (a.map) refuse("--show is for single pictures, and excludes --path.");
+    if (o.judges_changes && o.draws && !*o.draws) refuse("--no-draw and --changes exclude each other.");
+    if (o.judges_changes && a.draw.wireframe) refuse("--changes are those of the model: leave --wireframe away.");
     if (a.out.empty()) return;
     if (o.draws && !*o.draws) refuse("--no-draw and -o exclude each other.");
     if (const auto complaint = complaint_about_picture_names(a.out); !complaint.empty()) refuse(complaint);
@@ -174,7 +180,8 @@ Command render_command(CLI::App& app) {
     CLI::Option* samples =
         verb->add_option(
                 "--samples", a->draw.samples,
-                "Samples a pixel, 1 to 256 (default: 16; for PFM and EXR, which are to be judged: 64; with --path: 1)")
+                "Samples a pixel, 1 to 256 (default: 16; for what is to be judged, PFM, EXR and --changes: 64; with "
+                "--path: 1)")
             ->type_name("N")
             ->check(whole(1, 256));
     verb->add_flag("--wireframe", a->draw.wireframe, "Draw the triangles' edges, too");
@@ -193,11 +200,12 @@ Command render_command(CLI::App& app) {
     CLI::Option* frames_a_second = verb->get_option("--fps");
     verb->callback([a, samples, frames_a_second] {
         if (!frames_a_second->empty() && !a->flight.geomorph_seconds && a->view.lights.empty() &&
-            !is_moving(a->flight.gaze))
-            refuse("--fps needs --geomorph, --lights, --gaze-trace or --gaze-mode simulated.");
+            !a->flight.judges_changes && !is_moving(a->flight.gaze))
+            refuse("--fps needs --geomorph, --changes, --lights, --gaze-trace or --gaze-mode simulated.");
         check(*a);
         if (!samples->empty()) return;
-        if (!a->flight.path.empty()) a->draw.samples = 1;
+        if (a->flight.judges_changes) a->draw.samples = samples_to_judge;
+        else if (!a->flight.path.empty()) a->draw.samples = 1;
         else if (!is_for_people(a->out)) a->draw.samples = samples_to_judge;
     });
     add_view_options(*verb, a->view);
@@ -214,7 +222,8 @@ Command render_command(CLI::App& app) {
         "  unseen render dragon.vdt --path flight.csv -o frames/%04d.png --threshold 2\n"
         "  unseen render dragon.vdt -o lit.png --lights lights.json\n"
         "  unseen render dragon.vdt --path orbit:0:240 --lights lights.json --fps 60 --csv light.csv\n"
-        "  unseen render dragon.vdt --path orbit:1 -o frames/%04d.png --triangles 20000 --geomorph 0.25 --fps 60");
+        "  unseen render dragon.vdt --path orbit:1 -o frames/%04d.png --triangles 20000 --geomorph 0.25 --fps 60\n"
+        "  unseen render dragon.vdt --path orbit:1:60 --changes --gaze 1603 512 --csv changes.csv");
     return {verb, [a] { return run(*a); }};
 }
 

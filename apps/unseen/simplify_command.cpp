@@ -33,6 +33,7 @@ Result<int> run(const SimplifyArguments& a) {
     auto session = open_session(a.model, a.view, a.display);
     if (!session) return session.error();
     session->set_gaze(fixed_gaze(a.what));
+    session->set_velocity(a.what.velocity());
     auto result = session->simplify(make_view(*session, a.view), a.what.request_for(session->tree().triangle_count()));
     if (!result) return result.error();
     const auto start = std::chrono::steady_clock::now();

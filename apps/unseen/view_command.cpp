@@ -34,6 +34,7 @@ Result<int> run(ViewArguments& a) {
     if (!window) return window.error();
     auto session = open_session(a.model, a.view, a.display);
     if (!session) return session.error();
+    session->set_velocity(a.viewer.what.velocity());
     a.viewer.first_view = make_view(*session, a.view);
     a.viewer.has_fixed_field = a.view.fov_degrees.has_value();
     a.viewer.gaze_source = a.gaze.source;

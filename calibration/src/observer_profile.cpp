@@ -10,7 +10,7 @@ namespace unseen::calibration {
 namespace {
 
 constexpr std::string_view format_name = "unseen-csf";
-constexpr int table_version = 1, measured_version = 2;
+constexpr int table_version = 1, measured_version = 2, summation_version = 3;
 
 Result<std::vector<double>> read_axis(const JsonObject& object, const char* key) {
     const auto array = object.array(key);
@@ -58,9 +58,9 @@ Result<int> read_version(const JsonObject& object) {
     }
     const auto version = object.number("version", {.minimum = 1, .maximum = 1e9, .whole = true});
     if (!version) return version.error();
-    if (*version <= measured_version) return static_cast<int>(*version);
+    if (*version <= summation_version) return static_cast<int>(*version);
     Error error =
-        object.key_error("version", "must be 1 or 2, but is " + to_text(*version) + ": a newer program wrote it");
+        object.key_error("version", "must be 1 to 3, but is " + to_text(*version) + ": a newer program wrote it");
     error.code = ErrorCode::unsupported;
     return error;
 }
@@ -70,14 +70,22 @@ constexpr std::string ObserverProfile::*texts[] = {&ObserverProfile::observer, &
                                                    &ObserverProfile::method, &ObserverProfile::display,
                                                    &ObserverProfile::conditions};
 
-Result<std::vector<Measurement>> read_measurements(const JsonObject& object) {
-    const auto rows = object.array("measured");
+// Rows of "measured", or of "measured_wide", which have an area.
+Result<void> read_measurements(const JsonObject& object, const char* key, bool is_wide,
+                               std::vector<Measurement>& measured) {
+    const auto rows = object.array(key);
     if (!rows) return rows.error();
-    std::vector<Measurement> measured;
+    std::size_t count = 0;
     for (const auto& row : **rows) {
-        const std::string where = "measured[" + std::to_string(measured.size()) + "]";
+        const std::string where = std::string(key).append("[").append(std::to_string(count++)).append("]");
         std::vector<double> v;
-        if (auto ok = object.append_numbers(row, where, 6, v); !ok) return ok.error();
+        if (auto ok = object.append_numbers(row, where, is_wide ? 7 : 6, v); !ok) return ok.error();
+        double area = 0;
+        if (is_wide) {
+            area = v[2];
+            v.erase(v.begin() + 2);
+            if (!(area > 0)) return object.key_error(where, "must have an area above 0 as its third number");
+        }
         const bool is_place = v[0] > 0 && v[1] >= 0;
         const bool is_interval = v[3] > 0 && v[3] <= v[2] && v[2] <= v[4];
         constexpr double most_answers = 1e6;
@@ -86,22 +94,36 @@ Result<std::vector<Measurement>> read_measurements(const JsonObject& object) {
         if (!is_interval) return object.key_error(where, "must have a sensitivity above 0 that lies in its interval");
         if (!(v[5] >= 0 && v[5] <= most_answers))
             return object.key_error(where, "must end in how many answers there were");
-        measured.push_back({{v[0], v[1]}, v[2], v[3], v[4], static_cast<int>(v[5])});
+        measured.push_back({{v[0], v[1], area}, v[2], v[3], v[4], static_cast<int>(v[5])});
     }
-    return measured;
+    return {};
 }
 
-Result<void> read_circumstances(const JsonObject& object, ObserverProfile& profile) {
+Result<void> read_summation(const JsonObject& object, Summation& summation) {
+    const auto array = object.array("summation");
+    if (!array) return array.error();
+    std::vector<double> v;
+    if (auto ok = object.append_numbers(**array, "summation", 3, v); !ok) return ok;
+    constexpr double least = 1e-2, most = 1e2; // far beyond how people differ
+    if (!(v[0] >= least && v[0] <= most))
+        return object.key_error("summation", "must begin with a factor from 0.01 to 100, which 1 is by castle's law");
+    if (!(v[1] > 0 && v[1] <= v[0] && v[0] <= v[2]))
+        return object.key_error("summation", "must be a factor, and the interval in which it lies");
+    summation = {v[0], v[1], v[2]};
+    return {};
+}
+
+Result<void> read_circumstances(const JsonObject& object, int version, ObserverProfile& profile) {
     for (std::size_t i = 0; i < std::size(text_keys); ++i)
         if (auto ok = object.get(text_keys[i], profile.*texts[i]); !ok) return ok;
     const Range positive{.minimum = 0, .maximum = 1e6, .minimum_allowed = false};
     const auto luminance = object.number("measured_at_cdm2", positive);
     if (!luminance) return luminance.error();
     profile.measured_at_cdm2 = *luminance;
-    auto measured = read_measurements(object);
-    if (!measured) return measured.error();
-    profile.measured = std::move(*measured);
-    return {};
+    if (auto ok = read_measurements(object, "measured", false, profile.measured); !ok) return ok;
+    if (version < summation_version) return {};
+    if (auto ok = read_measurements(object, "measured_wide", true, profile.measured); !ok) return ok;
+    return read_summation(object, profile.summation);
 }
 
 std::string to_array(std::span<const double> values) {
@@ -113,15 +135,19 @@ std::string to_array(std::span<const double> values) {
 } // namespace
 
 Result<ObserverProfile> read_observer(const std::filesystem::path& file) {
-    const auto object = JsonObject::read(file, {"format", "version", "source", "frequency_cpd", "eccentricity_deg",
-                                                "luminance_cdm2", "sensitivity", "observer", "date", "method",
-                                                "display", "conditions", "measured_at_cdm2", "measured"});
+    const auto object =
+        JsonObject::read(file, {"format", "version", "source", "frequency_cpd", "eccentricity_deg", "luminance_cdm2",
+                                "sensitivity", "observer", "date", "method", "display", "conditions",
+                                "measured_at_cdm2", "measured", "measured_wide", "summation"});
     if (!object) return object.error();
     const auto version = read_version(*object);
     if (!version) return version.error();
     for (const char* key : {"observer", "date", "method", "display", "conditions", "measured_at_cdm2", "measured"})
         if (*version < measured_version && object->has(key))
             return object->key_error(key, "is unknown in version 1: remove it, or give version 2");
+    for (const char* key : {"measured_wide", "summation"})
+        if (*version < summation_version && object->has(key))
+            return object->key_error(key, "is unknown before version 3: remove it, or give version 3");
 
     perception::CsfSamples samples;
     if (auto ok = object->get("source", samples.source); !ok) return ok.error();
@@ -138,8 +164,8 @@ Result<ObserverProfile> read_observer(const std::filesystem::path& file) {
     if (!table) return object->error(table.error().message);
     ObserverProfile profile;
     profile.table = std::move(*table);
-    if (*version == measured_version)
-        if (auto ok = read_circumstances(*object, profile); !ok) return ok.error();
+    if (*version >= measured_version)
+        if (auto ok = read_circumstances(*object, *version, profile); !ok) return ok.error();
     return profile;
 }
 
@@ -184,14 +210,22 @@ Result<void> write_observer(const std::filesystem::path& file, const ObserverPro
     std::string text;
     for (std::size_t i = 0; i < std::size(text_keys); ++i)
         text += ",\n\"" + std::string(text_keys[i]) + "\": " + to_json(profile.*texts[i]);
-    text += ",\n\"measured_at_cdm2\": " + to_text(profile.measured_at_cdm2) + ",\n\"measured\": [";
-    for (std::size_t i = 0; i < profile.measured.size(); ++i) {
-        const Measurement& m = profile.measured[i];
-        const double row[] = {m.place.frequency_cpd,         m.place.eccentricity_deg, m.sensitivity, m.low, m.high,
-                              static_cast<double>(m.answers)};
-        text += (i > 0 ? ",\n" : "\n") + to_array(row);
-    }
-    return write(file, profile.table, measured_version, text + "]");
+    const auto rows = [&](const char* key, bool is_wide) {
+        std::string lines;
+        for (const Measurement& m : profile.measured) {
+            if (m.place.is_wide() != is_wide) continue;
+            std::vector<double> row = {m.place.frequency_cpd, m.place.eccentricity_deg};
+            if (is_wide) row.push_back(m.place.area_deg2);
+            row.insert(row.end(), {m.sensitivity, m.low, m.high, static_cast<double>(m.answers)});
+            lines += (lines.empty() ? "\n" : ",\n") + to_array(row);
+        }
+        return ",\n\"" + std::string(key) + "\": [" + lines + "]";
+    };
+    text += ",\n\"measured_at_cdm2\": " + to_text(profile.measured_at_cdm2) + rows("measured", false);
+    if (!profile.has_summation()) return write(file, profile.table, measured_version, text);
+    const double summation[] = {profile.summation.own, profile.summation.low, profile.summation.high};
+    text += rows("measured_wide", true) + ",\n\"summation\": " + to_array(summation);
+    return write(file, profile.table, summation_version, text);
 }
 
 } // namespace unseen::calibration

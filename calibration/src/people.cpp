@@ -138,4 +138,74 @@ double gain_for_share(std::span<const MeasuredSensitivity> people, const Model& 
     return std::pow(10.0, quantile(compared(people, model), share_above) / 20);
 }
 
+namespace {
+
+// What the fit goes by of one threshold.
+struct AtFovea {
+    Stimulus stimulus;
+    double decibels = 0; // of the sensitivity, had it been measured at the fovea
+    double weight = 0;
+};
+
+std::vector<AtFovea> at_fovea(std::span<const MeasuredSensitivity> people) {
+    std::map<std::string, int> counts;
+    for (const MeasuredSensitivity& m : people) ++counts[m.study];
+    std::vector<AtFovea> all;
+    for (const MeasuredSensitivity& m : people) {
+        Stimulus still = m.stimulus, foveal = still;
+        still.temporal = foveal.temporal = perception::Hertz(0);
+        foveal.eccentricity = perception::Degrees(0);
+        const auto castle = perception::CsfModel::castle;
+        const double fall = perception::sensitivity(castle, still) / perception::sensitivity(castle, foveal);
+        all.push_back({foveal, 20 * std::log10(m.sensitivity / fall),
+                       1.0 / counts[m.study] / static_cast<double>(counts.size())});
+    }
+    return all;
+}
+
+double squares_of(std::span<const AtFovea> all, const perception::BartenConstants& constants) {
+    double sum = 0;
+    for (const AtFovea& one : all) {
+        const Stimulus& s = one.stimulus;
+        const double error =
+            one.decibels - 20 * std::log10(perception::barten_sensitivity(constants, s.frequency, s.luminance, s.area,
+                                                                          perception::barten_fitted_field));
+        sum += one.weight * error * error;
+    }
+    return sum;
+}
+
+} // namespace
+
+perception::BartenConstants fit_barten(std::span<const MeasuredSensitivity> people) {
+    constexpr double first_step = 0.3, last_step = 1e-4, shorter = 0.6; // of a constant's logarithm
+    const std::vector<AtFovea> all = at_fovea(people);
+    std::array<double, 4> log_factor{}, step;
+    step.fill(first_step);
+    const auto constants = [&](const std::array<double, 4>& logs) {
+        perception::BartenConstants c;
+        c.signal_to_noise *= std::exp(logs[0]);
+        c.line_spread = perception::Degrees(c.line_spread.value() * std::exp(logs[1]));
+        c.inhibition = perception::CyclesPerDegree(c.inhibition.value() * std::exp(logs[2]));
+        c.greatest_cycles *= std::exp(logs[3]);
+        return c;
+    };
+    double best = squares_of(all, constants(log_factor));
+    while (*std::max_element(step.begin(), step.end()) > last_step) {
+        for (std::size_t i = 0; i < step.size(); ++i) {
+            bool is_better = false;
+            for (const double move : {step[i], -step[i]}) {
+                std::array<double, 4> tried = log_factor;
+                tried[i] += move;
+                const double squares = squares_of(all, constants(tried));
+                if (!(squares < best)) continue;
+                best = squares, log_factor = tried, is_better = true;
+                break;
+            }
+            if (!is_better) step[i] *= shorter;
+        }
+    }
+    return constants(log_factor);
+}
+
 } // namespace unseen::calibration

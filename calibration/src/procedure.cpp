@@ -5,6 +5,8 @@
 #include <bit>
 #include <cassert>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <numbers>
 #include <numeric>
 #include <utility>
@@ -51,25 +53,71 @@ std::string in_brackets(const char* name, std::size_t i) {
 }
 
 // How far a patch reaches: two standard deviations of its envelope.
-double patch_radius_deg(double frequency_cpd) { return 2 * 1.5 / frequency_cpd; }
+double patch_radius_deg(const GratingPlace& place) { return 2 * place.sigma_deg(); }
+
+constexpr double cross_deg = 1; // what the fixation cross takes
 
 // Between a fixation cross near one edge of the screen and a patch near the other.
-double farthest_eccentricity_deg(const perception::Display& display, double frequency_cpd) {
-    const double half = perception::physical_field(display, display.width_px).value() / 2;
-    return 2 * half - patch_radius_deg(frequency_cpd) - 1; // the cross takes a degree
+double farthest_eccentricity_deg(const perception::Display& display, double radius_deg) {
+    return perception::physical_field(display, display.width_px).value() - radius_deg - cross_deg;
 }
 
 double log10_expected(const CsfTable& table, const GratingPlace& place, Luminance luminance) {
     return std::log10(
-        table.sensitivity(CyclesPerDegree(place.frequency_cpd), Degrees(place.eccentricity_deg), luminance));
+        table.sensitivity(CyclesPerDegree(place.frequency_cpd), Degrees(place.eccentricity_deg), luminance) *
+        summation_gain(place));
+}
+
+// Whether a threshold can be measured: well below the highest contrast.
+bool is_measurable(const CalibrationPlan& plan, const CsfTable& expected, const GratingPlace& place) {
+    constexpr double visible_share = 3;
+    return std::pow(10, log10_expected(expected, place, plan.luminance)) * plan.highest_contrast >= visible_share;
 }
 
 } // namespace
 
 bool fits(const perception::Display& display, const GratingPlace& place) {
     const double height = perception::physical_field(display, display.height_px).value();
-    const double radius = patch_radius_deg(place.frequency_cpd);
-    return 2 * radius <= height && place.eccentricity_deg <= farthest_eccentricity_deg(display, place.frequency_cpd);
+    const double radius = patch_radius_deg(place);
+    return 2 * radius <= height && place.eccentricity_deg <= farthest_eccentricity_deg(display, radius);
+}
+
+std::vector<GratingPlace> wide_places(const CalibrationPlan& plan, const perception::Display& display,
+                                      const CsfTable& expected) {
+    constexpr std::size_t coarsest = 2;         // frequencies
+    constexpr double least_improvement = 1.189; // 1.5 dB, or the patch says nothing about summation
+    std::vector<double> frequencies, eccentricities;
+    for (const GratingPlace& place : plan.places) {
+        if (place.is_wide()) continue;
+        frequencies.push_back(place.frequency_cpd);
+        eccentricities.push_back(place.eccentricity_deg);
+    }
+    for (std::vector<double>* values : {&frequencies, &eccentricities}) {
+        std::sort(values->begin(), values->end());
+        values->erase(std::unique(values->begin(), values->end()), values->end());
+    }
+    frequencies.resize(std::min(frequencies.size(), coarsest));
+    // The display's smaller side, in circles of two standard deviations.
+    const double side = std::min(perception::physical_field(display, display.width_px).value(),
+                                 perception::physical_field(display, display.height_px).value());
+    const double area = std::min(most_wide_deg2, std::numbers::pi * side * side / 16 * (1 - 1e-9)); // rounding
+    std::vector<GratingPlace> wide;
+    const auto is_useful = [&](const GratingPlace& place) {
+        return area >= least_wide_deg2 && summation_gain(place) >= least_improvement && fits(display, place) &&
+               is_measurable(plan, expected, place);
+    };
+    for (const double frequency : frequencies) {
+        const auto nearest = std::find_if(eccentricities.begin(), eccentricities.end(), [&](double e) {
+            return is_useful({frequency, e, area});
+        });
+        if (nearest == eccentricities.end()) continue;
+        wide.push_back({frequency, *nearest, area});
+        const auto farthest = std::find_if(eccentricities.rbegin(), eccentricities.rend(), [&](double e) {
+            return is_useful({frequency, e, area});
+        });
+        if (*farthest != *nearest) wide.push_back({frequency, *farthest, area});
+    }
+    return wide;
 }
 
 std::string_view name(Method method) { return method == Method::two_interval ? "2ifc" : "adjustment"; }
@@ -90,11 +138,12 @@ CalibrationPlan plan_for(const perception::Display& display, const CsfTable& exp
     for (const double eccentricity : {0.0, 5.0, 10.0, 20.0})
         for (const double frequency : frequencies) {
             const GratingPlace place{frequency, eccentricity};
-            constexpr double visible_share = 3;
-            const bool is_visible =
-                std::pow(10, log10_expected(expected, place, plan.luminance)) * plan.highest_contrast >= visible_share;
-            if (fits(display, place) && is_visible) plan.places.push_back(place);
+            if (fits(display, place) && is_measurable(plan, expected, place)) plan.places.push_back(place);
         }
+    for (const GratingPlace& place : wide_places(plan, display, expected)) {
+        plan.places.push_back(place);
+        plan.trials += trials_of_wide_place;
+    }
     return plan;
 }
 
@@ -103,7 +152,7 @@ Result<void> validate(const CalibrationPlan& plan) {
         return invalid_argument("A calibration needs 1 to " + std::to_string(most_places) + " places, not " +
                                 std::to_string(plan.places.size()) + ".");
     for (std::size_t i = 0; i < plan.places.size(); ++i) {
-        const auto& [frequency, eccentricity] = plan.places[i];
+        const auto& [frequency, eccentricity, area] = plan.places[i];
         const std::string where = in_brackets("places", i);
         constexpr double coarsest_cpd = 1.0 / 16, finest_cpd = 64; // of the tables
         if (!(frequency >= coarsest_cpd && frequency <= finest_cpd))
@@ -112,10 +161,16 @@ Result<void> validate(const CalibrationPlan& plan) {
         if (!(eccentricity >= 0 && eccentricity <= widest_eccentricity_deg))
             return invalid_argument(where + ": the eccentricity must lie in 0 to 90 degrees, not " +
                                     to_text(eccentricity) + ".");
+        constexpr double largest_deg2 = 1e4; // a quarter of the sphere
+        if (!(area >= 0 && area <= largest_deg2))
+            return invalid_argument(where + ": the area must lie in 0 to 10,000 square degrees, not " + to_text(area) +
+                                    ".");
         if (std::find(plan.places.begin(), plan.places.begin() + static_cast<std::ptrdiff_t>(i), plan.places[i]) !=
             plan.places.begin() + static_cast<std::ptrdiff_t>(i))
             return invalid_argument(where + " is there twice.");
     }
+    if (std::all_of(plan.places.begin(), plan.places.end(), std::mem_fn(&GratingPlace::is_wide)))
+        return invalid_argument("All places are of wide patches: add one of 1.5 cycles radius.");
     if (plan.trials < 1 || plan.trials > most_trials)
         return invalid_argument("There must be 1 to 100,000 trials, not " + std::to_string(plan.trials) + ".");
     if (plan.settings < 2 || plan.settings > most_settings)
@@ -136,6 +191,24 @@ double PlaceEstimate::low() const {
 }
 double PlaceEstimate::high() const {
     return std::pow(10, log10_sensitivity.mean + two_sided_95 * log10_sensitivity.deviation);
+}
+
+Result<void> check(const Summation& measured, const CalibrationPlan& plan) {
+    double lowest_cpd = std::numeric_limits<double>::infinity();
+    for (const GratingPlace& place : plan.places)
+        if (place.is_wide()) lowest_cpd = std::min(lowest_cpd, place.frequency_cpd);
+    if (std::isinf(lowest_cpd)) return {};
+    // By the law, a wide patch is seen worse than a small one where an unlimited grating is.
+    const perception::SquareDegrees unlimited(std::numeric_limits<double>::infinity());
+    const double worse_below = 1 / perception::summation_gain(CyclesPerDegree(lowest_cpd), unlimited);
+    if (measured.high >= worse_below) return {};
+    const auto text = [](double value) { return to_text(std::round(100 * value) / 100); };
+    return invalid_argument("Wide patches were seen worse than small ones of the same bars: " + text(measured.own) +
+                            " times as well as by the law of area (95%: " + text(measured.low) + " to " +
+                            text(measured.high) + "), where below " + text(worse_below) + " is worse at " +
+                            to_text(lowest_cpd) +
+                            " cpd. No eye does so: some of the patch was hidden, or the answers were careless. Measure "
+                            "again, or without wide patches.");
 }
 
 Procedure::Procedure(CalibrationPlan plan, CsfTable expected, QuestPlus blank)
@@ -371,6 +444,14 @@ std::vector<PlaceEstimate> Procedure::estimates() const {
     return result;
 }
 
+std::optional<Summation> Procedure::summation() const {
+    if (std::none_of(plan_.places.begin(), plan_.places.end(), std::mem_fn(&GratingPlace::is_wide)))
+        return std::nullopt;
+    const auto [mean, deviation] = field_.log10_summation();
+    return Summation{std::pow(10, mean), std::pow(10, mean - two_sided_95 * deviation),
+                     std::pow(10, mean + two_sided_95 * deviation)};
+}
+
 Result<CsfTable> Procedure::table(std::string source) const {
     perception::CsfSamples samples;
     samples.source = std::move(source);
@@ -409,6 +490,7 @@ Result<CsfTable> Procedure::table(std::string source) const {
 namespace {
 
 constexpr std::string_view state_format = "unseen-calibration";
+constexpr int small_version = 1, wide_version = 2; // without and with the patches' areas
 
 // FNV-1a over all numbers of a table, in hexadecimal. As floats, since another machine's logarithms may differ in a
 // double's last bits.
@@ -449,7 +531,7 @@ Result<Method> read_method(const JsonObject& object) {
     return object.key_error("method", "must be \"2ifc\" or \"adjustment\"");
 }
 
-Result<CalibrationPlan> read_plan(const JsonObject& object) {
+Result<CalibrationPlan> read_plan(const JsonObject& object, int version) {
     CalibrationPlan plan;
     const auto method = read_method(object);
     if (!method) return method.error();
@@ -468,9 +550,10 @@ Result<CalibrationPlan> read_plan(const JsonObject& object) {
     plan.settings = static_cast<int>(*settings);
     plan.luminance = Luminance(*luminance);
     plan.highest_contrast = *contrast;
-    const auto places = read_rows(object, "places", 2);
+    const auto places = read_rows(object, "places", version == wide_version ? 3 : 2);
     if (!places) return places.error();
-    for (const auto& place : *places) plan.places.push_back({place[0], place[1]});
+    for (const auto& place : *places)
+        plan.places.push_back({place[0], place[1], version == wide_version ? place[2] : 0});
     if (auto valid = validate(plan); !valid) return object.error(valid.error().message);
     return plan;
 }
@@ -478,15 +561,17 @@ Result<CalibrationPlan> read_plan(const JsonObject& object) {
 } // namespace
 
 Result<void> Procedure::save(const std::filesystem::path& file) const {
-    std::string text =
-        "{\n\"format\": " + to_json(state_format) + ",\n\"version\": 1,\n\"method\": " + to_json(name(plan_.method));
+    const int version = summation() ? wide_version : small_version;
+    std::string text = "{\n\"format\": " + to_json(state_format) + ",\n\"version\": " + std::to_string(version) +
+                       ",\n\"method\": " + to_json(name(plan_.method));
     text += ",\n\"seed\": " + std::to_string(plan_.seed) + ",\n\"trials\": " + std::to_string(plan_.trials) +
             ",\n\"settings\": " + std::to_string(plan_.settings);
     text += ",\n\"luminance_cdm2\": " + to_text(plan_.luminance.value()) +
             ",\n\"highest_contrast\": " + to_text(plan_.highest_contrast) + ",\n\"places\": [";
     for (std::size_t i = 0; i < plan_.places.size(); ++i)
         text += (i > 0 ? ", [" : "[") + to_text(plan_.places[i].frequency_cpd) + ", " +
-                to_text(plan_.places[i].eccentricity_deg) + "]";
+                to_text(plan_.places[i].eccentricity_deg) +
+                (version == wide_version ? ", " + to_text(plan_.places[i].area_deg2) : "") + "]";
     text += "],\n\"expected\": " + to_json(expected_.samples().source) +
             ",\n\"expected_hash\": " + to_json(hash_of(expected_));
     text += ",\n\"answers\": [";
@@ -505,8 +590,8 @@ Result<Procedure> Procedure::resume(const std::filesystem::path& file, CsfTable 
     if (auto ok = object->get("format", format); !ok) return ok.error();
     if (format != state_format)
         return object->key_error("format", "must be \"unseen-calibration\": this is no interrupted calibration");
-    if (auto version = object->number("version", {.minimum = 1, .maximum = 1, .whole = true}); !version)
-        return version.error();
+    const auto version = object->number("version", {.minimum = small_version, .maximum = wide_version, .whole = true});
+    if (!version) return version.error();
     std::string begun_with = "another", hash = hash_of(expected);
     if (auto ok = object->get("expected", begun_with); !ok) return ok.error();
     if (auto ok = object->get("expected_hash", hash); !ok) return ok.error();
@@ -514,7 +599,7 @@ Result<Procedure> Procedure::resume(const std::filesystem::path& file, CsfTable 
         return object->key_error("expected", "is " + to_json(begun_with) + ", but the expected table is " +
                                                  to_json(expected.samples().source) +
                                                  ": go on with the one that the calibration was begun with");
-    auto plan = read_plan(*object);
+    auto plan = read_plan(*object, static_cast<int>(*version));
     if (!plan) return plan.error();
     auto procedure = create(std::move(*plan), std::move(expected));
     if (!procedure) return object->error(procedure.error().message);

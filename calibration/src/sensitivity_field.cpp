@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace unseen::calibration {
 namespace {
@@ -18,6 +19,8 @@ constexpr double decline_per_degree = 0.012;
 constexpr double fall_per_cpd_degree = 0.006; // castleCSF's nasal and temporal fields lie 0.011 apart
 constexpr double share_of_loss = 0.2;
 constexpr double local = 0.07, local_share_of_loss = 0.16;
+// Of how people sum over area little is known but the spread of all, which is that of the gain.
+constexpr double summation = 0.3;
 constexpr double local_octaves = 1.5; // length over which it stays alike; also in octaves of 2 deg + eccentricity
 // What lies lower is not seen at any contrast, and need not vary more.
 constexpr double most_loss = 2.5;
@@ -36,7 +39,8 @@ double shape_covariance(const Site& a, const Site& b) {
                  eb = b.place.eccentricity_deg;
     return square(gain) + square(tilt_per_octave) * octaves(a.place) * octaves(b.place) +
            square(cutoff_per_cpd) * fa * fb + square(decline_per_degree) * ea * eb +
-           square(fall_per_cpd_degree) * fa * ea * fb * eb + square(share_of_loss) * a.loss * b.loss;
+           square(fall_per_cpd_degree) * fa * ea * fb * eb + square(share_of_loss) * a.loss * b.loss +
+           square(summation) * a.share * b.share;
 }
 
 double local_deviation_of(const Site& s) { return local + local_share_of_loss * s.loss; }
@@ -81,6 +85,16 @@ std::vector<double> weighted_factor(const std::vector<double>& prior, const std:
 
 } // namespace
 
+double GratingPlace::sigma_deg() const {
+    return is_wide() ? std::sqrt(area_deg2 / std::numbers::pi) : 1.5 / frequency_cpd;
+}
+
+double summation_gain(const GratingPlace& place, double own) {
+    if (!place.is_wide()) return 1;
+    return perception::summation_gain(perception::CyclesPerDegree(place.frequency_cpd),
+                                      perception::SquareDegrees(place.area_deg2), own);
+}
+
 SensitivityField::SensitivityField(const std::vector<GratingPlace>& places, perception::CsfTable expected,
                                    perception::Luminance luminance)
     : table_(std::move(expected)), luminance_(luminance), precision_(places.size(), 0.0), shift_(places.size(), 0.0) {
@@ -98,11 +112,17 @@ SensitivityField::SensitivityField(const std::vector<GratingPlace>& places, perc
 
 double SensitivityField::log10_expected(const GratingPlace& at) const {
     return std::log10(table_.sensitivity(perception::CyclesPerDegree(at.frequency_cpd),
-                                         perception::Degrees(at.eccentricity_deg), luminance_));
+                                         perception::Degrees(at.eccentricity_deg), luminance_) *
+                      summation_gain(at));
 }
 
 Site SensitivityField::site(const GratingPlace& at) const {
-    return {at, std::clamp(log10_expected({middle_cpd, 0}) - log10_expected(at), 0.0, most_loss)};
+    // What a place has lost does not depend on the patch there.
+    const double here = log10_expected({at.frequency_cpd, at.eccentricity_deg});
+    const double share = at.is_wide() ? perception::summation_share(perception::CyclesPerDegree(at.frequency_cpd),
+                                                                    perception::SquareDegrees(at.area_deg2))
+                                      : 0;
+    return {at, std::clamp(log10_expected({middle_cpd, 0}) - here, 0.0, most_loss), share};
 }
 
 SensitivityField::Belief SensitivityField::belief(std::size_t i) const {
@@ -207,6 +227,12 @@ SensitivityField::Belief SensitivityField::deviation(const GratingPlace& at) con
     const Site here = site(at);
     for (const Site& s : sites_) with_places.push_back(covariance(here, s));
     return predict(prior_, precision_, shift_, with_places, covariance(here, here));
+}
+
+SensitivityField::Belief SensitivityField::log10_summation() const {
+    std::vector<double> with_places;
+    for (const Site& s : sites_) with_places.push_back(summation * summation * s.share);
+    return predict(prior_, precision_, shift_, with_places, summation * summation);
 }
 
 SensitivityField::Belief SensitivityField::local_deviation(std::size_t i) const {

@@ -26,6 +26,7 @@ constexpr Key keys[] = {
     {"gain", &SimulatedObserver::gain, nullptr, 1e-2, 1e2},
     {"frequency", &SimulatedObserver::frequency, nullptr, 0.1, 10},
     {"eccentricity", &SimulatedObserver::eccentricity, nullptr, 0, 10},
+    {"summation", &SimulatedObserver::summation, nullptr, 1e-2, 1e2},
     {"slope", nullptr, &Psychometric::slope, 0.1, 20},
     {"lapse", nullptr, &Psychometric::lapse, 0, 0.3},
     {"scatter", &SimulatedObserver::scatter, nullptr, 0, 1},
@@ -37,8 +38,9 @@ Result<void> apply(SimulatedObserver& observer, std::string_view assignment) {
     const std::string_view name = assignment.substr(0, equals);
     const auto key = std::find_if(std::begin(keys), std::end(keys), [&](const Key& k) { return k.name == name; });
     if (key == std::end(keys) || equals == assignment.npos)
-        return invalid_argument("observer: '" + std::string(assignment) +
-                                "' is none of gain=, frequency=, eccentricity=, slope=, lapse=, scatter= and delay=.");
+        return invalid_argument(
+            "observer: '" + std::string(assignment) +
+            "' is none of gain=, frequency=, eccentricity=, summation=, slope=, lapse=, scatter= and delay=.");
     const std::string_view text = assignment.substr(equals + 1);
     const auto parsed = number_from<double>(text);
     if (!parsed || !(*parsed >= key->least && *parsed <= key->most))
@@ -68,8 +70,9 @@ Random chance(std::uint64_t seed, int trial) {
 } // namespace
 
 double SimulatedObserver::sensitivity(const GratingPlace& place, perception::Luminance luminance) const {
-    return gain * csf.sensitivity(perception::CyclesPerDegree(place.frequency_cpd / frequency),
-                                  perception::Degrees(place.eccentricity_deg * eccentricity), luminance);
+    return gain * summation_gain(place, summation) *
+           csf.sensitivity(perception::CyclesPerDegree(place.frequency_cpd / frequency),
+                           perception::Degrees(place.eccentricity_deg * eccentricity), luminance);
 }
 
 int SimulatedObserver::choose(const Trial& trial, perception::Luminance luminance) const {
@@ -89,7 +92,8 @@ Result<void> check_measurable(const SimulatedObserver& observer, const Calibrati
         const double sensitivity = observer.sensitivity(place, plan.luminance);
         if (!(std::log10(sensitivity) <= -lowest_log10_contrast))
             return invalid_argument("observer: the sensitivity at " + to_text(place.frequency_cpd) + " cpd and " +
-                                    to_text(place.eccentricity_deg) + " degrees is " +
+                                    to_text(place.eccentricity_deg) + " degrees" +
+                                    (place.is_wide() ? " over " + to_text(place.area_deg2) + " deg2" : "") + " is " +
                                     to_text(std::round(sensitivity)) + ", but none above " +
                                     to_text(std::round(std::pow(10, -lowest_log10_contrast))) +
                                     " can be measured: give a lower gain.");

@@ -26,11 +26,16 @@ TEST_F(CalibrateCommandTest, MeasuresASimulatedObserver) {
         EXPECT_GT(row["high"], row["sensitivity"]);
     }
     const Json profile = Json::parse(read_text(path("observer.json")));
-    EXPECT_EQ(profile["version"], 2);
+    EXPECT_EQ(profile["version"], 3);
+    EXPECT_LT(report["summation"]["low"], 1);
+    EXPECT_GT(report["summation"]["high"], 1);
+    EXPECT_EQ(profile["summation"][0], report["summation"]["own"]);
+    EXPECT_THAT(outcome.out, HasSubstr("wide patches: unlimited ones are seen"));
     EXPECT_EQ(profile["date"], "2001-06-25");
     EXPECT_EQ(profile["conditions"], "dim room");
     EXPECT_EQ(profile["observer"], "simulated: castle:gain=0.7");
-    EXPECT_EQ(profile["measured"].size(), report["measured"].size());
+    EXPECT_EQ(profile["measured"].size() + profile["measured_wide"].size(), report["measured"].size());
+    EXPECT_EQ(profile["measured_wide"].size(), 4u);
 
     // The table stands for the observer: 0.7 of the standard one.
     const auto sensitivity = [&](std::vector<std::string> more) {
@@ -95,6 +100,7 @@ TEST_F(CalibrateCommandTest, GoesOnOnlyAsItWasBegun) {
         {{"--trials", "40"}, "--trials (it was 30)"},
         {{"--settings", "9"}, "--settings (it was 7)"},
         {{"--seed", "5"}, "--seed (it was 4)"},
+        {{"--wide"}, "--wide"},
         {{"--luminance", "30"}, "--luminance (it was 50.25)"},
         {{"--frequencies", "1", "2", "--eccentricities", "0", "10"}, "--frequencies and --eccentricities"},
         {{"--trials", "40", "--seed", "5"}, "--trials (it was 30), --seed (it was 4)"},
@@ -129,6 +135,41 @@ TEST_F(CalibrateCommandTest, PlacesAreVisibleAtTheLuminanceThatIsGiven) {
         return json["measured"].size();
     };
     EXPECT_LT(places("0.6"), places("50"));
+}
+
+TEST_F(CalibrateCommandTest, WidePatchesAreLeftOutOrAddedAsAskedFor) {
+    const auto report = [&](std::vector<std::string> more) {
+        more.insert(more.begin(), {"calibrate", "--simulate", "castle", "--json", "-"});
+        const Outcome outcome = run(more);
+        EXPECT_EQ(outcome.status, 0) << outcome.err;
+        return outcome.json();
+    };
+    const Json all = report({}), small = report({"--no-wide"});
+    EXPECT_EQ(all["answers"], 240);
+    EXPECT_EQ(small["answers"], 200);
+    EXPECT_FALSE(small.contains("summation"));
+    EXPECT_EQ(all["measured"].size(), small["measured"].size() + 4);
+    const std::vector<std::string> named = {"--frequencies", "1", "4", "--eccentricities", "0", "--trials", "30"};
+    EXPECT_EQ(report(named)["measured"].size(), 2u);
+    std::vector<std::string> wide = named;
+    wide.push_back("--wide");
+    const Json with_wide = report(wide);
+    ASSERT_EQ(with_wide["measured"].size(), 4u);
+    EXPECT_EQ(with_wide["measured"][2]["area_deg2"], 100);
+    EXPECT_NEAR(with_wide["measured"][0]["area_deg2"].get<double>(), 7.07, 0.01);
+
+    // Nobody sees wide patches worse than small ones; nothing is written.
+    const Outcome worse =
+        run({"calibrate", "--simulate", "castle:summation=0.15", "-o", "worse.json", "--json", "report.json"});
+    EXPECT_EQ(worse.status, 1);
+    EXPECT_THAT(worse.err, IsAnErrorForPeople());
+    EXPECT_THAT(worse.err, HasSubstr("Wide patches were seen worse than small ones"));
+    EXPECT_FALSE(fs::exists(path("worse.json")));
+    EXPECT_FALSE(fs::exists(path("report.json")));
+    const Outcome none =
+        run({"calibrate", "--simulate", "castle", "--frequencies", "60", "--eccentricities", "0", "--wide"});
+    EXPECT_EQ(none.status, 1);
+    EXPECT_THAT(none.err, HasSubstr("No wide patch"));
 }
 
 TEST_F(CalibrateCommandTest, WhereNothingIsSeenThereIsNoError) {
@@ -208,6 +249,7 @@ TEST_F(CalibrateCommandTest, RefusesWhatMakesNoSense) {
         {"--simulate", "castle", "--settings", "9"},
         {"--simulate", "castle", "--method", "adjustment", "--trials", "9"},
         {"--chart", "--seed", "2"},
+        {"--chart", "--wide"},
         {"--gamma", "--resume", "state.json"}};
     for (std::vector<std::string> words : wrong) {
         words.insert(words.begin(), "calibrate");

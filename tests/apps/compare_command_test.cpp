@@ -42,7 +42,7 @@ TEST_F(CompareTest, IdenticalImagesShowNothing) {
     write("a.pfm", disc(30, 20));
     write("a.exr", disc(30, 20));
     write("a.png", disc(0.6f, 0.5f));
-    for (const std::string model : {"modern", "summing", "rpg99"}) {
+    for (const std::string model : {"modern", "second", "rpg99"}) {
         for (const std::string name : {"a.pfm", "a.exr", "a.png"}) {
             const Json report = compare({name, name, "--model", model});
             EXPECT_EQ(report["visible_pixels"], 0) << name << model;
@@ -71,24 +71,63 @@ TEST_F(CompareTest, ItIsLessVisibleAside) {
     EXPECT_LT(beside["max_ratio"], compare({"a.pfm", "b.pfm"})["max_ratio"]);
 }
 
-TEST_F(CompareTest, SumsForAnObserver) {
+TEST_F(CompareTest, SeesForAnObserver) {
     write("a.pfm", disc(20, 20));
     write("b.pfm", disc(20.1f, 20));
-    const auto seen = [&](const std::string& observer) {
-        return compare({"a.pfm", "b.pfm", "--model", "summing", "--observer", observer})["max_ratio"].get<double>();
+    const auto seen = [&](const std::vector<std::string>& more) {
+        std::vector<std::string> words = {"a.pfm", "b.pfm"};
+        words.insert(words.end(), more.begin(), more.end());
+        return compare(words)["max_ratio"].get<double>();
     };
-    const double median = seen("median");
+    const auto out = [&](const std::vector<std::string>& more) {
+        std::vector<std::string> words = {"compare", "a.pfm", "b.pfm"};
+        words.insert(words.end(), more.begin(), more.end());
+        return run(words).out;
+    };
+    const double median = seen({"--observer", "median"});
     EXPECT_GT(median, 0);
-    EXPECT_NEAR(seen("default") / median, 2, 1e-3);
-    EXPECT_NEAR(seen("strict") / median, 2.7, 1e-3);
-    EXPECT_EQ(compare({"a.pfm", "b.pfm", "--model", "summing"})["max_ratio"].get<double>(), seen("default"));
-    EXPECT_THAT(run({"compare", "a.pfm", "b.pfm", "--model", "summing"}).out, HasSubstr("8.7% see more"));
+    EXPECT_NEAR(seen({"--observer", "default"}) / median, 2, 1e-3);
+    EXPECT_NEAR(seen({"--observer", "strict"}) / median, 2.7, 1e-3);
+    EXPECT_EQ(seen({}), seen({"--observer", "default"}));
+    EXPECT_EQ(seen({"--model", "modern"}), seen({}));
+    EXPECT_THAT(out({}), HasSubstr("by the judge modern and the observer default (of measured people, 8.7% see more)"));
 
-    EXPECT_THAT(run({"compare", "a.pfm", "b.pfm", "--observer", "strict"}).err, HasSubstr("needs --model summing"));
-    EXPECT_THAT(run({"compare", "a.pfm", "b.pfm", "--model", "summing", "--threshold-map", "t.pfm"}).err,
-                HasSubstr("--threshold-map needs"));
-    EXPECT_THAT(run({"compare", "a.pfm", "b.pfm", "--model", "summing", "--observer", "strict", "--csf", "castle"}).err,
-                HasSubstr("--observer excludes --csf"));
+    const double second = seen({"--model", "second"});
+    EXPECT_NE(second, seen({}));
+    EXPECT_EQ(second, seen({"--model", "second", "--observer", "default"}));
+    EXPECT_GT(seen({"--model", "second", "--observer", "strict"}), second);
+    EXPECT_THAT(out({"--model", "second", "--observer", "median"}),
+                HasSubstr("by the judge second and the observer median (of measured people, 65% see more)"));
+}
+
+// A model of sensitivity is a typical person's, a file some person's own.
+TEST_F(CompareTest, SeesByAnotherSensitivity) {
+    write("a.pfm", disc(20, 20));
+    write("b.pfm", disc(20.1f, 20));
+    EXPECT_EQ(compare({"a.pfm", "b.pfm", "--csf", "castle"}), compare({"a.pfm", "b.pfm"}));
+    EXPECT_NE(compare({"a.pfm", "b.pfm", "--csf", "daly"}), compare({"a.pfm", "b.pfm"}));
+    EXPECT_THAT(run({"compare", "a.pfm", "b.pfm", "--csf", "daly"}).out, HasSubstr("observer default (2 times daly)"));
+
+    ASSERT_EQ(run({"csf", "--csf", "castle", "--save-table", "me.json"}).status, 0);
+    const Json by_file = compare({"a.pfm", "b.pfm", "--csf", "me.json"});
+    EXPECT_NEAR(by_file["max_ratio"].get<double>(),
+                compare({"a.pfm", "b.pfm", "--observer", "median"})["max_ratio"].get<double>(), 0.01);
+    EXPECT_THAT(run({"compare", "a.pfm", "b.pfm", "--csf", "me.json"}).out, HasSubstr("observer me.json, looked"));
+}
+
+TEST_F(CompareTest, RefusesWhatTheJudgeDoesNotKnow) {
+    write("a.pfm", disc(20, 20));
+    const auto error = [&](std::vector<std::string> more) {
+        more.insert(more.begin(), {"compare", "a.pfm", "a.pfm"});
+        const Outcome outcome = run(more);
+        EXPECT_NE(outcome.status, 0);
+        return outcome.err;
+    };
+    EXPECT_THAT(error({"--model", "rpg99", "--observer", "strict"}), HasSubstr("--observer needs --model modern"));
+    EXPECT_THAT(error({"--observer", "strict", "--csf", "me.json"}), HasSubstr("--observer excludes --csf FILE"));
+    EXPECT_THAT(error({"--model", "second", "--csf", "castle"}), HasSubstr("--csf needs --model modern"));
+    EXPECT_THAT(error({"--model", "rpg99", "--csf", "castle"}), HasSubstr("--csf needs --model modern"));
+    EXPECT_THAT(error({"--model", "summing"}), HasSubstr("modern"));
 }
 
 TEST_F(CompareTest, PngIsDecodedByTheDisplay) {
@@ -114,7 +153,7 @@ TEST_F(CompareTest, FailsAboveALimit) {
 TEST_F(CompareTest, WritesMaps) {
     write("a.pfm", disc(20, 20));
     write("b.pfm", disc(40, 20));
-    for (const std::string model : {"modern", "rpg99"}) {
+    for (const std::string model : {"modern", "second", "rpg99"}) {
         compare({"a.pfm", "b.pfm", "--model", model, "--map", "map.png", "--threshold-map", "t.pfm"});
         const auto map = unseen::perception::read_image(path("map.png"));
         ASSERT_TRUE(map) << map.error().message;

@@ -6,6 +6,7 @@
 namespace {
 
 using namespace unseen::app::testing;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 class CsfCommandTest : public CommandTest {
@@ -185,6 +186,28 @@ TEST_F(CsfCommandTest, TablesCanBeSavedAndUsed) {
     by_file.insert(by_file.end(), {"--csf", "table.json"});
     by_model.push_back("--table");
     EXPECT_EQ(sensitivity(by_file), sensitivity(by_model));
+}
+
+TEST_F(CsfCommandTest, SaysWhereATableHasNoSamples) {
+    const std::string table = R"({"format": "unseen-csf", "version": 1, "frequency_cpd": [1, 16],
+        "eccentricity_deg": [0, 20], "luminance_cdm2": [1, 100], "sensitivity": [[[60, 5], [120, 10]], [[30, 1], [50, 2]]]})";
+    write_text(path("own.json"), table);
+    const auto at = [&](const char* degrees) {
+        return run({"csf", "--csf", "own.json", "--frequency", "4", "--luminance", "9", "--eccentricity", degrees,
+                    "--json", "-"})
+            .json();
+    };
+    EXPECT_FALSE(at("20").contains("beyond_table"));
+    EXPECT_EQ(at("40")["beyond_table"], "beyond the table's 20 degrees sensitivity is taken as there");
+    EXPECT_EQ(at("40")["sensitivity"], at("20")["sensitivity"]);
+    std::string upside_down = table;
+    upside_down.replace(upside_down.find("[[60, 5], [120, 10]]"), 20, "[[3, 0.1], [9, 0.2]]");
+    write_text(path("wrong.json"), upside_down);
+    const Outcome outcome = run({"csf", "--csf", "wrong.json", "--frequency", "4", "--luminance", "9"});
+    EXPECT_EQ(outcome.status, 1);
+    EXPECT_THAT(outcome.err, IsAnErrorForPeople());
+    EXPECT_THAT(outcome.err, AllOf(HasSubstr("wrong.json"), HasSubstr("sensitivity[1][0][0] is 30"),
+                                   HasSubstr("grows by 20 dB with eccentricity")));
 }
 
 // A measured profile says more than its table: it must not be lost to it.

@@ -130,6 +130,32 @@ TEST_F(PerceptionBenchTest, EffectsAreComparedWithoutEach) {
     EXPECT_THAT(people.out, HasSubstr("no silhouettes"));
 }
 
+TEST_F(PerceptionBenchTest, PeopleAreComparedWithModels) {
+    const Outcome outcome = bench({"people", "--json", "-"});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    std::map<std::string, double> above;
+    const Json all = outcome.json();
+    for (const Json& row : all["rows"])
+        if (row.contains("model")) above[row["model"]] = row["share_above"];
+    EXPECT_NEAR(above["castle times 2: observer default"], 0.087, 5e-4);
+    EXPECT_NEAR(above["castle times 1: observer median"], 0.649, 5e-4);
+    EXPECT_EQ(bench({"people", "--table", "nowhere.csv"}).status, 2);
+}
+
+// By eccentricity, on a mesh of its own beside the regular waves: nothing is visible to either judge.
+TEST_F(PerceptionBenchTest, NothingIsSeenWhereverTheViewerLooks) {
+    const Outcome outcome =
+        bench({"perception", "--quick", "--only", "aside", "--window", "128", "--mesh", "ball.vdt", "--json", "-"});
+    ASSERT_EQ(outcome.status, 0) << outcome.err;
+    const Json views = outcome.json()["views"];
+    ASSERT_EQ(views.size(), 16u); // two meshes, eight eccentricities
+    for (const Json& view : views) {
+        EXPECT_EQ(view["visible_pixels"], 0) << view;
+        EXPECT_EQ(view["second_visible_pixels"], 0) << view;
+    }
+    EXPECT_LT(views[7]["triangles"], views[0]["triangles"]);
+}
+
 // A factor cut to a quarter keeps fewer triangles; the more it is, the more are kept.
 TEST_F(PerceptionBenchTest, FactorsOfTheFoldModelAreVaried) {
     const Outcome outcome = bench({"fit", "--quick", "--factor", "peak_of_shift", "--json", "-"});
@@ -139,8 +165,9 @@ TEST_F(PerceptionBenchTest, FactorsOfTheFoldModelAreVaried) {
     for (std::size_t i = 0; i < rows.size(); ++i) {
         EXPECT_EQ(rows[i]["factor"], "peak_of_shift");
         EXPECT_EQ(rows[i]["is_own"], rows[i]["value"] == 1.2);
-        EXPECT_GT(rows[i]["looked_at"]["largest_v"], 0);
-        EXPECT_LT(rows[i]["aside"]["largest_v"], 1);
+        ASSERT_EQ(rows[i]["seen"].size(), 4u); // looked at, and aside
+        EXPECT_GT(rows[i]["seen"][0]["largest_v"], 0);
+        EXPECT_LT(rows[i]["seen"][3]["largest_v"], 1);
         if (i == 0) continue;
         EXPECT_GT(rows[i]["value"], rows[i - 1]["value"]);
         EXPECT_GE(rows[i]["triangles"], rows[i - 1]["triangles"]);

@@ -79,13 +79,13 @@ std::vector<std::vector<double>> numbers_of(const std::string& csv) {
     std::string line;
     std::getline(lines, line);
     EXPECT_EQ(line, "frame,triangles,folds,unfolds,changes,node_tests,cut_ms,index_ms,uploaded_bytes,draw_ms,frame_ms,"
-                    "drawn_triangles,gliding");
+                    "drawn_triangles,gliding,change_v,flicker_v,picture_v");
     while (std::getline(lines, line)) {
         std::istringstream cells(line);
         rows.emplace_back();
         for (std::string cell; std::getline(cells, cell, ',');)
             rows.back().push_back(cell.empty() ? -1 : std::stod(cell));
-        rows.back().resize(11, -1);
+        rows.back().resize(16, -1);
     }
     return rows;
 }
@@ -159,8 +159,8 @@ TEST_F(RenderCommandTest, PathsComeFromFiles) {
 
 TEST_F(RenderCommandTest, GazesArePlayedAndRepeat) {
     const auto triangles = [&](std::vector<std::string> more) {
-        more.insert(more.begin(), {"render", "ball.vdt", "--path", "orbit:0:40", "--size", "800x640", "--fold-test",
-                                   "error", "--csv", "out.csv", "--no-draw"});
+        more.insert(more.begin(), {"render", "ball.vdt", "--path", "orbit:0:40", "--size", "800x640", "--observer",
+                                   "median", "--fold-test", "error", "--csv", "out.csv", "--no-draw"});
         const Outcome flown = run(more);
         EXPECT_EQ(flown.status, 0) << flown.err;
         std::vector<double> column;
@@ -306,6 +306,58 @@ TEST_F(RenderCommandTest, BadPathsAreNamedByLineAndColumn) {
                                                          {"--path", "orbit:1", "--no-draw", "-o", "%d.png"}};
     for (auto words : wrong) {
         words.insert(words.begin(), {"render", "ball.vdt"});
+        EXPECT_EQ(run(words).status, 2) << ::testing::PrintToString(words);
+    }
+}
+
+// The ball goes away, so that its cut becomes coarser, in steps that one sees. Gliding hides them.
+TEST_F(RenderCommandTest, AFlightSaysWhetherChangesCanBeSeen) {
+    std::string away = "eye_x,eye_y,eye_z,target_x,target_y,target_z\n";
+    for (int i = 0; i < 12; ++i) away += "0,0," + std::to_string(60 + 2 * i) + ",0,0,0\n";
+    write_text(path("away.csv"), away);
+    const auto fly = [&](std::vector<std::string> more) {
+        more.insert(more.begin(),
+                    {"render", "ball.vdt", "--changes", "--size", "96x80", "--samples", "16", "--json", "-"});
+        const Outcome flown = run(more);
+        EXPECT_EQ(flown.status, 0) << flown.err;
+        return flown.json();
+    };
+    const Json popping =
+        fly({"--path", "away.csv", "--pixels", "6", "--fps", "25", "--csv", "popping.csv"})["changes_seen"];
+    EXPECT_EQ(popping["judged"], 11);
+    EXPECT_GT(popping["seen"], 0);
+    EXPECT_GT(popping["largest_v"], 1);
+    EXPECT_GT(popping["failing_pictures"], 0) << "six pixels can be seen";
+    const auto rows = numbers_of(read_text(path("popping.csv")));
+    ASSERT_EQ(rows.size(), 12u);
+    for (const auto& row : rows) {
+        if (row[13] > 0) {
+            EXPECT_GT(row[4], 0) << "the cut changes";
+        }
+        EXPECT_GE(row[13], row[14]);
+        EXPECT_GT(row[15], 0);
+    }
+    EXPECT_EQ(rows[popping["frame"].get<std::size_t>()][13], popping["largest_v"]);
+    const Json gliding = fly({"--path", "away.csv", "--pixels", "6", "--fps", "25", "--geomorph", "1"})["changes_seen"];
+    EXPECT_LT(gliding["largest_v"], 0.5 * popping["largest_v"].get<double>());
+    EXPECT_EQ(gliding["judged"], 11);
+
+    // Where nothing moves, nothing changes; a gaze that does is no change of the picture.
+    const Json still = fly({"--path", "orbit:0:4"})["changes_seen"];
+    EXPECT_EQ(still["largest_v"], 0);
+    EXPECT_EQ(still["seen"], 0);
+    EXPECT_FALSE(fly({"--path", "orbit:0:2", "--pixels", "6"})["changes_seen"].is_null());
+    // What comes into the window is cut finer than it was outside: no change that anybody sees.
+    std::string turning = "eye_x,eye_y,eye_z,target_x,target_y,target_z\n";
+    for (int i = 0; i < 6; ++i) turning += "0,0,60," + std::to_string(-2 + 0.4 * i) + ",0,0\n";
+    write_text(path("turning.csv"), turning);
+    const Json entering = fly({"--path", "turning.csv", "--pixels", "0.2"})["changes_seen"];
+    EXPECT_LT(entering["largest_v"], 0.5);
+    for (const auto& wrong : {std::vector<std::string>{"-o", "a.png"},
+                              {"--path", "orbit:1", "--no-draw"},
+                              {"--path", "orbit:1", "--wireframe"}}) {
+        std::vector<std::string> words = {"render", "ball.vdt", "--changes"};
+        words.insert(words.end(), wrong.begin(), wrong.end());
         EXPECT_EQ(run(words).status, 2) << ::testing::PrintToString(words);
     }
 }

@@ -1,4 +1,5 @@
 // The session library: requests that contradict themselves, plans, several objects.
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -23,6 +24,7 @@ using session::Request;
 using session::Session;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 vdtree::VertexTree tree_of(const vdtree::Mesh& mesh, const vdtree::BuildOptions& options = {}) {
     return *vdtree::build_tree(mesh.view(), options);
@@ -137,8 +139,9 @@ TEST(Session, FoldsObjectsBeforeTheLuminanceOfAll) {
     };
     session::Scene both = session::Scene::of(tree_of(grey, prelit));
     both.objects.push_back({tree_of(white, prelit), {.translation = {0, 0, -5}}});
-    auto alone = Session::create(session::Scene::of(tree_of(grey, prelit)));
-    auto together = Session::create(std::move(both));
+    const session::Observer median{.person = perception::median_person};
+    auto alone = Session::create(session::Scene::of(tree_of(grey, prelit)), median);
+    auto together = Session::create(std::move(both), median);
     EXPECT_GT(triangles_of_grey(*together), triangles_of_grey(*alone));
 }
 
@@ -166,13 +169,85 @@ TEST(Follower, ComesWhereACutFromScratchIs) {
     }
 }
 
+// Of what moves fast over the retina less is kept; what stands still again is refined at once, by the next call.
+TEST(Follower, RefinesWhatStandsStillAgain) {
+    auto session = *Session::create(session::Scene::of(tree_of(shapes::bumpy_sphere(6, 0.003))),
+                                    {.person = perception::median_person});
+    const vdtree::View view = session.default_view();
+    const Request request{.fold_test = FoldTest::luebke_hallen};
+    session::Follower follower(session);
+    const auto triangles = [&] {
+        const auto report = follower.follow(view, request);
+        EXPECT_TRUE(report) << report.error().message;
+        return report->stats.triangles;
+    };
+    const auto still = triangles();
+    const perception::DegreesPerSecond fast(40);
+    session.set_velocity(fast);
+    const auto moving = triangles();
+    EXPECT_LT(moving, still);
+    const auto simplified = session.simplify(view, request);
+    EXPECT_EQ(simplified->stats.triangles, moving) << "as from scratch";
+    const auto effect = [&](const char* name) {
+        const auto found = std::find_if(simplified->effects.begin(), simplified->effects.end(),
+                                        [&](const session::Effect& e) { return e.name == name; });
+        return *found;
+    };
+    EXPECT_TRUE(effect("motion").on);
+    EXPECT_THAT(effect("motion").why, HasSubstr("40 degrees/s"));
+    session.set_velocity(perception::DegreesPerSecond(0.05)); // the eye is never at rest
+    EXPECT_EQ(triangles(), still);
+    session.set_velocity(fast);
+    EXPECT_EQ(triangles(), moving);
+    session.set_velocity(perception::DegreesPerSecond(0));
+    EXPECT_EQ(triangles(), still);
+    // With a gaze that is known to a margin only, too.
+    session.set_gaze(session::Gaze{{-400, 512}, 4});
+    const auto aside = triangles();
+    session.set_velocity(fast);
+    EXPECT_NE(triangles(), aside);
+    session.set_velocity(perception::DegreesPerSecond(0));
+    EXPECT_EQ(triangles(), aside);
+}
+
+TEST(Session, SaysWhereItsTableHasNoSamples) {
+    perception::CsfSamples samples{"own", {1, 16}, {0, 20}, {1, 40}, {60, 5, 120, 10, 30, 1, 50, 2}};
+    session::Observer observer;
+    observer.csf = std::make_shared<const perception::CsfTable>(*perception::CsfTable::create(samples));
+    auto session = *Session::create(session::Scene::of(tree_of(shapes::bumpy_sphere(3, 0.03))), observer);
+    const auto beyond = [&]() -> session::Effect {
+        const auto plan = session.plan(session.default_view(), {.fold_test = FoldTest::luebke_hallen});
+        return *std::find_if(plan->effects.begin(), plan->effects.end(),
+                             [](const session::Effect& e) { return e.name == "beyond the csf table"; });
+    };
+    EXPECT_TRUE(beyond().on);
+    EXPECT_THAT(beyond().why, AllOf(HasSubstr("above the table's 40 cd/m2"), Not(HasSubstr("degrees"))));
+    session.set_gaze(session::Gaze{session::gaze_aside({}, session.default_view(), 29)});
+    EXPECT_THAT(beyond().why, HasSubstr("beyond the table's 20 degrees sensitivity is taken as there"));
+    Session by_default = two_balls();
+    const auto plan = by_default.plan(by_default.default_view(), {.fold_test = FoldTest::luebke_hallen});
+    for (const session::Effect& e : plan->effects)
+        if (e.name == "beyond the csf table") {
+            EXPECT_FALSE(e.on) << e.why;
+        }
+}
+
+TEST(Observer, AVelocityIsOneThatTablesKnow) {
+    for (const double bad : {-1.0, 81.0, std::numeric_limits<double>::quiet_NaN()}) {
+        const auto refused = Session::create(session::Scene::of(tree_of(shapes::cube(2))),
+                                             {.velocity = perception::DegreesPerSecond(bad)});
+        ASSERT_FALSE(refused);
+        EXPECT_THAT(refused.error().message, HasSubstr("observer.velocity"));
+    }
+}
+
 TEST(Follower, OutlivesItsSessionAndTakesUpMeasuredTrees) {
     std::optional<session::Follower> follower;
     vdtree::View view;
     {
         auto session = Session::create(session::Scene::of(tree_of(shapes::bumpy_sphere(3, 0.03))));
         view = session->default_view();
-        view.eye = view.target + 20.0 * (view.eye - view.target);
+        view.eye = view.target + 100.0 * (view.eye - view.target);
         follower.emplace(*session);
     }
     const auto whole = follower->follow(view, {.goal = Goal::full()});

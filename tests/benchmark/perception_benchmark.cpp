@@ -1,4 +1,7 @@
 // What accuracy costs: the perceptual test against the geometric ones, with and without gaze.
+#include <cmath>
+#include <optional>
+
 #include <benchmark/benchmark.h>
 
 #include <perception/criterion.h>
@@ -45,18 +48,38 @@ void csf_table_from_model(benchmark::State& state) {
 }
 BENCHMARK(csf_table_from_model)->Unit(benchmark::kMillisecond);
 
-void judge_modern(benchmark::State& state) {
-    perception::Image image;
-    image.width = image.height = 1024;
-    image.values.assign(1024 * 1024, 20.0f);
-    for (std::size_t i = 0; i < image.values.size(); i += 7) image.values[i] = 22.0f;
-    perception::Image other = image;
-    for (std::size_t i = 0; i < other.values.size(); i += 11) other.values[i] *= 1.001f;
-    perception::JudgeOptions options;
-    options.gaze_px = glm::dvec2(200, 300);
-    for (auto _ : state) benchmark::DoNotOptimize(perception::judge_modern(image, other, options));
+// A disc with fine detail on grey, and the same a little otherwise; 512 x 512 pixels.
+perception::Image disc_with_detail(float more) {
+    constexpr int side = 512;
+    perception::Image image{side, side, 1, {}};
+    for (int y = 0; y < side; ++y)
+        for (int x = 0; x < side; ++x) {
+            const float r = std::hypot(static_cast<float>(x - side / 2), static_cast<float>(y - side / 2)) / (side / 2);
+            const float wave = std::sin(0.3f * static_cast<float>(x)) * std::sin(0.2f * static_cast<float>(y));
+            image.values.push_back(r > 0.9f ? 20 : (90 - 70 * r) * (1 + (0.3f + more) * wave));
+        }
+    return image;
 }
-BENCHMARK(judge_modern)->Unit(benchmark::kMillisecond);
+
+perception::JudgeOptions judge_options(bool gazes, bool is_second) {
+    const auto gaze = gazes ? std::optional(glm::dvec2(1100, 256)) : std::nullopt;
+    return is_second ? perception::second_judge_options(perception::default_person, {}, gaze)
+                     : perception::JudgeOptions{.gaze_px = gaze};
+}
+
+void judge_prepare(benchmark::State& state) {
+    const perception::Image reference = disc_with_detail(0);
+    const perception::JudgeOptions options = judge_options(state.range(0), state.range(1));
+    for (auto _ : state) benchmark::DoNotOptimize(perception::Judge::create(reference, options));
+}
+BENCHMARK(judge_prepare)->ArgNames({"gaze", "second"})->ArgsProduct({{0, 1}, {0, 1}})->Unit(benchmark::kMillisecond);
+
+void judge_picture(benchmark::State& state) {
+    const auto judge = *perception::Judge::create(disc_with_detail(0), judge_options(state.range(0), state.range(1)));
+    const perception::Image test = disc_with_detail(0.01f);
+    for (auto _ : state) benchmark::DoNotOptimize(judge.judge(test));
+}
+BENCHMARK(judge_picture)->ArgNames({"gaze", "second"})->ArgsProduct({{0, 1}, {0, 1}})->Unit(benchmark::kMillisecond);
 
 } // namespace
 } // namespace unseen::bench

@@ -76,7 +76,7 @@ TEST_F(ObserverProfileTest, RoundTripOfOddNumbersIsExact) {
     samples.frequency_cpd = {1e-300, 1.0 / 3, 1e4 / 3};
     samples.eccentricity_deg = {0, 0.1 + 0.2};
     samples.luminance_cdm2 = {std::numeric_limits<double>::denorm_min(), 0.1};
-    samples.sensitivity = {1e6 / 3, 2.0 / 3, 1e-308, 5e-324, 1e-300, 1, 2, 3, 4, 5, 6, 7};
+    samples.sensitivity = {1e6 / 3, 2.0 / 3, 1e-308, 5e-324, 1e-300, 4, 2, 3, 4, 1.5, 0.1, 7};
     const auto table = CsfTable::create(samples);
     ASSERT_TRUE(table) << table.error().message;
     const auto file = folder() / "odd.json";
@@ -115,6 +115,7 @@ TEST_F(ObserverProfileTest, ErrorsNameTheFileAndThePlace) {
         {"[3, 100]", "[3]", "\"sensitivity[0]\" must be an array of 1"},
         {"[3, 100]", "[100, 3]", "luminance_cdm2[1]"},
         {"[3, 100]", "[-3, 100]", "luminance_cdm2[0]"},
+        {"[30, 15, 0.5]", "[200, 15, 0.5]", "sensitivity[1][0][0] is 200 (10 degrees, 3 cd/m2, 1 cpd)"},
         {"[30, 15, 0.5]", "[30, 15]", "\"sensitivity[1][0]\" must have 3 values, but has 2"},
         {"[30, 15, 0.5]", "[30, 15, 0.5, 0.1]", "\"sensitivity[1][0]\" must have 3 values, but has 4"},
         {"[30, 15, 0.5]", "[30, 0, 0.5]", "sensitivity[1][0][1]"},
@@ -138,6 +139,23 @@ TEST_F(ObserverProfileTest, ErrorsNameTheFileAndThePlace) {
          "measured[0]"},
         {"\"version\": 1", "\"version\": 2, \"date\": 7, \"measured_at_cdm2\": 50, \"measured\": []", "date"},
         {"\"version\": 1", "\"version\": 1, \"version\": 1", "\"version\" twice"},
+        {"\"version\": 1", "\"version\": 2, \"measured_at_cdm2\": 50, \"measured\": [], \"summation\": [1, 1, 1]",
+         "\"summation\" is unknown before version 3"},
+        {"\"version\": 1", "\"version\": 3, \"measured_at_cdm2\": 50, \"measured\": []",
+         "\"measured_wide\" is missing"},
+        {"\"version\": 1", "\"version\": 3, \"measured_at_cdm2\": 50, \"measured\": [], \"measured_wide\": []",
+         "\"summation\" is missing"},
+        {"\"version\": 1",
+         "\"version\": 3, \"measured_at_cdm2\": 50, \"measured\": [], \"measured_wide\": [], \"summation\": [1, 1.1, "
+         "2]",
+         "\"summation\" must be a factor, and the interval in which it lies"},
+        {"\"version\": 1",
+         "\"version\": 3, \"measured_at_cdm2\": 50, \"measured\": [], \"measured_wide\": [], \"summation\": [0, 0, 2]",
+         "\"summation\" must begin with a factor from 0.01 to 100"},
+        {"\"version\": 1",
+         "\"version\": 3, \"measured_at_cdm2\": 50, \"measured\": [], \"summation\": [1, 1, 1], "
+         "\"measured_wide\": [[1, 0, 0, 50, 40, 60, 7]]",
+         "measured_wide[0]"},
     };
     for (const Case& bad : cases) {
         const auto table = read_csf(write(replaced(small, bad.from, bad.to), "bad.json"));
@@ -149,7 +167,7 @@ TEST_F(ObserverProfileTest, ErrorsNameTheFileAndThePlace) {
 }
 
 TEST_F(ObserverProfileTest, NewerVersionsAreUnsupported) {
-    const auto table = read_csf(write(replaced(small, "\"version\": 1", "\"version\": 3")));
+    const auto table = read_csf(write(replaced(small, "\"version\": 1", "\"version\": 4")));
     ASSERT_FALSE(table);
     EXPECT_EQ(table.error().code, ErrorCode::unsupported);
     EXPECT_THAT(table.error().message, HasSubstr("version"));
@@ -189,6 +207,8 @@ TEST_F(ObserverProfileTest, MeasurementsGoThereAndBack) {
     EXPECT_EQ(back->display, profile.display);
     EXPECT_EQ(back->conditions, profile.conditions);
     EXPECT_EQ(back->measured_at_cdm2, profile.measured_at_cdm2);
+    EXPECT_FALSE(back->has_summation());
+    EXPECT_EQ(back->summation.own, 1) << "castle's law";
     ASSERT_EQ(back->measured.size(), 2u);
     EXPECT_EQ(back->measured[1].place, profile.measured[1].place);
     EXPECT_EQ(back->measured[1].sensitivity, 1.0 / 3);
@@ -202,6 +222,29 @@ TEST_F(ObserverProfileTest, MeasurementsGoThereAndBack) {
     const auto old = read_observer(write(small));
     ASSERT_TRUE(old) << old.error().message;
     EXPECT_TRUE(old->measured.empty());
+}
+
+TEST_F(ObserverProfileTest, SummationGoesThereAndBack) {
+    ObserverProfile profile;
+    profile.measured_at_cdm2 = 50;
+    profile.measured = {{{0.5, 0}, 60.1, 50, 70, 12}, {{0.5, 20, 100}, 1.0 / 3, 0.25, 0.5, 9}};
+    profile.summation = {1.25, 1.0 / 3, 2};
+    const auto file = folder() / "wide.json";
+    ASSERT_TRUE(write_observer(file, profile));
+    const auto back = read_observer(file);
+    ASSERT_TRUE(back) << back.error().message;
+    EXPECT_EQ(back->summation, profile.summation);
+    EXPECT_TRUE(back->has_summation());
+    ASSERT_EQ(back->measured.size(), 2u);
+    EXPECT_EQ(back->measured[0].place, profile.measured[0].place);
+    EXPECT_EQ(back->measured[1].place, profile.measured[1].place);
+    EXPECT_EQ(back->measured[1].sensitivity, 1.0 / 3);
+    EXPECT_EQ(back->measured[1].answers, 9);
+    // A profile without is of the version that older programs read.
+    profile.summation = {};
+    profile.measured.pop_back();
+    ASSERT_TRUE(write_observer(file, profile));
+    EXPECT_THAT(read(file), HasSubstr("\"version\": 2"));
 }
 
 TEST_F(ObserverProfileTest, WritingFailsWithoutLeavingAFile) {

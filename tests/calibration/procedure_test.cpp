@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <span>
 
 #include <gmock/gmock.h>
@@ -83,6 +84,34 @@ TEST_F(ProcedureTest, ThePlanFitsTheDisplay) {
         EXPECT_GE(place.frequency_cpd, 1);
         EXPECT_EQ(place.eccentricity_deg, 0);
     }
+}
+
+TEST_F(ProcedureTest, ThePlanHasWidePatches) {
+    const perception::Display display;
+    const CalibrationPlan plan = default_plan();
+    std::vector<GratingPlace> wide = plan.places, small = plan.places;
+    std::erase_if(wide, [](const GratingPlace& p) { return !p.is_wide(); });
+    std::erase_if(small, [](const GratingPlace& p) { return p.is_wide(); });
+    EXPECT_EQ(small.size(), 18u);
+    EXPECT_EQ(wide, (std::vector<GratingPlace>{{0.5, 0, 100}, {0.5, 20, 100}, {1, 0, 100}, {1, 20, 100}}));
+    EXPECT_EQ(plan.trials, 240);
+    for (const GratingPlace& place : wide) {
+        EXPECT_TRUE(fits(display, place));
+        EXPECT_GT(summation_gain(place), 1.1);
+        EXPECT_NEAR(std::numbers::pi * std::pow(place.sigma_deg(), 2), place.area_deg2, 1e-9);
+    }
+    // As large as a smaller display allows; and none where there is no room for 20 square degrees.
+    perception::Display small_display = display;
+    small_display.width_px = small_display.height_px = 600; // 17 degrees
+    const auto smaller = wide_places(plan, small_display, CsfTable::standard());
+    ASSERT_FALSE(smaller.empty());
+    for (const GratingPlace& place : smaller) {
+        EXPECT_GT(place.area_deg2, least_wide_deg2);
+        EXPECT_LT(place.area_deg2, 60);
+    }
+    small_display.width_px = small_display.height_px = 200; // 5.8 degrees
+    EXPECT_TRUE(wide_places(plan, small_display, CsfTable::standard()).empty());
+    EXPECT_EQ(plan_for(small_display, CsfTable::standard()).trials, 200);
 }
 
 // Some near the expected castleCSF, some of other gains, scales, slopes and lapse rates; and of other shapes: Barten's
@@ -261,6 +290,68 @@ TEST_F(ProcedureTest, IntervalsHoldTheTruthAboutAsOftenAsTheySay) {
     EXPECT_GT(share_inside(other_shapes, 2), 0.88);
 }
 
+// Of 95%, the interval holds the truth in 9 of 10 runs; and by chance a run strays by 3 dB.
+TEST_F(ProcedureTest, FindsHowAnObserverSumsOverArea) {
+    int inside = 0, runs = 0;
+    for (const double own : {0.6, 1.0, 2.0}) {
+        double mean_db = 0;
+        constexpr int seeds = 4;
+        for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+            CalibrationPlan plan = default_plan();
+            plan.trials = 400;
+            plan.seed = seed;
+            Procedure procedure = begin(plan);
+            SimulatedObserver observer = observer_of("castle:gain=0.8,slope=3", 300 + seed);
+            observer.summation = own;
+            while (!procedure.is_done()) answer(procedure, observer);
+            const Summation found = *procedure.summation();
+            mean_db += 20 * std::log10(found.own / own) / seeds;
+            inside += found.low <= own && own <= found.high;
+            ++runs;
+            EXPECT_LT(found.high / found.low, 2.3) << "7.2 dB from end to end";
+            EXPECT_TRUE(check(found, plan));
+            EXPECT_LT(rms_error_db(procedure, observer), 1.5);
+        }
+        EXPECT_NEAR(mean_db, 0, 2) << own;
+    }
+    EXPECT_GE(inside, runs - 2);
+}
+
+TEST_F(ProcedureTest, WithoutWidePatchesSummationIsNotKnown) {
+    CalibrationPlan plan = default_plan();
+    std::erase_if(plan.places, [](const GratingPlace& p) { return p.is_wide(); });
+    EXPECT_FALSE(begin(plan).summation());
+    EXPECT_TRUE(check(Summation(), plan));
+    // Before any answer it is castle's law, with what people differ by.
+    const Summation before = *begin(default_plan()).summation();
+    EXPECT_EQ(before.own, 1);
+    EXPECT_NEAR(std::log10(before.high), 1.96 * 0.3, 1e-3);
+}
+
+TEST_F(ProcedureTest, WidePatchesThatAreSeenWorseThanSmallOnesAreRefused) {
+    const CalibrationPlan plan = default_plan();
+    for (const bool is_careless : {false, true}) {
+        Procedure procedure = begin(plan);
+        const SimulatedObserver observer = observer_of("castle", 11);
+        while (!procedure.is_done()) {
+            const Trial trial = procedure.next();
+            Trial seen = trial;
+            // Half of what a small patch would be seen with.
+            if (is_careless && trial.grating.is_wide()) seen.contrast *= 0.5 / summation_gain(trial.grating);
+            procedure.choose(observer.choose(seen, plan.luminance));
+        }
+        const auto checked = check(*procedure.summation(), plan);
+        EXPECT_EQ(checked.has_value(), !is_careless);
+        if (!checked) {
+            EXPECT_THAT(checked.error().message, AllOf(HasSubstr("Wide patches were seen worse than small ones"),
+                                                       HasSubstr("0.46"), HasSubstr("Measure again")));
+        }
+    }
+    // Beyond the interval: it must lie below as a whole.
+    EXPECT_TRUE(check({0.3, 0.2, 0.5}, plan));
+    EXPECT_FALSE(check({0.3, 0.2, 0.45}, plan));
+}
+
 // A notch of 6 dB an octave wide: the shape's parameters cannot follow it, the places' own answers must.
 TEST_F(ProcedureTest, WhatDoesNotFitTheShapeComesThrough) {
     CalibrationPlan plan = default_plan();
@@ -299,6 +390,7 @@ TEST_F(ProcedureTest, TheTableAgreesWithTheEstimates) {
     EXPECT_EQ(table.samples().source, "me");
     constexpr double between_samples = 0.01; // of a quarter octave, a few degrees, a quarter of a decade
     for (const PlaceEstimate& e : procedure.estimates()) {
+        if (e.place.is_wide()) continue; // a table is of patches of 1.5 cycles
         const double value = table.sensitivity(CyclesPerDegree(e.place.frequency_cpd),
                                                Degrees(e.place.eccentricity_deg), procedure.plan().luminance);
         EXPECT_NEAR(value / e.sensitivity(), 1, between_samples)
@@ -352,6 +444,23 @@ TEST_F(ProcedureTest, RunsRepeatAndResume) {
     EXPECT_NE(a.phase_deg, b.phase_deg);
 }
 
+// States of calibrations that were begun before there were wide patches.
+TEST_F(ProcedureTest, OlderStatesGoOn) {
+    CalibrationPlan plan = default_plan();
+    std::erase_if(plan.places, [](const GratingPlace& p) { return p.is_wide(); });
+    plan.trials = 30;
+    Procedure procedure = begin(plan);
+    const SimulatedObserver observer = observer_of("castle", 1);
+    for (int i = 0; i < 5; ++i) answer(procedure, observer);
+    const auto file = folder() / "old.json";
+    ASSERT_TRUE(procedure.save(file));
+    EXPECT_THAT(read(file), AllOf(HasSubstr("\"version\": 1"), HasSubstr("\"places\": [[0.5, 0], [1, 0],")));
+    const auto resumed = Procedure::resume(file, CsfTable::standard());
+    ASSERT_TRUE(resumed) << resumed.error().message;
+    EXPECT_EQ(resumed->plan().places, plan.places);
+    EXPECT_EQ(resumed->answers().size(), 5u);
+}
+
 TEST_F(ProcedureTest, RefusesPlansThatAreNone) {
     const auto error_of = [](auto change) {
         CalibrationPlan plan = default_plan();
@@ -391,12 +500,13 @@ TEST_F(ProcedureTest, BadStatesNameTheFileAndThePlace) {
         const char *from, *to, *expected;
     };
     const BadCase cases[] = {{"unseen-calibration", "unseen-csf", "\"format\""},
-                             {"\"version\": 1", "\"version\": 2", "version"},
+                             {"\"version\": 2", "\"version\": 3", "version"},
                              {"\"2ifc\"", "\"3ifc\"", "\"method\" must be"},
                              {"\"seed\": 1", "\"seed\": -1", "seed"},
                              {"\"trials\": 5", "\"trials\": 2", "\"answers\" has more"},
                              {"\"places\": [[", "\"places\": [[1], [", "places[0]"},
                              {"\"places\": [[0.5", "\"places\": [[0", "places[0]: the frequency"},
+                             {"\"places\": [[0.5, 0, 0]", "\"places\": [[0.5, 0, -1]", "places[0]: the area"},
                              {"\"answers\": [\n[", "\"answers\": [\n[99", "\"answers[0]\" has no place"},
                              {"\"luminance_cdm2\": ", "\"luminance_cdm2\": -", "luminance_cdm2"}};
     for (const BadCase& bad : cases) {

@@ -1,6 +1,7 @@
 // The table: how near it comes to the closed form, how it interpolates, and that its conservative form is monotone and
 // inverted exactly.
 #include <perception/csf.h>
+#include <perception/motion.h>
 
 #include <algorithm>
 #include <cmath>
@@ -75,7 +76,7 @@ CsfTable create(CsfSamples samples) {
     return *std::move(table);
 }
 
-// A measured table as it may come: noisy, uneven, and monotone nowhere.
+// A measured table as it may come: noisy, uneven, and monotone nowhere; over eccentricity as noisy as may be.
 CsfTable noisy_table(unsigned seed) {
     RandomPlaces random(seed);
     CsfSamples s;
@@ -83,8 +84,14 @@ CsfTable noisy_table(unsigned seed) {
     for (double cpd = 0.3; cpd < 40; cpd *= random.uniform(1.01, 1.9)) s.frequency_cpd.push_back(cpd);
     for (double degrees = 0; degrees < 70; degrees += random.uniform(0.01, 15)) s.eccentricity_deg.push_back(degrees);
     for (double cdm2 = 0.1; cdm2 < 2000; cdm2 *= random.uniform(1.01, 6)) s.luminance_cdm2.push_back(cdm2);
-    const std::size_t count = s.frequency_cpd.size() * s.eccentricity_deg.size() * s.luminance_cdm2.size();
-    for (std::size_t i = 0; i < count; ++i) s.sensitivity.push_back(std::pow(10, random.uniform(-2, 3)));
+    const std::size_t plane = s.frequency_cpd.size() * s.luminance_cdm2.size();
+    for (std::size_t i = 0; i < plane; ++i) s.sensitivity.push_back(std::pow(10, random.uniform(-2, 3)));
+    std::vector<double> least(s.sensitivity);
+    for (std::size_t i = plane; i < plane * s.eccentricity_deg.size(); ++i) {
+        double& nearer = least[i % plane];
+        s.sensitivity.push_back(nearer * std::pow(10, random.uniform(-0.2, 0.99 * CsfTable::noise_db / 20)));
+        nearer = std::min(nearer, s.sensitivity.back());
+    }
     return create(std::move(s));
 }
 
@@ -505,6 +512,146 @@ TEST(CsfTable, RefusesBadSamplesAndNamesThem) {
         EXPECT_THAT(table.error().message, HasSubstr(bad.expected));
         EXPECT_EQ(table.error().code, ErrorCode::invalid_argument);
     }
+}
+
+// A table with its eccentricities in reverse, as a slip in a script makes it.
+TEST(CsfTable, RefusesWhatGrowsWithEccentricityBeyondNoise) {
+    CsfSamples samples = small_samples();
+    std::rotate(samples.sensitivity.begin(), samples.sensitivity.begin() + 6, samples.sensitivity.end());
+    const auto reversed = CsfTable::create(samples);
+    ASSERT_FALSE(reversed);
+    EXPECT_EQ(reversed.error().code, ErrorCode::invalid_argument);
+    EXPECT_THAT(reversed.error().message,
+                testing::AllOf(HasSubstr("sensitivity[1][0][0] is 16 (10 degrees, 1 cd/m2, 1 cpd)"),
+                               HasSubstr("sensitivity[0][0][0] is 1.6 (0 degrees)"), HasSubstr("20 dB"),
+                               HasSubstr("6.2 dB"), HasSubstr("in the order of the axes")));
+    // What is compared is the least sensitive place nearer to the gaze, not only the neighbour.
+    samples = small_samples();
+    samples.eccentricity_deg = {0, 10, 20};
+    samples.sensitivity = {16, 4, 1, 64, 16, 4, 1.6, 0.4, 0.1, 6.4, 1.6, 0.4, 3, 0.4, 0.1, 6.4, 1.6, 0.4};
+    EXPECT_TRUE(CsfTable::create(samples));
+    samples.eccentricity_deg = {0, 10, 20, 30};
+    samples.sensitivity.insert(samples.sensitivity.end(), {5, 0.4, 0.1, 6.4, 1.6, 0.4});
+    const auto grown = CsfTable::create(samples);
+    ASSERT_FALSE(grown);
+    EXPECT_THAT(grown.error().message,
+                testing::AllOf(HasSubstr("sensitivity[3][0][0]"), HasSubstr("sensitivity[1][0][0]")));
+}
+
+TEST(CsfTable, NoiseIsNoReasonToRefuse) {
+    const double noise = std::pow(10, CsfTable::noise_db / 20);
+    const auto accepts = [](const CsfSamples& s) { return CsfTable::create(s).has_value(); };
+    CsfSamples s = small_samples();
+    s.sensitivity[7] = 4 * noise * 0.999; // 4 cpd at 10 degrees, where the fovea has 4
+    EXPECT_TRUE(accepts(s));
+    s.sensitivity[7] = 4 * noise * 1.001;
+    EXPECT_FALSE(accepts(s));
+    // Nothing that can be shown is seen where sensitivity is below 1.
+    s = small_samples();
+    s.sensitivity[2] = 1e-30, s.sensitivity[8] = 0.99 * noise;
+    EXPECT_TRUE(accepts(s));
+    s.sensitivity[8] = 1.01 * noise;
+    EXPECT_FALSE(accepts(s));
+    // By night the fovea is blind.
+    s.luminance_cdm2[0] = CsfTable::rods_alone_below.value() / 2;
+    EXPECT_TRUE(accepts(s));
+}
+
+TEST(CsfTable, ModelsDoNotGrowWithEccentricity) {
+    for (const CsfModel model : csf_models) EXPECT_TRUE(CsfTable::create(CsfTable::from_model(model).samples()));
+}
+
+// Amounts that only a scaled table shows were never measured.
+TEST(CsfTable, WhatIsMadeOfATableIsNotRefused) {
+    CsfSamples s = small_samples();
+    s.sensitivity = {16, 4, 1e-3, 64, 16, 4, 1.6, 0.4, 0.5, 6.4, 1.6, 0.4};
+    const auto scaled = create(s).scaled(100);
+    ASSERT_TRUE(scaled) << scaled.error().message;
+}
+
+TEST(CsfTable, OfWhatMovesIsAsFromTheModel) {
+    RandomPlaces random(21);
+    for (const CsfModel model : {CsfModel::castle, CsfModel::daly, CsfModel::barten_2004}) {
+        for (const double velocity : {0.5, 10.0}) {
+            const auto moving = CsfTable::from_model(model).moving(DegreesPerSecond(velocity));
+            ASSERT_TRUE(moving) << moving.error().message;
+            const auto direct = CsfTable::from_model(model, {.velocity = DegreesPerSecond(velocity)});
+            for (int i = 0; i < 500; ++i) {
+                const Place p = random.next();
+                if (!(interpolated(*direct, p) > 1e-3)) continue;
+                EXPECT_NEAR(interpolated(*moving, p) / interpolated(*direct, p), 1, 1e-9) << name(model);
+            }
+        }
+    }
+    const CsfTable& still = CsfTable::standard();
+    EXPECT_EQ(&still.moving(least_velocity)->samples(), &still.samples()) << "the eye is never at rest";
+    for (const double bad : {-1.0, 81.0, not_a_number, infinity}) {
+        const auto refused = still.moving(DegreesPerSecond(bad));
+        ASSERT_FALSE(refused);
+        EXPECT_THAT(refused.error().message, HasSubstr("0 to 80 degrees/s"));
+    }
+}
+
+// The factor is above 1 for coarse gratings: the form must hold what is coarser than the peak of stationary ones, and
+// where nothing was sampled.
+TEST(CsfTable, ConservativeFormHoldsWhatMoves) {
+    RandomPlaces random(22);
+    for (const double velocity : {0.3, 2.0, 10.0, 40.0, 80.0}) {
+        const DegreesPerSecond v(velocity);
+        const CsfTable moving = *CsfTable::standard().moving(v);
+        double highest = 0; // of the closed form, also far below the table's first frequency
+        for (double cpd = 1.0 / 1024; cpd < 64; cpd *= 1.02)
+            highest = std::max(highest, sensitivity(CsfModel::castle, stimulus_of({.velocity = v}, CyclesPerDegree(cpd),
+                                                                                  Degrees(0), Luminance(50))));
+        EXPECT_GE(monotone(moving, {0.001, 0, 50}), highest * (1 - table_accuracy)) << velocity;
+        if (velocity >= 2) {
+            EXPECT_GT(highest, 1.5 * CsfTable::standard().peak_sensitivity(Degrees(0), Luminance(50))) << velocity;
+        }
+        for (int i = 0; i < 3000; ++i) {
+            const Place p = random.next();
+            const double s = sensitivity(CsfModel::castle, stimulus_of({.velocity = v}, CyclesPerDegree(p.cpd),
+                                                                       Degrees(p.degrees), Luminance(p.cdm2)));
+            if (s > 1) {
+                ASSERT_GT(monotone(moving, p), s * (1 - table_accuracy)) << velocity;
+            }
+            Place other = p;
+            other.cpd *= 2;
+            ASSERT_LE(monotone(moving, other), monotone(moving, p) * (1 + rounding));
+        }
+    }
+    // A viewer's table with few samples, none of them coarse.
+    const CsfTable few = create(small_samples()), moving = *few.moving(DegreesPerSecond(10));
+    for (double cpd = 1.0 / 16; cpd < 16; cpd *= 1.1) {
+        const double wanted =
+            interpolated(few, {cpd, 5, 10}) * velocity_factor(CyclesPerDegree(cpd), DegreesPerSecond(10));
+        EXPECT_GE(monotone(moving, {cpd, 5, 10}), wanted * (1 - table_accuracy)) << cpd;
+        EXPECT_NEAR(interpolated(moving, {cpd, 5, 10}) / wanted, 1, table_accuracy) << cpd;
+    }
+}
+
+TEST(CsfTable, SaysHowFarItsSamplesReach) {
+    const CsfTable table = create(small_samples());
+    const CsfReach reach = table.reach();
+    EXPECT_EQ(reach.coarsest, CyclesPerDegree(1));
+    EXPECT_EQ(reach.finest, CyclesPerDegree(16));
+    EXPECT_EQ(reach.eccentricity, Degrees(10));
+    EXPECT_EQ(reach.darkest, Luminance(1));
+    EXPECT_EQ(reach.brightest, Luminance(100));
+    const auto beyond = [&](double degrees, double darkest, double brightest) {
+        return beyond_reach(table, Degrees(degrees), Luminance(darkest), Luminance(brightest));
+    };
+    EXPECT_EQ(beyond(10, 1, 100), "");
+    EXPECT_EQ(beyond(11, 1, 100), "beyond the table's 10 degrees sensitivity is taken as there");
+    EXPECT_EQ(beyond(0, 0.5, 100), "below the table's 1 cd/m2 sensitivity is taken as there");
+    EXPECT_THAT(beyond(0, 1, 101), HasSubstr("above the table's 100 cd/m2 sensitivity is taken as there, though"));
+    EXPECT_THAT(beyond(11, 0.5, 101),
+                testing::AllOf(HasSubstr("10 degrees"), HasSubstr("; below"), HasSubstr("; above")));
+    EXPECT_THAT(beyond(not_a_number, 1, 100), HasSubstr("10 degrees"));
+    // And it is taken as there.
+    EXPECT_EQ(interpolated(table, {2, 60, 50}), interpolated(table, {2, 10, 50}));
+    EXPECT_EQ(monotone(table, {2, 60, 50}), monotone(table, {2, 10, 50}));
+    EXPECT_EQ(monotone(table, {2, 5, 1e3}), monotone(table, {2, 5, 100}));
+    EXPECT_EQ(monotone(table, {2, 5, 0.1}), monotone(table, {2, 5, 1}));
 }
 
 } // namespace

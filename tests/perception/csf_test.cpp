@@ -158,6 +158,38 @@ TEST(Csf, PatchHasARadiusOfOneAndAHalfCycles) {
     EXPECT_DOUBLE_EQ(patch_area(3.0_cpd).value(), std::numbers::pi / 4);
 }
 
+TEST(Csf, WiderPatchesAreSeenBetterByTheLawOfArea) {
+    const SquareDegrees unlimited(std::numeric_limits<double>::infinity());
+    for (const double cpd : {0.25, 0.5, 1.0, 2.0, 8.0, 30.0}) {
+        const CyclesPerDegree frequency(cpd);
+        EXPECT_NEAR(summation_gain(frequency, patch_area(frequency)), 1, 1e-12);
+        EXPECT_EQ(summation_share(frequency, patch_area(frequency) * 0.5), 0);
+        EXPECT_NEAR(summation_share(frequency, unlimited), 1, 1e-12);
+        double last = 0;
+        for (double deg2 = 1e-3; deg2 < 1e5; deg2 *= 3) {
+            const SquareDegrees area(deg2);
+            const double gain = summation_gain(frequency, area);
+            EXPECT_GT(gain, last);
+            last = gain;
+            // castleCSF's sustained channel, which is nearly all that sees what stands still.
+            const auto castle = [&](SquareDegrees patch) {
+                return sensitivity(CsfModel::castle, {.frequency = frequency, .area = patch});
+            };
+            EXPECT_NEAR(gain / (castle(area) / castle(patch_area(frequency))), 1, 0.03) << cpd << " cpd, " << deg2;
+            // A person's own law meets castle's where patches are as small as tables have them.
+            const double share = summation_share(frequency, area);
+            EXPECT_NEAR(summation_gain(frequency, area, 1.7), gain * std::pow(1.7, share), 1e-9 * gain);
+        }
+        EXPECT_NEAR(summation_gain(frequency, unlimited, 0.6), 0.6 * summation_gain(frequency, unlimited), 1e-12);
+    }
+    // docs/model.md's numbers.
+    EXPECT_NEAR(summation_gain(0.5_cpd, unlimited), 2.16, 0.01);
+    EXPECT_NEAR(summation_gain(4.0_cpd, unlimited), 3.4, 0.05);
+    for (const auto& [cpd, deg2, own] :
+         {std::array{0.0, 1.0, 1.0}, {1.0, 0.0, 1.0}, {1.0, -1.0, 1.0}, {1.0, 1.0, 0.0}, {1.0, 1.0, std::nan("")}})
+        EXPECT_TRUE(std::isnan(summation_gain(CyclesPerDegree(cpd), SquareDegrees(deg2), own)));
+}
+
 TEST(Csf, ModelsHaveNames) {
     for (const CsfModel model : models) {
         const auto found = csf_model(name(model));

@@ -90,6 +90,7 @@ View view_of_screen() {
 
 FoldTestOptions fold_test(const VertexTree& tree) {
     FoldTestOptions options;
+    options.csf = csf_of(median_person); // whose holes these are: others have smaller ones
     options.scene = {std::min(tree.luminance_range().lo, background), std::max(tree.luminance_range().hi, background)};
     return options;
 }
@@ -202,7 +203,7 @@ Image picture(const Cut& cut, const View& view) {
 std::uint64_t visible_pixels(const Cut& cut, const View& view) {
     Cut whole(cut.tree());
     whole.unfold_all();
-    const auto judged = judge_modern(picture(whole, view), picture(cut, view), {});
+    const auto judged = judge_modern(picture(whole, view), picture(cut, view), {.gain = median_person.gain});
     if (!judged) throw std::runtime_error(judged.error().message);
     return judged->visible_pixels;
 }

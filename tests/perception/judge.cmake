@@ -6,5 +6,8 @@ unseen_add_test(NAME perception_image SOURCES image_test.cpp
 unseen_add_test(NAME perception_judge_modern SOURCES judge_modern_test.cpp DEPENDS unseen::perception LABELS unit)
 unseen_add_test(NAME perception_judge_rpg99 SOURCES judge_rpg99_test.cpp DEPENDS unseen::perception LABELS unit)
 unseen_add_test(NAME perception_ssim SOURCES ssim_test.cpp DEPENDS unseen::perception LABELS unit)
-unseen_add_test(NAME perception_summing_judge SOURCES summing_judge_test.cpp
+unseen_add_test(NAME perception_fast_math SOURCES fast_math_test.cpp
                 DEPENDS unseen::perception PRIVATE_HEADERS perception LABELS unit)
+unseen_add_test(NAME perception_summation SOURCES summation_test.cpp
+                DEPENDS unseen::perception PRIVATE_HEADERS perception LABELS unit)
+unseen_add_test(NAME perception_change SOURCES change_test.cpp DEPENDS unseen::perception LABELS unit)

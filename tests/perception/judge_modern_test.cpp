@@ -1,5 +1,6 @@
 // The modern judge is not blind and not nervous: single gratings, a disc and an offset become visible where the
-// contrast sensitivity function says so; what is identical, masked by the reference or far from the gaze does not.
+// contrast sensitivity function says so; what is identical, masked by the reference or far from the gaze does not. Here
+// it judges for the median person, who is castleCSF. People: tests/calibration/people_test.cpp.
 #include <perception/judge.h>
 
 #include <algorithm>
@@ -24,12 +25,15 @@ double default_ppd() { return pixels_per_degree(Display{}).value(); }
 
 struct Gabor {
     double freq_cpd = 4, contrast = 0.1, luminance = 20, orientation_deg = 0, phase = 0;
+    double radius_cycles = 1.5; // the envelope's standard deviation; its area is pi radius^2
+
+    double sigma_deg() const { return radius_cycles / freq_cpd; }
+    SquareDegrees area() const { return SquareDegrees(std::numbers::pi * sigma_deg() * sigma_deg()); }
 };
 
-// Envelope of 1.5 cycles radius, so its area is patch_area(frequency).
 Image draw(const Gabor& g, int side) {
     Image image = flat(side, side, 0);
-    const double sigma = 1.5 / g.freq_cpd, angle = g.orientation_deg * std::numbers::pi / 180;
+    const double sigma = g.sigma_deg(), angle = g.orientation_deg * std::numbers::pi / 180;
     for (int y = 0; y < side; ++y) {
         for (int x = 0; x < side; ++x) {
             const double dx = (x - side / 2) / default_ppd(), dy = (y - side / 2) / default_ppd();
@@ -42,9 +46,11 @@ Image draw(const Gabor& g, int side) {
     return image;
 }
 
+JudgeOptions median() { return {.gain = median_person.gain}; }
+
 // A gaze that sees the window's centre at `degrees`.
 JudgeOptions looking_aside(double degrees, int side) {
-    JudgeOptions options;
+    JudgeOptions options = median();
     if (degrees > 0) {
         const double px = std::tan(degrees * std::numbers::pi / 180) * options.display.distance.value() /
                           options.display.pixel_pitch.value();
@@ -53,20 +59,26 @@ JudgeOptions looking_aside(double degrees, int side) {
     return options;
 }
 
-double closed_form(double freq_cpd, double luminance, double eccentricity) {
+double closed_form(const Gabor& g, double eccentricity, CsfModel model = CsfModel::castle) {
     Stimulus s;
-    s.frequency = CyclesPerDegree(freq_cpd);
-    s.luminance = Luminance(luminance);
+    s.frequency = CyclesPerDegree(g.freq_cpd);
+    s.luminance = Luminance(g.luminance);
     s.eccentricity = Degrees(eccentricity);
-    s.area = patch_area(s.frequency);
-    return sensitivity(CsfModel::castle, s);
+    s.area = g.area();
+    return sensitivity(model, s);
+}
+// Of a patch of patch_area().
+double closed_form(double freq_cpd, double luminance, double eccentricity) {
+    return closed_form({.freq_cpd = freq_cpd, .luminance = luminance}, eccentricity);
 }
 
-// 5 standard deviations of the envelope across, at least 256 pixels.
-int side_for(double freq_cpd) { return std::max(256, static_cast<int>(5 * 1.5 / freq_cpd * default_ppd()) / 2 * 2); }
+// 5 standard deviations of the envelope across, at least 256 pixels and at most 700.
+int side_for(const Gabor& g) {
+    return std::clamp(static_cast<int>(5 * g.sigma_deg() * default_ppd()) / 2 * 2, 256, 700);
+}
 
 double largest_ratio(const Gabor& g, double eccentricity) {
-    const int side = side_for(g.freq_cpd);
+    const int side = side_for(g);
     const auto judged = judge_modern(flat(side, side, g.luminance), draw(g, side), looking_aside(eccentricity, side));
     EXPECT_TRUE(judged.has_value());
     return judged ? judged->max_ratio : 0;
@@ -76,7 +88,7 @@ constexpr double three_decibels = 1.4125375446227544; // 10^(3/20)
 
 // Below 1/S by 3 dB a grating must not be visible, above it by 3 dB it must be.
 void expect_threshold_within_3_db(Gabor g, double eccentricity, int& tested) {
-    const double threshold = 1 / closed_form(g.freq_cpd, g.luminance, eccentricity);
+    const double threshold = 1 / closed_form(g, eccentricity);
     const auto where = [&] {
         return std::to_string(g.freq_cpd) + " cpd, " + std::to_string(g.luminance) + " cd/m2, " +
                std::to_string(eccentricity) + " deg, orientation " + std::to_string(g.orientation_deg);
@@ -110,6 +122,91 @@ TEST(JudgeModern, SeesGaborsBetweenItsBandsAndAtAnyOrientationAndPhase) {
     EXPECT_GE(tested, 15);
 }
 
+TEST(JudgeModern, SeesGaborsOfAnyAreaAtTheirThreshold) {
+    int tested = 0;
+    for (const double freq : {1.0, 2.0, 4.0, 5.5, 8.0, 13.0}) {
+        for (const double radius_cycles : {1.0, 3.0, 6.0}) {
+            for (const double orientation : {0.0, 45.0})
+                expect_threshold_within_3_db({freq, 0, 20, orientation, 0, radius_cycles}, 0, tested);
+        }
+    }
+    EXPECT_EQ(tested, 36);
+}
+
+TEST(JudgeModern, SeesMoreOfWhatIsLarger) {
+    double last = 0;
+    for (const double radius_cycles : {0.4, 1.2, 4.0, 8.0}) {
+        const double v = largest_ratio({4, 0.02, 20, 0, 0, radius_cycles}, 0);
+        EXPECT_GT(v, 1.1 * last) << radius_cycles;
+        last = v;
+    }
+}
+
+TEST(JudgeModern, SeesSoManyTimesAsMuchAsThePerson) {
+    const Image reference = flat(128, 128, 20), test = draw({4, 0.01, 20, 0, 0}, 128);
+    const auto seen = [&](const Person& person) {
+        return judge_modern(reference, test, {.gain = person.gain})->max_ratio;
+    };
+    for (const Person& person : people)
+        EXPECT_NEAR(seen(person) / seen(median_person), person.gain, 1e-4) << person.name;
+    EXPECT_EQ(judge_modern(reference, test, {})->max_ratio, seen(default_person));
+}
+
+// Prepared once, it judges as if it had been made for each picture.
+TEST(JudgeModern, MayBeAskedAgain) {
+    const Image reference = flat(96, 96, 20), a = draw({4, 0.03, 20, 0, 0}, 96), b = draw({2, 0.05, 20, 0, 0}, 96);
+    const auto judge = Judge::create(reference, {});
+    const double first = judge->judge(a)->max_ratio;
+    EXPECT_NE(judge->judge(b)->max_ratio, first);
+    EXPECT_EQ(judge->judge(a)->max_ratio, first);
+    EXPECT_EQ(judge_modern(reference, b, {})->max_ratio, judge->judge(b)->max_ratio);
+}
+
+// ---- the second judge
+
+// Of patches of any size.
+TEST(SecondJudge, SeesWhatBartenSays) {
+    for (const double freq : {2.0, 5.5}) {
+        for (const double radius_cycles : {2.0, 6.0}) {
+            Gabor g{freq, 0, 20, 0, 0, radius_cycles};
+            g.contrast = 1 / closed_form(g, 0, CsfModel::barten_fitted);
+            const int side = side_for(g);
+            JudgeOptions options = second_judge_options(median_person);
+            options.gain = 1;
+            const auto judged = judge_modern(flat(side, side, 20), draw(g, side), options);
+            EXPECT_NEAR(20 * std::log10(judged->max_ratio), 0, 3) << freq << " cpd, " << radius_cycles;
+        }
+    }
+}
+
+TEST(SecondJudge, FadesWithEccentricityAsTheFirstDoes) {
+    const Image reference = flat(256, 256, 20), test = draw({4, 0.1, 20, 0, 0}, 256);
+    const auto fading = [&](JudgeOptions options) {
+        options.gaze_px.reset();
+        const double looked_at = judge_modern(reference, test, options)->max_ratio;
+        options.gaze_px = looking_aside(15, 256).gaze_px;
+        return judge_modern(reference, test, options)->max_ratio / looked_at;
+    };
+    EXPECT_NEAR(fading(second_judge_options(median_person)) / fading(median()), 1, 0.3);
+}
+
+TEST(SecondJudge, SeesForItsPerson) {
+    const Image reference = flat(128, 128, 20), test = draw({4, 0.01, 20, 0, 0}, 128);
+    double last = 0;
+    for (const Person& person : people) {
+        const double v = judge_modern(reference, test, second_judge_options(person))->max_ratio;
+        EXPECT_GT(v, last) << person.name;
+        last = v;
+    }
+    Display far;
+    far.distance = Metres(1);
+    const auto options = second_judge_options(default_person, far, glm::dvec2(3, 4));
+    EXPECT_EQ(options.display.distance.value(), 1);
+    EXPECT_EQ(options.gaze_px, glm::dvec2(3, 4));
+}
+
+// ---- the first one again
+
 Image with_disc(double luminance, double contrast, double radius_deg, int side) {
     Image image = flat(side, side, luminance);
     for (int y = 0; y < side; ++y) {
@@ -124,7 +221,7 @@ Image with_disc(double luminance, double contrast, double radius_deg, int side) 
 TEST(JudgeModern, SeesATenthMoreOrLessOnATwoDegreeDisc) {
     for (const int side : {96, 256, 512}) {
         for (const double contrast : {0.1, -0.1}) {
-            const auto judged = judge_modern(flat(side, side, 20), with_disc(20, contrast, 1, side), {});
+            const auto judged = judge_modern(flat(side, side, 20), with_disc(20, contrast, 1, side), median());
             EXPECT_GE(judged->max_ratio, 1) << side;
             EXPECT_GE(judged->visibility.at(side / 2 + 30, side / 2), 1) << side; // near its edge
         }
@@ -133,7 +230,7 @@ TEST(JudgeModern, SeesATenthMoreOrLessOnATwoDegreeDisc) {
 
 TEST(JudgeModern, SeesAChangeWithoutAnyEdge) {
     for (const int width : {1, 2, 5, 64, 300}) {
-        const auto judged = judge_modern(flat(width, 64, 20), flat(width, 64, 22), {});
+        const auto judged = judge_modern(flat(width, 64, 20), flat(width, 64, 22), median());
         EXPECT_EQ(judged->visible_pixels, judged->pixels) << width;
     }
 }
@@ -166,12 +263,13 @@ TEST(JudgeModern, MasksByTheReferenceButNotByTheError) {
         rough_test.values[i] += gabor.values[i] - 20;
     }
     // Where the mask crosses zero it hides nothing, so the largest ratio says little and the number of pixels much.
-    EXPECT_GT(judge_modern(smooth, smooth_test, {})->visible_pixels,
-              2 * judge_modern(rough, rough_test, {})->visible_pixels);
+    EXPECT_GT(judge_modern(smooth, smooth_test, median())->visible_pixels,
+              2 * judge_modern(rough, rough_test, median())->visible_pixels);
     // The strong error in `rough` against `smooth` is not its own mask: twice the error, twice the visibility.
     Image half = smooth;
     for (std::size_t i = 0; i < half.values.size(); ++i) half.values[i] = 0.5F * (smooth.values[i] + rough.values[i]);
-    EXPECT_NEAR(judge_modern(smooth, rough, {})->max_ratio / judge_modern(smooth, half, {})->max_ratio, 2, 1e-4);
+    EXPECT_NEAR(judge_modern(smooth, rough, median())->max_ratio / judge_modern(smooth, half, median())->max_ratio, 2,
+                1e-4);
 }
 
 TEST(JudgeModern, FadesWithEccentricityAsTheClosedFormSays) {
@@ -191,12 +289,12 @@ TEST(JudgeModern, FadesWithEccentricityAsTheClosedFormSays) {
 TEST(JudgeModern, WithoutGazeTreatsEveryPixelAsFoveal) {
     Image test = flat(512, 512, 20);
     test.at(40, 64) += 5;
-    const auto corner = judge_modern(flat(512, 512, 20), test, {});
+    const auto corner = judge_modern(flat(512, 512, 20), test, median());
     Image centred = flat(512, 512, 20);
     centred.at(256, 256) += 5;
-    const auto centre = judge_modern(flat(512, 512, 20), centred, {});
+    const auto centre = judge_modern(flat(512, 512, 20), centred, median());
     EXPECT_NEAR(corner->max_ratio / centre->max_ratio, 1, 0.2); // sample phases differ
-    JudgeOptions aside;
+    JudgeOptions aside = median();
     aside.gaze_px = glm::dvec2(1603, 256);
     EXPECT_LT(judge_modern(flat(512, 512, 20), test, aside)->max_ratio, 0.2 * corner->max_ratio);
 }
@@ -204,7 +302,7 @@ TEST(JudgeModern, WithoutGazeTreatsEveryPixelAsFoveal) {
 TEST(JudgeModern, CountsTheWholeBlockOfALowBand) {
     Gabor g{0.35, 0.03, 20, 0, 0};
     const Image test = draw(g, 512);
-    const auto judged = judge_modern(flat(512, 512, 20), test, {});
+    const auto judged = judge_modern(flat(512, 512, 20), test, median());
     ASSERT_GE(judged->max_ratio, 1);
     // Band 5 has blocks of 32 pixels: within one, the coarse part of V does not change, so runs of equal values are
     // long.
@@ -216,7 +314,7 @@ TEST(JudgeModern, CountsTheWholeBlockOfALowBand) {
 
 // Degrees from the gaze to the centre of pixel (0, 0), which is exactly a sample of every level of the pyramid.
 JudgeOptions looking_beside_the_corner(double degrees, int side) {
-    JudgeOptions options;
+    JudgeOptions options = median();
     const double pixel = options.display.pixel_pitch.value() / options.display.distance.value();
     const double corner = (0.5 * side - 0.5) * pixel; // left of and above the centre, in viewing distances
     const double depth = std::hypot(1.0, corner);     // from the eye to the corner's row
@@ -299,7 +397,7 @@ TEST(ThresholdMapModern, RisesWhereTheReferenceMasks) {
     for (int y = 0; y < 256; ++y) {
         for (int x = 128; x < 256; ++x) image.at(x, y) = rough.at(x, y);
     }
-    const auto map = threshold_map_modern(image, {});
+    const auto map = threshold_map_modern(image, median());
     double left = 0, right = 0;
     for (int y = 96; y < 160; ++y) {
         for (int x = 16; x < 48; ++x) {
@@ -312,15 +410,27 @@ TEST(ThresholdMapModern, RisesWhereTheReferenceMasks) {
 
 TEST(JudgeModern, StaysFiniteInTheDarkAndInFullContrast) {
     const Image black = flat(128, 128, 0);
-    Image dots = black;
-    for (int y = 0; y < 128; y += 2) {
-        for (int x = 0; x < 128; x += 2) dots.at(x, y) = 10000;
-    }
-    for (const auto& options : {JudgeOptions{}, looking_aside(20, 128)}) {
-        for (const auto& [a, b] : {std::pair(black, dots), std::pair(dots, black)}) {
-            const auto judged = judge_modern(a, b, options);
-            EXPECT_TRUE(std::isfinite(judged->max_ratio));
-            EXPECT_EQ(judged->visible_pixels, judged->pixels);
+    const auto dotted = [&](float cdm2) {
+        Image dots = black;
+        for (int y = 0; y < 128; y += 2)
+            for (int x = 0; x < 128; x += 2) dots.at(x, y) = cdm2;
+        return dots;
+    };
+    JudgeOptions steep, opposite = looking_aside(20, 128);
+    steep.beta = 8, steep.gain = 1000;
+    opposite.gaze_px = glm::dvec2(-1e300, 1e300);
+    for (const float cdm2 : {1e4f, 1e30f}) {
+        const Image dots = dotted(cdm2);
+        for (const auto& options :
+             {JudgeOptions{}, second_judge_options(strict_person), steep, looking_aside(20, 128), opposite}) {
+            for (const auto& [a, b] : {std::pair(black, dots), std::pair(dots, black)}) {
+                const auto judged = judge_modern(a, b, options);
+                EXPECT_TRUE(std::isfinite(judged->max_ratio));
+                // Nobody sees in light of 1e30 cd/m2, nor behind the head.
+                if (cdm2 == 1e4f && options.gaze_px != opposite.gaze_px) {
+                    EXPECT_EQ(judged->visible_pixels, judged->pixels);
+                }
+            }
         }
     }
 }
@@ -334,6 +444,7 @@ TEST(JudgeModern, RefusesBadInput) {
         ASSERT_FALSE(judged);
         EXPECT_NE(judged.error().message.find("(3, 1)"), std::string::npos) << judged.error().message;
         EXPECT_FALSE(judge_modern(bad, good, {}));
+        EXPECT_FALSE(Judge::create(bad, {}));
         EXPECT_FALSE(threshold_map_modern(bad, {}));
     }
     EXPECT_FALSE(judge_modern(good, flat(9, 8, 1), {}));
@@ -344,6 +455,7 @@ TEST(JudgeModern, RefusesBadInput) {
     JudgeOptions options;
     options.beta = std::numeric_limits<double>::quiet_NaN();
     EXPECT_FALSE(judge_modern(good, good, options));
+    for (const double gain : {0.0, -1.0, 1e4, std::nan("")}) EXPECT_FALSE(judge_modern(good, good, {.gain = gain}));
     options = {};
     options.gaze_px = glm::dvec2(std::numeric_limits<double>::infinity(), 0);
     EXPECT_FALSE(judge_modern(good, good, options));

@@ -219,11 +219,13 @@ TEST(FoldOracle, SeesNothingOfFurtherMeshes) {
 struct Omission {
     const char* name;
     void (*leave_out)(perception::FoldRecord&);
+    double pattern = 0.2; // amplitude of what is painted on the ball
 };
 class FoldMutations : public testing::TestWithParam<Omission> {};
 INSTANTIATE_TEST_SUITE_P(
     Without, FoldMutations,
-    testing::Values(Omission{"outlines", [](perception::FoldRecord& r) { r.shift = r.farthest = r.mean_distance = 0; }},
+    testing::Values(Omission{"outlines", [](perception::FoldRecord& r) { r.shift = r.farthest = r.mean_distance = 0; },
+                             0.0},
                     Omission{"luminance",
                              [](perception::FoldRecord& r) {
                                  r.largest_luminance = r.mean_luminance = 0;
@@ -241,9 +243,10 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& of) { return std::string(of.param.name); });
 
 TEST_P(FoldMutations, AreSeen) {
-    const VertexTree tree = measured(
-        painted(shapes::icosphere(6), [](glm::dvec3 p) { return 0.5 + 0.2 * std::sin(9 * p.x) * std::sin(9 * p.y); }),
-        true);
+    const VertexTree tree =
+        measured(painted(shapes::icosphere(6),
+                         [](glm::dvec3 p) { return 0.5 + GetParam().pattern * std::sin(9 * p.x) * std::sin(9 * p.y); }),
+                 true);
     std::uint64_t triangles = 0, fewer = 0;
     ASSERT_EQ(seen_by_castle(tree, {.count = 4}, triangles), 0u);
     const auto records = tree.attribute<perception::FoldRecord>(perception::record_name);

@@ -76,8 +76,11 @@ constexpr perception::CsfModel judges[] = {perception::CsfModel::castle, percept
 
 inline perception::Judgement judge(const perception::Image& whole, const perception::Image& simplified,
                                    const Look& look, perception::CsfModel judge) {
-    auto judged = perception::judge_modern(
-        whole, simplified, {.display = look.options.display, .gaze_px = look.options.gaze_px, .csf = judge});
+    auto judged = perception::judge_modern(whole, simplified,
+                                           {.display = look.options.display,
+                                            .gaze_px = look.options.gaze_px,
+                                            .csf = judge,
+                                            .gain = perception::default_person.gain}); // as of the fold tests' tables
     if (!judged) throw std::runtime_error(judged.error().message);
     return std::move(*judged);
 }

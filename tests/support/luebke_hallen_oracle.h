@@ -11,6 +11,7 @@
 #include <glm/geometric.hpp>
 
 #include <perception/criterion.h>
+#include <perception/person.h>
 #include <vdtree/cut.h>
 #include <vdtree/normal_mask.h>
 
@@ -22,7 +23,7 @@ inline std::vector<float> luebke_hallen_costs(const vdtree::VertexTree& tree, co
                                               const perception::FoldTestOptions& options) {
     using namespace perception;
     constexpr double degrees = 180 / std::numbers::pi; // in a radian
-    const CsfTable& csf = options.csf ? *options.csf : CsfTable::standard();
+    const CsfTable& csf = options.csf ? *options.csf : *csf_of(default_person); // which is kept
     const double pixel_deg = 1 / coarsest_pixels_per_degree(options.display).value();
     const std::size_t count = tree.interior_count();
     std::vector<float> contrast(count), eccentricity(count), luminance(count), log2_frequency(count), extent_deg(count);

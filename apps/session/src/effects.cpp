@@ -2,9 +2,12 @@
 
 #include "effects.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <glm/geometric.hpp>
+
+#include <perception/motion.h>
 
 #include <vdtree/internal/number_format.h>
 
@@ -63,9 +66,45 @@ Effect silhouette_effect(const Sight& sight, const Decision& decision) {
 
 Effect csf_effect(const Sight& sight, const Decision& decision) {
     if (!is_perceptual(decision)) return {"csf table", false, "only the perceptual fold test looks sensitivity up"};
-    return {"csf table", sight.observer.csf != nullptr,
-            sight.observer.csf ? "by observer.csf: " + sight.observer.csf->samples().source
-                               : "the standard observer is used, castleCSF"};
+    return {"csf table", sight.observer.csf != nullptr, describe(sight.observer)};
+}
+
+Effect motion_effect(const Sight& sight, const Decision& decision) {
+    if (!is_perceptual(decision)) return {"motion", false, "only the perceptual fold test knows it"};
+    if (sight.observer.velocity <= perception::least_velocity)
+        return {"motion", false, "without observer.velocity everything counts as still on the retina"};
+    return {
+        "motion", true,
+        "everything counts as moving over the retina at " + rounded(sight.observer.velocity.value(), 3) +
+            " degrees/s, where fine things blur and coarse ones are seen better; what stands still, or what the eye "
+            "follows, is seen more finely than that"};
+}
+
+// Where in the window, and between which luminances, the table has no samples.
+Effect reach_effect(const Sight& sight, const Decision& decision) {
+    const std::string name = "beyond the csf table";
+    if (!is_perceptual(decision)) return {name, false, "only the perceptual fold test looks sensitivity up"};
+    const perception::Display& display = sight.observer.display;
+    double farthest = 0; // degrees
+    if (sight.gaze_px) {
+        const double distance_px = display.distance / display.pixel_pitch;
+        const auto direction = [&](double x, double y) {
+            return glm::normalize(glm::dvec3(x - sight.view.width * 0.5, y - sight.view.height * 0.5, distance_px));
+        };
+        const glm::dvec3 gaze = direction(sight.gaze_px->x, sight.gaze_px->y);
+        for (const double x : {0.0, double(sight.view.width)})
+            for (const double y : {0.0, double(sight.view.height)}) {
+                const glm::dvec3 corner = direction(x, y);
+                farthest =
+                    std::max(farthest, perception::degrees_per_radian *
+                                           std::atan2(glm::length(glm::cross(gaze, corner)), glm::dot(gaze, corner)));
+            }
+    }
+    const auto light = [&](float relative) { return perception::to_luminance(display, static_cast<double>(relative)); };
+    const std::string beyond = perception::beyond_reach(
+        *sight.csf, perception::Degrees(farthest), light(sight.luminance.darkest), light(sight.luminance.brightest));
+    if (beyond.empty()) return {name, false, "the table reaches as far as the window and its light do"};
+    return {name, true, beyond};
 }
 
 Effect prelit_effect(const Sight& sight) {
@@ -196,11 +235,11 @@ Effect time_limit_effect(const Decision& decision, const std::optional<CutFacts>
 std::vector<Effect> effects_of(const Sight& sight, const Decision& decision, const std::optional<CutFacts>& facts) {
     const Purpose purpose = decision.request.purpose;
     std::vector<Effect> effects = {
-        fold_test_effect(decision),      gaze_effect(sight, decision),   silhouette_effect(sight, decision),
-        csf_effect(sight, decision),     chroma_effect(sight, decision), translucency_effect(sight, decision),
-        texture_effect(sight, decision), prelit_effect(sight),           light_effect(sight, decision),
-        frustum_effect(decision),        culling_effect(sight, purpose), magnification_effect(sight, decision),
-        distance_effect(decision, facts)};
+        fold_test_effect(decision),     gaze_effect(sight, decision),          silhouette_effect(sight, decision),
+        csf_effect(sight, decision),    motion_effect(sight, decision),        reach_effect(sight, decision),
+        chroma_effect(sight, decision), translucency_effect(sight, decision),  texture_effect(sight, decision),
+        prelit_effect(sight),           light_effect(sight, decision),         frustum_effect(decision),
+        culling_effect(sight, purpose), magnification_effect(sight, decision), distance_effect(decision, facts)};
     if (is_full(decision)) return effects;
     effects.push_back(back_face_effect(sight, purpose));
     effects.push_back(hidden_effect(sight, decision, facts));

@@ -9,6 +9,7 @@
 
 #include <calibration/observer_profile.h>
 #include <vdtree/internal/errors.h>
+#include <vdtree/internal/number_format.h>
 #include <vdtree/internal/number_text.h>
 
 namespace unseen::session {
@@ -18,6 +19,27 @@ constexpr double default_background_cdm2 = 20;
 constexpr double least_depth = 1e-3; // of a direction of length 1, to lie on the screen: 89.94 degrees from its centre
 
 } // namespace
+
+std::string describe(const Observer& observer) {
+    if (observer.csf) {
+        const std::string& source = observer.csf->samples().source;
+        return "the observer of " + source.substr(0, source.find(',')); // then come the conditions
+    }
+    const perception::Person& person = observer.person;
+    return "the " + std::string(person.name) + " observer (castleCSF x " + shortest(person.gain) +
+           ": of measured people, " + rounded(100 * person.share_above, 2) + "% see more)";
+}
+
+Result<ObserverChoice> choose_observer(const std::string& name_or_file) {
+    const auto person = perception::person(name_or_file);
+    if (person) return ObserverChoice{*person, {}};
+    std::error_code unknown;
+    if (!std::filesystem::exists(name_or_file, unknown))
+        return invalid_argument("observer.person: there is no such file, and " + person.error().message);
+    auto table = calibration::read_csf(name_or_file);
+    if (!table) return table.error();
+    return ObserverChoice{{}, std::make_shared<const perception::CsfTable>(std::move(*table))};
+}
 
 Result<CsfChoice> choose_csf(const std::string& model_or_file) {
     const auto model = perception::csf_model(model_or_file);
@@ -34,12 +56,13 @@ Result<CsfChoice> choose_csf(const std::string& model_or_file) {
     return CsfChoice{{}, std::move(*table)};
 }
 
-Result<std::shared_ptr<const perception::CsfTable>> read_csf_table(const std::string& model_or_file,
-                                                                   const perception::Display& display) {
+Result<std::shared_ptr<const perception::CsfTable>>
+read_csf_table(const std::string& model_or_file, const perception::Display& display, const perception::Person& person) {
     auto choice = choose_csf(model_or_file);
     if (!choice) return choice.error();
     auto table = choice->model ? perception::CsfTable::from_model(*choice->model, {.distance = display.distance})
                                : Result<perception::CsfTable>(*std::move(choice->table));
+    if (table && choice->model) table = table->scaled(person.gain);
     if (!table) return table.error();
     return std::make_shared<const perception::CsfTable>(std::move(*table));
 }

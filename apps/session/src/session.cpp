@@ -6,8 +6,10 @@
 #include <glm/geometric.hpp>
 
 #include <perception/gaze.h>
+#include <perception/motion.h>
 #include <session/follower.h>
 #include <vdtree/internal/errors.h>
+#include <vdtree/internal/number_text.h>
 #include <vdtree/occluders.h>
 
 #include "loaded_tree.h"
@@ -70,6 +72,10 @@ Result<std::shared_ptr<Session::State>> Session::State::create(Scene scene, Obse
     if (scene.objects.empty())
         return invalid_argument("A scene needs an object: load one, or add it to scene.objects.");
     if (const auto valid = perception::validate(observer.display); !valid) return valid.error();
+    if (!(observer.velocity.value() >= 0 && observer.velocity <= perception::fastest_velocity))
+        return invalid_argument("observer.velocity must lie in 0 to " +
+                                number_text(perception::fastest_velocity.value()) + " degrees a second, not " +
+                                number_text(observer.velocity.value()) + ".");
     const auto background = relative_background(observer.display, scene.background);
     if (!background) return background.error();
     return std::shared_ptr<State>(new State(std::move(scene), std::move(observer), std::move(messages), *background));
@@ -102,18 +108,34 @@ perception::SceneLuminance Session::State::luminance_of(const std::vector<Sight>
     return all;
 }
 
-void Session::State::set_gaze_of(Sight& sight) {
-    sight.csf = observer.csf;
-    if (!observer.gaze) return;
+Result<std::shared_ptr<const perception::CsfTable>> Session::State::sensitivity() {
+    auto at_rest = observer.csf ? observer.csf : perception::csf_of(observer.person);
+    if (observer.velocity <= perception::least_velocity) return at_rest;
+    if (!moving_ || moving_->velocity != observer.velocity || moving_->at_rest != at_rest) {
+        auto made = at_rest->moving(observer.velocity);
+        if (!made) return Error{made.error().code, "observer.velocity: " + made.error().message + "."};
+        moving_ = Moving{observer.velocity, std::move(at_rest),
+                         std::make_shared<const perception::CsfTable>(std::move(*made))};
+    }
+    return moving_->table;
+}
+
+Result<void> Session::State::set_gaze_of(Sight& sight) {
+    auto table = sensitivity();
+    if (!table) return table.error();
+    sight.csf = std::move(*table);
+    if (!observer.gaze) return {};
     if (observer.gaze->margin_deg != 0) {
-        if (!widened_)
-            widened_ = std::make_unique<perception::WidenedTables>(observer.csf ? *observer.csf
-                                                                                : perception::CsfTable::standard());
+        if (!widened_ || widened_of_ != sight.csf) {
+            widened_ = std::make_unique<perception::WidenedTables>(*sight.csf);
+            widened_of_ = sight.csf;
+        }
         auto around_gaze = widened_->at(perception::Degrees(observer.gaze->margin_deg));
-        if (!around_gaze) return; // anything may be looked at
+        if (!around_gaze) return {}; // anything may be looked at
         sight.csf = std::move(around_gaze);
     }
     sight.gaze_px = observer.gaze->px;
+    return {};
 }
 
 Result<std::vector<Sight>> Session::State::look(const vdtree::View& view) {
@@ -129,7 +151,7 @@ Result<std::vector<Sight>> Session::State::look(const vdtree::View& view) {
         }
         sights.push_back({scene.objects[i], caches[i], observer, view, scene.lights ? &*scene.lights : nullptr,
                           std::move(*lit), background});
-        set_gaze_of(sights.back());
+        if (const auto set = set_gaze_of(sights.back()); !set) return set.error();
     }
     const perception::SceneLuminance luminance = luminance_of(sights);
     for (Sight& sight : sights) sight.luminance = luminance;
@@ -190,6 +212,7 @@ const vdtree::VertexTree& Session::tree(std::size_t object) const noexcept {
 const Observer& Session::observer() const noexcept { return state_->observer; }
 float Session::background() const noexcept { return state_->background; }
 void Session::set_gaze(std::optional<Gaze> gaze) { state_->observer.gaze = gaze; }
+void Session::set_velocity(perception::DegreesPerSecond velocity) { state_->observer.velocity = velocity; }
 void Session::set_time(double seconds) { state_->seconds = seconds; }
 
 WorldSphere Session::bounding_sphere() const {

@@ -41,9 +41,17 @@ private:
     State(Scene scene_, Observer observer_, Messages messages_, float background_);
     perception::SceneLuminance luminance_of(const std::vector<Sight>& sights) const;
     Result<void> measure(std::size_t object);
-    void set_gaze_of(Sight& sight);
+    Result<void> set_gaze_of(Sight& sight);
+    Result<std::shared_ptr<const perception::CsfTable>> sensitivity(); // of the observer, to what moves so fast
 
     std::unique_ptr<perception::WidenedTables> widened_; // for gazes that are not known for sure
+    // The table for a velocity, and the one at rest that it was made of.
+    struct Moving {
+        perception::DegreesPerSecond velocity;
+        std::shared_ptr<const perception::CsfTable> at_rest, table;
+    };
+    std::optional<Moving> moving_;
+    std::shared_ptr<const perception::CsfTable> widened_of_;
 };
 
 } // namespace unseen::session

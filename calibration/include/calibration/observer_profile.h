@@ -27,15 +27,22 @@ struct Measurement {
 
 // What was measured, on whom, when and how, beside the table that came of it. As JSON version 2, with the further keys
 // "observer", "date", "method", "display", "conditions" (strings), "measured_at_cdm2" (a number), and "measured":
-// [[frequency_cpd, eccentricity_deg, sensitivity, low, high, answers], ...].
+// [[frequency_cpd, eccentricity_deg, sensitivity, low, high, answers], ...]. Where wide patches were measured, version 3,
+// with "summation": [own, low, high] and "measured_wide": [[frequency_cpd, eccentricity_deg, area_deg2, sensitivity, low,
+// high, answers], ...].
 struct ObserverProfile {
     perception::CsfTable table = perception::CsfTable::standard();
     std::string observer, date, method, display, conditions;
     double measured_at_cdm2 = 0;
-    std::vector<Measurement> measured;
+    std::vector<Measurement> measured; // the wide ones last
+    // How the viewer sums over area. `own` is 1 where that was not measured: castle's law. A fold test or judge that asks
+    // for patches wider than the table's takes perception::summation_gain(frequency, area, summation.own) times the
+    // table's sensitivity.
+    Summation summation;
+    bool has_summation() const { return !(summation == Summation()); } // was measured
 };
 
-// Files of version 1 are profiles without measurements.
+// Files of version 1 are profiles without measurements, those of version 2 without wide patches.
 Result<ObserverProfile> read_observer(const std::filesystem::path& file);
 Result<void> write_observer(const std::filesystem::path& file, const ObserverProfile& profile);
 

@@ -25,7 +25,7 @@ std::string_view name(Method method); // "2ifc", "adjustment"
 struct CalibrationPlan {
     Method method = Method::two_interval;
     std::vector<GratingPlace> places;    // what is measured
-    int trials = 200;                    // of two_interval
+    int trials = 200;                    // of two_interval; plan_for() adds trials_of_wide_place for each wide patch
     int settings = 7;                    // of adjustment, at each place; the first is practice and does not count
     perception::Luminance luminance{50}; // mean luminance of the gratings, at most 1e6 cd/m2
     double highest_contrast = 1;         // Michelson, that the display can show
@@ -40,14 +40,26 @@ inline constexpr double lowest_log10_contrast = -3.5;
 // what the expected observer sees at a third of the highest contrast. The luminance is midway between the display's
 // black and white where none is given; one that is must lie between them, and the highest contrast is what the display
 // has room for on either side of it.
+// Then its wide_places(), and the trials for them.
 inline constexpr double pixels_per_cycle = 4;
+inline constexpr int trials_of_wide_place = 10; // about what each of the others has
 CalibrationPlan plan_for(const perception::Display& display, const perception::CsfTable& expected,
                          std::optional<perception::Luminance> luminance = {});
+
+// Wide patches for a plan: of its two lowest frequencies, at its least eccentricity and at the largest at which there is
+// room beside the cross; as large as the display allows, up to most_wide_deg2. None smaller than least_wide_deg2, none
+// that castle's law of area takes for hardly better than a patch of 1.5 cycles, and none that the expected observer
+// would not see.
+inline constexpr double least_wide_deg2 = 20;
+inline constexpr double most_wide_deg2 = 100; // castleCSF's law was held against patches of up to so much
+std::vector<GratingPlace> wide_places(const CalibrationPlan& plan, const perception::Display& display,
+                                      const perception::CsfTable& expected);
 
 // Whether a patch and the cross beside it fit on the display.
 bool fits(const perception::Display& display, const GratingPlace& place);
 
-// 1 to 1000 places with frequencies of 1/16 to 64 cpd and eccentricities of 0 to 90 degrees, none twice; 1 to 100,000
+// 1 to 1000 places with frequencies of 1/16 to 64 cpd, eccentricities of 0 to 90 degrees and areas of up to 10,000
+// square degrees (0: of 1.5 cycles radius), none twice, and not all of them wide; 1 to 100,000
 // trials; 2 to 1000 settings; luminance above 0 and at most 1e6 cd/m2; 0 < highest_contrast <= 1; a seed of at most
 // 2^53. The error names the field.
 Result<void> validate(const CalibrationPlan& plan);
@@ -81,6 +93,16 @@ struct PlaceEstimate {
     double sensitivity() const;
 };
 
+// How an observer sums over area: `own` of perception::summation_gain(). The interval is that of 95% confidence.
+struct Summation {
+    double own = 1, low = 1, high = 1; // castle's law of area, taken and not measured
+    bool operator==(const Summation&) const = default;
+};
+
+// Fails where wide patches of the plan were seen worse than small ones of the same bars and place, beyond the interval:
+// no eye does so.
+Result<void> check(const Summation& measured, const CalibrationPlan& plan);
+
 class Procedure {
 public:
     // `expected` is what an observer is believed to see before any answer. Fails on plans that validate() refuses,
@@ -102,6 +124,7 @@ public:
     void set(double contrast); // above 0, below the lowest contrast: as that; the highest or more: not seen even there
 
     std::vector<PlaceEstimate> estimates() const;
+    std::optional<Summation> summation() const; // none without wide patches
     // The expected table with the measured deviations, on the axes of a profile (see calibrated_table in the sources):
     // beyond the measured places, and at other luminances, the deviation of the nearest measured frequency and
     // eccentricity is taken. Fails where that is no table (CsfTable::create()): where the expected one comes near to

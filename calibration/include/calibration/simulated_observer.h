@@ -12,10 +12,10 @@
 
 namespace unseen::calibration {
 
-// S(f, e, L) = gain * csf(f / frequency, e * eccentricity, L).
+// S(f, e, L) = gain * csf(f / frequency, e * eccentricity, L), and of wide patches summation_gain() times that.
 struct SimulatedObserver {
     perception::CsfTable csf;
-    double gain = 1, frequency = 1, eccentricity = 1;
+    double gain = 1, frequency = 1, eccentricity = 1, summation = 1;
     Psychometric psychometric; // of two-interval answers
     // Settings scatter by so much (log10 units), and come too late by `delay` in either direction.
     double scatter = 0.08, delay = 0.03;
@@ -31,7 +31,7 @@ struct SimulatedObserver {
 Result<void> check_measurable(const SimulatedObserver& observer, const CalibrationPlan& plan);
 
 // "NAME[:key=value,...]": NAME is a CSF model or the file of an observer profile; the keys are gain, frequency,
-// eccentricity, slope, lapse, scatter, delay. Such as "castle:gain=0.7,slope=3". The error names the key.
+// eccentricity, summation, slope, lapse, scatter, delay. Such as "castle:gain=0.7,slope=3". The error names the key.
 Result<SimulatedObserver> simulated_observer(std::string_view description, std::uint64_t seed);
 
 } // namespace unseen::calibration

@@ -31,7 +31,7 @@ struct FoldTestOptions {
     SceneLuminance scene = {};
     // In the window, from the top left; may lie outside. Default: foveal everywhere.
     std::optional<glm::dvec2> gaze_px = {};
-    std::shared_ptr<const CsfTable> csf = {}; // shared with the criteria that look it up; default: CsfTable::standard()
+    std::shared_ptr<const CsfTable> csf = {}; // shared with the criteria that look it up; default: of default_person
     // Look at colour, too, where the tree has any. The Luebke-Hallen tests then fold where
     //   sqrt((c S)^2 + (c_rg S_rg)^2 + (c_yv S_yv)^2) <= 1,
     // with the contrasts of the ring's range in both opponent directions and castleCSF's sensitivities to them. The

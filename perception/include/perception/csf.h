@@ -38,6 +38,7 @@ enum class CsfModel {
     daly,             // Daly 1993, the Visible Differences Predictor's
     barten_1989,      // Barten 1989, the short form that Ramasubramanian et al. 1999 and PerceptualDiff use
     barten_1999,      // Barten 1999, the physical model in full, both eyes
+    barten_fitted,    // the same with constants fitted to people's thresholds, and castle's fall with eccentricity
     barten_2004,      // Barten 2003/04, the short form
     mannos_sakrison,  // Mannos and Sakrison 1974; relative
     rushmeier,        // Rushmeier et al. 1995, a simplification of Daly's; relative
@@ -49,6 +50,7 @@ inline constexpr std::array csf_models = {CsfModel::castle,
                                           CsfModel::daly,
                                           CsfModel::barten_1989,
                                           CsfModel::barten_1999,
+                                          CsfModel::barten_fitted,
                                           CsfModel::barten_2004,
                                           CsfModel::mannos_sakrison,
                                           CsfModel::rushmeier,
@@ -87,7 +89,30 @@ SquareDegrees patch_area(CyclesPerDegree frequency);
 
 // The law of area: patches of area A are seen sqrt(A / (A + Ac)) times as well as unlimited ones, with this Ac.
 SquareDegrees castle_summation_area(CyclesPerDegree frequency);
-SquareDegrees barten_summation_area(CyclesPerDegree frequency); // of Barten 1999
+
+// What Barten leaves to be chosen by observer; by default what he takes for the usual one.
+struct BartenConstants {
+    double signal_to_noise = 3;    // k
+    Degrees line_spread{0.5 / 60}; // sigma0: half a minute of arc
+    CyclesPerDegree inhibition{7}; // u0
+    double greatest_cycles = 15;   // Nmax: over more of a grating the eye does not sum
+};
+// Of CsfModel::barten_fitted: by least squares of decibels to people's thresholds, each study counting alike
+// (calibration::fit_barten()).
+inline constexpr BartenConstants fitted_barten{4.9936, Degrees(0.4597 / 60), CyclesPerDegree(4.3221), 7.8149};
+// At the fovea; `area` of the pattern, `field` of all that is lit, which decides on the pupil. Preconditions: above 0.
+double barten_sensitivity(const BartenConstants& constants, CyclesPerDegree frequency, Luminance luminance,
+                          SquareDegrees area, SquareDegrees field);
+SquareDegrees barten_summation_area(const BartenConstants& constants, CyclesPerDegree frequency);
+inline constexpr SquareDegrees barten_fitted_field{100}; // of barten_fitted: the screen's business, and no patch's
+
+// How many times as well a patch of `area` is seen as one of patch_area(frequency), A15:
+//   R own^t,   R = sqrt(A / (A + Ac) (A15 + Ac) / A15),   t = ln R / ln R(unlimited), and 0 for smaller patches than A15
+// with castle's law for `own` = 1. People sum more or less than that: `own` says how many times as well as by castle's
+// law somebody sees an unlimited grating, of whom it is known how well they see patches of A15 (calibration's
+// ObserverProfile::summation). NaN where frequency, area or own are not above 0; the area may be infinite.
+double summation_gain(CyclesPerDegree frequency, SquareDegrees area, double own = 1);
+double summation_share(CyclesPerDegree frequency, SquareDegrees area); // t
 
 // What a table holds constant; as in Stimulus.
 struct CsfConditions {
@@ -100,7 +125,7 @@ Stimulus stimulus_of(const CsfConditions& conditions, CyclesPerDegree frequency,
                      Luminance luminance); // of patch_area(frequency)
 
 // Sensitivity over frequency x eccentricity x luminance, interpolated linearly in log S over log frequency,
-// eccentricity and log luminance; outside of the axes clamped to their ends.
+// eccentricity and log luminance; outside of the axes clamped to their ends: see CsfReach.
 struct CsfSamples {
     std::string source;                   // what filled it: model and conditions, or observer and date
     std::vector<double> frequency_cpd;    // two or more, ascending, > 0 and at most 1e4
@@ -109,15 +134,38 @@ struct CsfSamples {
     std::vector<double> sensitivity;      // > 0 and at most 1e6; [(e * luminances + l) * frequencies + f]
 };
 
+// Where a table has samples. Beyond them it goes on by these rules; the third is of the conservative form alone:
+// - farther aside sensitivity is as at the last eccentricity, and in dimmer light as at the lowest luminance. Both take
+//   the eye for better than it is, for it sees less there;
+// - in brighter light it is as at the highest luminance. Eyes may see more there: up to some 100 cd/m2 sensitivity
+//   grows with the light, so give a table that reaches as far as the display does;
+// - coarser gratings are seen as well as the best of all that are finer, and finer ones fall on with the shallowest slope
+//   at which any column ends.
+struct CsfReach {
+    CyclesPerDegree coarsest, finest;
+    Degrees eccentricity;
+    Luminance darkest, brightest;
+};
+
 // Copies are cheap and share their data; any number of threads may look up at once.
 class CsfTable {
 public:
     CsfTable(const CsfTable&) = default; // and no move: there is no empty table
     CsfTable& operator=(const CsfTable&) = default;
 
-    // Checks the samples: the ranges above, and that each axis rises by `smallest_spacing` at least from sample to
-    // sample. The error names the field and the index. Then prepares the conservative form below.
+    // Checks the samples: the ranges above, that each axis rises by `smallest_spacing` at least from sample to sample,
+    // and that sensitivity does not grow with eccentricity by more than `noise_db`. The error names the field and the
+    // index, with the values. Then prepares the conservative form below.
     static Result<CsfTable> create(CsfSamples samples);
+    // What measured sensitivities may grow by from any eccentricity to a larger one, in decibels (20 log10): a table that
+    // grows by more has its rows or columns out of order, or a slip. It is the standard deviation of the difference of
+    // two measurements by different studies, each of which strays by 4.4 dB (person.h): root 2 times that. Thresholds by
+    // `unseen calibrate` stray by 2.3 dB at the worst, so two of them differ by so much in one case of twenty.
+    // Sensitivities below 1 count as 1, for nothing that can be shown is seen there.
+    static constexpr double noise_db = 6.2;
+    // Below this luminance only rods see, of which the fovea has none: there sensitivity may grow. (CIE 191:2010: where
+    // mesopic vision begins.)
+    static constexpr Luminance rods_alone_below{0.005};
     // Of neighbours on an axis, in octaves or degrees: closer ones are no measurement but a slip, and would make the
     // slope between them meaningless in float.
     static constexpr double smallest_spacing = 1e-4;
@@ -141,7 +189,15 @@ public:
     // this is much more than at the patch's own frequency. sensitivity() stays the samples'. Cost: some milliseconds.
     CsfTable of_half_waves() const;
 
+    // Of what moves over the retina at this velocity: S times velocity_factor() of motion.h, as from_model() has it under
+    // CsfConditions::velocity. Coarse gratings are seen better then, so a table that begins at a higher frequency goes on
+    // down to 1/16 cpd as at its first one, and columns are sampled densely, for the factor bends. Fails where the
+    // velocity is not within 0 to fastest_velocity, or sensitivities leave the bounds above. The same up to
+    // least_velocity.
+    Result<CsfTable> moving(DegreesPerSecond velocity) const;
+
     const CsfSamples& samples() const noexcept;
+    CsfReach reach() const noexcept;
 
     // The samples, interpolated.
     double sensitivity(CyclesPerDegree frequency, Degrees eccentricity, Luminance luminance) const;
@@ -164,10 +220,18 @@ public:
                                         std::span<const float> luminance_cdm2, std::span<float> log2_frequency) const;
 
 private:
+    friend CsfTable widened(const CsfTable& table, Degrees margin);
+    // Of another table's columns, which need not be measured again: all checks of create() but that of growth.
+    static Result<CsfTable> derived(CsfSamples samples);
+
     struct State;
     explicit CsfTable(std::shared_ptr<const State> state);
 
     std::shared_ptr<const State> state_; // the samples and what look-ups need; never changes, so copies share it
 };
+
+// What of a request lies outside of a table's samples, and how it is taken, for reports; empty where nothing does.
+// "beyond the table's 20 degrees sensitivity is taken as there".
+std::string beyond_reach(const CsfTable& table, Degrees farthest, Luminance darkest, Luminance brightest);
 
 } // namespace unseen::perception

@@ -9,6 +9,9 @@
 // nothing. The others it does not tell: no value that it tries is seen.
 #pragma once
 
+#include <array>
+
+#include <perception/units.h>
 #include <vdtree/result.h>
 
 namespace unseen::perception {
@@ -51,10 +54,30 @@ struct FoldModel {
     // these 26, one is within 31 degrees of any; foreshortening by that angle is 1.16.
     double between_directions = 1.15;
 
+    // ---- sensitivity
+
+    // Patches lie among others like them, and what they come to is summed over space, whatever their signs. So a patch
+    // is seen as well as a grating in a disc of so many times its width, by the law of area (summation_gain()). Fitted:
+    // the least with which nothing is seen, regular patterns included.
+    double neighbourhood = 6;
+    // How much of the observer's sensitivity the test needs, by eccentricity; linear between, beyond as at the last.
+    // Less than all is enough aside: the table takes frequencies below the peak to be seen as well as the peak, which
+    // lies at the lowest frequencies there; a node counts as where it is nearest to the gaze; and fewer folds have their
+    // chance of being the worst, for nodes are larger. Fitted. Areas that shift together need all of it everywhere.
+    static constexpr std::array<double, 4> needed_at_degrees = {0, 12, 29, 50};
+    std::array<double, 4> needed = {1, 1, 0.72, 0.68}; // must not rise
+    // By outlines, wherever they are. They count as long straight strips, all of which move by the largest shift and
+    // towards the darkest or brightest that may be behind. Along a true outline shifts change their signs from node to
+    // node. Where it moves by an eighth of the mesh's radius and more, as where a part vanishes, all is needed. Fitted.
+    double needed_by_outlines = 0.3;
+
     static constexpr int largest_side_by_side = 64;
 
     bool operator==(const FoldModel&) const = default;
 };
+
+// By FoldModel::needed. Precondition: not NaN.
+double needed_sensitivity(const FoldModel& model, Degrees eccentricity);
 
 // Factors must be finite and 0 or more, and most_side_by_side from 1 to largest_side_by_side.
 Result<void> validate(const FoldModel& model);

@@ -9,6 +9,7 @@
 #include <perception/csf.h>
 #include <perception/display.h>
 #include <perception/image.h>
+#include <perception/person.h>
 
 namespace unseen::perception {
 
@@ -17,6 +18,7 @@ struct JudgeOptions {
     std::optional<glm::dvec2> gaze_px = {};         // pixels from the top left, may lie outside; none: all foveal
     CsfModel csf = CsfModel::castle;                // an achromatic one, from the display's distance
     std::shared_ptr<const CsfTable> csf_table = {}; // a viewer's own sensitivity in the model's place; null: the model
+    double gain = default_person.gain;              // of the observer's sensitivity, 0.001 to 1000; with a table: 1
     double beta = 3.5;                              // Minkowski exponent over the bands; V = 1 is 75% detection
 };
 
@@ -27,19 +29,44 @@ struct Judgement {
     double max_ratio = 0; // the largest V
 };
 
-// The modern map, in double. Both images are luminance in cd/m2 and of one size. A decimated Laplacian pyramid with its
-// base band; Weber contrast of the difference against the reference's local luminance; sensitivity by pixel and
-// band (luminance, eccentricity, area pi (1.5 / rho)^2); Daly masking from the reference alone; Minkowski sum over the
-// bands. A hit in a low band counts its whole block. A NaN or negative luminance is an error, and so are options that
-// are none: a display that validate() refuses, a gaze that is not finite, a sensitivity to colour, a beta outside of 1
-// to 20. Calibrated: a Gabor patch of 1.5 cycles radius reaches V = 1 within 3 dB of contrast 1 / S at any frequency
-// between 0.5 cpd and the display's limit, since a band's contrast is tilted by the slope of S within it (see the
-// source). Cost: about 0.4 s and 70 bytes a pixel for 1024 x 1024 pixels on one core.
+// The modern judge. Images are luminance in cd/m2. A decimated Laplacian pyramid with its base band; Weber contrast of
+// the difference against the reference's local luminance; sensitivity by pixel and band (luminance, eccentricity); Daly
+// masking from the reference alone; Minkowski sum over the bands. Of each band energy, the square of contrasts in
+// thresholds, is summed over a window whose form is castleCSF's law of area: a patch of area A is seen
+// sqrt(A / (A + Ac)) times as well as an unlimited one, and many small differences beside each other better than one.
+//
+// Calibrated: a Gabor patch of any area reaches V = 1 within 3 dB of contrast 1 / S, between 0.5 cpd and the display's
+// limit, S with the gain. V of a pixel tells of what is around it, up to a degree and more at low frequencies. Barten's
+// models have a law of area of their own.
+class Judge {
+public:
+    // Prepares the reference: some 50 ns and 15 bytes a pixel. A NaN, infinite or negative luminance is an error, and
+    // so are options that are none: a display that validate() refuses, a gaze that is not finite, a sensitivity to
+    // colour, a gain outside of its range, a beta outside of 1 to 8.
+    static Result<Judge> create(Image reference, const JudgeOptions& options);
+
+    // Of a picture of the reference's size. Cost: some 40 ns a pixel. Errors: a NaN, infinite or negative luminance, and
+    // another size. Any number of threads may judge at once.
+    Result<Judgement> judge(const Image& test) const;
+
+private:
+    struct State;
+    explicit Judge(std::shared_ptr<const State> state);
+    std::shared_ptr<const State> state_; // never changes
+};
+
+// The same at once, of one pair.
 Result<Judgement> judge_modern(const Image& reference, const Image& test, const JudgeOptions& options);
 
-// The threshold map of judge_modern, cd/m2: the luminance step at the pixel's most sensitive band that is just
-// visible there, given the reference's masking.
+// The judge's threshold map, cd/m2: how large a step of luminance must be to be just visible at the pixel as a patch of
+// patch_area(), in the band that is most sensitive there, given the reference's masking.
 Result<Image> threshold_map_modern(const Image& reference, const JudgeOptions& options);
+
+// What makes of the judge the second one, another model of the same observer: CsfModel::barten_fitted, of the eye's
+// physics, in place of castleCSF, with Barten's law of area; squares over the bands in place of powers of 3.5. It is
+// held against the same people: Person::barten_gain.
+JudgeOptions second_judge_options(const Person& person, const Display& display = {},
+                                  const std::optional<glm::dvec2>& gaze_px = {});
 
 // Ramasubramanian, Pattanaik and Greenberg 1999 as Yee's PerceptualDiff computes it, kept for comparison; almost blind
 // to high-frequency changes: not a gate.

@@ -22,6 +22,10 @@ inline constexpr Spatiovelocity laird_2006{0.6329 * 0.8404 * 0.7986, 0.8404, 0.7
 // The eye is never at rest: slower motion counts as this.
 constexpr DegreesPerSecond least_velocity{0.1};
 
+// The fastest that tables know (CsfTable::moving()), as fast as an eye follows anything: beyond, gratings are seen best that
+// are coarser than the coarsest in a table, 1/16 cpd.
+inline constexpr DegreesPerSecond fastest_velocity{80};
+
 // Of a grating that drifts over the retina at `velocity`. Luminance, size and eccentricity are no part of it.
 // NaN where the frequency is not above 0 or the velocity below 0.
 double spatiovelocity_sensitivity(CyclesPerDegree frequency, DegreesPerSecond velocity,

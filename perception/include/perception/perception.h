@@ -28,7 +28,7 @@
 #include <perception/fold_model.h>
 
 // Pictures, and judges of them.
+#include <perception/change.h>
 #include <perception/image.h>
 #include <perception/judge.h>
 #include <perception/person.h>
-#include <perception/summing_judge.h>

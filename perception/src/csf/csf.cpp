@@ -23,6 +23,7 @@ constexpr std::array<std::pair<CsfModel, std::string_view>, csf_models.size()> n
     {CsfModel::daly, "daly"},
     {CsfModel::barten_1989, "barten-1989"},
     {CsfModel::barten_1999, "barten-1999"},
+    {CsfModel::barten_fitted, "barten-fitted"},
     {CsfModel::barten_2004, "barten-2004"},
     {CsfModel::mannos_sakrison, "mannos-sakrison"},
     {CsfModel::rushmeier, "rushmeier"},
@@ -69,6 +70,7 @@ bool is_achromatic(CsfModel model) {
 
 double decay_per_degree(CsfModel model, CyclesPerDegree frequency, VisualField field) {
     if (is_castle_family(model)) return castle_family_decay(model, frequency, field);
+    if (model == CsfModel::barten_fitted) return castle_family_decay(CsfModel::castle, frequency, field);
     return geisler_perry_decay * frequency.value();
 }
 
@@ -97,6 +99,30 @@ double sensitivity(CsfModel model, const Stimulus& s) {
 SquareDegrees patch_area(CyclesPerDegree frequency) {
     const double radius_deg = 1.5 / frequency.value();
     return SquareDegrees(std::numbers::pi * radius_deg * radius_deg);
+}
+
+namespace {
+
+// R squared.
+double castle_area_gain(CyclesPerDegree frequency, SquareDegrees area) {
+    const double whole = castle_summation_area(frequency).value(), usual = patch_area(frequency).value();
+    return (1 + whole / usual) / (1 + whole / area.value());
+}
+
+bool is_patch(CyclesPerDegree frequency, SquareDegrees area) { return frequency.value() > 0 && area.value() > 0; }
+
+} // namespace
+
+double summation_share(CyclesPerDegree frequency, SquareDegrees area) {
+    if (!is_patch(frequency, area)) return std::numeric_limits<double>::quiet_NaN();
+    const SquareDegrees unlimited(std::numeric_limits<double>::infinity());
+    const double all = std::log(castle_area_gain(frequency, unlimited));
+    return std::max(0.0, std::log(castle_area_gain(frequency, area)) / all);
+}
+
+double summation_gain(CyclesPerDegree frequency, SquareDegrees area, double own) {
+    if (!is_patch(frequency, area) || !(own > 0)) return std::numeric_limits<double>::quiet_NaN();
+    return std::sqrt(castle_area_gain(frequency, area)) * std::pow(own, summation_share(frequency, area));
 }
 
 Stimulus stimulus_of(const CsfConditions& conditions, CyclesPerDegree frequency, Degrees eccentricity,

@@ -78,35 +78,32 @@ double retinal_illuminance(double pupil, double cdm2) {
     return std::numbers::pi * pupil * pupil / 4 * cdm2 * (1 - rim * rim + std::pow(far_rim, 4));
 }
 
-constexpr double barten_greatest_field = 12;  // Xmax, degrees
-constexpr double barten_greatest_cycles = 15; // Nmax
+constexpr double barten_greatest_field = 12; // Xmax, degrees
 
-double barten_1999(double cpd, double cdm2, double area_deg2) {
-    constexpr double signal_to_noise = 3;        // k
+} // namespace
+
+SquareDegrees barten_summation_area(const BartenConstants& constants, CyclesPerDegree frequency) {
+    const double cycles = frequency.value() / constants.greatest_cycles;
+    return SquareDegrees(1 / (1 / (barten_greatest_field * barten_greatest_field) + cycles * cycles));
+}
+
+double barten_sensitivity(const BartenConstants& constants, CyclesPerDegree frequency, Luminance luminance,
+                          SquareDegrees area, SquareDegrees field) {
     constexpr double integration_time = 0.1;     // T, s
     constexpr double quantum_efficiency = 0.03;  // eta
     constexpr double photons = 1.2274e6;         // p, per s, deg2 and troland
     constexpr double neural_noise = 3e-8;        // Phi0, s deg2
-    constexpr double inhibition_cpd = 7;         // u0
-    constexpr double line_spread_deg = 0.5 / 60; // sigma0; 0.5 minutes of arc
     constexpr double aberration_deg = 0.08 / 60; // Cab, per mm of the pupil
 
-    const double pupil = pupil_mm(cdm2, area_deg2);
-    const double sigma_deg = std::hypot(line_spread_deg, aberration_deg * pupil);
-    const double blur = std::numbers::pi * sigma_deg * cpd;
+    const double pupil = pupil_mm(luminance.value(), field.value());
+    const double sigma_deg = std::hypot(constants.line_spread.value(), aberration_deg * pupil);
+    const double blur = std::numbers::pi * sigma_deg * frequency.value();
     const double optics = std::exp(-2 * blur * blur);
-    const double inhibited = cpd / inhibition_cpd;
-    const double integration = 1 / area_deg2 + 1 / barten_summation_area(CyclesPerDegree(cpd)).value();
-    const double photon_noise = 1 / (quantum_efficiency * photons * retinal_illuminance(pupil, cdm2));
+    const double inhibited = frequency / constants.inhibition;
+    const double integration = 1 / area.value() + 1 / barten_summation_area(constants, frequency).value();
+    const double photon_noise = 1 / (quantum_efficiency * photons * retinal_illuminance(pupil, luminance.value()));
     const double noise = photon_noise + neural_noise / rising(inhibited * inhibited);
-    return optics / signal_to_noise / std::sqrt(2 / integration_time * integration * noise);
-}
-
-} // namespace
-
-SquareDegrees barten_summation_area(CyclesPerDegree frequency) {
-    const double cycles = frequency.value() / barten_greatest_cycles;
-    return SquareDegrees(1 / (1 / (barten_greatest_field * barten_greatest_field) + cycles * cycles));
+    return optics / constants.signal_to_noise / std::sqrt(2 / integration_time * integration * noise);
 }
 
 Barten1989::Barten1989(double cdm2)
@@ -128,7 +125,9 @@ double classical_at_fovea(CsfModel model, const Stimulus& s) {
     const double cpd = s.frequency.value(), cdm2 = s.luminance.value(), area_deg2 = s.area.value();
     switch (model) {
     case CsfModel::barten_1989: return Barten1989(cdm2)(cpd);
-    case CsfModel::barten_1999: return barten_1999(cpd, cdm2, area_deg2);
+    case CsfModel::barten_1999: return barten_sensitivity({}, s.frequency, s.luminance, s.area, s.area);
+    case CsfModel::barten_fitted:
+        return barten_sensitivity(fitted_barten, s.frequency, s.luminance, s.area, barten_fitted_field);
     case CsfModel::barten_2004: return barten_2004(cpd, cdm2, area_deg2);
     case CsfModel::mannos_sakrison: return mannos_sakrison(cpd) * (relative_models_peak / mannos_sakrison_peak);
     case CsfModel::rushmeier: return rushmeier(cpd) * (relative_models_peak / rushmeier_peak);

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include <perception/csf.h>
+#include <perception/motion.h>
 
 #include "csf/csf_model.h"
 #include <vdtree/internal/number_text.h>
@@ -86,6 +87,36 @@ Result<void> check_axis(std::string_view field, std::span<const double> values, 
                        ": the values must rise from sample to sample, by at least " +
                        number_text(CsfTable::smallest_spacing) +
                        (values.data() == positions.data() ? " degrees" : " octaves"));
+        }
+    }
+    return {};
+}
+
+// What grows with eccentricity is no contrast sensitivity: see CsfTable::noise_db. `s` has valid axes and values.
+Result<void> check_decline(const CsfSamples& s) {
+    // A contrast above 1 that is needed to see anything is not shown by any grating, and nobody can have measured it.
+    constexpr double least_measurable = 1;
+    const double tolerance = std::pow(10.0, CsfTable::noise_db / 20);
+    const std::size_t frequencies = s.frequency_cpd.size(), plane = s.luminance_cdm2.size() * frequencies;
+    for (std::size_t i = 0; i < plane; ++i) {
+        const std::size_t l = i / frequencies, f = i % frequencies;
+        if (s.luminance_cdm2[l] < CsfTable::rods_alone_below.value()) continue;
+        std::size_t least = 0;
+        for (std::size_t e = 1; e < s.eccentricity_deg.size(); ++e) {
+            const double before = s.sensitivity[least * plane + i], here = s.sensitivity[e * plane + i];
+            const double growth = std::max(here, least_measurable) / std::max(before, least_measurable);
+            if (growth > tolerance) {
+                return bad(indexed("sensitivity", {e, l, f}) + " is " + number_text(here) + " (" +
+                           number_text(s.eccentricity_deg[e]) + " degrees, " + number_text(s.luminance_cdm2[l]) +
+                           " cd/m2, " + number_text(s.frequency_cpd[f]) + " cpd), but nearer to the gaze " +
+                           indexed("sensitivity", {least, l, f}) + " is " + number_text(before) + " (" +
+                           number_text(s.eccentricity_deg[least]) + " degrees): it grows by " +
+                           number_text(std::round(200 * std::log10(growth)) / 10) +
+                           " dB with eccentricity, and noise explains " + number_text(CsfTable::noise_db) +
+                           " dB at most. Check that rows and columns are in the order of the axes, or measure these "
+                           "two again");
+            }
+            if (here < before) least = e;
         }
     }
     return {};
@@ -342,7 +373,14 @@ struct CsfTable::State {
 
 CsfTable::CsfTable(std::shared_ptr<const State> state) : state_(std::move(state)) {}
 
-Result<CsfTable> CsfTable::create(CsfSamples samples) { return State::make_table(std::move(samples), {}); }
+Result<CsfTable> CsfTable::create(CsfSamples samples) {
+    auto table = State::make_table(std::move(samples), {});
+    if (!table) return table;
+    if (auto ok = check_decline(table->samples()); !ok) return ok.error();
+    return table;
+}
+
+Result<CsfTable> CsfTable::derived(CsfSamples samples) { return State::make_table(std::move(samples), {}); }
 
 Result<CsfTable> CsfTable::State::make_table(CsfSamples samples, Branches branches) {
     const CsfSamples& s = samples;
@@ -421,6 +459,7 @@ CsfTable CsfTable::from_model(CsfModel model) {
 Result<CsfTable> CsfTable::scaled(double gain) const {
     if (!(gain >= 1e-3 && gain <= 1e3)) return bad("the gain must be from 0.001 to 1000");
     CsfSamples samples = state_->samples;
+    if (gain != 1) samples.source = number_text(gain) + " x " + samples.source;
     Branches branches = state_->branches;
     for (auto* values : {&samples.sensitivity, &branches.sensitivity, &branches.ceiling})
         for (double& s : *values) s *= gain;
@@ -440,6 +479,51 @@ CsfTable CsfTable::of_half_waves() const {
     }
     if (table->last_slope < 0) table->last_slope = std::max(table->last_slope, steepest);
     return CsfTable(table);
+}
+
+namespace {
+
+// With samples between those that lie farther apart than moving tables may have, and down to the lowest frequency.
+CsfSamples densely_sampled(const CsfTable& table) {
+    constexpr double per_octave = smooth_model.per_octave;
+    constexpr double wide_enough = 1.0 / 16; // octaves: models' tables stay as they are
+    CsfSamples samples = table.samples();
+    const std::vector<double> given = samples.frequency_cpd;
+    std::vector<double> cpd;
+    if (given.front() > lowest_frequency_cpd * std::exp2(wide_enough))
+        append_ladder(cpd, lowest_frequency_cpd, given.front(), 2, per_octave);
+    for (std::size_t f = 0; f + 1 < given.size(); ++f) {
+        if (given[f + 1] > given[f] * std::exp2(wide_enough)) append_ladder(cpd, given[f], given[f + 1], 2, per_octave);
+        else cpd.push_back(given[f]);
+    }
+    cpd.push_back(given.back());
+    if (cpd == given) return samples;
+    samples.frequency_cpd = std::move(cpd);
+    samples.sensitivity.clear();
+    for (const double degrees : samples.eccentricity_deg)
+        for (const double cdm2 : samples.luminance_cdm2)
+            for (const double frequency : samples.frequency_cpd)
+                samples.sensitivity.push_back(
+                    table.sensitivity(CyclesPerDegree(frequency), Degrees(degrees), Luminance(cdm2)));
+    return samples;
+}
+
+} // namespace
+
+Result<CsfTable> CsfTable::moving(DegreesPerSecond velocity) const {
+    if (!(velocity.value() >= 0 && velocity <= fastest_velocity))
+        return bad("the velocity on the retina must lie in 0 to " + number_text(fastest_velocity.value()) +
+                   " degrees/s, but is " + number_text(velocity.value()));
+    if (velocity <= least_velocity) return *this;
+    Branches branches = state_->branches; // of a model's table, which is dense
+    CsfSamples samples = branches.sensitivity.empty() ? densely_sampled(*this) : state_->samples;
+    samples.source += "; moving at " + number_text(velocity.value()) + " degrees/s";
+    std::vector<double> factors;
+    for (const double cpd : samples.frequency_cpd) factors.push_back(velocity_factor(CyclesPerDegree(cpd), velocity));
+    for (auto* values : {&samples.sensitivity, &branches.sensitivity, &branches.ceiling})
+        for (std::size_t i = 0; i < values->size(); ++i)
+            (*values)[i] = floored((*values)[i] * factors[i % factors.size()]);
+    return State::make_table(std::move(samples), std::move(branches));
 }
 
 const CsfTable& CsfTable::standard() {
@@ -505,6 +589,27 @@ void CsfTable::State::prepare_extrapolation() {
 }
 
 const CsfSamples& CsfTable::samples() const noexcept { return state_->samples; }
+
+CsfReach CsfTable::reach() const noexcept {
+    const CsfSamples& s = state_->samples;
+    return {CyclesPerDegree(s.frequency_cpd.front()), CyclesPerDegree(s.frequency_cpd.back()),
+            Degrees(s.eccentricity_deg.back()), Luminance(s.luminance_cdm2.front()),
+            Luminance(s.luminance_cdm2.back())};
+}
+
+std::string beyond_reach(const CsfTable& table, Degrees farthest, Luminance darkest, Luminance brightest) {
+    const CsfReach reach = table.reach();
+    std::string text;
+    const auto add = [&](bool is_inside, const char* beyond, double end, const char* unit, const char* and_so) {
+        if (is_inside) return; // NaN is not
+        text += (text.empty() ? "" : "; ") + std::string(beyond) + " the table's " + number_text(end) + " " + unit +
+                " sensitivity is taken as there" + and_so;
+    };
+    add(farthest <= reach.eccentricity, "beyond", reach.eccentricity.value(), "degrees", "");
+    add(darkest >= reach.darkest, "below", reach.darkest.value(), "cd/m2", "");
+    add(brightest <= reach.brightest, "above", reach.brightest.value(), "cd/m2", ", though eyes may see more");
+    return text;
+}
 
 double CsfTable::sensitivity(CyclesPerDegree frequency, Degrees eccentricity, Luminance luminance) const {
     const double log2_cpd = std::log2(frequency.value()), log2_cdm2 = std::log2(luminance.value());

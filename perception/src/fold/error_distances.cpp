@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "fold/error_distances.h"
@@ -34,6 +35,9 @@ constexpr double frequency_step = 1.0905077326652577; // an eighth of an octave
 // Octaves of contrast that a small part of a patch may have over all of it: sharper ones count as this, a sixteenth of
 // the width. They are rare, and each octave is more rows.
 constexpr int steepest_spike = 8 * contrasts_per_octave;
+
+// An outline that moves by such a share of the mesh's radius is that of a part, which vanishes as a whole.
+constexpr float whole_part = 0.125f;
 
 // The widest mesh there can be, in widths of a node: also where nodes have none.
 constexpr float widest = 1e9f;
@@ -66,6 +70,7 @@ struct Pattern {
     int bias = no_contrast;       // of what many such nodes shift together
     int fading = 0, quarters = 0; // of octaves, from the node's width to the mesh's
     bool is_strip = false;
+    bool is_all = false; // of strips: all of it moves one way
 
     auto operator<=>(const Pattern&) const = default;
     bool is_nothing() const { return largest == no_contrast && bias == no_contrast; }
@@ -81,7 +86,8 @@ Pattern above(const Pattern& a, const Pattern& b) {
                 std::max(a.bias, b.bias),
                 0,
                 std::max(a.quarters, b.quarters),
-                a.is_strip};
+                a.is_strip,
+                a.is_all || b.is_all};
     all.fading = a.bias == no_contrast ? b.fading : b.bias == no_contrast ? a.fading : std::min(a.fading, b.fading);
     return all;
 }
@@ -109,6 +115,7 @@ Pattern rounded(Pattern p, int coarseness) {
 // Of patterns, from far below any width that can be seen up to the lowest frequency's.
 constexpr double widest_deg = 1 / lowest_table_cpd, width_step = 0.91700404320467122; // an eighth of an octave
 constexpr std::size_t width_count = 160;
+SquareDegrees disc(double width_deg) { return SquareDegrees(std::numbers::pi * width_deg * width_deg / 4); }
 double width_deg(std::size_t i) { return widest_deg * std::pow(width_step, static_cast<double>(i)); }
 
 // What bands of frequency see of patterns of all widths, as shares of their contrast: of this, eyes that see patterns
@@ -123,10 +130,13 @@ struct Bands {
         for (double low = lowest_table_cpd; low < highest_cpd; low *= frequency_step) lowest_cpd.push_back(low);
         for (std::size_t i = 0; i < width_count; ++i) {
             const double width = width_deg(i);
+            const SquareDegrees area = disc(width), neighbourhood = disc(width * model.neighbourhood);
             for (const double low : lowest_cpd) {
-                const double waves = width * std::min(low * frequency_step, highest_cpd);
-                of_patches.push_back(share_of_patches(waves, model.most_side_by_side));
-                of_areas.push_back(share_of_area(waves));
+                const double high = std::min(low * frequency_step, highest_cpd), waves = width * high;
+                const CyclesPerDegree cpd(high);
+                of_patches.push_back(share_of_patches(waves, model.most_side_by_side) *
+                                     summation_gain(cpd, neighbourhood));
+                of_areas.push_back(share_of_area(waves) * summation_gain(cpd, area));
                 of_strips.push_back(std::min(1.0, waves)); // half as wide
             }
         }
@@ -144,8 +154,9 @@ public:
         for (const double low : bands.lowest_cpd)
             sensitivities.push_back(
                 csf.monotone_sensitivity(CyclesPerDegree(low), Degrees(eccentricity_deg), Luminance(luminance_cdm2)));
+        const double needed = needed_sensitivity(model, Degrees(eccentricity_deg));
         for (std::size_t i = 0; i < width_count; ++i) {
-            patches_[i] = 1 / visibility(sensitivities, bands.of_patches, i);
+            patches_[i] = 1 / (needed * visibility(sensitivities, bands.of_patches, i));
             areas_[i] = 1 / visibility(sensitivities, bands.of_areas, i);
             strips_[i] = 1 / visibility(sensitivities, bands.of_strips, i);
         }
@@ -156,8 +167,9 @@ public:
     double area_distance(double contrast) const { return switch_distance(areas_, contrast); }
 
     // The distance, in widths, from which a long strip is invisible.
-    double strip_distance(double contrast) const {
-        const double invisible_deg = 0.5 * least_visible_width(strips_, contrast);
+    double strip_distance(double contrast, bool is_all) const {
+        const double invisible_deg =
+            0.5 * least_visible_width(strips_, contrast * (is_all ? 1 : model_.needed_by_outlines));
         if (!std::isfinite(invisible_deg)) return 0;
         const double counted_deg =
             std::max(invisible_deg - model_.sampled_shift_px * screen_.pixel_deg, invisible_deg / 2);
@@ -332,7 +344,7 @@ private:
         const std::size_t first = switch_distance_.size();
         for (std::size_t bin = 0; bin < bins_; ++bin)
             switch_distance_.push_back(
-                static_cast<float>(eye(p.luminance, bin).strip_distance(Levels::contrast(p.largest))));
+                static_cast<float>(eye(p.luminance, bin).strip_distance(Levels::contrast(p.largest), p.is_all)));
         make_monotone(first);
     }
 
@@ -418,13 +430,14 @@ void cover(SwitchDistances& switch_distances, Shown& a, const Shown& b) {
 // What nodes show, no less than their children: patches, and strips where they are outlines. False where the rows do
 // not suffice.
 bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors, const FoldTestOptions& options,
-                const Levels& levels, const CsfTable& csf, SwitchDistances& switch_distances,
+                const Levels& levels, const CsfTable& csf, double highest_cpd, SwitchDistances& switch_distances,
                 std::vector<Shown>& patches, std::vector<Shown>& strips) {
     const double darkest = levels.in_cdm2(options.scene.darkest), brightest = levels.in_cdm2(options.scene.brightest);
     const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
     const vdtree::LuminanceRange all = tree.ring_luminance()[vdtree::VertexTree::root()];
     const int whole = levels.luminance_level(levels.in_cdm2(static_cast<double>(all.lo + all.hi) / 2));
-    const double whole_peak = csf.peak_sensitivity(Degrees(0), Luminance(levels.luminance(whole)));
+    const double whole_peak = csf.peak_sensitivity(Degrees(0), Luminance(levels.luminance(whole))) *
+                              summation_gain(CyclesPerDegree(highest_cpd), disc(180));
     patches.assign(tree.interior_count(), {});
     strips.assign(tree.interior_count(), {});
     for (NodeId node = tree.interior_count(); node-- > 0;) { // children before parents
@@ -467,6 +480,7 @@ bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors
             strip.pattern = above(strip.pattern, own);
         }
         strip.length = errors[node].outline;
+        strip.pattern.is_all = strip.length >= whole_part * object_radius;
         strip.row = switch_distances.row(strip.pattern);
         cover(switch_distances, strip, strips[node]);
         strips[node] = strip;
@@ -506,7 +520,7 @@ Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const Fold
     const NodeId nodes = tree.interior_count();
     const Screen screen(view, options);
     const Levels levels(options.display);
-    const CsfTable& csf = options.csf ? *options.csf : CsfTable::standard();
+    const CsfTable& csf = csf_of(options);
 
     DistanceCriterion::Parts parts;
     parts.spheres = DistanceCriterion::Spheres::ring;
@@ -520,7 +534,7 @@ Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const Fold
     SwitchDistances switch_distances(levels, screen, csf, options.model, parts.eccentricity_bins,
                                      measured.stages.size());
     std::vector<Shown> patches, strips;
-    while (!find_shown(tree, errors, options, levels, csf, switch_distances, patches, strips))
+    while (!find_shown(tree, errors, options, levels, csf, screen.highest_cpd, switch_distances, patches, strips))
         switch_distances.coarsen();
     const std::vector<float> distances =
         stage_distances(tree, measured.stages, screen, options, parts.eccentricity_bins);
@@ -544,12 +558,28 @@ Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const Fold
     return DistanceCriterion::create(tree, std::move(parts));
 }
 
+double needed_sensitivity(const FoldModel& model, Degrees eccentricity) {
+    const auto& at = FoldModel::needed_at_degrees;
+    const double e = std::clamp(eccentricity.value(), at.front(), at.back());
+    std::size_t i = 0;
+    while (i + 2 < at.size() && e > at[i + 1]) ++i;
+    return std::lerp(model.needed[i], model.needed[i + 1], (e - at[i]) / (at[i + 1] - at[i]));
+}
+
 Result<void> validate(const FoldModel& m) {
-    for (const double factor :
-         {m.peak_of_shift, m.moved_by_neighbours, m.contact_reach, m.least_sine, m.sampled_shift_px,
-          m.amplitude_of_point_mean, m.amplitude_of_shift_mean, m.longest_ring, m.between_directions})
+    for (const double factor : {m.neighbourhood, m.needed_by_outlines, m.peak_of_shift, m.moved_by_neighbours,
+                                m.contact_reach, m.least_sine, m.sampled_shift_px, m.amplitude_of_point_mean,
+                                m.amplitude_of_shift_mean, m.longest_ring, m.between_directions})
         if (!(factor >= 0 && std::isfinite(factor)))
             return Error{ErrorCode::invalid_argument, "fold test: the model's factors must be finite, and 0 or more"};
+    for (std::size_t i = 0; i < m.needed.size(); ++i)
+        if (!(m.needed[i] > 0 && m.needed[i] <= (i > 0 ? m.needed[i - 1] : 1e3)))
+            return Error{ErrorCode::invalid_argument, "fold test: the sensitivity needed, model.needed[" +
+                                                          std::to_string(i) +
+                                                          "], must be above 0 and not rise with the eccentricity"};
+    if (m.neighbourhood == 0 || m.needed_by_outlines == 0)
+        return Error{ErrorCode::invalid_argument,
+                     "fold test: the model's neighbourhood and needed_by_outlines must be above 0"};
     if (m.most_side_by_side < 1 || m.most_side_by_side > FoldModel::largest_side_by_side)
         return Error{ErrorCode::invalid_argument, "fold test: the model's most_side_by_side must be from 1 to 64"};
     return {};

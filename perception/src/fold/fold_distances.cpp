@@ -47,7 +47,7 @@ Sensitivities sensitivities_for(const FoldTestOptions& options, bool has_chroma,
     const auto seen = [&](const CsfTable& table) {
         return patches == Patches::half_waves ? table.of_half_waves() : table;
     };
-    Sensitivities all{options.csf ? seen(*options.csf) : seen(CsfTable::standard()), {}, {}};
+    Sensitivities all{seen(csf_of(options)), {}, {}};
     if (!has_chroma) return all;
     static const CsfTable red_green = CsfTable::from_model(CsfModel::castle_red_green);
     static const CsfTable yellow_violet = CsfTable::from_model(CsfModel::castle_yellow_violet);

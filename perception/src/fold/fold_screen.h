@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include <perception/criterion.h>
+#include <perception/person.h>
 
 namespace unseen::perception {
 
@@ -18,6 +19,11 @@ inline constexpr double lowest_table_cpd = 0.5;
 
 // Covers the rounding of a switch distance to float.
 inline constexpr double distance_rounding = 1e-6;
+
+// The sensitivity that the test goes by.
+inline const CsfTable& csf_of(const FoldTestOptions& options) {
+    return options.csf ? *options.csf : *csf_of(default_person); // which is kept
+}
 
 // What has to hold before a fold test computes with its arguments.
 inline Result<void> check_arguments(const vdtree::View& view, const FoldTestOptions& options) {

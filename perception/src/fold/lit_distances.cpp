@@ -99,7 +99,7 @@ Result<vdtree::DistanceCriterion> lit_distances(const vdtree::VertexTree& tree,
     parts.lit =
         vdtree::LitClasses{std::move(bounds), scale,
                            classes.class_of({scene.darkest, scene.brightest}, static_cast<double>(scene.brightest))};
-    fill_table(parts, classes, screen, options.csf ? *options.csf : CsfTable::standard());
+    fill_table(parts, classes, screen, csf_of(options));
     make_growing(parts);
     return DistanceCriterion::create(tree, std::move(parts));
 }

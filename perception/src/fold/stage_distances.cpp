@@ -108,7 +108,7 @@ std::vector<float> stage_distances(const vdtree::VertexTree& tree, std::span<con
     const double least = std::max(black / span, 1.0 / 4096);
     const double contrast_factor =
         std::max(1.0, static_cast<double>(FoldStage::black) / least) * options.model.between_directions;
-    const CsfTable& csf = options.csf ? *options.csf : CsfTable::standard();
+    const CsfTable& csf = csf_of(options);
     const double diameter = 2 * static_cast<double>(tree.bounding_sphere().radius);
 
     std::vector<float> distances(stages.size() * bins);

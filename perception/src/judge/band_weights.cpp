@@ -1,12 +1,14 @@
 #include "judge/band_weights.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 #include <string>
 
-#include <glm/geometric.hpp>
-
+#include "judge/fast_math.h"
 #include "judge/judge_input.h"
 #include "pyramid_kernel.h"
 
@@ -17,14 +19,21 @@ constexpr double lowest_frequency = 1.0 / 16; // cpd, end of the CSF's domain; t
 constexpr int smallest_base_side = 4;         // pixels; a smaller base would be all edge
 constexpr double luminance_floor = 0.01;      // cd/m2, where the display's black level does not say more
 constexpr double sensitivity_floor = 1e-60;   // keeps logarithms and squares finite; 1e-57 times below visibility
-// Steps of the sensitivity tables. log S is linear in eccentricity, so only luminance errs: by less than 5e-4 of S,
-// most where castleCSF's peak frequency crosses the band's.
-constexpr double eccentricity_step = 1.0;    // degrees
-constexpr double luminance_step = 1.0 / 128; // decades
-// Where the tilt is fitted, in units of the band's nominal frequency: half an octave to either side. Band 0 has no band
-// above it; it is fitted on the way down to band 1, where it answers alone.
-constexpr double fit_ratios[2] = {std::numbers::sqrt2, 1 / std::numbers::sqrt2};
-constexpr double first_band_fit_ratios[2] = {0.64, 0.76};
+constexpr double least_gain = 1e-3, largest_gain = 1e3;
+constexpr double least_beta = 1, largest_beta = 8; // beyond, powers of what is hardly seen are no floats
+
+// Steps of the tables. Between them log S and the weights are linear, over luminance and over eccentricity. log S is
+// linear in eccentricity. In luminance it errs by less than 1e-3 of S, most where castleCSF's peak crosses the band's
+// frequency.
+constexpr double eccentricity_step = 2; // degrees
+constexpr int cell_bits = 4;            // cells of an octave of luminance: 2^4
+constexpr int fraction_bits = 23 - cell_bits;
+
+// Where own and smoothed are fitted, in units of the band's nominal frequency. Band 0 has no band above it; it is fitted
+// on the way down to band 1, where it answers alone.
+constexpr std::array fit_ratios = {0.5, 1 / std::numbers::sqrt2, 1.0, std::numbers::sqrt2};
+constexpr std::array first_band_fit_ratios = {0.4, 0.55, 0.7, 0.85, 1.0};
+constexpr double largest_weight = 1e6; // of a band that is blind to its nominal frequency
 
 // ---- frequency responses ------------------------------------------------------------------------------------------
 
@@ -43,48 +52,106 @@ double smooth_response(double omega, Orientation orientation = Orientation::axis
 double angular_frequency(double freq_cpd, double ppd, int level) {
     return 2 * std::numbers::pi * freq_cpd / ppd * std::exp2(level);
 }
-// Amplitude of Laplacian band `level` per unit amplitude of a grating: low-pass by every level above, less what the
-// next level gives back.
-double band_response(double freq_cpd, double ppd, int level, Orientation orientation = Orientation::axis) {
-    const auto kernel_at = [&](int at) {
-        return in_both_axes(angular_frequency(freq_cpd, ppd, at), orientation, kernel_response);
-    };
+// Amplitude of level `level` per unit amplitude of a grating: low-pass by every level above.
+double level_response(double freq_cpd, double ppd, int level, Orientation orientation) {
     double response = 1;
-    for (int i = 0; i < level; ++i) response *= std::abs(kernel_at(i));
-    const double back = kernel_at(level);
-    return response * (1 - back * back);
+    for (int i = 0; i < level; ++i)
+        response *= std::abs(in_both_axes(angular_frequency(freq_cpd, ppd, i), orientation, kernel_response));
+    return response;
+}
+// Of a Laplacian band: of its level, less what the next level gives back.
+double band_response(double freq_cpd, double ppd, int level, Orientation orientation) {
+    const double back = in_both_axes(angular_frequency(freq_cpd, ppd, level), orientation, kernel_response);
+    return level_response(freq_cpd, ppd, level, orientation) * (1 - back * back);
+}
+// A band's answer to a grating, 1 at its nominal frequency along an axis; the base's is that of its level.
+double answer(const BandConditions& c, double freq_cpd, int level, Orientation orientation) {
+    if (level == c.base_level) return level_response(freq_cpd, c.ppd, level, orientation);
+    return band_response(freq_cpd, c.ppd, level, orientation) /
+           band_response(nominal_frequency(c.ppd, level), c.ppd, level, Orientation::axis);
 }
 
-// ---- sensitivity ---------------------------------------------------------------------------------------------------
+// ---- sensitivity at the nodes of a table -------------------------------------------------------------------------------
 
-// To a patch of patch_area(), as in the table of a viewer.
-double patch_sensitivity(const BandConditions& c, double freq_cpd, double luminance, double eccentricity) {
-    Stimulus stimulus;
-    stimulus.frequency = CyclesPerDegree(freq_cpd);
-    stimulus.luminance = Luminance(luminance);
-    stimulus.eccentricity = Degrees(eccentricity);
-    stimulus.area = patch_area(stimulus.frequency);
-    stimulus.field = VisualField::worst;
-    stimulus.distance = c.distance;
-    double s = 0;
-    if (c.table) {
-        s = c.table->sensitivity(stimulus.frequency, stimulus.eccentricity, stimulus.luminance);
-    } else if (c.model == CsfModel::barten_1999 && c.stimuli == Stimuli::unlimited) {
-        // Its own fall with eccentricity is refuted by people's thresholds: castleCSF's is taken.
-        const double aside = sensitivity(CsfModel::castle, stimulus);
-        stimulus.eccentricity = Degrees(0);
-        s = sensitivity(c.model, stimulus) * aside / sensitivity(CsfModel::castle, stimulus);
-    } else {
-        s = sensitivity(c.model, stimulus);
+int luminance_cell(float luminance) {
+    return static_cast<int>(std::bit_cast<std::uint32_t>(luminance) >> fraction_bits);
+}
+double first_luminance(int cell) { return std::bit_cast<float>(static_cast<std::uint32_t>(cell) << fraction_bits); }
+
+// cd/m2 and degrees.
+struct Nodes {
+    std::vector<double> luminances, eccentricities;
+};
+
+// To unlimited gratings of one frequency, by eccentricity.
+std::vector<double> sensitivities(const BandConditions& c, double freq_cpd, const Nodes& nodes) {
+    std::vector<double> all;
+    // What other models lose with eccentricity does not depend on luminance.
+    const bool is_separable = !c.table && c.model != CsfModel::daly;
+    if (!is_separable) {
+        for (const double e : nodes.eccentricities)
+            for (const double l : nodes.luminances) all.push_back(sensitivity_of(c, freq_cpd, l, e));
+        return all;
     }
-    return std::max(c.table ? s : c.gain * s, sensitivity_floor); // of NaN, too: 0 / 0 far aside
+    std::vector<double> looked_at;
+    for (const double l : nodes.luminances) looked_at.push_back(sensitivity_of(c, freq_cpd, l, 0));
+    for (const double e : nodes.eccentricities) {
+        const double kept = e > 0 ? sensitivity_of(c, freq_cpd, nodes.luminances.front(), e) / looked_at.front() : 1.0;
+        for (const double s : looked_at) all.push_back(std::max(sensitivity_floor, kept * s));
+    }
+    return all;
 }
 
-double sensitivity_to(const BandConditions& c, double freq_cpd, double luminance, double eccentricity) {
-    if (c.stimuli == Stimuli::patches) return patch_sensitivity(c, freq_cpd, luminance, eccentricity);
-    const double patch = patch_area(CyclesPerDegree(freq_cpd)).value();
-    return patch_sensitivity(c, freq_cpd, luminance, eccentricity) *
-           std::sqrt((summation_area(c, freq_cpd) + patch) / patch);
+// ---- the fit of a band's weights ---------------------------------------------------------------------------------------
+
+// One grating, and what the fit knows of it before it knows S.
+struct FitPoint {
+    std::size_t frequency = 0; // index
+    double scale = 0;          // of the weights' answer, over what is wanted of a flat S
+    double smooth = 0;         // response of the binomial filter
+    double weight = 0;         // the band's share of the pooled powers
+};
+
+std::vector<FitPoint> fit_points(const BandConditions& c, int level, std::span<const double> frequencies) {
+    std::vector<FitPoint> points;
+    const double nominal = nominal_frequency(c.ppd, level);
+    const double gain = band_response(nominal, c.ppd, level, Orientation::axis);
+    for (std::size_t i = 0; i < frequencies.size(); ++i) {
+        // The law of area within a band is that of its nominal frequency. Of gratings as large as their own Ac, half of
+        // an unlimited one's energy should be seen.
+        const double area = summation_area(c, frequencies[i]), of_band = summation_area(c, nominal);
+        const double seen = std::sqrt(2 * area / (area + of_band));
+        for (const Orientation o : {Orientation::axis, Orientation::diagonal}) {
+            double powers = 0;
+            for (int k = 0; k <= c.base_level; ++k) powers += std::pow(answer(c, frequencies[i], k, o), c.beta);
+            const double own_power = std::pow(answer(c, frequencies[i], level, o), c.beta);
+            points.push_back({i, seen * gain * std::pow(powers, 1 / c.beta),
+                              smooth_response(angular_frequency(frequencies[i], c.ppd, level), o), own_power / powers});
+        }
+    }
+    return points;
+}
+
+struct Fitted {
+    double own = 0, smoothed = 0;
+};
+// Least squares of weight (scale (own + smoothed smooth) / s - 1)^2. s is the sensitivity by frequency, over that to the
+// nominal one, which is `of_nominal`. What no contrast makes visible, S being below 1, counts for less and less.
+Fitted fit(std::span<const FitPoint> points, std::span<const double> s, double of_nominal) {
+    double xx = 0, xy = 0, yy = 0, x1 = 0, y1 = 0;
+    for (const FitPoint& p : points) {
+        const double x = p.scale / s[p.frequency], y = x * p.smooth;
+        const double square = s[p.frequency] * of_nominal * s[p.frequency] * of_nominal;
+        const double weight = p.weight * square / (1 + square);
+        xx += weight * x * x, xy += weight * x * y, yy += weight * y * y;
+        x1 += weight * x, y1 += weight * y;
+    }
+    const double determinant = xx * yy - xy * xy;
+    const auto limited = [&](double numerator) {
+        const double value = numerator / determinant;
+        return std::isfinite(value) ? std::clamp(value, -largest_weight, largest_weight) : 0;
+    };
+    return {limited(x1 * yy - y1 * xy), limited(y1 * xx - x1 * xy)};
 }
 
 } // namespace
@@ -93,9 +160,9 @@ double nominal_frequency(double ppd, int level) {
     return level == 0 ? ppd / 2 : second_band_ratio * std::exp2(1 - level) * ppd / 2;
 }
 
-int base_level(const Image& image, double ppd) {
+int base_level(int width, int height, double ppd) {
     int level = 0;
-    for (int side = std::min(image.width, image.height); (side + 1) / 2 >= smallest_base_side; side = (side + 1) / 2) {
+    for (int side = std::min(width, height); (side + 1) / 2 >= smallest_base_side; side = (side + 1) / 2) {
         if (nominal_frequency(ppd, level + 1) < lowest_frequency) break;
         ++level;
     }
@@ -103,103 +170,132 @@ int base_level(const Image& image, double ppd) {
 }
 
 double summation_area(const BandConditions& c, double freq_cpd) {
-    return (c.model == CsfModel::barten_1999 && !c.table ? barten_summation_area
-                                                         : castle_summation_area)(CyclesPerDegree(freq_cpd))
-        .value();
+    const CyclesPerDegree frequency(freq_cpd);
+    if (c.table) return castle_summation_area(frequency).value();
+    switch (c.model) {
+    case CsfModel::barten_1999: return barten_summation_area({}, frequency).value();
+    case CsfModel::barten_fitted: return barten_summation_area(fitted_barten, frequency).value();
+    default: return castle_summation_area(frequency).value();
+    }
+}
+
+double sensitivity_of(const BandConditions& c, double freq_cpd, double luminance, double eccentricity) {
+    Stimulus stimulus;
+    stimulus.frequency = CyclesPerDegree(freq_cpd);
+    stimulus.luminance = Luminance(luminance);
+    stimulus.eccentricity = Degrees(eccentricity);
+    stimulus.area = patch_area(stimulus.frequency);
+    stimulus.field = VisualField::worst;
+    stimulus.distance = c.distance;
+    const double s = c.table ? c.table->sensitivity(stimulus.frequency, stimulus.eccentricity, stimulus.luminance)
+                             : sensitivity(c.model, stimulus);
+    const double area = stimulus.area.value();
+    const double unlimited = std::sqrt((summation_area(c, freq_cpd) + area) / area);
+    return std::max(sensitivity_floor, c.gain * s * unlimited); // in this order of NaN, too: where all is 0 or infinite
 }
 
 // ---- weights of a band ---------------------------------------------------------------------------------------------
 
-BandTable::BandTable(const BandConditions& c, int level, bool is_base)
-    : origin_(c.log10_luminance.low), level_(level), is_base_(is_base), gain_(1),
-      smooth_at_nominal_(smooth_response(angular_frequency(nominal_frequency(c.ppd, level), c.ppd, level))) {
-    if (!is_base) gain_ = band_response(nominal_frequency(c.ppd, level), c.ppd, level);
+BandTable::BandTable(const BandConditions& c, int level) {
     const double nominal = nominal_frequency(c.ppd, level), patch = patch_area(CyclesPerDegree(nominal)).value();
     of_patch_ = std::sqrt(patch / (summation_area(c, nominal) + patch));
-    luminances_ = 2 + static_cast<int>((c.log10_luminance.high - origin_) / luminance_step);
-    eccentricities_ = 1;
-    if (c.largest_eccentricity > 0) {
-        eccentricities_ = 2 + static_cast<int>(c.largest_eccentricity / eccentricity_step);
-    }
-    for (int e = 0; e < eccentricities_; ++e) {
-        for (int l = 0; l < luminances_; ++l) {
-            nodes_.push_back(node(c, std::pow(10.0, origin_ + l * luminance_step), e * eccentricity_step));
+
+    Nodes nodes;
+    first_cell_ = luminance_cell(c.luminance.low);
+    for (int cell = first_cell_; cell <= luminance_cell(c.luminance.high) + 1; ++cell)
+        nodes.luminances.push_back(first_luminance(cell));
+    first_eccentricity_ = c.eccentricity.low;
+    nodes.eccentricities.push_back(c.eccentricity.low);
+    while (nodes.eccentricities.back() < c.eccentricity.high)
+        nodes.eccentricities.push_back(nodes.eccentricities.back() + eccentricity_step);
+    luminances_ = nodes.luminances.size(), eccentricities_ = nodes.eccentricities.size();
+
+    std::vector<double> of_nominal = sensitivities(c, nominal, nodes);
+    nodes_.resize(of_nominal.size());
+    if (level == c.base_level) {
+        // The base band holds every lower frequency too. Where the pyramid is short (a small image), its own frequency
+        // lies right of the peak of S, and the band would be blind to what is plain at a lower frequency.
+        for (double f = nominal / std::numbers::sqrt2; f >= lowest_frequency; f /= std::numbers::sqrt2) {
+            const std::vector<double> lower = sensitivities(c, f, nodes);
+            for (std::size_t n = 0; n < lower.size(); ++n) of_nominal[n] = std::max(of_nominal[n], lower[n]);
+        }
+    } else {
+        std::vector<double> frequencies;
+        if (level == 0)
+            for (const double ratio : first_band_fit_ratios) frequencies.push_back(ratio * nominal);
+        else
+            for (const double ratio : fit_ratios) frequencies.push_back(ratio * nominal);
+        std::vector<std::vector<double>> s;
+        for (const double f : frequencies) s.push_back(sensitivities(c, f, nodes));
+        const std::vector<FitPoint> points = fit_points(c, level, frequencies);
+        std::vector<double> relative(frequencies.size());
+        for (std::size_t n = 0; n < nodes_.size(); ++n) {
+            for (std::size_t i = 0; i < relative.size(); ++i) relative[i] = s[i][n] / of_nominal[n];
+            const Fitted fitted = fit(points, relative, of_nominal[n] / c.gain);
+            nodes_[n].own = static_cast<float>(fitted.own), nodes_[n].smoothed = static_cast<float>(fitted.smoothed);
         }
     }
+    for (std::size_t n = 0; n < nodes_.size(); ++n) nodes_[n].log2_s = static_cast<float>(std::log2(of_nominal[n]));
 }
 
-BandWeight BandTable::at(double log10_luminance, double eccentricity) const {
-    const Cell l = cell((log10_luminance - origin_) / luminance_step, luminances_);
-    const Cell e = cell(eccentricity / eccentricity_step, eccentricities_);
-    const auto width = static_cast<std::size_t>(luminances_);
-    const Node a = mix(nodes_[e.low * width + l.low], nodes_[e.low * width + l.high], l.share);
-    if (e.low == e.high) return {std::exp(a.log_s), a.tilt};
-    const Node b = mix(nodes_[e.high * width + l.low], nodes_[e.high * width + l.high], l.share);
-    const Node m = mix(a, b, e.share);
-    return {std::exp(m.log_s), m.tilt};
-}
-
-BandTable::Cell BandTable::cell(double position, int count) {
-    const double p = std::clamp(position, 0.0, static_cast<double>(count - 1));
-    const auto low = static_cast<std::size_t>(p);
-    return {low, std::min(low + 1, static_cast<std::size_t>(count - 1)), p - static_cast<double>(low)};
-}
-BandTable::Node BandTable::mix(const Node& a, const Node& b, double t) {
-    return {a.log_s + t * (b.log_s - a.log_s), a.tilt + t * (b.tilt - a.tilt)};
-}
-
-BandTable::Node BandTable::node(const BandConditions& c, double luminance, double eccentricity) const {
-    const double nominal = nominal_frequency(c.ppd, level_);
-    double s = sensitivity_to(c, nominal, luminance, eccentricity);
-    if (!is_base_) return {std::log(s), fit_tilt(c, luminance, eccentricity, s)};
-    // The base band holds every lower frequency too. Where the pyramid is short (a small image), its own frequency
-    // lies right of the peak of S, and the band would be blind to what is plain at a lower frequency.
-    for (double f = nominal / std::numbers::sqrt2; f >= lowest_frequency; f /= std::numbers::sqrt2) {
-        s = std::max(s, sensitivity_to(c, f, luminance, eccentricity));
-    }
-    return {std::log(s), 0};
-}
-
-// Least squares of the tilted band's answer against S at two frequencies. Half an octave from its centre a band
-// shares the work with its neighbour, so each has to bring S 2^(-1/beta).
-double BandTable::fit_tilt(const BandConditions& c, double luminance, double eccentricity, double nominal_s) const {
-    const double nominal = nominal_frequency(c.ppd, level_);
-    const double share = level_ == 0 ? 1 : std::exp2(-1 / c.beta);
-    double numerator = 0, denominator = 0;
-    for (const double ratio : level_ == 0 ? first_band_fit_ratios : fit_ratios) {
-        const double f = ratio * nominal;
-        const double wanted = share * sensitivity_to(c, f, luminance, eccentricity) / nominal_s;
-        for (const Orientation o : {Orientation::axis, Orientation::diagonal}) {
-            // One place on its own is judged by the largest band there, a sum by all of it.
-            if (o == Orientation::diagonal && c.stimuli == Stimuli::patches) continue;
-            const double answer = band_response(f, c.ppd, level_, o) / gain_ / wanted;
-            const double slope =
-                answer * (smooth_response(angular_frequency(f, c.ppd, level_), o) - smooth_at_nominal_);
-            numerator += slope * (1 - answer);
-            denominator += slope * slope;
+void BandTable::weigh(std::span<const float> luminance, std::span<const float> eccentricity,
+                      BandWeights& weights) const {
+    constexpr std::uint32_t fraction_mask = (1U << fraction_bits) - 1;
+    constexpr float cell_share = 1.f / (1U << fraction_bits);
+    constexpr auto node_share = static_cast<float>(1 / eccentricity_step);
+    const auto mix = [](const Node& a, const Node& b, float t) {
+        return Node{a.log2_s + t * (b.log2_s - a.log2_s), a.own + t * (b.own - a.own),
+                    a.smoothed + t * (b.smoothed - a.smoothed)};
+    };
+    const std::size_t count = luminance.size();
+    for (std::vector<float>* const row : {&weights.sensitivity, &weights.own, &weights.smoothed}) row->resize(count);
+    const auto last_cell = static_cast<int>(luminances_) - 2;
+    for (std::size_t i = 0; i < count; ++i) {
+        const auto bits = std::bit_cast<std::uint32_t>(luminance[i]);
+        const int cell = static_cast<int>(bits >> fraction_bits) - first_cell_;
+        const float share = cell < 0 ? 0 : cell > last_cell ? 1 : static_cast<float>(bits & fraction_mask) * cell_share;
+        const Node* const at = nodes_.data() + std::clamp(cell, 0, last_cell);
+        Node node;
+        if (eccentricities_ < 2 || eccentricity.empty()) {
+            node = mix(at[0], at[1], share);
+        } else {
+            const float place = std::clamp((eccentricity[i] - first_eccentricity_) * node_share, 0.f,
+                                           static_cast<float>(eccentricities_ - 1));
+            const std::size_t row = std::min(static_cast<std::size_t>(place), eccentricities_ - 2);
+            const Node* const near = at + row * luminances_;
+            const Node* const far = near + luminances_;
+            node = mix(mix(near[0], near[1], share), mix(far[0], far[1], share), place - static_cast<float>(row));
         }
+        weights.sensitivity[i] = node.log2_s, weights.own[i] = node.own, weights.smoothed[i] = node.smoothed;
     }
-    return numerator / denominator;
+    for (float& s : weights.sensitivity) s = fast_exp2(s);
 }
 
 // ---- geometry and arguments ----------------------------------------------------------------------------------------
 
-Eccentricity::Eccentricity(const Image& window, const JudgeOptions& options)
-    : centre_(0.5 * window.width, 0.5 * window.height),
-      distance_px_(options.display.distance.value() / options.display.pixel_pitch.value()) {
-    if (options.gaze_px) {
-        has_gaze_ = true;
-        gaze_ = direction(options.gaze_px->x, options.gaze_px->y);
-        for (const double x : {0.0, static_cast<double>(window.width)}) {
-            for (const double y : {0.0, static_cast<double>(window.height)}) {
-                largest_ = std::max(largest_, angle(direction(x, y)));
-            }
+Plane eccentricities(const Image& window, const JudgeOptions& options) {
+    if (!options.gaze_px) return {};
+    Plane degrees(window.width, window.height);
+    // Directions (x, y, 1) from the eye, the distance to the screen being 1; that of the gaze has length 1.
+    const double pixel = options.display.pixel_pitch.value() / options.display.distance.value();
+    const auto from_centre = [&](double px, int size) { return (px - 0.5 * size) * pixel; };
+    const double right = from_centre(options.gaze_px->x, window.width),
+                 down = from_centre(options.gaze_px->y, window.height), length = std::hypot(right, down, 1.0);
+    const auto gaze_x = static_cast<float>(right / length), gaze_y = static_cast<float>(down / length),
+               gaze_z = static_cast<float>(1 / length);
+    std::vector<float> xs;
+    for (int x = 0; x < window.width; ++x) xs.push_back(static_cast<float>(from_centre(x + 0.5, window.width)));
+    constexpr auto per_radian = static_cast<float>(180 / std::numbers::pi);
+    for (int row = 0; row < window.height; ++row) {
+        const auto y = static_cast<float>(from_centre(row + 0.5, window.height));
+        float* const to = degrees.row(row);
+        for (std::size_t i = 0; i < xs.size(); ++i) {
+            const float x = xs[i], a = gaze_y - gaze_z * y, b = gaze_z * x - gaze_x, c = gaze_x * y - gaze_y * x;
+            const float dot = gaze_x * x + gaze_y * y + gaze_z;
+            to[i] = fast_angle(std::sqrt(a * a + b * b + c * c), dot) * per_radian;
         }
-        if (largest_ > 90) largest_ = 180; // beyond a right angle the largest need not lie in a corner
     }
-}
-double Eccentricity::angle(const glm::dvec3& d) const {
-    return std::atan2(glm::length(glm::cross(gaze_, d)), glm::dot(gaze_, d)) * 180 / std::numbers::pi;
+    return degrees;
 }
 
 std::vector<std::size_t> nearest_samples(int pixels, int level, int samples) {
@@ -216,8 +312,10 @@ Result<void> check(const JudgeOptions& options) {
     if (!options.csf_table && !is_achromatic(options.csf))
         return judge_argument_error("judge", std::string(name(options.csf)) +
                                                  " is sensitivity to colour, not to luminance contrast");
-    if (!(options.beta >= 1 && options.beta <= 20))
-        return judge_argument_error("judge", "beta must lie between 1 and 20");
+    if (!(options.gain >= least_gain && options.gain <= largest_gain))
+        return judge_argument_error("judge", "the observer's gain must lie between 0.001 and 1000");
+    if (!(options.beta >= least_beta && options.beta <= largest_beta))
+        return judge_argument_error("judge", "beta must lie between 1 and 8");
     if (options.gaze_px && !(std::isfinite(options.gaze_px->x) && std::isfinite(options.gaze_px->y))) {
         return judge_argument_error("judge", "the gaze must be a finite position in pixels");
     }
@@ -226,20 +324,24 @@ Result<void> check(const JudgeOptions& options) {
 
 double contrast_floor(const Display& display) { return std::max(black_level(display).value(), luminance_floor); }
 
-BandConditions conditions_for(Stimuli stimuli, double gain, const Image& reference, const JudgeOptions& options,
-                              const Eccentricity& eccentricity) {
-    const auto [low, high] = std::minmax_element(reference.values.begin(), reference.values.end());
-    const double floor_cdm2 = contrast_floor(options.display);
-    return {stimuli,
-            options.csf,
-            options.csf_table,
-            options.display.distance,
-            pixels_per_degree(options.display).value(),
-            options.beta,
-            gain,
-            {std::log10(std::max(static_cast<double>(*low), floor_cdm2)),
-             std::log10(std::max(static_cast<double>(*high), floor_cdm2))},
-            eccentricity.largest()};
+BandConditions conditions_for(const Image& reference, const JudgeOptions& options, const Plane& eccentricities) {
+    BandConditions c;
+    c.model = options.csf;
+    c.table = options.csf_table;
+    c.distance = options.display.distance;
+    c.ppd = pixels_per_degree(options.display).value();
+    c.beta = options.beta;
+    c.gain = options.gain;
+    const auto [darkest, brightest] = std::minmax_element(reference.values.begin(), reference.values.end());
+    const auto floor_cdm2 = static_cast<float>(contrast_floor(options.display));
+    c.luminance = {std::max(*darkest, floor_cdm2), std::max(*brightest, floor_cdm2)};
+    if (!eccentricities.values.empty()) {
+        const auto [nearest, farthest] =
+            std::minmax_element(eccentricities.values.begin(), eccentricities.values.end());
+        c.eccentricity = {*nearest, *farthest};
+    }
+    c.base_level = base_level(reference.width, reference.height, c.ppd);
+    return c;
 }
 
 } // namespace unseen::perception

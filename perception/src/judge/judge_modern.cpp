@@ -1,6 +1,8 @@
-// The modern visibility map: a decimated Laplacian pyramid of the reference and of the difference, each band weighted
-// by the contrast sensitivity at its frequency (judge/band_weights.h), masked by the reference, and pooled over the
-// bands.
+// The modern judge: a decimated Laplacian pyramid of the reference and of the difference, each band weighted by the
+// sensitivity to unlimited gratings (judge/band_weights.h) and masked by the reference. How much there is of one decides
+// how well it is seen: squares of contrasts in thresholds are summed over a window whose form is the law of area
+// (judge/summation.h). A grating's squares are half its amplitude's square in the mean, hence the factor of 2. The bands
+// are pooled.
 #include <perception/judge.h>
 
 #include <algorithm>
@@ -9,26 +11,19 @@
 #include <vector>
 
 #include "judge/band_weights.h"
+#include "judge/fast_math.h"
 #include "judge/judge_input.h"
 #include "judge/masking.h"
+#include "judge/summation.h"
 #include "pyramid_kernel.h"
 
 namespace unseen::perception {
 namespace {
 
-constexpr double contrast_limit = 1000; // of one band, so that a black reference stays finite
+// Of one band: far beyond all that is visible, and its power is a float.
+float most_thresholds(float beta) { return std::min(1e8f, std::exp2(120 / beta)); }
 
 // ---- images -------------------------------------------------------------------------------------------------------
-
-struct Plane {
-    int width = 0, height = 0;
-    std::vector<double> values;
-    Plane(int w, int h) : width(w), height(h), values(static_cast<std::size_t>(w) * static_cast<std::size_t>(h)) {}
-    double* row(int y) { return values.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width); }
-    const double* row(int y) const {
-        return values.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width);
-    }
-};
 
 // Mirrored about the outermost pixels; an image narrower than the kernel repeats its last one.
 int mirrored(int i, int n) {
@@ -37,46 +32,64 @@ int mirrored(int i, int n) {
     return std::clamp(i, 0, n - 1);
 }
 
-// One axis of the reduction: out[i] = sum of the five pixels around in[2 i].
-template <class Read>
-double reduced(int i, int n, Read in) {
-    const int c = 2 * i;
-    return kernel_middle * in(c) + kernel_near * (in(mirrored(c - 1, n)) + in(mirrored(c + 1, n))) +
-           kernel_far * (in(mirrored(c - 2, n)) + in(mirrored(c + 2, n)));
-}
-// One axis of the expansion: pixel x between coarse samples at even positions; the coarse row ends with its last
-// sample.
-template <class Read>
-double expanded(int x, int coarse_n, Read in) {
-    const int c = x / 2, next = std::min(c + 1, coarse_n - 1);
-    if (x % 2 == 1) return 2 * kernel_near * (in(c) + in(next));
-    return 2 * (kernel_middle * in(c) + kernel_far * (in(std::max(c - 1, 0)) + in(next)));
+constexpr auto middle = static_cast<float>(kernel_middle), near = static_cast<float>(kernel_near),
+               far = static_cast<float>(kernel_far);
+
+// A line with `margin` mirrored samples to each side, which the kernels below reach.
+constexpr int margin = 2;
+void mirror(const float* line, int count, std::vector<float>& padded) {
+    padded.resize(static_cast<std::size_t>(count + 2 * margin));
+    std::copy_n(line, count, padded.begin() + margin);
+    for (int i = 1; i <= margin; ++i) {
+        padded[static_cast<std::size_t>(margin - i)] = line[mirrored(-i, count)];
+        padded[static_cast<std::size_t>(margin + count - 1 + i)] = line[mirrored(count - 1 + i, count)];
+    }
 }
 
+// Smoothed by the pyramid's kernel, every second sample of each axis.
 Plane reduce(const Plane& in) {
-    Plane rows((in.width + 1) / 2, in.height), out(rows.width, (in.height + 1) / 2);
-    for (int y = 0; y < in.height; ++y) {
-        const double* line = in.row(y);
-        for (int x = 0; x < rows.width; ++x) rows.row(y)[x] = reduced(x, in.width, [&](int i) { return line[i]; });
+    Plane rows(in.width, (in.height + 1) / 2), out((in.width + 1) / 2, rows.height);
+    for (int y = 0; y < rows.height; ++y) {
+        const auto line = [&](int offset) { return in.row(mirrored(2 * y + offset, in.height)); };
+        const float *a = line(-2), *b = line(-1), *c = line(0), *d = line(1), *e = line(2);
+        float* const to = rows.row(y);
+        for (int x = 0; x < in.width; ++x) to[x] = middle * c[x] + near * (b[x] + d[x]) + far * (a[x] + e[x]);
     }
+    std::vector<float> padded;
     for (int y = 0; y < out.height; ++y) {
+        mirror(rows.row(y), rows.width, padded);
+        const float* const at = padded.data() + margin;
+        float* const to = out.row(y);
         for (int x = 0; x < out.width; ++x) {
-            out.row(y)[x] = reduced(y, in.height, [&](int i) { return rows.row(i)[x]; });
+            const float* const c = at + 2 * x;
+            to[x] = middle * c[0] + near * (c[-1] + c[1]) + far * (c[-2] + c[2]);
         }
     }
     return out;
 }
 
+// Between samples of a coarse level at even places; a coarse line ends with its last sample.
 Plane expand(const Plane& coarse, int width, int height) {
-    Plane rows(width, coarse.height), out(width, height);
-    for (int y = 0; y < coarse.height; ++y) {
-        const double* line = coarse.row(y);
-        for (int x = 0; x < width; ++x) rows.row(y)[x] = expanded(x, coarse.width, [&](int i) { return line[i]; });
-    }
+    Plane rows(coarse.width, height), out(width, height);
     for (int y = 0; y < height; ++y) {
-        for (int x = 0; x < width; ++x) {
-            out.row(y)[x] = expanded(y, coarse.height, [&](int i) { return rows.row(i)[x]; });
-        }
+        const int at = y / 2;
+        const float *above = coarse.row(std::max(at - 1, 0)), *here = coarse.row(at),
+                    *below = coarse.row(std::min(at + 1, coarse.height - 1));
+        float* const to = rows.row(y);
+        if (y % 2 == 1)
+            for (int x = 0; x < coarse.width; ++x) to[x] = 2 * near * (here[x] + below[x]);
+        else
+            for (int x = 0; x < coarse.width; ++x) to[x] = 2 * (middle * here[x] + far * (above[x] + below[x]));
+    }
+    std::vector<float> padded(static_cast<std::size_t>(coarse.width + 2));
+    for (int y = 0; y < height; ++y) {
+        std::copy_n(rows.row(y), coarse.width, padded.begin() + 1);
+        padded.front() = padded[1];
+        padded.back() = padded[static_cast<std::size_t>(coarse.width)];
+        const float* const at = padded.data() + 1;
+        float* const to = out.row(y);
+        for (int x = 0; 2 * x < width; ++x) to[2 * x] = 2 * (middle * at[x] + far * (at[x - 1] + at[x + 1]));
+        for (int x = 0; 2 * x + 1 < width; ++x) to[2 * x + 1] = 2 * near * (at[x] + at[x + 1]);
     }
     return out;
 }
@@ -84,155 +97,247 @@ Plane expand(const Plane& coarse, int width, int height) {
 // The binomial filter (1 2 1)/4 along both axes, whose response the tilt uses.
 Plane smooth(const Plane& in) {
     Plane rows(in.width, in.height), out(in.width, in.height);
+    std::vector<float> padded;
     for (int y = 0; y < in.height; ++y) {
-        const double* line = in.row(y);
-        for (int x = 0; x < in.width; ++x) {
-            rows.row(y)[x] = 0.5 * line[x] + 0.25 * (line[mirrored(x - 1, in.width)] + line[mirrored(x + 1, in.width)]);
-        }
+        mirror(in.row(y), in.width, padded);
+        const float* const at = padded.data() + margin;
+        float* const to = rows.row(y);
+        for (int x = 0; x < in.width; ++x) to[x] = 0.5f * at[x] + 0.25f * (at[x - 1] + at[x + 1]);
     }
     for (int y = 0; y < in.height; ++y) {
-        const double *above = rows.row(mirrored(y - 1, in.height)), *below = rows.row(mirrored(y + 1, in.height));
-        for (int x = 0; x < in.width; ++x) out.row(y)[x] = 0.5 * rows.row(y)[x] + 0.25 * (above[x] + below[x]);
+        const float *above = rows.row(mirrored(y - 1, in.height)), *here = rows.row(y),
+                    *below = rows.row(mirrored(y + 1, in.height));
+        float* const to = out.row(y);
+        for (int x = 0; x < in.width; ++x) to[x] = 0.5f * here[x] + 0.25f * (above[x] + below[x]);
     }
     return out;
 }
 
-// ---- the bands of an image pair -----------------------------------------------------------------------------------
+// ---- bands ----------------------------------------------------------------------------------------------------------
 
-// One band at its own resolution: contrasts relative to the reference's local luminance, and their tilted companions.
+// One band of the reference, at its own resolution.
+struct ReferenceBand {
+    int level = 0;
+    bool is_base = false;
+    Plane luminance; // cd/m2, floored
+    Plane contrast;
+};
+
+// Leaves the next level in `reference`.
+ReferenceBand split_reference(Plane& reference, int level, bool is_base, float floor_cdm2) {
+    ReferenceBand band;
+    band.level = level, band.is_base = is_base;
+    if (is_base) { // what the pyramid did not split; a base does not mask itself
+        band.luminance = std::move(reference);
+        band.contrast = Plane(band.luminance.width, band.luminance.height);
+    } else {
+        Plane next = reduce(reference);
+        band.luminance = expand(next, reference.width, reference.height);
+        band.contrast = std::move(reference);
+        for (std::size_t i = 0; i < band.luminance.values.size(); ++i)
+            band.contrast.values[i] -= band.luminance.values[i];
+        reference = std::move(next);
+    }
+    for (std::size_t i = 0; i < band.luminance.values.size(); ++i) {
+        float& luminance = band.luminance.values[i];
+        luminance = std::max(luminance, floor_cdm2);
+        band.contrast.values[i] /= luminance;
+    }
+    return band;
+}
+
+// How a row of samples is seen.
+struct RowSight {
+    BandWeights weights;
+    std::vector<float> elevation; // of thresholds, by the reference
+};
+
+// The reference, band by band.
+class Reference {
+public:
+    Reference(const Image& image, const JudgeOptions& options)
+        : eccentricities_(eccentricities(image, options)), conditions_(conditions_for(image, options, eccentricities_)),
+          floor_cdm2_(static_cast<float>(contrast_floor(options.display))), rest_(image.width, image.height) {
+        rest_.values = image.values;
+    }
+
+    const BandConditions& conditions() const { return conditions_; }
+
+    // Calls `use(band)` for each from fine to coarse; only one is held at a time. Once.
+    template <class Use>
+    void for_each_band(Use use) {
+        for (int level = 0; level <= conditions_.base_level; ++level)
+            use(split_reference(rest_, level, level == conditions_.base_level, floor_cdm2_));
+    }
+
+    // `use(y, sight)` for each row of a band.
+    template <class Use>
+    void for_each_row(const ReferenceBand& band, const BandTable& table, Use use) const {
+        const Plane smooth_contrast = smooth(band.contrast);
+        const auto width = static_cast<std::size_t>(band.luminance.width);
+        const auto of_patch = static_cast<float>(table.of_patch());
+        std::vector<float> eccentricity;
+        RowSight sight;
+        sight.elevation.resize(width);
+        for (int y = 0; y < band.luminance.height; ++y) {
+            if (!eccentricities_.values.empty()) {
+                const float* const degrees = eccentricities_.row(y << band.level);
+                eccentricity.resize(width);
+                for (std::size_t x = 0; x < width; ++x) eccentricity[x] = degrees[x << band.level];
+            }
+            table.weigh({band.luminance.row(y), width}, eccentricity, sight.weights);
+            const auto& [sensitivity, own, smoothed] = sight.weights;
+            const float *const contrast = band.contrast.row(y), *const around = smooth_contrast.row(y);
+            for (std::size_t x = 0; x < width; ++x) {
+                // Maskers work where they are: their contrasts count in thresholds of patches.
+                const float masker = std::abs(own[x] * contrast[x] + smoothed[x] * around[x]);
+                sight.elevation[x] = fast_daly_elevation(masker * sensitivity[x] * of_patch);
+            }
+            use(y, sight);
+        }
+    }
+
+private:
+    Plane eccentricities_;
+    BandConditions conditions_;
+    float floor_cdm2_;
+    Plane rest_; // what is not split into bands yet
+};
+
+// What the reference makes of one band of differences.
 struct Band {
     int level = 0;
     bool is_base = false;
-    Plane luminance;  // cd/m2, floored
-    Plane reference;  // contrast
-    Plane difference; // contrast
+    // Of differences in cd/m2: contrasts in thresholds of unlimited gratings, masked, are
+    //   own x + smoothed (h*x).
+    Plane own, smoothed;
+    SummationWindow window{1};
 };
 
-// The luminance and the two contrasts of one band; leaves the next levels in `reference` and `difference`.
-Band split_band(Plane& reference, Plane& difference, int level, double floor_cdm2) {
-    Plane next_reference = reduce(reference), next_difference = reduce(difference);
-    Band band{level, false, expand(next_reference, reference.width, reference.height), std::move(reference),
-              std::move(difference)};
-    const Plane back = expand(next_difference, band.luminance.width, band.luminance.height);
-    for (std::size_t i = 0; i < back.values.size(); ++i) {
-        double& luminance = band.luminance.values[i];
-        band.reference.values[i] -= luminance;
-        band.difference.values[i] -= back.values[i];
-        luminance = std::max(luminance, floor_cdm2);
-        band.reference.values[i] = std::clamp(band.reference.values[i] / luminance, -contrast_limit, contrast_limit);
-        band.difference.values[i] = std::clamp(band.difference.values[i] / luminance, -contrast_limit, contrast_limit);
-    }
-    reference = std::move(next_reference);
-    difference = std::move(next_difference);
-    return band;
-}
-
-// What the pyramid did not split: the contrast of the difference against the level itself; a base does not mask itself.
-Band base_band(Plane& reference, Plane& difference, int level, double floor_cdm2) {
-    Band band{level, true, std::move(reference), Plane(0, 0), std::move(difference)};
-    band.reference = Plane(band.luminance.width, band.luminance.height);
-    for (std::size_t i = 0; i < band.luminance.values.size(); ++i) {
-        double& luminance = band.luminance.values[i];
-        luminance = std::max(luminance, floor_cdm2);
-        band.difference.values[i] = std::clamp(band.difference.values[i] / luminance, -contrast_limit, contrast_limit);
-    }
-    return band;
-}
-
-// Calls `use(band)` for each band from fine to coarse; only one is held at a time.
-template <class Use>
-void for_each_band(const Image& reference, const Image* test, int base, double floor_cdm2, Use use) {
-    Plane r(reference.width, reference.height), d(reference.width, reference.height);
-    for (std::size_t i = 0; i < r.values.size(); ++i) {
-        r.values[i] = reference.values[i];
-        if (test != nullptr) d.values[i] = static_cast<double>(test->values[i]) - r.values[i];
-    }
-    for (int level = 0; level < base; ++level) use(split_band(r, d, level, floor_cdm2));
-    use(base_band(r, d, base, floor_cdm2));
-}
-
-// A band's table is made when its luminances are known; `Visit` gets the sample index, the weight there, and the
-// reference's and the difference's contrast, gain and tilt applied.
-template <class Visit>
-void for_each_sample(const Band& band, const BandConditions& conditions, const Eccentricity& eccentricity,
-                     bool skip_equal, Visit visit) {
-    const BandTable table(conditions, band.level, band.is_base);
-    const Plane smooth_reference = smooth(band.reference), smooth_difference = smooth(band.difference);
-    const double step = std::exp2(band.level);
-    for (int y = 0; y < band.luminance.height; ++y) {
-        for (int x = 0; x < band.luminance.width; ++x) {
-            const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(band.luminance.width) +
-                                  static_cast<std::size_t>(x);
-            const double d = band.difference.values[i], d_smooth = smooth_difference.values[i];
-            if (skip_equal && d == 0 && d_smooth == 0) continue;
-            const BandWeight weight =
-                table.at(std::log10(band.luminance.values[i]), eccentricity.at_pixel(x * step, y * step));
-            const double r = band.reference.values[i], r_smooth = smooth_reference.values[i];
-            const auto tilted = [&](double c, double c_smooth) {
-                return std::abs(c + weight.tilt * (c_smooth - table.smooth_at_nominal() * c)) / table.gain();
-            };
-            visit(i, weight.sensitivity, tilted(r, r_smooth), tilted(d, d_smooth));
+Band prepare_band(const Reference& reference, const ReferenceBand& from) {
+    const BandConditions& conditions = reference.conditions();
+    const BandTable table(conditions, from.level);
+    const int width = from.luminance.width, height = from.luminance.height;
+    const double samples_a_degree = conditions.ppd / std::exp2(from.level);
+    const double area_deg2 = summation_area(conditions, nominal_frequency(conditions.ppd, from.level));
+    Band band{from.level, from.is_base, Plane(width, height), Plane(width, height),
+              SummationWindow(area_deg2 * samples_a_degree * samples_a_degree)};
+    reference.for_each_row(from, table, [&](int y, const RowSight& sight) {
+        const float* const luminance = from.luminance.row(y);
+        float *const own = band.own.row(y), *const smoothed = band.smoothed.row(y);
+        const auto& weights = sight.weights;
+        for (std::size_t x = 0; x < sight.elevation.size(); ++x) {
+            const float to_thresholds = weights.sensitivity[x] / (luminance[x] * sight.elevation[x]);
+            own[x] = to_thresholds * weights.own[x];
+            smoothed[x] = to_thresholds * weights.smoothed[x];
         }
-    }
+    });
+    return band;
 }
 
-// ---- images out ----------------------------------------------------------------------------------------------------
+// Energies to the power of beta / 2, beta the exponent of amplitudes; the usual ones without logarithms.
+void raise(std::vector<float>& energies, float beta) {
+    constexpr float least = std::numeric_limits<float>::min();
+    if (beta == 2) return;
+    if (beta == 3.5f)
+        for (float& e : energies) e = e * std::sqrt(e) * std::sqrt(std::sqrt(e));
+    else
+        for (float& e : energies) e = e > 0 ? fast_exp2(beta / 2 * fast_log2(std::max(e, least))) : 0;
+}
 
-Image as_image(const Plane& plane) {
-    Image image{plane.width, plane.height, 1, {}};
-    image.values.reserve(plane.values.size());
-    for (const double v : plane.values) {
-        image.values.push_back(static_cast<float>(std::min<double>(v, std::numeric_limits<float>::max())));
-    }
-    return image;
+// The sums of powers to V.
+void take_root(std::vector<float>& powers, float beta) {
+    constexpr float least = std::numeric_limits<float>::min();
+    for (float& p : powers) p = p > 0 ? fast_exp2(fast_log2(std::max(p, least)) / beta) : 0;
 }
 
 } // namespace
 
-Result<Judgement> judge_modern(const Image& reference, const Image& test, const JudgeOptions& options) {
+struct Judge::State {
+    Image reference;
+    JudgeOptions options;
+    std::vector<Band> bands; // from fine to coarse
+};
+
+Judge::Judge(std::shared_ptr<const State> state) : state_(std::move(state)) {}
+
+Result<Judge> Judge::create(Image reference, const JudgeOptions& options) {
     if (auto ok = check(options); !ok) return ok.error();
+    if (auto ok = check_luminance("judge", reference, "reference"); !ok) return ok.error();
+    auto state = std::make_shared<State>();
+    Reference bands(reference, options);
+    bands.for_each_band([&](const ReferenceBand& band) { state->bands.push_back(prepare_band(bands, band)); });
+    state->reference = std::move(reference);
+    state->options = options;
+    return Judge(std::move(state));
+}
+
+Result<Judgement> Judge::judge(const Image& test) const {
+    const Image& reference = state_->reference;
     if (auto ok = check_luminance_pair("judge", reference, test); !ok) return ok.error();
-    const Eccentricity eccentricity(reference, options);
-    const BandConditions conditions = conditions_for(Stimuli::patches, 1, reference, options, eccentricity);
-    const int base = base_level(reference, conditions.ppd);
+    const auto beta = static_cast<float>(state_->options.beta);
+    const float most = most_thresholds(beta);
+    Plane difference(reference.width, reference.height), sum(reference.width, reference.height);
+    for (std::size_t i = 0; i < difference.values.size(); ++i)
+        difference.values[i] = test.values[i] - reference.values[i];
+    for (const Band& band : state_->bands) {
+        Plane here = std::move(difference);
+        if (!band.is_base) {
+            difference = reduce(here);
+            const Plane back = expand(difference, here.width, here.height);
+            for (std::size_t i = 0; i < back.values.size(); ++i) here.values[i] -= back.values[i];
+        }
+        const Plane smoothed = smooth(here);
+        for (std::size_t i = 0; i < here.values.size(); ++i) {
+            const float thresholds = std::min(
+                std::abs(band.own.values[i] * here.values[i] + band.smoothed.values[i] * smoothed.values[i]), most);
+            here.values[i] = 2 * thresholds * thresholds;
+        }
+        Plane powers = band.window.sums(here);
+        raise(powers.values, beta);
+        spread(powers, band.level, sum, [](float& to, float from) { to += from; });
+    }
 
-    Plane sum(reference.width, reference.height);
-    for_each_band(reference, &test, base, contrast_floor(options.display), [&](const Band& band) {
-        Plane powers(band.luminance.width, band.luminance.height);
-        for_each_sample(band, conditions, eccentricity, true, [&](std::size_t i, double s, double mask, double change) {
-            powers.values[i] = std::pow(change * s / daly_elevation(mask * s), options.beta);
-        });
-        spread(powers, band.level, sum, [](double& to, double from) { to += from; });
-    });
-
+    take_root(sum.values, beta);
     Judgement judgement;
     judgement.pixels = sum.values.size();
-    for (double& v : sum.values) {
-        if (v != 0) v = std::pow(v, 1 / options.beta);
-        judgement.visible_pixels += !(v < 1);
-        judgement.max_ratio = std::max(judgement.max_ratio, v);
-    }
-    judgement.visibility = as_image(sum);
+    judgement.visible_pixels = static_cast<std::uint64_t>(
+        std::count_if(sum.values.begin(), sum.values.end(), [](float v) { return !(v < 1); }));
+    judgement.max_ratio = static_cast<double>(*std::max_element(sum.values.begin(), sum.values.end()));
+    judgement.visibility = {reference.width, reference.height, 1, std::move(sum.values)};
     return judgement;
+}
+
+Result<Judgement> judge_modern(const Image& reference, const Image& test, const JudgeOptions& options) {
+    const auto judge = Judge::create(reference, options);
+    if (!judge) return judge.error();
+    return judge->judge(test);
+}
+
+JudgeOptions second_judge_options(const Person& person, const Display& display,
+                                  const std::optional<glm::dvec2>& gaze_px) {
+    return {
+        .display = display, .gaze_px = gaze_px, .csf = CsfModel::barten_fitted, .gain = person.barten_gain, .beta = 2};
 }
 
 Result<Image> threshold_map_modern(const Image& reference, const JudgeOptions& options) {
     if (auto ok = check(options); !ok) return ok.error();
     if (auto ok = check_luminance("judge", reference, "reference"); !ok) return ok.error();
-    const Eccentricity eccentricity(reference, options);
-    const BandConditions conditions = conditions_for(Stimuli::patches, 1, reference, options, eccentricity);
-    const int base = base_level(reference, conditions.ppd);
-
     Plane threshold(reference.width, reference.height);
-    std::fill(threshold.values.begin(), threshold.values.end(), std::numeric_limits<double>::infinity());
-    for_each_band(reference, nullptr, base, contrast_floor(options.display), [&](const Band& band) {
+    std::fill(threshold.values.begin(), threshold.values.end(), std::numeric_limits<float>::max());
+    Reference bands(reference, options);
+    bands.for_each_band([&](const ReferenceBand& band) {
+        const BandTable table(bands.conditions(), band.level);
+        const auto of_patch = static_cast<float>(table.of_patch());
         Plane steps(band.luminance.width, band.luminance.height);
-        for_each_sample(band, conditions, eccentricity, false, [&](std::size_t i, double s, double mask, double) {
-            steps.values[i] = band.luminance.values[i] * daly_elevation(mask * s) / s;
+        bands.for_each_row(band, table, [&](int y, const RowSight& sight) {
+            const float* const luminance = band.luminance.row(y);
+            for (std::size_t x = 0; x < sight.elevation.size(); ++x)
+                steps.row(y)[x] = luminance[x] * sight.elevation[x] / (sight.weights.sensitivity[x] * of_patch);
         });
-        spread(steps, band.level, threshold, [](double& to, double from) { to = std::min(to, from); });
+        spread(steps, band.level, threshold, [](float& to, float from) { to = std::min(to, from); });
     });
-    return as_image(threshold);
+    return Image{threshold.width, threshold.height, 1, std::move(threshold.values)};
 }
 
 } // namespace unseen::perception

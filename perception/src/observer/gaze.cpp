@@ -238,7 +238,7 @@ CsfTable widened(const CsfTable& table, Degrees margin) {
         }
         column += plane;
     }
-    auto made = CsfTable::create(std::move(wide));
+    auto made = CsfTable::derived(std::move(wide));
     assert(made); // the columns of a table, at eccentricities that a table can have
     return std::move(*made);
 }

@@ -10,6 +10,7 @@
 
 #include <perception/csf.h>
 #include <perception/display.h>
+#include <perception/person.h>
 #include <vdtree/view.h>
 
 namespace unseen::session {
@@ -22,10 +23,24 @@ struct Gaze {
 // Error messages and reasons call these fields observer.gaze and so on.
 struct Observer {
     perception::Display display = {};
-    // Contrast sensitivity; null: the standard observer, castleCSF.
+    perception::Person person = perception::default_person; // how well they see; castleCSF times a gain
+    // This very viewer's contrast sensitivity, in the person's place; null: the person's.
     std::shared_ptr<const perception::CsfTable> csf = {};
     std::optional<Gaze> gaze = {}; // none: everything counts as looked at
+    // How fast everything moves over the retina, 0 to perception::fastest_velocity. Fine things blur, coarse ones are
+    // seen better. What the eye follows hardly moves there: give what is left of it (perception/motion.h).
+    perception::DegreesPerSecond velocity{0};
 };
+
+// Whose eyes, in words: "the default observer (castleCSF x 2: of measured people, 8.7% see more)".
+std::string describe(const Observer& observer);
+
+// A person by name (perception/person.h), or the file of a viewer's table.
+struct ObserverChoice {
+    perception::Person person = perception::default_person;
+    std::shared_ptr<const perception::CsfTable> csf = {}; // of the file; else null
+};
+Result<ObserverChoice> choose_observer(const std::string& name_or_file);
 
 // Contrast sensitivity by name: that of a model (see perception::csf_model()), or else the file of a table. A model
 // must be of luminance contrast.
@@ -35,9 +50,9 @@ struct CsfChoice {
 };
 Result<CsfChoice> choose_csf(const std::string& model_or_file);
 
-// Its table, of a model for the display's distance.
-Result<std::shared_ptr<const perception::CsfTable>> read_csf_table(const std::string& model_or_file,
-                                                                   const perception::Display& display);
+// Its table: of a model, for the display's distance and times the person's gain.
+Result<std::shared_ptr<const perception::CsfTable>>
+read_csf_table(const std::string& model_or_file, const perception::Display& display, const perception::Person& person);
 
 // The background in relative luminance: what is asked for must be possible on the display, within its black and white.
 // See Scene::background for the default.

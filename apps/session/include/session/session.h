@@ -67,6 +67,8 @@ public:
     // From now on.
     void set_gaze(std::optional<Gaze> gaze); // precondition: finite, the margin 0 or more
     void set_time(double seconds);           // of lights that move; precondition: finite
+    // Precondition: 0 to perception::fastest_velocity. Followers refine at once what stands still again.
+    void set_velocity(perception::DegreesPerSecond velocity);
 
     // The sphere around all objects.
     WorldSphere bounding_sphere() const;
