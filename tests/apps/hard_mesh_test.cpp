@@ -1,6 +1,7 @@
 // Meshes made to be hard, under the oracle's eyes.
 #include <hard_mesh.h>
 
+#include <memory>
 #include <optional>
 #include <span>
 #include <stdexcept>
@@ -125,6 +126,26 @@ TEST(ShipHulls, AreFoldedUnseenByTheSafeTest) {
         const Direction directions[] = {{{0.1, 1, 0.2}, 0.2}, {{1, 0.5, 0.1}, 0.5}};
         seen.expect_nothing(directions, [&](const vdtree::View& view, const perception::FoldTestOptions& options) {
             return perception::luebke_hallen_safe_distances(seen.tree(), rings, view, options);
+        });
+    }
+}
+
+// The same by light that comes from above.
+TEST(ShipHulls, AreFoldedUnseenUnderLights) {
+    vdtree::Lighting from_above;
+    from_above.ambient = 0.1;
+    from_above.lights.push_back({.intensity = 0.8, .direction = glm::normalize(glm::dvec3(0.2, 1, 0.1))});
+    for (HardMesh& hull : ship_hulls(96'000)) {
+        SCOPED_TRACE(hull.name);
+        Seen seen(built(hull), from_above);
+        const perception::CutRings rings = *perception::bound_cut_rings(seen.tree());
+        const auto bounds =
+            std::make_shared<const vdtree::LightBounds>(*perception::bound_lit_cut_rings(seen.tree(), rings));
+        const Direction directions[] = {{{0.1, 1, 0.2}, 0.2}, {{1, 0.5, 0.1}, 0.2}};
+        seen.expect_nothing(directions, [&](const vdtree::View& view, perception::FoldTestOptions options) {
+            options.scene = perception::lit_scene(seen.tree(), *bounds, from_above,
+                                                  vdtree::eye_in_tree(seen.tree(), view, {}), oracle::background);
+            return perception::lit_safe_distances(seen.tree(), rings, bounds, view, options);
         });
     }
 }

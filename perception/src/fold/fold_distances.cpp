@@ -15,6 +15,8 @@
 
 #include "fold/fold_classes.h"
 #include "fold/fold_screen.h"
+#include "fold/largest_extents.h"
+#include "fold/safe_rings.h"
 
 namespace unseen::perception {
 
@@ -22,8 +24,6 @@ namespace {
 
 using vdtree::DistanceCriterion;
 using vdtree::NodeId;
-
-constexpr float length_rounding = 1e-6f; // covers that of a mean of two floats
 
 // Of eccentricity on the screen; beyond the last one sensitivity is taken as there.
 struct Bins {
@@ -115,55 +115,6 @@ struct Row {
     }
 };
 
-// The largest extents, in degrees on the screen, of which a row shows nothing; infinite where it does at no extent.
-// Smaller is what comes first: bins in ascending eccentricity.
-class LargestExtents {
-public:
-    // Extents around the spheres are larger than these, from whose nearest points eccentricity is counted: they reach
-    // nearer to the gaze, by half of their width at most.
-    LargestExtents(const Row& row, const Sensitivities& see, const Screen& screen, bool is_around_spheres)
-        : row_(row), see_(see), is_around_spheres_(is_around_spheres),
-          step_(step_of(screen.pixel_deg / smallest_of_a_pixel)) {}
-
-    double at(double eccentricity_deg) {
-        // Of a fixed series of extents, so that more contrast never makes them larger.
-        if (step_ == last_step || is_unseen(last_step, eccentricity_deg)) {
-            step_ = last_step;
-            return std::numeric_limits<double>::infinity();
-        }
-        int above = step_ + 1;
-        for (int stride = 1; above < last_step && is_unseen(above, eccentricity_deg); stride *= 2) {
-            step_ = above;
-            above = std::min(above + stride, last_step);
-        }
-        while (above - step_ > 1) {
-            const int middle = step_ + (above - step_) / 2;
-            (is_unseen(middle, eccentricity_deg) ? step_ : above) = middle;
-        }
-        return extent(step_);
-    }
-
-private:
-    static constexpr double steps_per_octave = 128;
-    static constexpr int last_step = 9 * 128;           // 512 degrees: all that is seen
-    static constexpr double smallest_of_a_pixel = 1024; // far below what any fold costs 1 at
-
-    static double extent(int step) { return std::exp2(step / steps_per_octave); }
-    static int step_of(double extent_deg) {
-        return static_cast<int>(std::floor(steps_per_octave * std::log2(extent_deg)));
-    }
-    bool is_unseen(int step, double eccentricity_deg) const {
-        const double nearest =
-            is_around_spheres_ ? std::max(0.0, eccentricity_deg - extent(step) / 2) : eccentricity_deg;
-        return row_.visibility(see_, 1 / (2 * extent(step)), nearest) <= 1;
-    }
-
-    const Row& row_;
-    const Sensitivities& see_;
-    bool is_around_spheres_;
-    int step_; // not seen, or smaller than anything that matters
-};
-
 // Of grey rows whose extents are the spheres' own, all at once.
 void find_largest_extents(const Row& row, const CsfTable& csf, const Bins& bins, std::span<double> extents) {
     std::array<float, fine_bins.count> contrast, eccentricity, luminance, log2_frequency;
@@ -176,14 +127,6 @@ void find_largest_extents(const Row& row, const CsfTable& csf, const Bins& bins,
     // Infinite where not even the peak is seen.
     for (std::size_t bin = 0; bin < extents.size(); ++bin)
         extents[bin] = 1 / (2 * std::exp2(static_cast<double>(log2_frequency[bin])));
-}
-
-// The distance, in lengths, from which an extent is no larger than this on the screen.
-float switch_distance_of(double extent_deg, const Screen& screen, bool is_around_spheres) {
-    if (std::isinf(extent_deg)) return 0; // only from inside
-    const double half = extent_deg / screen.largest_magnification / degrees_per_radian / 2;
-    const double in_lengths = half < std::numbers::pi / 2 ? 1 / std::sin(half) : 1; // from the centre
-    return static_cast<float>((is_around_spheres ? in_lengths : in_lengths - 1) * (1 + distance_rounding));
 }
 
 void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes& classes, const Bins& eccentricities,
@@ -201,7 +144,9 @@ void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes
         const auto [found, is_new] = known.try_emplace(without_shifts.number(), bins);
         std::vector<double>& extents = found->second;
         if (is_new && (is_around_spheres || row.has_chroma() || row.has_texture())) {
-            LargestExtents largest(row, see, screen, is_around_spheres);
+            LargestExtents largest(
+                [&](double frequency, double eccentricity) { return row.visibility(see, frequency, eccentricity); },
+                screen, is_around_spheres);
             for (std::size_t bin = 0; bin < bins; ++bin) extents[bin] = largest.at(eccentricities.at(bin));
         } else if (is_new) {
             find_largest_extents(row, see.luminance, eccentricities, extents);
@@ -373,18 +318,8 @@ Result<DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree&
         rings.chroma = cut_rings.chroma;
         rings.mean_chroma_shift = cut_rings.mean_chroma_shift;
     }
-    std::vector<float> lengths(tree.interior_count(), 0.0f);
-    for (NodeId node = tree.interior_count(); node-- > 0;) {
-        // The change is largest within the support and fades to nothing at the ring's border.
-        const float around =
-            0.5f * (tree.support_spheres()[node].radius + cut_rings.radius[node]) * (1 + length_rounding);
-        lengths[node] = std::max({lengths[node], tree.bounds()[node].ring.radius, around});
-        if (node > 0) lengths[sound->parents()[node]] = std::max(lengths[sound->parents()[node]], lengths[node]);
-    }
-    if (!cut_rings.meets_another.empty())
-        for (NodeId node = 0; node < tree.interior_count(); ++node) // an outline, whatever it faces
-            rings.facing.push_back(cut_rings.meets_another[node] ? vdtree::NormalSlabs::everything()
-                                                                 : tree.bounds()[node].slabs);
+    std::vector<float> lengths = safe_lengths(*sound, cut_rings);
+    rings.facing = safe_facing(tree, cut_rings);
     rings.vertices = cut_rings.vertices;
     rings.texture = cut_rings.texture;
     rings.texture_deviation = cut_rings.texture_deviation;
