@@ -303,37 +303,27 @@ std::vector<HardMesh> open_sheets(int triangles) {
 }
 
 std::vector<HardMesh> ship_hulls(int triangles) {
-    const int along = std::max(8, triangles / 96);
-    // Around the section: up the one side, over the deck, down the other.
-    const auto section = [](double around, double width) {
-        const double t = 4 * around;
-        const double x = t < 1.5 ? -width : t < 2.5 ? width * (2 * (t - 1.5) - 1) : width;
-        const double y = t < 1.5 ? -1 + t / 1.5 : t < 2.5 ? 0 : -(t - 2.5) / 1.5;
-        return glm::dvec2(x * (1 + 0.3 * std::min(y, 0.0)), y);
+    constexpr int across = 16; // of a deck, and of a side
+    const int along = std::max(8, triangles / (3 * 2 * across));
+    const auto half_width = [](double z) {
+        return 1.2 * std::sqrt(std::max(0.02, 1 - std::pow(z / 6.2, 4))) * (1 + 0.01 * std::sin(9 * z));
     };
-    const auto hull = [&](int around, double ridges) {
-        Mesh mesh = net(along, around, false, [&](double down, double across) {
-            const double z = 12 * down - 6, width = 1.2 * std::sqrt(std::max(0.02, 1 - std::pow(z / 6.2, 4)));
-            glm::dvec2 at = section(across, width);
-            at.x *= 1 + ridges * std::sin(60 * across);
-            return glm::dvec3(at, z);
-        });
-        return painted(std::move(mesh), [](const glm::dvec3& p) { return p.y > -1e-3 ? 0.85 : 0.06; });
+    const auto deck = [&](double down, double right) {
+        const double z = 12 * down - 6, x = 2 * right - 1;
+        return glm::dvec3(x * half_width(z), 0.05 * (1 - x * x), z);
     };
-    Mesh railed = hull(24, 0);
-    for (int i = 0; i < 2; ++i)
-        append(railed, painted(net(along, 2, false,
-                                   [&](double down, double across) {
-                                       const double z = 12 * down - 6;
-                                       const double width = 1.15 * std::sqrt(std::max(0.02, 1 - std::pow(z / 6.2, 4)));
-                                       return glm::dvec3(i == 0 ? -width : width, 0.02 + 0.1 * across, z);
-                                   }),
-                               [](const glm::dvec3&) { return 0.4; }));
-    std::vector<HardMesh> hulls;
-    hulls.push_back({"hull", hull(48, 0)});
-    hulls.push_back({"ridged hull", hull(48, 0.02)});
-    hulls.push_back({"railed hull", std::move(railed)});
-    return hulls;
+    const auto hull = [&](double bright, double dark) {
+        Mesh mesh = painted(net(along, across, false, deck), [=](const glm::dvec3&) { return bright; });
+        for (const double sign : {1.0, -1.0})
+            append(mesh, painted(net(along, across, false,
+                                     [&](double down, double below) {
+                                         const double z = 12 * down - 6;
+                                         return glm::dvec3(sign * half_width(z) * (1 - 0.3 * below * below), -below, z);
+                                     }),
+                                 [=](const glm::dvec3&) { return dark; }));
+        return mesh;
+    };
+    return {{"hull", hull(0.85, 0.06)}, {"grey hull", hull(0.6, 0.25)}};
 }
 
 Result<vdtree::VertexTree> build_hard_tree(const HardMesh& hard) {

@@ -29,8 +29,8 @@ std::vector<HardMesh> tuning_meshes(int triangles);
 // of each facet's own; a jagged outline, holes, a spiral. Of about so many triangles each; at least a thousand.
 std::vector<HardMesh> open_sheets(int triangles);
 
-// Hulls of a ship, of long thin quads, as CAD programs write them: a bright deck beside a dark side, with ridges, and
-// with a railing of separate strips above it. Of about so many triangles each; at least a thousand.
+// Ships, of slender quads: a bright deck beside dark sides, which share their edges' places and no vertices, as CAD
+// programs write them. Of about so many triangles each; at least a thousand.
 std::vector<HardMesh> ship_hulls(int triangles);
 
 Result<vdtree::VertexTree> build_hard_tree(const HardMesh& hard);

@@ -1,7 +1,9 @@
 // Meshes made to be hard, under the oracle's eyes.
 #include <hard_mesh.h>
 
-#include <map>
+#include <memory>
+#include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -14,7 +16,6 @@
 #include <render/context.h>
 #include <render/renderer.h>
 #include <session/observer.h>
-#include <vdtree/conserve_light.h>
 
 #include "measured.h"
 #include "oracle.h"
@@ -38,34 +39,57 @@ VertexTree built(const HardMesh& hard) {
 // Looked at, and so many degrees aside.
 constexpr double degrees_aside[] = {0, 12, 29, 50};
 
-template <class MakeCriterion>
-void expect_unseen(const VertexTree& tree, std::span<const Direction> directions, const MakeCriterion& make_criterion) {
-    auto context = render::Context::headless();
-    ASSERT_TRUE(context) << context.error().message;
-    auto renderer = render::Renderer::create(*context, tree);
-    ASSERT_TRUE(renderer) << renderer.error().message;
-    vdtree::Cut whole(tree);
-    whole.unfold_all();
-    for (const Direction& from : directions) {
-        oracle::Look look = oracle::looks_at(tree, {.window_px = 512, .count = 1}).front();
-        const vdtree::Sphere sphere = tree.bounding_sphere();
-        look.view = vdtree::frame_sphere(tree.origin() + glm::dvec3(sphere.centre), sphere.radius, from.towards_eye,
+// A tree as it is seen, in light of its own or under lights.
+class Seen {
+public:
+    explicit Seen(VertexTree tree, std::optional<vdtree::Lighting> lighting = {})
+        : tree_(std::move(tree)), lighting_(std::move(lighting)), context_(*render::Context::headless()),
+          renderer_(*render::Renderer::create(context_, tree_)) {}
+
+    const VertexTree& tree() const { return tree_; }
+
+    // How the cut of a criterion is judged that make_criterion(view, options) makes.
+    template <class MakeCriterion>
+    perception::Judgement judge(const Direction& from, double aside, const MakeCriterion& make_criterion) {
+        oracle::Look look = oracle::looks_at(tree_, {.window_px = 512, .count = 1}).front();
+        const vdtree::Sphere sphere = tree_.bounding_sphere();
+        look.view = vdtree::frame_sphere(tree_.origin() + glm::dvec3(sphere.centre), sphere.radius, from.towards_eye,
                                          from.fill, look.view);
-        const perception::Image before = oracle::draw(*renderer, whole, look.view);
-        for (const double aside : degrees_aside) {
-            if (aside > 0) look.options.gaze_px = session::gaze_aside(look.options.display, look.view, aside);
-            const auto criterion = make_criterion(look.view, look.options);
-            ASSERT_TRUE(criterion) << criterion.error().message;
-            vdtree::Cut cut(tree);
-            ASSERT_TRUE(cut.follow(*criterion, perception::viewpoint_of(tree, look.view, look.options)));
-            const perception::Judgement judged =
-                oracle::judge(before, oracle::draw(*renderer, cut, look.view), look, perception::CsfModel::castle);
-            EXPECT_EQ(judged.visible_pixels, 0u)
-                << "from " << oracle::words(look) << ", " << aside << " degrees aside, " << cut.triangle_count()
-                << " of " << tree.triangle_count() << " triangles, largest V " << judged.max_ratio;
-        }
+        if (aside > 0) look.options.gaze_px = session::gaze_aside(look.options.display, look.view, aside);
+        const auto criterion = make_criterion(look.view, look.options);
+        if (!criterion) throw std::runtime_error(criterion.error().message);
+        vdtree::Viewpoint viewpoint = perception::viewpoint_of(tree_, look.view, look.options);
+        if (lighting_) viewpoint.lighting = *lighting_;
+        vdtree::Cut whole(tree_), cut(tree_);
+        whole.unfold_all();
+        EXPECT_TRUE(cut.follow(*criterion, viewpoint));
+        triangles_ = cut.triangle_count();
+        return oracle::judge(oracle::draw(renderer_, whole, look.view, samples, lighting_),
+                             oracle::draw(renderer_, cut, look.view, samples, lighting_), look,
+                             perception::CsfModel::castle);
     }
-}
+
+    template <class MakeCriterion>
+    void expect_nothing(std::span<const Direction> directions, const MakeCriterion& make_criterion) {
+        for (const Direction& from : directions)
+            for (const double aside : degrees_aside) {
+                const perception::Judgement judged = judge(from, aside, make_criterion);
+                EXPECT_EQ(judged.visible_pixels, 0u)
+                    << "from " << from.towards_eye.x << " " << from.towards_eye.y << " " << from.towards_eye.z
+                    << ", fill " << from.fill << ", " << aside << " degrees aside: " << triangles_ << " of "
+                    << tree_.triangle_count() << " triangles, largest V " << judged.max_ratio;
+            }
+    }
+
+private:
+    static constexpr int samples = 64;
+
+    VertexTree tree_;
+    std::optional<vdtree::Lighting> lighting_;
+    render::Context context_;
+    render::Renderer renderer_;
+    vdtree::Index triangles_ = 0; // of the last cut
+};
 
 class OpenSheets : public testing::TestWithParam<std::size_t> {
 public:
@@ -84,11 +108,56 @@ INSTANTIATE_TEST_SUITE_P(All, OpenSheets, testing::Range(std::size_t{0}, OpenShe
 
 // On a sheet without depth nothing but its border shows, and creases: a notch there is all that an eye sees.
 TEST_P(OpenSheets, AreFoldedUnseen) {
-    const VertexTree tree = support::measured(built(all()[GetParam()]), 0);
+    Seen seen(support::measured(built(all()[GetParam()]), 0));
     const Direction directions[] = {{{0, 0, 1}, 0.9}, {{0.5, 0.2, 1}, 0.5}, {{0.5, 0.2, 1}, 0.2}};
-    expect_unseen(tree, directions, [&](const vdtree::View& view, const perception::FoldTestOptions& options) {
-        return perception::error_distances(tree, view, options);
+    seen.expect_nothing(directions, [&](const vdtree::View& view, const perception::FoldTestOptions& options) {
+        return perception::error_distances(seen.tree(), view, options);
     });
+}
+
+// Beside a bright deck a side's nodes, all dark, fold at any size. Then triangles stretch from the deck's edge over the
+// side, with a gradient of luminances that no ring of the mesh's own has: the safe test knows of it. And far from the
+// gaze, lower frequencies than that of half a wave show in a row of such triangles.
+TEST(ShipHulls, AreFoldedUnseenByTheSafeTest) {
+    for (const HardMesh& hull : ship_hulls(96'000)) {
+        SCOPED_TRACE(hull.name);
+        Seen seen(built(hull));
+        const perception::CutRings rings = *perception::bound_cut_rings(seen.tree());
+        const Direction directions[] = {{{0.1, 1, 0.2}, 0.2}, {{1, 0.5, 0.1}, 0.5}};
+        seen.expect_nothing(directions, [&](const vdtree::View& view, const perception::FoldTestOptions& options) {
+            return perception::luebke_hallen_safe_distances(seen.tree(), rings, view, options);
+        });
+    }
+}
+
+// The same by light that comes from above.
+TEST(ShipHulls, AreFoldedUnseenUnderLights) {
+    vdtree::Lighting from_above;
+    from_above.ambient = 0.1;
+    from_above.lights.push_back({.intensity = 0.8, .direction = glm::normalize(glm::dvec3(0.2, 1, 0.1))});
+    for (HardMesh& hull : ship_hulls(96'000)) {
+        SCOPED_TRACE(hull.name);
+        Seen seen(built(hull), from_above);
+        const perception::CutRings rings = *perception::bound_cut_rings(seen.tree());
+        const auto bounds =
+            std::make_shared<const vdtree::LightBounds>(*perception::bound_lit_cut_rings(seen.tree(), rings));
+        const Direction directions[] = {{{0.1, 1, 0.2}, 0.2}, {{1, 0.5, 0.1}, 0.2}};
+        seen.expect_nothing(directions, [&](const vdtree::View& view, perception::FoldTestOptions options) {
+            options.scene = perception::lit_scene(seen.tree(), *bounds, from_above,
+                                                  vdtree::eye_in_tree(seen.tree(), view, {}), oracle::background);
+            return perception::lit_safe_distances(seen.tree(), rings, bounds, view, options);
+        });
+    }
+}
+
+// Why that test is what requests fall back to.
+TEST(ShipHulls, ShowWhatLuebkeAndHallensTestFolds) {
+    Seen seen(built(ship_hulls(96'000).front()));
+    const auto judged =
+        seen.judge({{1, 0.5, 0.1}, 0.2}, 12, [&](const vdtree::View& view, const perception::FoldTestOptions& options) {
+            return perception::luebke_hallen_distances(seen.tree(), view, options);
+        });
+    EXPECT_GT(judged.visible_pixels, 0u);
 }
 
 } // namespace

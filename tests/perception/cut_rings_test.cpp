@@ -27,6 +27,14 @@ bool is_larger(const VertexTree& tree, NodeId a, NodeId b) {
     return ra != rb ? ra > rb : a < b;
 }
 
+// Of a triangle's corners that are proxies; no_node where none is.
+NodeId largest_of(const VertexTree& tree, std::span<const NodeId> corners) {
+    NodeId largest = no_node;
+    for (const NodeId corner : corners)
+        if (!tree.is_leaf(corner) && (largest == no_node || is_larger(tree, corner, largest))) largest = corner;
+    return largest;
+}
+
 // Triangles of cuts that have a proxy, and how many of them the mesh's own rings do not hold.
 struct Looked {
     int at = 0, outside_of_mesh_rings = 0;
@@ -37,10 +45,7 @@ Looked expect_within_rings(const Cut& cut, const CutRings& rings) {
     const auto indices = cut.indices();
     Looked looked;
     for (std::size_t i = 0; i < indices.size(); i += 3) {
-        NodeId largest = no_node;
-        for (std::size_t k = 0; k < 3; ++k)
-            if (!tree.is_leaf(indices[i + k]) && (largest == no_node || is_larger(tree, indices[i + k], largest)))
-                largest = indices[i + k];
+        const NodeId largest = largest_of(tree, indices.subspan(i, 3));
         if (largest == no_node || tree.support_spheres()[largest].radius == 0) continue;
         ++looked.at;
         bool is_outside = false;
@@ -121,6 +126,61 @@ TEST(CutRings, ContainTheMeshsRingsAndNest) {
     EXPECT_GT(wider, 100);
 }
 
+// ---- under lights
+
+Lighting random_lighting(std::mt19937_64& random, const VertexTree& tree) {
+    Lighting lighting;
+    lighting.ambient = 0.1, lighting.specular = 0.3, lighting.shininess = 20;
+    LightSource& far = lighting.lights.emplace_back();
+    far.intensity = 0.6;
+    far.direction = shapes::random_direction(random);
+    LightSource& near = lighting.lights.emplace_back();
+    near.kind = LightSource::Kind::point;
+    near.intensity = 0.4;
+    near.distance = static_cast<double>(tree.bounding_sphere().radius);
+    near.position = glm::dvec3(tree.bounding_sphere().centre) + 1.2 * near.distance * shapes::random_direction(random);
+    return lighting;
+}
+
+TEST(LitCutRings, HoldWhatLightsMakeOfEveryTriangleOfEveryCut) {
+    std::mt19937 random(12);
+    std::mt19937_64 of_lights(13);
+    int looked_at = 0, outside_of_mesh_rings = 0;
+    for (const Mesh& mesh :
+         {shapes::bumpy_sphere(4, 0.03), shapes::with_attributes(shapes::torus(40, 20)), shapes::two_parts(),
+          shapes::random_soup(200, 400, 3), shapes::unwelded(shapes::cube(6))}) {
+        const VertexTree tree = built(mesh);
+        const LightBounds rings = *bound_lit_cut_rings(tree, *bound_cut_rings(tree)),
+                          mesh_rings = *LightBounds::measure(tree);
+        for (int trial = 0; trial < 40; ++trial) {
+            const Lighting lighting = random_lighting(of_lights, tree);
+            const glm::dvec3 eye =
+                3.0 * static_cast<double>(tree.bounding_sphere().radius) * shapes::random_direction(of_lights);
+            const Cut cut = random_cut(tree, random);
+            for (std::size_t i = 0; i < cut.indices().size(); i += 3) {
+                const auto corners = cut.indices().subspan(i, 3);
+                const NodeId largest = largest_of(tree, corners);
+                if (largest == no_node || tree.support_spheres()[largest].radius == 0) continue;
+                const LuminanceRange range =
+                    lit_range(lighting, rings.cones()[largest], rings.sphere(tree, largest), eye);
+                const LuminanceRange of_mesh =
+                    lit_range(lighting, mesh_rings.cones()[largest], mesh_rings.sphere(tree, largest), eye);
+                for (const NodeId corner : corners) {
+                    const double y = lit_luminance(lighting, glm::dvec3(tree.positions()[corner]),
+                                                   glm::dvec3(glm::vec3(tree.normals()[corner])),
+                                                   static_cast<double>(albedo_of(tree, corner)), eye);
+                    ASSERT_GE(y, range.lo) << largest;
+                    ASSERT_LE(y, range.hi) << largest;
+                    outside_of_mesh_rings += !(y >= of_mesh.lo && y <= of_mesh.hi);
+                    ++looked_at;
+                }
+            }
+        }
+    }
+    EXPECT_GT(looked_at, 10000);
+    EXPECT_GT(outside_of_mesh_rings, 5);
+}
+
 // A chain as deep as there are vertices: it takes no longer than another tree, and its bounds hold.
 TEST(CutRings, OfADeepTreeAreQuicklyBounded) {
     const Mesh mesh = shapes::with_attributes(shapes::grid(120));
@@ -136,6 +196,7 @@ TEST(CutRings, OfADeepTreeAreQuicklyBounded) {
     const CutRings rings = *bound_cut_rings(*tree);
     std::mt19937 random(5);
     for (int trial = 0; trial < 5; ++trial) expect_within_rings(random_cut(*tree, random), rings);
+    EXPECT_TRUE(bound_lit_cut_rings(*tree, rings));
 }
 
 // Two squares side by side, the right edge brighter: folding the middle edge to one of its ends leaves the light as it

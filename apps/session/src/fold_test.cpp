@@ -34,7 +34,7 @@ struct Choice {
 // Of the tests by luminance one that knows the scene, and colours where they count.
 Choice suitable_test(const Sight& sight, bool chroma, bool may_measure) {
     const vdtree::VertexTree& tree = sight.object.tree;
-    if (sight.lighting) return {FoldTest::luebke_hallen, "the test error does not know lights that move"};
+    if (sight.lighting) return {FoldTest::luebke_hallen_safe, "the test error does not know lights that move"};
     if (!tree.texture().empty()) return {FoldTest::luebke_hallen_safe, "the test error does not know textures"};
     if (chroma) return {FoldTest::luebke_hallen_safe, "the test error does not know colours"};
     if (perception::has_fold_measurement(tree) || (may_measure && tree.interior_count() <= most_measured)) return {};
@@ -45,11 +45,11 @@ Choice suitable_test(const Sight& sight, bool chroma, bool may_measure) {
 // Whether a test knows what it would have to look at.
 Result<void> check_knowledge(const Sight& sight, FoldTest test, bool chroma) {
     if (!is_perceptual(test)) return {};
-    if (sight.lighting && test != FoldTest::luebke_hallen)
+    if (sight.lighting && test == FoldTest::error)
         return invalid_argument(
             "request.fold_test = " + name_of(test) +
             " knows only the light that the tree was built for: with scene.lights, use request.fold_test = "
-            "luebke-hallen.");
+            "luebke-hallen-safe.");
     if (sight.lighting && chroma)
         return invalid_argument(
             "request.chroma and scene.lights exclude each other: ranges of colour are those of the tree's own light.");
@@ -123,12 +123,16 @@ Result<vdtree::DistanceCriterion> make_criterion(const Sight& sight, const Decis
     if (decision.test == FoldTest::displacement) return vdtree::displacement_criterion(tree, view, key.pixels);
     perception::FoldTestOptions options = test_options(sight, decision.request);
     if (key.farthest_gaze_px) options.gaze_px = glm::dvec2(view.width * 0.5 + *key.farthest_gaze_px, view.height * 0.5);
-    if (sight.lighting) return perception::lit_distances(tree, sight.cache.light_bounds, view, options);
+    if (sight.lighting && decision.test == FoldTest::luebke_hallen)
+        return perception::lit_distances(tree, sight.cache.light_bounds, view, options);
     if (decision.test == FoldTest::luebke_hallen) return perception::luebke_hallen_distances(tree, view, options);
     if (decision.test == FoldTest::luebke_hallen_safe) {
         const auto rings = cut_rings(sight.object, sight.cache, decision.request.chroma);
         if (!rings) return rings.error();
-        return perception::luebke_hallen_safe_distances(tree, **rings, view, options);
+        if (!sight.lighting) return perception::luebke_hallen_safe_distances(tree, **rings, view, options);
+        auto bounds = lit_cut_rings(sight.object, sight.cache);
+        if (!bounds) return bounds.error();
+        return perception::lit_safe_distances(tree, **rings, std::move(*bounds), view, options);
     }
     return perception::error_distances(tree, view, options);
 }

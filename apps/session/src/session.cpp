@@ -52,6 +52,17 @@ std::span<const vdtree::Sphere> inner_spheres(const Object& object, ObjectCache&
     return *cache.inner_spheres;
 }
 
+Result<std::shared_ptr<const vdtree::LightBounds>> lit_cut_rings(const Object& object, ObjectCache& cache) {
+    if (!cache.lit_cut_rings) {
+        const auto rings = cut_rings(object, cache, false);
+        if (!rings) return rings.error();
+        auto bounded = perception::bound_lit_cut_rings(object.tree, **rings);
+        if (!bounded) return bounded.error();
+        cache.lit_cut_rings = std::make_shared<const vdtree::LightBounds>(std::move(*bounded));
+    }
+    return cache.lit_cut_rings;
+}
+
 Result<const perception::CutRings*> cut_rings(const Object& object, ObjectCache& cache, bool with_chroma) {
     if (!cache.cut_rings || (with_chroma && !cache.rings_have_chroma)) {
         auto bounded = perception::bound_cut_rings(object.tree, with_chroma);

@@ -20,7 +20,7 @@ struct ObjectCache {
     std::optional<std::vector<vdtree::Sphere>> inner_spheres = {};
     std::optional<perception::CutRings> cut_rings = {};
     bool rings_have_chroma = false; // few requests look at colours, and bounding them takes time
-    std::shared_ptr<const vdtree::LightBounds> light_bounds = {};
+    std::shared_ptr<const vdtree::LightBounds> light_bounds = {}, lit_cut_rings = {};
     std::shared_ptr<const KeptCriterion> criterion = {}; // the last that was asked for
 };
 
@@ -48,6 +48,8 @@ struct Decision {
 
 WorldSphere world_sphere(const Object& object);
 std::span<const vdtree::Sphere> inner_spheres(const Object& object, ObjectCache& cache);
+// What lights make of the rings of all cuts.
+Result<std::shared_ptr<const vdtree::LightBounds>> lit_cut_rings(const Object& object, ObjectCache& cache);
 Result<const perception::CutRings*> cut_rings(const Object& object, ObjectCache& cache, bool with_chroma);
 
 } // namespace unseen::session

@@ -83,6 +83,13 @@ Result<vdtree::DistanceCriterion> lit_distances(const vdtree::VertexTree& tree,
                                                 std::shared_ptr<const vdtree::LightBounds> bounds,
                                                 const vdtree::View& view, const FoldTestOptions& options);
 
+// luebke_hallen_safe_distances() under lights that may move: ranges are what the lights can make of all that the ring
+// can be in any cut. `rings`: of the tree; `bounds`: from bound_lit_cut_rings() of these. What it leaves open: shifts of
+// the mean, which depend on the light. Cost: some 60 ms with a gaze, less without, and 10 ns a node.
+Result<vdtree::DistanceCriterion> lit_safe_distances(const vdtree::VertexTree& tree, const CutRings& rings,
+                                                     std::shared_ptr<const vdtree::LightBounds> bounds,
+                                                     const vdtree::View& view, const FoldTestOptions& options);
+
 // Between which luminances everything under the lights is, and the background. Rounded outward to steps of 1/32, so
 // that it mostly stays while lights move. `eye`: in the tree's frame.
 SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBounds& bounds,

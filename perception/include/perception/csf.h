@@ -182,6 +182,13 @@ public:
     // above.
     Result<CsfTable> scaled(double gain) const;
 
+    // The same eye's conservative form for patches that hold half a wave of a frequency, one across. Such a patch has
+    // lower frequencies in it, too, of a contrast that goes with the share that it fills of their own patches: the
+    // square of the frequency. So sensitivity at a frequency is no less than that at any lower one times the square of
+    // their ratio: it falls by no more than two octaves an octave. Where sensitivity falls fast, far from the gaze,
+    // this is much more than at the patch's own frequency. sensitivity() stays the samples'. Cost: some milliseconds.
+    CsfTable of_half_waves() const;
+
     // Of what moves over the retina at this velocity: S times velocity_factor() of motion.h, as from_model() has it under
     // CsfConditions::velocity. Coarse gratings are seen better then, so a table that begins at a higher frequency goes on
     // down to 1/16 cpd as at its first one, and columns are sampled densely, for the factor bends. Fails where the

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <perception/chroma.h>
+#include <vdtree/lighting.h>
 #include <vdtree/result.h>
 #include <vdtree/vertex_tree.h>
 
@@ -54,5 +55,10 @@ struct CutRings {
 // tens with a texture; in parallel. Results do not depend on the threads. Fails where VertexTree::check() does.
 // `with_chroma`: bounds the colours, too, where there are any.
 Result<CutRings> bound_cut_rings(const vdtree::VertexTree& tree, bool with_chroma = true);
+
+// What lights can make of these rings: the normals and albedos of all vertices that a node's ring can have in any cut,
+// in spheres of the rings' radii. `rings`: of the tree. Cost: some microseconds a triangle, in parallel, and 130 bytes
+// a node meanwhile.
+Result<vdtree::LightBounds> bound_lit_cut_rings(const vdtree::VertexTree& tree, const CutRings& rings);
 
 } // namespace unseen::perception

@@ -466,6 +466,21 @@ Result<CsfTable> CsfTable::scaled(double gain) const {
     return State::make_table(std::move(samples), std::move(branches));
 }
 
+CsfTable CsfTable::of_half_waves() const {
+    constexpr double steepest = -2; // octaves of sensitivity an octave: the share of a patch's area
+    const auto table = std::make_shared<State>(*state_);
+    const std::vector<double>& positions = table->frequency.positions;
+    // A maximum over the same steps everywhere grows with what it is taken of, so the form stays monotone.
+    for (std::size_t i = 1; i < table->log2_monotone.size(); ++i) {
+        const std::size_t f = i % positions.size();
+        if (f == 0) continue;
+        const double fallen = table->log2_monotone[i - 1] + steepest * (positions[f] - positions[f - 1]);
+        table->log2_monotone[i] = std::max(table->log2_monotone[i], static_cast<float>(fallen));
+    }
+    if (table->last_slope < 0) table->last_slope = std::max(table->last_slope, steepest);
+    return CsfTable(table);
+}
+
 namespace {
 
 // With samples between those that lie farther apart than moving tables may have, and down to the lowest frequency.

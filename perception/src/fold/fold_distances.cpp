@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <unordered_map>
 #include <vector>
 
@@ -14,6 +15,8 @@
 
 #include "fold/fold_classes.h"
 #include "fold/fold_screen.h"
+#include "fold/largest_extents.h"
+#include "fold/safe_rings.h"
 
 namespace unseen::perception {
 
@@ -21,8 +24,6 @@ namespace {
 
 using vdtree::DistanceCriterion;
 using vdtree::NodeId;
-
-constexpr float length_rounding = 1e-6f; // covers that of a mean of two floats
 
 // Of eccentricity on the screen; beyond the last one sensitivity is taken as there.
 struct Bins {
@@ -35,18 +36,23 @@ constexpr Bins coarse_bins{degrees_per_bin, bin_count}, fine_bins{degrees_per_bi
 
 // The sensitivities that a test uses: to colour only where it looks at colour.
 struct Sensitivities {
-    const CsfTable& luminance;
-    const CsfTable* red_green = nullptr;
-    const CsfTable* yellow_violet = nullptr;
+    CsfTable luminance;
+    std::optional<CsfTable> red_green, yellow_violet;
 };
 
-Sensitivities sensitivities_for(const FoldTestOptions& options, bool has_chroma) {
-    Sensitivities all{csf_of(options)};
+// Whether patches are taken for gratings alone, as published, or for what else half a wave holds.
+enum class Patches { gratings, half_waves };
+
+Sensitivities sensitivities_for(const FoldTestOptions& options, bool has_chroma, Patches patches) {
+    const auto seen = [&](const CsfTable& table) {
+        return patches == Patches::half_waves ? table.of_half_waves() : table;
+    };
+    Sensitivities all{seen(csf_of(options)), {}, {}};
     if (!has_chroma) return all;
     static const CsfTable red_green = CsfTable::from_model(CsfModel::castle_red_green);
     static const CsfTable yellow_violet = CsfTable::from_model(CsfModel::castle_yellow_violet);
-    all.red_green = &red_green;
-    all.yellow_violet = &yellow_violet;
+    all.red_green = seen(red_green);
+    all.yellow_violet = seen(yellow_violet);
     return all;
 }
 
@@ -109,55 +115,6 @@ struct Row {
     }
 };
 
-// The largest extents, in degrees on the screen, of which a row shows nothing; infinite where it does at no extent.
-// Smaller is what comes first: bins in ascending eccentricity.
-class LargestExtents {
-public:
-    // Extents around the spheres are larger than these, from whose nearest points eccentricity is counted: they reach
-    // nearer to the gaze, by half of their width at most.
-    LargestExtents(const Row& row, const Sensitivities& see, const Screen& screen, bool is_around_spheres)
-        : row_(row), see_(see), is_around_spheres_(is_around_spheres),
-          step_(step_of(screen.pixel_deg / smallest_of_a_pixel)) {}
-
-    double at(double eccentricity_deg) {
-        // Of a fixed series of extents, so that more contrast never makes them larger.
-        if (step_ == last_step || is_unseen(last_step, eccentricity_deg)) {
-            step_ = last_step;
-            return std::numeric_limits<double>::infinity();
-        }
-        int above = step_ + 1;
-        for (int stride = 1; above < last_step && is_unseen(above, eccentricity_deg); stride *= 2) {
-            step_ = above;
-            above = std::min(above + stride, last_step);
-        }
-        while (above - step_ > 1) {
-            const int middle = step_ + (above - step_) / 2;
-            (is_unseen(middle, eccentricity_deg) ? step_ : above) = middle;
-        }
-        return extent(step_);
-    }
-
-private:
-    static constexpr double steps_per_octave = 128;
-    static constexpr int last_step = 9 * 128;           // 512 degrees: all that is seen
-    static constexpr double smallest_of_a_pixel = 1024; // far below what any fold costs 1 at
-
-    static double extent(int step) { return std::exp2(step / steps_per_octave); }
-    static int step_of(double extent_deg) {
-        return static_cast<int>(std::floor(steps_per_octave * std::log2(extent_deg)));
-    }
-    bool is_unseen(int step, double eccentricity_deg) const {
-        const double nearest =
-            is_around_spheres_ ? std::max(0.0, eccentricity_deg - extent(step) / 2) : eccentricity_deg;
-        return row_.visibility(see_, 1 / (2 * extent(step)), nearest) <= 1;
-    }
-
-    const Row& row_;
-    const Sensitivities& see_;
-    bool is_around_spheres_;
-    int step_; // not seen, or smaller than anything that matters
-};
-
 // Of grey rows whose extents are the spheres' own, all at once.
 void find_largest_extents(const Row& row, const CsfTable& csf, const Bins& bins, std::span<double> extents) {
     std::array<float, fine_bins.count> contrast, eccentricity, luminance, log2_frequency;
@@ -170,14 +127,6 @@ void find_largest_extents(const Row& row, const CsfTable& csf, const Bins& bins,
     // Infinite where not even the peak is seen.
     for (std::size_t bin = 0; bin < extents.size(); ++bin)
         extents[bin] = 1 / (2 * std::exp2(static_cast<double>(log2_frequency[bin])));
-}
-
-// The distance, in lengths, from which an extent is no larger than this on the screen.
-float switch_distance_of(double extent_deg, const Screen& screen, bool is_around_spheres) {
-    if (std::isinf(extent_deg)) return 0; // only from inside
-    const double half = extent_deg / screen.largest_magnification / degrees_per_radian / 2;
-    const double in_lengths = half < std::numbers::pi / 2 ? 1 / std::sin(half) : 1; // from the centre
-    return static_cast<float>((is_around_spheres ? in_lengths : in_lengths - 1) * (1 + distance_rounding));
 }
 
 void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes& classes, const Bins& eccentricities,
@@ -195,7 +144,9 @@ void fill_table(DistanceCriterion::Parts& parts, const Rows& rows, const Classes
         const auto [found, is_new] = known.try_emplace(without_shifts.number(), bins);
         std::vector<double>& extents = found->second;
         if (is_new && (is_around_spheres || row.has_chroma() || row.has_texture())) {
-            LargestExtents largest(row, see, screen, is_around_spheres);
+            LargestExtents largest(
+                [&](double frequency, double eccentricity) { return row.visibility(see, frequency, eccentricity); },
+                screen, is_around_spheres);
             for (std::size_t bin = 0; bin < bins; ++bin) extents[bin] = largest.at(eccentricities.at(bin));
         } else if (is_new) {
             find_largest_extents(row, see.luminance, eccentricities, extents);
@@ -313,7 +264,7 @@ bool classify(const vdtree::SoundTree& tree, const Rings& rings, const FoldTestO
 }
 
 Result<DistanceCriterion> make_criterion(const vdtree::SoundTree& tree, const Rings& rings, std::vector<float> lengths,
-                                         const vdtree::View& view, const FoldTestOptions& options) {
+                                         Patches patches, const vdtree::View& view, const FoldTestOptions& options) {
     if (const auto valid = check_arguments(view, options); !valid) return valid.error();
     const Screen screen(view, options);
     const bool has_chroma = !rings.chroma.empty();
@@ -333,7 +284,7 @@ Result<DistanceCriterion> make_criterion(const vdtree::SoundTree& tree, const Ri
     for (std::size_t coarseness = 1;; coarseness *= 2) {
         Rows rows(!has_chroma && rings.vertices.empty(), classes.contrasts(), coarseness);
         if (!classify(tree, rings, options, classes, rows, parts.classes)) continue;
-        fill_table(parts, rows, classes, bins, screen, sensitivities_for(options, has_chroma));
+        fill_table(parts, rows, classes, bins, screen, sensitivities_for(options, has_chroma, patches));
         return DistanceCriterion::create(tree, std::move(parts));
     }
 }
@@ -352,7 +303,7 @@ Result<DistanceCriterion> luebke_hallen_distances(const vdtree::VertexTree& tree
         chroma = std::move(*found);
     }
     rings.chroma = chroma;
-    return make_criterion(*sound, rings, {}, view, options);
+    return make_criterion(*sound, rings, {}, Patches::gratings, view, options);
 }
 
 Result<DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree& tree, const CutRings& cut_rings,
@@ -367,25 +318,15 @@ Result<DistanceCriterion> luebke_hallen_safe_distances(const vdtree::VertexTree&
         rings.chroma = cut_rings.chroma;
         rings.mean_chroma_shift = cut_rings.mean_chroma_shift;
     }
-    std::vector<float> lengths(tree.interior_count(), 0.0f);
-    for (NodeId node = tree.interior_count(); node-- > 0;) {
-        // The change is largest within the support and fades to nothing at the ring's border.
-        const float around =
-            0.5f * (tree.support_spheres()[node].radius + cut_rings.radius[node]) * (1 + length_rounding);
-        lengths[node] = std::max({lengths[node], tree.bounds()[node].ring.radius, around});
-        if (node > 0) lengths[sound->parents()[node]] = std::max(lengths[sound->parents()[node]], lengths[node]);
-    }
-    if (!cut_rings.meets_another.empty())
-        for (NodeId node = 0; node < tree.interior_count(); ++node) // an outline, whatever it faces
-            rings.facing.push_back(cut_rings.meets_another[node] ? vdtree::NormalSlabs::everything()
-                                                                 : tree.bounds()[node].slabs);
+    std::vector<float> lengths = safe_lengths(*sound, cut_rings);
+    rings.facing = safe_facing(tree, cut_rings);
     rings.vertices = cut_rings.vertices;
     rings.texture = cut_rings.texture;
     rings.texture_deviation = cut_rings.texture_deviation;
     const std::vector<float> own_lengths =
         rings.vertices.empty() ? std::vector<float>() : lengths; // which the criterion takes
     rings.lengths = own_lengths;
-    return make_criterion(*sound, rings, std::move(lengths), view, options);
+    return make_criterion(*sound, rings, std::move(lengths), Patches::half_waves, view, options);
 }
 
 vdtree::Viewpoint viewpoint_of(const vdtree::VertexTree& tree, const vdtree::View& view, const FoldTestOptions& options,

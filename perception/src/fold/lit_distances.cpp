@@ -5,12 +5,14 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <numbers>
+#include <span>
 
 #include <perception/criterion.h>
 #include <vdtree/internal/contrast_classes.h>
 
 #include "fold/fold_screen.h"
+#include "fold/largest_extents.h"
+#include "fold/safe_rings.h"
 
 namespace unseen::perception {
 
@@ -25,42 +27,52 @@ vdtree::AbsoluteScale scale_of(const Display& display) {
     return {.offset = black, .span = to_luminance(display, 1).value() - black};
 }
 
-// What a class comes to at an eccentricity.
-struct Visibility {
-    float switch_distance = 0; // the distance, in radii of the ring's sphere, at which the extent is no longer seen
-    float least_cost = 0;      // that of a pixel, below which nothing is drawn
-};
-
-Visibility visibility_of(float log2_frequency, const Screen& screen) {
-    if (std::isinf(log2_frequency) && log2_frequency < 0) return {}; // not even at the peak; only from inside
-    const double largest_extent_deg = 1 / (2 * std::exp2(static_cast<double>(log2_frequency)));
-    const double half = largest_extent_deg / screen.largest_magnification / degrees_per_radian / 2;
-    const double switch_distance = half < std::numbers::pi / 2 ? 1 / std::sin(half) - 1 : 0;
-    return {static_cast<float>(switch_distance * (1 + distance_rounding)),
-            static_cast<float>(screen.pixel_deg / largest_extent_deg)};
+// The largest extents of a class, by eccentricity.
+void find_extents(double contrast, double luminance_cdm2, const Screen& screen, const CsfTable& csf,
+                  bool is_around_spheres, std::span<double> extents) {
+    if (is_around_spheres) {
+        LargestExtents largest(
+            [&](double frequency, double eccentricity) {
+                return contrast * csf.monotone_sensitivity(CyclesPerDegree(frequency), Degrees(eccentricity),
+                                                           Luminance(luminance_cdm2));
+            },
+            screen, is_around_spheres);
+        for (std::size_t bin = 0; bin < extents.size(); ++bin)
+            extents[bin] = largest.at(static_cast<double>(bin) * degrees_per_bin);
+        return;
+    }
+    const std::size_t bins = extents.size();
+    std::array<float, bin_count> contrasts, eccentricity, luminance, log2_frequency;
+    for (std::size_t bin = 0; bin < bins; ++bin)
+        eccentricity[bin] = static_cast<float>(static_cast<double>(bin) * degrees_per_bin);
+    contrasts.fill(static_cast<float>(contrast));
+    luminance.fill(static_cast<float>(luminance_cdm2));
+    csf.highest_visible_log2_frequency(std::span(contrasts).first(bins), std::span(eccentricity).first(bins),
+                                       std::span(luminance).first(bins), std::span(log2_frequency).first(bins));
+    // Infinite where not even the peak is seen.
+    for (std::size_t bin = 0; bin < bins; ++bin)
+        extents[bin] = 1 / (2 * std::exp2(static_cast<double>(log2_frequency[bin])));
 }
 
 void fill_table(DistanceCriterion::Parts& parts, const ContrastClasses& classes, const Screen& screen,
                 const CsfTable& csf) {
     const std::size_t bins = parts.eccentricity_bins;
+    const bool is_around_spheres = !parts.lengths.empty();
     parts.switch_distance.assign(ContrastClasses::class_count * bins, DistanceCriterion::never_visible);
     parts.least_cost.assign(ContrastClasses::class_count * bins, 0);
-    std::array<float, bin_count> contrast, eccentricity, luminance, log2_frequency;
-    for (std::size_t bin = 0; bin < bins; ++bin)
-        eccentricity[bin] = static_cast<float>(static_cast<double>(bin) * degrees_per_bin);
+    std::array<double, bin_count> extents;
     for (std::size_t number = 1; number < ContrastClasses::class_count; ++number) {
-        contrast.fill(static_cast<float>(ContrastClasses::contrast(number)));
-        luminance.fill(static_cast<float>(classes.level(number)));
-        csf.highest_visible_log2_frequency(std::span(contrast).first(bins), std::span(eccentricity).first(bins),
-                                           std::span(luminance).first(bins), std::span(log2_frequency).first(bins));
+        find_extents(ContrastClasses::contrast(number), classes.level(number), screen, csf, is_around_spheres,
+                     std::span(extents).first(bins));
         float* const switch_distance = &parts.switch_distance[number * bins];
-        float* const least_cost = &parts.least_cost[number * bins];
+        float* const least_cost = &parts.least_cost[number * bins]; // that of a pixel, below which nothing is drawn
         for (std::size_t bin = 0; bin < bins; ++bin) {
-            const Visibility here = visibility_of(log2_frequency[bin], screen);
+            switch_distance[bin] = switch_distance_of(extents[bin], screen, is_around_spheres);
+            least_cost[bin] = static_cast<float>(screen.pixel_deg / extents[bin]);
             // The table's own rounding must not make anything grow with the eccentricity.
-            switch_distance[bin] =
-                bin == 0 ? here.switch_distance : std::min(here.switch_distance, switch_distance[bin - 1]);
-            least_cost[bin] = bin == 0 ? here.least_cost : std::min(here.least_cost, least_cost[bin - 1]);
+            if (bin == 0) continue;
+            switch_distance[bin] = std::min(switch_distance[bin], switch_distance[bin - 1]);
+            least_cost[bin] = std::min(least_cost[bin], least_cost[bin - 1]);
         }
     }
 }
@@ -82,33 +94,53 @@ void make_growing(DistanceCriterion::Parts& parts) {
         }
 }
 
-} // namespace
-
-Result<vdtree::DistanceCriterion> lit_distances(const vdtree::VertexTree& tree,
-                                                std::shared_ptr<const vdtree::LightBounds> bounds,
-                                                const vdtree::View& view, const FoldTestOptions& options) {
-    if (const auto sound = check_arguments(view, options); !sound) return sound.error();
+Result<DistanceCriterion> make_criterion(const vdtree::VertexTree& tree, DistanceCriterion::Parts parts,
+                                         std::shared_ptr<const vdtree::LightBounds> bounds, const CsfTable& csf,
+                                         const vdtree::View& view, const FoldTestOptions& options) {
     const Screen screen(view, options);
     const vdtree::AbsoluteScale scale = scale_of(options.display);
     const ContrastClasses classes(scale);
     const SceneLuminance scene = options.scene;
-    DistanceCriterion::Parts parts;
     parts.spheres = DistanceCriterion::Spheres::ring;
     parts.eccentricity_bins = options.gaze_px ? bin_count : 1;
     parts.bin_degrees = degrees_per_bin / screen.least_magnification;
     parts.lit =
         vdtree::LitClasses{std::move(bounds), scale,
                            classes.class_of({scene.darkest, scene.brightest}, static_cast<double>(scene.brightest))};
-    fill_table(parts, classes, screen, csf_of(options));
+    fill_table(parts, classes, screen, csf);
     make_growing(parts);
     return DistanceCriterion::create(tree, std::move(parts));
+}
+
+} // namespace
+
+Result<DistanceCriterion> lit_distances(const vdtree::VertexTree& tree,
+                                        std::shared_ptr<const vdtree::LightBounds> bounds, const vdtree::View& view,
+                                        const FoldTestOptions& options) {
+    if (const auto valid = check_arguments(view, options); !valid) return valid.error();
+    return make_criterion(tree, {}, std::move(bounds), csf_of(options), view, options);
+}
+
+Result<DistanceCriterion> lit_safe_distances(const vdtree::VertexTree& tree, const CutRings& rings,
+                                             std::shared_ptr<const vdtree::LightBounds> bounds,
+                                             const vdtree::View& view, const FoldTestOptions& options) {
+    if (const auto valid = check_arguments(view, options); !valid) return valid.error();
+    const auto sound = vdtree::SoundTree::of(tree);
+    if (!sound) return sound.error();
+    if (rings.radius.size() != tree.interior_count() || !bounds || bounds->radii().size() != tree.interior_count())
+        return Error{ErrorCode::invalid_argument,
+                     "The rings, or what lights make of them (bound_lit_cut_rings()), are not those of the tree."};
+    DistanceCriterion::Parts parts;
+    parts.lengths = safe_lengths(*sound, rings);
+    parts.facing = safe_facing(tree, rings);
+    return make_criterion(tree, std::move(parts), std::move(bounds), csf_of(options).of_half_waves(), view, options);
 }
 
 SceneLuminance lit_scene(const vdtree::VertexTree& tree, const vdtree::LightBounds& bounds,
                          const vdtree::Lighting& lighting, glm::dvec3 eye, float background) {
     const vdtree::NodeId root = vdtree::VertexTree::root();
     const vdtree::LuminanceRange range =
-        vdtree::lit_range(lighting, bounds.cones()[root], tree.bounds()[root].ring, eye);
+        vdtree::lit_range(lighting, bounds.cones()[root], bounds.sphere(tree, root), eye);
     constexpr float steps = 32;
     return {std::floor(steps * std::min(range.lo, background)) / steps,
             std::ceil(steps * std::max(range.hi, background)) / steps};

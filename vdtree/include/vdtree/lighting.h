@@ -18,6 +18,7 @@
 
 #include <glm/vec3.hpp>
 
+#include <vdtree/function_ref.h>
 #include <vdtree/result.h>
 #include <vdtree/vertex_tree.h>
 
@@ -86,10 +87,27 @@ public:
     // Fails where VertexTree::check() does. Cost: about 1 us a triangle, in parallel; does not depend on the threads.
     static Result<LightBounds> measure(const VertexTree& tree);
 
+    // Of further vertices as well: `vertices` calls its argument for each, as often as it likes and from as many
+    // threads, but from one at a time for one node. no_node as a vertex: anything may be there, and at
+    // all nodes above.
+    using FurtherVertex = FunctionRef<void(NodeId node, NodeId vertex)>;
+    // `radii`: by interior node, mesh units, of spheres around the rings' centres that hold the rings and all of these.
+    // Programmer's error: fewer radii than nodes.
+    static Result<LightBounds> measure(const VertexTree& tree, std::vector<float> radii,
+                                       const FunctionRef<void(const FurtherVertex&)>& vertices);
+
     std::span<const VertexCone> cones() const noexcept { return cones_; } // by interior node
+    std::span<const float> radii() const noexcept { return radii_; }      // likewise; empty: the rings' own
+
+    // Where the node's vertices are.
+    Sphere sphere(const VertexTree& tree, NodeId node) const {
+        const Sphere ring = tree.bounds()[node].ring;
+        return {ring.centre, radii_.empty() ? ring.radius : radii_[node]};
+    }
 
 private:
     std::vector<VertexCone> cones_;
+    std::vector<float> radii_;
 };
 
 // Contains lit_luminance() of every vertex in the sphere whose normal and albedo are in the cone. Larger for larger

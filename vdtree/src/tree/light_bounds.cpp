@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <utility>
 
 #include <glm/geometric.hpp>
 #include <tbb/blocked_range.h>
@@ -30,7 +32,7 @@ public:
           normals_(tree.node_count()), albedo_(tree.node_count()), start_(tree.leaf_count() + 1, 0),
           sums_(tree.leaf_count() + 1, glm::dvec3(0)) {}
 
-    std::vector<VertexCone> run() {
+    std::vector<VertexCone> run(const FunctionRef<void(const LightBounds::FurtherVertex&)>* further_vertices) {
         tbb::parallel_for(NodeId{0}, tree_.node_count(), [&](NodeId node) {
             normals_[node] = tree_.normals()[node];
             albedo_[node] = albedos_of(node);
@@ -38,6 +40,21 @@ public:
         find_neighbours();
         for (Index leaf = 0; leaf < tree_.leaf_count(); ++leaf)
             sums_[leaf + 1] = sums_[leaf] + glm::dvec3(normals_[interior_ + leaf]);
+        if (further_vertices) {
+            further_.resize(interior_);
+            tbb::parallel_for(NodeId{0}, interior_, [&](NodeId node) { further_[node] = nothing_of(node); });
+            const auto add = [&](NodeId node, NodeId vertex) {
+                if (vertex != no_node) see(vertex, further_[node]);
+                else further_[node].is_unknown = true;
+            };
+            (*further_vertices)(add);
+            for (NodeId node = interior_; node-- > 0;) {
+                Seen& seen = further_[node];
+                if (!seen.is_unknown) continue;
+                seen.everywhere = true, seen.lo = 0, seen.hi = 1;
+                if (node > 0) further_[tree_.parents()[node]].is_unknown = true;
+            }
+        }
         constexpr NodeId grain = 1024;
         tbb::parallel_for(tbb::blocked_range<NodeId>(0, interior_, grain), [&](const auto& range) {
             for (NodeId node = range.begin(); node < range.end(); ++node)
@@ -59,7 +76,7 @@ private:
     struct Seen {
         glm::vec3 axis{0};
         float squared_chord = 0, angle = 0;
-        bool everywhere = false;
+        bool everywhere = false, is_unknown = false;
         float lo = 1, hi = 0;
         glm::vec3 across[2];
         float least_across[2] = {2, 2}, largest_across[2] = {-2, -2};
@@ -87,7 +104,8 @@ private:
         }
     }
 
-    Seen begin(NodeId node) const {
+    Seen begin(NodeId node) const { return further_.empty() ? nothing_of(node) : further_[node]; }
+    Seen nothing_of(NodeId node) const {
         const glm::dvec3 sum = sums_[tree_.leaf_end()[node]] - sums_[tree_.first_leaf()[node]];
         const double length = glm::length(sum);
         Seen seen;
@@ -161,6 +179,7 @@ private:
     std::vector<LuminanceRange> albedo_;    // by node
     std::vector<Index> start_, neighbours_; // by leaf: those that it shares triangles with, some more than once
     std::vector<glm::dvec3> sums_;          // by leaf: of the normals of those before it
+    std::vector<Seen> further_;             // by interior node, where there are further vertices: what they have
 };
 
 } // namespace
@@ -169,7 +188,18 @@ Result<LightBounds> LightBounds::measure(const VertexTree& tree) {
     const auto sound = SoundTree::of(tree);
     if (!sound) return sound.error();
     LightBounds bounds;
-    bounds.cones_ = Measurer(*sound).run();
+    bounds.cones_ = Measurer(*sound).run(nullptr);
+    return bounds;
+}
+
+Result<LightBounds> LightBounds::measure(const VertexTree& tree, std::vector<float> radii,
+                                         const FunctionRef<void(const FurtherVertex&)>& vertices) {
+    const auto sound = SoundTree::of(tree);
+    if (!sound) return sound.error();
+    assert(radii.size() == tree.interior_count());
+    LightBounds bounds;
+    bounds.cones_ = Measurer(*sound).run(&vertices);
+    bounds.radii_ = std::move(radii);
     return bounds;
 }
 

@@ -19,8 +19,9 @@ UNSEEN_INLINE auto at(const Values& values, std::int32_t i) {
 
 LitTester::LitTester(const VertexTree& tree, const LitClasses& classes, std::span<const float> switch_distance,
                      std::size_t bins)
-    : tree_(tree), cones_(classes.bounds->cones().data()), switch_distance_(switch_distance),
-      bins_(static_cast<std::int32_t>(bins)), silhouette_row_(classes.silhouette),
+    : tree_(tree), cones_(classes.bounds->cones().data()),
+      radii_(classes.bounds->radii().empty() ? nullptr : classes.bounds->radii().data()),
+      switch_distance_(switch_distance), bins_(static_cast<std::int32_t>(bins)), silhouette_row_(classes.silhouette),
       black_(static_cast<float>(classes.scale.offset / classes.scale.span)) {
     const ContrastClasses levels(classes.scale);
     for (std::size_t i = 0; i < contrasts_.size(); ++i)

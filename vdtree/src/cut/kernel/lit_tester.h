@@ -56,7 +56,7 @@ public:
     std::int32_t silhouette_row() const { return silhouette_row_; }
 
     void set(std::size_t lane, NodeId node, const Sphere& ring, LitFindings& lit) const {
-        lit.ranges.set(lane, cones_[node], ring);
+        lit.ranges.set(lane, cones_[node], radii_ ? Sphere{ring.centre, radii_[node]} : ring);
     }
     void find_rows(LitFindings& lit) const;
 
@@ -94,6 +94,7 @@ private:
 
     const VertexTree& tree_;
     const VertexCone* cones_;
+    const float* radii_; // of the spheres around the vertices; null: the rings'
     std::span<const float> switch_distance_;
     std::int32_t bins_;
     std::int32_t silhouette_row_;
