@@ -41,9 +41,10 @@ struct Factor {
 const std::vector<Factor>& factors() {
     static const std::vector<Factor> all = {
         {"neighbourhood", [](FoldModel& m, double v) { m.neighbourhood = v; }, {2, 3, 4, 6, 9}},
-        {"needed_at_12_degrees", set_needed<1>, {0.6, 0.8, 0.9, 1}},
-        {"needed_at_29_degrees", set_needed<2>, {0.4, 0.5, 0.6, 0.72, 1}},
-        {"needed_at_50_degrees", set_needed<3>, {0.25, 0.35, 0.5, 0.68, 1}},
+        {"needed_at_12_degrees", set_needed<1>, {0.6, 0.8, 0.95, 1}},
+        {"needed_at_29_degrees", set_needed<2>, {0.3, 0.4, 0.6, 0.8, 0.95}},
+        {"needed_at_50_degrees", set_needed<3>, {0.2, 0.35, 0.5, 0.6}},
+        {"needed_by_areas", [](FoldModel& m, double v) { m.needed_by_areas = v; }, {0.1, 0.2, 0.3, 0.5, 1}},
         {"needed_by_borders", [](FoldModel& m, double v) { m.needed_by_borders = v; }, {0.1, 0.2, 0.3, 0.5, 1}},
         {"needed_by_outlines", [](FoldModel& m, double v) { m.needed_by_outlines = v; }, {0.1, 0.2, 0.3, 0.4, 1}},
         {"peak_of_shift", [](FoldModel& m, double v) { m.peak_of_shift = v; }, {0.3, 0.6, 0.9, 1.2, 1.8}},

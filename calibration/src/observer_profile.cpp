@@ -104,7 +104,7 @@ Result<void> read_summation(const JsonObject& object, Summation& summation) {
     if (!array) return array.error();
     std::vector<double> v;
     if (auto ok = object.append_numbers(**array, "summation", 3, v); !ok) return ok;
-    constexpr double least = 1e-2, most = 1e2; // far beyond how people differ
+    constexpr double least = 1e-2, most = 1e2; // as CsfSamples has it
     if (!(v[0] >= least && v[0] <= most))
         return object.key_error("summation", "must begin with a factor from 0.01 to 100, which 1 is by castle's law");
     if (!(v[1] > 0 && v[1] <= v[0] && v[0] <= v[2]))
@@ -122,14 +122,18 @@ Result<void> read_circumstances(const JsonObject& object, int version, ObserverP
     profile.measured_at_cdm2 = *luminance;
     if (auto ok = read_measurements(object, "measured", false, profile.measured); !ok) return ok;
     if (version < summation_version) return {};
-    if (auto ok = read_measurements(object, "measured_wide", true, profile.measured); !ok) return ok;
-    return read_summation(object, profile.summation);
+    return read_measurements(object, "measured_wide", true, profile.measured);
 }
 
 std::string to_array(std::span<const double> values) {
     std::string text = "[";
     for (const double value : values) text.append(text.size() > 1 ? ", " : "").append(to_text(value));
     return text.append("]");
+}
+
+std::string summation_key(const Summation& summation) {
+    const double values[] = {summation.own, summation.low, summation.high};
+    return ",\n\"summation\": " + to_array(values);
 }
 
 } // namespace
@@ -160,11 +164,15 @@ Result<ObserverProfile> read_observer(const std::filesystem::path& file) {
     }
     if (auto ok = read_sensitivity(*object, samples); !ok) return ok.error();
 
+    ObserverProfile profile;
+    if (*version >= summation_version)
+        if (auto ok = read_summation(*object, profile.summation); !ok) return ok.error();
+    samples.summation = profile.summation.own;
     auto table = perception::CsfTable::create(std::move(samples));
     if (!table) return object->error(table.error().message);
-    ObserverProfile profile;
     profile.table = std::move(*table);
-    if (*version >= measured_version)
+    const bool is_table_alone = *version >= summation_version && !object->has("measured"); // of write_csf()
+    if (*version >= measured_version && !is_table_alone)
         if (auto ok = read_circumstances(*object, *version, profile); !ok) return ok.error();
     return profile;
 }
@@ -203,7 +211,9 @@ Result<void> write(const std::filesystem::path& file, const perception::CsfTable
 } // namespace
 
 Result<void> write_csf(const std::filesystem::path& file, const perception::CsfTable& table) {
-    return write(file, table, table_version, {});
+    const double own = table.samples().summation;
+    if (own == 1) return write(file, table, table_version, {});
+    return write(file, table, summation_version, summation_key({own, own, own}));
 }
 
 Result<void> write_observer(const std::filesystem::path& file, const ObserverProfile& profile) {
@@ -223,8 +233,7 @@ Result<void> write_observer(const std::filesystem::path& file, const ObserverPro
     };
     text += ",\n\"measured_at_cdm2\": " + to_text(profile.measured_at_cdm2) + rows("measured", false);
     if (!profile.has_summation()) return write(file, profile.table, measured_version, text);
-    const double summation[] = {profile.summation.own, profile.summation.low, profile.summation.high};
-    text += rows("measured_wide", true) + ",\n\"summation\": " + to_array(summation);
+    text += rows("measured_wide", true) + summation_key(profile.summation);
     return write(file, profile.table, summation_version, text);
 }
 

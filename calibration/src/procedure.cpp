@@ -482,6 +482,7 @@ Result<CsfTable> Procedure::table(std::string source) const {
                     log10_expected(expected_, place, Luminance(luminance)) + deviations[e * frequencies + f];
                 samples.sensitivity.push_back(std::pow(10, std::max(value, least_log10)));
             }
+    if (const auto summed = summation()) samples.summation = summed->own;
     return CsfTable::create(std::move(samples));
 }
 

@@ -141,7 +141,7 @@ TEST_F(ObserverProfileTest, ErrorsNameTheFileAndThePlace) {
         {"\"version\": 1", "\"version\": 1, \"version\": 1", "\"version\" twice"},
         {"\"version\": 1", "\"version\": 2, \"measured_at_cdm2\": 50, \"measured\": [], \"summation\": [1, 1, 1]",
          "\"summation\" is unknown before version 3"},
-        {"\"version\": 1", "\"version\": 3, \"measured_at_cdm2\": 50, \"measured\": []",
+        {"\"version\": 1", "\"version\": 3, \"measured_at_cdm2\": 50, \"measured\": [], \"summation\": [1, 1, 1]",
          "\"measured_wide\" is missing"},
         {"\"version\": 1", "\"version\": 3, \"measured_at_cdm2\": 50, \"measured\": [], \"measured_wide\": []",
          "\"summation\" is missing"},
@@ -235,6 +235,13 @@ TEST_F(ObserverProfileTest, SummationGoesThereAndBack) {
     ASSERT_TRUE(back) << back.error().message;
     EXPECT_EQ(back->summation, profile.summation);
     EXPECT_TRUE(back->has_summation());
+    const auto table = read_csf(file);
+    ASSERT_TRUE(table);
+    EXPECT_EQ(table->samples().summation, 1.25);
+    ASSERT_TRUE(write_csf(folder() / "table.json", *table));
+    const auto again = read_csf(folder() / "table.json");
+    ASSERT_TRUE(again) << again.error().message;
+    EXPECT_EQ(again->samples().summation, 1.25);
     ASSERT_EQ(back->measured.size(), 2u);
     EXPECT_EQ(back->measured[0].place, profile.measured[0].place);
     EXPECT_EQ(back->measured[1].place, profile.measured[1].place);

@@ -503,6 +503,8 @@ TEST(CsfTable, RefusesBadSamplesAndNamesThem) {
         {"sensitivity[0][1][1]", [](CsfSamples& s) { s.sensitivity[4] = -1; }},
         {"sensitivity[1][0][2]", [](CsfSamples& s) { s.sensitivity[8] = not_a_number; }},
         {"sensitivity[1][1][2]", [](CsfSamples& s) { s.sensitivity[11] = infinity; }},
+        {"summation must be from 0.01 to 100, but is 0.001", [](CsfSamples& s) { s.summation = 0.001; }},
+        {"summation", [](CsfSamples& s) { s.summation = not_a_number; }},
     };
     for (const Case& bad : cases) {
         CsfSamples samples = small_samples();

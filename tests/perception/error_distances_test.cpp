@@ -5,11 +5,15 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <numbers>
 #include <random>
 #include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include <perception/person.h>
+#include <vdtree/cut.h>
 
 #include "built.h"
 #include "fold/error_distances.h"
@@ -122,6 +126,56 @@ TEST(ErrorDistances, OfMorePatternsThanRowsAreNoLess) {
     EXPECT_GT(exact_rows, most_rows) << "there are rows for all";
 }
 
+TEST(ErrorDistances, GrowWithWhatTheViewerSumsOverSpace) {
+    const VertexTree tree = support::measured(support::built(shapes::bumpy_sphere(5, 0.03)));
+    vdtree::View view;
+    view.eye = {0, 0, 60};
+    const auto triangles = [&](double summation) {
+        CsfSamples samples = csf_of(default_person)->samples();
+        samples.summation = summation;
+        FoldTestOptions options;
+        options.csf = std::make_shared<const CsfTable>(*CsfTable::create(std::move(samples)));
+        view.fov_y_degrees = physical_field(options.display, view.height).value();
+        const auto criterion = error_distances(tree, view, options);
+        EXPECT_TRUE(criterion);
+        vdtree::Cut cut(tree);
+        EXPECT_TRUE(cut.follow(*criterion, viewpoint_of(tree, view, options)));
+        return cut.triangle_count();
+    };
+    EXPECT_GT(triangles(2), triangles(1));
+    EXPECT_LT(triangles(0.5), triangles(1));
+}
+
+// A wide shift of light is seen best aside, where sensitivity is highest at the lowest frequencies: the wider the area,
+// the better, far beyond the width of what is looked at.
+TEST(ErrorDistances, CountAreasOfManyDegreesAside) {
+    const VertexTree tree = support::built(shapes::grid(64), {.prelit = true});
+    const vdtree::SoundTree sound = support::sound(tree);
+    FoldTestOptions options;
+    vdtree::View view;
+    view.eye = {0.5, 0.5, 3};
+    view.fov_y_degrees = physical_field(options.display, view.height).value();
+    options.gaze_px = glm::dvec2(5000, 100);
+    const auto switch_degrees = [&](float bias) {
+        std::vector<FoldError> errors(tree.interior_count());
+        for (FoldError& e : errors) e.bias = bias;
+        const auto criterion = criterion_of(sound, {errors, {}}, view, options);
+        EXPECT_TRUE(criterion);
+        const vdtree::DistanceCriterion::Parts& parts = criterion->parts();
+        const auto bin = static_cast<std::size_t>(50 / parts.bin_degrees);
+        const NodeId small = tree.interior_count() - 1;
+        const double distance =
+            static_cast<double>(parts.lengths[small] *
+                                parts.switch_distance[parts.classes[small].interior * parts.eccentricity_bins + bin]);
+        const double radius = static_cast<double>(tree.support_spheres()[VertexTree::root()].radius);
+        return distance > radius ? 2 * std::asin(radius / distance) * 180 / std::numbers::pi : 180;
+    };
+    // The largest areas that go unseen, of less and less contrast.
+    const double wide = switch_degrees(0.6f), wider = switch_degrees(0.3f);
+    EXPECT_GT(wide, 2);
+    EXPECT_GT(wider, 1.3 * wide);
+}
+
 TEST(ErrorDistances, RefuseFactorsThatAreNone) {
     const VertexTree tree = support::measured(support::built(shapes::icosphere(2)));
     FoldTestOptions options;
@@ -130,9 +184,10 @@ TEST(ErrorDistances, RefuseFactorsThatAreNone) {
     EXPECT_TRUE(error_distances(tree, view, options));
     for (const double none : {-1.0, std::nan(""), std::numeric_limits<double>::infinity()})
         for (double FoldModel::*factor :
-             {&FoldModel::peak_of_shift, &FoldModel::moved_by_neighbours, &FoldModel::contact_reach,
-              &FoldModel::least_sine, &FoldModel::sampled_shift_px, &FoldModel::amplitude_of_point_mean,
-              &FoldModel::amplitude_of_shift_mean, &FoldModel::longest_ring, &FoldModel::between_directions}) {
+             {&FoldModel::needed_by_areas, &FoldModel::peak_of_shift, &FoldModel::moved_by_neighbours,
+              &FoldModel::contact_reach, &FoldModel::least_sine, &FoldModel::sampled_shift_px,
+              &FoldModel::amplitude_of_point_mean, &FoldModel::amplitude_of_shift_mean, &FoldModel::longest_ring,
+              &FoldModel::between_directions}) {
             options.model = {};
             options.model.*factor = none;
             EXPECT_FALSE(error_distances(tree, view, options));

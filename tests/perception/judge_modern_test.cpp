@@ -338,6 +338,24 @@ TEST(JudgeModern, TakesAViewersOwnTableInPlaceOfTheModel) {
     EXPECT_LT(judge_modern(reference, test, options)->max_ratio, 0.6 * by_model); // less masking makes up for some
 }
 
+// Of small patches a viewer's table knows how well they are seen; of large ones so many times as well as by castle's law.
+TEST(JudgeModern, SumsOverSpaceAsTheViewerDoes) {
+    const Gabor small{4, 0.005, 20, 0, 0, 1.5}, large{4, 0.002, 20, 0, 0, 12};
+    const auto seen = [](const Gabor& g, double summation) {
+        CsfSamples samples = CsfTable::from_model(CsfModel::castle).samples();
+        samples.summation = summation;
+        const int side = side_for(g);
+        JudgeOptions options = median();
+        options.csf_table = std::make_shared<const CsfTable>(*CsfTable::create(std::move(samples)));
+        return judge_modern(flat(side, side, g.luminance), draw(g, side), options)->max_ratio;
+    };
+    EXPECT_NEAR(seen(small, 1.5) / seen(small, 1), 1, 0.1);
+    const double expected =
+        summation_gain(CyclesPerDegree(4), large.area(), 1.5) / summation_gain(CyclesPerDegree(4), large.area());
+    EXPECT_GT(expected, 1.3);
+    EXPECT_NEAR(seen(large, 1.5) / seen(large, 1) / expected, 1, 0.12);
+}
+
 // The images are the flat picture that is drawn for a headset: its lens is none of their business.
 TEST(JudgeModern, TakesTheAnglesOfThePictureWhateverTheLens) {
     constexpr int side = 256;

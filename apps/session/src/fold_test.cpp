@@ -38,7 +38,7 @@ Choice suitable_test(const Sight& sight, bool chroma, bool may_measure) {
     if (!tree.texture().empty()) return {FoldTest::luebke_hallen_safe, "the test error does not know textures"};
     if (chroma) return {FoldTest::luebke_hallen_safe, "the test error does not know colours"};
     if (perception::has_fold_measurement(tree) || (may_measure && tree.interior_count() <= most_measured)) return {};
-    return {FoldTest::luebke_hallen,
+    return {FoldTest::luebke_hallen_safe,
             "the tree does not hold the errors of its folds, and measuring them takes long: session::measured()"};
 }
 

@@ -35,9 +35,8 @@ struct ObserverProfile {
     std::string observer, date, method, display, conditions;
     double measured_at_cdm2 = 0;
     std::vector<Measurement> measured; // the wide ones last
-    // How the viewer sums over area. `own` is 1 where that was not measured: castle's law. A fold test or judge that asks
-    // for patches wider than the table's takes perception::summation_gain(frequency, area, summation.own) times the
-    // table's sensitivity.
+    // How the viewer sums over area. `own` is 1 where that was not measured: castle's law. The table has it, too
+    // (CsfSamples::summation), so that fold tests and judges go by it.
     Summation summation;
     bool has_summation() const { return !(summation == Summation()); } // was measured
 };

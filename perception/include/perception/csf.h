@@ -132,6 +132,7 @@ struct CsfSamples {
     std::vector<double> eccentricity_deg; // ascending from 0 to at most 180
     std::vector<double> luminance_cdm2;   // ascending, > 0 and at most 1e10
     std::vector<double> sensitivity;      // > 0 and at most 1e6; [(e * luminances + l) * frequencies + f]
+    double summation = 1;                 // of larger patches: `own` of summation_gain(), 0.01 to 100
 };
 
 // Where a table has samples. Beyond them it goes on by these rules; the third is of the conservative form alone:

@@ -63,9 +63,12 @@ struct FoldModel {
     // How much of the observer's sensitivity the test needs, by eccentricity; linear between, beyond as at the last.
     // Less than all is enough aside: the table takes frequencies below the peak to be seen as well as the peak, which
     // lies at the lowest frequencies there; a node counts as where it is nearest to the gaze; and fewer folds have their
-    // chance of being the worst, for nodes are larger. Fitted. Areas that shift together need all of it everywhere.
+    // chance of being the worst, for nodes are larger. Fitted.
     static constexpr std::array<double, 4> needed_at_degrees = {0, 12, 29, 50};
-    std::array<double, 4> needed = {1, 1, 0.72, 0.68}; // must not rise
+    std::array<double, 4> needed = {1, 0.95, 0.6, 0.5}; // must not rise
+    // By areas whose light shifts together: the shift is the largest from any direction, and counts as if all of the
+    // area shifted as its nodes do in the mean. Fitted.
+    double needed_by_areas = 0.5;
     // By outlines, wherever they are. They count as long straight strips, all of which move by the largest shift and
     // towards the darkest or brightest that may be behind. Along a true outline shifts change their signs from node to
     // node. Where it moves by an eighth of the mesh's radius and more, as where a part vanishes, all is needed. Fitted.

@@ -394,6 +394,9 @@ Result<CsfTable> CsfTable::State::make_table(CsfSamples samples, Branches branch
     if (auto ok = check_axis("eccentricity_deg", s.eccentricity_deg, s.eccentricity_deg, most_degrees); !ok)
         return ok.error();
     if (auto ok = check_axis("luminance_cdm2", s.luminance_cdm2, log2_luminance, most_cdm2); !ok) return ok.error();
+    constexpr double least_summation = 0.01, most_summation = 100; // far beyond how people differ
+    if (!(s.summation >= least_summation && s.summation <= most_summation))
+        return bad("summation must be from 0.01 to 100, but is " + number_text(s.summation));
     if (s.eccentricity_deg.front() != 0) {
         return bad("eccentricity_deg[0] must be 0 (the fovea), but is " + number_text(s.eccentricity_deg.front()));
     }

@@ -121,8 +121,7 @@ Pattern rounded(Pattern p, int coarseness) {
 
 // Of patterns, from far below any width that can be seen up to the lowest frequency's.
 constexpr double widest_deg = 1 / lowest_table_cpd, width_step = 0.91700404320467122; // an eighth of an octave
-constexpr std::size_t width_count = 160;
-SquareDegrees disc(double width_deg) { return SquareDegrees(std::numbers::pi * width_deg * width_deg / 4); }
+constexpr std::size_t width_count = 184;
 double width_deg(std::size_t i) { return widest_deg * std::pow(width_step, static_cast<double>(i)); }
 
 // What bands of frequency see of patterns of all widths, as shares of their contrast: of this, eyes that see patterns
@@ -133,7 +132,8 @@ struct Bands {
     std::vector<double> lowest_cpd; // by band
     Shares of_patches, of_areas, of_strips;
 
-    Bands(double highest_cpd, const FoldModel& model) {
+    // `summation`: of CsfSamples.
+    Bands(double highest_cpd, const FoldModel& model, double summation) {
         for (double low = lowest_table_cpd; low < highest_cpd; low *= frequency_step) lowest_cpd.push_back(low);
         for (std::size_t i = 0; i < width_count; ++i) {
             const double width = width_deg(i);
@@ -142,8 +142,8 @@ struct Bands {
                 const double high = std::min(low * frequency_step, highest_cpd), waves = width * high;
                 const CyclesPerDegree cpd(high);
                 of_patches.push_back(share_of_patches(waves, model.most_side_by_side) *
-                                     summation_gain(cpd, neighbourhood));
-                of_areas.push_back(share_of_area(waves) * summation_gain(cpd, area));
+                                     summation_gain(cpd, neighbourhood, summation));
+                of_areas.push_back(share_of_area(waves) * summation_gain(cpd, area, summation));
                 of_strips.push_back(std::min(1.0, waves)); // half as wide
             }
         }
@@ -164,7 +164,7 @@ public:
         const double needed = needed_sensitivity(model, Degrees(eccentricity_deg));
         for (std::size_t i = 0; i < width_count; ++i) {
             patches_[i] = 1 / (needed * visibility(sensitivities, bands.of_patches, i));
-            areas_[i] = 1 / visibility(sensitivities, bands.of_areas, i);
+            areas_[i] = 1 / (model.needed_by_areas * visibility(sensitivities, bands.of_areas, i));
             strips_[i] = 1 / visibility(sensitivities, bands.of_strips, i);
         }
     }
@@ -230,8 +230,9 @@ public:
     // `added`: rows that add() will ask for.
     SwitchDistances(const Levels& levels, const Screen& screen, const CsfTable& csf, const FoldModel& model,
                     std::size_t bins, std::size_t added)
-        : levels_(levels), screen_(screen), csf_(csf), model_(model), bands_(screen.highest_cpd, model), bins_(bins),
-          most_patterns_(last_row - added), discs_(luminance_count), eyes_(luminance_count) {
+        : levels_(levels), screen_(screen), csf_(csf), model_(model),
+          bands_(screen.highest_cpd, model, csf.samples().summation), bins_(bins), most_patterns_(last_row - added),
+          discs_(luminance_count), eyes_(luminance_count) {
         begin();
     }
 
@@ -446,7 +447,7 @@ bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors
     const vdtree::LuminanceRange all = tree.ring_luminance()[vdtree::VertexTree::root()];
     const int whole = levels.luminance_level(levels.in_cdm2(static_cast<double>(all.lo + all.hi) / 2));
     const double whole_peak = csf.peak_sensitivity(Degrees(0), Luminance(levels.luminance(whole))) *
-                              summation_gain(CyclesPerDegree(highest_cpd), disc(180));
+                              summation_gain(CyclesPerDegree(highest_cpd), disc(180), csf.samples().summation);
     patches.assign(tree.interior_count(), {});
     strips.assign(tree.interior_count(), {});
     for (NodeId node = tree.interior_count(); node-- > 0;) { // children before parents
@@ -579,9 +580,9 @@ double needed_sensitivity(const FoldModel& model, Degrees eccentricity) {
 
 Result<void> validate(const FoldModel& m) {
     for (const double factor :
-         {m.neighbourhood, m.needed_by_outlines, m.needed_by_borders, m.peak_of_shift, m.moved_by_neighbours,
-          m.contact_reach, m.least_sine, m.sampled_shift_px, m.amplitude_of_point_mean, m.amplitude_of_shift_mean,
-          m.longest_ring, m.between_directions})
+         {m.neighbourhood, m.needed_by_areas, m.needed_by_outlines, m.needed_by_borders, m.peak_of_shift,
+          m.moved_by_neighbours, m.contact_reach, m.least_sine, m.sampled_shift_px, m.amplitude_of_point_mean,
+          m.amplitude_of_shift_mean, m.longest_ring, m.between_directions})
         if (!(factor >= 0 && std::isfinite(factor)))
             return Error{ErrorCode::invalid_argument, "fold test: the model's factors must be finite, and 0 or more"};
     for (std::size_t i = 0; i < m.needed.size(); ++i)
@@ -589,9 +590,9 @@ Result<void> validate(const FoldModel& m) {
             return Error{ErrorCode::invalid_argument, "fold test: the sensitivity needed, model.needed[" +
                                                           std::to_string(i) +
                                                           "], must be above 0 and not rise with the eccentricity"};
-    if (m.neighbourhood == 0 || m.needed_by_outlines == 0 || m.needed_by_borders == 0)
-        return Error{ErrorCode::invalid_argument,
-                     "fold test: the model's neighbourhood, needed_by_outlines and needed_by_borders must be above 0"};
+    if (m.neighbourhood == 0 || m.needed_by_areas == 0 || m.needed_by_outlines == 0 || m.needed_by_borders == 0)
+        return Error{ErrorCode::invalid_argument, "fold test: the model's neighbourhood, needed_by_areas, "
+                                                  "needed_by_outlines and needed_by_borders must be above 0"};
     if (m.most_side_by_side < 1 || m.most_side_by_side > FoldModel::largest_side_by_side)
         return Error{ErrorCode::invalid_argument, "fold test: the model's most_side_by_side must be from 1 to 64"};
     return {};

@@ -14,11 +14,14 @@ namespace unseen::perception {
 inline constexpr double degrees_per_bin = 0.5; // of eccentricity on the screen
 inline constexpr std::size_t bin_count = 128;  // up to 64 degrees; beyond, sensitivity is taken as there
 
-// The lowest frequency that a sensitivity table must know.
-inline constexpr double lowest_table_cpd = 0.5;
+// The lowest frequency that counts: far aside coarse patterns are seen best. Below it, meshes fill the field.
+inline constexpr double lowest_table_cpd = 1.0 / 16;
 
 // Covers the rounding of a switch distance to float.
 inline constexpr double distance_rounding = 1e-6;
+
+// What a pattern of this width covers.
+inline SquareDegrees disc(double width_deg) { return SquareDegrees(std::numbers::pi * width_deg * width_deg / 4); }
 
 // The sensitivity that the test goes by.
 inline const CsfTable& csf_of(const FoldTestOptions& options) {

@@ -9,7 +9,6 @@
 #include <limits>
 #include <numbers>
 
-#include "fold/pooling.h"
 #include "judge/masking.h"
 
 namespace unseen::perception {
@@ -41,8 +40,10 @@ public:
                     behind.value() + share_of_mesh(cycles) * std::max(mesh.value() - behind.value(), 0.0);
                 const double cpd = cycles / angle(i);
                 const double at = std::max(std::min(cpd, highest_cpd), lowest_table_cpd);
+                // A pattern may cover all of the mesh.
                 const double sensitivity =
                     share_on_display(cpd / highest_cpd) *
+                    summation_gain(CyclesPerDegree(at), disc(angle(i)), csf.samples().summation) *
                     csf.monotone_sensitivity(CyclesPerDegree(at), Degrees(eccentricity_deg), Luminance(luminance));
                 for (std::size_t row = 0; row < FoldStage::masks.size(); ++row) {
                     const double mask = b < finer_bands ? 0 : static_cast<double>(FoldStage::masks[row]);
@@ -75,6 +76,8 @@ private:
     // diameters of the sphere.
     static double share_of_mesh(double cycles) { return 1 - std::exp(-cycles * cycles); }
 
+    // Bands add up as their energies do, the most of what is known of eyes: patterns of few nodes are in few bands, but
+    // pictures of a whole mesh are in many, and models of the eye differ by how these add up.
     static double visibility(const float (&contrast)[FoldStage::band_count][FoldStage::masks.size()],
                              const Bands& bands) {
         double sum = 0;
@@ -83,9 +86,9 @@ private:
             double most = 0;
             for (std::size_t row = 0; row < FoldStage::masks.size(); ++row)
                 most = std::max(most, static_cast<double>(rows[row]) * bands[b][row]);
-            sum += to_power_of_pooling(most);
+            sum += most * most;
         }
-        return std::pow(sum, 1 / pooling);
+        return std::sqrt(sum);
     }
 
     std::array<Bands, angle_count> bands_;

@@ -171,7 +171,10 @@ int base_level(int width, int height, double ppd) {
 
 double summation_area(const BandConditions& c, double freq_cpd) {
     const CyclesPerDegree frequency(freq_cpd);
-    if (c.table) return castle_summation_area(frequency).value();
+    if (c.table) { // unlimited gratings are seen so many times as well as by castle's law
+        const double patch = patch_area(frequency).value(), own = c.table->samples().summation;
+        return std::max(0.0, own * own * (castle_summation_area(frequency).value() + patch) - patch);
+    }
     switch (c.model) {
     case CsfModel::barten_1999: return barten_summation_area({}, frequency).value();
     case CsfModel::barten_fitted: return barten_summation_area(fitted_barten, frequency).value();

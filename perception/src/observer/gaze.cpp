@@ -223,7 +223,7 @@ CsfTable widened(const CsfTable& table, Degrees margin) {
     const CsfSamples& samples = table.samples();
     const auto plane = static_cast<std::ptrdiff_t>(samples.luminance_cdm2.size() * samples.frequency_cpd.size());
     const double shift = std::max(margin.value(), CsfTable::smallest_spacing); // NaN stays
-    CsfSamples wide{samples.source, samples.frequency_cpd, {0.0}, samples.luminance_cdm2, {}};
+    CsfSamples wide{samples.source, samples.frequency_cpd, {0.0}, samples.luminance_cdm2, {}, samples.summation};
     wide.sensitivity.assign(samples.sensitivity.begin(), samples.sensitivity.begin() + plane);
     for (auto column = samples.sensitivity.begin(); const double e : samples.eccentricity_deg) {
         const double degrees = e + shift;
