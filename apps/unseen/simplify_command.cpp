@@ -11,6 +11,7 @@
 #include "session_options.h"
 #include "terminal.h"
 #include "verbs.h"
+#include "visibility.h"
 
 namespace unseen::app {
 namespace {
@@ -34,7 +35,10 @@ Result<int> run(const SimplifyArguments& a) {
     if (!session) return session.error();
     session->set_gaze(fixed_gaze(a.what));
     session->set_velocity(a.what.velocity());
-    auto result = session->simplify(make_view(*session, a.view), a.what.request_for(session->tree().triangle_count()));
+    const vdtree::View view = make_view(*session, a.view);
+    const session::Request request = a.what.request_for(session->tree().triangle_count());
+    auto result = a.what.visibility == Visibility::picture ? simplify_as_seen(*session, view, request)
+                                                           : session->simplify(view, request);
     if (!result) return result.error();
     const auto start = std::chrono::steady_clock::now();
     result->cuts[0].indices();
@@ -78,6 +82,7 @@ Command simplify_command(CLI::App& app) {
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->what);
+    add_visibility_option(*verb, a->what);
     verb->footer(
         "OUT.glb, .gltf (with its data in OUT.bin) and .obj have what the model's glTF or OBJ file had: nodes, names,\n"
         "materials, texture coordinates. Images in the file stay in it; images and .mtl files beside it are copied\n"
@@ -87,6 +92,7 @@ Command simplify_command(CLI::App& app) {
         "Examples:\n  unseen simplify bunny.vdt -o seen-from-the-right.ply --direction 1 0 0\n"
         "  unseen simplify bunny.vdt -o small.obj --triangles 5000 --json report.json\n"
         "  unseen simplify bunny.vdt -o half.ply --triangles 50%\n"
+        "  unseen simplify bunny.vdt -o stage-set.ply --direction 1 0 0 --visibility picture\n"
         "  unseen simplify house.gltf -o small.glb --pixels 2 --drop animations\n"
         "  unseen simplify flow.vtp -o small.vtp --triangles 20%\n"
         "  unseen simplify bunny.vdt -o rough.glb --pixels 4 --fold-test displacement");

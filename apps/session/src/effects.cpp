@@ -205,6 +205,8 @@ Effect back_face_effect(const Sight& sight, Purpose purpose) {
 Effect hidden_effect(const Sight& sight, const Decision& decision, const std::optional<CutFacts>& facts) {
     const std::string name = "hidden folding";
     if (decision.request.purpose == Purpose::mesh) return {name, false, "the mesh may be looked at from elsewhere"};
+    if (folds_unseen(sight, decision))
+        return {name, true, "what lies behind what this view shows is folded, by a picture of its depths"};
     if (!folds_hidden(sight, decision))
         return {name, false,
                 is_perceptual(decision) ? "nothing solid is looked at from outside"

@@ -21,5 +21,6 @@ bool is_translucent(const Sight& sight);
 bool culls_back_faces(
     const Sight& sight); // faces that look away can be folded: they are not drawn, and nothing shows them from outside
 bool folds_hidden(const Sight& sight, const Decision& decision); // what a solid's inside hides
+bool folds_unseen(const Sight& sight, const Decision& decision); // what lies behind what the view shows
 
 } // namespace unseen::session
