@@ -32,12 +32,12 @@ void main() {
                    weights.y * enlarged(second, halvings.y, second_size, at) +
                    weights.z * enlarged(third, halvings.z, third_size, at)) *
                   weights.w;
-    if (halvings.w == 3.5) { // the usual one, without logarithms
-        powers = energy * sqrt(energy) * sqrt(sqrt(energy));
-    } else if (halvings.w == 2.0) {
-        powers = energy;
-    } else {
-        for (int i = 0; i < 4; ++i)
-            powers[i] = energy[i] > 0.0 ? exact_exp2(0.5 * halvings.w * exact_log2(max(energy[i], least_normal))) : 0.0;
-    }
+#if defined(EXPONENT_3_5) // the usual one, without logarithms
+    powers = energy * sqrt(energy) * sqrt(sqrt(energy));
+#elif defined(EXPONENT_2)
+    powers = energy;
+#else
+    for (int i = 0; i < 4; ++i)
+        powers[i] = energy[i] > 0.0 ? exact_exp2(0.5 * halvings.w * exact_log2(max(energy[i], least_normal))) : 0.0;
+#endif
 }

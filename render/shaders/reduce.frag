@@ -15,9 +15,16 @@ void main() {
         for (int i = 0; i < 4; ++i)
             v[4 * t + i] = some[i];
     }
-    if (x == 0 || x + 8 >= size.x)
-        for (int i = 2; i < 13; ++i)
-            v[i] = pixel(plane, mirrored(x - 4 + i, size.x), at.y);
+    // Mirrored at the row's ends.
+    int inside = size.x - x;
+    for (int k = 1; k <= 8; ++k) {
+        v[4 + k] = inside == k ? v[2 + k] : v[4 + k];
+        v[5 + k] = inside == k ? v[1 + k] : v[5 + k];
+    }
+    if (size.x == 1)
+        v[5] = v[6] = v[4];
+    v[3] = x == 0 ? v[5] : v[3];
+    v[2] = x == 0 ? v[6] : v[2];
     values = kernel.x * vec4(v[4], v[6], v[8], v[10]) +
              kernel.y * (vec4(v[3], v[5], v[7], v[9]) + vec4(v[5], v[7], v[9], v[11])) +
              kernel.z * (vec4(v[2], v[4], v[6], v[8]) + vec4(v[6], v[8], v[10], v[12]));

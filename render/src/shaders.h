@@ -25,5 +25,6 @@ extern const std::string_view surface_vert;
 extern const std::string_view surface_geom;
 extern const std::string_view surface_frag;
 extern const std::string_view test_pattern_frag;
+extern const std::string_view unpack_frag;
 
 } // namespace unseen::render::shaders

@@ -308,7 +308,8 @@ struct VisibilityPasses::Impl {
     void add_energies(PlanePasses& passes, std::size_t level);
     void blur(PlanePasses& passes, unsigned from, glm::ivec2 from_size, const std::vector<float>& kernel,
               const GpuPlanes& to);
-    void pool(PlanePasses& passes, const Program& program, const std::vector<GpuPlanes>& from, const GpuPlanes& to);
+    void pool(PlanePasses& passes, const Program& program, const std::vector<GpuPlanes>& from, const GpuPlanes& packed,
+              const GpuPlanes& to);
     Result<void> map_thresholds();
 
     PlaneFormat kept() const { return is_half ? PlaneFormat::half : PlaneFormat::full; }
@@ -327,15 +328,16 @@ struct VisibilityPasses::Impl {
 
     const Program *copy = nullptr, *subtract = nullptr, *reduce_rows = nullptr, *reduce_columns = nullptr,
                   *split_reference = nullptr, *split_base = nullptr, *split_difference = nullptr, *weigh = nullptr,
-                  *step = nullptr, *square = nullptr, *halve = nullptr, *blur_columns = nullptr, *raise = nullptr,
-                  *pool_powers = nullptr, *pool_thresholds = nullptr, *look = nullptr;
-    std::array<const Program*, 3> blur_rows = {};
+                  *step = nullptr, *square = nullptr, *halve = nullptr, *raise = nullptr, *pool_powers = nullptr,
+                  *pool_thresholds = nullptr, *unpack = nullptr, *look = nullptr;
+    std::array<const Program*, 3> blur_rows = {}, blur_columns = {};
 };
 
 // Programs that nothing calls for are not compiled.
 Result<void> VisibilityPasses::Impl::find_programs(Sight sight) {
     PlanePrograms programs(context);
     programs.find(copy, "luminance", shaders::luminance_frag);
+    programs.find(unpack, "unpack", shaders::unpack_frag);
     programs.find(reduce_columns, "reduce columns", shaders::reduce_frag);
     programs.find(reduce_rows, "reduce rows", shaders::reduce_frag, {"ALONG_ROWS"});
     programs.find(split_reference, "split reference", shaders::split_frag, {"REFERENCE"});
@@ -480,11 +482,15 @@ Result<void> VisibilityPasses::Impl::prepare_judging() {
     programs.find(split_difference, "split difference", shaders::split_frag);
     programs.find(square, "energy", shaders::energy_frag);
     programs.find(halve, "halve", shaders::halve_frag);
-    programs.find(blur_rows[0], "blur rows by 4", shaders::blur_frag, {"REACH_1"});
-    programs.find(blur_rows[1], "blur rows by 8", shaders::blur_frag, {"REACH_2"});
-    programs.find(blur_rows[2], "blur rows by 11", shaders::blur_frag, {"REACH_3"});
-    programs.find(blur_columns, "blur columns", shaders::blur_frag);
-    programs.find(raise, "power", shaders::power_frag);
+    programs.find(blur_rows[0], "blur rows by 4", shaders::blur_frag, {"ALONG_ROWS", "REACH_1"});
+    programs.find(blur_rows[1], "blur rows by 8", shaders::blur_frag, {"ALONG_ROWS", "REACH_2"});
+    programs.find(blur_rows[2], "blur rows by 11", shaders::blur_frag, {"ALONG_ROWS", "REACH_3"});
+    programs.find(blur_columns[0], "blur columns by 4", shaders::blur_frag, {"REACH_1"});
+    programs.find(blur_columns[1], "blur columns by 8", shaders::blur_frag, {"REACH_2"});
+    programs.find(blur_columns[2], "blur columns by 11", shaders::blur_frag, {"REACH_3"});
+    if (tables.beta == 3.5f) programs.find(raise, "power 3.5", shaders::power_frag, {"EXPONENT_3_5"});
+    else if (tables.beta == 2) programs.find(raise, "power 2", shaders::power_frag, {"EXPONENT_2"});
+    else programs.find(raise, "power", shaders::power_frag);
     programs.find(pool_powers, "pool powers", shaders::pool_frag);
     if (auto ok = programs.result(); !ok) return ok;
     const auto found = examining(context);
@@ -540,16 +546,15 @@ void VisibilityPasses::Impl::blur(PlanePasses& passes, unsigned from, glm::ivec2
                                   const std::vector<float>& kernel, const GpuPlanes& to) {
     std::array<float, most_taps> padded = {};
     std::copy(kernel.begin(), kernel.end(), padded.begin());
-    const std::size_t reach = kernel.size() - 1;
-    const Program& rows = *blur_rows[reach <= 4 ? 0 : reach <= 8 ? 1 : 2];
-    rows.set(0, from_size);
-    // What lies beyond a variant's reach is no uniform of it.
-    rows.set(1, std::span<const float>(padded.data(), reach <= 4 ? 5 : reach <= 8 ? 9 : 12));
-    passes.draw(rows, judging->blurred_rows, texels_of(from_size), {from});
-    blur_columns->set(0, from_size);
-    blur_columns->set(1, std::span<const float>(padded));
-    blur_columns->set(13, static_cast<unsigned>(reach));
-    passes.draw(*blur_columns, to, texels_of(from_size), {judging->blurred_rows.texture()});
+    const std::size_t reach = kernel.size() - 1, variant = reach <= 4 ? 0 : reach <= 8 ? 1 : 2;
+    const std::span<const float> used(padded.data(), std::min(4 * variant + 5, most_taps));
+    const auto pass = [&](const Program& program, unsigned source, const GpuPlanes& into) {
+        program.set(0, from_size);
+        program.set(1, used);
+        passes.draw(program, into, texels_of(from_size), {source});
+    };
+    pass(*blur_rows[variant], from, judging->blurred_rows);
+    pass(*blur_columns[variant], judging->blurred_rows.texture(), to);
 }
 
 // From the energies of a band to what the window holds of them, as powers.
@@ -581,12 +586,13 @@ void VisibilityPasses::Impl::add_energies(PlanePasses& passes, std::size_t level
 
 // The shader reads all its textures, also those that it does not count.
 void VisibilityPasses::Impl::pool(PlanePasses& passes, const Program& program, const std::vector<GpuPlanes>& from,
-                                  const GpuPlanes& to) {
+                                  const GpuPlanes& packed, const GpuPlanes& to) {
     for (std::size_t i = 0; i < most_bands; ++i)
         passes.bind(static_cast<unsigned>(i), from[std::min(i, from.size() - 1)].texture());
     program.set(0, size);
     program.set(1, static_cast<unsigned>(from.size()));
-    passes.draw(program, to, size, {});
+    passes.draw(program, packed, texels_of(size), {});
+    passes.draw(*unpack, to, size, {packed.texture()});
 }
 
 Result<void> VisibilityPasses::Impl::judge(const LuminanceTexture& test) {
@@ -624,7 +630,7 @@ Result<void> VisibilityPasses::Impl::judge(const LuminanceTexture& test) {
         add_energies(passes, level);
     }
     pool_powers->set(2, tables.beta);
-    pool(passes, *pool_powers, j.powers, j.visibility);
+    pool(passes, *pool_powers, j.powers, j.differences[0], j.visibility); // the difference is needed no more
     examine(*look, passes, {.id = j.visibility.texture(), .width = size.x, .height = size.y}, j.found_visible);
     return {};
 }
@@ -644,7 +650,9 @@ Result<void> VisibilityPasses::Impl::map_thresholds() {
         return {};
     });
     if (!done) return done;
-    pool(passes, *pool_thresholds, steps, *made);
+    const auto packed = GpuPlanes::create(size, 1, PlaneFormat::full, "thresholds");
+    if (!packed) return packed.error();
+    pool(passes, *pool_thresholds, steps, *packed, *made);
     thresholds = std::move(*made);
     return {};
 }
