@@ -1,5 +1,10 @@
 // Pools the bands, each sample for the pixels that it is nearest to: powers to V, or the least of THRESHOLDS.
-layout(binding = 0) uniform sampler2D bands[16]; // the first ones are used
+#ifdef UP_TO_8
+const int most = 8;
+#else
+const int most = 16;
+#endif
+layout(binding = 0) uniform sampler2D bands[most]; // the first ones are used
 layout(location = 0) uniform ivec2 size;         // of the picture
 layout(location = 1) uniform uint count;
 #ifndef THRESHOLDS
@@ -16,7 +21,7 @@ void main() {
 #else
     vec4 sum = vec4(0.0);
 #endif
-    for (int level = 0; level < 16; ++level) {
+    for (int level = 0; level < most; ++level) {
         if (level >= int(count))
             break;
         int half_block = level == 0 ? 0 : 1 << (level - 1);

@@ -21,13 +21,13 @@ namespace unseen::render {
 namespace {
 
 constexpr std::size_t most_bands = 16;             // of pool.frag: what a fragment shader can read at least
+constexpr std::size_t few_bands = 8;               // of its variant for usual sizes
 constexpr std::size_t most_taps = 12;              // of blur.frag
 constexpr int most_halvings = 30;                  // shifts of a whole number
 constexpr int group_columns = 64, group_rows = 16; // of examine.comp
 
-// In half floats an energy of one threshold is 1/128: thresholds from 0.02, where an energy still has seven bits, to 2895
-// fit in.
-constexpr float half_energy_scale = 1.f / 256, largest_half = 65504;
+// Thresholds from 0.1, whose energy is 40 times the least half float, to 16,000 fit into half floats.
+constexpr float half_energy_scale = 1.f / 8192, largest_half = 65504;
 constexpr float half_weights_reach = 32768; // half of the largest: the bound of the weights is one at nodes
 
 glm::ivec2 halved(glm::ivec2 size) { return (size + 1) / 2; }
@@ -348,7 +348,10 @@ Result<void> VisibilityPasses::Impl::find_programs(Sight sight) {
     else if (is_step) programs.find(seen, "step", shaders::sight_frag, {"THRESHOLDS"});
     else if (tables.gaze) programs.find(seen, "weigh by gaze", shaders::sight_frag, {"GAZE"});
     else programs.find(seen, "weigh", shaders::sight_frag);
-    if (is_step) programs.find(pool_thresholds, "pool thresholds", shaders::pool_frag, {"THRESHOLDS"});
+    const bool is_few = tables.bands.size() <= few_bands;
+    if (is_step && is_few)
+        programs.find(pool_thresholds, "pool 8 thresholds", shaders::pool_frag, {"THRESHOLDS", "UP_TO_8"});
+    else if (is_step) programs.find(pool_thresholds, "pool thresholds", shaders::pool_frag, {"THRESHOLDS"});
     return programs.result();
 }
 
@@ -491,7 +494,8 @@ Result<void> VisibilityPasses::Impl::prepare_judging() {
     if (tables.beta == 3.5f) programs.find(raise, "power 3.5", shaders::power_frag, {"EXPONENT_3_5"});
     else if (tables.beta == 2) programs.find(raise, "power 2", shaders::power_frag, {"EXPONENT_2"});
     else programs.find(raise, "power", shaders::power_frag);
-    programs.find(pool_powers, "pool powers", shaders::pool_frag);
+    if (bands.size() <= few_bands) programs.find(pool_powers, "pool 8 powers", shaders::pool_frag, {"UP_TO_8"});
+    else programs.find(pool_powers, "pool powers", shaders::pool_frag);
     if (auto ok = programs.result(); !ok) return ok;
     const auto found = examining(context);
     if (!found) return found.error();
@@ -587,7 +591,7 @@ void VisibilityPasses::Impl::add_energies(PlanePasses& passes, std::size_t level
 // The shader reads all its textures, also those that it does not count.
 void VisibilityPasses::Impl::pool(PlanePasses& passes, const Program& program, const std::vector<GpuPlanes>& from,
                                   const GpuPlanes& packed, const GpuPlanes& to) {
-    for (std::size_t i = 0; i < most_bands; ++i)
+    for (std::size_t i = 0; i < (from.size() <= few_bands ? few_bands : most_bands); ++i)
         passes.bind(static_cast<unsigned>(i), from[std::min(i, from.size() - 1)].texture());
     program.set(0, size);
     program.set(1, static_cast<unsigned>(from.size()));

@@ -8,8 +8,8 @@ namespace {
 
 // What a texture cannot tell: whether it is one channel of as many values as its size says.
 Result<void> check_shape(const perception::Image& image, const char* which) {
-    const auto pixels = static_cast<std::size_t>(std::max(image.width, 0)) *
-                        static_cast<std::size_t>(std::max(image.height, 0));
+    const auto pixels =
+        static_cast<std::size_t>(std::max(image.width, 0)) * static_cast<std::size_t>(std::max(image.height, 0));
     if (pixels > 0 && image.channels == 1 && image.values.size() == pixels) return {};
     return Error{ErrorCode::invalid_argument,
                  "judge: the " + std::string(which) + " is not a luminance image (one channel, one pixel or more)"};
@@ -42,8 +42,7 @@ render::VisibilityTables visibility_tables(const perception::JudgeTables& tables
         render::VisibilityTables::Band& out = to.bands.emplace_back();
         out.of_patch = band.of_patch;
         for (std::size_t i = 0; i < band.window.size(); ++i)
-            out.window[i] = {static_cast<float>(band.window[i].weight), band.window[i].halvings,
-                             band.window[i].kernel};
+            out.window[i] = {static_cast<float>(band.window[i].weight), band.window[i].halvings, band.window[i].kernel};
         for (const perception::JudgeTables::Node& node : band.nodes)
             out.nodes.push_back({node.log2_s, node.own, node.smoothed});
     }
