@@ -26,8 +26,8 @@ constexpr std::size_t most_taps = 12;              // of blur.frag
 constexpr int most_halvings = 30;                  // shifts of a whole number
 constexpr int group_columns = 64, group_rows = 16; // of examine.comp
 
-// Thresholds from 0.1, whose energy is 40 times the least half float, to 16,000 fit into half floats.
-constexpr float half_energy_scale = 1.f / 8192, largest_half = 65504;
+// Thresholds from 0.1, whose energy is 160 times the least half float, to 8,000 fit into half floats.
+constexpr float half_energy_scale = 1.f / 2048, largest_half = 65504;
 constexpr float half_weights_reach = 32768; // half of the largest: the bound of the weights is one at nodes
 
 glm::ivec2 halved(glm::ivec2 size) { return (size + 1) / 2; }

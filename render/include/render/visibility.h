@@ -84,7 +84,7 @@ struct VisibilityTables {
 };
 
 // Of what the passes keep. With half floats the reference's weights and the energies take half of the memory; V is within
-// 1% from 0.1 to 10,000.
+// 1% from 0.1 to 5,000.
 enum class VisibilityPrecision { full, half };
 
 struct VisibilitySummary {
