@@ -96,7 +96,8 @@ struct VisibilitySummary {
 // judging at the first judge(), the map of thresholds at the first map_thresholds(), and without a gaze nothing knows of
 // eccentricity. The same pictures give the same bits on the same GPU. Move-only; keeps a handle to the context.
 //
-// Memory, in bytes a pixel: 15 for the reference (half floats: 9), 41 more for judging (25), 4 more for thresholds.
+// Memory, in bytes a pixel: 15 for the reference (half floats: 9) and 11 more while it is prepared; some 35 for judging
+// (28), 4 for thresholds and 25 more while they are mapped.
 class VisibilityPasses {
 public:
     // The reference is copied. Fails on tables that contradict themselves or the picture, on more than this GL takes, and
