@@ -150,7 +150,7 @@ Result<perception::Judgement> JudgedModel::judge(const Picture& picture, const s
         if (second_ != usual_second) options.csf = second_, options.gain = perception::default_person.gain;
     }
     if (device_ == JudgeDevice::cpu) return perception::judge_modern(**reference, picture.luminance, options);
-    auto on_gpu = session_gpu::GpuJudge::create(*context_, **reference, options);
+    auto on_gpu = session::GpuJudge::create(*context_, **reference, options);
     if (!on_gpu) return on_gpu.error();
     return on_gpu->judge(picture.luminance);
 }

@@ -9,7 +9,7 @@ Result<GpuComparison> compare_on_gpu(const perception::Image& reference, const p
                                      const perception::JudgeOptions& options, bool wants_threshold_map) {
     const auto context = render::Context::headless();
     if (!context) return context.error();
-    auto judge = session_gpu::GpuJudge::create(*context, reference, options);
+    auto judge = session::GpuJudge::create(*context, reference, options);
     if (!judge) return judge.error();
     auto judgement = judge->judge(test);
     if (!judgement) return judgement.error();

@@ -27,7 +27,7 @@ using perception::Judge;
 using perception::Judgement;
 using perception::JudgeOptions;
 using render::VisibilityPrecision;
-using session_gpu::GpuJudge;
+using session::GpuJudge;
 using ::testing::HasSubstr;
 using GpuJudgeTest = render::testing::GlTest;
 

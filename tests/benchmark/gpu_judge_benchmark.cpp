@@ -11,7 +11,7 @@ namespace unseen::bench {
 namespace {
 
 using render::VisibilityPrecision;
-using session_gpu::GpuJudge;
+using session::GpuJudge;
 
 // Fine detail on grey, and the same a little otherwise.
 std::vector<float> detail(int side, float more) {

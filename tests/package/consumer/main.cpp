@@ -11,7 +11,7 @@
 #include <session/session.h>
 #endif
 #if defined(WITH_RENDER) && defined(WITH_SESSION)
-#include <session_gpu/gpu_judge.h>
+#include <session_gpu/session_gpu.h>
 #endif
 
 int main() {
@@ -43,7 +43,7 @@ int main() {
     if (!whole || whole->mesh().triangles.size() != 4) return std::printf("the session lost a face\n"), 1;
 #endif
 #if defined(WITH_RENDER) && defined(WITH_SESSION)
-    if (session_gpu::visibility_tables(*perception::judge_tables(64, 64, 1, 100, {})).bands.empty())
+    if (session::visibility_tables(*perception::judge_tables(64, 64, 1, 100, {})).bands.empty())
         return std::printf("the judge has no bands\n"), 1;
 #endif
 #ifdef WITH_RENDER

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string>
 
-namespace unseen::session_gpu {
+namespace unseen::session {
 namespace {
 
 // What a texture cannot tell: whether it is one channel of as many values as its size says.
@@ -104,4 +104,4 @@ Result<perception::Image> GpuJudge::threshold_map() {
     return perception::Image{width_, height_, 1, std::move(*thresholds)};
 }
 
-} // namespace unseen::session_gpu
+} // namespace unseen::session

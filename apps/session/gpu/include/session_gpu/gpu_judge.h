@@ -1,7 +1,7 @@
 // The modern judge on the GPU: perception's tables, render's passes.
 //
 //     const auto context = render::Context::headless();
-//     auto judge = session_gpu::GpuJudge::create(*context, reference, options);
+//     auto judge = session::GpuJudge::create(*context, reference, options);
 //     const auto judgement = judge->judge(test); // as perception::Judge has it
 #pragma once
 
@@ -14,7 +14,7 @@
 #include <render/context.h>
 #include <render/visibility.h>
 
-namespace unseen::session_gpu {
+namespace unseen::session {
 
 // perception::Judge on the GPU. V and thresholds are its own within 1e-3; with half floats V within 1%. Used from the
 // context's thread. Move-only; keeps a handle to the context.
@@ -53,4 +53,4 @@ private:
 // The tables in render's terms.
 render::VisibilityTables visibility_tables(const perception::JudgeTables& tables);
 
-} // namespace unseen::session_gpu
+} // namespace unseen::session
