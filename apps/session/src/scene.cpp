@@ -6,6 +6,7 @@
 #include <vdtree/internal/errors.h>
 
 #include "loaded_tree.h"
+#include "scene_from_file.h"
 
 #include <glm/geometric.hpp>
 
@@ -27,6 +28,19 @@ bool is_direction(glm::dvec3 v) {
 Result<Scene> Scene::load(const std::filesystem::path& file, const LoadOptions& options) {
     if (!(options.unit_metres > 0 && std::isfinite(options.unit_metres)))
         return invalid_argument("load.unit_metres must be above 0 and finite.");
+    if (options.as != LoadAs::model) {
+        const bool may_be_scene = meshio::is_gltf_file(file);
+        if (!may_be_scene && options.as == LoadAs::scene)
+            return invalid_argument(file.string() +
+                                    " is no glTF file (.glb, .gltf), and only these are scenes: read it "
+                                    "with load.as = model.");
+        if (may_be_scene) {
+            auto read = meshio::SceneFile::read(file, reading_options(options));
+            if (!read) return read.error();
+            if (options.as == LoadAs::scene || read->contents().is_scene)
+                return scene_from(std::move(*read), file, options);
+        }
+    }
     auto loaded = session::load(file, options, true);
     if (!loaded) return loaded.error();
     Scene scene = of(std::move(loaded->tree), options.unit_metres);
