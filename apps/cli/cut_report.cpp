@@ -30,7 +30,37 @@ Json to_json(const session::Report& s, double draw_ms) {
             {"effects", to_json(s.effects)}};
 }
 
+void add_scene(Json& json, const session::Session& session, std::span<const vdtree::Cut> cuts) {
+    const session::Scene& scene = session.scene();
+    json["as"] = scene.is_of_file() ? "scene" : "model";
+    if (!scene.objects.empty()) json["tree"] = name_of(scene.objects[0].origin);
+    if (!scene.is_of_file()) return;
+    Json objects = Json::array();
+    for (std::size_t i = 0; i < cuts.size(); ++i)
+        objects.push_back({{"name", scene.objects[i].name},
+                           {"node", scene.objects[i].node},
+                           {"mesh", scene.objects[i].mesh},
+                           {"source_triangles", scene.objects[i].tree.triangle_count()},
+                           {"triangles", cuts[i].triangle_count()}});
+    std::uint64_t backdrop = 0;
+    for (const session::Object& part : scene.backdrop) backdrop += part.tree.triangle_count();
+    json["objects"] = std::move(objects);
+    json["backdrop_triangles"] = backdrop;
+}
+
+void print_scene(const session::Session& session) {
+    const session::Scene& scene = session.scene();
+    if (!scene.is_of_file()) return;
+    const auto counted = [](std::size_t count, const char* what) {
+        return grouped(count) + " " + what + (count == 1 ? "" : "s");
+    };
+    print_line("a scene of " + counted(scene.objects.size(), "object") +
+               (scene.backdrop.empty() ? std::string()
+                                       : ", before " + counted(scene.backdrop.size(), "part") + " of background"));
+}
+
 std::string triangles_text(std::uint64_t triangles, std::uint64_t source_triangles) {
+    if (source_triangles == 0) return "no triangles";
     const double percent = 100.0 * static_cast<double>(triangles) / static_cast<double>(source_triangles);
     return grouped(triangles) + " of " + grouped(source_triangles) + " triangles (" +
            rounded(percent, percent > 99 ? 4 : 2) + "%)";

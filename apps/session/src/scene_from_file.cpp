@@ -238,23 +238,6 @@ Result<calibration::LightRig> lights_of(const meshio::SceneContents& contents, c
     return calibration::LightRig::of(std::move(lighting), file);
 }
 
-// The light that trees have of their own, in the world.
-Result<calibration::LightRig> usual_lights(const fs::path& file) {
-    const vdtree::Light light;
-    const auto from = [&](double intensity, glm::dvec3 direction) {
-        vdtree::LightSource source;
-        source.intensity = intensity;
-        source.direction = glm::normalize(direction);
-        return source;
-    };
-    const auto ambient = static_cast<double>(light.ambient), fill = static_cast<double>(light.fill);
-    vdtree::Lighting lighting;
-    lighting.ambient = ambient;
-    lighting.lights = {from(1 - ambient, glm::dvec3(light.direction)),
-                       from((1 - ambient) * fill, -glm::dvec3(light.direction))};
-    return calibration::LightRig::of(std::move(lighting), file);
-}
-
 bool is_turned(const vdtree::Similarity& placement) {
     constexpr double same_direction = 1e-6; // of a unit quaternion's vector: less than any light shows
     const glm::dquat& q = placement.rotation;
@@ -328,7 +311,7 @@ Result<Scene> scene_from(meshio::SceneFile file, const fs::path& name, const Loa
     if (is_lit) {
         auto rig =
             contents.lights.empty()
-                ? usual_lights(name)
+                ? light_rig()
                 : lights_of(contents, middle_of(scene.objects.empty() ? scene.backdrop : scene.objects), name, options);
         if (!rig) return rig.error();
         scene.lights = std::move(*rig);

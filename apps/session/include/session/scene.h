@@ -63,4 +63,9 @@ struct Scene {
                          std::optional<double> fill = {});
 };
 
+// The light of vdtree::Light in the world, with what is given instead: for scenes whose objects are turned. Fails where
+// Scene::relight() does.
+Result<calibration::LightRig> light_rig(std::optional<glm::dvec3> towards = {}, std::optional<double> ambient = {},
+                                        std::optional<double> fill = {});
+
 } // namespace unseen::session
