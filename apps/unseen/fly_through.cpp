@@ -296,6 +296,7 @@ public:
         for (std::size_t i = 0; i < poses.size() && !until_interrupted.is_interrupted(); ++i) {
             bar(static_cast<double>(i) / static_cast<double>(poses.size()), "frames");
             take(poses[i]);
+            request_.reasons = i + 1 == poses.size() || i == 0; // of the last frame; of the first, where interrupted
             session_.set_time(static_cast<double>(i) * frame_s);
             session_.set_gaze(gaze.at(static_cast<double>(i) * frame_s, view_, gaze_px_));
             auto frame = next(*drawing);
@@ -341,6 +342,7 @@ private:
         const auto start = Clock::now();
         auto simplified = follower_.follow(view_, request_);
         if (!simplified) return simplified.error();
+        if (!request_.reasons) simplified->effects = std::move(last_.effects);
         last_ = std::move(*simplified);
         FrameRecord record;
         record.stats = last_.stats;

@@ -48,7 +48,10 @@ Result<int> run(const SimplifyArguments& a) {
         return ready.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
-    auto session = open_session(a.model, a.view, a.display);
+    ViewOptions view = a.view;
+    // Other formats hold one mesh.
+    if (view.as == session::LoadAs::automatic && !is_gltf(a.out)) view.as = session::LoadAs::model;
+    auto session = open_session(a.model, view, a.display);
     if (!session) return session.error();
     session->set_gaze(fixed_gaze(a.what));
     session->set_velocity(a.what.velocity());
@@ -57,7 +60,7 @@ Result<int> run(const SimplifyArguments& a) {
         return Error{ErrorCode::invalid_argument, "'" + a.model +
                                                       "' is a scene, which only glTF holds: let -o end in "
                                                       ".glb or .gltf, or make one mesh of it with --as model."};
-    auto result = session->simplify(make_view(*session, a.view), a.what.request_for(session->triangle_count()));
+    auto result = session->simplify(make_view(*session, view), a.what.request_for(session->triangle_count()));
     if (!result) return result.error();
     const auto start = std::chrono::steady_clock::now();
     for (const vdtree::Cut& cut : result->cuts) cut.indices();

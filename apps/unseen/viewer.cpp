@@ -84,6 +84,7 @@ public:
           gaze_(std::move(gaze)) {
         request_.purpose = session::Purpose::picture;
         request_.may_measure = false; // nobody waits for that here
+        request_.reasons = false;
         draw_.background = session.background();
         const Goal& goal = request_.goal;
         budget_ = goal.kind == Goal::Kind::budget ? goal.triangles : budget_of(session.triangle_count() / 4);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <numbers>
 #include <unordered_map>
 
 #include <glm/geometric.hpp>
@@ -34,8 +35,26 @@ WorldSphere united(const WorldSphere& a, const WorldSphere& b) {
     return {a.centre + way * ((radius - a.radius) / distance), radius};
 }
 
+// Around the eye: the planes go through it, and their offsets are 0.
+std::vector<vdtree::Plane> window_of(const vdtree::View& view) {
+    const vdtree::CameraFrame frame = vdtree::camera_frame(view);
+    const double tan_y = std::tan(view.fov_y_degrees * std::numbers::pi / 360);
+    const double tan_x = tan_y * view.width / view.height;
+    std::vector<vdtree::Plane> planes;
+    for (const glm::dvec3& inward : {-frame.back, frame.right - tan_x * frame.back, -frame.right - tan_x * frame.back,
+                                     frame.up - tan_y * frame.back, -frame.up - tan_y * frame.back})
+        planes.push_back({glm::normalize(inward), 0});
+    return planes;
+}
+
+// As the session's users take it.
+Result<std::optional<vdtree::Lighting>> copied(const Result<std::shared_ptr<const vdtree::Lighting>>& lighting) {
+    if (!lighting) return lighting.error();
+    return *lighting ? std::optional(**lighting) : std::nullopt;
+}
+
 Plan plan_of(const Sight& sight, const Decision& decision, std::size_t object) {
-    Plan plan{decision.test, decision.why, decision.measures, effects_of(sight, decision, std::nullopt)};
+    Plan plan{decision.test, std::string(decision.why), decision.measures, effects_of(sight, decision, std::nullopt)};
     for (Effect& effect : plan.effects) effect.object = object;
     return plan;
 }
@@ -48,6 +67,21 @@ WorldSphere world_sphere(const Object& object) {
     const vdtree::Sphere sphere = object.tree.bounding_sphere();
     return {object.placement.to_world(object.tree.origin() + glm::dvec3(sphere.centre)),
             object.placement.scale * sphere.radius};
+}
+
+WorldSphere sphere_of_all(const Object& object, ObjectCache& cache) {
+    if (!cache.all) {
+        const vdtree::VertexTree& tree = object.tree;
+        vdtree::Sphere all = tree.bounding_sphere();
+        const auto include = [&](const vdtree::Sphere& sphere) {
+            all.radius = std::max(all.radius, glm::length(sphere.centre - all.centre) + sphere.radius);
+        };
+        include(tree.bounds()[vdtree::VertexTree::root()].ring);
+        include(tree.support_spheres()[vdtree::VertexTree::root()]);
+        cache.all = all;
+    }
+    return {object.placement.to_world(object.tree.origin() + glm::dvec3(cache.all->centre)),
+            object.placement.scale * static_cast<double>(cache.all->radius)};
 }
 
 std::span<const vdtree::Sphere> inner_spheres(const Object& object, ObjectCache& cache) {
@@ -108,8 +142,10 @@ Result<std::shared_ptr<Session::State>> Session::State::create(Scene scene, Obse
     return std::shared_ptr<State>(new State(std::move(scene), std::move(observer), std::move(messages), *background));
 }
 
-Result<std::optional<vdtree::Lighting>> Session::State::lighting(const vdtree::View& view, std::size_t item) {
-    if (!scene.lights) return std::optional<vdtree::Lighting>();
+using SharedLighting = std::shared_ptr<const vdtree::Lighting>;
+
+Result<SharedLighting> Session::State::lighting(const vdtree::View& view, std::size_t item) {
+    if (!scene.lights) return SharedLighting();
     const bool stands_still = scene.lights->stands_still();
     if (stands_still && still_lights_[item]) return still_lights_[item];
     const bool is_object = item < scene.objects.size();
@@ -121,8 +157,9 @@ Result<std::optional<vdtree::Lighting>> Session::State::lighting(const vdtree::V
         return Error{ok.error().code, scene.lights->file().string() + ": " +
                                           (scene.is_of_file() ? "object '" + lit.name + "': " : std::string()) +
                                           ok.error().message};
-    if (stands_still) still_lights_[item] = lighting;
-    return std::optional(std::move(lighting));
+    auto shared = std::make_shared<const vdtree::Lighting>(std::move(lighting));
+    if (stands_still) still_lights_[item] = shared;
+    return SharedLighting(std::move(shared));
 }
 
 // Everything that a moved outline may uncover. Behind a single object is the background; behind one of several may be
@@ -200,7 +237,9 @@ Result<void> Session::State::look_at_backdrop(const vdtree::View& view) {
 
 Result<std::vector<Sight>> Session::State::look(const vdtree::View& view) {
     if (const auto valid = vdtree::validate(view); !valid) return valid.error();
+    window_ = window_of(view);
     std::vector<Sight> sights;
+    sights.reserve(scene.objects.size());
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
         auto lit = lighting(view, i);
         if (!lit) return lit.error();
@@ -210,7 +249,7 @@ Result<std::vector<Sight>> Session::State::look(const vdtree::View& view) {
             caches[i]->light_bounds = std::make_shared<const vdtree::LightBounds>(std::move(*bounds));
         }
         sights.push_back({scene.objects[i], *caches[i], observer, view, scene.lights ? &*scene.lights : nullptr,
-                          std::move(*lit), background});
+                          std::move(*lit), &window_, background});
         if (const auto set = set_gaze_of(sights.back()); !set) return set.error();
     }
     if (const auto looked = look_at_backdrop(view); !looked) return looked.error();
@@ -352,11 +391,11 @@ Result<CutRecipe> Session::recipe(const vdtree::View& view, const Request& reque
 }
 
 Result<std::optional<vdtree::Lighting>> Session::lighting(const vdtree::View& view, std::size_t object) const {
-    return state_->lighting(view, object);
+    return copied(state_->lighting(view, object));
 }
 
 Result<std::optional<vdtree::Lighting>> Session::backdrop_lighting(const vdtree::View& view, std::size_t part) const {
-    return state_->lighting(view, state_->scene.objects.size() + part);
+    return copied(state_->lighting(view, state_->scene.objects.size() + part));
 }
 
 Result<perception::SceneLuminance> Session::luminance(const vdtree::View& view) const {

@@ -18,6 +18,10 @@ namespace unseen::session {
 struct Prepared {
     std::vector<Sight> sights;
     std::vector<Decision> decisions; // by object
+
+    bool shares_budget() const {
+        return decisions.size() > 1 && decisions.front().request.goal.kind == Goal::Kind::budget;
+    }
 };
 
 class Session::State {
@@ -28,7 +32,7 @@ public:
     // Measures the errors of folds where a decision wants them.
     Result<Prepared> prepare(const vdtree::View& view, const Request& request);
     // Of all objects, then of the backdrop.
-    Result<std::optional<vdtree::Lighting>> lighting(const vdtree::View& view, std::size_t item);
+    Result<std::shared_ptr<const vdtree::Lighting>> lighting(const vdtree::View& view, std::size_t item);
 
     Scene scene;
     Observer observer;
@@ -55,8 +59,9 @@ private:
     };
     std::optional<Moving> moving_;
     std::shared_ptr<const perception::CsfTable> widened_of_;
-    std::vector<std::optional<vdtree::Lighting>> still_lights_; // by item, of lights that stand still
-    std::vector<vdtree::LuminanceRange> backdrop_ranges_;       // of luminance, as they are lit
+    std::vector<std::shared_ptr<const vdtree::Lighting>> still_lights_; // by item, of lights that stand still
+    std::vector<vdtree::Plane> window_;                                 // of the last look
+    std::vector<vdtree::LuminanceRange> backdrop_ranges_;               // of luminance, as they are lit
 };
 
 } // namespace unseen::session
