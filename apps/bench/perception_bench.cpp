@@ -462,12 +462,12 @@ private:
     // ---- random views
 
     // The models in turn, those that are huge only so often.
-    std::vector<std::size_t> models_of_random_views(std::size_t count) const {
-        const auto is_huge = [&](std::size_t m) { return models_[m]->triangles() > huge_mesh; };
+    static std::vector<std::size_t> models_of_random_views(std::size_t count, const Models& models) {
+        const auto is_huge = [&](std::size_t m) { return models[m]->triangles() > huge_mesh; };
         bool all_huge = true;
-        for (std::size_t m = 0; m < models_.size(); ++m) all_huge = all_huge && is_huge(m);
-        std::vector<std::size_t> order, views(models_.size());
-        for (std::size_t m = 0; order.size() < count; m = (m + 1) % models_.size()) {
+        for (std::size_t m = 0; m < models.size(); ++m) all_huge = all_huge && is_huge(m);
+        std::vector<std::size_t> order, views(models.size());
+        for (std::size_t m = 0; order.size() < count; m = (m + 1) % models.size()) {
             if (is_huge(m) && !all_huge && views[m] >= huge_views) continue;
             ++views[m];
             order.push_back(m);
@@ -475,15 +475,27 @@ private:
         return order;
     }
 
-    // On all kinds of displays, before anything from black to white, at all sizes, looked at and aside.
+    // On all kinds of displays, before anything from black to white, at all sizes, looked at and aside. Of the models, and
+    // of regular waves drawn at random, which no factor was fitted on.
     Result<void> random_views() {
-        const std::size_t count = options_.quick ? std::min<std::size_t>(models_.size(), 6) : options_.random_views;
-        const std::vector<std::size_t> order = models_of_random_views(count);
         const std::uint64_t seed = options_.seed ? *options_.seed : std::random_device()();
         std::mt19937_64 random(seed);
         const auto uniform = [&](double low, double high) {
             return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
         };
+        const std::size_t own = models_.size(), waved = options_.quick ? 1 : 4;
+        for (std::size_t i = 0; i < waved; ++i) {
+            const double waves = 2 * std::pow(16.0, uniform(0, 1)), height = 0.0005 * std::pow(64.0, uniform(0, 1));
+            HardMesh mesh = waved_square(options_.quick ? 3'000 : 60'000, height, waves);
+            mesh.name = rounded(waves, 3) + " waves " + rounded(height, 2) + " high";
+            auto tree = build_hard_tree(mesh);
+            if (!tree) return tree.error();
+            auto model = JudgedModel::create(*context_, mesh.name, std::move(*tree), options_.window_px, second_);
+            if (!model) return model.error();
+            models_.push_back(std::make_unique<JudgedModel>(std::move(*model)));
+        }
+        const std::size_t count = options_.quick ? std::min<std::size_t>(models_.size(), 6) : options_.random_views;
+        const std::vector<std::size_t> order = models_of_random_views(count, models_);
         std::vector<Judged> found;
         for (std::size_t i = 0; i < count; ++i) {
             progress(i, count, "random views");
@@ -515,7 +527,9 @@ private:
             if (auto ok = judge("random", models_, order[i], how, found); !ok) return ok;
         }
         add_visibility_rows(std::to_string(count) + " random views, seed " + std::to_string(seed), found, models_);
-        return write_worst(found, models_, "random.png");
+        auto written = write_worst(found, models_, "random.png");
+        models_.resize(own);
+        return written;
     }
 
     // ---- where the viewer looks

@@ -428,4 +428,11 @@ void add_what_options(CLI::App& verb, WhatOptions& o) {
     });
 }
 
+void add_visibility_option(CLI::App& verb, WhatOptions& o) {
+    add_choice<Visibility, Visibility>(
+        verb, "--visibility", o.visibility, {{"spheres", Visibility::spheres}, {"picture", Visibility::picture}},
+        "What counts as hidden: what faces away or lies behind spheres inside solids (spheres; of 'unseen render' the "
+        "default), or also all that lies behind what this picture shows (picture)");
+}
+
 } // namespace unseen::app

@@ -70,6 +70,9 @@ struct TriangleCount {
 };
 
 // WHAT.
+// How it is known what of a picture cannot be seen: by spheres inside solids, or by what the picture shows, too.
+enum class Visibility { spheres, picture };
+
 struct WhatOptions {
     session::Request request; // of budgets, without the number of triangles
     TriangleCount budget;
@@ -78,6 +81,7 @@ struct WhatOptions {
     session::Request request_for(std::uint64_t source_triangles) const;
     std::optional<glm::dvec2> gaze_px;
     std::optional<double> velocity_deg_s; // of everything, on the retina
+    Visibility visibility = Visibility::spheres;
     perception::DegreesPerSecond velocity() const { return perception::DegreesPerSecond(velocity_deg_s.value_or(0)); }
 };
 
@@ -92,6 +96,7 @@ void add_view_options(CLI::App& verb, ViewOptions& options);
 void add_as_option(CLI::App& verb, session::LoadAs& as);
 void add_display_options(CLI::App& verb, DisplayOptions& options);
 void add_what_options(CLI::App& verb, WhatOptions& options);
+void add_visibility_option(CLI::App& verb, WhatOptions& options); // of verbs for one view
 // Beside add_what_options(), for verbs with frames in time: gazes that move. `allows_mouse`: the verb has a window.
 void add_moving_gaze_options(CLI::App& verb, GazeOptions& options, bool allows_mouse);
 // What add_what_options() and add_moving_gaze_options(), or the view's options, do not allow together.

@@ -302,6 +302,10 @@ std::vector<HardMesh> open_sheets(int triangles) {
     return sheets;
 }
 
+HardMesh waved_square(int triangles, double height, double waves) {
+    return {"waved square", waved_sheet(std::max(24, static_cast<int>(std::sqrt(triangles / 2.0))), height, waves)};
+}
+
 std::vector<HardMesh> ship_hulls(int triangles) {
     constexpr int across = 16; // of a deck, and of a side
     const int along = std::max(8, triangles / (3 * 2 * across));

@@ -29,6 +29,10 @@ std::vector<HardMesh> tuning_meshes(int triangles);
 // of each facet's own; a jagged outline, holes, a spiral. Of about so many triangles each; at least a thousand.
 std::vector<HardMesh> open_sheets(int triangles);
 
+// An open square from -1 to 1, of about so many triangles, waved along both sides: `waves` along each, so high. The errors
+// of its folds are alike everywhere, the worst that is known.
+HardMesh waved_square(int triangles, double height, double waves);
+
 // Ships, of slender quads: a bright deck beside dark sides, which share their edges' places and no vertices, as CAD
 // programs write them. Of about so many triangles each; at least a thousand.
 std::vector<HardMesh> ship_hulls(int triangles);

@@ -1,6 +1,7 @@
 // The verbs that draw, in a build without OpenGL: they say so.
 #include "calibration_window.h"
 #include "verbs.h"
+#include "visibility.h"
 
 namespace unseen::app {
 namespace {
@@ -28,6 +29,11 @@ Result<void> run_calibration_window(calibration::Procedure&, const CalibrationWi
 }
 Result<std::vector<GammaMatch>> match_gamma(const CalibrationWindowOptions&) { return no_window(); }
 Result<void> show_chart(const CalibrationWindowOptions&, const std::string&) { return no_window(); }
+
+Result<session::Simplification> simplify_as_seen(session::Session&, const vdtree::View&, const session::Request&) {
+    return Error{ErrorCode::unsupported, "--visibility picture is not in this build, for it was made without OpenGL; "
+                                         "configure it with -DUNSEEN_BUILD_RENDER=ON."};
+}
 
 Command demo_command(CLI::App& app) { return absent(app, "demo"); }
 Command render_command(CLI::App& app) { return absent(app, "render"); }

@@ -4,6 +4,7 @@
 
 #include <perception/image.h>
 #include <render/renderer.h>
+#include <session_gpu/as_seen.h>
 
 #include "cut_report.h"
 #include "fly_through.h"
@@ -67,7 +68,9 @@ Result<int> run(RenderArguments& a) {
         return Error{ErrorCode::invalid_argument, "--show is of one object, and the scene has " +
                                                       grouped(session->scene().objects.size()) +
                                                       ": leave it out, or give --as model."};
-    const auto result = session->simplify(view, request);
+    const auto result = a.what.visibility == Visibility::picture
+                            ? session::simplify_as_seen(*session, *context, view, request)
+                            : session->simplify(view, request);
     if (!result) return result.error();
 
     auto renderer = SceneRenderer::create(*context, *session);
@@ -164,6 +167,8 @@ void check(const RenderArguments& a) {
         return;
     }
     if (a.map) refuse("--show is for single pictures, and excludes --path.");
+    if (a.what.visibility == Visibility::picture)
+        refuse("--visibility picture is for single pictures, and excludes --path.");
     if (o.judges_changes && o.draws && !*o.draws) refuse("--no-draw and --changes exclude each other.");
     if (o.judges_changes && a.draw.wireframe) refuse("--changes are those of the model: leave --wireframe away.");
     if (a.out.empty()) return;
@@ -217,6 +222,7 @@ Command render_command(CLI::App& app) {
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->what);
+    add_visibility_option(*verb, a->what);
     add_moving_gaze_options(*verb, a->flight.gaze, false);
     verb->footer(
         "Examples:\n  unseen render bunny.vdt -o bunny.png --wireframe\n"

@@ -13,6 +13,7 @@
 #include "session_options.h"
 #include "terminal.h"
 #include "verbs.h"
+#include "visibility.h"
 
 namespace unseen::app {
 namespace {
@@ -60,7 +61,10 @@ Result<int> run(const SimplifyArguments& a) {
         return Error{ErrorCode::invalid_argument, "'" + a.model +
                                                       "' is a scene, which only glTF holds: let -o end in "
                                                       ".glb or .gltf, or make one mesh of it with --as model."};
-    auto result = session->simplify(make_view(*session, view), a.what.request_for(session->triangle_count()));
+    const vdtree::View seen = make_view(*session, view);
+    const session::Request request = a.what.request_for(session->triangle_count());
+    auto result = a.what.visibility == Visibility::picture ? simplify_as_seen(*session, seen, request)
+                                                           : session->simplify(seen, request);
     if (!result) return result.error();
     const auto start = std::chrono::steady_clock::now();
     for (const vdtree::Cut& cut : result->cuts) cut.indices();
@@ -109,6 +113,7 @@ Command simplify_command(CLI::App& app) {
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->what);
+    add_visibility_option(*verb, a->what);
     verb->footer(
         "OUT.glb, .gltf (with its data in OUT.bin) and .obj have what the model's glTF or OBJ file had: nodes, names,\n"
         "materials, texture coordinates. Images in the file stay in it; images and .mtl files beside it are copied\n"
@@ -120,6 +125,7 @@ Command simplify_command(CLI::App& app) {
         "Examples:\n  unseen simplify bunny.vdt -o seen-from-the-right.ply --direction 1 0 0\n"
         "  unseen simplify bunny.vdt -o small.obj --triangles 5000 --json report.json\n"
         "  unseen simplify bunny.vdt -o half.ply --triangles 50%\n"
+        "  unseen simplify bunny.vdt -o stage-set.ply --direction 1 0 0 --visibility picture\n"
         "  unseen simplify house.gltf -o small.glb --pixels 2 --drop animations\n"
         "  unseen simplify museum.glb -o seen.glb --triangles 50%\n"
         "  unseen simplify flow.vtp -o small.vtp --triangles 20%\n"

@@ -441,7 +441,7 @@ TEST_F(SimplifyTest, TheDefaultTestGoesByErrorsWhereTheseKnowTheScene) {
     write_text(path("lights.json"),
                R"({"ambient": 0.2, "lights": [{"type": "directional", "direction": [0, 0, 1], "intensity": 0.8}]})");
     EXPECT_THAT(fold_test(simplify({"--lights", "lights.json"})),
-                AllOf(StartsWith("luebke-hallen:"), HasSubstr("does not know lights")));
+                AllOf(StartsWith("luebke-hallen-safe:"), HasSubstr("does not know lights")));
 }
 
 // The ball in red and green of one luminance, with an alpha for all vertices.

@@ -45,10 +45,18 @@ public:
     File& add(const vdtree::Mesh& mesh, const std::string& name = "body") {
         std::vector<glm::vec3> positions(mesh.positions.begin(), mesh.positions.end());
         const auto p = accessor(positions.data(), sizeof(glm::vec3), positions.size(), 1, 5126, "VEC3");
+        std::vector<glm::dvec3> sums(mesh.positions.size(), glm::dvec3(0));
+        for (const vdtree::Triangle& t : mesh.triangles) {
+            const glm::dvec3 a = mesh.positions[t[0]];
+            for (const vdtree::Index v : t) sums[v] += glm::cross(mesh.positions[t[1]] - a, mesh.positions[t[2]] - a);
+        }
+        std::vector<glm::vec3> normals;
+        for (const glm::dvec3& sum : sums) normals.emplace_back(glm::normalize(sum));
+        const auto n = accessor(normals.data(), sizeof(glm::vec3), normals.size(), 1, 5126, "VEC3");
         const auto i =
             accessor(mesh.triangles.data(), sizeof(vdtree::Triangle), mesh.triangles.size(), 3, 5125, "SCALAR");
         document_["meshes"].push_back(
-            {{"name", name}, {"primitives", {{{"attributes", {{"POSITION", p}}}, {"indices", i}}}}});
+            {{"name", name}, {"primitives", {{{"attributes", {{"POSITION", p}, {"NORMAL", n}}}, {"indices", i}}}}});
         return *this;
     }
     Json& document() { return document_; }
@@ -303,7 +311,8 @@ TEST_F(SceneTest, WritesScenesThatLookTheSame) {
     write_text(path("s.glb"), File(all_kinds).add(body()).glb());
     if (!can_draw()) GTEST_SKIP() << "no OpenGL";
     const std::vector<std::string> view = {"--eye", "2", "3", "12", "--target", "0", "1.5", "0", "--fov", "50"};
-    std::vector<std::string> words = {"simplify", "s.glb", "-o", "small.glb", "--triangles", "40%", "--json", "-"};
+    std::vector<std::string> words = {"simplify", "s.glb",  "-o",      "small.glb", "--pixels",
+                                      "4",        "--size", "256x256", "--json",    "-"};
     words.insert(words.end(), view.begin(), view.end());
     const Outcome simplified = run(words);
     ASSERT_EQ(simplified.status, 0) << simplified.err;
@@ -320,8 +329,9 @@ TEST_F(SceneTest, WritesScenesThatLookTheSame) {
     std::vector<std::string> names;
     for (const meshio::SceneNode& node : read->contents().nodes) names.push_back(node.name);
     EXPECT_THAT(names, Contains("nested again"));
-    // The cut from before, and what was written.
-    std::vector<std::string> cut = {"s.glb", "--triangles", "40%"}, written = {"small.glb", "--full", "--as", "scene"};
+    EXPECT_LT(report["triangles"], 0.9 * report["source_triangles"].get<double>());
+    // What a picture is drawn of folds by the same test, but for what it does not show.
+    std::vector<std::string> cut = {"s.glb", "--pixels", "4"}, written = {"small.glb", "--full", "--as", "scene"};
     cut.insert(cut.end(), view.begin(), view.end());
     written.insert(written.end(), view.begin(), view.end());
     expect_same_picture(cut, written);

@@ -82,7 +82,7 @@ TEST(Session, PlansBeforeItMeasures) {
     EXPECT_FALSE(perception::has_fold_measurement(session->tree())) << "a plan changes nothing";
     const auto hurried = session->plan(view, {.may_measure = false});
     ASSERT_TRUE(hurried);
-    EXPECT_EQ(hurried->fold_test, FoldTest::luebke_hallen);
+    EXPECT_EQ(hurried->fold_test, FoldTest::luebke_hallen_safe);
     EXPECT_THAT(hurried->why, HasSubstr("takes long"));
     EXPECT_FALSE(session->plan(view, {.fold_test = FoldTest::error, .may_measure = false}));
 

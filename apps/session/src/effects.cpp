@@ -19,7 +19,7 @@ constexpr double same_field_degrees = 1e-7;
 
 bool is_full(const Decision& decision) { return decision.request.goal.kind == Goal::Kind::full; }
 
-Effect fold_test_effect(const Decision& decision) {
+Effect fold_test_effect(const Sight& sight, const Decision& decision) {
     if (is_full(decision)) return {"fold test", false, "nothing is folded in the full model"};
     const std::string instead = decision.why.empty() ? std::string() : " (" + std::string(decision.why) + ")";
     if (decision.test == FoldTest::error)
@@ -27,10 +27,9 @@ Effect fold_test_effect(const Decision& decision) {
                 "error: what each fold changes in luminance and outline, against the contrast sensitivity"};
     if (decision.test == FoldTest::luebke_hallen_safe)
         return {"fold test", true,
-                "luebke-hallen-safe: the worst grating of each fold with any neighbours folded, and the shift of the "
-                "mean, against the contrast "
-                "sensitivity" +
-                    instead};
+                "luebke-hallen-safe: the worst grating of each fold with any neighbours folded, " +
+                    std::string(sight.lighting ? "under the lights, " : "and the shift of the mean, ") +
+                    "against the contrast sensitivity" + instead};
     if (decision.test == FoldTest::luebke_hallen)
         return {"fold test", true,
                 "luebke-hallen: the worst grating of each fold against the contrast sensitivity" + instead};
@@ -206,6 +205,8 @@ Effect back_face_effect(const Sight& sight, Purpose purpose) {
 Effect hidden_effect(const Sight& sight, const Decision& decision, const std::optional<CutFacts>& facts) {
     const std::string name = "hidden folding";
     if (decision.request.purpose == Purpose::mesh) return {name, false, "the mesh may be looked at from elsewhere"};
+    if (folds_unseen(sight, decision))
+        return {name, true, "what lies behind what this view shows is folded, by a picture of its depths"};
     if (!folds_hidden(sight, decision))
         return {name, false,
                 is_perceptual(decision) ? "nothing solid is looked at from outside"
@@ -234,12 +235,14 @@ Effect time_limit_effect(const Decision& decision, const std::optional<CutFacts>
 
 std::vector<Effect> effects_of(const Sight& sight, const Decision& decision, const std::optional<CutFacts>& facts) {
     const Purpose purpose = decision.request.purpose;
-    std::vector<Effect> effects = {
-        fold_test_effect(decision),     gaze_effect(sight, decision),          silhouette_effect(sight, decision),
-        csf_effect(sight, decision),    motion_effect(sight, decision),        reach_effect(sight, decision),
-        chroma_effect(sight, decision), translucency_effect(sight, decision),  texture_effect(sight, decision),
-        prelit_effect(sight),           light_effect(sight, decision),         frustum_effect(decision),
-        culling_effect(sight, purpose), magnification_effect(sight, decision), distance_effect(decision, facts)};
+    std::vector<Effect> effects = {fold_test_effect(sight, decision),  gaze_effect(sight, decision),
+                                   silhouette_effect(sight, decision), csf_effect(sight, decision),
+                                   motion_effect(sight, decision),     reach_effect(sight, decision),
+                                   chroma_effect(sight, decision),     translucency_effect(sight, decision),
+                                   texture_effect(sight, decision),    prelit_effect(sight),
+                                   light_effect(sight, decision),      frustum_effect(decision),
+                                   culling_effect(sight, purpose),     magnification_effect(sight, decision),
+                                   distance_effect(decision, facts)};
     if (is_full(decision)) return effects;
     effects.push_back(back_face_effect(sight, purpose));
     effects.push_back(hidden_effect(sight, decision, facts));

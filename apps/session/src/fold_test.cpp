@@ -43,13 +43,15 @@ Choice suitable_test(const Sight& sight, bool chroma, bool may_measure) {
 }
 
 // Whether a test knows what it would have to look at.
-Result<void> check_knowledge(const Sight& sight, FoldTest test, bool chroma) {
+Result<void> check_knowledge(const Sight& sight, FoldTest test, bool chroma, bool shown) {
     if (!is_perceptual(test)) return {};
     if (sight.lighting && test == FoldTest::error)
         return invalid_argument(
             "request.fold_test = " + name_of(test) +
             " knows only the light that the tree was built for: with scene.lights, use request.fold_test = "
             "luebke-hallen-safe.");
+    if (sight.lighting && shown)
+        return invalid_argument("request.shown and scene.lights exclude each other: leave request.shown away.");
     if (sight.lighting && chroma)
         return invalid_argument(
             "request.chroma and scene.lights exclude each other: ranges of colour are those of the tree's own light.");
@@ -165,19 +167,27 @@ vdtree::FollowOptions follow_options(const Sight& sight, const Request& request)
 
 } // namespace
 
+bool is_same(const vdtree::View& a, const vdtree::View& b) {
+    return a.eye == b.eye && a.target == b.target && a.up == b.up && a.fov_y_degrees == b.fov_y_degrees &&
+           a.width == b.width && a.height == b.height;
+}
+
 struct KeptCriterion {
     Key key;
     vdtree::DistanceCriterion criterion;
 };
 
 Result<Decision> decide(const Sight& sight, const Request& request) {
+    if (request.shown && !is_same(request.shown->view(), sight.view))
+        return invalid_argument("request.shown is of another view.");
     const bool folds = request.goal.kind != Goal::Kind::full;
     const bool has_errors = perception::has_fold_measurement(sight.object.tree);
     Choice choice = suitable_test(sight, request.chroma, folds && request.may_measure);
     if (!folds) return Decision{request, choice.test, choice.why};
     if (request.goal.kind == Goal::Kind::pixels) choice = {FoldTest::extent};
     if (request.fold_test) choice = {*request.fold_test};
-    if (const auto known = check_knowledge(sight, choice.test, request.chroma); !known) return known.error();
+    if (const auto known = check_knowledge(sight, choice.test, request.chroma, request.shown.has_value()); !known)
+        return known.error();
     const bool measures = choice.test == FoldTest::error && !has_errors;
     if (measures && !request.may_measure)
         return invalid_argument(
@@ -216,6 +226,10 @@ bool folds_hidden(const Sight& sight, const Decision& decision) {
     return decision.request.purpose == Purpose::picture && is_perceptual(decision) && culls_back_faces(sight);
 }
 
+bool folds_unseen(const Sight& sight, const Decision& decision) {
+    return decision.request.shown && is_perceptual(decision) && !is_translucent(sight);
+}
+
 Result<CutRecipe> make_recipe(const Sight& sight, const Decision& decision) {
     const Key key = key_of(sight, decision);
     std::shared_ptr<const KeptCriterion>& last = sight.cache.criterion;
@@ -224,7 +238,14 @@ Result<CutRecipe> make_recipe(const Sight& sight, const Decision& decision) {
         if (!made) return made.error();
         last = std::make_shared<const KeptCriterion>(KeptCriterion{key, std::move(*made)});
     }
-    return CutRecipe{{last, &last->criterion}, viewpoint_of(sight, decision), follow_options(sight, decision.request)};
+    CutRecipe recipe{{last, &last->criterion}, viewpoint_of(sight, decision), follow_options(sight, decision.request)};
+    if (!folds_unseen(sight, decision)) return recipe;
+    const auto hidden = vdtree::find_hidden(sight.object.tree, sight.object.placement, *decision.request.shown);
+    if (!hidden) return hidden.error();
+    auto without = vdtree::folding_hidden(sight.object.tree, last->criterion, *hidden);
+    if (!without) return without.error();
+    recipe.criterion = std::make_shared<const vdtree::DistanceCriterion>(std::move(*without));
+    return recipe;
 }
 
 } // namespace unseen::session

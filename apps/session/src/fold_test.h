@@ -23,5 +23,6 @@ bool culls_back_faces(
 // Whether what lies outside of the window folds, and all of the object does, by more than any rounding.
 bool is_out_of_sight(const Sight& sight, const Decision& decision);
 bool folds_hidden(const Sight& sight, const Decision& decision); // what a solid's inside hides
+bool folds_unseen(const Sight& sight, const Decision& decision); // what lies behind what the view shows
 
 } // namespace unseen::session

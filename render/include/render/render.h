@@ -13,6 +13,7 @@
 #pragma once
 
 #include <render/context.h>
+#include <render/depth.h>
 #include <render/draw.h>
 #include <render/gpu_tree.h>
 #include <render/overlay.h>

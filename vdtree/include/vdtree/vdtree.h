@@ -31,6 +31,7 @@
 // Views, what decides about folds, and cuts.
 #include <vdtree/criteria.h>
 #include <vdtree/cut.h>
+#include <vdtree/depth_picture.h>
 #include <vdtree/distance_criterion.h>
 #include <vdtree/geomorph.h>
 #include <vdtree/lighting.h>

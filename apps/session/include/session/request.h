@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include <vdtree/depth_picture.h>
 #include <vdtree/mesh.h>
 #include <vdtree/result.h>
 
@@ -50,6 +51,9 @@ struct Request {
     double threshold = 1;    // of imperceptible: fold up to this cost; 2: what cannot be seen from twice the distance
     float hysteresis = 1.1f; // of budgets, frame by frame: by what factor the largest cost may exceed the least, 1..2
     Purpose purpose = Purpose::mesh;
+    // Of pictures: what this view, and no other, shows. What lies behind that is folded, too: simplify_as_seen() of
+    // <session_gpu/as_seen.h> draws it. Not under lights that move.
+    std::optional<vdtree::DepthPicture> shown = {};
     // Measure the errors of folds where the test needs them and the tree lacks them: up to a minute.
     bool may_measure = true;
     // Report::effects: some 20 us an object, which flights through scenes of many can do without.

@@ -1,0 +1,143 @@
+// What a picture hides folds, and nobody sees it: by drawings of scenes whose parts lie behind others.
+#include <session_gpu/as_seen.h>
+
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <perception/judge.h>
+#include <render/depth.h>
+#include <render/renderer.h>
+
+#include "built.h"
+#include "measured.h"
+#include "shapes.h"
+
+namespace unseen::session {
+namespace {
+
+using ::testing::HasSubstr;
+using vdtree::Mesh;
+using vdtree::VertexTree;
+
+// A wall before a bumpy ball, which it covers for the most part.
+Mesh ball_behind_wall() {
+    Mesh wall = shapes::placed(shapes::cube(24), 1.2, {-1.6, -0.6, 2});
+    return shapes::together(shapes::bumpy_sphere(5, 0.01), wall);
+}
+
+perception::Image picture_of(const render::Context& context, const Session& session, const vdtree::Cut& cut,
+                             const vdtree::View& view) {
+    auto renderer = render::Renderer::create(context, session.tree());
+    render::DrawOptions options;
+    options.samples = 64;
+    options.background = session.background();
+    const auto frame = renderer->draw(cut, view, options);
+    EXPECT_TRUE(frame);
+    perception::Image image{frame->width, frame->height, 1, frame->luminance};
+    for (float& value : image.values)
+        value = static_cast<float>(
+            perception::to_luminance(session.observer().display, static_cast<double>(value)).value());
+    return image;
+}
+
+class AsSeen : public testing::Test {
+protected:
+    static Session session_of(const Mesh& mesh) {
+        return *Session::create(Scene::of(support::measured(support::built(mesh))));
+    }
+    static vdtree::View view_of(const Session& session, glm::dvec3 direction) {
+        vdtree::View window = session.default_view();
+        window.fov_y_degrees *= 256.0 / window.height;
+        window.width = window.height = 256;
+        return session.frame(direction, 0.8, window);
+    }
+
+    render::Context context_ = *render::Context::headless();
+};
+
+TEST_F(AsSeen, FoldsWhatIsBehindAndShowsTheSame) {
+    Session session = session_of(ball_behind_wall());
+    for (const glm::dvec3 direction : {glm::dvec3(0, 0, 1), glm::dvec3(-0.3, 0.2, 1), glm::dvec3(1, 0.1, 0.3)}) {
+        const vdtree::View view = view_of(session, direction);
+        const Request request{.purpose = Purpose::picture};
+        const auto usual = session.simplify(view, request);
+        ASSERT_TRUE(usual) << usual.error().message;
+        const auto as_seen = simplify_as_seen(session, context_, view, request);
+        ASSERT_TRUE(as_seen) << as_seen.error().message;
+        if (direction.x <= 0) {
+            EXPECT_LT(as_seen->stats.triangles, 0.9 * usual->stats.triangles);
+        } else {
+            EXPECT_LE(as_seen->stats.triangles, usual->stats.triangles);
+        }
+        vdtree::Cut whole(session.tree());
+        whole.unfold_all();
+        const auto judged = perception::judge_modern(picture_of(context_, session, whole, view),
+                                                     picture_of(context_, session, as_seen->cuts[0], view), {});
+        ASSERT_TRUE(judged);
+        EXPECT_EQ(judged->visible_pixels, 0u) << judged->max_ratio;
+    }
+}
+
+TEST_F(AsSeen, DepthsAreThoseOfTheFarthestSample) {
+    const VertexTree tree = support::built(shapes::icosphere(5));
+    vdtree::View view;
+    view.eye = {0, 0, 5};
+    view.fov_y_degrees = 30;
+    view.width = view.height = 64;
+    vdtree::Cut whole(tree);
+    whole.unfold_all();
+    render::GpuCut cut(*render::GpuTree::create(context_, tree));
+    ASSERT_TRUE(cut.follow(whole));
+    const render::Item item{cut, {}};
+    const auto depth = render::farthest_depth(context_, {&item, 1}, view);
+    ASSERT_TRUE(depth) << depth.error().message;
+    const double focal = 32 / std::tan(view.fov_y_degrees * std::acos(-1.0) / 360);
+    int on_ball = 0;
+    for (int y = 0; y < 64; ++y)
+        for (int x = 0; x < 64; ++x) {
+            const double found = static_cast<double>((*depth)[static_cast<std::size_t>(y * 64 + x)]);
+            // Between the depths at the pixel's nearest and farthest corner from the middle.
+            const auto depth_at = [&](double px, double py) {
+                const double tx = (px - 32) / focal, ty = (py - 32) / focal, t2 = 1 + tx * tx + ty * ty;
+                const double root = 25 - 24 * t2;
+                return root >= 0 ? (5 - std::sqrt(root)) / t2 : std::numeric_limits<double>::infinity();
+            };
+            const double far_x = x < 32 ? x : x + 1, far_y = y < 32 ? y : y + 1;
+            const double near_x = x < 32 ? x + 1 : x, near_y = y < 32 ? y + 1 : y;
+            constexpr double facets = 2e-3; // of the ball, which lie inside of it
+            const double farthest = depth_at(far_x, far_y), nearest = depth_at(near_x, near_y);
+            if (std::isinf(nearest)) {
+                EXPECT_TRUE(std::isinf(found));
+            } else if (std::isfinite(farthest)) {
+                ++on_ball;
+                EXPECT_GE(found, nearest - facets) << x << " " << y;
+                EXPECT_LE(found, farthest + facets + 0.01 * (farthest - nearest)) << x << " " << y;
+            }
+        }
+    EXPECT_GT(on_ball, 1000);
+    EXPECT_FALSE(render::farthest_depth(context_, {&item, 1}, view, 0));
+}
+
+TEST_F(AsSeen, PicturesAreOfTheirOwnViewAlone) {
+    Session session = session_of(shapes::bumpy_sphere(3, 0.02));
+    vdtree::View view = view_of(session, {0, 0, 1});
+    const std::vector<float> depth(static_cast<std::size_t>(view.width * view.height), 1e9f);
+    Request request{.purpose = Purpose::picture};
+    request.shown = *vdtree::DepthPicture::create(view, depth);
+    EXPECT_TRUE(session.simplify(view, request));
+    view.eye.x += 1e-3;
+    const auto other = session.simplify(view, request);
+    ASSERT_FALSE(other);
+    EXPECT_THAT(other.error().message, HasSubstr("request.shown is of another view"));
+    request.purpose = Purpose::mesh;
+    const auto mesh = session.simplify(view, request);
+    ASSERT_FALSE(mesh);
+    EXPECT_THAT(mesh.error().message, HasSubstr("request.shown is of pictures"));
+}
+
+} // namespace
+} // namespace unseen::session

@@ -1,0 +1,163 @@
+// What a picture's depths hide, against points between others, looked up one by one.
+#include <vdtree/depth_picture.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <span>
+#include <vector>
+
+#include <glm/geometric.hpp>
+#include <gtest/gtest.h>
+#include <vdtree/cut.h>
+
+#include "built.h"
+#include "shapes.h"
+
+namespace unseen::vdtree {
+namespace {
+
+constexpr float infinity = std::numeric_limits<float>::infinity();
+
+View small_view() {
+    View view;
+    view.eye = {1, 2, 10};
+    view.target = {0.3, 1, 0};
+    view.up = {0.2, 1, 0.1};
+    view.fov_y_degrees = 50;
+    view.width = 61, view.height = 43;
+    return view;
+}
+
+// Plates at two depths in a random pattern of blocks, and holes.
+std::vector<float> blocks(const View& view, std::mt19937_64& random) {
+    std::vector<float> depth(static_cast<std::size_t>(view.width * view.height));
+    std::vector<float> block(64);
+    for (float& d : block) d = random() % 4 == 0 ? infinity : random() % 2 ? 4.0f : 8.0f;
+    for (int y = 0; y < view.height; ++y)
+        for (int x = 0; x < view.width; ++x)
+            depth[static_cast<std::size_t>(y * view.width + x)] = block[static_cast<std::size_t>(y / 12 * 8 + x / 8)];
+    return depth;
+}
+
+// Whether a point is beside the window or behind what is shown at its pixel.
+bool is_hidden(const View& view, const std::vector<float>& depth, glm::dvec3 point) {
+    const CameraFrame camera = camera_frame(view);
+    const glm::dvec3 p = point - view.eye;
+    const double along = -glm::dot(p, camera.back);
+    if (!(along > 0)) return false;
+    const double focal = view.height / (2 * std::tan(view.fov_y_degrees * std::numbers::pi / 360));
+    const double x = std::floor(0.5 * view.width + focal * glm::dot(p, camera.right) / along),
+                 y = std::floor(0.5 * view.height - focal * glm::dot(p, camera.up) / along);
+    if (x < 0 || y < 0 || x >= view.width || y >= view.height) return true;
+    return static_cast<double>(depth[static_cast<std::size_t>(y) * static_cast<std::size_t>(view.width) +
+                                     static_cast<std::size_t>(x)]) < along;
+}
+
+// So many places around one.
+std::vector<glm::dvec3> random_places(std::mt19937_64& random, int count) {
+    const glm::dvec3 centre(shapes::random_between(random, -6, 6), shapes::random_between(random, -5, 6),
+                            shapes::random_between(random, -8, 10));
+    const double radius = std::exp2(shapes::random_between(random, -6, 1));
+    std::vector<glm::dvec3> places;
+    for (int i = 0; i < count; ++i) places.push_back(centre + radius * shapes::random_direction(random));
+    return places;
+}
+
+DepthPicture::Footprint footprint_of(const DepthPicture& picture, std::span<const glm::dvec3> places) {
+    DepthPicture::Footprint all;
+    for (const glm::dvec3& place : places) all.add(picture.footprint(place));
+    return all;
+}
+
+TEST(DepthPicture, HidesOnlyWhatIsHiddenBetweenAllPoints) {
+    std::mt19937_64 random(3);
+    const View view = small_view();
+    int hidden = 0, seen = 0;
+    for (int trial = 0; trial < 4000; ++trial) {
+        const std::vector<float> depth = blocks(view, random);
+        const DepthPicture picture = *DepthPicture::create(view, depth);
+        const auto places = random_places(random, 4);
+        if (!picture.hides(footprint_of(picture, places))) {
+            ++seen;
+            continue;
+        }
+        ++hidden;
+        for (int i = 0; i < 100; ++i) {
+            glm::dvec3 between(0);
+            double left = 1;
+            for (std::size_t k = 0; k < places.size(); ++k) {
+                const double share = k + 1 < places.size() ? left * shapes::random_between(random, 0, 1) : left;
+                between += share * places[k];
+                left -= share;
+            }
+            ASSERT_TRUE(is_hidden(view, depth, between)) << "trial " << trial;
+        }
+    }
+    EXPECT_GT(hidden, 500);
+    EXPECT_GT(seen, 500);
+}
+
+TEST(DepthPicture, WhatHoldsWhatIsSeenIsSeen) {
+    std::mt19937_64 random(4);
+    const View view = small_view();
+    const DepthPicture picture = *DepthPicture::create(view, blocks(view, random));
+    for (int trial = 0; trial < 20000; ++trial) {
+        const auto places = random_places(random, 4);
+        if (picture.hides(footprint_of(picture, places))) {
+            ASSERT_TRUE(picture.hides(footprint_of(picture, std::span(places).first(2)))) << trial;
+        }
+    }
+}
+
+TEST(DepthPicture, FoldsWhatIsBehindAPlate) {
+    const VertexTree tree = support::built(shapes::icosphere(5));
+    View view;
+    view.eye = {0, 0, 6};
+    view.fov_y_degrees = 30;
+    view.width = view.height = 64;
+    const DistanceCriterion extent = *extent_criterion(tree, view, 0.01);
+    const Viewpoint viewpoint{.eye = view.eye - tree.origin()};
+    Cut whole(tree);
+    ASSERT_TRUE(whole.follow(extent, viewpoint));
+    // Left half covered by a plate before the ball.
+    std::vector<float> depth(64 * 64, infinity);
+    for (std::size_t i = 0; i < depth.size(); ++i)
+        if (i % 64 < 32) depth[i] = 3;
+    const auto hidden = find_hidden(tree, {}, *DepthPicture::create(view, depth));
+    ASSERT_TRUE(hidden);
+    const auto criterion = folding_hidden(tree, extent, *hidden);
+    ASSERT_TRUE(criterion) << criterion.error().message;
+    EXPECT_TRUE(criterion->is_monotone());
+    Cut half(tree);
+    ASSERT_TRUE(half.follow(*criterion, viewpoint));
+    EXPECT_LT(half.triangle_count(), 0.65 * whole.triangle_count());
+    EXPECT_GT(half.triangle_count(), 0.45 * whole.triangle_count());
+    for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf) {
+        const NodeId vertex = tree.interior_count() + leaf;
+        if (tree.positions()[vertex].x + tree.origin().x > 0.05) {
+            ASSERT_TRUE(half.is_active(vertex)) << leaf;
+        }
+    }
+}
+
+TEST(DepthPicture, RefusesWhatIsNone) {
+    const View view = small_view();
+    std::vector<float> depth(static_cast<std::size_t>(view.width * view.height), 1.0f);
+    EXPECT_TRUE(DepthPicture::create(view, depth));
+    EXPECT_FALSE(DepthPicture::create(view, std::span(depth).first(5)));
+    for (const float bad : {0.0f, -1.0f, std::nanf("")}) {
+        depth[7] = bad;
+        const auto none = DepthPicture::create(view, depth);
+        ASSERT_FALSE(none);
+        EXPECT_NE(none.error().message.find("pixel 7"), std::string::npos);
+    }
+    const VertexTree tree = support::built(shapes::icosphere(2)), other = support::built(shapes::icosphere(3));
+    const DistanceCriterion extent = *extent_criterion(tree, view, 1);
+    EXPECT_FALSE(folding_hidden(other, extent, std::vector<std::uint64_t>((other.interior_count() + 63) / 64)));
+    EXPECT_FALSE(folding_hidden(tree, extent, {}));
+}
+
+} // namespace
+} // namespace unseen::vdtree

@@ -1,0 +1,155 @@
+// Boxes on the screen against the farthest depths there: a pyramid of maxima, of which a question takes a few texels.
+#include <vdtree/depth_picture.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+
+#include <glm/geometric.hpp>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <vdtree/internal/errors.h>
+
+namespace unseen::vdtree {
+namespace {
+
+// Share of a depth: those of pictures are floats, and went through a few roundings.
+constexpr double depth_rounding = 1e-5;
+// Pixels around what a node covers: outlines move by less than a pixel without being seen.
+constexpr int margin_px = 1;
+// A question looks at so many texels along each axis at most.
+constexpr int texels_a_side = 3;
+int to_pixel(double px, int size) {
+    return static_cast<int>(std::clamp(std::floor(px), -1.0, static_cast<double>(size)));
+}
+
+} // namespace
+
+Result<DepthPicture> DepthPicture::create(const View& view, std::span<const float> depth) {
+    if (const auto valid = validate(view); !valid) return valid.error();
+    const auto pixels = static_cast<std::size_t>(view.width) * static_cast<std::size_t>(view.height);
+    if (depth.size() != pixels)
+        return invalid_argument("A depth picture of this view has " + std::to_string(pixels) + " pixels, not " +
+                                std::to_string(depth.size()) + ".");
+    for (std::size_t i = 0; i < pixels; ++i)
+        if (!(depth[i] > 0)) return invalid_argument("The depth at pixel " + std::to_string(i) + " must be above 0.");
+    auto all = std::make_shared<Levels>();
+    all->view = view;
+    all->camera = camera_frame(view);
+    all->focal_px = view.height / (2 * std::tan(view.fov_y_degrees * std::numbers::pi / 360));
+    all->levels.push_back({view.width, view.height, {depth.begin(), depth.end()}});
+    while (all->levels.back().width > 1 || all->levels.back().height > 1) {
+        const Level& fine = all->levels.back();
+        Level coarse{(fine.width + 1) / 2, (fine.height + 1) / 2, {}};
+        coarse.farthest.reserve(static_cast<std::size_t>(coarse.width) * static_cast<std::size_t>(coarse.height));
+        for (int y = 0; y < coarse.height; ++y) {
+            const auto row = [&](int at) {
+                return fine.farthest.data() + static_cast<std::ptrdiff_t>(std::min(at, fine.height - 1)) * fine.width;
+            };
+            const float *const above = row(2 * y), *const below = row(2 * y + 1);
+            for (int x = 0; x < coarse.width; ++x) {
+                const int left = 2 * x, right = std::min(2 * x + 1, fine.width - 1);
+                coarse.farthest.push_back(std::max({above[left], above[right], below[left], below[right]}));
+            }
+        }
+        all->levels.push_back(std::move(coarse));
+    }
+    return DepthPicture(std::move(all));
+}
+
+float DepthPicture::farthest(int left, int top, int right, int bottom) const noexcept {
+    std::size_t level = 0;
+    while ((right >> level) - (left >> level) >= texels_a_side || (bottom >> level) - (top >> level) >= texels_a_side)
+        ++level;
+    const Level& texels = levels_->levels[level];
+    float most = 0;
+    for (int y = top >> level; y <= bottom >> level; ++y)
+        for (int x = left >> level; x <= right >> level; ++x)
+            most = std::max(most, texels.farthest[static_cast<std::size_t>(y) * static_cast<std::size_t>(texels.width) +
+                                                  static_cast<std::size_t>(x)]);
+    return most;
+}
+
+void DepthPicture::Footprint::add(const Footprint& other) noexcept {
+    left = std::min(left, other.left), top = std::min(top, other.top);
+    right = std::max(right, other.right), bottom = std::max(bottom, other.bottom);
+    nearest = std::min(nearest, other.nearest);
+}
+
+DepthPicture::Footprint DepthPicture::footprint(glm::dvec3 point) const noexcept {
+    const Levels& all = *levels_;
+    const glm::dvec3 from_eye = point - all.view.eye;
+    const double along = -glm::dot(from_eye, all.camera.back), scale = all.focal_px / along;
+    if (!(along > 0)) return {.nearest = 0};
+    const double x = 0.5 * all.view.width + scale * glm::dot(from_eye, all.camera.right);
+    const double y = 0.5 * all.view.height - scale * glm::dot(from_eye, all.camera.up);
+    return {x, y, x, y, along};
+}
+
+bool DepthPicture::hides(const Footprint& of) const noexcept {
+    if (!(of.nearest > 0)) return false;
+    const int width = levels_->view.width, height = levels_->view.height;
+    const int left = to_pixel(of.left - margin_px, width), right = to_pixel(of.right + margin_px, width);
+    const int top = to_pixel(of.top - margin_px, height), bottom = to_pixel(of.bottom + margin_px, height);
+    if (right < 0 || bottom < 0 || left >= width || top >= height) return true; // beside the window
+    const float shown =
+        farthest(std::max(left, 0), std::max(top, 0), std::min(right, width - 1), std::min(bottom, height - 1));
+    return static_cast<double>(shown) < of.nearest * (1 - depth_rounding);
+}
+
+Result<std::vector<std::uint64_t>> find_hidden(const VertexTree& tree, const Similarity& placement,
+                                               const DepthPicture& picture) {
+    const auto sound = SoundTree::of(tree);
+    if (!sound) return sound.error();
+    const NodeId interior = tree.interior_count();
+    const auto at = [&](NodeId node) {
+        return picture.footprint(placement.to_world(tree.origin() + glm::dvec3(tree.positions()[node])));
+    };
+    std::vector<DepthPicture::Footprint> footprints(tree.node_count());
+    tbb::parallel_for(NodeId{0}, tree.node_count(), [&](NodeId node) { footprints[node] = at(node); });
+    // Leaves: all triangles that touch them. From their own places, not from what has grown.
+    std::vector<DepthPicture::Footprint> leaves(footprints.begin() + interior, footprints.end());
+    for (const Triangle& triangle : sound->triangles())
+        for (const Index corner : triangle)
+            for (const Index other : triangle) leaves[corner].add(footprints[interior + other]);
+    std::copy(leaves.begin(), leaves.end(), footprints.begin() + interior);
+    for (NodeId node = tree.node_count(); node-- > 1;) footprints[sound->parents()[node]].add(footprints[node]);
+
+    constexpr NodeId word = 64;
+    std::vector<std::uint64_t> hidden((interior + word - 1) / word, 0);
+    constexpr std::size_t grain = 64;
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, hidden.size(), grain), [&](const auto& range) {
+        for (std::size_t w = range.begin(); w < range.end(); ++w) {
+            const NodeId end = std::min(static_cast<NodeId>((w + 1) * word), interior);
+            for (auto node = static_cast<NodeId>(w * word); node < end; ++node)
+                if (picture.hides(footprints[node])) hidden[w] |= std::uint64_t{1} << (node % word);
+        }
+    });
+    return hidden;
+}
+
+Result<DistanceCriterion> folding_hidden(const VertexTree& tree, const DistanceCriterion& criterion,
+                                         std::span<const std::uint64_t> hidden) {
+    constexpr NodeId word = 64;
+    if (criterion.interior_count() != tree.interior_count() ||
+        hidden.size() != (tree.interior_count() + word - 1) / word)
+        return invalid_argument("The criterion, or what is hidden, is not of this tree.");
+    DistanceCriterion::Parts parts = criterion.parts();
+    if (parts.lit) return invalid_argument("Criteria with lights cannot fold what a picture hides.");
+    const std::size_t rows = parts.switch_distance.size() / parts.eccentricity_bins;
+    constexpr std::size_t most_rows = std::size_t{std::numeric_limits<std::uint16_t>::max()} + 1;
+    if (rows >= most_rows) return invalid_argument("The criterion has no room for a row more.");
+    parts.classes.resize(tree.interior_count()); // empty: the first row for all
+    parts.switch_distance.insert(parts.switch_distance.end(), parts.eccentricity_bins,
+                                 DistanceCriterion::never_visible);
+    if (!parts.least_cost.empty()) parts.least_cost.insert(parts.least_cost.end(), parts.eccentricity_bins, 0.0f);
+    const auto nothing = static_cast<std::uint16_t>(rows);
+    for (NodeId node = 0; node < tree.interior_count(); ++node)
+        if ((hidden[node / word] >> (node % word) & 1) != 0) parts.classes[node] = {nothing, nothing};
+    return DistanceCriterion::create(tree, std::move(parts));
+}
+
+} // namespace unseen::vdtree
