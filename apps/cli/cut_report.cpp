@@ -2,6 +2,10 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
+#include <string_view>
+#include <tuple>
+#include <utility>
 
 #include "option_names.h"
 #include "terminal.h"
@@ -11,6 +15,18 @@ namespace {
 
 bool is_whole(const session::Report& s) {
     return s.stats.triangles == s.source_triangles && s.stats.max_fold_cost == 0;
+}
+
+// Each once, in the order of the first, with how many objects have it.
+std::vector<std::pair<const session::Effect*, std::size_t>> merged(std::span<const session::Effect> effects) {
+    std::vector<std::pair<const session::Effect*, std::size_t>> all;
+    std::map<std::tuple<std::string_view, bool, std::string_view>, std::size_t> places;
+    for (const session::Effect& effect : effects) {
+        const auto [place, is_new] = places.try_emplace({effect.name, effect.on, effect.why}, all.size());
+        if (is_new) all.push_back({&effect, 0});
+        ++all[place->second].second;
+    }
+    return all;
 }
 
 } // namespace
@@ -111,14 +127,18 @@ void print_details(const session::Report& s, double draw_ms) {
 
 Json to_json(std::span<const session::Effect> effects) {
     Json json = Json::array();
-    for (const session::Effect& effect : effects)
-        json.push_back({{"name", effect.name}, {"on", effect.on}, {"why", with_option_names(effect.why)}});
+    for (const auto& [effect, objects] : merged(effects)) {
+        json.push_back({{"name", effect->name}, {"on", effect->on}, {"why", with_option_names(effect->why)}});
+        if (objects > 1) json.back()["objects"] = objects;
+    }
     return json;
 }
 
 void print(std::span<const session::Effect> effects) {
-    for (const session::Effect& effect : effects)
-        print_line(std::string(effect.on ? "  on   " : "  off  ") + effect.name + ": " + with_option_names(effect.why));
+    for (const auto& [effect, objects] : merged(effects))
+        print_line(std::string(effect->on ? "  on   " : "  off  ") + effect->name + ": " +
+                   with_option_names(effect->why) +
+                   (objects > 1 ? " (" + grouped(objects) + " objects)" : std::string()));
 }
 
 } // namespace unseen::app

@@ -59,9 +59,10 @@ CLI::App* add_make(CLI::App& verb, const std::shared_ptr<SceneArguments>& a) {
         ->type_name("museum|treasure|house|forest")
         ->check(one_of({"museum", "treasure", "house", "forest"}));
     make->add_option("-o,--output", a->out, "The scene")->required()->type_name("OUT.glb")->check(ending_in({".glb"}));
-    add_triangles_option(*make, a->triangles,
-                         "About so many of all objects, shared meshes counted for each, 10,000 to 100,000,000 "
-                         "(default: museum 0.3, house 1.5, treasure and forest 2 million)")
+    add_triangles_option(
+        *make, a->triangles,
+        "About so many of all objects, shared meshes counted for each, 10,000 to 100,000,000 "
+        "(default: museum 0.3, house 1.5, treasure and forest 2 million); a forest has 0.3 million at least")
         ->type_name("N");
     make->add_option("--mesh", a->statues,
                      "A statue; may be given again (default: the bunny of Debian's package glmark2-data, where it is "
