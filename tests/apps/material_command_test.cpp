@@ -59,8 +59,8 @@ protected:
     // From where the scene is seen.
     ::testing::AssertionResult look_the_same(const std::string& a, const std::string& b) const {
         return CommandTest::look_the_same(a, b,
-                                          {"--as", "model", "--size", "400x200", "--eye", "0", "0.5", "6", "--target", "0", "0", "0",
-                                           "--samples", "4", "--light", "1", "1", "1"});
+                                          {"--as", "model", "--size", "400x200", "--eye", "0", "0.5", "6", "--target",
+                                           "0", "0", "0", "--samples", "4", "--light", "1", "1", "1"});
     }
 };
 
