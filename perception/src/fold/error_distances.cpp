@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include <glm/geometric.hpp>
+
 #include "fold/error_distances.h"
 #include "fold/fold_screen.h"
 #include "fold/luminance_classes.h"
@@ -150,22 +152,60 @@ struct Bands {
     }
 };
 
+// What a mesh is seen before, as far as it darkens what bands of low frequencies adapt to.
+struct Surround {
+    double darkest_cdm2 = 0;
+    double coverage = 1; // of the mesh's disc, from all sides in the mean
+};
+
+// By how many octaves the mean light around a pattern of one luminance is less than its own: [width * bands + band], as
+// Bands. A band looks at a neighbourhood as wide as its wave, of which the mesh lights no more than it covers of the
+// pattern's own. Empty where nothing darker is behind.
+struct Dimming {
+    std::vector<float> of_patches, of_areas;
+    std::size_t most = 0; // octaves
+
+    Dimming(const Bands& bands, const Surround& surround, double luminance_cdm2, double highest_cpd,
+            const FoldModel& model) {
+        const double dark = std::max(surround.darkest_cdm2, luminance_cdm2 * std::exp2(-most_dimming));
+        if (!(dark < luminance_cdm2)) return;
+        const auto octaves_below = [&](double waves) {
+            const double lit = std::min(1.0, surround.coverage * waves * waves);
+            return static_cast<float>(-std::log2(std::lerp(dark / luminance_cdm2, 1.0, lit)));
+        };
+        for (std::size_t i = 0; i < width_count; ++i)
+            for (const double low : bands.lowest_cpd) {
+                const double waves = width_deg(i) * std::min(low * frequency_step, highest_cpd);
+                of_patches.push_back(octaves_below(waves * model.neighbourhood));
+                of_areas.push_back(octaves_below(waves));
+            }
+        most = static_cast<std::size_t>(std::ceil(std::log2(luminance_cdm2 / dark)));
+    }
+    static constexpr double most_dimming = 12; // octaves; beyond, the eye's own noise is the limit
+};
+
 // What can be seen at one luminance and eccentricity. Bands of frequency an octave apart look for a pattern; what they
 // see of it is pooled as the eye pools its channels; wherever the bands' octaves begin.
 class Eye {
 public:
     Eye(const CsfTable& csf, double eccentricity_deg, double luminance_cdm2, const Screen& screen, const Bands& bands,
-        const FoldModel& model)
+        const Dimming& dimming, const FoldModel& model)
         : screen_(screen), model_(model) {
-        std::vector<double> sensitivities;
-        for (const double low : bands.lowest_cpd)
-            sensitivities.push_back(
-                csf.monotone_sensitivity(CyclesPerDegree(low), Degrees(eccentricity_deg), Luminance(luminance_cdm2)));
+        // To contrasts over the pattern's own luminance, by octaves that the mean around it is less: [octaves][band].
+        Sensitivities sensitivities(dimming.most + 1);
+        for (std::size_t octaves = 0; octaves <= dimming.most; ++octaves)
+            for (std::size_t band = 0; band < bands.lowest_cpd.size(); ++band) {
+                const double less = std::exp2(static_cast<double>(octaves));
+                const double here =
+                    less * csf.monotone_sensitivity(CyclesPerDegree(bands.lowest_cpd[band]), Degrees(eccentricity_deg),
+                                                    Luminance(luminance_cdm2 / less));
+                sensitivities[octaves].push_back(octaves > 0 ? std::max(here, sensitivities[octaves - 1][band]) : here);
+            }
         const double needed = needed_sensitivity(model, Degrees(eccentricity_deg));
         for (std::size_t i = 0; i < width_count; ++i) {
-            patches_[i] = 1 / (needed * visibility(sensitivities, bands.of_patches, i));
-            areas_[i] = 1 / (model.needed_by_areas * visibility(sensitivities, bands.of_areas, i));
-            strips_[i] = 1 / visibility(sensitivities, bands.of_strips, i);
+            patches_[i] = 1 / (needed * visibility(sensitivities, bands.of_patches, dimming.of_patches, i));
+            areas_[i] = 1 / (model.needed_by_areas * visibility(sensitivities, bands.of_areas, dimming.of_areas, i));
+            strips_[i] = 1 / visibility(sensitivities, bands.of_strips, {}, i);
         }
     }
 
@@ -188,14 +228,24 @@ public:
 private:
     static constexpr std::size_t bands_per_octave = 8;
     using Thresholds = std::array<double, width_count>; // contrasts, by width
+    using Sensitivities = std::vector<std::vector<double>>;
 
-    // Of unit contrast, in thresholds.
-    static double visibility(const std::vector<double>& sensitivities, const Bands::Shares& shares, std::size_t width) {
-        const std::size_t bands = sensitivities.size();
+    // Of unit contrast, in thresholds. `dimmed`: octaves, as Dimming has them; empty: none.
+    static double visibility(const Sensitivities& sensitivities, const Bands::Shares& shares,
+                             std::span<const float> dimmed, std::size_t width) {
+        const std::size_t bands = sensitivities.front().size();
         const double* const share = shares.data() + width * bands;
         std::array<double, bands_per_octave> sums{}; // by where the octaves begin
-        for (std::size_t i = 0; i < bands; ++i)
-            sums[i % bands_per_octave] += to_power_of_pooling(share[i] * sensitivities[i]);
+        for (std::size_t i = 0; i < bands; ++i) {
+            double sensitivity = sensitivities[0][i];
+            if (!dimmed.empty() && dimmed[width * bands + i] > 0) {
+                const double octaves = static_cast<double>(dimmed[width * bands + i]);
+                const auto whole = std::min(static_cast<std::size_t>(octaves), sensitivities.size() - 2);
+                sensitivity = std::lerp(sensitivities[whole][i], sensitivities[whole + 1][i],
+                                        octaves - static_cast<double>(whole));
+            }
+            sums[i % bands_per_octave] += to_power_of_pooling(share[i] * sensitivity);
+        }
         return std::pow(*std::max_element(sums.begin(), sums.end()), 1 / pooling);
     }
 
@@ -229,8 +279,8 @@ class SwitchDistances {
 public:
     // `added`: rows that add() will ask for.
     SwitchDistances(const Levels& levels, const Screen& screen, const CsfTable& csf, const FoldModel& model,
-                    std::size_t bins, std::size_t added)
-        : levels_(levels), screen_(screen), csf_(csf), model_(model),
+                    const Surround& surround, std::size_t bins, std::size_t added)
+        : levels_(levels), screen_(screen), csf_(csf), model_(model), surround_(surround),
           bands_(screen.highest_cpd, model, csf.samples().summation), bins_(bins), most_patterns_(last_row - added),
           discs_(luminance_count), eyes_(luminance_count) {
         begin();
@@ -292,10 +342,13 @@ private:
 
     const Eye& eye(int luminance, std::size_t bin) {
         auto& eyes = eyes_[static_cast<std::size_t>(luminance)];
-        if (eyes.empty())
+        if (eyes.empty()) {
+            const double cdm2 = levels_.luminance(luminance);
+            const Dimming dimming(bands_, surround_, cdm2, screen_.highest_cpd, model_);
             for (std::size_t b = 0; b < bins_; ++b)
-                eyes.emplace_back(csf_, static_cast<double>(b) * degrees_per_bin, levels_.luminance(luminance), screen_,
-                                  bands_, model_);
+                eyes.emplace_back(csf_, static_cast<double>(b) * degrees_per_bin, cdm2, screen_, bands_, dimming,
+                                  model_);
+        }
         return eyes[bin];
     }
 
@@ -368,6 +421,7 @@ private:
     const Screen& screen_;
     const CsfTable& csf_;
     const FoldModel& model_;
+    const Surround surround_;
     const Bands bands_;
     std::size_t bins_, most_patterns_;
     int coarseness_ = 1;
@@ -506,6 +560,19 @@ bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors
     return true;
 }
 
+// How much of its sphere's disc a mesh covers from all sides, in the mean: a quarter of a convex surface's area is what
+// it covers.
+double coverage_of(const vdtree::SoundTree& tree) {
+    const NodeId leaves = tree.interior_count();
+    double area = 0;
+    for (const vdtree::Triangle& triangle : tree.triangles()) {
+        const auto at = [&](std::size_t k) { return glm::dvec3(tree.positions()[leaves + triangle[k]]); };
+        area += 0.5 * glm::length(glm::cross(at(1) - at(0), at(2) - at(0)));
+    }
+    const double radius = tree.bounding_sphere().radius, disc = std::numbers::pi * radius * radius;
+    return disc > 0 ? std::min(1.0, area / 4 / disc) : 1;
+}
+
 // A node folds as well where the whole mesh does, as far as the node's stage: takes the stage where that is nowhere
 // seen from farther, unless a child would then be. Children before parents.
 void fold_in_stages(const vdtree::SoundTree& tree, std::span<const FoldError> errors,
@@ -543,7 +610,9 @@ Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const Fold
     parts.lengths.resize(nodes);
     parts.silhouette_lengths.resize(nodes);
     const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
-    SwitchDistances switch_distances(levels, screen, csf, options.model, parts.eccentricity_bins,
+    const Surround surround{levels.in_cdm2(options.scene.behind ? options.scene.behind->lo : options.scene.darkest),
+                            coverage_of(tree)};
+    SwitchDistances switch_distances(levels, screen, csf, options.model, surround, parts.eccentricity_bins,
                                      measured.stages.size());
     std::vector<Shown> patches, strips;
     while (!find_shown(tree, errors, options, levels, csf, screen.highest_cpd, switch_distances, patches, strips))

@@ -38,6 +38,28 @@ constexpr Bins coarse_bins{degrees_per_bin, bin_count}, fine_bins{degrees_per_bi
 struct Sensitivities {
     CsfTable luminance;
     std::optional<CsfTable> red_green, yellow_violet;
+
+    // To gratings without end, of whatever frequency is seen best.
+    double of_areas(Degrees eccentricity, Luminance at) const {
+        constexpr double octaves = 0.25;
+        constexpr int steps = 40; // to 64 cpd
+        static const std::array<double, steps> gains = [] {
+            std::array<double, steps> all{}; // by step: no less than within it, for gains grow with the frequency
+            for (int i = 0; i < steps; ++i)
+                all[static_cast<std::size_t>(i)] =
+                    summation_gain(CyclesPerDegree(lowest_table_cpd * std::exp2((i + 1) * octaves)), unlimited);
+            return all;
+        }();
+        const double own = luminance.samples().summation;
+        double best = 0;
+        for (int i = 0; i < steps; ++i) {
+            const CyclesPerDegree low(lowest_table_cpd * std::exp2(i * octaves));
+            best = std::max(best, own * gains[static_cast<std::size_t>(i)] *
+                                      luminance.monotone_sensitivity(low, eccentricity, at));
+        }
+        return best;
+    }
+    static constexpr SquareDegrees unlimited{std::numeric_limits<double>::infinity()};
 };
 
 // Whether patches are taken for gratings alone, as published, or for what else half a wave holds.
@@ -104,11 +126,11 @@ struct Row {
             multiple = next;
         }
     }
-    // Of the shifts of the mean, at whatever frequency they are seen best.
+    // Of the shifts of the mean, at whatever frequency they are seen best, over areas of any size.
     double shift_visibility(const Sensitivities& see, double eccentricity_deg) const {
         const Degrees eccentricity(eccentricity_deg);
         const Luminance luminance(luminance_cdm2);
-        const double grey = shift > 0 ? shift * see.luminance.peak_sensitivity(eccentricity, luminance) : 0;
+        const double grey = shift > 0 ? shift * see.of_areas(eccentricity, luminance) : 0;
         if (chroma_shift == glm::dvec2(0)) return grey;
         return std::hypot(grey, chroma_shift.x * see.red_green->peak_sensitivity(eccentricity, luminance),
                           chroma_shift.y * see.yellow_violet->peak_sensitivity(eccentricity, luminance));
