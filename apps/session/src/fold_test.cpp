@@ -28,7 +28,7 @@ perception::FoldTestOptions test_options(const Sight& sight, const Request& requ
 
 struct Choice {
     FoldTest test = FoldTest::error;
-    std::string why = {};
+    std::string_view why = {};
 };
 
 // Of the tests by luminance one that knows the scene, and colours where they count.
@@ -111,7 +111,7 @@ Key key_of(const Sight& sight, const Decision& decision) {
         return key;
     }
     key.scene = sight.luminance;
-    key.is_lit = sight.lighting.has_value();
+    key.is_lit = sight.lighting != nullptr;
     key.chroma = decision.request.chroma;
     key.csf = sight.csf;
     if (sight.gaze_px) key.farthest_gaze_px = farthest_gaze_px(sight.view, *sight.gaze_px);
@@ -183,7 +183,7 @@ Result<Decision> decide(const Sight& sight, const Request& request) {
     const bool folds = request.goal.kind != Goal::Kind::full;
     const bool has_errors = perception::has_fold_measurement(sight.object.tree);
     Choice choice = suitable_test(sight, request.chroma, folds && request.may_measure);
-    if (!folds) return Decision{request, choice.test, std::move(choice.why)};
+    if (!folds) return Decision{request, choice.test, choice.why};
     if (request.goal.kind == Goal::Kind::pixels) choice = {FoldTest::extent};
     if (request.fold_test) choice = {*request.fold_test};
     if (const auto known = check_knowledge(sight, choice.test, request.chroma, request.shown.has_value()); !known)
@@ -193,7 +193,7 @@ Result<Decision> decide(const Sight& sight, const Request& request) {
         return invalid_argument(
             "request.fold_test = error goes by errors that the tree does not hold: allow request.may_measure, or call "
             "session::measured().");
-    return Decision{request, choice.test, std::move(choice.why), measures};
+    return Decision{request, choice.test, choice.why, measures};
 }
 
 bool is_perceptual(const Decision& decision) {
@@ -208,6 +208,17 @@ bool culls_back_faces(const Sight& sight) {
     const WorldSphere sphere = world_sphere(sight.object);
     return !is_translucent(sight) && sight.object.tree.closedness() != vdtree::Closedness::open &&
            glm::length(sight.view.eye - sphere.centre) > sphere.radius;
+}
+
+bool is_out_of_sight(const Sight& sight, const Decision& decision) {
+    if (decision.request.purpose != Purpose::picture) return false;
+    const WorldSphere sphere = sphere_of_all(sight.object, sight.cache);
+    const glm::dvec3 away = sphere.centre - sight.view.eye;
+    // Far more than planes and spheres in single floats are off by.
+    const double margin = 1e-3 * sphere.radius + 1e-5 * glm::length(away);
+    return std::any_of(sight.window->begin(), sight.window->end(), [&](const vdtree::Plane& plane) {
+        return glm::dot(plane.normal, away) < -(sphere.radius + margin);
+    });
 }
 
 // Extent and displacement look at supports, which do not contain all that a fold changes.
