@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include <session_gpu/gpu_judge.h>
+
 #include "frame_image.h"
 
 namespace unseen::app {
@@ -20,11 +22,12 @@ bool needs_errors(FoldTest test) { return test == FoldTest::error; }
 } // namespace
 
 Result<JudgedModel> JudgedModel::create(const render::Context& context, std::string name, vdtree::VertexTree tree,
-                                        int window_px, perception::CsfModel second) {
+                                        int window_px, perception::CsfModel second, JudgeDevice device) {
     JudgedModel model;
     model.context_ = context;
     model.name_ = std::move(name);
     model.second_ = second;
+    model.device_ = device;
     auto stand = model.make_stand(std::move(tree));
     if (!stand) return stand.error();
     model.plain_ = std::move(*stand);
@@ -146,7 +149,10 @@ Result<perception::Judgement> JudgedModel::judge(const Picture& picture, const s
         options = perception::second_judge_options(perception::default_person, display, gaze_px);
         if (second_ != usual_second) options.csf = second_, options.gain = perception::default_person.gain;
     }
-    return perception::judge_modern(**reference, picture.luminance, options);
+    if (device_ == JudgeDevice::cpu) return perception::judge_modern(**reference, picture.luminance, options);
+    auto on_gpu = session::GpuJudge::create(*context_, **reference, options);
+    if (!on_gpu) return on_gpu.error();
+    return on_gpu->judge(picture.luminance);
 }
 
 Result<perception::Judgement> JudgedModel::judge(const WhatOptions& what, Judge by) {

@@ -22,6 +22,9 @@ inline constexpr std::array judges = {Judge::modern, Judge::second};
 inline constexpr perception::CsfModel usual_second =
     perception::CsfModel::barten_fitted; // of the eye's physics, by its own laws of area and of frequency
 
+// Where they run. The GPU's says what the CPU's says within 0.1%.
+enum class JudgeDevice { cpu, gpu };
+
 struct Verdicts {
     vdtree::Index triangles = 0;
     std::array<std::uint64_t, judges.size()> visible_pixels = {};
@@ -32,7 +35,8 @@ class JudgedModel {
 public:
     // Keeps a handle to the context.
     static Result<JudgedModel> create(const render::Context& context, std::string name, vdtree::VertexTree tree,
-                                      int window_px, perception::CsfModel second = usual_second);
+                                      int window_px, perception::CsfModel second = usual_second,
+                                      JudgeDevice device = JudgeDevice::cpu);
 
     const std::string& name() const { return name_; }
     const vdtree::VertexTree& tree() const { return plain_.session->tree(); }
@@ -82,6 +86,7 @@ private:
     perception::Display display_;
     std::optional<perception::Luminance> background_;
     perception::CsfModel second_ = usual_second;
+    JudgeDevice device_ = JudgeDevice::cpu;
     vdtree::View view_;
     Stand plain_, measured_; // the second with the errors of folds; made when it is first asked for
     std::optional<perception::Image> full_;

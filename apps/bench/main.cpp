@@ -158,7 +158,7 @@ Command engine_command(CLI::App& app) {
 
 struct PerceptionArguments {
     PerceptionBenchOptions options;
-    std::string only, targets;
+    std::string only, targets, device = "cpu";
     ReportArguments report;
 };
 
@@ -197,7 +197,9 @@ Result<int> run(PerceptionArguments& a) {
     if (!result) return result.error();
     std::vector<BenchTable> tables = {table_of(result->title, result->rows)};
     tables.insert(tables.end(), result->details.begin(), result->details.end());
-    return bench->close({{"title", result->title}, {"rows", to_json(result->rows)}, {"views", result->views}}, tables);
+    return bench->close(
+        {{"title", result->title}, {"rows", to_json(result->rows)}, {"views", result->views}, {"device", a.device}},
+        tables);
 }
 
 Command perception_command(CLI::App& app) {
@@ -225,6 +227,9 @@ Command perception_command(CLI::App& app) {
                      "Its model of contrast sensitivity: barten-fitted (default), stela, daly, ...")
         ->type_name("MODEL")
         ->check(one_of(achromatic_models()));
+    verb->add_option("--device", a->device, "Where the judges run: cpu (default) or gpu")
+        ->type_name("NAME")
+        ->check(one_of({"cpu", "gpu"}));
     verb->add_option("--window", o.window_px, "Its side; promises are about 1024 (default)")
         ->type_name("PIXELS")
         ->check(whole(64, 4096));
@@ -236,7 +241,10 @@ Command perception_command(CLI::App& app) {
     verb->add_flag("--quick", o.quick, "Few views: rough figures");
     add_targets_option(*verb, a->targets);
     add_report_options(*verb, a->report);
-    verb->callback([a] { a->options.only = parse_groups(a->only); });
+    verb->callback([a] {
+        a->options.only = parse_groups(a->only);
+        a->options.judges_on_gpu = a->device == "gpu";
+    });
     verb->footer(
         "Pictures are drawn with 64 samples a pixel; all of it takes about half an hour without a graphics card.\n\n"
         "Examples:\n  unseen-bench perception --quick\n"

@@ -266,6 +266,7 @@ private:
             result_.title += (i ? (i == main_models_ ? "; and " : ", ") : "") + models_[i]->name() + " (" +
                              grouped(models_[i]->triangles()) + ")";
         result_.title += "; " + grouped(static_cast<std::uint64_t>(options_.window_px)) + " pixels a side";
+        if (options_.judges_on_gpu) result_.title += ", judged on the GPU (" + context_->renderer_name() + ")";
         return {};
     }
     // Where nobody named the meshes, huge ones are looked at only at random, from afar and for speed, and with --quick
@@ -283,7 +284,8 @@ private:
         return add(file.stem().string(), std::move(*tree));
     }
     Result<void> add(std::string name, vdtree::VertexTree tree) {
-        auto model = JudgedModel::create(*context_, std::move(name), std::move(tree), options_.window_px, second_);
+        auto model = JudgedModel::create(*context_, std::move(name), std::move(tree), options_.window_px, second_,
+                                         options_.judges_on_gpu ? JudgeDevice::gpu : JudgeDevice::cpu);
         if (!model) return model.error();
         models_.push_back(std::make_unique<JudgedModel>(std::move(*model)));
         return {};
@@ -542,7 +544,8 @@ private:
             if (mesh.name.find("waves") == mesh.name.npos) continue;
             auto tree = build_hard_tree(mesh);
             if (!tree) return tree.error();
-            auto model = JudgedModel::create(*context_, mesh.name, std::move(*tree), options_.window_px, second_);
+            auto model = JudgedModel::create(*context_, mesh.name, std::move(*tree), options_.window_px, second_,
+                                             options_.judges_on_gpu ? JudgeDevice::gpu : JudgeDevice::cpu);
             if (!model) return model.error();
             models.push_back(std::make_unique<JudgedModel>(std::move(*model)));
             if (options_.quick) break;
@@ -657,7 +660,8 @@ private:
         for (const HardMesh& mesh : hard_meshes(triangles)) {
             auto tree = build_hard_tree(mesh);
             if (!tree) return tree.error();
-            auto model = JudgedModel::create(*context_, mesh.name, std::move(*tree), options_.window_px, second_);
+            auto model = JudgedModel::create(*context_, mesh.name, std::move(*tree), options_.window_px, second_,
+                                             options_.judges_on_gpu ? JudgeDevice::gpu : JudgeDevice::cpu);
             if (!model) return model.error();
             hard_models.push_back(std::make_unique<JudgedModel>(std::move(*model)));
         }

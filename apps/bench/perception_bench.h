@@ -22,6 +22,7 @@ struct PerceptionBenchOptions {
     std::string pictures;            // a folder for a picture of each group; empty: none
     std::string reference;           // a folder of published sensitivities; empty: the checkout's own
     std::string second_judge;        // its model of contrast sensitivity; empty: Barten's, fitted
+    bool judges_on_gpu = false;
     int window_px = 1024;
     std::size_t random_views = 72;
     std::optional<std::uint64_t> seed; // of random views; none: drawn anew

@@ -2,6 +2,10 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
+#include <string_view>
+#include <tuple>
+#include <utility>
 
 #include "option_names.h"
 #include "terminal.h"
@@ -11,6 +15,18 @@ namespace {
 
 bool is_whole(const session::Report& s) {
     return s.stats.triangles == s.source_triangles && s.stats.max_fold_cost == 0;
+}
+
+// Each once, in the order of the first, with how many objects have it.
+std::vector<std::pair<const session::Effect*, std::size_t>> merged(std::span<const session::Effect> effects) {
+    std::vector<std::pair<const session::Effect*, std::size_t>> all;
+    std::map<std::tuple<std::string_view, bool, std::string_view>, std::size_t> places;
+    for (const session::Effect& effect : effects) {
+        const auto [place, is_new] = places.try_emplace({effect.name, effect.on, effect.why}, all.size());
+        if (is_new) all.push_back({&effect, 0});
+        ++all[place->second].second;
+    }
+    return all;
 }
 
 } // namespace
@@ -30,7 +46,37 @@ Json to_json(const session::Report& s, double draw_ms) {
             {"effects", to_json(s.effects)}};
 }
 
+void add_scene(Json& json, const session::Session& session, std::span<const vdtree::Cut> cuts) {
+    const session::Scene& scene = session.scene();
+    json["as"] = scene.is_of_file() ? "scene" : "model";
+    if (!scene.objects.empty()) json["tree"] = name_of(scene.objects[0].origin);
+    if (!scene.is_of_file()) return;
+    Json objects = Json::array();
+    for (std::size_t i = 0; i < cuts.size(); ++i)
+        objects.push_back({{"name", scene.objects[i].name},
+                           {"node", scene.objects[i].node},
+                           {"mesh", scene.objects[i].mesh},
+                           {"source_triangles", scene.objects[i].tree.triangle_count()},
+                           {"triangles", cuts[i].triangle_count()}});
+    std::uint64_t backdrop = 0;
+    for (const session::Object& part : scene.backdrop) backdrop += part.tree.triangle_count();
+    json["objects"] = std::move(objects);
+    json["backdrop_triangles"] = backdrop;
+}
+
+void print_scene(const session::Session& session) {
+    const session::Scene& scene = session.scene();
+    if (!scene.is_of_file()) return;
+    const auto counted = [](std::size_t count, const char* what) {
+        return grouped(count) + " " + what + (count == 1 ? "" : "s");
+    };
+    print_line("a scene of " + counted(scene.objects.size(), "object") +
+               (scene.backdrop.empty() ? std::string()
+                                       : ", before " + counted(scene.backdrop.size(), "part") + " of background"));
+}
+
 std::string triangles_text(std::uint64_t triangles, std::uint64_t source_triangles) {
+    if (source_triangles == 0) return "no triangles";
     const double percent = 100.0 * static_cast<double>(triangles) / static_cast<double>(source_triangles);
     return grouped(triangles) + " of " + grouped(source_triangles) + " triangles (" +
            rounded(percent, percent > 99 ? 4 : 2) + "%)";
@@ -81,14 +127,18 @@ void print_details(const session::Report& s, double draw_ms) {
 
 Json to_json(std::span<const session::Effect> effects) {
     Json json = Json::array();
-    for (const session::Effect& effect : effects)
-        json.push_back({{"name", effect.name}, {"on", effect.on}, {"why", with_option_names(effect.why)}});
+    for (const auto& [effect, objects] : merged(effects)) {
+        json.push_back({{"name", effect->name}, {"on", effect->on}, {"why", with_option_names(effect->why)}});
+        if (objects > 1) json.back()["objects"] = objects;
+    }
     return json;
 }
 
 void print(std::span<const session::Effect> effects) {
-    for (const session::Effect& effect : effects)
-        print_line(std::string(effect.on ? "  on   " : "  off  ") + effect.name + ": " + with_option_names(effect.why));
+    for (const auto& [effect, objects] : merged(effects))
+        print_line(std::string(effect->on ? "  on   " : "  off  ") + effect->name + ": " +
+                   with_option_names(effect->why) +
+                   (objects > 1 ? " (" + grouped(objects) + " objects)" : std::string()));
 }
 
 } // namespace unseen::app

@@ -64,6 +64,7 @@ Result<session::Scene> load_scene(const std::filesystem::path& file, const ViewO
     ProgressBar bar(file.filename().string());
     session::LoadOptions options = load_options(view.texture, bar);
     options.unit_metres = view.unit_metres;
+    options.as = view.as;
     options.cache.is_off = view.no_cache;
     return session::Scene::load(file, options);
 }

@@ -33,6 +33,7 @@ constexpr OptionName option_names[] = {
     {"load.texture", "--texture"},
     {"load.without_textures", "--no-texture"},
     {"load.prelit", "--prelit"},
+    {"load.as = ", "--as "},
     {"load.unit_metres", "--unit"},
     {"Follower::set_glide()", "--geomorph"},
     {"session::read_textured_mesh()", "unseen build"},

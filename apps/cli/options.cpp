@@ -307,6 +307,15 @@ CLI::Option* add_triangles_option(CLI::App& verb, TriangleCount& count, const st
         ->type_name("N|P%");
 }
 
+void add_as_option(CLI::App& verb, session::LoadAs& as) {
+    as = session::LoadAs::automatic;
+    add_choice<session::LoadAs, session::LoadAs>(
+        verb, "--as", as, {{"scene", session::LoadAs::scene}, {"model", session::LoadAs::model}},
+        "Of a glTF file: scene (many objects, each simplified by itself, with the file's camera and lights) or model "
+        "(all of it one mesh). Default: a scene where it has cameras, lights, a mesh under several nodes, or marks of "
+        "what is background");
+}
+
 void add_view_options(CLI::App& verb, ViewOptions& o) {
     CLI::App& group = *verb.add_option_group("VIEW", "Where from (world units are metres; see --unit)");
     add_vector(group, "--eye", o.eye, "The eye");
@@ -316,7 +325,8 @@ void add_view_options(CLI::App& verb, ViewOptions& o) {
     add_number(group, "--fill", o.fill, within(1e-6, 1e6), "F",
                "With --direction: the share of the window's height that the bounding sphere takes (default: 0.9)");
     add_number(group, "--fov", o.fov_degrees, within(1e-3, 179.9), "DEGREES",
-               "Vertical field of view (default: the field that the window fills on the display)");
+               "Vertical field of view (default: that of a scene's camera, else the field that the window fills on the "
+               "display)");
     group
         .add_option_function<std::string>(
             "--size",

@@ -15,6 +15,7 @@
 #include <meshio/mesh_io.h>
 #include <perception/units.h>
 #include <session/gaze_player.h>
+#include <session/model_file.h>
 #include <session/request.h>
 
 namespace unseen::app {
@@ -46,7 +47,8 @@ struct ViewOptions {
     std::optional<double> background_cdm2;
     double unit_metres = 1; // world units a mesh unit
     TextureOptions texture;
-    bool no_cache = false; // trees are neither kept nor taken from what was kept
+    bool no_cache = false;                       // trees are neither kept nor taken from what was kept
+    session::LoadAs as = session::LoadAs::model; // what glTF files become; set by verbs that take scenes
 };
 
 // DISPLAY.
@@ -90,6 +92,8 @@ using session::GazeSource;
 // Each adds a group of options to a verb. The structs must outlive the parser. Impossible values and combinations end
 // the parse with an error that names the option.
 void add_view_options(CLI::App& verb, ViewOptions& options);
+// Of verbs that take scenes: --as. Files that look like scenes are, from now on.
+void add_as_option(CLI::App& verb, session::LoadAs& as);
 void add_display_options(CLI::App& verb, DisplayOptions& options);
 void add_what_options(CLI::App& verb, WhatOptions& options);
 void add_visibility_option(CLI::App& verb, WhatOptions& options); // of verbs for one view

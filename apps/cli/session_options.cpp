@@ -40,9 +40,17 @@ Result<Surroundings> read_surroundings(const ViewOptions& view, const DisplayOpt
 }
 
 Result<session::Session> assemble(session::Scene scene, Surroundings around, const ViewOptions& view) {
-    if (const auto lit = scene.relight(view.light, view.ambient, view.fill_light); !lit) return lit.error();
+    const bool asks_for_light = view.light || view.ambient || view.fill_light;
+    if (asks_for_light && scene.is_of_file()) {
+        // Objects are turned, and trees are shared: lights in the world in place of the file's.
+        auto rig = session::light_rig(view.light, view.ambient, view.fill_light);
+        if (!rig) return rig.error();
+        scene.lights = std::move(*rig);
+    } else if (const auto lit = scene.relight(view.light, view.ambient, view.fill_light); !lit) {
+        return lit.error();
+    }
     scene.background = background_of(view);
-    scene.lights = std::move(around.lights);
+    if (around.lights) scene.lights = std::move(around.lights);
     return session::Session::create(std::move(scene), std::move(around.observer), terminal_messages());
 }
 
@@ -114,7 +122,11 @@ vdtree::View make_view(const session::Session& session, const ViewOptions& optio
     view.height = options.height;
     view.fov_y_degrees =
         options.fov_degrees.value_or(perception::physical_field(session.observer().display, options.height).value());
-    if (options.eye) {
+    const bool has_place = options.eye || options.direction || options.fill;
+    if (const auto seen = has_place ? std::nullopt : session.camera_view(view)) {
+        view = *seen;
+        if (options.fov_degrees) view.fov_y_degrees = *options.fov_degrees;
+    } else if (options.eye) {
         view.eye = *options.eye;
         view.target = options.target.value_or(session.bounding_sphere().centre);
     } else {

@@ -8,6 +8,7 @@
 #include <perception/image.h>
 #include <perception/judge.h>
 
+#include "gpu_comparison.h"
 #include "output_files.h"
 #include "report.h"
 #include "session_options.h"
@@ -23,11 +24,13 @@ using perception::ImageFile;
 using perception::Judgement;
 
 constexpr const char* perceptualdiff = "perceptualdiff";
+constexpr const char* gpu = "gpu";
 
 enum class Model { modern, second, rpg99 };
 
 struct CompareArguments {
-    std::string reference, test, map, threshold_map, json, profile, observer_name, model_name = "modern";
+    std::string reference, test, map, threshold_map, json, profile, observer_name, model_name = "modern",
+                                                                                   device = "cpu";
     Model model = Model::modern;
     perception::Person observer = perception::default_person;
     DisplayOptions display;
@@ -61,6 +64,7 @@ Result<Pair> read_pair(const CompareArguments& a) {
 struct Verdict {
     Judgement judgement;
     std::optional<Image> threshold_map;
+    std::string gpu; // which judged; empty: the CPU
 };
 
 Result<perception::JudgeOptions> judge_options(const CompareArguments& a, const perception::Display& display) {
@@ -86,9 +90,14 @@ Result<Verdict> judge_by_bands(const CompareArguments& a, const Pair& pair, cons
     const Image test = perception::to_luminance(pair.test, display);
     const auto options = judge_options(a, display);
     if (!options) return options.error();
+    if (a.device == gpu) {
+        auto compared = compare_on_gpu(reference, test, *options, !a.threshold_map.empty());
+        if (!compared) return compared.error();
+        return Verdict{std::move(compared->judgement), std::move(compared->threshold_map), compared->renderer};
+    }
     auto judgement = perception::judge_modern(reference, test, *options);
     if (!judgement) return judgement.error();
-    Verdict verdict{std::move(*judgement), {}};
+    Verdict verdict{std::move(*judgement), {}, {}};
     if (!a.threshold_map.empty()) {
         auto map = perception::threshold_map_modern(reference, *options);
         if (!map) return map.error();
@@ -112,7 +121,7 @@ Result<Verdict> judge_rpg99(const CompareArguments& a, const Pair& pair, const p
     options.masked_by_both = as_the_program;
     auto judgement = perception::judge_rpg99(reference, test, options);
     if (!judgement) return judgement.error();
-    Verdict verdict{std::move(*judgement), {}};
+    Verdict verdict{std::move(*judgement), {}, {}};
     if (!a.threshold_map.empty()) {
         auto map = perception::rpg99_map(reference, test, options);
         if (!map) return map.error();
@@ -150,13 +159,14 @@ std::string observer_of(const CompareArguments& a) {
 }
 
 // Whose verdict it is, and under which conditions.
-std::string judged_by(const CompareArguments& a, const perception::Display& display) {
+std::string judged_by(const CompareArguments& a, const Verdict& verdict, const perception::Display& display) {
     if (a.model == Model::rpg99)
         return "by the judge rpg99" + (a.profile.empty() ? "" : ", as " + a.profile + " does it");
     std::string text = "by the judge " + a.model_name + " and the observer " + observer_of(a);
     text += ", looked at from " + rounded(display.distance.value(), 3) + " m, ";
-    if (!a.gaze_px) return text + "wherever the gaze";
-    return text + "with the gaze at pixel " + shortest(a.gaze_px->x) + " " + shortest(a.gaze_px->y);
+    text += a.gaze_px ? "with the gaze at pixel " + shortest(a.gaze_px->x) + " " + shortest(a.gaze_px->y)
+                      : std::string("wherever the gaze");
+    return verdict.gpu.empty() ? text : text + ", on the GPU (" + verdict.gpu + ")";
 }
 
 Result<int> run(const CompareArguments& a) {
@@ -178,7 +188,8 @@ Result<int> run(const CompareArguments& a) {
     const Json json = {{"visible_pixels", judgement.visible_pixels},
                        {"pixels", judgement.pixels},
                        {"max_ratio", number_or_null(judgement.max_ratio)},
-                       {"ssim", number_or_null(ssim)}};
+                       {"ssim", number_or_null(ssim)},
+                       {"device", a.device}};
     if (auto ok = report->prepare(json); !ok) return ok.error();
     if (auto ok = write_maps(a, *verdict); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
@@ -188,7 +199,7 @@ Result<int> run(const CompareArguments& a) {
         print_line(grouped(judgement.visible_pixels) + " of " + grouped(judgement.pixels) + " pixels differ visibly (" +
                    rounded(share, 3) + "%); the largest difference is " + rounded(judgement.max_ratio, 3) +
                    " times its threshold; SSIM " + rounded(ssim, 6));
-        print_line(judged_by(a, *display));
+        print_line(judged_by(a, *verdict, *display));
         print_written({a.map, a.threshold_map, a.json});
     }
     return a.fail_above && judgement.visible_pixels > *a.fail_above ? exit_failed : exit_done;
@@ -204,6 +215,7 @@ void check(CompareArguments& a) {
     const bool is_rpg99 = a.model == Model::rpg99;
     if (!is_rpg99 && !a.profile.empty()) refuse("--profile perceptualdiff needs --model rpg99.");
     if (!is_rpg99 && a.field_degrees) refuse("--field needs --model rpg99; the others take the display's.");
+    if (is_rpg99 && a.device == gpu) refuse("--device gpu needs --model modern or second: rpg99 runs on the CPU.");
     if (is_rpg99 && a.gaze_px) refuse("--gaze needs --model modern or second: rpg99 knows no eccentricity.");
     if (a.model != Model::modern && !a.display.csf.empty())
         refuse("--csf needs --model modern: the others have a sensitivity of their own.");
@@ -241,6 +253,10 @@ Command compare_command(CLI::App& app) {
             "With rpg99: the image's horizontal field (default: as shown on the display)")
         ->type_name("DEGREES")
         ->check(within(1e-3, 179.9));
+    verb->add_option("--device", a->device,
+                     "Where the judges modern and second run: cpu (default), or gpu, which says the same within 0.1%")
+        ->type_name("NAME")
+        ->check(one_of({"cpu", gpu}));
     add_gaze_option(*verb, a->gaze_px);
     verb->add_option("--map", a->map,
                      "The differences, with a scale below: blue where invisible, yellow to red where visible")

@@ -20,6 +20,7 @@
 #include "output_files.h"
 #include "progress_bar.h"
 #include "report.h"
+#include "scene_renderer.h"
 #include "session_options.h"
 #include "terminal.h"
 
@@ -68,15 +69,16 @@ std::optional<NamePattern> parse_pattern(const std::string& pattern) {
 
 // The parts that draw, where anything is drawn.
 struct Drawing {
-    render::Context context;
-    render::Renderer renderer;
+    std::unique_ptr<render::Context> context; // whose place does not change: the renderer refers to it
+    SceneRenderer renderer;
 };
 
 Result<std::optional<Drawing>> make_drawing(const session::Session& session, std::optional<render::Context> context) {
     if (!context) return std::optional<Drawing>();
-    auto renderer = render::Renderer::create(*context, session.tree());
+    auto kept = std::make_unique<render::Context>(std::move(*context));
+    auto renderer = SceneRenderer::create(*kept, session);
     if (!renderer) return renderer.error();
-    return std::optional<Drawing>(Drawing{std::move(*context), std::move(*renderer)});
+    return std::optional<Drawing>(Drawing{std::move(kept), std::move(*renderer)});
 }
 
 // What a flight has written so far, frame by frame; of one that fails nothing is left.
@@ -220,7 +222,7 @@ std::string to_text(const SeenChanges& s, bool glides) {
 }
 
 Json to_json(const session::Session& session, const std::vector<FrameRecord>& frames, const session::Report& last) {
-    Json json = {{"source_triangles", session.tree().triangle_count()},
+    Json json = {{"source_triangles", session.triangle_count()},
                  {"frames", frames.size()},
                  {"first_cut_ms", number_or_null(frames.front().cut_ms + frames.front().index_ms)}};
     for (const Measure& m : measures_of(frames))
@@ -246,8 +248,7 @@ std::string middle_and_most(const std::vector<double>& values) {
 void print(const session::Session& session, const std::vector<FrameRecord>& frames, const session::Report& last,
            const DisplayOptions& display) {
     const auto kept = static_cast<std::uint64_t>(median(column(frames, [](auto& f) { return f.stats.triangles; })));
-    print_line(grouped(frames.size()) + " frames; the median frame " +
-               kept_text(kept, session.tree().triangle_count()));
+    print_line(grouped(frames.size()) + " frames; the median frame " + kept_text(kept, session.triangle_count()));
     print_line("in the median frame, the cut took " +
                middle_and_most(column(frames, [](auto& f) { return f.cut_ms + f.index_ms; })) +
                (std::isnan(frames.back().draw_ms)
@@ -295,6 +296,7 @@ public:
         for (std::size_t i = 0; i < poses.size() && !until_interrupted.is_interrupted(); ++i) {
             bar(static_cast<double>(i) / static_cast<double>(poses.size()), "frames");
             take(poses[i]);
+            request_.reasons = i + 1 == poses.size() || i == 0; // of the last frame; of the first, where interrupted
             session_.set_time(static_cast<double>(i) * frame_s);
             session_.set_gaze(gaze.at(static_cast<double>(i) * frame_s, view_, gaze_px_));
             auto frame = next(*drawing);
@@ -321,7 +323,10 @@ private:
     Result<render::DrawOptions> draw_options() const {
         render::DrawOptions draw = options_.draw;
         draw.background = session_.background();
-        auto lighting = session_.lighting(view_);
+        // Of one model, whose changes are judged.
+        auto lighting = session_.scene().is_of_file()
+                            ? Result<std::optional<vdtree::Lighting>>(std::optional<vdtree::Lighting>())
+                            : session_.lighting(view_);
         if (!lighting) return lighting.error();
         draw.lighting = std::move(*lighting);
         return draw;
@@ -329,12 +334,6 @@ private:
 
     Result<render::Frame> next(std::optional<Drawing>& drawing) {
         if (options_.geomorph_seconds) follower_.let_pass(1 / options_.frames_a_second);
-        const auto draw_cut = [&](const vdtree::View& view, const render::DrawOptions& draw) {
-            const vdtree::Similarity& placement = session_.scene().objects.front().placement;
-            render::Renderer& renderer = drawing->renderer;
-            return follower_.geomorph() ? renderer.draw(*follower_.geomorph(), view, draw, placement)
-                                        : renderer.draw(follower_.cut(), view, draw, placement);
-        };
         if (changes_) {
             const auto draw = draw_options();
             if (!draw) return draw.error();
@@ -343,6 +342,7 @@ private:
         const auto start = Clock::now();
         auto simplified = follower_.follow(view_, request_);
         if (!simplified) return simplified.error();
+        if (!request_.reasons) simplified->effects = std::move(last_.effects);
         last_ = std::move(*simplified);
         FrameRecord record;
         record.stats = last_.stats;
@@ -356,7 +356,7 @@ private:
         if (drawing) {
             const auto draw = draw_options();
             if (!draw) return draw.error();
-            frame = draw_cut(view_, *draw);
+            frame = drawing->renderer.draw(drawn_cuts(follower_, session_.scene().objects.size()), view_, *draw);
             if (!frame) return frame;
             record.draw_ms = frame->draw_ms;
             record.uploaded_bytes = static_cast<double>(drawing->renderer.uploaded_bytes());
@@ -429,11 +429,14 @@ Result<void> fly_through(const std::string& model, const ViewOptions& view, cons
     if (!session) return session.error();
     session->set_velocity(options.what.velocity());
     const vdtree::View first_view = make_view(*session, view);
-    session::Request request = options.what.request_for(session->tree().triangle_count());
+    session::Request request = options.what.request_for(session->triangle_count());
     request.purpose = session::Purpose::picture;
     request.threshold = options.threshold;
     if (const auto ready = session->prepare(first_view, request); !ready) return ready.error();
 
+    if (options.judges_changes && session->scene().is_of_file())
+        return Error{ErrorCode::unsupported,
+                     "--changes are judged of one model, and '" + model + "' is a scene: give --as model."};
     FlyThrough flight(*session, first_view, request, options);
     Pictures pictures(options.pictures);
     const std::vector<CameraPose> poses = path->poses_from(first_view);
@@ -443,7 +446,7 @@ Result<void> fly_through(const std::string& model, const ViewOptions& view, cons
         if (auto ok = csv->write(to_csv(flight.records())); !ok) return ok;
     if (auto ok = report->prepare(to_json(*session, flight.records(), flight.last())); !ok) return ok;
     if (!options.plot.empty()) {
-        const std::string title = grouped(session->tree().triangle_count()) + " triangles, " + options.path;
+        const std::string title = grouped(session->triangle_count()) + " triangles, " + options.path;
         if (auto ok = write_plot(options.plot, plot_of(flight.records(), title)); !ok) return ok;
     }
     if (csv)

@@ -1,15 +1,18 @@
 // unseen info: what a mesh or a tree is, and whether it is sound.
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <memory>
 
 #include <meshio/examine.h>
 #include <meshio/mesh_io.h>
+#include <meshio/scene_file.h>
 
 #include "model_file.h"
 #include "options.h"
 #include "progress_bar.h"
 #include "report.h"
+#include "session_options.h"
 #include "terminal.h"
 #include "verbs.h"
 
@@ -19,6 +22,7 @@ namespace {
 struct InfoArguments {
     std::string file;
     bool verify = false, json = false, is_verbose = false;
+    session::LoadAs as = session::LoadAs::automatic;
 };
 
 using Rows = std::vector<std::vector<std::string>>;
@@ -267,22 +271,125 @@ Result<int> describe_mesh(const InfoArguments& a) {
     return exit_done;
 }
 
-Result<int> run(const InfoArguments& a) { return vdtree::is_tree_file(a.file) ? describe_tree(a) : describe_mesh(a); }
+const char* name_of(meshio::SceneLight::Kind kind) {
+    using Kind = meshio::SceneLight::Kind;
+    return kind == Kind::directional ? "directional" : kind == Kind::point ? "point" : "spot";
+}
+
+Json json_of(glm::dvec3 v) { return {v.x, v.y, v.z}; }
+
+// Every mesh by itself, and who shows it.
+Result<int> describe_scene(const InfoArguments& a, meshio::SceneFile& file) {
+    const meshio::SceneContents& contents = file.contents();
+    const session::Messages messages = terminal_messages();
+    for (const std::string& warning : contents.warnings) messages.warning(a.file + ": " + warning);
+    for (const std::string& note : contents.notes) messages.note(a.file + ": " + note);
+    struct Shown {
+        std::string name; // of the first node
+        std::uint64_t triangles = 0, nodes = 0, background_nodes = 0;
+    };
+    std::map<std::int32_t, Shown> meshes;
+    for (const meshio::SceneNode& node : contents.nodes) {
+        Shown& shown = meshes[node.mesh];
+        if (shown.nodes++ == 0) shown.name = node.name;
+        shown.background_nodes += node.is_background;
+    }
+    std::uint64_t objects = 0, own = 0, shown_triangles = 0, background = 0;
+    Json meshes_json = Json::array();
+    std::vector<std::vector<std::string>> lines;
+    for (auto& [number, shown] : meshes) {
+        const auto read = file.mesh(static_cast<std::size_t>(number));
+        if (!read) return read.error();
+        if (*read) {
+            if (const auto examined = meshio::examine((*read)->mesh.view()); !examined)
+                return Error{examined.error().code, a.file + ": " + examined.error().message};
+            shown.triangles = (*read)->mesh.triangles.size();
+        }
+        const std::uint64_t of_objects = shown.nodes - shown.background_nodes;
+        objects += of_objects;
+        own += shown.triangles;
+        shown_triangles += shown.triangles * of_objects;
+        background += shown.triangles * shown.background_nodes;
+        meshes_json.push_back({{"mesh", number},
+                               {"name", shown.name},
+                               {"triangles", shown.triangles},
+                               {"nodes", shown.nodes},
+                               {"background_nodes", shown.background_nodes}});
+        lines.push_back({"mesh " + std::to_string(number) + " '" + printable(shown.name) + "'",
+                         grouped(shown.triangles) + " triangles, " + grouped(shown.nodes) +
+                             (shown.nodes == 1 ? " node" : " nodes") + (of_objects == 0 ? ", background" : "")});
+    }
+    Json lights = Json::array();
+    for (const meshio::SceneLight& light : contents.lights)
+        lights.push_back({{"type", name_of(light.kind)}, {"name", light.name}, {"intensity", light.intensity}});
+    Json camera;
+    if (contents.camera)
+        camera = {{"name", contents.camera->name},
+                  {"eye", json_of(contents.camera->eye)},
+                  {"forward", json_of(contents.camera->forward)},
+                  {"fov_y_degrees", contents.camera->fov_y_degrees}};
+    Json json = {{"kind", "scene"},
+                 {"objects", objects},
+                 {"triangles", shown_triangles},
+                 {"meshes", std::move(meshes_json)},
+                 {"mesh_triangles", own},
+                 {"background_triangles", background},
+                 {"lights", std::move(lights)},
+                 {"camera", std::move(camera)},
+                 {"file_bytes", file_bytes_of(a.file)}};
+    if (a.verify) json["verified"] = true;
+    Rows rows = {{"kind", "scene"},
+                 {"objects", grouped(objects)},
+                 {"their triangles", grouped(shown_triangles)},
+                 {"different meshes", grouped(meshes.size())},
+                 {"their triangles, once each", grouped(own)},
+                 {"background triangles", grouped(background)},
+                 {"lights", grouped(contents.lights.size())},
+                 {"camera", contents.camera ? rounded(contents.camera->fov_y_degrees, 3) + " degrees high" : "none"},
+                 {"bytes on disk", grouped(file_bytes_of(a.file))}};
+    if (a.verify) rows.push_back({"verified", "sound"});
+    constexpr std::size_t most_lines = 40;
+    const std::size_t left_out = lines.size() > most_lines && !a.is_verbose ? lines.size() - most_lines : 0;
+    lines.resize(lines.size() - left_out);
+    rows.insert(rows.end(), lines.begin(), lines.end());
+    output(a.json, json, rows);
+    if (!a.json && left_out > 0) print_line("and " + grouped(left_out) + " more meshes (--verbose lists them)");
+    return exit_done;
+}
+
+Result<int> run(const InfoArguments& a) {
+    if (vdtree::is_tree_file(a.file)) return describe_tree(a);
+    if (a.as == session::LoadAs::scene && !meshio::is_gltf_file(a.file))
+        return Error{ErrorCode::invalid_argument,
+                     a.file + " is no glTF file (.glb, .gltf), and only these are scenes: leave --as out."};
+    if (a.as != session::LoadAs::model && meshio::is_gltf_file(a.file)) {
+        meshio::ReadOptions options;
+        options.drop = {true, true, true, true}; // nothing is made of it
+        options.skip_bad = !a.verify;
+        auto file = meshio::SceneFile::read(a.file, options);
+        if (!file) return file.error();
+        if (a.as == session::LoadAs::scene || file->contents().is_scene) return describe_scene(a, *file);
+    }
+    return describe_mesh(a);
+}
 
 } // namespace
 
 Command info_command(CLI::App& app) {
     auto a = std::make_shared<InfoArguments>();
-    CLI::App* verb = app.add_subcommand("info", "Say what a mesh or a tree holds, and what is wrong with it");
-    verb->add_option("FILE", a->file, "A mesh or a tree")->required()->type_name("MESH|TREE.vdt");
+    CLI::App* verb = app.add_subcommand("info", "Say what a mesh, a tree or a scene holds, and what is wrong with it");
+    verb->add_option("FILE", a->file, "A mesh, a tree or a scene")->required()->type_name("MESH|TREE.vdt|SCENE.glb");
+    add_as_option(*verb, a->as);
     verb->add_flag("--verify", a->verify, "Check everything: checksums, ranges, nesting of the bounds");
     verb->add_flag("--json", a->json, "JSON instead of a table");
-    verb->add_flag("--verbose", a->is_verbose, "Of a mesh: counts of zero as well");
+    verb->add_flag("--verbose", a->is_verbose, "Of a mesh: counts of zero as well; of a scene: all meshes");
     verb->footer(
         "A mesh is examined: holes, non-manifold and inconsistent edges, duplicates, parts that are inside out, size;\n"
         "what is unusual is said with what it means for simplification. Bad vertices and faces are counted and left\n"
         "out, but for --verify. Values of vertices are listed: name, type, components, range of each.\n\n"
-        "Examples:\n  unseen info bunny.ply\n  unseen info bunny.vdt --verify --json");
+        "Of a scene: its objects, how often each mesh is shown, lights and camera; --as model examines it as one "
+        "mesh.\n\n"
+        "Examples:\n  unseen info bunny.ply\n  unseen info museum.glb\n  unseen info bunny.vdt --verify --json");
     return {verb, [a] { return run(*a); }};
 }
 

@@ -1,5 +1,6 @@
 // The verbs that draw, in a build without OpenGL: they say so.
 #include "calibration_window.h"
+#include "gpu_comparison.h"
 #include "verbs.h"
 #include "visibility.h"
 
@@ -33,6 +34,13 @@ Result<void> show_chart(const CalibrationWindowOptions&, const std::string&) { r
 Result<session::Simplification> simplify_as_seen(session::Session&, const vdtree::View&, const session::Request&) {
     return Error{ErrorCode::unsupported, "--visibility picture is not in this build, for it was made without OpenGL; "
                                          "configure it with -DUNSEEN_BUILD_RENDER=ON."};
+}
+
+Result<GpuComparison> compare_on_gpu(const perception::Image&, const perception::Image&,
+                                     const perception::JudgeOptions&, bool) {
+    return Error{ErrorCode::unsupported,
+                 "This build cannot judge on the GPU, for it was made without OpenGL; configure it "
+                 "with -DUNSEEN_BUILD_RENDER=ON, or use --device cpu."};
 }
 
 Command demo_command(CLI::App& app) { return absent(app, "demo"); }

@@ -12,7 +12,9 @@
 #include "frame_image.h"
 #include "output_files.h"
 #include "report.h"
+#include "scene_renderer.h"
 #include "session_options.h"
+#include "terminal.h"
 #include "verbs.h"
 
 namespace unseen::app {
@@ -60,37 +62,38 @@ Result<int> run(RenderArguments& a) {
     const vdtree::View view = make_view(*session, a.view);
     session->set_gaze(gaze->at(0, view, a.what.gaze_px));
     session->set_velocity(a.what.velocity());
-    session::Request request = a.what.request_for(session->tree().triangle_count());
+    session::Request request = a.what.request_for(session->triangle_count());
     request.purpose = session::Purpose::picture;
+    if (a.map && session->scene().objects.size() != 1)
+        return Error{ErrorCode::invalid_argument, "--show is of one object, and the scene has " +
+                                                      grouped(session->scene().objects.size()) +
+                                                      ": leave it out, or give --as model."};
     const auto result = a.what.visibility == Visibility::picture
                             ? session::simplify_as_seen(*session, *context, view, request)
                             : session->simplify(view, request);
     if (!result) return result.error();
-    const vdtree::Cut& cut = result->cuts.front();
 
-    auto renderer = render::Renderer::create(*context, session->tree());
+    auto renderer = SceneRenderer::create(*context, *session);
     if (!renderer) return renderer.error();
-    auto lighting = session->lighting(view);
-    if (!lighting) return lighting.error();
     render::DrawOptions options = a.draw;
     options.background = session->background();
-    options.lighting = std::move(*lighting);
-    const auto frame = renderer->draw(cut, view, options, session->scene().objects.front().placement);
+    const auto frame = renderer->draw(drawn_cuts(result->cuts), view, options);
     if (!frame) return frame.error();
 
     const perception::Display& display = session->observer().display;
     perception::Image image = is_for_people(a.out) ? code_image(*frame, display) : luminance_image(*frame, display);
     if (a.map) {
-        auto drawn = draw_fold_map(cut, *session, view, request, *a.map, view);
+        auto drawn = draw_fold_map(result->cuts.front(), *session, view, request, *a.map, view);
         if (!drawn) return drawn.error();
         image = std::move(*drawn);
     }
     Json json = to_json(*result, frame->draw_ms);
-    json["tree"] = name_of(session->scene().objects[0].origin);
+    add_scene(json, *session, result->cuts);
     if (auto ok = report->prepare(json); !ok) return ok.error();
     if (auto ok = perception::write_image(a.out, image); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();
     if (report->is_on_stdout()) return exit_done;
+    print_scene(*session);
     print_line(kept_text(result->stats.triangles, result->source_triangles));
     print_line(visibility_text(*result, session->observer(), a.display, "in this view"));
     print_written({a.out, a.json});
@@ -177,8 +180,10 @@ void check(const RenderArguments& a) {
 
 Command render_command(CLI::App& app) {
     auto a = std::make_shared<RenderArguments>();
-    CLI::App* verb = app.add_subcommand("render", "Draw a simplification for a view");
-    verb->add_option("TREE", a->model, "A tree, or a mesh")->required()->type_name("TREE.vdt|MESH");
+    CLI::App* verb = app.add_subcommand("render", "Draw a simplification of a model or a scene for a view");
+    verb->add_option("TREE", a->model, "A tree, a mesh, or a scene (glTF)")
+        ->required()
+        ->type_name("TREE.vdt|MESH|SCENE.glb");
     verb->add_option("-o,--output", a->out, "PNG for people; PFM or EXR for judging: luminance in cd/m2")
         ->type_name("OUT.png|.pfm|.exr")
         ->check(ending_in({".png", ".pfm", ".exr"}));
@@ -213,6 +218,7 @@ Command render_command(CLI::App& app) {
         else if (!a->flight.path.empty()) a->draw.samples = 1;
         else if (!is_for_people(a->out)) a->draw.samples = samples_to_judge;
     });
+    add_as_option(*verb, a->view.as);
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->what);
@@ -221,6 +227,7 @@ Command render_command(CLI::App& app) {
     verb->footer(
         "Examples:\n  unseen render bunny.vdt -o bunny.png --wireframe\n"
         "  unseen render bunny.vdt -o full.pfm --full --size 1024x1024\n"
+        "  unseen render museum.glb -o museum.png --json -\n"
         "  unseen render bunny.vdt -o cost.png --gaze 1603 512 --show cost\n"
         "  unseen render bunny.vdt -o aside.pfm --gaze 1603 512 --json -\n"
         "  unseen render dragon.vdt --path orbit:1 --gaze-mode simulated --seed 7 --gaze-error 0.5 --gaze-latency 50\n"

@@ -1,9 +1,11 @@
 // unseen simplify: a cut of a tree as a mesh of its own.
 #include <chrono>
+#include <deque>
 #include <limits>
 #include <memory>
 
 #include <meshio/mesh_io.h>
+#include <meshio/scene_file.h>
 
 #include "cut_report.h"
 #include "output_files.h"
@@ -24,6 +26,22 @@ struct SimplifyArguments {
     bool is_verbose = false;
 };
 
+bool is_gltf(const std::string& file) { return has_ending(file, ".glb") || has_ending(file, ".gltf"); }
+
+// The background goes whole.
+Result<std::vector<std::string>> write_scene(const std::string& file, const session::Scene& scene,
+                                             const std::vector<vdtree::Cut>& cuts) {
+    std::vector<meshio::SceneCut> all;
+    for (std::size_t i = 0; i < cuts.size(); ++i)
+        all.push_back({scene.objects[i].node, scene.objects[i].mesh, &cuts[i]});
+    std::deque<vdtree::Cut> whole;
+    for (const session::Object& part : scene.backdrop) {
+        whole.emplace_back(part.tree).unfold_all();
+        all.push_back({part.node, part.mesh, &whole.back()});
+    }
+    return meshio::write_scene(file, *scene.source, all);
+}
+
 constexpr double nothing_drawn = std::numeric_limits<double>::quiet_NaN();
 
 Result<int> run(const SimplifyArguments& a) {
@@ -31,19 +49,27 @@ Result<int> run(const SimplifyArguments& a) {
         return ready.error();
     auto report = JsonReport::open(a.json);
     if (!report) return report.error();
-    auto session = open_session(a.model, a.view, a.display);
+    ViewOptions view = a.view;
+    // Other formats hold one mesh.
+    if (view.as == session::LoadAs::automatic && !is_gltf(a.out)) view.as = session::LoadAs::model;
+    auto session = open_session(a.model, view, a.display);
     if (!session) return session.error();
     session->set_gaze(fixed_gaze(a.what));
     session->set_velocity(a.what.velocity());
-    const vdtree::View view = make_view(*session, a.view);
-    const session::Request request = a.what.request_for(session->tree().triangle_count());
-    auto result = a.what.visibility == Visibility::picture ? simplify_as_seen(*session, view, request)
-                                                           : session->simplify(view, request);
+    const bool is_scene = session->scene().is_of_file();
+    if (is_scene && !is_gltf(a.out))
+        return Error{ErrorCode::invalid_argument, "'" + a.model +
+                                                      "' is a scene, which only glTF holds: let -o end in "
+                                                      ".glb or .gltf, or make one mesh of it with --as model."};
+    const vdtree::View seen = make_view(*session, view);
+    const session::Request request = a.what.request_for(session->triangle_count());
+    auto result = a.what.visibility == Visibility::picture ? simplify_as_seen(*session, seen, request)
+                                                           : session->simplify(seen, request);
     if (!result) return result.error();
     const auto start = std::chrono::steady_clock::now();
-    result->cuts[0].indices();
+    for (const vdtree::Cut& cut : result->cuts) cut.indices();
     result->extract_ms += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-    if (result->cuts[0].triangle_count() == 0) {
+    if (result->stats.triangles == 0 && session->scene().backdrop.empty()) {
         if (!result->stats.is_complete)
             return Error{ErrorCode::invalid_argument,
                          "No triangle is there yet when the time is over: allow more with --milliseconds."};
@@ -53,13 +79,15 @@ Result<int> run(const SimplifyArguments& a) {
     }
 
     Json json = to_json(*result, nothing_drawn);
-    json["tree"] = name_of(session->scene().objects[0].origin);
+    add_scene(json, *session, result->cuts);
     if (auto ok = report->prepare(json); !ok) return ok.error();
-    const auto notes = meshio::write_cut(a.out, result->cuts[0]);
+    const auto notes =
+        is_scene ? write_scene(a.out, session->scene(), result->cuts) : meshio::write_cut(a.out, result->cuts[0]);
     if (!notes) return notes.error();
     for (const std::string& note : *notes) print_note(a.out + ": " + note);
     if (auto ok = report->publish(); !ok) return ok.error();
     if (report->is_on_stdout()) return exit_done;
+    print_scene(*session);
     print_line(kept_text(result->stats.triangles, result->source_triangles));
     print_line(visibility_text(*result, session->observer(), a.display, "in this view"));
     print_written({a.out, a.json});
@@ -71,14 +99,17 @@ Result<int> run(const SimplifyArguments& a) {
 
 Command simplify_command(CLI::App& app) {
     auto a = std::make_shared<SimplifyArguments>();
-    CLI::App* verb = app.add_subcommand("simplify", "Write a simplified mesh for a view");
-    verb->add_option("TREE", a->model, "A tree, or a mesh")->required()->type_name("TREE.vdt|MESH");
+    CLI::App* verb = app.add_subcommand("simplify", "Write a simplified mesh, or scene, for a view");
+    verb->add_option("TREE", a->model, "A tree, a mesh, or a scene (glTF)")
+        ->required()
+        ->type_name("TREE.vdt|MESH|SCENE.glb");
     verb->add_option("-o,--output", a->out, "The mesh")
         ->type_name("OUT.ply|.obj|.glb|.gltf|.vtp|.vtk")
         ->required()
         ->check(ending_in({".ply", ".obj", ".glb", ".gltf", ".vtp", ".vtk"}));
     add_json_option(*verb, a->json);
     add_verbose_option(*verb, a->is_verbose);
+    add_as_option(*verb, a->view.as);
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->what);
@@ -87,6 +118,8 @@ Command simplify_command(CLI::App& app) {
         "OUT.glb, .gltf (with its data in OUT.bin) and .obj have what the model's glTF or OBJ file had: nodes, names,\n"
         "materials, texture coordinates. Images in the file stay in it; images and .mtl files beside it are copied\n"
         "to the folder of OUT under their names, where no other file of that name may be.\n\n"
+        "Of a scene each node gets a mesh of its own, as seen from the view; transforms, materials, lights and the\n"
+        "camera stay, and the background is written whole.\n\n"
         "OUT.ply, .vtp and .vtk have the values of vertices that the model's PLY or VTK file had: vertices that stay\n"
         "keep theirs, others have the mean of those that they stand for, of whole numbers the nearest one's.\n\n"
         "Examples:\n  unseen simplify bunny.vdt -o seen-from-the-right.ply --direction 1 0 0\n"
@@ -94,6 +127,7 @@ Command simplify_command(CLI::App& app) {
         "  unseen simplify bunny.vdt -o half.ply --triangles 50%\n"
         "  unseen simplify bunny.vdt -o stage-set.ply --direction 1 0 0 --visibility picture\n"
         "  unseen simplify house.gltf -o small.glb --pixels 2 --drop animations\n"
+        "  unseen simplify museum.glb -o seen.glb --triangles 50%\n"
         "  unseen simplify flow.vtp -o small.vtp --triangles 20%\n"
         "  unseen simplify bunny.vdt -o rough.glb --pixels 4 --fold-test displacement");
     return {verb, [a] { return run(*a); }};

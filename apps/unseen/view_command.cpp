@@ -36,7 +36,7 @@ Result<int> run(ViewArguments& a) {
     if (!session) return session.error();
     session->set_velocity(a.viewer.what.velocity());
     a.viewer.first_view = make_view(*session, a.view);
-    a.viewer.has_fixed_field = a.view.fov_degrees.has_value();
+    a.viewer.has_fixed_field = a.view.fov_degrees.has_value() || session->scene().camera.has_value();
     a.viewer.gaze_source = a.gaze.source;
     if (auto ended = run_viewer(*window, *session, std::move(*gaze), a.viewer); !ended) return ended.error();
     return exit_done;
@@ -46,8 +46,10 @@ Result<int> run(ViewArguments& a) {
 
 Command view_command(CLI::App& app) {
     auto a = std::make_shared<ViewArguments>();
-    CLI::App* verb = app.add_subcommand("view", "Look at a model in a window");
-    verb->add_option("TREE", a->model, "A tree, or a mesh")->required()->type_name("TREE.vdt|MESH");
+    CLI::App* verb = app.add_subcommand("view", "Look at a model or a scene in a window");
+    verb->add_option("TREE", a->model, "A tree, a mesh, or a scene (glTF)")
+        ->required()
+        ->type_name("TREE.vdt|MESH|SCENE.glb");
     verb->add_flag("--wireframe", a->viewer.draw.wireframe, "Begin with the triangles' edges");
     add_choice<render::Shading, render::Shading>(*verb, "--shading", a->viewer.draw.shading,
                                                  {{"smooth", render::Shading::smooth}, {"flat", render::Shading::flat}},
@@ -59,6 +61,7 @@ Command view_command(CLI::App& app) {
         ->type_name("N")
         ->check(whole(1, 1e6));
     add_geomorph_option(*verb, a->viewer.geomorph_seconds);
+    add_as_option(*verb, a->view.as);
     add_view_options(*verb, a->view);
     add_display_options(*verb, a->display);
     add_what_options(*verb, a->viewer.what);

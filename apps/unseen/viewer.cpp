@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <limits>
 #include <utility>
 
 #define GLFW_INCLUDE_NONE
@@ -16,6 +17,7 @@
 #include <perception/image.h>
 
 #include "frame_image.h"
+#include "scene_renderer.h"
 #include "session_options.h"
 #include "terminal.h"
 #include "viewer_overlay.h"
@@ -41,6 +43,11 @@ constexpr double most_margin_deg = 89; // beyond, a gaze may be anywhere on the 
 
 double milliseconds_since(Clock::time_point start) {
     return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+std::uint32_t budget_of(std::uint64_t triangles) {
+    return static_cast<std::uint32_t>(
+        std::clamp<std::uint64_t>(triangles, 1, std::numeric_limits<std::uint32_t>::max()));
 }
 
 // The mean of the last frames, taken anew a few times a second.
@@ -69,17 +76,18 @@ private:
 class Viewer {
 public:
     Viewer(session::Session& session, session::GazePlayer gaze, const ViewerOptions& options, render::Context& context,
-           render::Renderer renderer)
+           SceneRenderer renderer)
         : session_(session), options_(options), context_(context), window_(context.glfw_window()),
           renderer_(std::move(renderer)), overlay_(context), follower_(session), view_(options.first_view),
-          request_(options.what.request_for(session.tree().triangle_count())), gaze_px_(options.what.gaze_px),
+          request_(options.what.request_for(session.triangle_count())), gaze_px_(options.what.gaze_px),
           draw_(options.draw), gaze_follows_pointer_(options.gaze_source == session::GazeSource::mouse),
           gaze_(std::move(gaze)) {
         request_.purpose = session::Purpose::picture;
         request_.may_measure = false; // nobody waits for that here
+        request_.reasons = false;
         draw_.background = session.background();
         const Goal& goal = request_.goal;
-        budget_ = goal.kind == Goal::Kind::budget ? goal.triangles : std::max(1U, session.tree().triangle_count() / 4);
+        budget_ = goal.kind == Goal::Kind::budget ? goal.triangles : budget_of(session.triangle_count() / 4);
         listen();
     }
     Viewer(const Viewer&) = delete;
@@ -176,15 +184,15 @@ private:
         // The full model has no time limit; the others get theirs back.
         request_.milliseconds = goal.kind == Goal::Kind::full ? std::nullopt : options_.what.request.milliseconds;
         // What was asked for may not do for this goal, or would have to be measured.
-        if (!session_.plan(view_, request_)) request_.fold_test.reset();
+        if (!session_.scene().objects.empty() && !session_.plan(view_, request_)) request_.fold_test.reset();
         gaze_px_.reset();
         gaze_follows_pointer_ = plays_gaze_ = false;
     }
 
     void scale_budget(double factor) {
         const double wanted = std::round(budget_ * factor);
-        budget_ =
-            static_cast<std::uint32_t>(std::clamp(wanted, 1.0, static_cast<double>(session_.tree().triangle_count())));
+        budget_ = static_cast<std::uint32_t>(
+            std::clamp(wanted, 1.0, static_cast<double>(budget_of(session_.triangle_count()))));
         choose(Goal::budget(budget_));
     }
 
@@ -269,14 +277,9 @@ private:
         const double now_s = std::chrono::duration<double>(start - first_frame_).count();
         take_gaze(now_s);
         session_.set_time(now_s);
-        auto lighting = session_.lighting(view_);
-        if (!lighting) return lighting.error();
-        draw_.lighting = std::move(*lighting);
         const auto result = follower_.follow(view_, request_);
         if (!result) return result.error();
-        const vdtree::Geomorph* const geomorph = follower_.geomorph();
-        const auto drawn = geomorph ? renderer_.draw_to_window(*geomorph, view_, draw_, placement())
-                                    : renderer_.draw_to_window(follower_.cut(), view_, draw_, placement());
+        const auto drawn = renderer_.draw_to_window(cuts(), view_, draw_);
         if (!drawn) return drawn;
         if (auto done = context_.finish(); !done) return done;
         // The first frame compiles and uploads: its time says nothing of those that follow.
@@ -296,7 +299,8 @@ private:
                           .report = report,
                           .display = display(),
                           .window_px = {view_.width, view_.height}};
-        if (request_.goal.kind != Goal::Kind::full && session::is_perceptual(report.fold_tests.front()))
+        if (request_.goal.kind != Goal::Kind::full && !report.fold_tests.empty() &&
+            session::is_perceptual(report.fold_tests.front()))
             state.gaze = session_.observer().gaze;
         state.gaze_source = gaze_follows_pointer_ ? session::GazeSource::mouse
                             : plays_gaze_         ? options_.gaze_source
@@ -360,9 +364,7 @@ private:
         // Keys that came since the last frame count.
         take_gaze(std::chrono::duration<double>(last_frame_ - first_frame_).count());
         if (const auto result = follower_.follow(view_, request_); !result) return result.error();
-        const vdtree::Geomorph* const geomorph = follower_.geomorph();
-        const auto frame = geomorph ? renderer_.draw(*geomorph, view_, draw_, placement())
-                                    : renderer_.draw(follower_.cut(), view_, draw_, placement());
+        const auto frame = renderer_.draw(cuts(), view_, draw_);
         if (!frame) return frame.error();
         return perception::write_image(file, code_image(*frame, display()));
     }
@@ -394,13 +396,13 @@ private:
     }
 
     const perception::Display& display() const { return session_.observer().display; }
-    const vdtree::Similarity& placement() const { return session_.scene().objects.front().placement; }
+    std::vector<DrawnCut> cuts() const { return drawn_cuts(follower_, session_.scene().objects.size()); }
 
     session::Session& session_;
     const ViewerOptions& options_;
     const render::Context& context_;
     GLFWwindow* window_;
-    render::Renderer renderer_;
+    SceneRenderer renderer_;
     ViewerOverlay overlay_;
     session::Follower follower_;
     vdtree::View view_;
@@ -432,10 +434,10 @@ private:
 
 Result<void> run_viewer(render::Context& window, session::Session& session, session::GazePlayer gaze,
                         const ViewerOptions& options) {
-    session::Request request = options.what.request_for(session.tree().triangle_count());
+    session::Request request = options.what.request_for(session.triangle_count());
     request.purpose = session::Purpose::picture;
     if (const auto ready = session.prepare(options.first_view, request); !ready) return ready.error();
-    auto renderer = render::Renderer::create(window, session.tree());
+    auto renderer = SceneRenderer::create(window, session);
     if (!renderer) return renderer.error();
     glfwShowWindow(window.glfw_window());
     if (options.frames == 0) print_note("press h in the window to see its keys.");

@@ -74,7 +74,7 @@ std::vector<TextLine> viewer_lines(const ViewerState& state) {
                                    {viewer_mode(state), "mode"}};
     if (state.goal.kind != session::Goal::Kind::full) {
         lines.push_back({seen_from_text(report, state.display), "visible"});
-        lines.push_back({words_for(report.fold_tests.front()), "fold test"});
+        if (!report.fold_tests.empty()) lines.push_back({words_for(report.fold_tests.front()), "fold test"});
     }
     if (state.gaze) lines.push_back({gaze_text(state), "gaze"});
     if (state.frame_ms)

@@ -260,6 +260,18 @@ Result<LightRig> LightRig::read(const std::filesystem::path& file) {
     return std::move(reader.rig);
 }
 
+Result<LightRig> LightRig::of(vdtree::Lighting lighting, std::filesystem::path file) {
+    if (const auto valid = vdtree::validate(lighting); !valid)
+        return Error{valid.error().code, file.string() + ": " + valid.error().message};
+    LightRig rig;
+    rig.file_ = std::move(file);
+    rig.ambient_ = lighting.ambient;
+    rig.specular_ = lighting.specular;
+    rig.shininess_ = lighting.shininess;
+    for (const vdtree::LightSource& source : lighting.lights) rig.lights_.emplace_back().at_rest = source;
+    return rig;
+}
+
 vdtree::Lighting LightRig::at(double seconds, const vdtree::VertexTree& tree, const vdtree::View& view,
                               const vdtree::Similarity& placement) const {
     vdtree::Lighting lighting;

@@ -41,6 +41,12 @@ struct ProgramTraits {
     static void destroy(GLuint id) { glDeleteProgram(id); }
 };
 
+struct SamplerTraits {
+    static constexpr GLenum kind = GL_SAMPLER;
+    static void create(GLuint* id) { glCreateSamplers(1, id); }
+    static void destroy(GLuint id) { glDeleteSamplers(1, &id); }
+};
+
 template <class Traits>
 GlObject<Traits> GlObject<Traits>::create(std::string_view label) {
     GLuint id = 0;
@@ -60,5 +66,6 @@ template class GlObject<Texture2dTraits>;
 template class GlObject<RenderbufferTraits>;
 template class GlObject<FramebufferTraits>;
 template class GlObject<ProgramTraits>;
+template class GlObject<SamplerTraits>;
 
 } // namespace unseen::render

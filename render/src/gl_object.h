@@ -16,6 +16,7 @@ struct Texture2dTraits;
 struct RenderbufferTraits;
 struct FramebufferTraits;
 struct ProgramTraits;
+struct SamplerTraits;
 
 template <class Traits>
 class GlObject {
@@ -52,6 +53,7 @@ using Texture2d = GlObject<Texture2dTraits>;
 using Renderbuffer = GlObject<RenderbufferTraits>;
 using FramebufferObject = GlObject<FramebufferTraits>;
 using ProgramObject = GlObject<ProgramTraits>;
+using Sampler = GlObject<SamplerTraits>;
 
 extern template class GlObject<BufferTraits>;
 extern template class GlObject<VertexArrayTraits>;
@@ -59,5 +61,6 @@ extern template class GlObject<Texture2dTraits>;
 extern template class GlObject<RenderbufferTraits>;
 extern template class GlObject<FramebufferTraits>;
 extern template class GlObject<ProgramTraits>;
+extern template class GlObject<SamplerTraits>;
 
 } // namespace unseen::render

@@ -108,6 +108,12 @@ void Program::set(int location, float value) const { glProgramUniform1f(id(), lo
 
 void Program::set(int location, unsigned value) const { glProgramUniform1ui(id(), location, value); }
 
+void Program::set(int location, glm::ivec2 value) const { glProgramUniform2i(id(), location, value.x, value.y); }
+
+void Program::set(int location, std::span<const float> values) const {
+    glProgramUniform1fv(id(), location, static_cast<GLsizei>(values.size()), values.data());
+}
+
 void Program::set(int location, const glm::vec4& value) const {
     glProgramUniform4fv(id(), location, 1, glm::value_ptr(value));
 }

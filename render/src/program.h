@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
 #include <glm/vec4.hpp>
 
 #include <vdtree/result.h>
@@ -34,7 +35,9 @@ public:
     // A location that the program does not use is an error of the caller, which the debug output reports.
     void set(int location, float value) const;
     void set(int location, unsigned value) const;
+    void set(int location, glm::ivec2 value) const;
     void set(int location, const glm::vec4& value) const;
+    void set(int location, std::span<const float> values) const;     // an array's first elements; not empty
     void set(int location, std::span<const glm::vec4> values) const; // an array's first elements; not empty
     void set(int location, const glm::mat4& value) const;
 

@@ -42,8 +42,9 @@ Result<const Program*> Programs::surface(ProgramKey key) {
     return find_or_build(surfaces_, key, [&] { return build_surface(key); });
 }
 
-Result<const Program*> Programs::named(std::string_view label, std::span<const ShaderSource> sources) {
-    return find_or_build(named_, label, [&] { return Program::build(label, sources); });
+Result<const Program*> Programs::named(std::string_view label, std::span<const ShaderSource> sources,
+                                       std::span<const std::string_view> defines) {
+    return find_or_build(named_, label, [&] { return Program::build(label, sources, defines); });
 }
 
 } // namespace unseen::render

@@ -30,7 +30,8 @@ public:
     Result<const Program*> surface(ProgramKey key);
 
     // The one program of this label, a literal.
-    Result<const Program*> named(std::string_view label, std::span<const ShaderSource> sources);
+    Result<const Program*> named(std::string_view label, std::span<const ShaderSource> sources,
+                                 std::span<const std::string_view> defines = {});
 
 private:
     std::map<ProgramKey, Program> surfaces_;

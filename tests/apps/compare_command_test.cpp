@@ -31,7 +31,7 @@ protected:
         const Outcome outcome = run(words);
         EXPECT_EQ(outcome.status, 0) << outcome.err;
         const Json report = outcome.json();
-        EXPECT_THAT(keys(report), UnorderedElementsAre("visible_pixels", "pixels", "max_ratio", "ssim"));
+        EXPECT_THAT(keys(report), UnorderedElementsAre("visible_pixels", "pixels", "max_ratio", "ssim", "device"));
         EXPECT_TRUE(report["visible_pixels"].is_number_unsigned()) << report;
         EXPECT_EQ(report["pixels"], 128 * 128) << report;
         return report;
@@ -204,6 +204,32 @@ TEST_F(CompareTest, PerceptualDiffHasNoBlackLevel) {
     const Outcome absolute = run({"compare", "a.pfm", "a.pfm", "--model", "rpg99", "--profile", "perceptualdiff"});
     EXPECT_EQ(absolute.status, 1) << "cd/m2 are no codes";
     EXPECT_THAT(absolute.err, IsAnErrorForPeople());
+}
+
+TEST_F(CompareTest, TheGpuSaysWhatTheCpuSays) {
+    write("a.pfm", disc(20, 20));
+    write("b.pfm", disc(22, 20));
+    const Outcome drawn = run({"compare", "a.pfm", "b.pfm", "--device", "gpu"});
+    if (drawn.err.find("OpenGL") != std::string::npos) GTEST_SKIP() << drawn.err;
+    EXPECT_EQ(drawn.status, 0) << drawn.err;
+    EXPECT_THAT(drawn.out, HasSubstr("on the GPU ("));
+    for (const std::string model : {"modern", "second"}) {
+        const Json on_gpu = compare(
+            {"a.pfm", "b.pfm", "--model", model, "--device", "gpu", "--gaze", "0", "5", "--threshold-map", "gpu.pfm"});
+        const Json on_cpu =
+            compare({"a.pfm", "b.pfm", "--model", model, "--gaze", "0", "5", "--threshold-map", "cpu.pfm"});
+        EXPECT_EQ(on_gpu["device"], "gpu");
+        EXPECT_EQ(on_cpu["device"], "cpu");
+        EXPECT_NEAR(on_gpu["max_ratio"].get<double>() / on_cpu["max_ratio"].get<double>(), 1, 1e-3);
+        const auto gpu = unseen::perception::read_image(path("gpu.pfm")),
+                   cpu = unseen::perception::read_image(path("cpu.pfm"));
+        ASSERT_TRUE(gpu && cpu);
+        for (std::size_t i = 0; i < cpu->image.values.size(); ++i)
+            ASSERT_NEAR(gpu->image.values[i] / cpu->image.values[i], 1, 1e-3) << i;
+    }
+    const Outcome refused = run({"compare", "a.pfm", "b.pfm", "--model", "rpg99", "--device", "gpu"});
+    EXPECT_EQ(refused.status, 2);
+    EXPECT_THAT(refused.err, HasSubstr("--device"));
 }
 
 } // namespace

@@ -59,8 +59,8 @@ protected:
     // From where the scene is seen.
     ::testing::AssertionResult look_the_same(const std::string& a, const std::string& b) const {
         return CommandTest::look_the_same(a, b,
-                                          {"--size", "400x200", "--eye", "0", "0.5", "6", "--target", "0", "0", "0",
-                                           "--samples", "4", "--light", "1", "1", "1"});
+                                          {"--as", "model", "--size", "400x200", "--eye", "0", "0.5", "6", "--target",
+                                           "0", "0", "0", "--samples", "4", "--light", "1", "1", "1"});
     }
 };
 
@@ -205,7 +205,7 @@ TEST_F(MaterialCommandTest, InstancesGetMeshesOfTheirOwn) {
         {{"name", "flat"}, {"mesh", 1}, {"scale", {1, 1, 0}}, {"translation", {0, 3, 0}}});
     scene.document["scenes"][0]["nodes"].push_back(4);
     write_text(path("in.glb"), scene.glb(images()));
-    const std::string said = succeed({"simplify", "in.glb", "--full", "-o", "out.glb"});
+    const std::string said = succeed({"simplify", "in.glb", "--as", "model", "--full", "-o", "out.glb"});
     EXPECT_THAT(said, AllOf(HasSubstr("1 mesh was under several nodes"), HasSubstr("no inverse")));
     const GltfContents in = read_gltf(path("in.glb")), out = read_gltf(path("out.glb"));
     EXPECT_EQ(out.rest["meshes"].size(), 3u);

@@ -28,8 +28,8 @@ protected:
 TEST_F(PerceptionBenchTest, JudgesViews) {
     const Json report = perception("savings,random,far");
     expect_measured(report, 12);
-    // Two fills, two gazes; one random view; three distances: by three tests.
-    ASSERT_EQ(report["views"].size(), 3u * (4 + 1 + 3));
+    // Two fills, two gazes; a random view of the model and one of waves; three distances: by three tests.
+    ASSERT_EQ(report["views"].size(), 3u * (4 + 2 + 3));
     double visible = 0, kept[2] = {};
     for (const Json& view : report["views"]) {
         EXPECT_LE(view["triangles"], view["of"]);

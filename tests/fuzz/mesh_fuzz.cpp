@@ -4,10 +4,14 @@
 #include "mesh_readers.h"
 
 #include <meshio/examine.h>
+#include <meshio/scene_file.h>
 
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <iterator>
+#include <set>
+#include <string>
 #include <string_view>
 
 namespace {
@@ -23,6 +27,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const std::string_view bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
     unseen::meshio::ReadOptions options;
     options.skip_bad = data[0] >= 128;
+    if (std::string_view(names[data[0] % std::size(names)]).ends_with(".gltf")) { // as a scene, too
+        auto scene = unseen::meshio::SceneFile::from_bytes(std::string(bytes), "fuzz.gltf", options);
+        if (!scene && scene.error().message.empty()) std::abort();
+        std::set<std::int32_t> meshes;
+        if (scene)
+            for (const auto& node : scene->contents().nodes) meshes.insert(node.mesh);
+        for (const std::int32_t mesh : meshes) {
+            const auto read = scene->mesh(static_cast<std::size_t>(mesh));
+            if (read && *read && !unseen::vdtree::validate((*read)->mesh.view())) std::abort();
+        }
+    }
     const auto result = unseen::meshio::read_mesh_bytes(bytes, names[data[0] % std::size(names)], options);
     if (!result) {
         if (result.error().message.empty()) std::abort();

@@ -130,6 +130,34 @@ bool is_beside(const fs::path& name) {
 
 } // namespace
 
+std::string mesh_cache_key(const vdtree::Mesh& mesh, std::uint64_t dropped_triangles, bool prelit, bool measures) {
+    Hash hash;
+    const auto add_all = [&](const auto& values) {
+        hash.add({reinterpret_cast<const char*>(values.data()), values.size() * sizeof(values[0])});
+    };
+    add_all(std::as_bytes(perception::measurement_settings()));
+    const std::uint64_t numbers[] = {revision,
+                                     std::endian::native == std::endian::little,
+                                     prelit,
+                                     measures,
+                                     dropped_triangles,
+                                     static_cast<std::uint64_t>(mesh.texture.width),
+                                     static_cast<std::uint64_t>(mesh.texture.height),
+                                     static_cast<std::uint64_t>(mesh.texture.wrap_u),
+                                     static_cast<std::uint64_t>(mesh.texture.wrap_v)};
+    hash.add("a mesh alone");
+    hash.add({reinterpret_cast<const char*>(numbers), sizeof numbers});
+    add_all(mesh.positions), add_all(mesh.triangles), add_all(mesh.normals), add_all(mesh.colours), add_all(mesh.uvs);
+    add_all(mesh.texture.texels), add_all(mesh.document);
+    for (const vdtree::MeshRange& range : mesh.ranges) {
+        const std::uint64_t place[] = {static_cast<std::uint64_t>(range.kind), range.first_triangle,
+                                       range.triangle_count};
+        hash.add(range.name);
+        hash.add({reinterpret_cast<const char*>(place), sizeof place});
+    }
+    return hash.digits();
+}
+
 std::optional<std::string> cache_key(const fs::path& file, const LoadOptions& options) {
     Hash hash;
     const auto settings = std::as_bytes(perception::measurement_settings());

@@ -13,4 +13,7 @@ namespace unseen::session {
 // and where it is not sure what the file refers to. Cost: reading the files once.
 std::optional<std::string> cache_key(const std::filesystem::path& file, const LoadOptions& options);
 
+// Of the tree of a mesh that was read, with its texture and document.
+std::string mesh_cache_key(const vdtree::Mesh& mesh, std::uint64_t dropped_triangles, bool prelit, bool measures);
+
 } // namespace unseen::session

@@ -20,6 +20,8 @@ Result<CutRecipe> make_recipe(const Sight& sight, const Decision& decision);
 bool is_translucent(const Sight& sight);
 bool culls_back_faces(
     const Sight& sight); // faces that look away can be folded: they are not drawn, and nothing shows them from outside
+// Whether what lies outside of the window folds, and all of the object does, by more than any rounding.
+bool is_out_of_sight(const Sight& sight, const Decision& decision);
 bool folds_hidden(const Sight& sight, const Decision& decision); // what a solid's inside hides
 bool folds_unseen(const Sight& sight, const Decision& decision); // what lies behind what the view shows
 

@@ -62,17 +62,21 @@ public:
         std::uint64_t tree_count = 0; // of the tree that the cut is of
         std::optional<vdtree::Cut> cut;
         std::optional<vdtree::Geomorph> geomorph;
-        std::optional<CutRecipe> recipe; // of the last cut, which refers to its criterion
+        std::optional<CutRecipe> recipe; // of the last cut, which refers to its criterion; none: out of sight
+        // Of the last call, where nothing of the object was in the window, and so all is folded.
+        std::optional<vdtree::AdjustStats> stats_out_of_sight;
+        FoldTest test_out_of_sight = FoldTest::error;
     };
     std::vector<Followed>& objects() { return objects_; }
     void let_pass(double seconds) { passed_s_ += seconds; }
 
 private:
     Result<void> take_up_trees();
-    Result<std::vector<CutRecipe>> recipes(const Prepared& prepared) const;
+    Result<void> make_recipes(const Prepared& prepared);
+    bool stays_out_of_sight(const Followed& object, const Sight& sight, const Decision& decision) const;
     Result<std::vector<vdtree::AdjustStats>> unfold_all();
     Result<std::vector<vdtree::AdjustStats>> share_budget(const Request& request);
-    Result<std::vector<vdtree::AdjustStats>> follow_each(const Request& request);
+    Result<std::vector<vdtree::AdjustStats>> follow_each(const Request& request, const Prepared& prepared);
     void conclude(Report& report, const Prepared& prepared, const std::vector<vdtree::AdjustStats>& stats) const;
     Result<void> glide(Report& report);
 
@@ -104,6 +108,7 @@ Result<void> Follower::State::take_up_trees() {
         const vdtree::VertexTree& tree = session_->scene.objects[i].tree;
         if (object.cut && object.tree_count == session_->tree_count[i]) continue;
         object.cut.emplace(tree);
+        object.stats_out_of_sight.reset();
         object.tree_count = session_->tree_count[i];
         if (!glide_s_) continue;
         auto made = vdtree::Geomorph::create(tree, {.seconds = *glide_s_});
@@ -113,19 +118,30 @@ Result<void> Follower::State::take_up_trees() {
     return {};
 }
 
-Result<std::vector<CutRecipe>> Follower::State::recipes(const Prepared& prepared) const {
-    std::vector<CutRecipe> all;
+// Nothing of the object is in the window, nor was it when its cut was made: all is folded, and stays so.
+bool Follower::State::stays_out_of_sight(const Followed& object, const Sight& sight, const Decision& decision) const {
+    return object.stats_out_of_sight && object.test_out_of_sight == decision.test && !glide_s_ &&
+           is_out_of_sight(sight, decision);
+}
+
+Result<void> Follower::State::make_recipes(const Prepared& prepared) {
+    const bool is_shared = prepared.shares_budget();
     for (std::size_t i = 0; i < objects_.size(); ++i) {
+        Followed& object = objects_[i];
         const Sight& sight = prepared.sights[i];
-        auto recipe = make_recipe(sight, prepared.decisions[i]);
+        const Decision& decision = prepared.decisions[i];
+        object.recipe.reset();
+        if (!is_shared && stays_out_of_sight(object, sight, decision)) continue;
+        auto recipe = make_recipe(sight, decision);
         if (!recipe) return recipe.error();
         // What comes into the window shall not glide there any more.
         if (glide_s_ && !recipe->viewpoint.frusta.empty())
             recipe->viewpoint.frusta = {
                 vdtree::frustum_of(sight.object.tree, widened(sight.view), sight.object.placement)};
-        all.push_back(std::move(*recipe));
+        object.recipe = std::move(*recipe);
+        object.stats_out_of_sight.reset();
     }
-    return all;
+    return {};
 }
 
 Result<std::vector<vdtree::AdjustStats>> Follower::State::unfold_all() {
@@ -153,16 +169,29 @@ Result<std::vector<vdtree::AdjustStats>> Follower::State::share_budget(const Req
 }
 
 // Each has the time that the ones before have left.
-Result<std::vector<vdtree::AdjustStats>> Follower::State::follow_each(const Request& request) {
+Result<std::vector<vdtree::AdjustStats>> Follower::State::follow_each(const Request& request,
+                                                                      const Prepared& prepared) {
     std::vector<vdtree::AdjustStats> stats;
     const auto start = Clock::now();
     for (std::size_t i = 0; i < objects_.size(); ++i) {
-        CutRecipe& recipe = *objects_[i].recipe;
+        Followed& object = objects_[i];
+        if (!object.recipe) {
+            stats.push_back(*object.stats_out_of_sight);
+            continue;
+        }
+        CutRecipe& recipe = *object.recipe;
         if (request.milliseconds && i > 0)
             recipe.options.milliseconds = std::max(0.0, *request.milliseconds - milliseconds_since(start));
-        auto followed = objects_[i].cut->follow(*recipe.criterion, recipe.viewpoint, recipe.options);
+        auto followed = object.cut->follow(*recipe.criterion, recipe.viewpoint, recipe.options);
         if (!followed) return followed.error();
         stats.push_back(*followed);
+        const Sight& sight = prepared.sights[i];
+        const Decision& decision = prepared.decisions[i];
+        if (followed->triangles > 0 || !followed->is_complete || !is_out_of_sight(sight, decision)) continue;
+        object.stats_out_of_sight = *followed;
+        object.stats_out_of_sight->node_tests = 0; // of the calls that are spared
+        object.stats_out_of_sight->folds = object.stats_out_of_sight->unfolds = 0;
+        object.test_out_of_sight = decision.test;
     }
     return stats;
 }
@@ -179,10 +208,13 @@ void Follower::State::conclude(Report& report, const Prepared& prepared,
         CutFacts facts;
         facts.imperceptible_from_m = imperceptible_from(sight, decision, stats[i].max_fold_cost);
         facts.is_complete = stats[i].is_complete;
-        if (folds_hidden(sight, decision)) facts.occluders = inner_spheres(sight.object, sight.cache).size();
-        for (Effect& effect : effects_of(sight, decision, facts)) {
-            effect.object = i;
-            report.effects.push_back(std::move(effect));
+        if (decision.request.reasons && folds_hidden(sight, decision))
+            facts.occluders = inner_spheres(sight.object, sight.cache).size();
+        if (decision.request.reasons) {
+            for (Effect& effect : effects_of(sight, decision, facts)) {
+                effect.object = i;
+                report.effects.push_back(std::move(effect));
+            }
         }
         const bool is_unknown = std::isnan(report.imperceptible_from_m) || std::isnan(facts.imperceptible_from_m);
         report.imperceptible_from_m =
@@ -208,14 +240,14 @@ Result<Report> Follower::State::follow(const vdtree::View& view, const Request& 
     if (const auto taken = take_up_trees(); !taken) return taken.error();
     const bool folds = request.goal.kind != Goal::Kind::full;
     if (folds) {
-        auto made = recipes(*prepared);
-        if (!made) return made.error();
-        for (std::size_t i = 0; i < objects_.size(); ++i) objects_[i].recipe = std::move((*made)[i]);
+        if (const auto made = make_recipes(*prepared); !made) return made.error();
+    } else {
+        for (Followed& object : objects_) object.stats_out_of_sight.reset();
     }
     Report report;
     const auto start = Clock::now();
-    const bool is_shared = request.goal.kind == Goal::Kind::budget && objects_.size() > 1;
-    const auto stats = !folds ? unfold_all() : is_shared ? share_budget(request) : follow_each(request);
+    const bool is_shared = prepared->shares_budget();
+    const auto stats = !folds ? unfold_all() : is_shared ? share_budget(request) : follow_each(request, *prepared);
     report.adapt_ms = milliseconds_since(start);
     if (!stats) return stats.error();
     conclude(report, *prepared, *stats);
@@ -226,6 +258,7 @@ Result<Report> Follower::State::follow(const vdtree::View& view, const Request& 
     for (std::size_t i = 0; i < objects_.size(); ++i) {
         const Followed& object = objects_[i];
         static_cast<void>(object.geomorph ? object.geomorph->drawn().indices() : object.cut->indices());
+        if (!request.reasons) continue;
         report.effects.push_back(geomorph_effect(object.geomorph ? &*object.geomorph : nullptr, *object.cut));
         report.effects.back().object = i;
     }

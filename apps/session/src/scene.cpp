@@ -6,6 +6,7 @@
 #include <vdtree/internal/errors.h>
 
 #include "loaded_tree.h"
+#include "scene_from_file.h"
 
 #include <glm/geometric.hpp>
 
@@ -22,11 +23,51 @@ bool is_direction(glm::dvec3 v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z) && v != glm::dvec3(0);
 }
 
+Result<void> check_light(std::optional<glm::dvec3> towards, std::optional<double> ambient, std::optional<double> fill) {
+    if (towards && !is_direction(*towards))
+        return invalid_argument("A light's direction must be finite and not 0 0 0.");
+    if (ambient && !(*ambient >= 0 && *ambient <= 1))
+        return invalid_argument("The share of light from everywhere must be from 0 to 1.");
+    if (fill && !(*fill >= 0 && *fill <= 1))
+        return invalid_argument("The share of light from the opposite side must be from 0 to 1.");
+    return {};
+}
+
 } // namespace
+
+Result<calibration::LightRig> light_rig(std::optional<glm::dvec3> towards, std::optional<double> ambient,
+                                        std::optional<double> fill) {
+    if (const auto valid = check_light(towards, ambient, fill); !valid) return valid.error();
+    const vdtree::Light usual;
+    const glm::dvec3 direction = glm::normalize(glm::dvec3(towards ? unit_vector(*towards) : usual.direction));
+    vdtree::Lighting lighting;
+    lighting.ambient = ambient.value_or(static_cast<double>(usual.ambient));
+    const auto add = [&](double intensity, glm::dvec3 from) {
+        if (!(intensity > 0)) return;
+        lighting.lights.emplace_back().intensity = intensity;
+        lighting.lights.back().direction = from;
+    };
+    add(1 - lighting.ambient, direction);
+    add((1 - lighting.ambient) * fill.value_or(static_cast<double>(usual.fill)), -direction);
+    return calibration::LightRig::of(std::move(lighting), "the usual light");
+}
 
 Result<Scene> Scene::load(const std::filesystem::path& file, const LoadOptions& options) {
     if (!(options.unit_metres > 0 && std::isfinite(options.unit_metres)))
         return invalid_argument("load.unit_metres must be above 0 and finite.");
+    if (options.as != LoadAs::model) {
+        const bool may_be_scene = meshio::is_gltf_file(file);
+        if (!may_be_scene && options.as == LoadAs::scene)
+            return invalid_argument(file.string() +
+                                    " is no glTF file (.glb, .gltf), and only these are scenes: read it "
+                                    "with load.as = model.");
+        if (may_be_scene) {
+            auto read = meshio::SceneFile::read(file, reading_options(options));
+            if (!read) return read.error();
+            if (options.as == LoadAs::scene || read->contents().is_scene)
+                return scene_from(std::move(*read), file, options);
+        }
+    }
     auto loaded = session::load(file, options, true);
     if (!loaded) return loaded.error();
     Scene scene = of(std::move(loaded->tree), options.unit_metres);
@@ -47,12 +88,7 @@ Scene Scene::of(vdtree::VertexTree tree, double unit_metres) {
 Result<void> Scene::relight(std::optional<glm::dvec3> towards, std::optional<double> ambient,
                             std::optional<double> fill) {
     if (!towards && !ambient && !fill) return {};
-    if (towards && !is_direction(*towards))
-        return invalid_argument("A light's direction must be finite and not 0 0 0.");
-    if (ambient && !(*ambient >= 0 && *ambient <= 1))
-        return invalid_argument("The share of light from everywhere must be from 0 to 1.");
-    if (fill && !(*fill >= 0 && *fill <= 1))
-        return invalid_argument("The share of light from the opposite side must be from 0 to 1.");
+    if (const auto valid = check_light(towards, ambient, fill); !valid) return valid;
     for (Object& object : objects) {
         vdtree::Light light = object.tree.light();
         if (towards) light.direction = unit_vector(*towards);

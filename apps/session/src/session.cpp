@@ -3,8 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include <numbers>
+#include <unordered_map>
+
 #include <glm/geometric.hpp>
 
+#include <perception/fold_measurement.h>
 #include <perception/gaze.h>
 #include <perception/motion.h>
 #include <session/follower.h>
@@ -31,8 +35,26 @@ WorldSphere united(const WorldSphere& a, const WorldSphere& b) {
     return {a.centre + way * ((radius - a.radius) / distance), radius};
 }
 
+// Around the eye: the planes go through it, and their offsets are 0.
+std::vector<vdtree::Plane> window_of(const vdtree::View& view) {
+    const vdtree::CameraFrame frame = vdtree::camera_frame(view);
+    const double tan_y = std::tan(view.fov_y_degrees * std::numbers::pi / 360);
+    const double tan_x = tan_y * view.width / view.height;
+    std::vector<vdtree::Plane> planes;
+    for (const glm::dvec3& inward : {-frame.back, frame.right - tan_x * frame.back, -frame.right - tan_x * frame.back,
+                                     frame.up - tan_y * frame.back, -frame.up - tan_y * frame.back})
+        planes.push_back({glm::normalize(inward), 0});
+    return planes;
+}
+
+// As the session's users take it.
+Result<std::optional<vdtree::Lighting>> copied(const Result<std::shared_ptr<const vdtree::Lighting>>& lighting) {
+    if (!lighting) return lighting.error();
+    return *lighting ? std::optional(**lighting) : std::nullopt;
+}
+
 Plan plan_of(const Sight& sight, const Decision& decision, std::size_t object) {
-    Plan plan{decision.test, decision.why, decision.measures, effects_of(sight, decision, std::nullopt)};
+    Plan plan{decision.test, std::string(decision.why), decision.measures, effects_of(sight, decision, std::nullopt)};
     for (Effect& effect : plan.effects) effect.object = object;
     return plan;
 }
@@ -45,6 +67,21 @@ WorldSphere world_sphere(const Object& object) {
     const vdtree::Sphere sphere = object.tree.bounding_sphere();
     return {object.placement.to_world(object.tree.origin() + glm::dvec3(sphere.centre)),
             object.placement.scale * sphere.radius};
+}
+
+WorldSphere sphere_of_all(const Object& object, ObjectCache& cache) {
+    if (!cache.all) {
+        const vdtree::VertexTree& tree = object.tree;
+        vdtree::Sphere all = tree.bounding_sphere();
+        const auto include = [&](const vdtree::Sphere& sphere) {
+            all.radius = std::max(all.radius, glm::length(sphere.centre - all.centre) + sphere.radius);
+        };
+        include(tree.bounds()[vdtree::VertexTree::root()].ring);
+        include(tree.support_spheres()[vdtree::VertexTree::root()]);
+        cache.all = all;
+    }
+    return {object.placement.to_world(object.tree.origin() + glm::dvec3(cache.all->centre)),
+            object.placement.scale * static_cast<double>(cache.all->radius)};
 }
 
 std::span<const vdtree::Sphere> inner_spheres(const Object& object, ObjectCache& cache) {
@@ -77,10 +114,27 @@ Result<const perception::CutRings*> cut_rings(const Object& object, ObjectCache&
 
 Session::State::State(Scene scene_, Observer observer_, Messages messages_, float background_)
     : scene(std::move(scene_)), observer(std::move(observer_)), messages(std::move(messages_)), background(background_),
-      caches(scene.objects.size()), tree_count(scene.objects.size(), 1) {}
+      caches(scene.objects.size()), tree_count(scene.objects.size(), 1),
+      still_lights_(scene.objects.size() + scene.backdrop.size()), lit_criteria_(scene.objects.size()) {
+    share_caches();
+    constexpr std::uint64_t most_lit = 4'000'000; // some 100 bytes, and up to a microsecond, a node of every object
+    std::uint64_t nodes = 0;
+    for (const Object& object : scene.objects) nodes += object.tree.interior_count();
+    is_crowded_ = nodes > most_lit;
+}
+
+// Keeps what is there.
+void Session::State::share_caches() {
+    std::unordered_map<const vdtree::VertexTree::Data*, std::shared_ptr<ObjectCache>> of_tree;
+    for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+        std::shared_ptr<ObjectCache>& cache = of_tree[&scene.objects[i].tree.data()];
+        if (!cache) cache = caches[i] ? caches[i] : std::make_shared<ObjectCache>();
+        caches[i] = cache;
+    }
+}
 
 Result<std::shared_ptr<Session::State>> Session::State::create(Scene scene, Observer observer, Messages messages) {
-    if (scene.objects.empty())
+    if (scene.objects.empty() && scene.backdrop.empty() && !scene.is_of_file())
         return invalid_argument("A scene needs an object: load one, or add it to scene.objects.");
     if (const auto valid = perception::validate(observer.display); !valid) return valid.error();
     if (!(observer.velocity.value() >= 0 && observer.velocity <= perception::fastest_velocity))
@@ -92,13 +146,24 @@ Result<std::shared_ptr<Session::State>> Session::State::create(Scene scene, Obse
     return std::shared_ptr<State>(new State(std::move(scene), std::move(observer), std::move(messages), *background));
 }
 
-Result<std::optional<vdtree::Lighting>> Session::State::lighting(const vdtree::View& view, std::size_t object) {
-    if (!scene.lights) return std::optional<vdtree::Lighting>();
-    const Object& lit = scene.objects[object];
+using SharedLighting = std::shared_ptr<const vdtree::Lighting>;
+
+Result<SharedLighting> Session::State::lighting(const vdtree::View& view, std::size_t item) {
+    if (!scene.lights) return SharedLighting();
+    const bool stands_still = scene.lights->stands_still();
+    if (stands_still && still_lights_[item]) return still_lights_[item];
+    const bool is_object = item < scene.objects.size();
+    const Object& lit = is_object ? scene.objects[item] : scene.backdrop[item - scene.objects.size()];
     vdtree::Lighting lighting = scene.lights->at(seconds, lit.tree, view, lit.placement);
-    if (const auto ok = vdtree::check_lights(lit.tree, lighting); !ok)
-        return Error{ok.error().code, scene.lights->file().string() + ": " + ok.error().message};
-    return std::optional(std::move(lighting));
+    // Walls may have lights within them: rooms are solid on the outside.
+    const auto ok = is_object ? vdtree::check_lights(lit.tree, lighting) : vdtree::validate(lighting);
+    if (!ok)
+        return Error{ok.error().code, scene.lights->file().string() + ": " +
+                                          (scene.is_of_file() ? "object '" + lit.name + "': " : std::string()) +
+                                          ok.error().message};
+    auto shared = std::make_shared<const vdtree::Lighting>(std::move(lighting));
+    if (stands_still) still_lights_[item] = shared;
+    return SharedLighting(std::move(shared));
 }
 
 // Everything that a moved outline may uncover. Behind a single object is the background; behind one of several may be
@@ -114,7 +179,11 @@ perception::SceneLuminance Session::State::luminance_of(const std::vector<Sight>
                                         vdtree::eye_in_tree(tree, sight.view, sight.object.placement), background);
         all.darkest = std::min(all.darkest, own.darkest);
         all.brightest = std::max(all.brightest, own.brightest);
-        if (sights.size() == 1) all.behind = own.behind;
+        if (sights.size() == 1 && scene.backdrop.empty()) all.behind = own.behind;
+    }
+    for (const vdtree::LuminanceRange& range : backdrop_ranges_) {
+        all.darkest = std::min(all.darkest, range.lo);
+        all.brightest = std::max(all.brightest, range.hi);
     }
     return all;
 }
@@ -149,21 +218,45 @@ Result<void> Session::State::set_gaze_of(Sight& sight) {
     return {};
 }
 
+// What a light makes of every vertex; once where lights stand still and have no highlights that go with the eye.
+Result<void> Session::State::look_at_backdrop(const vdtree::View& view) {
+    const bool stays = !scene.lights || scene.lights->stands_still();
+    if (stays && backdrop_ranges_.size() == scene.backdrop.size()) return {};
+    backdrop_ranges_.clear();
+    for (std::size_t i = 0; i < scene.backdrop.size(); ++i) {
+        const vdtree::VertexTree& tree = scene.backdrop[i].tree;
+        vdtree::LuminanceRange range = tree.luminance_range();
+        const auto lit = lighting(view, scene.objects.size() + i);
+        if (!lit) return lit.error();
+        if (*lit) {
+            double brightest = 0;
+            for (const vdtree::LightSource& light : (*lit)->lights) brightest += light.intensity;
+            // At least the ambient light of the darkest albedo, and no more than white shows.
+            range = {0, brightest > 0 ? 1.0f : static_cast<float>((*lit)->ambient)};
+        }
+        backdrop_ranges_.push_back(range);
+    }
+    return {};
+}
+
 Result<std::vector<Sight>> Session::State::look(const vdtree::View& view) {
     if (const auto valid = vdtree::validate(view); !valid) return valid.error();
+    window_ = window_of(view);
     std::vector<Sight> sights;
+    sights.reserve(scene.objects.size());
     for (std::size_t i = 0; i < scene.objects.size(); ++i) {
         auto lit = lighting(view, i);
         if (!lit) return lit.error();
-        if (*lit && !caches[i].light_bounds) {
+        if (*lit && !caches[i]->light_bounds) {
             auto bounds = vdtree::LightBounds::measure(scene.objects[i].tree);
             if (!bounds) return bounds.error();
-            caches[i].light_bounds = std::make_shared<const vdtree::LightBounds>(std::move(*bounds));
+            caches[i]->light_bounds = std::make_shared<const vdtree::LightBounds>(std::move(*bounds));
         }
-        sights.push_back({scene.objects[i], caches[i], observer, view, scene.lights ? &*scene.lights : nullptr,
-                          std::move(*lit), background});
+        sights.push_back({scene.objects[i], *caches[i], lit_criteria_[i], observer, view,
+                          scene.lights ? &*scene.lights : nullptr, std::move(*lit), &window_, background, is_crowded_});
         if (const auto set = set_gaze_of(sights.back()); !set) return set.error();
     }
+    if (const auto looked = look_at_backdrop(view); !looked) return looked.error();
     const perception::SceneLuminance luminance = luminance_of(sights);
     for (Sight& sight : sights) sight.luminance = luminance;
     return sights;
@@ -179,9 +272,27 @@ Result<void> Session::State::measure(std::size_t object) {
     auto with_errors = measured_once(of.tree, of.measurement.get(), messages);
     if (!with_errors) return with_errors.error();
     of.measurement.reset();
-    of.tree = std::move(*with_errors);
-    caches[object] = {};
-    ++tree_count[object];
+    // Of all objects that have this tree.
+    const vdtree::VertexTree before = of.tree.share();
+    for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+        if (&scene.objects[i].tree.data() != &before.data()) continue;
+        scene.objects[i].tree = with_errors->share();
+        caches[i].reset();
+        lit_criteria_[i].reset();
+        ++tree_count[i];
+    }
+    share_caches();
+    return {};
+}
+
+Result<void> Session::State::measure_under_lights(std::size_t object) {
+    constexpr vdtree::NodeId told_from = 6'000; // nodes; about half a second on one core
+    const vdtree::VertexTree& tree = scene.objects[object].tree;
+    if (messages.note && tree.interior_count() >= told_from)
+        messages.note("measuring what folds change under lights ...");
+    auto folds = perception::LitFolds::measure(tree, 0, messages.progress);
+    if (!folds) return folds.error();
+    caches[object]->lit_folds = std::move(*folds);
     return {};
 }
 
@@ -197,9 +308,13 @@ Result<Prepared> Session::State::prepare(const vdtree::View& view, const Request
     }
     if (std::none_of(decisions.begin(), decisions.end(), [](const Decision& d) { return d.measures; }))
         return Prepared{std::move(*sights), std::move(decisions)};
-    for (std::size_t i = 0; i < decisions.size(); ++i)
-        if (decisions[i].measures)
-            if (const auto measured = measure(i); !measured) return measured.error();
+    const bool is_lit = scene.lights.has_value();
+    for (std::size_t i = 0; i < decisions.size(); ++i) {
+        if (!decisions[i].measures) continue;
+        if (is_lit ? caches[i]->lit_folds.has_value() : perception::has_fold_measurement(scene.objects[i].tree))
+            continue; // of another object with this tree
+        if (const auto measured = is_lit ? measure_under_lights(i) : measure(i); !measured) return measured.error();
+    }
     return prepare(view, request); // of the other trees
 }
 
@@ -227,9 +342,33 @@ void Session::set_velocity(perception::DegreesPerSecond velocity) { state_->obse
 void Session::set_time(double seconds) { state_->seconds = seconds; }
 
 WorldSphere Session::bounding_sphere() const {
-    WorldSphere all = world_sphere(state_->scene.objects.front());
-    for (const Object& object : state_->scene.objects) all = united(all, world_sphere(object));
+    const Scene& scene = state_->scene;
+    const std::vector<Object>& framed = scene.objects.empty() ? scene.backdrop : scene.objects;
+    if (framed.empty()) return {};
+    WorldSphere all = world_sphere(framed.front());
+    for (const Object& object : framed) all = united(all, world_sphere(object));
     return all;
+}
+
+std::uint64_t Session::triangle_count() const noexcept {
+    std::uint64_t triangles = 0;
+    for (const Object& object : state_->scene.objects) triangles += object.tree.triangle_count();
+    return triangles;
+}
+
+std::optional<vdtree::View> Session::camera_view(const vdtree::View& window) const {
+    const auto& camera = state_->scene.camera;
+    if (!camera) return std::nullopt;
+    const WorldSphere sphere = bounding_sphere();
+    // Orbits turn around what lies ahead.
+    const double ahead = glm::dot(sphere.centre - camera->eye, camera->forward);
+    const double distance = ahead > 0 ? ahead : std::max(sphere.radius, 1.0);
+    vdtree::View view = window;
+    view.eye = camera->eye;
+    view.target = camera->eye + distance * camera->forward;
+    view.up = camera->up;
+    view.fov_y_degrees = camera->fov_y_degrees;
+    return view;
 }
 
 vdtree::View Session::frame(glm::dvec3 direction, double fill, const vdtree::View& window) const {
@@ -241,6 +380,7 @@ vdtree::View Session::frame(glm::dvec3 direction, double fill, const vdtree::Vie
 vdtree::View Session::default_view() const {
     vdtree::View window;
     window.fov_y_degrees = perception::physical_field(state_->observer.display, window.height).value();
+    if (const auto view = camera_view(window)) return *view;
     return frame({0, 0, 1}, default_fill, window);
 }
 
@@ -271,21 +411,26 @@ Result<CutRecipe> Session::recipe(const vdtree::View& view, const Request& reque
 }
 
 Result<std::optional<vdtree::Lighting>> Session::lighting(const vdtree::View& view, std::size_t object) const {
-    return state_->lighting(view, object);
+    return copied(state_->lighting(view, object));
+}
+
+Result<std::optional<vdtree::Lighting>> Session::backdrop_lighting(const vdtree::View& view, std::size_t part) const {
+    return copied(state_->lighting(view, state_->scene.objects.size() + part));
 }
 
 Result<perception::SceneLuminance> Session::luminance(const vdtree::View& view) const {
     const auto sights = state_->look(view);
     if (!sights) return sights.error();
+    if (sights->empty()) return perception::SceneLuminance{state_->background, state_->background};
     return sights->front().luminance;
 }
 
 std::span<const vdtree::Sphere> Session::inner_spheres(std::size_t object) const {
-    return session::inner_spheres(state_->scene.objects[object], state_->caches[object]);
+    return session::inner_spheres(state_->scene.objects[object], *state_->caches[object]);
 }
 
 Result<const perception::CutRings*> Session::cut_rings(std::size_t object) const {
-    return session::cut_rings(state_->scene.objects[object], state_->caches[object], false);
+    return session::cut_rings(state_->scene.objects[object], *state_->caches[object], false);
 }
 
 } // namespace unseen::session

@@ -18,6 +18,10 @@ namespace unseen::session {
 struct Prepared {
     std::vector<Sight> sights;
     std::vector<Decision> decisions; // by object
+
+    bool shares_budget() const {
+        return decisions.size() > 1 && decisions.front().request.goal.kind == Goal::Kind::budget;
+    }
 };
 
 class Session::State {
@@ -27,20 +31,24 @@ public:
     Result<std::vector<Sight>> look(const vdtree::View& view);
     // Measures the errors of folds where a decision wants them.
     Result<Prepared> prepare(const vdtree::View& view, const Request& request);
-    Result<std::optional<vdtree::Lighting>> lighting(const vdtree::View& view, std::size_t object);
+    // Of all objects, then of the backdrop.
+    Result<std::shared_ptr<const vdtree::Lighting>> lighting(const vdtree::View& view, std::size_t item);
 
     Scene scene;
     Observer observer;
     Messages messages;
-    float background = 0;                  // relative luminance
-    double seconds = 0;                    // of lights that move
-    std::vector<ObjectCache> caches;       // by object
-    std::vector<std::uint64_t> tree_count; // by object: how many trees it has had
+    float background = 0;                             // relative luminance
+    double seconds = 0;                               // of lights that move
+    std::vector<std::shared_ptr<ObjectCache>> caches; // by object; objects with one tree share one
+    std::vector<std::uint64_t> tree_count;            // by object: how many trees it has had
 
 private:
     State(Scene scene_, Observer observer_, Messages messages_, float background_);
+    void share_caches();
+    Result<void> look_at_backdrop(const vdtree::View& view);
     perception::SceneLuminance luminance_of(const std::vector<Sight>& sights) const;
     Result<void> measure(std::size_t object);
+    Result<void> measure_under_lights(std::size_t object);
     Result<void> set_gaze_of(Sight& sight);
     Result<std::shared_ptr<const perception::CsfTable>> sensitivity(); // of the observer, to what moves so fast
 
@@ -52,6 +60,11 @@ private:
     };
     std::optional<Moving> moving_;
     std::shared_ptr<const perception::CsfTable> widened_of_;
+    std::vector<std::shared_ptr<const vdtree::Lighting>> still_lights_; // by item, of lights that stand still
+    std::vector<std::shared_ptr<const KeptCriterion>> lit_criteria_;    // by object
+    bool is_crowded_ = false;
+    std::vector<vdtree::Plane> window_;                   // of the last look
+    std::vector<vdtree::LuminanceRange> backdrop_ranges_; // of luminance, as they are lit
 };
 
 } // namespace unseen::session

@@ -3,10 +3,12 @@
 
 #include <memory>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include <perception/criterion.h>
 #include <perception/cut_rings.h>
+#include <perception/lit_folds.h>
 #include <session/observer.h>
 #include <session/scene.h>
 #include <session/session.h>
@@ -19,20 +21,25 @@ struct KeptCriterion; // see fold_test.cpp
 struct ObjectCache {
     std::optional<std::vector<vdtree::Sphere>> inner_spheres = {};
     std::optional<perception::CutRings> cut_rings = {};
-    bool rings_have_chroma = false; // few requests look at colours, and bounding them takes time
+    std::optional<vdtree::Sphere> all = {}; // see sphere_of_all()
+    bool rings_have_chroma = false;         // few requests look at colours, and bounding them takes time
     std::shared_ptr<const vdtree::LightBounds> light_bounds = {}, lit_cut_rings = {};
+    std::optional<perception::LitFolds> lit_folds = {};  // measured where the default test asks for it
     std::shared_ptr<const KeptCriterion> criterion = {}; // the last that was asked for
 };
 
 struct Sight {
     const Object& object;
     ObjectCache& cache;
+    std::shared_ptr<const KeptCriterion>& lit_criterion; // the object's own, where lights that stand still light it
     const Observer& observer;
     const vdtree::View& view;
-    const calibration::LightRig* lights;       // null: the tree's own light
-    std::optional<vdtree::Lighting> lighting;  // theirs
-    float background;                          // relative luminance
-    perception::SceneLuminance luminance = {}; // of the whole scene
+    const calibration::LightRig* lights;              // null: the tree's own light
+    std::shared_ptr<const vdtree::Lighting> lighting; // theirs
+    const std::vector<vdtree::Plane>* window;         // the frustum's planes around the eye, in the world
+    float background;                                 // relative luminance
+    bool is_crowded;                                  // too many nodes to look at all of them under lights
+    perception::SceneLuminance luminance = {};        // of the whole scene
     // For the gaze's margin; no gaze where the margin is so wide that everything may be looked at.
     std::shared_ptr<const perception::CsfTable> csf = {};
     std::optional<glm::dvec2> gaze_px = {};
@@ -42,11 +49,13 @@ struct Sight {
 struct Decision {
     const Request& request;
     FoldTest test;
-    std::string why;       // not the default
+    std::string_view why;  // not the default
     bool measures = false; // the tree lacks the errors of its folds
 };
 
 WorldSphere world_sphere(const Object& object);
+// Around all that fold tests look at: vertices, proxies, rings. Larger than that of the triangles.
+WorldSphere sphere_of_all(const Object& object, ObjectCache& cache);
 std::span<const vdtree::Sphere> inner_spheres(const Object& object, ObjectCache& cache);
 // What lights make of the rings of all cuts.
 Result<std::shared_ptr<const vdtree::LightBounds>> lit_cut_rings(const Object& object, ObjectCache& cache);

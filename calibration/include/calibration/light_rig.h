@@ -33,12 +33,17 @@ public:
     // Errors name the file and the key.
     static Result<LightRig> read(const std::filesystem::path& file);
 
+    // Lights that stand still, in the world, as `lighting` has them (places and distances in world units). `file`: where they are from, for messages. Fails where lighting does not hold, see vdtree::validate().
+    static Result<LightRig> of(vdtree::Lighting lighting, std::filesystem::path file);
+
     // Where the lights are, in the frame of a tree.
     vdtree::Lighting at(double seconds, const vdtree::VertexTree& tree, const vdtree::View& view,
                         const vdtree::Similarity& placement) const;
 
     bool moves() const noexcept { return moves_; } // with time
     bool follows_camera() const noexcept { return follows_camera_; }
+    // Whether they are the same at all times and from everywhere, but for highlights.
+    bool stands_still() const noexcept { return !moves_ && !follows_camera_; }
     std::string description() const; // for people: "1 directional and 2 point lights, ambient 0.1"
     const std::filesystem::path& file() const noexcept { return file_; }
 

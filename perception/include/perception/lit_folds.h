@@ -12,8 +12,8 @@
 namespace unseen::perception {
 
 // Of a vertex of the albedo a and the normal n a distant light from l makes a max(0, n.l). So what any light makes of a
-// fold follows from what the fold changes of a n, a vector: no more than the light's luminance times its length. That is
-// measured in three pictures, one an axis, as measure_folds() measures luminance; and a fourth one of a, for ambient
+// fold follows from what the fold changes of a n, a vector: no more than the light's luminance times the sum of |l_k| times
+// what it changes along each axis. That is measured in three pictures, one an axis, as measure_folds() measures luminance; and a fourth one of a, for ambient
 // light. Copies are cheap and share their data.
 class LitFolds {
 public:

@@ -32,4 +32,5 @@
 #include <perception/change.h>
 #include <perception/image.h>
 #include <perception/judge.h>
+#include <perception/judge_tables.h>
 #include <perception/person.h>

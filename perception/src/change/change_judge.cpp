@@ -103,7 +103,7 @@ double flicker_of(std::span<const Change> changes, const Image& before, const Ju
     const double ppd = pixels_per_degree(options.display).value();
     const double gain = flicker_gain(options);
     const Values luminance = adaptation(before, ppd, contrast_floor(options.display));
-    const Plane aside = eccentricities(before, options);
+    const Plane aside = eccentricities(before.width, before.height, options);
     double sum = 0;
     for (int y = 0; y < before.height; ++y)
         for (int x = 0; x < before.width; ++x) {

@@ -8,13 +8,12 @@
 #include <string>
 #include <vector>
 
-#include <glm/geometric.hpp>
-
 #include "fold/error_distances.h"
 #include "fold/fold_screen.h"
 #include "fold/luminance_classes.h"
 #include "fold/pooling.h"
 #include "fold/stage_distances.h"
+#include "fold/surround.h"
 
 namespace unseen::perception {
 
@@ -152,12 +151,6 @@ struct Bands {
     }
 };
 
-// What a mesh is seen before, as far as it darkens what bands of low frequencies adapt to.
-struct Surround {
-    double darkest_cdm2 = 0;
-    double coverage = 1; // of the mesh's disc, from all sides in the mean
-};
-
 // By how many octaves the mean light around a pattern of one luminance is less than its own: [width * bands + band], as
 // Bands. A band looks at a neighbourhood as wide as its wave, of which the mesh lights no more than it covers of the
 // pattern's own. Empty where nothing darker is behind.
@@ -170,8 +163,8 @@ struct Dimming {
         const double dark = std::max(surround.darkest_cdm2, luminance_cdm2 * std::exp2(-most_dimming));
         if (!(dark < luminance_cdm2)) return;
         const auto octaves_below = [&](double waves) {
-            const double lit = std::min(1.0, surround.coverage * waves * waves);
-            return static_cast<float>(-std::log2(std::lerp(dark / luminance_cdm2, 1.0, lit)));
+            const double mean = std::max(dark, surround.mean_cdm2(luminance_cdm2, waves * waves));
+            return static_cast<float>(std::log2(luminance_cdm2 / mean));
         };
         for (std::size_t i = 0; i < width_count; ++i)
             for (const double low : bands.lowest_cpd) {
@@ -560,19 +553,6 @@ bool find_shown(const vdtree::SoundTree& tree, std::span<const FoldError> errors
     return true;
 }
 
-// How much of its sphere's disc a mesh covers from all sides, in the mean: a quarter of a convex surface's area is what
-// it covers.
-double coverage_of(const vdtree::SoundTree& tree) {
-    const NodeId leaves = tree.interior_count();
-    double area = 0;
-    for (const vdtree::Triangle& triangle : tree.triangles()) {
-        const auto at = [&](std::size_t k) { return glm::dvec3(tree.positions()[leaves + triangle[k]]); };
-        area += 0.5 * glm::length(glm::cross(at(1) - at(0), at(2) - at(0)));
-    }
-    const double radius = tree.bounding_sphere().radius, disc = std::numbers::pi * radius * radius;
-    return disc > 0 ? std::min(1.0, area / 4 / disc) : 1;
-}
-
 // A node folds as well where the whole mesh does, as far as the node's stage: takes the stage where that is nowhere
 // seen from farther, unless a child would then be. Children before parents.
 void fold_in_stages(const vdtree::SoundTree& tree, std::span<const FoldError> errors,
@@ -610,8 +590,7 @@ Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const Fold
     parts.lengths.resize(nodes);
     parts.silhouette_lengths.resize(nodes);
     const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
-    const Surround surround{levels.in_cdm2(options.scene.behind ? options.scene.behind->lo : options.scene.darkest),
-                            coverage_of(tree)};
+    const Surround surround = surround_of(tree, options);
     SwitchDistances switch_distances(levels, screen, csf, options.model, surround, parts.eccentricity_bins,
                                      measured.stages.size());
     std::vector<Shown> patches, strips;

@@ -17,6 +17,7 @@
 #include "fold/fold_screen.h"
 #include "fold/largest_extents.h"
 #include "fold/safe_rings.h"
+#include "fold/surround.h"
 
 namespace unseen::perception {
 
@@ -37,10 +38,19 @@ constexpr Bins coarse_bins{degrees_per_bin, bin_count}, fine_bins{degrees_per_bi
 // The sensitivities that a test uses: to colour only where it looks at colour.
 struct Sensitivities {
     CsfTable luminance;
+    Surround surround;
     std::optional<CsfTable> red_green, yellow_violet;
 
-    // To gratings without end, of whatever frequency is seen best.
+    // To gratings without end, of whatever frequency is seen best; as wide as the mesh, over its mean with what is
+    // behind.
     double of_areas(Degrees eccentricity, Luminance at) const {
+        const Luminance mean(surround.mean_cdm2(at.value(), 1));
+        return std::max(of_areas_at(eccentricity, at), at / mean * of_areas_at(eccentricity, mean));
+    }
+    static constexpr SquareDegrees unlimited{std::numeric_limits<double>::infinity()};
+
+private:
+    double of_areas_at(Degrees eccentricity, Luminance at) const {
         constexpr double octaves = 0.25;
         constexpr int steps = 40; // to 64 cpd
         static const std::array<double, steps> gains = [] {
@@ -59,17 +69,17 @@ struct Sensitivities {
         }
         return best;
     }
-    static constexpr SquareDegrees unlimited{std::numeric_limits<double>::infinity()};
 };
 
 // Whether patches are taken for gratings alone, as published, or for what else half a wave holds.
 enum class Patches { gratings, half_waves };
 
-Sensitivities sensitivities_for(const FoldTestOptions& options, bool has_chroma, Patches patches) {
+Sensitivities sensitivities_for(const FoldTestOptions& options, const Surround& surround, bool has_chroma,
+                                Patches patches) {
     const auto seen = [&](const CsfTable& table) {
         return patches == Patches::half_waves ? table.of_half_waves() : table;
     };
-    Sensitivities all{seen(csf_of(options)), {}, {}};
+    Sensitivities all{seen(csf_of(options)), surround, {}, {}};
     if (!has_chroma) return all;
     static const CsfTable red_green = CsfTable::from_model(CsfModel::castle_red_green);
     static const CsfTable yellow_violet = CsfTable::from_model(CsfModel::castle_yellow_violet);
@@ -292,6 +302,8 @@ Result<DistanceCriterion> make_criterion(const vdtree::SoundTree& tree, const Ri
     const bool has_chroma = !rings.chroma.empty();
     // Where contrasts and luminances alone make the rows, these are few enough, and quickly found, to be fine.
     const bool is_fine = !has_chroma && rings.mean_shift.empty() && rings.vertices.empty() && lengths.empty();
+    // Of shifts of the mean alone.
+    const Surround surround = rings.mean_shift.empty() ? Surround() : surround_of(tree, options);
     const Classes classes(options.display, is_fine ? fine_contrasts : coarse_contrasts);
     const Bins& bins = is_fine ? fine_bins : coarse_bins;
     if (!tree.texture().empty() && options.chroma)
@@ -306,7 +318,7 @@ Result<DistanceCriterion> make_criterion(const vdtree::SoundTree& tree, const Ri
     for (std::size_t coarseness = 1;; coarseness *= 2) {
         Rows rows(!has_chroma && rings.vertices.empty(), classes.contrasts(), coarseness);
         if (!classify(tree, rings, options, classes, rows, parts.classes)) continue;
-        fill_table(parts, rows, classes, bins, screen, sensitivities_for(options, has_chroma, patches));
+        fill_table(parts, rows, classes, bins, screen, sensitivities_for(options, surround, has_chroma, patches));
         return DistanceCriterion::create(tree, std::move(parts));
     }
 }

@@ -5,7 +5,9 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <numbers>
+#include <optional>
 #include <string>
 
 #include "judge/fast_math.h"
@@ -25,9 +27,8 @@ constexpr double least_beta = 1, largest_beta = 8; // beyond, powers of what is 
 // Steps of the tables. Between them log S and the weights are linear, over luminance and over eccentricity. log S is
 // linear in eccentricity. In luminance it errs by less than 1e-3 of S, most where castleCSF's peak crosses the band's
 // frequency.
-constexpr double eccentricity_step = 2; // degrees
-constexpr int cell_bits = 4;            // cells of an octave of luminance: 2^4
-constexpr int fraction_bits = 23 - cell_bits;
+constexpr double eccentricity_step = BandTable::eccentricity_step;
+constexpr int fraction_bits = BandTable::fraction_bits;
 
 // Where own and smoothed are fitted, in units of the band's nominal frequency. Band 0 has no band above it; it is fitted
 // on the way down to band 1, where it answers alone.
@@ -182,6 +183,11 @@ double summation_area(const BandConditions& c, double freq_cpd) {
     }
 }
 
+double summation_area_in_samples(const BandConditions& c, int level) {
+    const double samples_a_degree = c.ppd / std::exp2(level);
+    return summation_area(c, nominal_frequency(c.ppd, level)) * samples_a_degree * samples_a_degree;
+}
+
 double sensitivity_of(const BandConditions& c, double freq_cpd, double luminance, double eccentricity) {
     Stimulus stimulus;
     stimulus.frequency = CyclesPerDegree(freq_cpd);
@@ -276,29 +282,58 @@ void BandTable::weigh(std::span<const float> luminance, std::span<const float> e
 
 // ---- geometry and arguments ----------------------------------------------------------------------------------------
 
-Plane eccentricities(const Image& window, const JudgeOptions& options) {
+std::optional<GazeOnScreen> gaze_on_screen(int width, int height, const JudgeOptions& options) {
     if (!options.gaze_px) return {};
-    Plane degrees(window.width, window.height);
-    // Directions (x, y, 1) from the eye, the distance to the screen being 1; that of the gaze has length 1.
-    const double pixel = options.display.pixel_pitch.value() / options.display.distance.value();
-    const auto from_centre = [&](double px, int size) { return (px - 0.5 * size) * pixel; };
-    const double right = from_centre(options.gaze_px->x, window.width),
-                 down = from_centre(options.gaze_px->y, window.height), length = std::hypot(right, down, 1.0);
-    const auto gaze_x = static_cast<float>(right / length), gaze_y = static_cast<float>(down / length),
-               gaze_z = static_cast<float>(1 / length);
-    std::vector<float> xs;
-    for (int x = 0; x < window.width; ++x) xs.push_back(static_cast<float>(from_centre(x + 0.5, window.width)));
+    GazeOnScreen gaze;
+    gaze.tangent_per_pixel = options.display.pixel_pitch.value() / options.display.distance.value();
+    const double right = gaze.tangent(options.gaze_px->x, width), down = gaze.tangent(options.gaze_px->y, height),
+                 length = std::hypot(right, down, 1.0);
+    gaze.direction = {static_cast<float>(right / length), static_cast<float>(down / length),
+                      static_cast<float>(1 / length)};
+    return gaze;
+}
+
+namespace {
+
+// Calls `use(row, degrees)` for each row of a window.
+template <class Use>
+void for_each_row_of_eccentricities(const GazeOnScreen& gaze, int width, int height, Use use) {
+    const auto [gaze_x, gaze_y, gaze_z] = gaze.direction;
+    std::vector<float> xs, degrees(static_cast<std::size_t>(width));
+    for (int x = 0; x < width; ++x) xs.push_back(static_cast<float>(gaze.tangent(x + 0.5, width)));
     constexpr auto per_radian = static_cast<float>(180 / std::numbers::pi);
-    for (int row = 0; row < window.height; ++row) {
-        const auto y = static_cast<float>(from_centre(row + 0.5, window.height));
-        float* const to = degrees.row(row);
+    for (int row = 0; row < height; ++row) {
+        const auto y = static_cast<float>(gaze.tangent(row + 0.5, height));
         for (std::size_t i = 0; i < xs.size(); ++i) {
             const float x = xs[i], a = gaze_y - gaze_z * y, b = gaze_z * x - gaze_x, c = gaze_x * y - gaze_y * x;
             const float dot = gaze_x * x + gaze_y * y + gaze_z;
-            to[i] = fast_angle(std::sqrt(a * a + b * b + c * c), dot) * per_radian;
+            degrees[i] = fast_angle(std::sqrt(a * a + b * b + c * c), dot) * per_radian;
         }
+        use(row, std::span<const float>(degrees));
     }
-    return degrees;
+}
+
+} // namespace
+
+Plane eccentricities(int width, int height, const JudgeOptions& options) {
+    const auto gaze = gaze_on_screen(width, height, options);
+    if (!gaze) return {};
+    Plane plane(width, height);
+    for_each_row_of_eccentricities(*gaze, width, height, [&](int row, std::span<const float> degrees) {
+        std::copy(degrees.begin(), degrees.end(), plane.row(row));
+    });
+    return plane;
+}
+
+Range eccentricity_range(int width, int height, const JudgeOptions& options) {
+    const auto gaze = gaze_on_screen(width, height, options);
+    if (!gaze) return {};
+    Range range{std::numeric_limits<float>::infinity(), 0};
+    for_each_row_of_eccentricities(*gaze, width, height, [&](int, std::span<const float> degrees) {
+        const auto [nearest, farthest] = std::minmax_element(degrees.begin(), degrees.end());
+        range = {std::min(range.low, *nearest), std::max(range.high, *farthest)};
+    });
+    return range;
 }
 
 std::vector<std::size_t> nearest_samples(int pixels, int level, int samples) {
@@ -327,7 +362,20 @@ Result<void> check(const JudgeOptions& options) {
 
 double contrast_floor(const Display& display) { return std::max(black_level(display).value(), luminance_floor); }
 
+float most_thresholds(double beta) { return std::min(1e8f, std::exp2(120 / static_cast<float>(beta))); }
+
 BandConditions conditions_for(const Image& reference, const JudgeOptions& options, const Plane& eccentricities) {
+    const auto [darkest, brightest] = std::minmax_element(reference.values.begin(), reference.values.end());
+    Range eccentricity;
+    if (!eccentricities.values.empty()) {
+        const auto [nearest, farthest] =
+            std::minmax_element(eccentricities.values.begin(), eccentricities.values.end());
+        eccentricity = {*nearest, *farthest};
+    }
+    return conditions_for(reference.width, reference.height, {*darkest, *brightest}, eccentricity, options);
+}
+
+BandConditions conditions_for(int width, int height, Range luminance, Range eccentricity, const JudgeOptions& options) {
     BandConditions c;
     c.model = options.csf;
     c.table = options.csf_table;
@@ -335,15 +383,10 @@ BandConditions conditions_for(const Image& reference, const JudgeOptions& option
     c.ppd = pixels_per_degree(options.display).value();
     c.beta = options.beta;
     c.gain = options.gain;
-    const auto [darkest, brightest] = std::minmax_element(reference.values.begin(), reference.values.end());
     const auto floor_cdm2 = static_cast<float>(contrast_floor(options.display));
-    c.luminance = {std::max(*darkest, floor_cdm2), std::max(*brightest, floor_cdm2)};
-    if (!eccentricities.values.empty()) {
-        const auto [nearest, farthest] =
-            std::minmax_element(eccentricities.values.begin(), eccentricities.values.end());
-        c.eccentricity = {*nearest, *farthest};
-    }
-    c.base_level = base_level(reference.width, reference.height, c.ppd);
+    c.luminance = {std::max(luminance.low, floor_cdm2), std::max(luminance.high, floor_cdm2)};
+    c.eccentricity = eccentricity;
+    c.base_level = base_level(width, height, c.ppd);
     return c;
 }
 

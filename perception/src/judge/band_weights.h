@@ -13,12 +13,14 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include <perception/csf.h>
 #include <perception/image.h>
 #include <perception/judge.h>
+#include <perception/judge_tables.h>
 #include <vdtree/result.h>
 
 #include "judge/plane.h"
@@ -29,9 +31,12 @@ struct Range {
     float low = 0, high = 0;
 };
 
+// Nothing without a gaze.
+std::optional<GazeOnScreen> gaze_on_screen(int width, int height, const JudgeOptions& options);
 // The angles between the gaze and each pixel's centre, in degrees, both on the flat screen, for an eye in front of the
 // window's centre. Empty without a gaze.
-Plane eccentricities(const Image& window, const JudgeOptions& options);
+Plane eccentricities(int width, int height, const JudgeOptions& options);
+Range eccentricity_range(int width, int height, const JudgeOptions& options); // of the same, which nobody keeps
 
 // What the weights of all bands depend on.
 struct BandConditions {
@@ -46,12 +51,17 @@ struct BandConditions {
     int base_level = 0;
 };
 BandConditions conditions_for(const Image& reference, const JudgeOptions& options, const Plane& eccentricities);
+BandConditions conditions_for(int width, int height, Range luminance, Range eccentricity, const JudgeOptions& options);
 // What the screen cannot show cannot be a reference luminance either.
 double contrast_floor(const Display& display);
 Result<void> check(const JudgeOptions& options);
 
 // The area at which patches of a frequency are seen half as well, in power, as unlimited gratings; square degrees.
 double summation_area(const BandConditions& c, double freq_cpd);
+double summation_area_in_samples(const BandConditions& c, int level); // of a level, at its nominal frequency
+
+// Of one band's contrasts: far beyond all that is visible, and its power is a float.
+float most_thresholds(double beta);
 
 // To unlimited gratings.
 double sensitivity_of(const BandConditions& c, double freq_cpd, double luminance, double eccentricity);
@@ -70,16 +80,24 @@ class BandTable {
 public:
     BandTable(const BandConditions& c, int level);
 
+    // By luminance, then by eccentricity. Cells of luminances are told by a float's bits.
+    using Node = JudgeTables::Node;
+    static constexpr double eccentricity_step = 2; // degrees
+    static constexpr int cell_bits = 4;            // cells of an octave of luminance: 2^4
+    static constexpr int fraction_bits = 23 - cell_bits;
+
     double of_patch() const { return of_patch_; } // sensitivity to a patch, over that to unlimited gratings
+    int first_cell() const { return first_cell_; }
+    float first_eccentricity() const { return first_eccentricity_; }
+    std::size_t luminances() const { return luminances_; }
+    std::size_t eccentricities() const { return eccentricities_; }
+    const std::vector<Node>& nodes() const { return nodes_; }
 
     // Of samples with these luminances in cd/m2 and eccentricities in degrees; with none of those, where there is no
     // gaze. What is beyond the conditions' ranges counts as their end.
     void weigh(std::span<const float> luminance, std::span<const float> eccentricity, BandWeights& weights) const;
 
 private:
-    struct Node {
-        float log2_s = 0, own = 1, smoothed = 0;
-    };
     int first_cell_ = 0; // of luminances, see luminance_cell()
     std::size_t luminances_ = 0, eccentricities_ = 0;
     float first_eccentricity_ = 0;

@@ -20,9 +20,6 @@
 namespace unseen::perception {
 namespace {
 
-// Of one band: far beyond all that is visible, and its power is a float.
-float most_thresholds(float beta) { return std::min(1e8f, std::exp2(120 / beta)); }
-
 // ---- images -------------------------------------------------------------------------------------------------------
 
 // Mirrored about the outermost pixels; an image narrower than the kernel repeats its last one.
@@ -156,7 +153,8 @@ struct RowSight {
 class Reference {
 public:
     Reference(const Image& image, const JudgeOptions& options)
-        : eccentricities_(eccentricities(image, options)), conditions_(conditions_for(image, options, eccentricities_)),
+        : eccentricities_(eccentricities(image.width, image.height, options)),
+          conditions_(conditions_for(image, options, eccentricities_)),
           floor_cdm2_(static_cast<float>(contrast_floor(options.display))), rest_(image.width, image.height) {
         rest_.values = image.values;
     }
@@ -218,10 +216,8 @@ Band prepare_band(const Reference& reference, const ReferenceBand& from) {
     const BandConditions& conditions = reference.conditions();
     const BandTable table(conditions, from.level);
     const int width = from.luminance.width, height = from.luminance.height;
-    const double samples_a_degree = conditions.ppd / std::exp2(from.level);
-    const double area_deg2 = summation_area(conditions, nominal_frequency(conditions.ppd, from.level));
     Band band{from.level, from.is_base, Plane(width, height), Plane(width, height),
-              SummationWindow(area_deg2 * samples_a_degree * samples_a_degree)};
+              SummationWindow(summation_area_in_samples(conditions, from.level))};
     reference.for_each_row(from, table, [&](int y, const RowSight& sight) {
         const float* const luminance = from.luminance.row(y);
         float *const own = band.own.row(y), *const smoothed = band.smoothed.row(y);
@@ -276,7 +272,7 @@ Result<Judgement> Judge::judge(const Image& test) const {
     const Image& reference = state_->reference;
     if (auto ok = check_luminance_pair("judge", reference, test); !ok) return ok.error();
     const auto beta = static_cast<float>(state_->options.beta);
-    const float most = most_thresholds(beta);
+    const float most = most_thresholds(state_->options.beta);
     Plane difference(reference.width, reference.height), sum(reference.width, reference.height);
     for (std::size_t i = 0; i < difference.values.size(); ++i)
         difference.values[i] = test.values[i] - reference.values[i];

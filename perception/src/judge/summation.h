@@ -9,6 +9,8 @@
 #include <array>
 #include <vector>
 
+#include <perception/judge_tables.h>
+
 #include "judge/plane.h"
 
 namespace unseen::perception {
@@ -23,12 +25,10 @@ public:
     // The weighted sums around each place. Outside of the plane there is nothing. Cost: some 30 operations a sample.
     Plane sums(const Plane& energy) const;
 
+    using Gaussian = JudgeTables::Gaussian;
+    const std::array<Gaussian, 3>& gaussians() const { return gaussians_; } // from the widest on
+
 private:
-    struct Gaussian {
-        double weight = 0;
-        int halvings = 0;          // of the plane on which it is applied
-        std::vector<float> kernel; // from the middle on
-    };
     std::array<Gaussian, 3> gaussians_;
 };
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <tbb/parallel_for.h>
 
@@ -28,6 +29,7 @@ constexpr float brightest = (offset + 1) / scale;
 // times x^2, as a share: 1/8 of the square of the ring's diameter times the second derivatives of 1 / d^2 and of the
 // direction, 6 / d^2 and 1 / d^2, rounded up.
 constexpr float falloff_curvature = 4;
+constexpr float least_lit = 1e-5f;       // what is less lit is dark: below a step of stored luminances
 constexpr float least_luminance = 1e-3f; // that shifts of the mean are shares of
 
 using Records = MeasuredFolds;
@@ -70,6 +72,17 @@ Reach reach_of(const LightSource& light, const Sphere& ring) {
         reach.most *= high;
     }
     return reach;
+}
+
+// The largest that each coordinate of the direction to the light is, from anywhere in the ring.
+glm::vec3 direction_bound(const LightSource& light, const Sphere& ring) {
+    if (light.kind == LightSource::Kind::directional) return glm::abs(glm::vec3(light.direction));
+    const glm::dvec3 to_light = light.position - glm::dvec3(ring.centre);
+    const double distance = glm::length(to_light), radius = static_cast<double>(ring.radius);
+    if (!(distance > radius)) return glm::vec3(1);
+    // A unit vector that turns by an angle moves by no more than the angle.
+    const glm::dvec3 reached = glm::abs(to_light / distance) + std::asin(radius / distance);
+    return glm::vec3(glm::min(reached, glm::dvec3(1)));
 }
 
 } // namespace
@@ -126,23 +139,32 @@ Result<VertexTree> LitFolds::under(const VertexTree& tree, const Lighting& light
     tbb::parallel_for(NodeId{0}, tree.interior_count(), [&](NodeId node) {
         const VertexCone& cone = state_->bounds.cones()[node];
         const Sphere ring = tree.bounds()[node].ring;
-        float most = 0, uneven = 0; // of all lights that something in the ring faces
+        // Of all lights that something in the ring faces: a light from l makes l a n of a vertex, so a change of a n by
+        // at most v along each axis comes to |l_k| v_k at most.
+        glm::vec3 most(0);
+        float uneven = 0;
         for (std::size_t i = 0; i < alone.size(); ++i) {
-            if (!(lit_range(alone[i], cone, ring, glm::dvec3(0)).hi > 0)) continue;
+            if (!(lit_range(alone[i], cone, ring, glm::dvec3(0)).hi > least_lit)) continue;
             const Reach reach = reach_of(lighting.lights[i], ring);
-            most += reach.most;
+            most += reach.most * direction_bound(lighting.lights[i], ring);
             uneven += reach.uneven * cone.albedo.hi;
         }
         const auto combined = [&](auto&& value) {
-            float squared = 0;
-            for (const Records& axis : state_->by_axis) {
-                const float v = value(axis.folds[node]);
-                squared += v * v;
-            }
+            float of_axes = 0;
+            for (int k = 0; k < 3; ++k)
+                of_axes += most[k] * value(state_->by_axis[static_cast<std::size_t>(k)].folds[node]);
             const float painted = state_->albedo.empty() ? 0 : ambient * value(state_->albedo[node]);
-            return painted + scale * most * std::sqrt(squared);
+            return painted + scale * of_axes;
         };
         FoldRecord& fold = folds[node];
+        // Which neighbours are folded with a node depends on their luminances, so these differ a little.
+        for (const Records& axis : state_->by_axis) {
+            const FoldRecord& other = axis.folds[node];
+            for (float FoldRecord::*length : {&FoldRecord::shift, &FoldRecord::farthest, &FoldRecord::mean_distance,
+                                              &FoldRecord::extent, &FoldRecord::border})
+                fold.*length = std::max(fold.*length, other.*length);
+            fold.gap = std::min(fold.gap, other.gap), fold.sine = std::min(fold.sine, other.sine);
+        }
         const auto set = [&](float& to, float value) { to = std::min(1.0f, value); }; // luminances end there
         set(fold.largest_luminance, uneven + combined([](const FoldRecord& r) { return r.largest_luminance; }));
         set(fold.mean_luminance, uneven + combined([](const FoldRecord& r) { return r.mean_luminance; }));

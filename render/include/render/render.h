@@ -21,3 +21,4 @@
 #include <render/sample_sum.h>
 #include <render/target.h>
 #include <render/test_pattern.h>
+#include <render/visibility.h>

@@ -10,6 +10,9 @@
 #ifdef WITH_SESSION
 #include <session/session.h>
 #endif
+#if defined(WITH_RENDER) && defined(WITH_SESSION)
+#include <session_gpu/session_gpu.h>
+#endif
 
 int main() {
     using namespace unseen;
@@ -38,6 +41,10 @@ int main() {
     if (!session) return std::printf("%s\n", session.error().message.c_str()), 1;
     const auto whole = session->simplify({.goal = session::Goal::full()});
     if (!whole || whole->mesh().triangles.size() != 4) return std::printf("the session lost a face\n"), 1;
+#endif
+#if defined(WITH_RENDER) && defined(WITH_SESSION)
+    if (session::visibility_tables(*perception::judge_tables(64, 64, 1, 100, {})).bands.empty())
+        return std::printf("the judge has no bands\n"), 1;
 #endif
 #ifdef WITH_RENDER
     return render::n_rooks(16, 1).size() == 16 ? 0 : 1;

@@ -11,6 +11,7 @@
 #include <set>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include <glm/geometric.hpp>
@@ -19,6 +20,8 @@
 
 #include "gltf_data.h"
 #include "gltf_document.h"
+#include "gltf_meshes.h"
+#include "gltf_nodes.h"
 #include "mesh_readers.h"
 
 namespace unseen::meshio {
@@ -28,7 +31,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr std::size_t max_node_depth = 512; // deeper trees are found in attacks, not in scenes
 // Instancing multiplies a file, so what may come out is bounded: bytes for each byte read, and bytes in any case.
 constexpr std::uint64_t max_bytes_out_per_byte_in = 64;
 constexpr std::uint64_t min_bytes_out = std::uint64_t{16} << 20;
@@ -233,33 +235,6 @@ private:
 
 // ---- transforms ----
 
-glm::dmat4 rotation_matrix(const std::vector<double>& q, const std::string& where) {
-    const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    if (!(length > 0.0) || !std::isfinite(length)) fail(where + " has a rotation of length 0 or infinity; correct it.");
-    const double x = q[0] / length, y = q[1] / length, z = q[2] / length, w = q[3] / length;
-    glm::dmat4 m(1.0);
-    m[0] = {1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w), 0};
-    m[1] = {2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w), 0};
-    m[2] = {2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y), 0};
-    return m;
-}
-
-glm::dmat4 local_matrix(const tinygltf::Node& node, const std::string& where) {
-    glm::dmat4 m(1.0);
-    if (node.matrix.size() == 16) {
-        for (int i = 0; i < 16; ++i) m[i / 4][i % 4] = node.matrix[static_cast<std::size_t>(i)];
-        return m;
-    }
-    if (node.rotation.size() == 4) m = rotation_matrix(node.rotation, where);
-    if (node.scale.size() == 3) {
-        for (int i = 0; i < 3; ++i) m[i] *= node.scale[static_cast<std::size_t>(i)];
-    }
-    if (node.translation.size() == 3) {
-        m[3] = {node.translation[0], node.translation[1], node.translation[2], 1.0};
-    }
-    return m;
-}
-
 // How positions, normals and orientation go to the world.
 struct Placement {
     glm::dmat4 matrix{1.0};
@@ -306,28 +281,33 @@ public:
 
     // Empty where the caller cancelled.
     std::optional<ReadResult> read() {
-        if (model_.nodes.empty()) {
+        const auto shown = shown_nodes(source_, model_);
+        if (!shown) return std::nullopt;
+        if (model_.nodes.empty())
             for (std::size_t i = 0; i < model_.meshes.size(); ++i) add_mesh(i, -1, Placement{});
-        } else {
-            for (const int root : root_nodes()) {
-                if (!add_tree(root)) return std::nullopt;
-            }
+        for (const ShownNode& node : *shown) {
+            if (!source_.keep_going(source_.bytes.size() / 2, "reading glTF")) return std::nullopt;
+            if (const auto mesh = mesh_of(model_, node.node))
+                add_mesh(*mesh, static_cast<std::int32_t>(node.node), placement_of(node.to_world));
         }
-        if (skipped_primitives_ > 0) {
-            result_.warnings.push_back(counted_were(skipped_primitives_, "primitive") +
-                                       " left out for having no triangles or no positions.");
-        }
-        if (primitives_without_uvs_ > 0) {
-            result_.warnings.push_back(counted_were(primitives_without_uvs_, "primitive") +
-                                       " without the texture coordinates that their texture lies by and drawn in its "
-                                       "colour at 0, 0.");
-        }
-        std::uint64_t hidden = 0;
-        for (std::size_t i = 0; i < reached_.size(); ++i) hidden += !reached_[i] && model_.nodes[i].mesh >= 0;
-        if (hidden > 0)
+        tell_of_parts();
+        if (const std::uint64_t hidden = hidden_meshes(model_, *shown); hidden > 0)
             result_.warnings.push_back(counted_were(hidden, "node") + " not in the scene that is shown and left out.");
         keep_channels();
         return std::move(result_);
+    }
+
+    // One mesh alone, stretched; its parts count as those of mesh 0, and of no node.
+    ReadResult read_mesh(std::size_t mesh, const glm::dmat3& stretch) {
+        result_ = {};
+        document_ = {};
+        used_materials_.clear();
+        skipped_primitives_ = primitives_without_uvs_ = 0;
+        add_mesh(mesh, -1, placement_of(glm::dmat4(stretch)));
+        for (SourceDocument::Part& part : document_.parts) part.mesh = 0;
+        tell_of_parts();
+        keep_channels();
+        return std::exchange(result_, {});
     }
 
     // After read(): of the file, those that triangles have.
@@ -344,73 +324,16 @@ public:
     }
 
 private:
-    std::vector<int> root_nodes() const {
-        if (!model_.scenes.empty()) {
-            const auto scene = static_cast<std::size_t>(std::max(model_.defaultScene, 0));
-            if (scene >= model_.scenes.size()) {
-                fail("scene " + std::to_string(scene) + " is to be shown, but there are " +
-                     std::to_string(model_.scenes.size()) + "; correct the JSON.");
-            }
-            return model_.scenes[scene].nodes;
+    void tell_of_parts() {
+        if (skipped_primitives_ > 0) {
+            result_.warnings.push_back(counted_were(skipped_primitives_, "primitive") +
+                                       " left out for having no triangles or no positions.");
         }
-        std::vector<bool> is_child(model_.nodes.size());
-        for (const tinygltf::Node& node : model_.nodes) {
-            for (const int child : node.children) {
-                if (static_cast<std::size_t>(child) < is_child.size()) is_child[static_cast<std::size_t>(child)] = true;
-            }
+        if (primitives_without_uvs_ > 0) {
+            result_.warnings.push_back(counted_were(primitives_without_uvs_, "primitive") +
+                                       " without the texture coordinates that their texture lies by and drawn in its "
+                                       "colour at 0, 0.");
         }
-        std::vector<int> roots;
-        for (std::size_t i = 0; i < is_child.size(); ++i) {
-            if (!is_child[i]) roots.push_back(static_cast<int>(i));
-        }
-        if (roots.empty()) fail("its nodes have no root: each is the child of another; correct the JSON.");
-        return roots;
-    }
-
-    struct Visit {
-        std::size_t node;
-        std::size_t depth;
-        glm::dmat4 parent;
-    };
-
-    bool add_tree(int root) {
-        reached_.resize(model_.nodes.size());
-        std::vector<Visit> stack;
-        push(stack, root, 0, glm::dmat4(1.0));
-        while (!stack.empty()) {
-            const Visit visit = stack.back();
-            stack.pop_back();
-            if (!source_.keep_going(source_.bytes.size() / 2, "reading glTF")) return false;
-            const tinygltf::Node& node = model_.nodes[visit.node];
-            const std::string where = numbered("node", visit.node);
-            const glm::dmat4 world = visit.parent * local_matrix(node, where);
-            if (node.mesh >= 0) {
-                if (static_cast<std::size_t>(node.mesh) >= model_.meshes.size()) {
-                    fail(where + " uses mesh " + std::to_string(node.mesh) + ", but there are " +
-                         std::to_string(model_.meshes.size()) + "; correct the JSON.");
-                }
-                add_mesh(static_cast<std::size_t>(node.mesh), static_cast<std::int32_t>(visit.node),
-                         placement_of(world));
-            }
-            // Reversed, so that children come off the stack in their order.
-            for (auto child = node.children.rbegin(); child != node.children.rend(); ++child) {
-                push(stack, *child, visit.depth + 1, world);
-            }
-        }
-        return true;
-    }
-
-    void push(std::vector<Visit>& stack, int node, std::size_t depth, const glm::dmat4& parent) {
-        const auto index = static_cast<std::size_t>(node);
-        const std::string where = numbered("node", index);
-        if (index >= model_.nodes.size()) {
-            fail(where + " is used, but there are " + std::to_string(model_.nodes.size()) + "; correct the JSON.");
-        }
-        // A second visit means a cycle or two parents; glTF allows neither.
-        if (reached_[index]) fail(where + " is reached twice, but the nodes must form trees; correct the JSON.");
-        reached_[index] = true;
-        if (depth > max_node_depth) fail(where + " is nested too deeply; flatten the scene.");
-        stack.push_back({index, depth, parent});
     }
 
     // Accessors of a primitive's vertices, by attribute. Primitives of one mesh with the same ones, of which the same
@@ -621,7 +544,6 @@ private:
     const tinygltf::Model& model_;
     Accessors accessors_;
     ReadResult result_;
-    std::vector<bool> reached_;
     std::set<std::size_t> used_materials_;
     std::vector<std::uint32_t> uv_sets_;                         // by material
     std::vector<bool> is_textured_;                              // by material
@@ -657,6 +579,35 @@ Result<ReadResult> read_document(const MeshSource& source) {
 }
 
 } // namespace
+
+// ---- meshes one by one
+
+struct Meshes::Impl {
+    Impl(const MeshSource& source, const json& document, const tinygltf::Model& model, const Buffers& buffers)
+        : scene(source, document, model, buffers),
+          images(document, buffers, [this](std::uint64_t bytes) { scene.spend(1, bytes); }),
+          materials(document, source.options.images ? &images : nullptr) {}
+
+    SceneReader scene;
+    ImageReader images;
+    MaterialReader materials;
+};
+
+Meshes::Meshes(const MeshSource& source, const json& document, const tinygltf::Model& model, const Buffers& buffers)
+    : impl_(std::make_unique<Impl>(source, document, model, buffers)) {}
+Meshes::~Meshes() = default;
+
+ReadResult Meshes::read(std::size_t mesh, const glm::dmat3& stretch) {
+    ReadResult result = impl_->scene.read_mesh(mesh, stretch);
+    result.uvs_from_top = true;
+    impl_->scene.read_materials(impl_->materials, result);
+    return result;
+}
+
+std::vector<SourceDocument::File> Meshes::files(std::vector<std::string>& warnings) {
+    return impl_->images.read_all(warnings);
+}
+
 } // namespace gltf
 
 Result<ReadResult> read_gltf(const MeshSource& source) {

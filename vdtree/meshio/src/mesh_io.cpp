@@ -198,7 +198,13 @@ void hint_at_unwelded(const MeshSource& source, ReadResult& result) {
                            "and takes less memory where they are welded before.");
 }
 
-Result<ReadResult> finish(const MeshSource& source, ReadResult result) {
+Error too_large(const std::string& name) {
+    return {ErrorCode::unsupported, name + ": reading it needs more memory than there is; give a smaller file."};
+}
+
+} // namespace
+
+Result<ReadResult> finish_reading(const MeshSource& source, ReadResult result) {
     if (const Result<void> settled = settle_bad_parts(source, result); !settled) return settled.error();
     // Before the checks: they would accept a mesh without triangles.
     if (result.mesh.triangles.empty()) {
@@ -218,12 +224,6 @@ Result<ReadResult> finish(const MeshSource& source, ReadResult result) {
     hint_at_unwelded(source, result);
     return result;
 }
-
-Error too_large(const std::string& name) {
-    return {ErrorCode::unsupported, name + ": reading it needs more memory than there is; give a smaller file."};
-}
-
-} // namespace
 
 bool MeshSource::keep_going(std::uint64_t bytes_done, const char* stage) const {
     if (!options.progress) return true;
@@ -311,7 +311,7 @@ Result<ReadResult> read_mesh_bytes(std::string_view bytes, const fs::path& name,
     try {
         Result<ReadResult> result = read_as(*format, source);
         if (!result) return result;
-        return finish(source, std::move(result).value());
+        return finish_reading(source, std::move(result).value());
     } catch (const std::bad_alloc&) {
         return too_large(shown_name);
     } catch (const std::length_error&) { // what a vector throws instead beyond its largest size

@@ -40,6 +40,9 @@ Result<ReadResult> read_gltf(const MeshSource& source);
 Result<ReadResult> read_vtp(const MeshSource& source);
 Result<ReadResult> read_legacy_vtk(const MeshSource& source);
 
+// What all formats share, after their readers: checks coordinates and normals, drops triangles that use a vertex twice.
+Result<ReadResult> finish_reading(const MeshSource& source, ReadResult result);
+
 // read_mesh without a file system: finds the format, reads, checks coordinates, drops triangles that use a vertex
 // twice. The name's ending decides where the content does not. glTF files with external buffers need `folder`.
 Result<ReadResult> read_mesh_bytes(std::string_view bytes, const std::filesystem::path& name,

@@ -1,5 +1,6 @@
 // Cuts with all that the file of their mesh said.
 #include <algorithm>
+#include <deque>
 #include <map>
 #include <set>
 #include <string>
@@ -10,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include <meshio/mesh_io.h>
+#include <meshio/scene_file.h>
 #include <vdtree/colour.h>
 
 #include "file_output.h"
@@ -325,7 +327,126 @@ Result<void> write_table(const fs::path& file, const Cut& cut, const SourceDocum
     return write_mesh_with(file, extracted.mesh.view(), *arrays, notes);
 }
 
+// Runs what believes what a document says.
+template <class Write>
+Result<void> guarded_writing(Write&& write) {
+    const auto damaged = [](const std::string& why) {
+        return Error{ErrorCode::malformed_data,
+                     "The source document of the tree cannot be used: " + why + " Build the tree again from its mesh."};
+    };
+    try {
+        return write();
+    } catch (const gltf::Broken& broken) {
+        return damaged(broken.what);
+    } catch (const json::exception& error) {
+        return damaged(std::string("its JSON is wrong: ") + error.what() + ".");
+    } catch (const std::out_of_range&) {
+        return damaged("texture coordinates are missing.");
+    }
+}
+
+// ---- scenes
+
+// Whether nothing is folded, not even what leaves no triangle out.
+bool is_whole(const Cut& cut) {
+    const VertexTree& tree = cut.tree();
+    for (Index leaf = 0; leaf < tree.leaf_count(); ++leaf)
+        if (!tree.is_leaf(cut.proxy_of_leaf(leaf))) return false;
+    return true;
+}
+
+// Puts the meshes of cuts into a scene's document.
+class SceneWriter {
+public:
+    SceneWriter(const SceneSource& source, std::vector<std::string>& notes) : source_(source), notes_(notes) {}
+
+    Result<void> write(const fs::path& file, std::span<const SceneCut> cuts) {
+        out_ = gltf::parse_json(source_.json);
+        if (!out_.contains("nodes")) out_["nodes"] = json::array();
+        for (json& node : out_["nodes"]) node.erase("mesh");
+        meshes_ = out_.value("meshes", json::array());
+        for (const SceneCut& cut : cuts)
+            if (const auto added = add(cut); !added) return added;
+        if (empty_ > 0)
+            notes_.push_back(std::to_string(empty_) + (empty_ == 1 ? " node has" : " nodes have") +
+                             " no triangle left, and no mesh any more.");
+        if (written_.empty()) return failed_to_write(file, "no triangle is left; move nearer or allow more triangles.");
+        out_["meshes"] = std::move(written_);
+        SourceDocument images;
+        images.files = source_.files;
+        if (const auto written = write_beside(file, images, notes_); !written) return written;
+        add_images(out_, images, file_);
+        return file_.write(file, std::move(out_));
+    }
+
+private:
+    Result<void> add(const SceneCut& cut) {
+        if (cut.cut->triangle_count() == 0) {
+            ++empty_;
+            return {};
+        }
+        // Trees that differ by a stretch alone are the same mesh where nothing is folded.
+        const auto known = is_whole(*cut.cut) ? whole_.find(cut.mesh) : whole_.end();
+        std::size_t number = 0;
+        if (known != whole_.end()) {
+            number = known->second;
+        } else {
+            const auto made = mesh_of(cut);
+            if (!made) return made.error();
+            number = *made;
+            if (is_whole(*cut.cut)) whole_.emplace(cut.mesh, number);
+        }
+        if (cut.node >= 0) {
+            out_["nodes"].at(static_cast<std::size_t>(cut.node))["mesh"] = number;
+            return {};
+        }
+        out_["nodes"].push_back({{"mesh", number}});
+        if (!out_.contains("scenes") || out_["scenes"].empty()) return {}; // all are shown
+        out_["scenes"].at(out_.value("scene", std::size_t{0}))["nodes"].push_back(out_["nodes"].size() - 1);
+        return {};
+    }
+
+    Result<std::size_t> mesh_of(const SceneCut& cut) {
+        const auto document = unpack(cut.cut->tree().document());
+        if (!document) return document.error();
+        if (document->format != SourceDocument::Format::gltf) gltf::fail("it is of another format.");
+        auto restored = restore(*cut.cut, extract_with_sources(*cut.cut), *document, drawn_uvs(*document));
+        if (!restored) return restored.error();
+        parts_.push_back(std::move(*restored));
+        std::sort(parts_.back().begin(), parts_.back().end(), [&](const RestoredPart& a, const RestoredPart& b) {
+            return document->parts[a.part].primitive < document->parts[b.part].primitive;
+        });
+        json mesh = meshes_.at(static_cast<std::size_t>(cut.mesh));
+        json primitives = json::array();
+        for (const RestoredPart& part : parts_.back()) {
+            json primitive = mesh.at("primitives").at(static_cast<std::size_t>(document->parts[part.part].primitive));
+            primitive.update(gltf_primitive(part, *document, file_));
+            primitives.push_back(std::move(primitive));
+        }
+        mesh["primitives"] = std::move(primitives);
+        written_.push_back(std::move(mesh));
+        return written_.size() - 1;
+    }
+
+    const SceneSource& source_;
+    std::vector<std::string>& notes_;
+    GltfFile file_;
+    std::deque<std::vector<RestoredPart>> parts_; // which the file refers to
+    json out_, meshes_, written_ = json::array();
+    std::map<std::int32_t, std::size_t> whole_; // by mesh of the document
+    std::size_t empty_ = 0;
+};
+
 } // namespace
+
+Result<std::vector<std::string>> write_scene(const fs::path& file, const SceneSource& source,
+                                             std::span<const SceneCut> cuts) {
+    std::vector<std::string> notes;
+    const auto written =
+        guarded_writing([&]() -> Result<void> { return SceneWriter(source, notes).write(file, cuts); });
+    if (!written) return written.error();
+    return notes;
+}
 
 Result<std::vector<std::string>> write_cut(const fs::path& file, const Cut& cut) {
     std::vector<std::string> notes;
@@ -334,23 +455,12 @@ Result<std::vector<std::string>> write_cut(const fs::path& file, const Cut& cut)
     if (bytes.empty()) {
         written = write_mesh(file, extract_mesh(cut).view());
     } else {
-        const auto damaged = [](const std::string& why) {
-            return Error{ErrorCode::malformed_data, "The source document of the tree cannot be used: " + why +
-                                                        " Build the tree again from its mesh."};
-        };
-        try {
+        written = guarded_writing([&]() -> Result<void> {
             auto document = unpack(bytes);
-            if (!document) written = document.error();
-            else if (document->format == SourceDocument::Format::table)
-                written = write_table(file, cut, *document, notes);
-            else written = write_document(file, cut, std::move(*document), notes);
-        } catch (const gltf::Broken& broken) {
-            written = damaged(broken.what);
-        } catch (const json::exception& error) {
-            written = damaged(std::string("its JSON is wrong: ") + error.what() + ".");
-        } catch (const std::out_of_range&) {
-            written = damaged("texture coordinates are missing.");
-        }
+            if (!document) return document.error();
+            if (document->format == SourceDocument::Format::table) return write_table(file, cut, *document, notes);
+            return write_document(file, cut, std::move(*document), notes);
+        });
     }
     if (!written) return written.error();
     return notes;

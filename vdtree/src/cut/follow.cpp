@@ -116,7 +116,8 @@ void CutFollower::move_to(const Viewpoint& viewpoint, const Motion& motion) {
     // With a gaze, directions count, too: coming nearer does not make up for them.
     if (tester_->uses_gaze()) settler_.front().advance(motion.position, motion.facing);
     else settler_.front().move_to(viewpoint.eye, motion.facing);
-    settler_.front().advance_lights(motion.light);
+    // Where lights stand still nothing is due by them, not even what any motion would make due.
+    if (motion.light > 0) settler_.front().advance_lights(motion.light);
     settler_.front().advance_planes(motion.planes, tester_->view());
 }
 

@@ -11,8 +11,12 @@
 
 namespace unseen::session {
 
+// What a glTF file becomes: one tree of all that its nodes show, or a tree for each mesh, placed by the nodes.
+enum class LoadAs { model, scene, automatic }; // automatic: a scene where meshio::SceneContents::is_scene
+
 // Error messages and reasons call these fields load.texture and so on.
 struct LoadOptions {
+    LoadAs as = LoadAs::model;          // of Scene::load(); trees and files of other formats are models
     std::filesystem::path texture = {}; // an image that lies over a mesh instead of its materials' images; empty: none
     bool without_textures = false;      // look at no images; colours of materials count all the same
     meshio::LeftOut drop = {};          // what glTF files may have that trees cannot

@@ -56,6 +56,8 @@ struct Request {
     std::optional<vdtree::DepthPicture> shown = {};
     // Measure the errors of folds where the test needs them and the tree lacks them: up to a minute.
     bool may_measure = true;
+    // Report::effects: some 20 us an object, which flights through scenes of many can do without.
+    bool reasons = true;
 };
 
 // Whether the fields are in their ranges and go together, whatever the scene. The error names them.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <calibration/light_rig.h>
+#include <meshio/scene_file.h>
 #include <perception/units.h>
 #include <session/model_file.h>
 #include <vdtree/vertex_tree.h>
@@ -25,6 +26,7 @@ struct Object {
     bool texture_left_out = false, is_relit = false;
     TreeOrigin origin = TreeOrigin::given;
     std::shared_ptr<const MeasurementPlace> measurement = {}; // where that of a tree file's tree is kept; null: nowhere
+    std::int32_t node = -1, mesh = -1;                        // of Scene::source; -1: none
 };
 
 // A value, made once and then given to a Session. Error messages and reasons call these fields scene.lights and so on.
@@ -32,11 +34,27 @@ struct Scene {
     std::vector<Object> objects = {};
     std::optional<perception::Luminance> background = {}; // default: 20 cd/m2, or the nearest that the display can show
     std::optional<calibration::LightRig> lights = {};     // in place of the trees' own light; they may move
+    // Walls, ground and such: drawn whole, lit like the objects, and seen behind their outlines. Nothing of it is
+    // folded or counts as triangles of the scene.
+    std::vector<Object> backdrop = {};
+    std::optional<meshio::SceneCamera> camera = {}; // where the file looks from, world units
+    // Of a scene's file: what it is written again with (write_scene()). Such a scene may be without objects. Null: not
+    // of such a file.
+    std::shared_ptr<const meshio::SceneSource> source = {};
 
     // A scene of one object: a tree file or a mesh file with its textures (see open_tree()), placed at the world's
     // origin.
+    //
+    // As load.as says, a glTF file may become a scene of many. Every mesh is built once, and all nodes that show it
+    // share the tree. Transforms that are no similarities are parted into a rotation and a stretch or mirror image,
+    // which the mesh gets before its tree is built; nodes with the same stretch share. Nodes without an inverse are
+    // errors. Lights of the file come out so that white which faces all of them at the objects' middle has the
+    // relative luminance 1 with the ambient light, unless the file says how (SceneContents::exposure). A scene without
+    // lights has those of vdtree::Light where anything is turned, for the trees' own light would turn with it.
     static Result<Scene> load(const std::filesystem::path& file, const LoadOptions& options = {});
     static Scene of(vdtree::VertexTree tree, double unit_metres = 1);
+
+    bool is_of_file() const noexcept { return source != nullptr; } // a scene's, not a model's
 
     // Lights all objects anew, as vdtree::Light says; what is not given stays. What was pre-lit is lit, too. `towards`:
     // the direction of the light, not 0; `ambient` and `fill`: 0..1. Fails where they are not, and on trees that cannot
@@ -44,5 +62,10 @@ struct Scene {
     Result<void> relight(std::optional<glm::dvec3> towards, std::optional<double> ambient,
                          std::optional<double> fill = {});
 };
+
+// The light of vdtree::Light in the world, with what is given instead: for scenes whose objects are turned. Fails where
+// Scene::relight() does.
+Result<calibration::LightRig> light_rig(std::optional<glm::dvec3> towards = {}, std::optional<double> ambient = {},
+                                        std::optional<double> fill = {});
 
 } // namespace unseen::session

@@ -52,7 +52,7 @@ struct CutRecipe {
 // cuts, bounds under lights.
 class Session {
 public:
-    // Fails on a scene without objects, a background that the display does not show, and a display that is none.
+    // Fails on a scene without objects that is not of a file, a background that the display does not show, and a display that is none.
     // `messages` are told what takes long.
     static Result<Session> create(Scene scene, Observer observer = {}, Messages messages = {});
     Session(Session&&) noexcept;
@@ -70,12 +70,16 @@ public:
     // Precondition: 0 to perception::fastest_velocity. Followers refine at once what stands still again.
     void set_velocity(perception::DegreesPerSecond velocity);
 
-    // The sphere around all objects.
+    std::uint64_t triangle_count() const noexcept; // of all objects' trees, shared ones counted for each
+
+    // The sphere around all objects; without any, around the backdrop, or of no size at the world's origin.
     WorldSphere bounding_sphere() const;
     // From `direction` (towards the eye), with the sphere taking the share `fill` of the window's height; size and
     // field of the window.
     vdtree::View frame(glm::dvec3 direction, double fill, const vdtree::View& window) const;
-    // From +Z with 90% filled: 1024 x 1024 pixels, and the field that they fill on the display.
+    // Through the camera of the scene's file, if it has one; size of the window. The field is the camera's.
+    std::optional<vdtree::View> camera_view(const vdtree::View& window) const;
+    // That, or from +Z with 90% filled: 1024 x 1024 pixels, and the field that they fill on the display.
     vdtree::View default_view() const;
 
     // How a request would be met for an object. All of the following fail where the request is not valid or asks for a
@@ -99,6 +103,9 @@ public:
 
     // Where the scene's lights are, in an object's frame, at the time and for the view; none: the tree's own light.
     Result<std::optional<vdtree::Lighting>> lighting(const vdtree::View& view, std::size_t object = 0) const;
+
+    // The same of a part of the scene's backdrop.
+    Result<std::optional<vdtree::Lighting>> backdrop_lighting(const vdtree::View& view, std::size_t part) const;
 
     // What silhouettes can be seen against.
     Result<perception::SceneLuminance> luminance(const vdtree::View& view) const;

@@ -11,5 +11,6 @@
 
 #include <meshio/examine.h>
 #include <meshio/mesh_io.h>
+#include <meshio/scene_file.h>
 #include <meshio/source_document.h>
 #include <meshio/vertex_array.h>

@@ -1,0 +1,7 @@
+// session_gpu: where a session meets OpenGL. The header to include first.
+//
+// simplify_as_seen() folds what lies behind what a picture shows. A GpuJudge is perception::Judge on the GPU.
+#pragma once
+
+#include <session_gpu/as_seen.h>
+#include <session_gpu/gpu_judge.h>

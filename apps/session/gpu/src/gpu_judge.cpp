@@ -1,0 +1,107 @@
+#include <session_gpu/gpu_judge.h>
+
+#include <algorithm>
+#include <string>
+
+namespace unseen::session {
+namespace {
+
+// What a texture cannot tell: whether it is one channel of as many values as its size says.
+Result<void> check_shape(const perception::Image& image, const char* which) {
+    const auto pixels =
+        static_cast<std::size_t>(std::max(image.width, 0)) * static_cast<std::size_t>(std::max(image.height, 0));
+    if (pixels > 0 && image.channels == 1 && image.values.size() == pixels) return {};
+    return Error{ErrorCode::invalid_argument,
+                 "judge: the " + std::string(which) + " is not a luminance image (one channel, one pixel or more)"};
+}
+
+Result<render::LuminanceImage> upload(const render::Context& context, const perception::Image& image,
+                                      const char* which) {
+    if (auto ok = check_shape(image, which); !ok) return ok.error();
+    return render::LuminanceImage::create(context, image.width, image.height, image.values);
+}
+
+} // namespace
+
+render::VisibilityTables visibility_tables(const perception::JudgeTables& tables) {
+    render::VisibilityTables to;
+    to.width = tables.width, to.height = tables.height;
+    to.floor_cdm2 = tables.floor_cdm2;
+    to.beta = tables.beta, to.most_thresholds = tables.most_thresholds;
+    to.kernel = tables.kernel;
+    to.masking_power = tables.masking_power, to.masking_knee = tables.masking_knee;
+    to.least_masker = tables.least_masker, to.most_masker = tables.most_masker;
+    to.luminance_shift = tables.luminance_shift, to.first_luminance = tables.first_luminance;
+    to.luminances = tables.luminances, to.eccentricities = tables.eccentricities;
+    to.first_eccentricity = tables.first_eccentricity, to.eccentricity_step = tables.eccentricity_step;
+    if (tables.gaze) {
+        const auto& [right, down, forward] = tables.gaze->direction;
+        to.gaze = {{right, down, forward}, static_cast<float>(tables.gaze->tangent_per_pixel)};
+    }
+    for (const perception::JudgeTables::Band& band : tables.bands) {
+        render::VisibilityTables::Band& out = to.bands.emplace_back();
+        out.of_patch = band.of_patch;
+        for (std::size_t i = 0; i < band.window.size(); ++i)
+            out.window[i] = {static_cast<float>(band.window[i].weight), band.window[i].halvings, band.window[i].kernel};
+        for (const perception::JudgeTables::Node& node : band.nodes)
+            out.nodes.push_back({node.log2_s, node.own, node.smoothed});
+    }
+    return to;
+}
+
+Result<GpuJudge> GpuJudge::create(const render::Context& context, const perception::Image& reference,
+                                  const perception::JudgeOptions& options, render::VisibilityPrecision precision) {
+    const auto uploaded = upload(context, reference, "reference");
+    if (!uploaded) return uploaded.error();
+    return create(context, uploaded->texture(), options, precision);
+}
+
+Result<GpuJudge> GpuJudge::create(const render::Context& context, const render::LuminanceTexture& reference,
+                                  const perception::JudgeOptions& options, render::VisibilityPrecision precision) {
+    const auto extent = render::luminance_extent(context, reference, "reference");
+    if (!extent) return extent.error();
+    const auto tables =
+        perception::judge_tables(reference.width, reference.height, extent->least, extent->largest, options);
+    if (!tables) return tables.error();
+    auto passes = render::VisibilityPasses::create(context, visibility_tables(*tables), reference, precision);
+    if (!passes) return passes.error();
+    return GpuJudge(context, std::move(*passes), reference.width, reference.height);
+}
+
+Result<perception::Judgement> GpuJudge::judge(const perception::Image& test) {
+    if (auto ok = check_shape(test, "test"); !ok) return ok.error();
+    if (test.width != width_ || test.height != height_ || !test_) { // another size is an error of the passes'
+        auto uploaded = upload(context_, test, "test");
+        if (!uploaded) return uploaded.error();
+        test_ = std::move(*uploaded);
+    } else if (auto ok = test_->set(test.values); !ok) {
+        return ok.error();
+    }
+    const auto summary = judge(test_->texture());
+    if (!summary) {
+        test_.reset();
+        return summary.error();
+    }
+    auto visibility = passes_.read_visibility();
+    if (!visibility) return visibility.error();
+    perception::Judgement judgement;
+    judgement.pixels = visibility->size();
+    judgement.visible_pixels = summary->visible_pixels;
+    judgement.max_ratio = summary->largest;
+    judgement.visibility = {width_, height_, 1, std::move(*visibility)};
+    return judgement;
+}
+
+Result<render::VisibilitySummary> GpuJudge::judge(const render::LuminanceTexture& test) {
+    if (auto judged = passes_.judge(test); !judged) return judged.error();
+    return passes_.summary();
+}
+
+Result<perception::Image> GpuJudge::threshold_map() {
+    if (auto mapped = passes_.map_thresholds(); !mapped) return mapped.error();
+    auto thresholds = passes_.read_thresholds();
+    if (!thresholds) return thresholds.error();
+    return perception::Image{width_, height_, 1, std::move(*thresholds)};
+}
+
+} // namespace unseen::session

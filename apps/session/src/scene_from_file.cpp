@@ -1,0 +1,325 @@
+#include "scene_from_file.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <mutex>
+#include <thread>
+
+#include <glm/geometric.hpp>
+
+#include <vdtree/builder.h>
+#include <vdtree/internal/errors.h>
+#include <vdtree/internal/number_format.h>
+
+#include "cache_key.h"
+#include "loaded_tree.h"
+#include "stretch.h"
+#include "textures.h"
+
+namespace unseen::session {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+// What glTF says nothing of: light that comes from everywhere, so that nothing is black.
+constexpr double usual_ambient = 0.15; // relative luminance of white
+
+// A mesh with a stretch: what one tree is of.
+struct Part {
+    std::size_t mesh = 0;
+    glm::dmat3 stretch = glm::dmat3(1);
+    bool folds = false;                          // shown by other nodes than those of the background, too
+    std::optional<vdtree::VertexTree> tree = {}; // none: it has no triangles
+    TreeOrigin origin = TreeOrigin::built;
+};
+
+struct Placed {
+    const meshio::SceneNode* node;
+    vdtree::Similarity placement;
+    std::size_t part;
+};
+
+Error in_file(const fs::path& file, const Error& error) {
+    return Error{error.code, file.string() + ": " + error.message};
+}
+
+// Builds the trees of all parts: several at a time, for small ones leave cores idle.
+class Builder {
+public:
+    Builder(meshio::SceneFile& file, const fs::path& name, const LoadOptions& options, bool measures)
+        : file_(file), name_(name), options_(options), measures_(measures), cache_(options.cache) {}
+
+    Result<void> build(std::vector<Part>& parts) {
+        const auto start = Clock::now();
+        std::atomic<std::size_t> next{0}, done{0};
+        const auto work = [&](bool is_caller) {
+            for (std::size_t i; !is_over_ && (i = next++) < parts.size(); ++done) {
+                if (const auto built = build(parts[i]); !built) fail(built.error());
+                if (is_caller && options_.messages.progress &&
+                    !options_.messages.progress(static_cast<double>(done) / static_cast<double>(parts.size()),
+                                                "building trees"))
+                    fail({ErrorCode::cancelled, name_.string() + ": building was cancelled."});
+            }
+        };
+        const std::size_t workers = std::min<std::size_t>(std::max(1U, std::thread::hardware_concurrency()),
+                                                          std::max<std::size_t>(parts.size(), 1));
+        {
+            std::vector<std::jthread> helpers;
+            for (std::size_t i = 1; i < workers; ++i) helpers.emplace_back([&] { work(false); });
+            work(true);
+        }
+        if (failure_) return *failure_;
+        tell(std::chrono::duration<double>(Clock::now() - start).count());
+        return {};
+    }
+
+private:
+    Result<void> build(Part& part) {
+        auto read = read_part(part);
+        if (!read) return read.error();
+        if (!*read) return {};
+        const bool measures = measures_ && part.folds && (*read)->mesh.texture.texels.empty();
+        const std::string key = mesh_cache_key((*read)->mesh, (*read)->dropped_triangles, options_.prelit, measures);
+        if (cache_.is_on()) {
+            auto kept = cache_.find(key);
+            if (!kept) return kept.error();
+            if (*kept) {
+                part.tree = std::move(**kept);
+                part.origin = TreeOrigin::cache;
+                return {};
+            }
+        }
+        vdtree::BuildOptions building;
+        building.dropped_before = (*read)->dropped_triangles;
+        building.prelit = options_.prelit;
+        auto tree = vdtree::build_tree((*read)->mesh.view(), building);
+        if (!tree) return in_file(name_, tree.error());
+        if (measures && tree->interior_count() <= most_measured) tree = measured(*tree);
+        if (!tree) return in_file(name_, tree.error());
+        const std::lock_guard lock(mutex_);
+        ++built_;
+        if (cache_.is_on()) {
+            const auto kept = cache_.keep(key, name_, *tree);
+            if (!kept && not_kept_.empty()) not_kept_ = kept.error().message;
+        }
+        part.tree = std::move(*tree);
+        return {};
+    }
+
+    Result<std::optional<meshio::ReadResult>> read_part(const Part& part) {
+        const std::lock_guard lock(mutex_);
+        auto read = file_.mesh(part.mesh, part.stretch);
+        if (!read) return read;
+        if (!*read) {
+            ++empty_;
+            return read;
+        }
+        if (const auto laid = lay_texture(name_, **read, options_); !laid) return laid.error();
+        for (std::string& warning : (*read)->warnings) warnings_.push_back(std::move(warning));
+        for (std::string& note : (*read)->notes) notes_.push_back(std::move(note));
+        return read;
+    }
+
+    void fail(const Error& error) {
+        const std::lock_guard lock(mutex_);
+        if (!failure_) failure_ = error;
+        is_over_ = true;
+    }
+
+    // Sentences that several meshes have in common are said once.
+    static void tell_each(std::vector<std::string> texts, const fs::path& file,
+                          const Callback<void(const std::string&)>& tell) {
+        if (!tell) return;
+        std::map<std::string, int> counts;
+        for (const std::string& text : texts) ++counts[text];
+        for (const auto& [text, count] : counts)
+            tell(file.string() + ": " + (count > 1 ? "of " + std::to_string(count) + " meshes: " : "") + text);
+    }
+
+    void tell(double seconds) {
+        if (empty_ > 0)
+            warnings_.push_back(std::to_string(empty_) + (empty_ == 1 ? " mesh has" : " meshes have") +
+                                " no triangles and is not drawn.");
+        tell_each(std::move(warnings_), name_, options_.messages.warning);
+        tell_each(std::move(notes_), name_, options_.messages.note);
+        if (built_ == 0 || !options_.messages.note) return;
+        const std::string becomes =
+            !not_kept_.empty() ? "not kept for the next time: " + not_kept_
+            : cache_.is_on()   ? "kept in " + cache_.folder().string() + " for the next time (session::TreeCache)"
+                               : "not kept for the next time";
+        options_.messages.note("built " + std::to_string(built_) + (built_ == 1 ? " tree" : " trees") + " of " +
+                               name_.string() + " in " + rounded(seconds, 2) + " s; " + becomes);
+    }
+
+    meshio::SceneFile& file_;
+    const fs::path& name_;
+    const LoadOptions& options_;
+    bool measures_;
+    TreeCache cache_;
+    std::mutex mutex_;
+    std::atomic<bool> is_over_{false};
+    std::optional<Error> failure_;
+    std::vector<std::string> warnings_, notes_;
+    std::string not_kept_;
+    std::size_t built_ = 0, empty_ = 0;
+};
+
+// ---- lights
+
+struct Middle {
+    glm::dvec3 centre = glm::dvec3(0);
+    double radius = 1;
+};
+
+Middle middle_of(const std::vector<Object>& objects) {
+    glm::dvec3 low(std::numeric_limits<double>::infinity()), high = -low;
+    for (const Object& object : objects) {
+        const vdtree::Sphere sphere = object.tree.bounding_sphere();
+        const glm::dvec3 centre = object.placement.to_world(object.tree.origin() + glm::dvec3(sphere.centre));
+        const double radius = object.placement.scale * static_cast<double>(sphere.radius);
+        low = glm::min(low, centre - radius), high = glm::max(high, centre + radius);
+    }
+    if (objects.empty()) return {};
+    return {(low + high) * 0.5, std::max(glm::length(high - low) * 0.5, 1e-30)};
+}
+
+// Lux on what faces the light in the middle, or at half of the radius from lights that are nearer.
+double strength(const meshio::SceneLight& light, const Middle& middle, double unit_metres) {
+    if (light.kind == meshio::SceneLight::Kind::directional) return light.intensity;
+    const double distance = std::max(glm::length(light.position * unit_metres - middle.centre), middle.radius * 0.5);
+    return light.intensity / (distance * distance);
+}
+
+vdtree::LightSource source_of(const meshio::SceneLight& light, double exposure, double unit_metres) {
+    using Kind = vdtree::LightSource::Kind;
+    vdtree::LightSource source;
+    source.intensity = light.intensity * exposure; // of candelas: at a metre
+    if (light.kind == meshio::SceneLight::Kind::directional) {
+        source.direction = -light.direction;
+        return source;
+    }
+    source.kind = light.kind == meshio::SceneLight::Kind::point ? Kind::point : Kind::spot;
+    source.position = light.position * unit_metres;
+    if (source.kind == Kind::point) return source;
+    // Sharper edges of spots than this are none that a vertex shows, and their bounds none.
+    constexpr double least_edge = 0.5 * 3.14159265358979323846 / 180;
+    const double outer = std::max(light.outer_radians, 2 * least_edge);
+    source.direction = light.direction;
+    source.outer_cosine = std::cos(outer);
+    source.inner_cosine = std::cos(std::min(light.inner_radians, outer - least_edge));
+    return source;
+}
+
+Result<calibration::LightRig> lights_of(const meshio::SceneContents& contents, const Middle& middle,
+                                        const fs::path& file, const LoadOptions& options) {
+    std::vector<meshio::SceneLight> lights = contents.lights;
+    const auto stronger = [&](const meshio::SceneLight& a, const meshio::SceneLight& b) {
+        return strength(a, middle, options.unit_metres) > strength(b, middle, options.unit_metres);
+    };
+    if (lights.size() > vdtree::most_lights) {
+        if (options.messages.warning)
+            options.messages.warning(file.string() + ": of its " + std::to_string(lights.size()) + " lights the " +
+                                     std::to_string(vdtree::most_lights) +
+                                     " that are strongest in its middle light it.");
+        std::stable_sort(lights.begin(), lights.end(), stronger);
+        lights.resize(vdtree::most_lights);
+    }
+    double sum = 0;
+    for (const meshio::SceneLight& light : lights) sum += strength(light, middle, options.unit_metres);
+    vdtree::Lighting lighting;
+    lighting.ambient = contents.ambient.value_or(usual_ambient);
+    const double exposure = contents.exposure.value_or(sum > 0 ? (1 - std::min(lighting.ambient, 0.9)) / sum : 1);
+    for (const meshio::SceneLight& light : lights)
+        lighting.lights.push_back(source_of(light, exposure, options.unit_metres));
+    return calibration::LightRig::of(std::move(lighting), file);
+}
+
+bool is_turned(const vdtree::Similarity& placement) {
+    constexpr double same_direction = 1e-6; // of a unit quaternion's vector: less than any light shows
+    const glm::dquat& q = placement.rotation;
+    return glm::length(glm::dvec3(q.x, q.y, q.z)) > same_direction;
+}
+
+} // namespace
+
+meshio::ReadOptions reading_options(const LoadOptions& options) {
+    meshio::ReadOptions reading;
+    reading.images = options.texture.empty() && !options.without_textures;
+    reading.drop = options.drop;
+    reading.skip_bad = options.skip_bad;
+    reading.weld = options.weld;
+    return reading;
+}
+
+Result<Scene> scene_from(meshio::SceneFile file, const fs::path& name, const LoadOptions& options) {
+    const meshio::SceneContents& contents = file.contents();
+    if (!options.texture.empty())
+        return Error{ErrorCode::invalid_argument,
+                     name.string() + " is a scene, and load.texture lies over one model: leave it out, or read the "
+                                     "file with load.as = model."};
+    std::vector<Part> parts;
+    std::map<std::size_t, std::vector<std::size_t>> of_mesh; // parts
+    std::vector<Placed> placed;
+    bool turns = false;
+    for (const meshio::SceneNode& node : contents.nodes) {
+        auto factored = factor(node.to_world);
+        if (!factored)
+            return Error{ErrorCode::malformed_data,
+                         name.string() + ": node " + std::to_string(node.node) + " '" + node.name +
+                             "' has, with the nodes above it, a transform without an inverse (a scale of 0, or one "
+                             "that is a million times another): correct it, or read the file with load.as = model."};
+        factored->placement.scale *= options.unit_metres;
+        factored->placement.translation *= options.unit_metres;
+        turns = turns || is_turned(factored->placement);
+        const auto mesh = static_cast<std::size_t>(node.mesh);
+        std::vector<std::size_t>& same = of_mesh[mesh];
+        const auto found = std::find_if(same.begin(), same.end(), [&](std::size_t part) {
+            return is_same_stretch(parts[part].stretch, factored->stretch);
+        });
+        const std::size_t part = found != same.end() ? *found : parts.size();
+        if (found == same.end()) {
+            same.push_back(part);
+            parts.push_back({mesh, factored->stretch});
+        }
+        parts[part].folds = parts[part].folds || !node.is_background;
+        placed.push_back({&node, factored->placement, part});
+    }
+    if (options.messages.warning)
+        for (const std::string& warning : contents.warnings) options.messages.warning(name.string() + ": " + warning);
+    if (options.messages.note)
+        for (const std::string& note : contents.notes) options.messages.note(name.string() + ": " + note);
+
+    // The test by errors knows the trees' own light alone.
+    const bool is_lit = !options.prelit && (!contents.lights.empty() || turns);
+    if (const auto built = Builder(file, name, options, options.measures && !is_lit).build(parts); !built)
+        return built.error();
+    Scene scene;
+    for (const Placed& node : placed) {
+        const Part& part = parts[node.part];
+        if (!part.tree) continue;
+        Object object{part.tree->share(), node.placement, node.node->name};
+        object.texture_left_out = options.without_textures;
+        object.origin = part.origin;
+        object.node = node.node->node;
+        object.mesh = node.node->mesh;
+        (node.node->is_background ? scene.backdrop : scene.objects).push_back(std::move(object));
+    }
+    if (is_lit) {
+        auto rig =
+            contents.lights.empty()
+                ? light_rig()
+                : lights_of(contents, middle_of(scene.objects.empty() ? scene.backdrop : scene.objects), name, options);
+        if (!rig) return rig.error();
+        scene.lights = std::move(*rig);
+    }
+    scene.camera = contents.camera;
+    if (scene.camera) scene.camera->eye *= options.unit_metres;
+    scene.source = std::make_shared<const meshio::SceneSource>(contents.source);
+    return scene;
+}
+
+} // namespace unseen::session

@@ -1,0 +1,282 @@
+#include "make_scene.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <system_error>
+
+#include <meshio/mesh_io.h>
+
+#include "scene_draft.h"
+#include "scene_parts.h"
+#include "subdivide.h"
+
+namespace unseen::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* bunny = "/usr/share/glmark2/models/bunny.obj";
+
+// Lux and such are of no account for the picture: white that faces the sun is at 1, less the ambient light.
+constexpr double sun_lux = 1;
+
+class Maker {
+public:
+    explicit Maker(const MakeSceneOptions& options) : options_(options), chance_(options.seed) {}
+
+    Result<SceneDraft> run() {
+        if (const auto read = read_statues(); !read) return read.error();
+        const auto made = options_.kind == SceneKind::museum     ? museum()
+                          : options_.kind == SceneKind::treasure ? treasure()
+                          : options_.kind == SceneKind::house    ? house()
+                                                                 : forest();
+        if (!made) return made.error();
+        return std::move(draft_);
+    }
+
+private:
+    std::uint64_t triangles(std::uint64_t usual) const { return options_.triangles > 0 ? options_.triangles : usual; }
+
+    Result<void> read_statues() {
+        std::vector<fs::path> files = options_.statues;
+        std::error_code failure;
+        if (files.empty() && fs::is_regular_file(bunny, failure)) files = {bunny};
+        for (const fs::path& file : files) {
+            auto read = meshio::read_mesh(file);
+            if (!read) return read.error();
+            vdtree::Mesh mesh = set_upright(std::move(read->mesh));
+            mesh.colours.clear(), mesh.uvs.clear(), mesh.ranges.clear(), mesh.document.clear();
+            mesh.texture = {};
+            scanned_.push_back({file.stem().string(), std::move(mesh)});
+        }
+        return {};
+    }
+
+    // One of each kind, of about so many triangles each: scanned ones, refined, where they have no more than that, and
+    // two that are made.
+    Result<std::vector<std::size_t>> statues(std::uint64_t triangles, std::size_t most = 100) {
+        std::vector<std::size_t> made;
+        for (const Scanned& scanned : scanned_) {
+            if (scanned.mesh.triangles.size() > triangles || made.size() == most) continue;
+            SubdivideOptions refining;
+            refining.triangles = triangles;
+            refining.seed = options_.seed;
+            auto mesh = subdivide(scanned.mesh, refining);
+            if (!mesh) return mesh.error();
+            made.push_back(draft_.add_mesh(scanned.name, std::move(*mesh), 0.7));
+        }
+        if (made.size() < most) made.push_back(draft_.add_mesh("knot", knot(triangles), 0.55));
+        if (made.size() < most) made.push_back(draft_.add_mesh("great urn", urn(triangles), 0.65));
+        return made;
+    }
+
+    void wall(const std::string& name, glm::dvec3 size, glm::dvec3 foot, double cell = 0.25, double grey = 0.6) {
+        draft_.add(draft_.add_mesh(name, box(size, cell), grey), name, {.at = foot}, true);
+    }
+
+    // A gate or grille: bars from left to right, in the plane of the foot; turned by a quarter for windows at the side.
+    void bars(const std::string& name, glm::dvec3 foot, double width, double height, bool along_z) {
+        const double spacing = 1 / options_.bars_per_metre;
+        const auto count = static_cast<int>(std::floor(width / spacing + 1e-9)) + 1;
+        const std::size_t mesh = draft_.add_mesh(name, bar(height, spacing / 5, 10), 0.25);
+        for (int i = 0; i < count; ++i) {
+            const double off = spacing * (i - 0.5 * (count - 1));
+            draft_.add(mesh, name, {.at = foot + (along_z ? glm::dvec3(0, 0, off) : glm::dvec3(off, 0, 0))}, true);
+        }
+    }
+
+    // A statue on a plinth, behind a gate, in the sun that a window lets in from the left.
+    Result<void> museum() {
+        const auto one = statues(triangles(300'000), 1);
+        if (!one) return one.error();
+        draft_.add(one->front(), "statue", {.at = {0, 1, 0}, .turn_degrees = 20, .scale = glm::dvec3(1.2)});
+        wall("plinth", {1.1, 1, 1.1}, {0, 0, 0}, 0.1, 0.5);
+        wall("floor", {8, 0.2, 8}, {0, -0.2, 0});
+        wall("back wall", {8, 4, 0.3}, {0, 0, -3.15});
+        wall("right wall", {0.3, 4, 8}, {4.15, 0, 0});
+        wall("ceiling", {8, 0.2, 8}, {0, 4, 0});
+        // The left wall has an opening, z -1.2 to 1.2 and y 1.2 to 3.4.
+        wall("left wall below", {0.3, 1.2, 8}, {-4.15, 0, 0});
+        wall("left wall above", {0.3, 0.6, 8}, {-4.15, 3.4, 0});
+        wall("left wall behind", {0.3, 2.2, 2.8}, {-4.15, 1.2, -2.6});
+        wall("left wall before", {0.3, 2.2, 2.8}, {-4.15, 1.2, 2.6});
+        const bool has_gate = options_.bars == MuseumBars::both || options_.bars == MuseumBars::gate;
+        const bool has_window = options_.bars == MuseumBars::both || options_.bars == MuseumBars::window;
+        if (has_gate) bars("gate", {0, 0, 1.6}, 3, 2.8, false);
+        if (has_window) bars("window bars", {-4.15, 1.2, 0}, 2.4, 2.2, true);
+        draft_.add_sun({-0.85, 0.3, 0.25}, sun_lux);
+        draft_.add_lamp({1.5, 3.2, 2.5}, 1.2);
+        draft_.set_light(0.75, 0.12);
+        draft_.set_camera({0.4, 1.6, 4.2}, {0, 1.45, 0}, 36);
+        return {};
+    }
+
+    // Two rows of statues, and urns and rings strewn over the floor.
+    Result<void> treasure() {
+        constexpr int rows = 12, strewn = 160;
+        const std::uint64_t all = triangles(2'000'000);
+        const auto figures = statues(std::max<std::uint64_t>(all * 7 / 10 / (2 * rows), 200));
+        if (!figures) return figures.error();
+        const std::uint64_t each = std::max<std::uint64_t>(all * 3 / 10 / strewn, 100);
+        const std::array<std::size_t, 2> small = {draft_.add_mesh("goblet", urn(each), 0.7),
+                                                  draft_.add_mesh("ring", ring(each), 0.75)};
+        const std::size_t plinth = draft_.add_mesh("plinth", box({0.9, 0.6, 0.9}, 0.15), 0.45);
+        for (int i = 0; i < rows; ++i) {
+            for (const int side : {-1, 1}) {
+                const glm::dvec3 foot(2.6 * side, 0, 5.0 - 1.25 * i);
+                draft_.add(plinth, "plinth", {.at = foot}, true);
+                const std::size_t number = static_cast<std::size_t>(2 * i + (side + 1) / 2);
+                // Each kind on both sides.
+                draft_.add((*figures)[(number + number / 2) % figures->size()], "statue " + std::to_string(number),
+                           {.at = foot + glm::dvec3(0, 0.6, 0),
+                            .turn_degrees = -90.0 * side + chance_.next(-25, 25),
+                            .scale = glm::dvec3(chance_.next(1.0, 1.4))});
+            }
+        }
+        for (int i = 0; i < strewn; ++i) {
+            const std::size_t which = static_cast<std::size_t>(i % 2);
+            draft_.add(small[which], std::string(which == 0 ? "goblet " : "ring ") + std::to_string(i),
+                       {.at = {chance_.next(-1.8, 1.8), 0, chance_.next(-9, 4)},
+                        .turn_degrees = chance_.next(0, 360),
+                        .scale = glm::dvec3(chance_.next(0.12, 0.35))});
+        }
+        wall("floor", {9, 0.2, 20}, {0, -0.2, -2});
+        wall("left wall", {0.3, 4.5, 20}, {-4.65, 0, -2});
+        wall("right wall", {0.3, 4.5, 20}, {4.65, 0, -2});
+        wall("back wall", {9, 4.5, 0.3}, {0, 0, -12.15});
+        wall("ceiling", {9, 0.2, 20}, {0, 4.5, -2});
+        for (const double z : {5.0, -2.0, -9.0}) draft_.add_lamp({0, 4, z}, 3.2);
+        draft_.set_light(0.7, 0.12);
+        draft_.set_camera({0, 1.7, 7.4}, {0, 1.1, 0}, 50);
+        return {};
+    }
+
+    // Columns before a wall with niches and a balcony, trees before all of it.
+    Result<void> house() {
+        constexpr int columns = 8, niches = 5, bars_of_balcony = 60, trees = 6;
+        const std::uint64_t all = triangles(1'500'000);
+        const auto figures = statues(std::max<std::uint64_t>(all * 4 / 10 / niches, 200));
+        if (!figures) return figures.error();
+        const std::size_t pillar =
+            draft_.add_mesh("column", column(std::max<std::uint64_t>(all * 3 / 10 / columns, 200)), 0.7);
+        const std::size_t baluster =
+            draft_.add_mesh("baluster", urn(std::max<std::uint64_t>(all / 10 / bars_of_balcony, 100)), 0.7);
+        for (int i = 0; i < columns; ++i)
+            draft_.add(pillar, "column " + std::to_string(i), {.at = {2.0 * i - 7, 0.3, 1}, .scale = glm::dvec3(4)});
+        for (int i = 0; i < niches; ++i)
+            draft_.add(
+                (*figures)[static_cast<std::size_t>(i) % figures->size()], "statue " + std::to_string(i),
+                {.at = {3.0 * i - 6, 1.0, 0.1}, .turn_degrees = chance_.next(-30, 30), .scale = glm::dvec3(1.5)});
+        for (int i = 0; i < bars_of_balcony; ++i)
+            draft_.add(baluster, "baluster " + std::to_string(i),
+                       {.at = {16.0 * (i + 0.5) / bars_of_balcony - 8, 4.7, 1.35}, .scale = {0.45, 0.8, 0.45}});
+        for (int i = 0; i < niches; ++i) wall("plinth", {1.2, 0.7, 0.9}, {3.0 * i - 6, 0.3, 0.1}, 0.2, 0.5);
+        wall("steps", {17, 0.3, 4}, {0, 0, 0.5}, 0.4);
+        wall("front", {17, 9, 0.5}, {0, 0, -1.0}, 0.4, 0.65);
+        wall("balcony", {17, 0.4, 2.6}, {0, 4.3, 0.4}, 0.3);
+        wall("rail", {17, 0.12, 0.25}, {0, 5.5, 1.35}, 0.3);
+        draft_.add(draft_.add_mesh("ground", ground(60, 60, 0.0, options_.seed), 0.35), "ground", {.at = {0, 0, 0}},
+                   true);
+        const std::array<std::size_t, 2> green = {
+            draft_.add_mesh("tree 0", tree(std::max<std::uint64_t>(all * 2 / 10 / trees, 300), options_.seed), 0.4),
+            draft_.add_mesh("tree 1", tree(std::max<std::uint64_t>(all * 2 / 10 / trees, 300), options_.seed + 1),
+                            0.35)};
+        for (int i = 0; i < trees; ++i)
+            draft_.add(green[static_cast<std::size_t>(i % 2)], "tree " + std::to_string(i),
+                       {.at = {3.6 * i - 9 + chance_.next(-0.6, 0.6), 0, 6 + chance_.next(-1, 2)},
+                        .turn_degrees = chance_.next(0, 360),
+                        .scale = glm::dvec3(chance_.next(0.7, 1.0))});
+        draft_.add_sun({0.5, 0.7, 0.8}, sun_lux);
+        draft_.set_light(0.8, 0.18);
+        draft_.set_camera({-2, 1.7, 17}, {0, 3.2, 0}, 45);
+        return {};
+    }
+
+    // A thousand things in rings around a clearing, from where one walks in.
+    Result<void> forest() {
+        constexpr int things = 1000, figures_every = 25, kinds_of_trees = 5;
+        constexpr int figure_count = things / figures_every;
+        const std::uint64_t all = triangles(2'000'000);
+        const auto figures = statues(std::max<std::uint64_t>(all / 5 / figure_count, 200));
+        if (!figures) return figures.error();
+        std::vector<std::size_t> trees;
+        for (int i = 0; i < kinds_of_trees; ++i)
+            trees.push_back(draft_.add_mesh(
+                "tree " + std::to_string(i),
+                tree(std::max<std::uint64_t>(all * 4 / 5 / (things - figure_count), 300), options_.seed + 10 + i),
+                0.3 + 0.04 * i));
+        // A grid with each thing somewhere in its cell, so that nothing stands in another.
+        constexpr int cells = 32;
+        constexpr double cell_m = 3.5;
+        int placed = 0;
+        for (int k = 0; k < cells * cells && placed < things; ++k) {
+            const int row = k / cells, column = k % cells;
+            const glm::dvec3 at((column - (cells - 1) * 0.5) * cell_m + chance_.next(-1, 1), 0,
+                                -row * cell_m + chance_.next(-1, 1));
+            const double turn = chance_.next(0, 360), size = chance_.next(0.7, 1.3), lean = chance_.next(-4, 4);
+            const bool is_figure = placed % figures_every == 15;
+            const std::string number = std::to_string(placed);
+            const auto n = static_cast<std::size_t>(placed);
+            if (is_figure)
+                draft_.add((*figures)[n / figures_every % figures->size()], "statue " + number,
+                           {.at = at, .turn_degrees = turn, .scale = glm::dvec3(1.6 * size)});
+            else
+                draft_.add(trees[n % trees.size()], "tree " + number,
+                           {.at = at, .turn_degrees = turn, .scale = glm::dvec3(size), .lean_degrees = lean});
+            ++placed;
+        }
+        draft_.add(draft_.add_mesh("ground", ground(260, 130, 0.4, options_.seed), 0.3), "ground", {.at = {0, 0, -50}},
+                   true);
+        draft_.add_sun({0.4, 0.8, 0.5}, sun_lux);
+        draft_.set_light(0.8, 0.2);
+        draft_.set_camera({0, 1.7, 9}, {0, 1.8, -20}, 50);
+        return {};
+    }
+
+    struct Scanned {
+        std::string name;
+        vdtree::Mesh mesh;
+    };
+    const MakeSceneOptions& options_;
+    Chance chance_;
+    SceneDraft draft_;
+    std::vector<Scanned> scanned_;
+};
+
+Result<void> check(const MakeSceneOptions& options) {
+    const auto invalid = [](const std::string& what) { return Error{ErrorCode::invalid_argument, what}; };
+    if (options.triangles != 0 &&
+        (options.triangles < MakeSceneOptions::least_triangles || options.triangles > MakeSceneOptions::most_triangles))
+        return invalid("A scene has from " + std::to_string(MakeSceneOptions::least_triangles) + " to " +
+                       std::to_string(MakeSceneOptions::most_triangles) + " triangles, not " +
+                       std::to_string(options.triangles) + ".");
+    if (!(options.bars_per_metre >= 1 && options.bars_per_metre <= 100))
+        return invalid("A metre has from 1 to 100 bars.");
+    return {};
+}
+
+} // namespace
+
+Result<MadeScene> make_scene(const fs::path& file, const MakeSceneOptions& options) {
+    if (const auto valid = check(options); !valid) return valid.error();
+    const auto draft = Maker(options).run();
+    if (!draft) return draft.error();
+    MadeScene made;
+    for (const SceneDraft::Mesh& mesh : draft->meshes()) {
+        ++made.meshes;
+        made.mesh_triangles += mesh.mesh.triangles.size();
+    }
+    for (const SceneDraft::Node& node : draft->nodes()) {
+        const std::uint64_t triangles = draft->meshes()[node.mesh].mesh.triangles.size();
+        made.objects += !node.is_background;
+        (node.is_background ? made.background_triangles : made.triangles) += triangles;
+    }
+    if (const auto written = draft->write(file); !written) return written.error();
+    return made;
+}
+
+} // namespace unseen::app

@@ -1,0 +1,47 @@
+// Draws all objects of a session, and what stands around them.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <render/renderer.h>
+#include <session/session.h>
+
+namespace unseen::app {
+
+// A cut an object, and the geomorph that is drawn instead, or null.
+struct DrawnCut {
+    const vdtree::Cut* cut = nullptr;
+    const vdtree::Geomorph* geomorph = nullptr;
+};
+std::vector<DrawnCut> drawn_cuts(std::span<const vdtree::Cut> cuts);
+std::vector<DrawnCut> drawn_cuts(const session::Follower& follower, std::size_t objects);
+
+// Trees are on the GPU once, however many objects share them. A scene of one object is drawn as render::Renderer does,
+// to the bit. Move-only; refers to the session, whose trees must be those that it has when this is made (see
+// Session::prepare()).
+class SceneRenderer {
+public:
+    static Result<SceneRenderer> create(const render::Context& context, const session::Session& session);
+    SceneRenderer(SceneRenderer&&) noexcept;
+    SceneRenderer& operator=(SceneRenderer&&) noexcept;
+    ~SceneRenderer();
+
+    // `cuts`: by object. Of the options the lighting does not count: the session says how each object is lit.
+    Result<render::Frame> draw(std::span<const DrawnCut> cuts, const vdtree::View& view,
+                               const render::DrawOptions& options);
+    Result<void> draw_to_window(std::span<const DrawnCut> cuts, const vdtree::View& view,
+                                const render::DrawOptions& options);
+
+    std::uint64_t uploaded_bytes() const noexcept; // of objects, by the last draw
+
+private:
+    struct Impl;
+    explicit SceneRenderer(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+} // namespace unseen::app

@@ -1,0 +1,117 @@
+// unseen scene: scenes to try things out with.
+#include <algorithm>
+#include <memory>
+
+#include <make_scene.h>
+
+#include "options.h"
+#include "output_files.h"
+#include "report.h"
+#include "terminal.h"
+#include "verbs.h"
+
+namespace unseen::app {
+namespace {
+
+struct SceneArguments {
+    std::string out, json;
+    std::vector<std::string> statues;
+    TriangleCount triangles;
+    MakeSceneOptions options;
+};
+
+Result<int> run(SceneArguments& a) {
+    if (const auto ready = check_outputs(a.statues, {a.out, a.json}); !ready) return ready.error();
+    auto report = JsonReport::open(a.json);
+    if (!report) return report.error();
+    a.options.statues.assign(a.statues.begin(), a.statues.end());
+    const auto made = make_scene(a.out, a.options);
+    if (!made) return made.error();
+    const Json json = {{"objects", made->objects},
+                       {"triangles", made->triangles},
+                       {"meshes", made->meshes},
+                       {"mesh_triangles", made->mesh_triangles},
+                       {"background_triangles", made->background_triangles}};
+    if (auto ok = report->prepare(json); !ok) return ok.error();
+    if (auto ok = report->publish(); !ok) return ok.error();
+    if (report->is_on_stdout()) return exit_done;
+    print_line("made " + grouped(made->objects) + (made->objects == 1 ? " object" : " objects") + " of " +
+               grouped(made->triangles) + " triangles, and " + grouped(made->background_triangles) +
+               " of background; " + grouped(made->meshes) + " different meshes");
+    print_written({a.out, a.json});
+    return exit_done;
+}
+
+CLI::App* add_make(CLI::App& verb, const std::shared_ptr<SceneArguments>& a) {
+    CLI::App* make = verb.add_subcommand("make", "Make a scene, with a camera, lights and a background");
+    make->add_option_function<std::string>(
+            "KIND",
+            [a](const std::string& kind) {
+                a->options.kind = kind == "museum"     ? SceneKind::museum
+                                  : kind == "treasure" ? SceneKind::treasure
+                                  : kind == "house"    ? SceneKind::house
+                                                       : SceneKind::forest;
+            },
+            "museum: a statue behind a gate, in the sun through a window with bars; treasure: a chamber of statues; "
+            "house: a front with columns, statues and a balcony, trees before it; forest: statues among a thousand "
+            "trees")
+        ->required()
+        ->type_name("museum|treasure|house|forest")
+        ->check(one_of({"museum", "treasure", "house", "forest"}));
+    make->add_option("-o,--output", a->out, "The scene")->required()->type_name("OUT.glb")->check(ending_in({".glb"}));
+    add_triangles_option(
+        *make, a->triangles,
+        "About so many of all objects, shared meshes counted for each, 10,000 to 100,000,000 "
+        "(default: museum 0.3, house 1.5, treasure and forest 2 million); a forest has 0.3 million at least")
+        ->type_name("N");
+    make->add_option("--mesh", a->statues,
+                     "A statue; may be given again (default: the bunny of Debian's package glmark2-data, where it is "
+                     "installed). Those with more triangles than a statue may have are left out; the others are made "
+                     "here")
+        ->type_name("FILE")
+        ->allow_extra_args(false);
+    CLI::Option* spacing = make->add_option("--bars-per-metre", a->options.bars_per_metre, "Of a museum (default: 8)")
+                               ->type_name("N")
+                               ->check(within(1, 100));
+    CLI::Option* bars = add_choice<MuseumBars, MuseumBars>(*make, "--bars", a->options.bars,
+                                                           {{"both", MuseumBars::both},
+                                                            {"gate", MuseumBars::gate},
+                                                            {"window", MuseumBars::window},
+                                                            {"none", MuseumBars::none}},
+                                                           "Of a museum: both (default), gate, window or none");
+    make->add_option_function<double>(
+            "--seed", [a](const double& v) { a->options.seed = static_cast<std::uint64_t>(v); },
+            "Of what is strewn about (default: 1)")
+        ->type_name("N")
+        ->check(whole(0, 9007199254740992.0)); // 2^53, to which doubles count
+    add_json_option(*make, a->json);
+    make->callback([a, bars, spacing] {
+        if (a->options.kind != SceneKind::museum && (*bars || *spacing))
+            refuse("--bars and --bars-per-metre are of the museum.");
+        if (a->triangles.share > 0) refuse("--triangles: of a scene that is made, a number, not a share.");
+        a->options.triangles = a->triangles.triangles;
+        if (a->options.triangles != 0 && (a->options.triangles < MakeSceneOptions::least_triangles ||
+                                          a->options.triangles > MakeSceneOptions::most_triangles))
+            refuse("--triangles: from 10,000 to 100,000,000.");
+    });
+    return make;
+}
+
+} // namespace
+
+Command scene_command(CLI::App& app) {
+    auto a = std::make_shared<SceneArguments>();
+    CLI::App* verb = app.add_subcommand("scene", "Make scenes of many objects, to try things out with");
+    verb->require_subcommand(1);
+    CLI::App* make = add_make(*verb, a);
+    const std::string examples = "Examples:\n  unseen scene make museum -o museum.glb --bars-per-metre 12\n"
+                                 "  unseen scene make museum -o open.glb --bars none --mesh dragon.ply\n"
+                                 "  unseen scene make forest -o forest.glb --triangles 10000000 --seed 7\n"
+                                 "  unseen render museum.glb -o museum.png\n"
+                                 "  unseen simplify forest.glb -o seen.glb --triangles 5%";
+    make->footer(examples);
+    verb->footer(examples + "\n\n'unseen scene make --help' tells more.");
+    return {verb, [a] { return run(*a); }};
+}
+
+} // namespace unseen::app

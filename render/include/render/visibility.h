@@ -1,0 +1,133 @@
+// Which pixels of a picture differ visibly from a reference: the passes of a judge that works by bands of a pyramid. They
+// know no display and no observer. Tables say what is seen; perception::judge_tables() of Unseen makes them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <glm/vec3.hpp>
+
+#include <render/context.h>
+#include <vdtree/result.h>
+
+namespace unseen::render {
+
+// The luminance of a picture, cd/m2: offset + scale times a channel of a texture of two dimensions, floats or normalised,
+// whose first row is the picture's top. Such as {target.colour_texture(), width, height, 3, peak - black, black}.
+struct LuminanceTexture {
+    unsigned id = 0; // GL name; stays its owner's
+    int width = 0, height = 0;
+    int channel = 0; // 0 to 3
+    float scale = 1, offset = 0;
+};
+
+// A picture in memory that becomes a texture. Move-only; keeps a handle to the context.
+class LuminanceImage {
+public:
+    // Row-major from the top left. Fails on a size below 1x1, on more than this GL takes, on another number of values,
+    // and where memory does not suffice. Values are looked at by who uses them.
+    static Result<LuminanceImage> create(const Context& context, int width, int height, std::span<const float> cdm2);
+    LuminanceImage(LuminanceImage&&) noexcept;
+    LuminanceImage& operator=(LuminanceImage&&) noexcept;
+    ~LuminanceImage();
+
+    Result<void> set(std::span<const float> cdm2); // of the same size
+    LuminanceTexture texture() const noexcept;
+
+private:
+    struct Impl;
+    explicit LuminanceImage(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+struct LuminanceExtent {
+    float least = 0, largest = 0; // cd/m2
+};
+// Waits for the GPU. Fails on a NaN, infinite or negative luminance, naming the first pixel; `which` is the picture's name
+// in the message.
+Result<LuminanceExtent> luminance_extent(const Context& context, const LuminanceTexture& picture, const char* which);
+
+// What is seen of pictures of one size. See perception/judge_tables.h, whose fields are these, for what is computed.
+struct VisibilityTables {
+    struct Node {
+        float log2_s = 0, own = 1, smoothed = 0;
+    };
+    struct Gaussian {
+        float weight = 0;
+        int halvings = 0;          // 0 to 30
+        std::vector<float> kernel; // 1 to 12 values
+    };
+    struct Band {
+        float of_patch = 1;
+        std::array<Gaussian, 3> window;
+        std::vector<Node> nodes; // luminances x eccentricities
+    };
+    struct Gaze {
+        glm::vec3 direction = {0, 0, 1};
+        float tangent_per_pixel = 0;
+    };
+
+    int width = 0, height = 0;
+    float floor_cdm2 = 0; // above 0
+    float beta = 0, most_thresholds = 0;
+    std::array<float, 3> kernel = {};
+    float masking_power = 0, masking_knee = 0, least_masker = 0, most_masker = 0;
+    int luminance_shift = 0, first_luminance = 0;
+    int luminances = 0, eccentricities = 0;
+    float first_eccentricity = 0, eccentricity_step = 0;
+    std::optional<Gaze> gaze = {};
+    std::vector<Band> bands; // 1 to 16
+};
+
+// Of what the passes keep. With half floats the reference's weights and the energies take half of the memory; V is within
+// 1% from 0.1 to 5,000.
+enum class VisibilityPrecision { full, half };
+
+struct VisibilitySummary {
+    double largest = 0; // V
+    std::uint64_t visible_pixels = 0;
+};
+
+// Prepares a reference once, and judges any number of pictures by it. What is not called for is not made: planes for
+// judging at the first judge(), the map of thresholds at the first map_thresholds(), and without a gaze nothing knows of
+// eccentricity. The same pictures give the same bits on the same GPU. Move-only; keeps a handle to the context.
+//
+// Memory, in bytes a pixel: 15 for the reference (half floats: 9) and 11 more while it is prepared; some 35 for judging
+// (28), 4 for thresholds and 25 more while they are mapped.
+class VisibilityPasses {
+public:
+    // The reference is copied. Fails on tables that contradict themselves or the picture, on more than this GL takes, and
+    // where memory does not suffice. The tables' luminances have to span the reference's, which luminance_extent() checks.
+    static Result<VisibilityPasses> create(const Context& context, const VisibilityTables& tables,
+                                           const LuminanceTexture& reference,
+                                           VisibilityPrecision precision = VisibilityPrecision::full);
+    VisibilityPasses(VisibilityPasses&&) noexcept;
+    VisibilityPasses& operator=(VisibilityPasses&&) noexcept;
+    ~VisibilityPasses();
+
+    // Judges a picture of the reference's size. Waits for nothing.
+    Result<void> judge(const LuminanceTexture& test);
+
+    // Of the last picture judged; these wait for the GPU. Errors: none was judged; a luminance of it was negative or not
+    // finite, and the message names the first such pixel.
+    Result<VisibilitySummary> summary() const;
+    Result<std::vector<float>> read_visibility() const; // V by pixel, row-major from the top left
+    // The same in one channel of 32-bit floats; another picture overwrites it. 0 before the first.
+    unsigned visibility_texture() const noexcept;
+
+    // The step of luminance that is just visible, cd/m2, by pixel.
+    Result<void> map_thresholds();
+    Result<std::vector<float>> read_thresholds() const; // fails where there is no map yet
+    unsigned thresholds_texture() const noexcept;       // 0 before there is a map
+
+private:
+    struct Impl;
+    explicit VisibilityPasses(std::unique_ptr<Impl> impl);
+    std::unique_ptr<Impl> impl_;
+};
+
+} // namespace unseen::render

@@ -1,0 +1,60 @@
+// Planes of numbers that passes read and write, four of a row in each texel (shaders/planes.glsl).
+#pragma once
+
+#include <initializer_list>
+#include <vector>
+
+#include <glm/vec2.hpp>
+
+#include <vdtree/result.h>
+
+#include "gl_object.h"
+#include "program.h"
+
+namespace unseen::render {
+
+enum class PlaneFormat {
+    full,   // four 32-bit floats a texel
+    half,   // four 16-bit floats
+    single, // one 32-bit float: a pixel a texel
+};
+
+// One plane, or two that one pass writes at once. Needs a current context.
+class GpuPlanes {
+public:
+    GpuPlanes() noexcept = default;
+    // Of so many pixels, or more where it is reused for others. Fails where memory does not suffice.
+    static Result<GpuPlanes> create(glm::ivec2 pixels, int count, PlaneFormat format, const char* label);
+
+    unsigned framebuffer() const noexcept { return framebuffer_.id(); }
+    unsigned texture(std::size_t number = 0) const noexcept { return textures_[number].id(); }
+    explicit operator bool() const noexcept { return static_cast<bool>(framebuffer_); }
+
+private:
+    std::vector<Texture2d> textures_;
+    FramebufferObject framebuffer_;
+};
+
+// Texels of so many pixels.
+glm::ivec2 texels_of(glm::ivec2 pixels);
+
+// What passes of planes share: nothing is blended, tested or cut off, and textures are read as they are. Textures that are
+// bound in it are bound for the passes alone.
+class PlanePasses {
+public:
+    PlanePasses();
+    ~PlanePasses();
+    PlanePasses(const PlanePasses&) = delete;
+    PlanePasses& operator=(const PlanePasses&) = delete;
+
+    // Binds the textures from unit 0 on, and computes the first `texels` of the planes.
+    void draw(const Program& program, const GpuPlanes& to, glm::ivec2 texels, std::initializer_list<unsigned> textures);
+    void bind(unsigned unit, unsigned texture);
+
+private:
+    VertexArray no_arrays_; // for the full-screen triangle, which comes from nowhere
+    Sampler nearest_;
+    unsigned used_units_ = 0;
+};
+
+} // namespace unseen::render

@@ -1,0 +1,731 @@
+// The judge's passes. Step by step they do what perception's judge does on the CPU (judge_modern.cpp there, which is the
+// reference); shaders/planes.glsl says how numbers lie in textures.
+#include <render/visibility.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include <render/target.h>
+#include <vdtree/internal/errors.h>
+
+#include "context_impl.h"
+#include "gl.h"
+#include "gpu_plane.h"
+#include "shaders.h"
+
+namespace unseen::render {
+namespace {
+
+constexpr std::size_t most_bands = 16;             // of pool.frag: what a fragment shader can read at least
+constexpr std::size_t few_bands = 8;               // of its variant for usual sizes
+constexpr std::size_t most_taps = 12;              // of blur.frag
+constexpr int most_halvings = 30;                  // shifts of a whole number
+constexpr int group_columns = 64, group_rows = 16; // of examine.comp
+
+// Thresholds from 0.1, whose energy is 160 times the least half float, to 8,000 fit into half floats.
+constexpr float half_energy_scale = 1.f / 2048, largest_half = 65504;
+constexpr float half_weights_reach = 32768; // half of the largest: the bound of the weights is one at nodes
+
+glm::ivec2 halved(glm::ivec2 size) { return (size + 1) / 2; }
+
+glm::vec4 taps(const VisibilityTables& tables) { return {tables.kernel[0], tables.kernel[1], tables.kernel[2], 0}; }
+
+std::string size_text(int width, int height) { return std::to_string(width) + "x" + std::to_string(height); }
+
+Error judge_error(const std::string& message) { return invalid_argument("judge: " + message); }
+
+Result<void> check_size(int width, int height) {
+    if (width < 1 || height < 1)
+        return judge_error("a picture of " + size_text(width, height) + " pixels has none; it needs at least 1x1");
+    const int most = largest_target_side();
+    if (width > most || height > most)
+        return unsupported("judge: a picture of " + size_text(width, height) +
+                           " pixels is larger than this GPU's textures, at most " + size_text(most, most) +
+                           "; judge parts of it, or on the CPU");
+    return {};
+}
+
+// In its context.
+Result<void> check_texture(const LuminanceTexture& t) {
+    if (auto ok = check_size(t.width, t.height); !ok) return ok;
+    if (t.channel < 0 || t.channel > 3) return judge_error("a texture's channel must be 0 to 3");
+    if (!(std::isfinite(t.scale) && std::isfinite(t.offset)))
+        return judge_error("a texture's scale and offset must be finite");
+    if (!glIsTexture(t.id)) return judge_error("there is no texture " + std::to_string(t.id) + " in this context");
+    GLint target = 0, width = 0, height = 0, kind = GL_NONE;
+    glGetTextureParameteriv(t.id, GL_TEXTURE_TARGET, &target);
+    if (target != GL_TEXTURE_2D) return judge_error("a picture must be a texture of two dimensions, without samples");
+    glGetTextureLevelParameteriv(t.id, 0, GL_TEXTURE_WIDTH, &width);
+    glGetTextureLevelParameteriv(t.id, 0, GL_TEXTURE_HEIGHT, &height);
+    if (width != t.width || height != t.height)
+        return judge_error("the texture of a picture of " + size_text(t.width, t.height) + " pixels is " +
+                           size_text(width, height));
+    glGetTextureLevelParameteriv(t.id, 0, GL_TEXTURE_RED_TYPE, &kind);
+    if (kind == GL_INT || kind == GL_UNSIGNED_INT || kind == GL_NONE)
+        return judge_error("the texture of a picture must hold floats or normalised values");
+    return {};
+}
+
+Result<void> check(const VisibilityTables& t) {
+    const auto refuse = [](const std::string& what) { return judge_error("the tables are none: " + what); };
+    if (t.bands.empty() || t.bands.size() > most_bands) return refuse("they need 1 to 16 bands");
+    if (t.luminances < 2 || t.eccentricities < 1) return refuse("they need two luminances and an eccentricity");
+    if (!t.gaze && t.eccentricities != 1) return refuse("without a gaze there is one eccentricity");
+    if (!(t.floor_cdm2 > 0 && t.beta > 0 && t.most_thresholds > 0 && t.masking_knee > 0 && t.least_masker > 0 &&
+          t.most_masker >= t.least_masker && t.eccentricity_step > 0))
+        return refuse("a number that must be above 0 is not");
+    if (t.luminance_shift < 1 || t.luminance_shift > 23) return refuse("luminances are shifted by 1 to 23 bits");
+    const auto nodes = static_cast<std::size_t>(t.luminances) * static_cast<std::size_t>(t.eccentricities);
+    for (const VisibilityTables::Band& band : t.bands) {
+        if (band.nodes.size() != nodes) return refuse("a band has not as many nodes as luminances by eccentricities");
+        for (const VisibilityTables::Gaussian& g : band.window)
+            if (g.kernel.empty() || g.kernel.size() > most_taps || g.halvings < 0 || g.halvings > most_halvings)
+                return refuse("a window's Gaussian has 1 to 12 taps, and up to 30 halvings");
+        if (band.window[0].halvings < band.window[1].halvings || band.window[1].halvings < band.window[2].halvings)
+            return refuse("a window's Gaussians are given from the widest on");
+    }
+    const std::size_t rows = static_cast<std::size_t>(t.eccentricities) * t.bands.size();
+    const auto most = static_cast<std::size_t>(largest_target_side());
+    if (static_cast<std::size_t>(t.luminances) > most || rows > most)
+        return unsupported("judge: the tables are larger than this GPU's textures; judge on the CPU");
+    return {};
+}
+
+Result<const Program*> plane_program(const Context& context, std::string_view label, std::string_view fragment,
+                                     std::initializer_list<std::string_view> defines = {}) {
+    const std::string text = std::string(shaders::planes_glsl) + "#line 1\n" + std::string(fragment);
+    const ShaderSource sources[] = {{ShaderSource::Stage::vertex, shaders::full_screen_vert},
+                                    {ShaderSource::Stage::fragment, text}};
+    return context.impl().programs.named(label, sources, {defines.begin(), defines.size()});
+}
+
+// Programs by name, found when they are first needed; the first error is kept.
+class PlanePrograms {
+public:
+    explicit PlanePrograms(const Context& context) : context_(context) {}
+
+    bool find(const Program*& program, std::string_view label, std::string_view fragment,
+              std::initializer_list<std::string_view> defines = {}) {
+        if (program || error_) return !error_;
+        const auto found = plane_program(context_, label, fragment, defines);
+        if (found) program = *found;
+        else error_ = found.error();
+        return !error_;
+    }
+    Result<void> result() const { return error_ ? Result<void>(*error_) : Result<void>(); }
+
+private:
+    const Context& context_;
+    std::optional<Error> error_;
+};
+
+// ---- what is in a picture ---------------------------------------------------------------------------------------------
+
+struct Found { // as examine.comp has it
+    std::uint32_t least = 0xffffffffU, largest = 0, not_below_1 = 0, first_bad = 0xffffffffU;
+};
+
+Buffer make_found() {
+    Buffer buffer = Buffer::create("found in a picture");
+    const Found nothing;
+    glNamedBufferStorage(buffer.id(), sizeof(nothing), &nothing, GL_DYNAMIC_STORAGE_BIT);
+    return buffer;
+}
+
+Result<const Program*> examining(const Context& context) {
+    const ShaderSource source[] = {{ShaderSource::Stage::compute, shaders::examine_comp}};
+    return context.impl().programs.named("examine", source);
+}
+
+void examine(const Program& program, PlanePasses& passes, const LuminanceTexture& picture, const Buffer& found) {
+    const Found nothing;
+    glNamedBufferSubData(found.id(), 0, sizeof(nothing), &nothing);
+    passes.bind(0, picture.id);
+    program.set(0, glm::ivec2(picture.width, picture.height));
+    program.set(1, static_cast<unsigned>(picture.channel));
+    program.set(2, glm::vec4(picture.scale, picture.offset, 0, 0));
+    program.use();
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, found.id());
+    glDispatchCompute(static_cast<GLuint>((picture.width + group_columns - 1) / group_columns),
+                      static_cast<GLuint>((picture.height + group_rows - 1) / group_rows), 1);
+    glBindBufferBase(GL_SHADER_STORAGE_BUFFER, 0, 0);
+    glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+}
+
+Found read(const Buffer& buffer) {
+    Found found;
+    glGetNamedBufferSubData(buffer.id(), 0, sizeof(found), &found);
+    return found;
+}
+
+Result<void> check(const Found& found, int width, const char* which) {
+    if (found.first_bad == Found{}.first_bad) return {};
+    const auto columns = static_cast<std::uint32_t>(width);
+    return judge_error("luminance of the " + std::string(which) + " at pixel (" +
+                       std::to_string(found.first_bad % columns) + ", " + std::to_string(found.first_bad / columns) +
+                       ") is negative or not finite");
+}
+
+// ---- textures and memory ----------------------------------------------------------------------------------------------
+
+void reset_pixel_stores() {
+    for (const GLenum four : {GL_PACK_ALIGNMENT, GL_UNPACK_ALIGNMENT}) glPixelStorei(four, 4);
+    for (const GLenum zero : {GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS, GL_PACK_SKIP_PIXELS, GL_UNPACK_ROW_LENGTH,
+                              GL_UNPACK_SKIP_ROWS, GL_UNPACK_SKIP_PIXELS})
+        glPixelStorei(zero, 0);
+    glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
+    glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
+}
+
+std::vector<float> read_floats(unsigned texture, glm::ivec2 size) {
+    std::vector<float> values(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y));
+    reset_pixel_stores();
+    const std::size_t bytes = values.size() * sizeof(float);
+    // GL counts bytes as an int; rows are read in parts where there are more.
+    const auto row_bytes = static_cast<std::size_t>(size.x) * sizeof(float);
+    const auto rows = static_cast<int>(std::min<std::size_t>(std::size_t{1} << 30, bytes) / row_bytes);
+    for (int y = 0; y < size.y; y += rows) {
+        const int count = std::min(rows, size.y - y);
+        glGetTextureSubImage(texture, 0, 0, y, 0, size.x, count, 1, GL_RED, GL_FLOAT,
+                             static_cast<GLsizei>(static_cast<std::size_t>(count) * row_bytes),
+                             values.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(size.x));
+    }
+    return values;
+}
+
+} // namespace
+
+// ---- LuminanceImage ---------------------------------------------------------------------------------------------------
+
+struct LuminanceImage::Impl {
+    Impl(const Context& context_, int width_, int height_) : context(context_), width(width_), height(height_) {}
+    Impl(const Impl&) = delete;
+    Impl& operator=(const Impl&) = delete;
+    ~Impl() { static_cast<void>(context.make_current()); } // for the texture, which goes next
+
+    Result<void> set(std::span<const float> values) const {
+        const auto wanted = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+        if (values.size() != wanted)
+            return judge_error("a picture of " + size_text(width, height) + " pixels has " + std::to_string(wanted) +
+                               " luminances, not " + std::to_string(values.size()));
+        reset_pixel_stores();
+        glTextureSubImage2D(texture.id(), 0, 0, 0, width, height, GL_RED, GL_FLOAT, values.data());
+        return {};
+    }
+
+    Context context; // first, and so gone last
+    int width, height;
+    Texture2d texture;
+};
+
+LuminanceImage::LuminanceImage(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+LuminanceImage::LuminanceImage(LuminanceImage&&) noexcept = default;
+LuminanceImage& LuminanceImage::operator=(LuminanceImage&&) noexcept = default;
+LuminanceImage::~LuminanceImage() = default;
+
+Result<LuminanceImage> LuminanceImage::create(const Context& context, int width, int height,
+                                              std::span<const float> cdm2) {
+    auto impl = std::make_unique<Impl>(context, width, height);
+    auto made = in_context(context, "Making a picture", [&]() -> Result<void> {
+        if (auto ok = check_size(width, height); !ok) return ok;
+        impl->texture = Texture2d::create("luminance");
+        glTextureStorage2D(impl->texture.id(), 1, GL_R32F, width, height);
+        return impl->set(cdm2);
+    });
+    if (!made) return made.error();
+    return LuminanceImage(std::move(impl));
+}
+
+Result<void> LuminanceImage::set(std::span<const float> cdm2) {
+    return in_context(impl_->context, "Making a picture", [&] { return impl_->set(cdm2); });
+}
+
+LuminanceTexture LuminanceImage::texture() const noexcept {
+    return {.id = impl_->texture.id(), .width = impl_->width, .height = impl_->height};
+}
+
+Result<LuminanceExtent> luminance_extent(const Context& context, const LuminanceTexture& picture, const char* which) {
+    LuminanceExtent extent;
+    auto done = in_context(context, "Looking at a picture", [&]() -> Result<void> {
+        if (auto ok = check_texture(picture); !ok) return ok;
+        const auto program = examining(context);
+        if (!program) return program.error();
+        const Buffer buffer = make_found();
+        PlanePasses passes;
+        examine(**program, passes, picture, buffer);
+        const Found found = read(buffer);
+        extent = {std::bit_cast<float>(found.least), std::bit_cast<float>(found.largest)};
+        return check(found, picture.width, which);
+    });
+    if (!done) return done.error();
+    return extent;
+}
+
+// ---- VisibilityPasses -------------------------------------------------------------------------------------------------
+
+struct VisibilityPasses::Impl {
+    Impl(const Context& context_, const VisibilityTables& tables_, VisibilityPrecision precision)
+        : context(context_), tables(tables_), is_half(precision == VisibilityPrecision::half),
+          size(tables.width, tables.height) {}
+    Impl(const Impl&) = delete;
+    Impl& operator=(const Impl&) = delete;
+    ~Impl() { static_cast<void>(context.make_current()); } // for the objects, which go next
+
+    // Of the reference.
+    struct Band {
+        glm::ivec2 size = {};
+        GpuPlanes weights; // own, smoothed
+        float scale = 1;   // of the weights
+    };
+    // What judging needs. Planes that all levels use are as large as the largest of them.
+    struct Judging {
+        std::array<GpuPlanes, 3> differences; // of the first level, and of every second and third one
+        GpuPlanes reduced, band, blurred_rows;
+        std::array<GpuPlanes, 3> energies; // as they are, and halved by turns
+        std::array<GpuPlanes, 3> blurred;  // by the window's Gaussians
+        std::vector<GpuPlanes> powers;     // by band
+        GpuPlanes visibility;
+        Buffer found_in_test, found_visible;
+    };
+    enum class Sight { weights, thresholds };
+
+    Result<void> prepare(const LuminanceTexture& picture);
+    Result<void> find_programs(Sight sight);
+    void upload_nodes();
+    float weights_scale(const VisibilityTables::Band& band) const;
+    // Calls use(level, luminance and contrast) for each band.
+    template <class Use>
+    Result<void> for_each_reference_band(PlanePasses& passes, Use use);
+    void see(PlanePasses& passes, std::size_t level, const GpuPlanes& of_reference, Sight sight, const GpuPlanes& to);
+    void reduce(PlanePasses& passes, unsigned from, glm::ivec2 from_size, const GpuPlanes& across, const GpuPlanes& to);
+
+    Result<void> prepare_judging();
+    Result<void> judge(const LuminanceTexture& test);
+    void add_energies(PlanePasses& passes, std::size_t level);
+    void blur(PlanePasses& passes, unsigned from, glm::ivec2 from_size, const std::vector<float>& kernel,
+              const GpuPlanes& to);
+    void pool(PlanePasses& passes, const Program& program, const std::vector<GpuPlanes>& from, const GpuPlanes& packed,
+              const GpuPlanes& to);
+    Result<void> map_thresholds();
+
+    PlaneFormat kept() const { return is_half ? PlaneFormat::half : PlaneFormat::full; }
+    float energy_scale() const { return is_half ? half_energy_scale : 1; }
+
+    Context context; // first, and so gone last
+    VisibilityTables tables;
+    bool is_half;
+    glm::ivec2 size;
+    Texture2d nodes; // of all bands
+    GpuPlanes reference;
+    std::vector<Band> bands;
+    std::optional<Judging> judging;
+    bool is_judged = false;
+    GpuPlanes thresholds;
+
+    const Program *copy = nullptr, *subtract = nullptr, *reduce_rows = nullptr, *reduce_columns = nullptr,
+                  *split_reference = nullptr, *split_base = nullptr, *split_difference = nullptr, *weigh = nullptr,
+                  *step = nullptr, *square = nullptr, *halve = nullptr, *raise = nullptr, *pool_powers = nullptr,
+                  *pool_thresholds = nullptr, *unpack = nullptr, *look = nullptr;
+    std::array<const Program*, 3> blur_rows = {}, blur_columns = {};
+};
+
+// Programs that nothing calls for are not compiled.
+Result<void> VisibilityPasses::Impl::find_programs(Sight sight) {
+    PlanePrograms programs(context);
+    programs.find(copy, "luminance", shaders::luminance_frag);
+    programs.find(unpack, "unpack", shaders::unpack_frag);
+    programs.find(reduce_columns, "reduce columns", shaders::reduce_frag);
+    programs.find(reduce_rows, "reduce rows", shaders::reduce_frag, {"ALONG_ROWS"});
+    programs.find(split_reference, "split reference", shaders::split_frag, {"REFERENCE"});
+    programs.find(split_base, "split base", shaders::split_frag, {"REFERENCE", "BASE"});
+    const bool is_step = sight == Sight::thresholds;
+    const Program*& seen = is_step ? step : weigh;
+    if (is_step && tables.gaze) programs.find(seen, "step by gaze", shaders::sight_frag, {"THRESHOLDS", "GAZE"});
+    else if (is_step) programs.find(seen, "step", shaders::sight_frag, {"THRESHOLDS"});
+    else if (tables.gaze) programs.find(seen, "weigh by gaze", shaders::sight_frag, {"GAZE"});
+    else programs.find(seen, "weigh", shaders::sight_frag);
+    const bool is_few = tables.bands.size() <= few_bands;
+    if (is_step && is_few)
+        programs.find(pool_thresholds, "pool 8 thresholds", shaders::pool_frag, {"THRESHOLDS", "UP_TO_8"});
+    else if (is_step) programs.find(pool_thresholds, "pool thresholds", shaders::pool_frag, {"THRESHOLDS"});
+    return programs.result();
+}
+
+void VisibilityPasses::Impl::upload_nodes() {
+    std::vector<glm::vec4> texels;
+    for (const VisibilityTables::Band& band : tables.bands)
+        for (const VisibilityTables::Node& node : band.nodes)
+            texels.emplace_back(node.log2_s, node.own, node.smoothed, 0);
+    const auto rows = static_cast<GLsizei>(static_cast<std::size_t>(tables.eccentricities) * tables.bands.size());
+    nodes = Texture2d::create("sensitivity");
+    glTextureStorage2D(nodes.id(), 1, GL_RGBA32F, tables.luminances, rows);
+    reset_pixel_stores();
+    glTextureSubImage2D(nodes.id(), 0, 0, 0, tables.luminances, rows, GL_RGBA, GL_FLOAT, texels.data());
+}
+
+// A power of two that takes the largest weight to the middle of what half floats reach; masking makes weights only smaller.
+float VisibilityPasses::Impl::weights_scale(const VisibilityTables::Band& band) const {
+    if (!is_half) return 1;
+    double bound = 0;
+    for (std::size_t i = 0; i < band.nodes.size(); ++i) {
+        const VisibilityTables::Node& node = band.nodes[i];
+        const auto l = static_cast<std::uint32_t>(i % static_cast<std::size_t>(tables.luminances));
+        const auto bits = (static_cast<std::uint32_t>(tables.first_luminance) + l) << tables.luminance_shift;
+        const double luminance = std::max(std::bit_cast<float>(bits), tables.floor_cdm2);
+        const double weight = std::max(std::abs(node.own), std::abs(node.smoothed));
+        bound = std::max(bound, std::exp2(static_cast<double>(node.log2_s)) * weight / luminance);
+    }
+    if (!(bound > 0 && std::isfinite(bound))) return 1;
+    return std::exp2(std::clamp(std::floor(std::log2(half_weights_reach / static_cast<float>(bound))), -100.f, 100.f));
+}
+
+void VisibilityPasses::Impl::reduce(PlanePasses& passes, unsigned from, glm::ivec2 from_size, const GpuPlanes& across,
+                                    const GpuPlanes& to) {
+    const glm::ivec2 across_size(from_size.x, halved(from_size).y);
+    reduce_columns->set(0, from_size);
+    reduce_columns->set(1, taps(tables));
+    passes.draw(*reduce_columns, across, texels_of(across_size), {from});
+    reduce_rows->set(0, across_size);
+    reduce_rows->set(1, taps(tables));
+    passes.draw(*reduce_rows, to, texels_of(halved(from_size)), {across.texture()});
+}
+
+template <class Use>
+Result<void> VisibilityPasses::Impl::for_each_reference_band(PlanePasses& passes, Use use) {
+    const glm::ivec2 second = halved(size), third = halved(second);
+    auto split = GpuPlanes::create(size, 2, PlaneFormat::full, "luminance and contrast");
+    if (!split) return split.error();
+    GpuPlanes across, odd, even; // levels of the reference
+    if (bands.size() > 1)
+        for (const auto& [planes, pixels] :
+             {std::pair{&across, glm::ivec2(size.x, second.y)}, {&odd, second}, {&even, third}}) {
+            auto made = GpuPlanes::create(pixels, 1, PlaneFormat::full, "levels of a reference");
+            if (!made) return made.error();
+            *planes = std::move(*made);
+        }
+    unsigned fine = reference.texture();
+    for (std::size_t level = 0; level < bands.size(); ++level) {
+        const glm::ivec2 here = bands[level].size;
+        if (level + 1 == bands.size()) {
+            split_base->set(2, tables.floor_cdm2);
+            passes.draw(*split_base, *split, texels_of(here), {fine});
+        } else {
+            const GpuPlanes& next = level % 2 == 0 ? odd : even;
+            reduce(passes, fine, here, across, next);
+            split_reference->set(0, halved(here));
+            split_reference->set(1, taps(tables));
+            split_reference->set(2, tables.floor_cdm2);
+            passes.draw(*split_reference, *split, texels_of(here), {fine, next.texture()});
+            fine = next.texture();
+        }
+        if (auto used = use(level, *split); !used) return used;
+    }
+    return {};
+}
+
+void VisibilityPasses::Impl::see(PlanePasses& passes, std::size_t level, const GpuPlanes& of_reference, Sight sight,
+                                 const GpuPlanes& to) {
+    const Program& program = sight == Sight::thresholds ? *step : *weigh;
+    const Band& band = bands[level];
+    program.set(0, band.size);
+    program.set(1, glm::vec4(tables.masking_power, tables.masking_knee, tables.least_masker, tables.most_masker));
+    program.set(2, glm::ivec2(tables.first_luminance, tables.luminances));
+    program.set(3, glm::ivec2(static_cast<int>(level) * tables.eccentricities, tables.luminance_shift));
+    program.set(4, glm::vec4(tables.bands[level].of_patch, band.scale, 0, 0));
+    if (tables.gaze) {
+        program.set(5, glm::vec4(tables.gaze->direction, tables.gaze->tangent_per_pixel));
+        program.set(6, glm::vec4(tables.first_eccentricity, 1 / tables.eccentricity_step,
+                                 static_cast<float>(tables.eccentricities), 0));
+        program.set(7, size);
+        program.set(8, static_cast<unsigned>(level));
+    }
+    passes.draw(program, to, texels_of(band.size), {of_reference.texture(0), of_reference.texture(1), nodes.id()});
+}
+
+Result<void> VisibilityPasses::Impl::prepare(const LuminanceTexture& picture) {
+    if (auto ok = check(tables); !ok) return ok;
+    if (auto ok = check_texture(picture); !ok) return ok;
+    if (picture.width != size.x || picture.height != size.y)
+        return judge_error("the tables are for pictures of " + size_text(size.x, size.y) + ", not " +
+                           size_text(picture.width, picture.height));
+    if (auto ok = find_programs(Sight::weights); !ok) return ok;
+    upload_nodes();
+    auto copied = GpuPlanes::create(size, 1, PlaneFormat::full, "reference");
+    if (!copied) return copied.error();
+    reference = std::move(*copied);
+    PlanePasses passes;
+    copy->set(0, size);
+    copy->set(1, static_cast<unsigned>(picture.channel));
+    copy->set(2, glm::vec4(picture.scale, picture.offset, 0, 0));
+    passes.draw(*copy, reference, texels_of(size), {picture.id});
+
+    bands.resize(tables.bands.size());
+    for (std::size_t level = 0; level < bands.size(); ++level) {
+        Band& band = bands[level];
+        band.size = level == 0 ? size : halved(bands[level - 1].size);
+        band.scale = weights_scale(tables.bands[level]);
+        auto weights = GpuPlanes::create(band.size, 2, kept(), "weights of a band");
+        if (!weights) return weights.error();
+        band.weights = std::move(*weights);
+    }
+    return for_each_reference_band(passes, [&](std::size_t level, const GpuPlanes& of_reference) -> Result<void> {
+        see(passes, level, of_reference, Sight::weights, bands[level].weights);
+        return {};
+    });
+}
+
+Result<void> VisibilityPasses::Impl::prepare_judging() {
+    if (judging) return {};
+    PlanePrograms programs(context);
+    programs.find(subtract, "difference", shaders::luminance_frag, {"DIFFERENCE"});
+    programs.find(split_difference, "split difference", shaders::split_frag);
+    programs.find(square, "energy", shaders::energy_frag);
+    programs.find(halve, "halve", shaders::halve_frag);
+    programs.find(blur_rows[0], "blur rows by 4", shaders::blur_frag, {"ALONG_ROWS", "REACH_1"});
+    programs.find(blur_rows[1], "blur rows by 8", shaders::blur_frag, {"ALONG_ROWS", "REACH_2"});
+    programs.find(blur_rows[2], "blur rows by 11", shaders::blur_frag, {"ALONG_ROWS", "REACH_3"});
+    programs.find(blur_columns[0], "blur columns by 4", shaders::blur_frag, {"REACH_1"});
+    programs.find(blur_columns[1], "blur columns by 8", shaders::blur_frag, {"REACH_2"});
+    programs.find(blur_columns[2], "blur columns by 11", shaders::blur_frag, {"REACH_3"});
+    if (tables.beta == 3.5f) programs.find(raise, "power 3.5", shaders::power_frag, {"EXPONENT_3_5"});
+    else if (tables.beta == 2) programs.find(raise, "power 2", shaders::power_frag, {"EXPONENT_2"});
+    else programs.find(raise, "power", shaders::power_frag);
+    if (bands.size() <= few_bands) programs.find(pool_powers, "pool 8 powers", shaders::pool_frag, {"UP_TO_8"});
+    else programs.find(pool_powers, "pool powers", shaders::pool_frag);
+    if (auto ok = programs.result(); !ok) return ok;
+    const auto found = examining(context);
+    if (!found) return found.error();
+    look = *found;
+
+    Judging made;
+    Result<void> result;
+    const auto make = [&](GpuPlanes& planes, glm::ivec2 pixels, PlaneFormat format, const char* label) {
+        if (!result) return;
+        auto created = GpuPlanes::create(pixels, 1, format, label);
+        if (created) planes = std::move(*created);
+        else result = created.error();
+    };
+    const glm::ivec2 second = halved(size), third = halved(second);
+    const bool has_levels = bands.size() > 1;
+    make(made.differences[0], size, PlaneFormat::full, "difference");
+    if (has_levels) {
+        make(made.differences[1], second, PlaneFormat::full, "levels of a difference");
+        make(made.differences[2], third, PlaneFormat::full, "levels of a difference");
+        make(made.reduced, {size.x, second.y}, PlaneFormat::full, "levels of a difference");
+        make(made.band, size, PlaneFormat::full, "band of a difference");
+    }
+    int halvings = 0;
+    std::array<glm::ivec2, 3> largest = {glm::ivec2(1), glm::ivec2(1), glm::ivec2(1)};
+    for (std::size_t level = 0; level < bands.size(); ++level)
+        for (std::size_t i = 0; i < largest.size(); ++i) {
+            const int of_this = tables.bands[level].window[i].halvings;
+            glm::ivec2 pixels = bands[level].size;
+            for (int h = 0; h < of_this; ++h) pixels = halved(pixels);
+            largest[i] = glm::max(largest[i], pixels);
+            halvings = std::max(halvings, of_this);
+        }
+    make(made.energies[0], size, kept(), "energy");
+    if (halvings > 0) make(made.energies[1], second, kept(), "halved energy");
+    if (halvings > 1) make(made.energies[2], third, kept(), "halved energy");
+    glm::ivec2 widest(1);
+    for (std::size_t i = 0; i < largest.size(); ++i) {
+        make(made.blurred[i], largest[i], kept(), "blurred energy");
+        widest = glm::max(widest, largest[i]);
+    }
+    make(made.blurred_rows, widest, kept(), "blurred energy");
+    for (const Band& band : bands) make(made.powers.emplace_back(), band.size, PlaneFormat::full, "power of a band");
+    make(made.visibility, size, PlaneFormat::single, "visibility");
+    if (!result) return result;
+    made.found_in_test = make_found();
+    made.found_visible = make_found();
+    judging = std::move(made);
+    return {};
+}
+
+void VisibilityPasses::Impl::blur(PlanePasses& passes, unsigned from, glm::ivec2 from_size,
+                                  const std::vector<float>& kernel, const GpuPlanes& to) {
+    std::array<float, most_taps> padded = {};
+    std::copy(kernel.begin(), kernel.end(), padded.begin());
+    const std::size_t reach = kernel.size() - 1, variant = reach <= 4 ? 0 : reach <= 8 ? 1 : 2;
+    const std::span<const float> used(padded.data(), std::min(4 * variant + 5, most_taps));
+    const auto pass = [&](const Program& program, unsigned source, const GpuPlanes& into) {
+        program.set(0, from_size);
+        program.set(1, used);
+        passes.draw(program, into, texels_of(from_size), {source});
+    };
+    pass(*blur_rows[variant], from, judging->blurred_rows);
+    pass(*blur_columns[variant], judging->blurred_rows.texture(), to);
+}
+
+// From the energies of a band to what the window holds of them, as powers.
+void VisibilityPasses::Impl::add_energies(PlanePasses& passes, std::size_t level) {
+    const auto& window = tables.bands[level].window;
+    std::array<glm::ivec2, 3> sizes = {};
+    const GpuPlanes* from = &judging->energies[0];
+    glm::ivec2 from_size = bands[level].size;
+    int halvings = 0;
+    for (std::size_t i = window.size(); i-- > 0;) { // from the narrowest on
+        // A narrower one is halved no more often than a wider one.
+        for (; halvings < window[i].halvings; ++halvings) {
+            const GpuPlanes& to = judging->energies[halvings % 2 == 0 ? 1 : 2];
+            halve->set(0, from_size);
+            from_size = halved(from_size);
+            passes.draw(*halve, to, texels_of(from_size), {from->texture()});
+            from = &to;
+        }
+        blur(passes, from->texture(), from_size, window[i].kernel, judging->blurred[i]);
+        sizes[i] = from_size;
+    }
+    raise->set(0, glm::vec4(window[0].weight, window[1].weight, window[2].weight, 1 / energy_scale()));
+    raise->set(1, glm::vec4(window[0].halvings, window[1].halvings, window[2].halvings, tables.beta));
+    for (std::size_t i = 0; i < sizes.size(); ++i) raise->set(2 + static_cast<int>(i), sizes[i]);
+    const auto& blurred = judging->blurred;
+    passes.draw(*raise, judging->powers[level], texels_of(bands[level].size),
+                {blurred[0].texture(), blurred[1].texture(), blurred[2].texture()});
+}
+
+// The shader reads all its textures, also those that it does not count.
+void VisibilityPasses::Impl::pool(PlanePasses& passes, const Program& program, const std::vector<GpuPlanes>& from,
+                                  const GpuPlanes& packed, const GpuPlanes& to) {
+    for (std::size_t i = 0; i < (from.size() <= few_bands ? few_bands : most_bands); ++i)
+        passes.bind(static_cast<unsigned>(i), from[std::min(i, from.size() - 1)].texture());
+    program.set(0, size);
+    program.set(1, static_cast<unsigned>(from.size()));
+    passes.draw(program, packed, texels_of(size), {});
+    passes.draw(*unpack, to, size, {packed.texture()});
+}
+
+Result<void> VisibilityPasses::Impl::judge(const LuminanceTexture& test) {
+    if (auto ok = check_texture(test); !ok) return ok;
+    if (test.width != size.x || test.height != size.y)
+        return judge_error("the images differ in size: reference " + size_text(size.x, size.y) + ", test " +
+                           size_text(test.width, test.height));
+    if (auto ok = prepare_judging(); !ok) return ok;
+    const auto& j = *judging;
+    const float most = is_half ? std::min(tables.most_thresholds, std::sqrt(largest_half / (2 * half_energy_scale)))
+                               : tables.most_thresholds;
+    PlanePasses passes;
+    examine(*look, passes, test, j.found_in_test);
+    subtract->set(0, size);
+    subtract->set(1, static_cast<unsigned>(test.channel));
+    subtract->set(2, glm::vec4(test.scale, test.offset, 0, 0));
+    passes.draw(*subtract, j.differences[0], texels_of(size), {test.id, reference.texture()});
+    unsigned difference = j.differences[0].texture();
+    for (std::size_t level = 0; level < bands.size(); ++level) {
+        const Band& band = bands[level];
+        unsigned here = difference;
+        if (level + 1 < bands.size()) {
+            const GpuPlanes& next = j.differences[level % 2 == 0 ? 1 : 2];
+            reduce(passes, difference, band.size, j.reduced, next);
+            split_difference->set(0, halved(band.size));
+            split_difference->set(1, taps(tables));
+            passes.draw(*split_difference, j.band, texels_of(band.size), {difference, next.texture()});
+            here = j.band.texture();
+            difference = next.texture();
+        }
+        square->set(0, band.size);
+        square->set(1, glm::vec4(1 / band.scale, most, energy_scale(), 0));
+        passes.draw(*square, j.energies[0], texels_of(band.size),
+                    {here, band.weights.texture(0), band.weights.texture(1)});
+        add_energies(passes, level);
+    }
+    pool_powers->set(2, tables.beta);
+    pool(passes, *pool_powers, j.powers, j.differences[0], j.visibility); // the difference is needed no more
+    examine(*look, passes, {.id = j.visibility.texture(), .width = size.x, .height = size.y}, j.found_visible);
+    return {};
+}
+
+Result<void> VisibilityPasses::Impl::map_thresholds() {
+    if (thresholds) return {};
+    if (auto ok = find_programs(Sight::thresholds); !ok) return ok;
+    auto made = GpuPlanes::create(size, 1, PlaneFormat::single, "thresholds");
+    if (!made) return made.error();
+    std::vector<GpuPlanes> steps;
+    PlanePasses passes;
+    auto done = for_each_reference_band(passes, [&](std::size_t level, const GpuPlanes& of_reference) -> Result<void> {
+        auto here = GpuPlanes::create(bands[level].size, 1, PlaneFormat::full, "thresholds of a band");
+        if (!here) return here.error();
+        see(passes, level, of_reference, Sight::thresholds, *here);
+        steps.push_back(std::move(*here));
+        return {};
+    });
+    if (!done) return done;
+    const auto packed = GpuPlanes::create(size, 1, PlaneFormat::full, "thresholds");
+    if (!packed) return packed.error();
+    pool(passes, *pool_thresholds, steps, *packed, *made);
+    thresholds = std::move(*made);
+    return {};
+}
+
+VisibilityPasses::VisibilityPasses(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+VisibilityPasses::VisibilityPasses(VisibilityPasses&&) noexcept = default;
+VisibilityPasses& VisibilityPasses::operator=(VisibilityPasses&&) noexcept = default;
+VisibilityPasses::~VisibilityPasses() = default;
+
+Result<VisibilityPasses> VisibilityPasses::create(const Context& context, const VisibilityTables& tables,
+                                                  const LuminanceTexture& reference, VisibilityPrecision precision) {
+    auto impl = std::make_unique<Impl>(context, tables, precision);
+    auto made = in_context(context, "Preparing a judge's reference", [&] { return impl->prepare(reference); });
+    if (!made) return made.error();
+    return VisibilityPasses(std::move(impl));
+}
+
+Result<void> VisibilityPasses::judge(const LuminanceTexture& test) {
+    impl_->is_judged = false; // whatever fails
+    auto judged = in_context(impl_->context, "Judging", [&] { return impl_->judge(test); });
+    impl_->is_judged = static_cast<bool>(judged);
+    return judged;
+}
+
+Result<VisibilitySummary> VisibilityPasses::summary() const {
+    if (!impl_->is_judged) return judge_error("no picture was judged yet");
+    VisibilitySummary summary;
+    auto done = in_context(impl_->context, "Reading a judgement", [&]() -> Result<void> {
+        if (auto ok = check(read(impl_->judging->found_in_test), impl_->size.x, "test"); !ok) return ok;
+        const Found found = read(impl_->judging->found_visible);
+        summary = {static_cast<double>(std::bit_cast<float>(found.largest)), found.not_below_1};
+        return {};
+    });
+    if (!done) return done.error();
+    return summary;
+}
+
+Result<std::vector<float>> VisibilityPasses::read_visibility() const {
+    if (auto ok = summary(); !ok) return ok.error();
+    std::vector<float> values;
+    auto done = in_context(impl_->context, "Reading a judgement", [&]() -> Result<void> {
+        values = read_floats(impl_->judging->visibility.texture(), impl_->size);
+        return {};
+    });
+    if (!done) return done.error();
+    return values;
+}
+
+unsigned VisibilityPasses::visibility_texture() const noexcept {
+    return impl_->is_judged ? impl_->judging->visibility.texture() : 0;
+}
+
+Result<void> VisibilityPasses::map_thresholds() {
+    return in_context(impl_->context, "Mapping thresholds", [&] { return impl_->map_thresholds(); });
+}
+
+Result<std::vector<float>> VisibilityPasses::read_thresholds() const {
+    if (!impl_->thresholds) return judge_error("there is no map of thresholds yet");
+    std::vector<float> values;
+    auto done = in_context(impl_->context, "Reading thresholds", [&]() -> Result<void> {
+        values = read_floats(impl_->thresholds.texture(), impl_->size);
+        return {};
+    });
+    if (!done) return done.error();
+    return values;
+}
+
+unsigned VisibilityPasses::thresholds_texture() const noexcept {
+    return impl_->thresholds ? impl_->thresholds.texture() : 0;
+}
+
+} // namespace unseen::render

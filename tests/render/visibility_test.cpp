@@ -1,0 +1,189 @@
+// The judge's passes by themselves: what they refuse, and what they make only when it is called for. Whether they judge
+// right: tests/apps/gpu_judge_test.cpp.
+#include "gl_test.h"
+
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+#define GL_GLEXT_PROTOTYPES 1
+#include <GL/glcorearb.h>
+#include <gmock/gmock.h>
+
+#include <render/target.h>
+#include <render/visibility.h>
+
+#include "gpu_plane.h"
+
+namespace {
+
+using namespace unseen::render;
+using ::testing::Each;
+using ::testing::FloatNear;
+using ::testing::HasSubstr;
+using VisibilityTest = unseen::render::testing::GlTest;
+
+// One band, one pixel's window, S = 8 everywhere: V = sqrt 2 times the difference in thresholds.
+VisibilityTables tables(int width, int height) {
+    VisibilityTables t;
+    t.width = width, t.height = height;
+    t.floor_cdm2 = 0.5f;
+    t.beta = 2, t.most_thresholds = 1e8f;
+    t.kernel = {0.4f, 0.25f, 0.05f};
+    t.masking_power = 2.8f, t.masking_knee = 4, t.least_masker = 1e-20f, t.most_masker = 1e10f;
+    t.luminance_shift = 19, t.first_luminance = 0;
+    t.luminances = 2, t.eccentricities = 1;
+    t.eccentricity_step = 2;
+    VisibilityTables::Band band;
+    band.window = {{{0.5f, 0, {1}}, {0.25f, 0, {1}}, {0.25f, 0, {1}}}};
+    band.nodes = {{3, 1, 0}, {3, 1, 0}};
+    t.bands = {band};
+    return t;
+}
+
+LuminanceImage picture(const Context& context, int width, int height, float cdm2) {
+    const std::vector<float> values(static_cast<std::size_t>(width * height), cdm2);
+    auto made = LuminanceImage::create(context, width, height, values);
+    EXPECT_TRUE(made) << made.error().message;
+    return std::move(*made);
+}
+
+TEST_F(VisibilityTest, CountsInThresholds) {
+    const auto reference = picture(context(), 6, 3, 10), test = picture(context(), 6, 3, 11);
+    auto passes = VisibilityPasses::create(context(), tables(6, 3), reference.texture());
+    ASSERT_TRUE(passes) << passes.error().message;
+    ASSERT_TRUE(passes->judge(test.texture()));
+    const float v = std::sqrt(2.f) * 0.8f; // a contrast of 0.1, seen 8 times
+    const auto read = passes->read_visibility();
+    ASSERT_TRUE(read) << read.error().message;
+    EXPECT_THAT(*read, Each(FloatNear(v, 1e-5f)));
+    const auto summary = passes->summary();
+    ASSERT_TRUE(summary);
+    EXPECT_NEAR(summary->largest, v, 1e-5);
+    EXPECT_EQ(summary->visible_pixels, 18u);
+    ASSERT_TRUE(passes->map_thresholds());
+    EXPECT_THAT(*passes->read_thresholds(), Each(FloatNear(10.f / 8, 1e-5f)));
+    // Below one threshold nothing counts.
+    ASSERT_TRUE(passes->judge(picture(context(), 6, 3, 10.5f).texture()));
+    EXPECT_EQ(passes->summary()->visible_pixels, 0u);
+}
+
+TEST_F(VisibilityTest, MakesOnlyWhatIsCalledFor) {
+    const auto reference = picture(context(), 6, 3, 10);
+    auto passes = VisibilityPasses::create(context(), tables(6, 3), reference.texture());
+    ASSERT_TRUE(passes);
+    EXPECT_EQ(passes->visibility_texture(), 0u);
+    EXPECT_EQ(passes->thresholds_texture(), 0u);
+    EXPECT_FALSE(passes->summary());
+    EXPECT_FALSE(passes->read_visibility());
+    EXPECT_FALSE(passes->read_thresholds());
+    ASSERT_TRUE(passes->judge(reference.texture()));
+    EXPECT_NE(passes->visibility_texture(), 0u);
+    EXPECT_EQ(passes->thresholds_texture(), 0u);
+    ASSERT_TRUE(passes->map_thresholds());
+    EXPECT_NE(passes->thresholds_texture(), 0u);
+}
+
+TEST_F(VisibilityTest, RefusesTablesThatAreNone) {
+    const auto reference = picture(context(), 4, 4, 10);
+    const std::function<void(VisibilityTables&)> breaks[] = {
+        [](auto& t) { t.bands.clear(); },
+        [](auto& t) { t.bands.resize(17, t.bands[0]); },
+        [](auto& t) { t.bands[0].nodes.pop_back(); },
+        [](auto& t) { t.bands[0].window[1].kernel.clear(); },
+        [](auto& t) { t.bands[0].window[1].kernel.resize(13); },
+        [](auto& t) { t.bands[0].window[2].halvings = 1; },
+        [](auto& t) { t.bands[0].window[0].halvings = 31; },
+        [](auto& t) { t.luminances = 1; },
+        [](auto& t) { t.eccentricities = 2, t.bands[0].nodes.resize(4); },
+        [](auto& t) { t.floor_cdm2 = 0; },
+        [](auto& t) { t.beta = std::nanf(""); },
+        [](auto& t) { t.luminance_shift = 24; },
+        [](auto& t) { t.width = 5; },
+        [](auto& t) { t.height = 0; },
+    };
+    for (const auto& spoil : breaks) {
+        VisibilityTables t = tables(4, 4);
+        spoil(t);
+        const auto made = VisibilityPasses::create(context(), t, reference.texture());
+        ASSERT_FALSE(made) << &spoil - breaks;
+        EXPECT_THAT(made.error().message, HasSubstr("judge: "));
+    }
+}
+
+TEST_F(VisibilityTest, RefusesTexturesThatAreNoPictures) {
+    const auto reference = picture(context(), 4, 4, 10);
+    auto passes = VisibilityPasses::create(context(), tables(4, 4), reference.texture());
+    ASSERT_TRUE(passes);
+    const auto refused = [&](const LuminanceTexture& t, const char* why) {
+        const auto judged = passes->judge(t);
+        ASSERT_FALSE(judged) << why;
+        EXPECT_THAT(judged.error().message, HasSubstr(why));
+        EXPECT_FALSE(passes->summary()) << "of the picture before";
+        EXPECT_FALSE(luminance_extent(context(), t, "test")) << why;
+    };
+    auto texture = reference.texture();
+    refused({.id = 12345, .width = 4, .height = 4}, "no texture");
+    texture.width = 5;
+    refused(texture, "4x4");
+    texture = reference.texture(), texture.channel = 4;
+    refused(texture, "channel");
+    texture = reference.texture(), texture.scale = std::nanf("");
+    refused(texture, "finite");
+    GLuint others[3] = {};
+    glCreateTextures(GL_TEXTURE_2D, 1, &others[0]);
+    glTextureStorage2D(others[0], 1, GL_R32UI, 4, 4);
+    refused({.id = others[0], .width = 4, .height = 4}, "floats");
+    glCreateTextures(GL_TEXTURE_3D, 1, &others[1]);
+    glTextureStorage3D(others[1], 1, GL_R32F, 4, 4, 4);
+    refused({.id = others[1], .width = 4, .height = 4}, "two dimensions");
+    glCreateTextures(GL_TEXTURE_2D, 1, &others[2]); // of no size
+    refused({.id = others[2], .width = 4, .height = 4}, "0x0");
+    glDeleteTextures(3, others);
+    EXPECT_FALSE(LuminanceImage::create(context(), 4, 4, std::vector<float>(15, 1.f)));
+    EXPECT_FALSE(LuminanceImage::create(context(), 0, 4, {}));
+    ASSERT_TRUE(passes->judge(reference.texture()));
+    EXPECT_EQ(passes->summary()->largest, 0);
+}
+
+// Such as lack levels below their first, which an application's own may.
+TEST_F(VisibilityTest, ReadsTexturesWithoutMipLevels) {
+    GLuint id = 0;
+    glGenTextures(1, &id);
+    glBindTexture(GL_TEXTURE_2D, id);
+    const std::vector<float> values(16 * 4, 7);
+    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGBA32F, 4, 4, 0, GL_RGBA, GL_FLOAT, values.data());
+    const auto extent = luminance_extent(context(), {.id = id, .width = 4, .height = 4, .channel = 3}, "test");
+    ASSERT_TRUE(extent) << extent.error().message;
+    EXPECT_EQ(extent->least, 7);
+    EXPECT_EQ(extent->largest, 7);
+    glBindTexture(GL_TEXTURE_2D, 0);
+    glDeleteTextures(1, &id);
+}
+
+TEST_F(VisibilityTest, FindsTheExtentOfAPicture) {
+    std::vector<float> values(100 * 70, 3);
+    values[17] = -0.f, values[6999] = 1e5f;
+    auto image = LuminanceImage::create(context(), 100, 70, values);
+    ASSERT_TRUE(image);
+    const auto extent = luminance_extent(context(), image->texture(), "reference");
+    ASSERT_TRUE(extent) << extent.error().message;
+    EXPECT_EQ(extent->least, 0);
+    EXPECT_EQ(extent->largest, 1e5f);
+    values[201] = -1;
+    ASSERT_TRUE(image->set(values));
+    const auto bad = luminance_extent(context(), image->texture(), "reference");
+    ASSERT_FALSE(bad);
+    EXPECT_THAT(bad.error().message, HasSubstr("luminance of the reference at pixel (1, 2)"));
+    EXPECT_FALSE(image->set(std::vector<float>(3, 1.f)));
+}
+
+TEST_F(VisibilityTest, RefusesPlanesThatCannotBeDrawnTo) {
+    const auto made = GpuPlanes::create({4, largest_target_side() + 1}, 1, PlaneFormat::full, "too high");
+    ASSERT_FALSE(made);
+    EXPECT_THAT(made.error().message, HasSubstr("memory does not suffice"));
+    EXPECT_NE(context().take_errors(), ""); // GL says so, too
+}
+
+} // namespace

@@ -1,0 +1,142 @@
+#include "gltf_nodes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace unseen::meshio::gltf {
+namespace {
+
+constexpr std::size_t max_node_depth = 512; // deeper trees are found in attacks, not in scenes
+
+glm::dmat4 rotation_matrix(const std::vector<double>& q, const std::string& where) {
+    const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    if (!(length > 0.0) || !std::isfinite(length)) fail(where + " has a rotation of length 0 or infinity; correct it.");
+    const double x = q[0] / length, y = q[1] / length, z = q[2] / length, w = q[3] / length;
+    glm::dmat4 m(1.0);
+    m[0] = {1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w), 0};
+    m[1] = {2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w), 0};
+    m[2] = {2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y), 0};
+    return m;
+}
+
+glm::dmat4 local_matrix(const tinygltf::Node& node, const std::string& where) {
+    glm::dmat4 m(1.0);
+    if (node.matrix.size() == 16) {
+        for (int i = 0; i < 16; ++i) m[i / 4][i % 4] = node.matrix[static_cast<std::size_t>(i)];
+        return m;
+    }
+    if (node.rotation.size() == 4) m = rotation_matrix(node.rotation, where);
+    if (node.scale.size() == 3) {
+        for (int i = 0; i < 3; ++i) m[i] *= node.scale[static_cast<std::size_t>(i)];
+    }
+    if (node.translation.size() == 3) {
+        m[3] = {node.translation[0], node.translation[1], node.translation[2], 1.0};
+    }
+    return m;
+}
+
+std::vector<int> root_nodes(const tinygltf::Model& model) {
+    if (!model.scenes.empty()) {
+        const auto scene = static_cast<std::size_t>(std::max(model.defaultScene, 0));
+        if (scene >= model.scenes.size()) {
+            fail("scene " + std::to_string(scene) + " is to be shown, but there are " +
+                 std::to_string(model.scenes.size()) + "; correct the JSON.");
+        }
+        return model.scenes[scene].nodes;
+    }
+    std::vector<bool> is_child(model.nodes.size());
+    for (const tinygltf::Node& node : model.nodes) {
+        for (const int child : node.children) {
+            if (static_cast<std::size_t>(child) < is_child.size()) is_child[static_cast<std::size_t>(child)] = true;
+        }
+    }
+    std::vector<int> roots;
+    for (std::size_t i = 0; i < is_child.size(); ++i) {
+        if (!is_child[i]) roots.push_back(static_cast<int>(i));
+    }
+    if (roots.empty() && !model.nodes.empty())
+        fail("its nodes have no root: each is the child of another; correct the JSON.");
+    return roots;
+}
+
+class Walk {
+public:
+    Walk(const MeshSource& source, const tinygltf::Model& model)
+        : source_(source), model_(model), reached_(model.nodes.size()) {}
+
+    std::optional<std::vector<ShownNode>> run() {
+        for (const int root : root_nodes(model_))
+            if (!visit_tree(root)) return std::nullopt;
+        return std::move(shown_);
+    }
+
+private:
+    struct Visit {
+        std::size_t node, depth, parent; // the parent in the list
+    };
+
+    bool visit_tree(int root) {
+        std::vector<Visit> stack;
+        push(stack, root, 0, no_parent);
+        while (!stack.empty()) {
+            const Visit visit = stack.back();
+            stack.pop_back();
+            if (!source_.keep_going(source_.bytes.size() / 2, "reading glTF")) return false;
+            const tinygltf::Node& node = model_.nodes[visit.node];
+            const glm::dmat4 local = local_matrix(node, numbered("node", visit.node));
+            const std::size_t number = shown_.size();
+            shown_.push_back(
+                {visit.node, visit.parent, visit.parent == no_parent ? local : shown_[visit.parent].to_world * local});
+            // Reversed, so that children come off the stack in their order.
+            for (auto child = node.children.rbegin(); child != node.children.rend(); ++child)
+                push(stack, *child, visit.depth + 1, number);
+        }
+        return true;
+    }
+
+    void push(std::vector<Visit>& stack, int node, std::size_t depth, std::size_t parent) {
+        const auto index = static_cast<std::size_t>(node);
+        const std::string where = numbered("node", index);
+        if (index >= model_.nodes.size()) {
+            fail(where + " is used, but there are " + std::to_string(model_.nodes.size()) + "; correct the JSON.");
+        }
+        // A second visit means a cycle or two parents; glTF allows neither.
+        if (reached_[index]) fail(where + " is reached twice, but the nodes must form trees; correct the JSON.");
+        reached_[index] = true;
+        if (depth > max_node_depth) fail(where + " is nested too deeply; flatten the scene.");
+        stack.push_back({index, depth, parent});
+    }
+
+    const MeshSource& source_;
+    const tinygltf::Model& model_;
+    std::vector<bool> reached_;
+    std::vector<ShownNode> shown_;
+};
+
+} // namespace
+
+std::optional<std::vector<ShownNode>> shown_nodes(const MeshSource& source, const tinygltf::Model& model) {
+    if (model.nodes.empty()) return std::vector<ShownNode>(); // its meshes are shown as they are
+    return Walk(source, model).run();
+}
+
+std::optional<std::size_t> mesh_of(const tinygltf::Model& model, std::size_t node) {
+    const int mesh = model.nodes[node].mesh;
+    if (mesh < 0) return std::nullopt;
+    if (static_cast<std::size_t>(mesh) >= model.meshes.size()) {
+        fail(numbered("node", node) + " uses mesh " + std::to_string(mesh) + ", but there are " +
+             std::to_string(model.meshes.size()) + "; correct the JSON.");
+    }
+    return static_cast<std::size_t>(mesh);
+}
+
+std::uint64_t hidden_meshes(const tinygltf::Model& model, const std::vector<ShownNode>& shown) {
+    const auto has_mesh = [](const tinygltf::Node& node) { return node.mesh >= 0; };
+    const auto all = std::count_if(model.nodes.begin(), model.nodes.end(), has_mesh);
+    const auto seen =
+        std::count_if(shown.begin(), shown.end(), [&](const ShownNode& n) { return has_mesh(model.nodes[n.node]); });
+    return static_cast<std::uint64_t>(all - seen);
+}
+
+} // namespace unseen::meshio::gltf

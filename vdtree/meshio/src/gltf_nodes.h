@@ -1,0 +1,34 @@
+// The nodes of a glTF scene, with their places in the world.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <glm/mat4x4.hpp>
+
+#include "gltf_document.h"
+#include "mesh_readers.h"
+
+namespace unseen::meshio::gltf {
+
+inline constexpr std::size_t no_parent = ~std::size_t{0};
+
+struct ShownNode {
+    std::size_t node = 0;           // of the document
+    std::size_t parent = no_parent; // of the list; comes before
+    glm::dmat4 to_world = glm::dmat4(1);
+};
+
+// Those of the scene that is shown, parents before their children, each once; nothing where the caller cancelled.
+// Fails on cycles, nodes that are not there, and transforms that are none.
+std::optional<std::vector<ShownNode>> shown_nodes(const MeshSource& source, const tinygltf::Model& model);
+
+// The mesh of a node; fails where there is no such mesh.
+std::optional<std::size_t> mesh_of(const tinygltf::Model& model, std::size_t node);
+
+// Nodes with a mesh that are not shown.
+std::uint64_t hidden_meshes(const tinygltf::Model& model, const std::vector<ShownNode>& shown);
+
+} // namespace unseen::meshio::gltf

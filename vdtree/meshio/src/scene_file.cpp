@@ -1,0 +1,373 @@
+#include <meshio/scene_file.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <map>
+#include <new>
+#include <numbers>
+#include <set>
+#include <stdexcept>
+
+#include <glm/geometric.hpp>
+
+#include <vdtree/colour.h>
+
+#include "file_output.h"
+#include "gltf_data.h"
+#include "gltf_document.h"
+#include "gltf_meshes.h"
+#include "gltf_nodes.h"
+#include "gltf_subset.h"
+#include "mesh_readers.h"
+
+namespace unseen::meshio {
+
+namespace fs = std::filesystem;
+using gltf::fail;
+using gltf::json;
+using gltf::member;
+using gltf::numbered;
+
+namespace {
+
+constexpr double usual_outer_radians = std::numbers::pi / 4; // as the extension has it
+constexpr double brightest = 1e12;                           // lux or candela: beyond is a mistake
+constexpr const char* lights_extension = "KHR_lights_punctual";
+
+bool is_finite(const glm::dmat4& m) {
+    for (int c = 0; c < 4; ++c)
+        for (int r = 0; r < 4; ++r)
+            if (!std::isfinite(m[c][r])) return false;
+    return true;
+}
+
+const json* object_at(const json* in, const char* key) {
+    const json* value = in != nullptr && in->is_object() ? member(*in, key) : nullptr;
+    return value != nullptr && value->is_object() ? value : nullptr;
+}
+
+std::string name_in(const json& object) {
+    const json* name = member(object, "name");
+    return name != nullptr && name->is_string() ? name->get<std::string>() : std::string();
+}
+
+bool is_background_name(const std::string& name) {
+    constexpr std::string_view mark = "background";
+    if (name.size() < mark.size()) return false;
+    for (std::size_t i = 0; i < mark.size(); ++i)
+        if (std::tolower(static_cast<unsigned char>(name[i])) != mark[i]) return false;
+    return name.size() == mark.size() || !std::isalpha(static_cast<unsigned char>(name[mark.size()]));
+}
+
+// True, false, or nothing is said.
+bool is_marked(const json& node, const std::string& where) {
+    const json* mark = object_at(object_at(&node, "extras"), "unseen");
+    const json* value = mark != nullptr ? member(*mark, "background") : nullptr;
+    if (value == nullptr) return false;
+    if (!value->is_boolean()) fail(where + ": extras.unseen.background should be true or false; correct it.");
+    return value->get<bool>();
+}
+
+double number_in(const json& object, const char* key, double missing, double low, double high,
+                 const std::string& where) {
+    const json* value = member(object, key);
+    if (value == nullptr) return missing;
+    const double number = value->is_number() ? value->get<double>() : std::nan("");
+    if (!(number >= low && number <= high))
+        fail(where + ": its " + key + " is no number in the range that it may have; correct it.");
+    return number;
+}
+
+glm::dvec3 unit(glm::dvec3 v, const std::string& where) {
+    const double largest = std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)});
+    if (!(largest > 0) || !std::isfinite(largest)) fail(where + ": its transform leaves it no direction; correct it.");
+    return glm::normalize(v / largest);
+}
+
+// Reads what nodes refer to.
+class Contents {
+public:
+    Contents(const MeshSource& source, const json& document, const tinygltf::Model& model)
+        : source_(source), document_(document), model_(model) {}
+
+    // Nothing where the caller cancelled.
+    std::optional<SceneContents> read() {
+        const auto shown = gltf::shown_nodes(source_, model_);
+        if (!shown) return std::nullopt;
+        std::vector<bool> is_background(shown->size());
+        std::map<std::int32_t, int> uses;
+        for (std::size_t i = 0; i < shown->size(); ++i) {
+            const gltf::ShownNode& placed = (*shown)[i];
+            const json& node = gltf::array_of(document_, "nodes")[placed.node];
+            const std::string where = quoted(numbered("node", placed.node), name_in(node));
+            is_background[i] = (placed.parent != gltf::no_parent && is_background[placed.parent]) ||
+                               is_background_name(name_in(node)) || is_marked(node, where);
+            contents_.is_scene = contents_.is_scene || is_background[i];
+            const auto mesh = gltf::mesh_of(model_, placed.node);
+            if ((mesh || has_camera(node) || light_of(node)) && !is_finite(placed.to_world))
+                fail(where + ": its transform, with those above it, is NaN or infinite; correct it.");
+            if (mesh) {
+                add(placed, *mesh, name_in(node), is_background[i]);
+                contents_.is_scene = contents_.is_scene || ++uses[static_cast<std::int32_t>(*mesh)] > 1;
+            }
+            add_light(node, placed.to_world, where);
+            add_camera(node, placed.to_world, where);
+        }
+        if (model_.nodes.empty())
+            for (std::size_t i = 0; i < model_.meshes.size(); ++i)
+                contents_.nodes.push_back({model_.meshes[i].name.empty() ? numbered("mesh", i) : model_.meshes[i].name,
+                                           -1, static_cast<std::int32_t>(i), glm::dmat4(1), false});
+        if (const std::uint64_t hidden = gltf::hidden_meshes(model_, *shown); hidden > 0)
+            contents_.warnings.push_back(counted_were(hidden, "node") +
+                                         " not in the scene that is shown and left out.");
+        contents_.is_scene = contents_.is_scene || contents_.camera || !contents_.lights.empty();
+        read_light_settings();
+        tell();
+        return std::move(contents_);
+    }
+
+private:
+    static std::string quoted(const std::string& number, const std::string& name) {
+        return name.empty() ? number : number + " " + in_quotes(name);
+    }
+
+    void add(const gltf::ShownNode& placed, std::size_t mesh, std::string name, bool is_background) {
+        if (name.empty()) name = model_.meshes[mesh].name;
+        if (name.empty()) name = numbered("node", placed.node);
+        contents_.nodes.push_back({std::move(name), static_cast<std::int32_t>(placed.node),
+                                   static_cast<std::int32_t>(mesh), placed.to_world, is_background});
+    }
+
+    static const json* light_of(const json& node) {
+        const json* extension = object_at(object_at(&node, "extensions"), lights_extension);
+        return extension != nullptr ? member(*extension, "light") : nullptr;
+    }
+    static bool has_camera(const json& node) { return member(node, "camera") != nullptr; }
+
+    // The element of an array that a node names.
+    const json& element(const json& array, const json& index, const char* what, const std::string& where) const {
+        const auto i = static_cast<std::size_t>(gltf::to_integer_in_range(index, gltf::max_int, where + ": " + what));
+        if (i >= array.size() || !array[i].is_object())
+            fail(where + " uses " + numbered(what, i) + ", but there are " + std::to_string(array.size()) +
+                 "; correct the JSON.");
+        return array[i];
+    }
+
+    void add_light(const json& node, const glm::dmat4& to_world, const std::string& of_node) {
+        const json* index = light_of(node);
+        if (index == nullptr) return;
+        const json* extension = object_at(object_at(&document_, "extensions"), lights_extension);
+        static const json none = json::array();
+        const json& light =
+            element(extension != nullptr ? gltf::array_of(*extension, "lights") : none, *index, "light", of_node);
+        const std::string where = of_node + ": its light";
+        SceneLight read;
+        read.name = name_in(light);
+        const json* type = member(light, "type");
+        const std::string kind = type != nullptr && type->is_string() ? type->get<std::string>() : std::string();
+        if (kind == "point") read.kind = SceneLight::Kind::point;
+        else if (kind == "spot") read.kind = SceneLight::Kind::spot;
+        else if (kind != "directional") fail(where + " is neither directional, point nor spot; correct its type.");
+        read.intensity = number_in(light, "intensity", 1, 0, brightest, where);
+        if (const json* colour = member(light, "color")) {
+            bool is_valid = colour->is_array() && colour->size() == 3;
+            glm::vec3 rgb(1);
+            for (std::size_t i = 0; is_valid && i < 3; ++i) {
+                is_valid = (*colour)[i].is_number() && (*colour)[i].get<double>() >= 0 &&
+                           (*colour)[i].get<double>() <= brightest;
+                if (is_valid) rgb[static_cast<int>(i)] = (*colour)[i].get<float>();
+            }
+            if (!is_valid) fail(where + ": its color should be 3 numbers from 0 on; correct it.");
+            has_coloured_ = has_coloured_ || rgb.r != rgb.g || rgb.g != rgb.b;
+            read.intensity *= static_cast<double>(rec709_luminance(rgb));
+        }
+        has_range_ = has_range_ || member(light, "range") != nullptr;
+        read.position = glm::dvec3(to_world[3]);
+        if (read.kind != SceneLight::Kind::point) read.direction = unit(-glm::dvec3(to_world[2]), where);
+        if (read.kind == SceneLight::Kind::spot) {
+            const json* spot = object_at(&light, "spot");
+            static const json usual = json::object();
+            constexpr double right_angle = std::numbers::pi / 2 + 1e-6; // rounded up from single floats
+            read.inner_radians = number_in(spot ? *spot : usual, "innerConeAngle", 0, 0, right_angle, where);
+            read.outer_radians =
+                number_in(spot ? *spot : usual, "outerConeAngle", usual_outer_radians, 0, right_angle, where);
+            read.outer_radians = std::min(read.outer_radians, std::numbers::pi / 2);
+            if (!(read.inner_radians < read.outer_radians))
+                fail(where + ": its innerConeAngle should be less than its outerConeAngle; correct it.");
+        }
+        contents_.lights.push_back(std::move(read));
+    }
+
+    void add_camera(const json& node, const glm::dmat4& to_world, const std::string& of_node) {
+        const json* index = member(node, "camera");
+        if (index == nullptr) return;
+        const json& camera = element(gltf::array_of(document_, "cameras"), *index, "camera", of_node);
+        const std::string where = of_node + ": its camera";
+        const json* type = member(camera, "type");
+        if (type != nullptr && *type == "orthographic") {
+            ++orthographic_;
+            return;
+        }
+        const json* perspective = object_at(&camera, "perspective");
+        if (perspective == nullptr || member(*perspective, "yfov") == nullptr)
+            fail(where + " has no perspective with a yfov; correct it.");
+        constexpr double least = 1e-5, most = std::numbers::pi - 1e-3; // radians
+        SceneCamera read;
+        read.name = name_in(camera).empty() ? name_in(node) : name_in(camera);
+        read.fov_y_degrees = number_in(*perspective, "yfov", 1, least, most, where) * (180 / std::numbers::pi);
+        read.eye = glm::dvec3(to_world[3]);
+        read.forward = unit(-glm::dvec3(to_world[2]), where);
+        const glm::dvec3 up = unit(glm::dvec3(to_world[1]), where);
+        constexpr double least_sine = 1e-6;
+        if (!(glm::length(glm::cross(read.forward, up)) > least_sine))
+            fail(where + ": its transform is flat, so that up is along its sight; correct it.");
+        read.up = up;
+        contents_.is_scene = true;
+        if (contents_.camera) ++further_cameras_;
+        else contents_.camera = std::move(read);
+    }
+
+    void read_light_settings() {
+        const json* unseen = object_at(object_at(&document_, "extras"), "unseen");
+        if (unseen == nullptr) return;
+        constexpr double largest = 1e12;
+        const std::string where = "extras.unseen";
+        if (member(*unseen, "exposure") != nullptr)
+            contents_.exposure = number_in(*unseen, "exposure", 1, 1 / largest, largest, where);
+        if (member(*unseen, "ambient") != nullptr) contents_.ambient = number_in(*unseen, "ambient", 0, 0, 1, where);
+    }
+
+    void tell() {
+        if (has_coloured_) contents_.notes.push_back("of coloured lights the luminance counts alone.");
+        if (has_range_) contents_.notes.push_back("ranges of lights are not looked at: light falls off for ever.");
+        if (further_cameras_ > 0)
+            contents_.notes.push_back("the first of its " + std::to_string(further_cameras_ + 1) +
+                                      " perspective cameras is taken.");
+        if (orthographic_ > 0)
+            contents_.notes.push_back("orthographic cameras are not looked through: pictures are in perspective.");
+        std::set<std::string> extensions;
+        for (const json& name : gltf::array_of(document_, "extensionsUsed"))
+            if (name.is_string() && name.get_ref<const std::string&>().starts_with("KHR_materials_"))
+                extensions.insert(name.get<std::string>());
+        std::string list;
+        for (const std::string& name : extensions) list += (list.empty() ? "" : ", ") + name;
+        if (!list.empty())
+            contents_.notes.push_back("surfaces are drawn matt: " + list + (extensions.size() == 1 ? " is" : " are") +
+                                      " kept, and not looked at.");
+    }
+
+    const MeshSource& source_;
+    const json& document_;
+    const tinygltf::Model& model_;
+    SceneContents contents_;
+    bool has_coloured_ = false, has_range_ = false;
+    int further_cameras_ = 0, orthographic_ = 0;
+};
+
+Error out_of_memory(const std::string& name) {
+    return {ErrorCode::unsupported, name + ": reading it needs more memory than there is; give a smaller file."};
+}
+
+// Runs what may find a broken rule.
+template <class Value, class Do>
+Result<Value> guarded(const MeshSource& source, Do&& run) {
+    try {
+        return run();
+    } catch (const gltf::Broken& broken) {
+        return malformed(source, broken.what);
+    } catch (const json::exception& error) {
+        return malformed(source, std::string("its JSON cannot be used: ") + error.what() + ".");
+    } catch (const std::bad_alloc&) {
+        return out_of_memory(source.name);
+    } catch (const std::length_error&) {
+        return out_of_memory(source.name);
+    }
+}
+
+} // namespace
+
+// In the order in which they refer to each other.
+struct SceneFile::Impl {
+    std::string bytes;
+    ReadOptions options;
+    MeshSource source;
+    json document, kept; // whole, and without geometry
+    gltf::Reduced reduced;
+    std::optional<gltf::Buffers> buffers;
+    std::optional<gltf::Meshes> meshes;
+    SceneContents contents;
+
+    Impl(std::string bytes_, const fs::path& name, const ReadOptions& options_, const fs::path& folder)
+        : bytes(std::move(bytes_)), options(options_), source{bytes, name.string(), folder, options} {}
+
+    Result<void> read() {
+        gltf::Container container{source.bytes, std::nullopt};
+        if (source.bytes.starts_with("glTF")) container = gltf::split_glb(source.bytes);
+        document = gltf::parse_json(container.json_text);
+        if (!source.keep_going(source.bytes.size() / 4, "reading glTF")) return cancelled(source);
+        std::vector<std::string> warnings;
+        reduced = gltf::reduce(document);
+        gltf::check_kept(document, options.drop, warnings);
+        if (reduced.has_tangents)
+            warnings.push_back("tangents were left out; they follow from normals and coordinates.");
+        if (reduced.has_other_attributes) warnings.push_back("vertex attributes that are not known were left out.");
+        buffers.emplace(source, document, container.bin);
+        auto read = Contents(source, document, reduced.model).read();
+        if (!read) return cancelled(source);
+        contents = std::move(*read);
+        meshes.emplace(source, document, reduced.model, *buffers);
+        contents.source.files = meshes->files(warnings);
+        kept = gltf::without_geometry(document, warnings);
+        contents.source.json = kept.dump(-1, ' ', false, json::error_handler_t::replace);
+        contents.warnings.insert(contents.warnings.end(), warnings.begin(), warnings.end());
+        return {};
+    }
+};
+
+SceneFile::SceneFile(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+SceneFile::SceneFile(SceneFile&&) noexcept = default;
+SceneFile& SceneFile::operator=(SceneFile&&) noexcept = default;
+SceneFile::~SceneFile() = default;
+const SceneContents& SceneFile::contents() const noexcept { return impl_->contents; }
+
+Result<SceneFile> SceneFile::read(const fs::path& file, const ReadOptions& options) {
+    Result<std::string> bytes = read_whole_file(file);
+    if (!bytes) return bytes.error();
+    return from_bytes(std::move(*bytes), file, options, file.has_parent_path() ? file.parent_path() : fs::path("."));
+}
+
+Result<SceneFile> SceneFile::from_bytes(std::string bytes, const fs::path& name, const ReadOptions& options,
+                                        const fs::path& folder) {
+    constexpr std::string_view utf8_mark = "\xEF\xBB\xBF";
+    if (bytes.starts_with(utf8_mark)) bytes.erase(0, utf8_mark.size());
+    auto impl = std::make_unique<Impl>(std::move(bytes), name, options, folder);
+    const auto read = guarded<void>(impl->source, [&] { return impl->read(); });
+    if (!read) return read.error();
+    return SceneFile(std::move(impl));
+}
+
+Result<std::optional<ReadResult>> SceneFile::mesh(std::size_t mesh, const glm::dmat3& stretch) {
+    using Read = std::optional<ReadResult>;
+    const std::string& name = impl_->reduced.model.meshes[mesh].name;
+    MeshSource source = impl_->source;
+    source.name += ": " + numbered("mesh", mesh) + (name.empty() ? "" : " " + in_quotes(name));
+    return guarded<Read>(source, [&]() -> Result<Read> {
+        if (!impl_->source.keep_going(impl_->source.bytes.size() / 2, "reading glTF")) return cancelled(source);
+        ReadResult read = impl_->meshes->read(mesh, stretch);
+        if (read.mesh.triangles.empty() && !read.bad.any()) return Read();
+        gltf::Subset subset = gltf::subset_of(impl_->kept, impl_->contents.source.files, mesh);
+        read.document->json = subset.document.dump(-1, ' ', false, json::error_handler_t::replace);
+        read.document->files = std::move(subset.files);
+        auto finished = finish_reading(source, std::move(read));
+        if (!finished) return finished.error();
+        return Read(std::move(*finished));
+    });
+}
+
+bool is_gltf_file(const fs::path& file) {
+    const std::string ending = lower_ending(file);
+    return ending == ".glb" || ending == ".gltf";
+}
+
+} // namespace unseen::meshio
