@@ -156,7 +156,8 @@ TEST(ErrorDistances, CountAreasOfManyDegreesAside) {
     view.eye = {0.5, 0.5, 3};
     view.fov_y_degrees = physical_field(options.display, view.height).value();
     options.gaze_px = glm::dvec2(5000, 100);
-    const auto switch_degrees = [&](float bias) {
+    const auto switch_degrees = [&](float bias, float behind) {
+        options.scene = {behind, 0.9f};
         std::vector<FoldError> errors(tree.interior_count());
         for (FoldError& e : errors) e.bias = bias;
         const auto criterion = criterion_of(sound, {errors, {}}, view, options);
@@ -171,9 +172,11 @@ TEST(ErrorDistances, CountAreasOfManyDegreesAside) {
         return distance > radius ? 2 * std::asin(radius / distance) * 180 / std::numbers::pi : 180;
     };
     // The largest areas that go unseen, of less and less contrast.
-    const double wide = switch_degrees(0.6f), wider = switch_degrees(0.3f);
+    const double wide = switch_degrees(0.6f, 0.9f), wider = switch_degrees(0.3f, 0.9f);
     EXPECT_GT(wide, 2);
     EXPECT_GT(wider, 1.3 * wide);
+    // Before black the mean light around the mesh is less than its own, and the same shift is more of it.
+    EXPECT_LT(switch_degrees(0.3f, 0), 0.8 * wider);
 }
 
 TEST(ErrorDistances, RefuseFactorsThatAreNone) {

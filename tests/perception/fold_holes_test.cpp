@@ -422,7 +422,7 @@ TEST(FoldHoles, FiveManyShiftTheMeanTogether) {
 
 // The test keeps what has to be kept, and no more: the same rows fold where the shift is too small to be seen.
 TEST(FoldHoles, AShiftThatNobodySeesFolds) {
-    Scene scene = rows(0.503f, 0.5f);
+    Scene scene = rows(0.501f, 0.5f);
     scene.build();
     const Cut safe = safe_cut(scene, view_of_screen());
     std::size_t folded = 0;

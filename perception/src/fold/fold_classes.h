@@ -20,7 +20,7 @@ namespace unseen::perception {
 
 // Michelson's: the finer classes where few other things tell rows apart.
 inline constexpr ClassSeries coarse_contrasts{12, -9, 9}, fine_contrasts{48, -9, 9};
-inline constexpr ClassSeries shifts{3, -9, 10}; // of the mean over the middle of the range
+inline constexpr ClassSeries shifts{3, -13, 14}; // of the mean over the middle of the range
 // Of colour, in both directions.
 inline constexpr ClassSeries chroma_contrasts{3, -13, 18};
 inline constexpr ClassSeries chroma_shifts{1, -13, 18};
