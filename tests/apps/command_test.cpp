@@ -441,7 +441,15 @@ TEST_F(SimplifyTest, TheDefaultTestGoesByErrorsWhereTheseKnowTheScene) {
     write_text(path("lights.json"),
                R"({"ambient": 0.2, "lights": [{"type": "directional", "direction": [0, 0, 1], "intensity": 0.8}]})");
     EXPECT_THAT(fold_test(simplify({"--lights", "lights.json"})),
-                AllOf(StartsWith("luebke-hallen-safe:"), HasSubstr("does not know lights")));
+                AllOf(StartsWith("error:"), HasSubstr("from whichever side the lights come")));
+    write_text(path("shiny.json"), R"({"ambient": 0.2, "material": {"specular": 0.3, "shininess": 20},
+                "lights": [{"type": "directional", "direction": [0, 0, 1], "intensity": 0.8}]})");
+    EXPECT_THAT(fold_test(simplify({"--lights", "shiny.json"})),
+                AllOf(StartsWith("luebke-hallen-safe:"), HasSubstr("does not know highlights")));
+    write_text(path("turning.json"), R"({"ambient": 0.2, "lights": [{"type": "directional", "direction": [0, 0, 1],
+                "intensity": 0.8, "orbit": {"axis": [0, 1, 0], "degrees_per_second": 10}}]})");
+    EXPECT_THAT(fold_test(simplify({"--lights", "turning.json"})),
+                AllOf(StartsWith("luebke-hallen-safe:"), HasSubstr("does not know lights that move")));
 }
 
 // The ball in red and green of one luminance, with an alpha for all vertices.

@@ -1,6 +1,8 @@
 // Meshes made to be hard, under the oracle's eyes.
 #include <hard_mesh.h>
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <span>
@@ -13,6 +15,7 @@
 
 #include <perception/criterion.h>
 #include <perception/fold_measurement.h>
+#include <perception/lit_folds.h>
 #include <render/context.h>
 #include <render/renderer.h>
 #include <session/observer.h>
@@ -158,6 +161,42 @@ TEST(ShipHulls, ShowWhatLuebkeAndHallensTestFolds) {
             return perception::luebke_hallen_distances(seen.tree(), view, options);
         });
     EXPECT_GT(judged.visible_pixels, 0u);
+}
+
+// Measured once for all lights: a far one, a near one, and a spot that ends on the mesh.
+TEST(LitFolds, AreUnseenUnderLightsThatStandStill) {
+    for (HardMesh& hard : tuning_meshes(8'000)) {
+        SCOPED_TRACE(hard.name);
+        VertexTree tree = built(hard);
+        const vdtree::Sphere sphere = tree.bounding_sphere();
+        const auto radius = static_cast<double>(sphere.radius);
+        const glm::dvec3 middle(sphere.centre);
+        vdtree::Lighting lighting;
+        lighting.ambient = 0.15;
+        lighting.lights.push_back({.intensity = 0.4, .direction = glm::normalize(glm::dvec3(0.5, 1, 0.3))});
+        lighting.lights.push_back({.kind = vdtree::LightSource::Kind::point,
+                                   .intensity = 0.3,
+                                   .position = middle + 1.6 * radius * glm::normalize(glm::dvec3(-1, 0.3, 0.8)),
+                                   .distance = 1.6 * radius});
+        lighting.lights.push_back({.kind = vdtree::LightSource::Kind::spot,
+                                   .intensity = 0.4,
+                                   .direction = glm::dvec3(0, 0, -1),
+                                   .position = middle + 3 * radius * glm::dvec3(0, 0, 1),
+                                   .distance = 3 * radius,
+                                   .inner_cosine = std::cos(0.15),
+                                   .outer_cosine = std::cos(0.25)});
+        const auto folds = perception::LitFolds::measure(tree);
+        ASSERT_TRUE(folds) << folds.error().message;
+        const auto lit = folds->under(tree, lighting);
+        ASSERT_TRUE(lit) << lit.error().message;
+        Seen seen(std::move(tree), lighting);
+        const Direction directions[] = {{{0, 0, 1}, 0.5}, {{0.6, 0.5, 0.6}, 0.5}};
+        seen.expect_nothing(directions, [&](const vdtree::View& view, perception::FoldTestOptions options) {
+            const vdtree::LuminanceRange range = lit->luminance_range();
+            options.scene = {std::min(range.lo, oracle::background), std::max(range.hi, oracle::background)};
+            return perception::error_distances(*lit, view, options);
+        });
+    }
 }
 
 } // namespace

@@ -228,7 +228,7 @@ TEST_F(SceneTest, KnowsBackgroundCameraAndLights) {
     EXPECT_NEAR(view.fov_y_degrees, 57.29577951, 1e-6);
     const auto plan = session->plan(view, {});
     ASSERT_TRUE(plan) << plan.error().message;
-    EXPECT_EQ(plan->fold_test, session::FoldTest::luebke_hallen_safe);
+    EXPECT_EQ(plan->fold_test, session::FoldTest::error);
 }
 
 TEST_F(SceneTest, FollowsAsItSimplifiesFromScratch) {

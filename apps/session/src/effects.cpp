@@ -24,7 +24,9 @@ Effect fold_test_effect(const Sight& sight, const Decision& decision) {
     const std::string instead = decision.why.empty() ? std::string() : " (" + std::string(decision.why) + ")";
     if (decision.test == FoldTest::error)
         return {"fold test", true,
-                "error: what each fold changes in luminance and outline, against the contrast sensitivity"};
+                std::string("error: what each fold changes in luminance and outline, ") +
+                    (sight.lighting ? "from whichever side the lights come, " : "") +
+                    "against the contrast sensitivity"};
     if (decision.test == FoldTest::luebke_hallen_safe)
         return {"fold test", true,
                 "luebke-hallen-safe: the worst grating of each fold with any neighbours folded, " +

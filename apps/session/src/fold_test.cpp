@@ -34,10 +34,18 @@ struct Choice {
 // Of the tests by luminance one that knows the scene, and colours where they count.
 Choice suitable_test(const Sight& sight, bool chroma, bool may_measure) {
     const vdtree::VertexTree& tree = sight.object.tree;
-    if (sight.lighting) return {FoldTest::luebke_hallen_safe, "the test error does not know lights that move"};
+    if (sight.lighting && !sight.lights->stands_still())
+        return {FoldTest::luebke_hallen_safe, "the test error does not know lights that move"};
+    if (sight.lighting && sight.lighting->specular > 0)
+        return {FoldTest::luebke_hallen_safe, "the test error does not know highlights"};
     if (!tree.texture().empty()) return {FoldTest::luebke_hallen_safe, "the test error does not know textures"};
     if (chroma) return {FoldTest::luebke_hallen_safe, "the test error does not know colours"};
-    if (perception::has_fold_measurement(tree) || (may_measure && tree.interior_count() <= most_measured)) return {};
+    if (sight.lighting && sight.is_crowded)
+        return {FoldTest::luebke_hallen_safe, "the test error would look at millions of nodes under these lights"};
+    if (sight.lighting && sight.cache.lit_folds) return {};
+    if ((!sight.lighting && perception::has_fold_measurement(tree)) ||
+        (may_measure && tree.interior_count() <= most_measured))
+        return {};
     return {FoldTest::luebke_hallen_safe,
             "the tree does not hold the errors of its folds, and measuring them takes long: session::measured()"};
 }
@@ -45,13 +53,12 @@ Choice suitable_test(const Sight& sight, bool chroma, bool may_measure) {
 // Whether a test knows what it would have to look at.
 Result<void> check_knowledge(const Sight& sight, FoldTest test, bool chroma, bool shown) {
     if (!is_perceptual(test)) return {};
-    if (sight.lighting && test == FoldTest::error)
-        return invalid_argument(
-            "request.fold_test = " + name_of(test) +
-            " knows only the light that the tree was built for: with scene.lights, use request.fold_test = "
-            "luebke-hallen-safe.");
-    if (sight.lighting && shown)
-        return invalid_argument("request.shown and scene.lights exclude each other: leave request.shown away.");
+    if (sight.lighting && test == FoldTest::error && (!sight.lights->stands_still() || sight.lighting->specular > 0))
+        return invalid_argument("request.fold_test = " + name_of(test) +
+                                " knows only lights of scene.lights that stand still and make no highlights: use "
+                                "request.fold_test = luebke-hallen-safe.");
+    if (sight.lighting && shown && test != FoldTest::error)
+        return invalid_argument("request.shown and scene.lights go together with request.fold_test = error alone.");
     if (sight.lighting && chroma)
         return invalid_argument(
             "request.chroma and scene.lights exclude each other: ranges of colour are those of the tree's own light.");
@@ -82,6 +89,7 @@ struct Key {
     double pixels = 0; // of the others than perceptual tests; and of these alone:
     std::optional<double> farthest_gaze_px = {};
     perception::SceneLuminance scene = {0, 0};
+    std::shared_ptr<const vdtree::Lighting> still_lights = {}; // of the test by errors
     bool is_lit = false, chroma = false;
     std::shared_ptr<const perception::CsfTable> csf = {}; // kept, so that no other table comes to its address
     int width = 0, height = 0;
@@ -112,6 +120,7 @@ Key key_of(const Sight& sight, const Decision& decision) {
     }
     key.scene = sight.luminance;
     key.is_lit = sight.lighting != nullptr;
+    if (decision.test == FoldTest::error) key.still_lights = sight.lighting;
     key.chroma = decision.request.chroma;
     key.csf = sight.csf;
     if (sight.gaze_px) key.farthest_gaze_px = farthest_gaze_px(sight.view, *sight.gaze_px);
@@ -136,7 +145,10 @@ Result<vdtree::DistanceCriterion> make_criterion(const Sight& sight, const Decis
         if (!bounds) return bounds.error();
         return perception::lit_safe_distances(tree, **rings, std::move(*bounds), view, options);
     }
-    return perception::error_distances(tree, view, options);
+    if (!sight.lighting) return perception::error_distances(tree, view, options);
+    const auto lit = sight.cache.lit_folds->under(tree, *sight.lighting);
+    if (!lit) return lit.error();
+    return perception::error_distances(*lit, view, options);
 }
 
 vdtree::Viewpoint viewpoint_of(const Sight& sight, const Decision& decision) {
@@ -144,7 +156,7 @@ vdtree::Viewpoint viewpoint_of(const Sight& sight, const Decision& decision) {
     const bool window_only = decision.request.purpose == Purpose::picture && !is_wholly_in_window(sight);
     vdtree::Viewpoint viewpoint = perception::viewpoint_of(
         sight.object.tree, sight.view, test_options(sight, decision.request), sight.object.placement, window_only);
-    if (sight.lighting) viewpoint.lighting = *sight.lighting;
+    if (sight.lighting && decision.test != FoldTest::error) viewpoint.lighting = *sight.lighting;
     if (folds_hidden(sight, decision)) {
         const auto spheres = inner_spheres(sight.object, sight.cache);
         viewpoint.occluders.assign(spheres.begin(), spheres.end());
@@ -181,7 +193,8 @@ Result<Decision> decide(const Sight& sight, const Request& request) {
     if (request.shown && !is_same(request.shown->view(), sight.view))
         return invalid_argument("request.shown is of another view.");
     const bool folds = request.goal.kind != Goal::Kind::full;
-    const bool has_errors = perception::has_fold_measurement(sight.object.tree);
+    const bool has_errors =
+        sight.lighting ? sight.cache.lit_folds.has_value() : perception::has_fold_measurement(sight.object.tree);
     Choice choice = suitable_test(sight, request.chroma, folds && request.may_measure);
     if (!folds) return Decision{request, choice.test, choice.why};
     if (request.goal.kind == Goal::Kind::pixels) choice = {FoldTest::extent};
@@ -232,7 +245,8 @@ bool folds_unseen(const Sight& sight, const Decision& decision) {
 
 Result<CutRecipe> make_recipe(const Sight& sight, const Decision& decision) {
     const Key key = key_of(sight, decision);
-    std::shared_ptr<const KeptCriterion>& last = sight.cache.criterion;
+    // Objects with one tree share all but what their own lights make of it.
+    std::shared_ptr<const KeptCriterion>& last = key.still_lights ? sight.lit_criterion : sight.cache.criterion;
     if (!last || !(last->key == key)) {
         auto made = make_criterion(sight, decision, key);
         if (!made) return made.error();

@@ -115,8 +115,12 @@ Result<const perception::CutRings*> cut_rings(const Object& object, ObjectCache&
 Session::State::State(Scene scene_, Observer observer_, Messages messages_, float background_)
     : scene(std::move(scene_)), observer(std::move(observer_)), messages(std::move(messages_)), background(background_),
       caches(scene.objects.size()), tree_count(scene.objects.size(), 1),
-      still_lights_(scene.objects.size() + scene.backdrop.size()) {
+      still_lights_(scene.objects.size() + scene.backdrop.size()), lit_criteria_(scene.objects.size()) {
     share_caches();
+    constexpr std::uint64_t most_lit = 4'000'000; // some 100 bytes, and up to a microsecond, a node of every object
+    std::uint64_t nodes = 0;
+    for (const Object& object : scene.objects) nodes += object.tree.interior_count();
+    is_crowded_ = nodes > most_lit;
 }
 
 // Keeps what is there.
@@ -248,8 +252,8 @@ Result<std::vector<Sight>> Session::State::look(const vdtree::View& view) {
             if (!bounds) return bounds.error();
             caches[i]->light_bounds = std::make_shared<const vdtree::LightBounds>(std::move(*bounds));
         }
-        sights.push_back({scene.objects[i], *caches[i], observer, view, scene.lights ? &*scene.lights : nullptr,
-                          std::move(*lit), &window_, background});
+        sights.push_back({scene.objects[i], *caches[i], lit_criteria_[i], observer, view,
+                          scene.lights ? &*scene.lights : nullptr, std::move(*lit), &window_, background, is_crowded_});
         if (const auto set = set_gaze_of(sights.back()); !set) return set.error();
     }
     if (const auto looked = look_at_backdrop(view); !looked) return looked.error();
@@ -274,9 +278,21 @@ Result<void> Session::State::measure(std::size_t object) {
         if (&scene.objects[i].tree.data() != &before.data()) continue;
         scene.objects[i].tree = with_errors->share();
         caches[i].reset();
+        lit_criteria_[i].reset();
         ++tree_count[i];
     }
     share_caches();
+    return {};
+}
+
+Result<void> Session::State::measure_under_lights(std::size_t object) {
+    constexpr vdtree::NodeId told_from = 6'000; // nodes; about half a second on one core
+    const vdtree::VertexTree& tree = scene.objects[object].tree;
+    if (messages.note && tree.interior_count() >= told_from)
+        messages.note("measuring what folds change under lights ...");
+    auto folds = perception::LitFolds::measure(tree, 0, messages.progress);
+    if (!folds) return folds.error();
+    caches[object]->lit_folds = std::move(*folds);
     return {};
 }
 
@@ -292,9 +308,13 @@ Result<Prepared> Session::State::prepare(const vdtree::View& view, const Request
     }
     if (std::none_of(decisions.begin(), decisions.end(), [](const Decision& d) { return d.measures; }))
         return Prepared{std::move(*sights), std::move(decisions)};
-    for (std::size_t i = 0; i < decisions.size(); ++i)
-        if (decisions[i].measures && !perception::has_fold_measurement(scene.objects[i].tree))
-            if (const auto measured = measure(i); !measured) return measured.error();
+    const bool is_lit = scene.lights.has_value();
+    for (std::size_t i = 0; i < decisions.size(); ++i) {
+        if (!decisions[i].measures) continue;
+        if (is_lit ? caches[i]->lit_folds.has_value() : perception::has_fold_measurement(scene.objects[i].tree))
+            continue; // of another object with this tree
+        if (const auto measured = is_lit ? measure_under_lights(i) : measure(i); !measured) return measured.error();
+    }
     return prepare(view, request); // of the other trees
 }
 

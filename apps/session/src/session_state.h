@@ -48,6 +48,7 @@ private:
     Result<void> look_at_backdrop(const vdtree::View& view);
     perception::SceneLuminance luminance_of(const std::vector<Sight>& sights) const;
     Result<void> measure(std::size_t object);
+    Result<void> measure_under_lights(std::size_t object);
     Result<void> set_gaze_of(Sight& sight);
     Result<std::shared_ptr<const perception::CsfTable>> sensitivity(); // of the observer, to what moves so fast
 
@@ -60,8 +61,10 @@ private:
     std::optional<Moving> moving_;
     std::shared_ptr<const perception::CsfTable> widened_of_;
     std::vector<std::shared_ptr<const vdtree::Lighting>> still_lights_; // by item, of lights that stand still
-    std::vector<vdtree::Plane> window_;                                 // of the last look
-    std::vector<vdtree::LuminanceRange> backdrop_ranges_;               // of luminance, as they are lit
+    std::vector<std::shared_ptr<const KeptCriterion>> lit_criteria_;    // by object
+    bool is_crowded_ = false;
+    std::vector<vdtree::Plane> window_;                   // of the last look
+    std::vector<vdtree::LuminanceRange> backdrop_ranges_; // of luminance, as they are lit
 };
 
 } // namespace unseen::session

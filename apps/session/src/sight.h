@@ -8,6 +8,7 @@
 
 #include <perception/criterion.h>
 #include <perception/cut_rings.h>
+#include <perception/lit_folds.h>
 #include <session/observer.h>
 #include <session/scene.h>
 #include <session/session.h>
@@ -23,18 +24,21 @@ struct ObjectCache {
     std::optional<vdtree::Sphere> all = {}; // see sphere_of_all()
     bool rings_have_chroma = false;         // few requests look at colours, and bounding them takes time
     std::shared_ptr<const vdtree::LightBounds> light_bounds = {}, lit_cut_rings = {};
+    std::optional<perception::LitFolds> lit_folds = {};  // measured where the default test asks for it
     std::shared_ptr<const KeptCriterion> criterion = {}; // the last that was asked for
 };
 
 struct Sight {
     const Object& object;
     ObjectCache& cache;
+    std::shared_ptr<const KeptCriterion>& lit_criterion; // the object's own, where lights that stand still light it
     const Observer& observer;
     const vdtree::View& view;
     const calibration::LightRig* lights;              // null: the tree's own light
     std::shared_ptr<const vdtree::Lighting> lighting; // theirs
     const std::vector<vdtree::Plane>* window;         // the frustum's planes around the eye, in the world
     float background;                                 // relative luminance
+    bool is_crowded;                                  // too many nodes to look at all of them under lights
     perception::SceneLuminance luminance = {};        // of the whole scene
     // For the gaze's margin; no gaze where the margin is so wide that everything may be looked at.
     std::shared_ptr<const perception::CsfTable> csf = {};

@@ -26,6 +26,7 @@
 #include <perception/cut_rings.h>
 #include <perception/fold_measurement.h>
 #include <perception/fold_model.h>
+#include <perception/lit_folds.h>
 
 // Pictures, and judges of them.
 #include <perception/change.h>

@@ -27,6 +27,7 @@
 #include "measure/fold_record.h"
 #include "measure/leaf_triangles.h"
 #include "measure/luminance_bias.h"
+#include "measure/measure_folds.h"
 #include "measure/measurement.h"
 
 namespace unseen::perception {
@@ -675,7 +676,14 @@ bool has_fold_measurement(const VertexTree& tree) { return !tree.attribute<FoldR
 
 std::span<const float> measurement_settings() noexcept { return settings; }
 
-Result<VertexTree> measure_folds(const VertexTree& tree, int threads, const Progress& progress) {
+namespace {
+
+struct Measured : MeasuredFolds {
+    std::vector<FoldStage> stages;
+    std::vector<std::uint8_t> stage_of; // by interior node
+};
+
+Result<Measured> measure(const VertexTree& tree, int threads, const Progress& progress, bool with_stages) {
     const auto sound = SoundTree::of(tree);
     if (!sound) return sound.error();
     if (!tree.texture().empty())
@@ -689,38 +697,62 @@ Result<VertexTree> measure_folds(const VertexTree& tree, int threads, const Prog
     const auto measured = SoundTree::of(VertexTree(scaled));
     if (!measured) return measured.error();
 
-    std::vector<FoldRecord> records(tree.interior_count());
-    std::vector<FoldFacing> facing(tree.interior_count());
+    Measured found;
+    found.folds.resize(tree.interior_count());
+    found.facing.resize(tree.interior_count());
+    found.stage_of.resize(tree.interior_count());
     std::vector<FoldError> errors;
-    std::vector<FoldStage> stages;
     tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
     bool is_whole = false;
     arena.execute([&] {
-        is_whole = Measurer(*measured, records, facing).run(progress);
+        is_whole = Measurer(*measured, found.folds, found.facing).run(progress);
         if (!is_whole) return;
         // How much light many folds shift depends on the order in which they are folded: that of what the model makes
         // of each alone, whatever the factors of a criterion will be.
-        errors = nested_errors(*measured, records, facing, FoldModel());
+        errors = nested_errors(*measured, found.folds, found.facing, FoldModel());
         find_luminance_bias(*measured, errors);
-        stages = find_stages(*measured, errors);
+        if (with_stages) found.stages = find_stages(*measured, errors);
     });
     if (!is_whole) return Error{ErrorCode::cancelled, "Measuring what folds change was cancelled."};
-    std::vector<std::uint8_t> stage_of(tree.interior_count());
     for (NodeId node = 0; node < errors.size(); ++node) {
-        records[node].bias = errors[node].bias;
-        facing[node].fading = errors[node].fading;
-        stage_of[node] = errors[node].stage;
-        if (!scale_back(records[node], scale))
+        found.folds[node].bias = errors[node].bias;
+        found.facing[node].fading = errors[node].fading;
+        found.stage_of[node] = errors[node].stage;
+        if (!scale_back(found.folds[node], scale))
             return Error{ErrorCode::unsupported, "What folding node " + std::to_string(node) +
                                                      " changes is beyond all numbers: the mesh is too large."};
     }
+    return found;
+}
+
+Result<VertexTree> with_attributes(const VertexTree& tree, Measured measured) {
     Attributes with(tree.share());
     with.add(settings_name, AttributeDomain::tree, std::vector<float>(settings.begin(), settings.end()));
-    with.add(record_name, AttributeDomain::interior_node, std::move(records));
-    with.add(facing_name, AttributeDomain::interior_node, std::move(facing));
-    with.add(stage_of_name, AttributeDomain::interior_node, std::move(stage_of));
-    with.add(stages_name, AttributeDomain::tree, std::move(stages));
+    with.add(record_name, AttributeDomain::interior_node, std::move(measured.folds));
+    with.add(facing_name, AttributeDomain::interior_node, std::move(measured.facing));
+    with.add(stage_of_name, AttributeDomain::interior_node, std::move(measured.stage_of));
+    with.add(stages_name, AttributeDomain::tree, std::move(measured.stages));
     return with.take();
+}
+
+} // namespace
+
+Result<VertexTree> measure_folds(const VertexTree& tree, int threads, const Progress& progress) {
+    auto measured = measure(tree, threads, progress, true);
+    if (!measured) return measured.error();
+    return with_attributes(tree, std::move(*measured));
+}
+
+Result<MeasuredFolds> measure_records(const VertexTree& tree, int threads, const Progress& progress) {
+    auto measured = measure(tree, threads, progress, false);
+    if (!measured) return measured.error();
+    return MeasuredFolds(std::move(*measured));
+}
+
+Result<VertexTree> with_records(const VertexTree& tree, MeasuredFolds measured) {
+    Measured all{std::move(measured), {}, {}};
+    all.stage_of.resize(tree.interior_count());
+    return with_attributes(tree, std::move(all));
 }
 
 } // namespace unseen::perception

@@ -30,6 +30,7 @@
 #include <glm/vec4.hpp>
 
 #include <vdtree/attribute.h>
+#include <vdtree/function_ref.h>
 #include <vdtree/mesh.h>
 #include <vdtree/normal_mask.h>
 #include <vdtree/packed.h>
@@ -157,6 +158,11 @@ public:
     bool is_prelit() const noexcept; // luminance is that of the colours and the texture alone
     // Fails where check() does.
     Result<VertexTree> relit(const Light& light) const;
+
+    // The same with luminances of the caller's, of leaves and of proxies, relative, 0..1 (others are clamped, NaN is 0):
+    // light that is none of vdtree::Light's. Without the texture, and pre-lit. Called from several threads. Fails and
+    // costs as relit().
+    Result<VertexTree> shaded(const FunctionRef<float(NodeId)>& luminance) const;
 
     // The same tree without its texture, under its light, with luminance and bounds of its vertices alone; everything
     // else is shared, but for attributes, which it has not. Vertices without colours then have the default albedo, lit.

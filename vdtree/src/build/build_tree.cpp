@@ -283,8 +283,8 @@ Result<VertexTree> TreeBuilder::build(const Clusterer& clusterer) {
     g_->ranges.assign(source_.ranges.begin(), source_.ranges.end());
     g_->document = std::vector<std::byte>(source_.document.begin(), source_.document.end());
     auto data = std::make_shared<VertexTree::Data>();
-    data->light =
-        std::make_shared<TreeLuminance>(derive_luminance(*g_, *parts_, options_.light, prelit_, is_textured()));
+    data->light = std::make_shared<TreeLuminance>(
+        derive_luminance(*g_, *parts_, options_.light, prelit_, is_textured(), nullptr));
     data->geometry = std::move(g_);
     if (reporter_.cancelled(1.0, "done")) return cancelled_error();
     return VertexTree(std::move(data));

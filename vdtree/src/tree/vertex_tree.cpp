@@ -129,6 +129,12 @@ void light_leaves(const TreeGeometry& g, const Light& light, bool prelit, bool t
     });
 }
 
+void shade_by(const FunctionRef<float(NodeId)>& given, std::span<Unorm16> luminance) {
+    tbb::parallel_for(NodeId{0}, static_cast<NodeId>(luminance.size()), [&](NodeId node) {
+        luminance[node] = Unorm16::nearest(std::min(1.0f, std::max(0.0f, given(node)))); // NaN: 0
+    });
+}
+
 // What a node and all below it are multiplied with, or show.
 PackedRange range_below(const TreeGeometry& g, const Shades& shades, NodeId node) {
     const NodeId interior = static_cast<NodeId>(g.first_leaf.size());
@@ -156,7 +162,7 @@ float vertex_luminance(glm::vec3 normal, const glm::vec4* colour, const Light& l
 }
 
 TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, const Light& light, bool prelit,
-                               bool textured) {
+                               bool textured, const FunctionRef<float(NodeId)>* given) {
     textured = textured && !g.texels.empty();
     const TreeLinks tree = links_of(g);
     const NodeId interior = tree.interior();
@@ -166,7 +172,8 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
     out.ring_range.resize(interior);
     out.adaptation.resize(interior);
 
-    light_leaves(g, light, prelit, textured, out.luminance);
+    if (given) shade_by(*given, out.luminance);
+    else light_leaves(g, light, prelit, textured, out.luminance);
     const Shades shades(g, out.luminance, textured);
     const LeafSurroundings leaf = survey_leaves(g, parts, shades);
     // A proxy's luminance is the area-weighted mean of its leaves: folds keep the mean of their surroundings.
@@ -195,7 +202,8 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
                 });
             // The mean lies within the leaves' range but for rounding.
             const double mean = sums.mean(g.first_leaf[node], g.leaf_end[node]);
-            const Unorm16 y = std::clamp(Unorm16::nearest(mean / Unorm16::largest), support.lo, support.hi);
+            const Unorm16 y = given ? out.luminance[node]
+                                    : std::clamp(Unorm16::nearest(mean / Unorm16::largest), support.lo, support.hi);
             out.luminance[node] = y;
             support = unite(support, y);
             ring = unite(ring, shades[node]);
@@ -216,12 +224,14 @@ TreeLuminance derive_luminance(const TreeGeometry& g, const TreeParts& parts, co
             out.adaptation[node] = std::max(adaptation, middle(ring));
         };
     });
+    PackedRange drawn = leaf.corners;
+    if (given && interior > 0) drawn = unite(drawn, out.support_range[VertexTree::root()]); // proxies may go beyond
     TreeLuminance done{
         {std::move(out.luminance), std::move(out.support_range), std::move(out.ring_range), std::move(out.adaptation)},
         light,
         prelit,
         textured,
-        textured ? product(leaf.corners, g.ring_texture[VertexTree::root()]) : leaf.corners};
+        textured ? product(drawn, g.ring_texture[VertexTree::root()]) : drawn};
     return done;
 }
 
@@ -294,14 +304,16 @@ namespace {
 
 // The data of a tree whose luminance is found anew. There is nothing left to check.
 Result<std::shared_ptr<const VertexTree::Data>> shaded_anew(const VertexTree& tree, const Light& light, bool prelit,
-                                                            bool textured) {
+                                                            bool textured,
+                                                            const FunctionRef<float(NodeId)>* given = nullptr) {
     const auto sound = SoundTree::of(tree);
     if (!sound) return sound.error();
     auto data = std::make_shared<VertexTree::Data>();
     data->geometry = tree.data().geometry;
     TreeParts parts(links_of(*data->geometry));
     parts.assign_triangles(sound->first_triangle(), sound->triangles());
-    data->light = std::make_shared<TreeLuminance>(derive_luminance(*data->geometry, parts, light, prelit, textured));
+    data->light =
+        std::make_shared<TreeLuminance>(derive_luminance(*data->geometry, parts, light, prelit, textured, given));
     return std::shared_ptr<const VertexTree::Data>(std::move(data));
 }
 
@@ -309,6 +321,12 @@ Result<std::shared_ptr<const VertexTree::Data>> shaded_anew(const VertexTree& tr
 
 Result<VertexTree> VertexTree::relit(const Light& light) const {
     auto data = shaded_anew(*this, light, false, data_->light->textured);
+    if (!data) return data.error();
+    return VertexTree(std::move(*data));
+}
+
+Result<VertexTree> VertexTree::shaded(const FunctionRef<float(NodeId)>& luminance) const {
+    auto data = shaded_anew(*this, light(), true, false, &luminance);
     if (!data) return data.error();
     return VertexTree(std::move(*data));
 }

@@ -1,5 +1,6 @@
 #include <session_gpu/as_seen.h>
 
+#include <algorithm>
 #include <map>
 #include <utility>
 #include <vector>
@@ -36,8 +37,10 @@ Result<Simplification> simplify_as_seen(Session& session, const render::Context&
     request.shown.reset();
     auto all = session.simplify(view, request);
     if (!all) return all;
-    const bool can_tell = !session.scene().lights && request.goal.kind != Goal::Kind::full &&
-                          !all->fold_tests.empty() && is_perceptual(all->fold_tests.front());
+    const bool can_tell = request.goal.kind != Goal::Kind::full && !all->fold_tests.empty() &&
+                          is_perceptual(all->fold_tests.front()) &&
+                          (!session.scene().lights ||
+                           std::ranges::all_of(all->fold_tests, [](FoldTest test) { return test == FoldTest::error; }));
     if (!can_tell) return all;
     const auto depths = depths_of(session, context, all->cuts, view, samples);
     if (!depths) return depths.error();

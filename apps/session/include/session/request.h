@@ -52,7 +52,7 @@ struct Request {
     float hysteresis = 1.1f; // of budgets, frame by frame: by what factor the largest cost may exceed the least, 1..2
     Purpose purpose = Purpose::mesh;
     // Of pictures: what this view, and no other, shows. What lies behind that is folded, too: simplify_as_seen() of
-    // <session_gpu/as_seen.h> draws it. Not under lights that move.
+    // <session_gpu/as_seen.h> draws it. Under lights only by the test error.
     std::optional<vdtree::DepthPicture> shown = {};
     // Measure the errors of folds where the test needs them and the tree lacks them: up to a minute.
     bool may_measure = true;

@@ -109,9 +109,10 @@ TreeLuminance copy_of(const TreeLuminance& light);
 class TreeParts;
 
 // Luminance of every node and the bounds over support and ring, bottom-up. `parts`: of this tree, with its triangles.
+// `given`: luminances in the light's place, of proxies, too; null: none.
 // Cost: one pass over triangles and nodes; parallel.
 TreeLuminance derive_luminance(const TreeGeometry& geometry, const TreeParts& parts, const Light& light, bool prelit,
-                               bool textured);
+                               bool textured, const FunctionRef<float(NodeId)>* given);
 
 // Relative luminance of one vertex; a texture's is to be multiplied with it.
 float vertex_luminance(glm::vec3 normal, const glm::vec4* colour, const Light& light, bool prelit,
