@@ -596,8 +596,10 @@ TEST_F(RenderCommandTest, NamesFileAndFieldOfBadLights) {
         words.insert(words.end(), more.begin(), more.end());
         EXPECT_EQ(run(words).status, 2);
     }
+    write_text(path("shiny.json"), R"({"material": {"specular": 0.3, "shininess": 20},
+        "lights": [{"type": "directional", "direction": [0, 0, 1], "intensity": 0.5}]})");
     const Outcome by_errors =
-        run({"render", "ball.vdt", "-o", "o.png", "--lights", "good.json", "--fold-test", "error"});
+        run({"render", "ball.vdt", "-o", "o.png", "--lights", "shiny.json", "--fold-test", "error"});
     EXPECT_EQ(by_errors.status, 1);
     EXPECT_THAT(by_errors.err, HasSubstr("--fold-test luebke-hallen"));
 }
