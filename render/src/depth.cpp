@@ -3,18 +3,16 @@
 
 #include <algorithm>
 #include <limits>
-#include <string>
 
 #include <render/sample_sum.h>
+
+#include "sample_count.h"
 
 namespace unseen::render {
 
 Result<std::vector<float>> farthest_depth(const Context& context, std::span<const Item> items, const vdtree::View& view,
                                           int samples, std::uint32_t seed) {
-    constexpr int most_samples = 256;
-    if (samples < 1 || samples > most_samples)
-        return Error{ErrorCode::invalid_argument,
-                     "The samples a pixel must be from 1 to 256, not " + std::to_string(samples) + "."};
+    if (const auto valid = check_samples(samples); !valid) return valid.error();
     if (const auto valid = vdtree::validate(view); !valid) return valid.error();
     auto target = Target::create(context, view.width, view.height, {.colours = {}, .label = "farthest depth"});
     if (!target) return target.error();

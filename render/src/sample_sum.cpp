@@ -4,20 +4,17 @@
 #include <string>
 
 #include "gl.h"
+#include "sample_count.h"
 #include "shaders.h"
 #include "surface_pass.h"
 
 namespace unseen::render {
 namespace {
 
-constexpr int most_samples = 256; // beyond, the sum's rounding in float would outgrow what a sample adds to the picture
 constexpr int background_location = 0;
 
 Result<void> check(const Sampling& sampling) {
-    if (sampling.samples < 1 || sampling.samples > most_samples)
-        return Error{ErrorCode::invalid_argument, "The samples a pixel must be from 1 to " +
-                                                      std::to_string(most_samples) + ", not " +
-                                                      std::to_string(sampling.samples) + "."};
+    if (auto valid = check_samples(sampling.samples); !valid) return valid;
     if (!(sampling.background >= 0 && sampling.background <= 1))
         return Error{ErrorCode::invalid_argument, "The background must be a relative luminance from 0 to 1, not " +
                                                       std::to_string(sampling.background) + "."};

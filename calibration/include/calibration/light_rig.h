@@ -33,7 +33,8 @@ public:
     // Errors name the file and the key.
     static Result<LightRig> read(const std::filesystem::path& file);
 
-    // Lights that stand still, in the world, as `lighting` has them (places and distances in world units). `file`: where they are from, for messages. Fails where lighting does not hold, see vdtree::validate().
+    // Lights that stand still, in the world: places and distances in world units. `file`: where they are from, for
+    // messages. Fails where vdtree::validate() does.
     static Result<LightRig> of(vdtree::Lighting lighting, std::filesystem::path file);
 
     // Where the lights are, in the frame of a tree.

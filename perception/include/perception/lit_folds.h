@@ -11,10 +11,10 @@
 
 namespace unseen::perception {
 
-// Of a vertex of the albedo a and the normal n a distant light from l makes a max(0, n.l). So what any light makes of a
-// fold follows from what the fold changes of a n, a vector: no more than the light's luminance times the sum of |l_k| times
-// what it changes along each axis. That is measured in three pictures, one an axis, as measure_folds() measures luminance; and a fourth one of a, for ambient
-// light. Copies are cheap and share their data.
+// A light from l makes a max(0, n.l) of a vertex with the albedo a and the normal n. So what a light makes of a fold
+// follows from what the fold changes of the vector a n. Where that is no more than v_k along each axis, the light changes
+// by no more than its luminance times the sum of |l_k| v_k. The three v_k are measured as measure_folds() measures
+// luminance. So is what changes of a, for ambient light. Copies are cheap and share their data.
 class LitFolds {
 public:
     // Fails where measure_folds() does. Cost: three times its, or four where there are colours.

@@ -20,6 +20,7 @@
 
 #include "measure/contacts.h"
 #include "measure/ring_chroma.h"
+#include "measure/ring_neighbours.h"
 
 namespace unseen::perception {
 
@@ -160,11 +161,8 @@ public:
     }
 
 private:
-    bool supports(NodeId node, Index leaf) const { return g_.first_leaf[node] <= leaf && leaf < g_.leaf_end[node]; }
-    bool is_larger(NodeId a, NodeId b) const {
-        const float ra = g_.support_spheres[a].radius, rb = g_.support_spheres[b].radius;
-        return ra != rb ? ra > rb : a < b;
-    }
+    bool supports(NodeId node, Index leaf) const { return perception::supports(g_, node, leaf); }
+    bool is_larger(NodeId a, NodeId b) const { return perception::is_larger(g_, a, b); }
     NodeId parent_of_leaf(Index leaf) const { return g_.parents[interior_ + leaf]; }
 
     // What the nodes above `here` that do not support its neighbour must know of those above the neighbour.

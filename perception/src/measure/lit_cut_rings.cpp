@@ -6,6 +6,8 @@
 #include <vdtree/internal/tree_parts.h>
 #include <vdtree/internal/vertex_tree_data.h>
 
+#include "measure/ring_neighbours.h"
+
 namespace unseen::perception {
 
 using namespace vdtree;
@@ -59,11 +61,8 @@ private:
     }
 
     NodeId parent_of(Index leaf) const { return g_.parents[tree_.interior_count() + leaf]; }
-    bool supports(NodeId node, Index leaf) const { return g_.first_leaf[node] <= leaf && leaf < g_.leaf_end[node]; }
-    bool is_larger(NodeId a, NodeId b) const {
-        const float ra = g_.support_spheres[a].radius, rb = g_.support_spheres[b].radius;
-        return ra != rb ? ra > rb : a < b;
-    }
+    bool supports(NodeId node, Index leaf) const { return perception::supports(g_, node, leaf); }
+    bool is_larger(NodeId a, NodeId b) const { return perception::is_larger(g_, a, b); }
 
     const SoundTree& tree_;
     const TreeGeometry& g_;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include <tbb/parallel_for.h>
 
 #include <perception/fold_measurement.h>
+#include <vdtree/internal/spot_share.h>
 
 #include "measure/fold_record.h"
 #include "measure/measure_folds.h"
@@ -47,11 +49,9 @@ struct Reach {
     float uneven = 0; // by how much that is no plane over the ring
 };
 
-float spot_share(const LightSource& light, double angle) {
-    const double cosine = std::cos(std::clamp(angle, 0.0, std::acos(-1.0)));
-    if (!(light.inner_cosine > light.outer_cosine)) return cosine >= light.outer_cosine ? 1.0f : 0.0f;
-    const double t = std::clamp((cosine - light.outer_cosine) / (light.inner_cosine - light.outer_cosine), 0.0, 1.0);
-    return static_cast<float>(t * t * (3 - 2 * t));
+// `angle`: from the spot's axis, also beyond 0 and half a turn.
+float share_at(const LightSource& spot, double angle) {
+    return static_cast<float>(spot_share(spot, std::cos(std::clamp(angle, 0.0, std::numbers::pi))));
 }
 
 Reach reach_of(const LightSource& light, const Sphere& ring) {
@@ -67,7 +67,7 @@ Reach reach_of(const LightSource& light, const Sphere& ring) {
     if (light.kind == LightSource::Kind::spot) {
         const double angle = std::acos(std::clamp(glm::dot(to_ring, light.direction) / distance, -1.0, 1.0)),
                      half = std::asin(std::min(share, 1.0));
-        const float high = spot_share(light, angle - half), low = spot_share(light, angle + half);
+        const float high = share_at(light, angle - half), low = share_at(light, angle + half);
         reach.uneven = std::min(reach.most, reach.uneven * high + reach.most * (high - low));
         reach.most *= high;
     }

@@ -8,6 +8,7 @@
 
 #include "tree/unchecked_links.h"
 #include "tree/unit_vector.h"
+#include <vdtree/internal/spot_share.h>
 #include <vdtree/internal/vertex_tree_data.h>
 
 namespace unseen::vdtree {
@@ -50,11 +51,6 @@ Result<void> validate(const LightSource& light, const std::string& name) {
         return invalid(name + ".inner_degrees",
                        "be less than outer_degrees, by a degree or so, and outer_degrees at most 180");
     return {};
-}
-
-double smooth_step(double x, double low, double high) {
-    const double t = std::clamp((x - low) / (high - low), 0.0, 1.0);
-    return t * t * (3 - 2 * t);
 }
 
 // ---- where a light is
@@ -173,7 +169,7 @@ double lit_luminance(const Lighting& lighting, glm::dvec3 position, glm::dvec3 n
             towards = offset / distance;
             intensity *= (light.distance / distance) * (light.distance / distance);
             if (light.kind == LightSource::Kind::spot)
-                intensity *= smooth_step(-glm::dot(towards, light.direction), light.outer_cosine, light.inner_cosine);
+                intensity *= spot_share(light, -glm::dot(towards, light.direction));
         }
         const double facing = glm::dot(normal, towards);
         if (!(facing > 0)) continue;
