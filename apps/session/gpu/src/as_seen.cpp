@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -11,22 +12,45 @@
 namespace unseen::session {
 namespace {
 
+// Everything of a scene on the GPU, to be drawn for its depth.
+class Items {
+public:
+    explicit Items(const render::Context& context) : context_(context) {}
+
+    Result<void> add(const vdtree::Cut& cut, const vdtree::VertexTree& tree, const vdtree::Similarity& placement) {
+        auto known = trees_.find(&tree.data()); // objects share them
+        if (known == trees_.end()) {
+            auto made = render::GpuTree::create(context_, tree);
+            if (!made) return made.error();
+            known = trees_.emplace(&tree.data(), std::move(*made)).first;
+        }
+        render::GpuCut drawn(known->second);
+        if (auto followed = drawn.follow(cut); !followed) return followed;
+        items_.push_back({std::move(drawn), placement});
+        return {};
+    }
+
+    std::span<const render::Item> items() const { return items_; }
+
+private:
+    const render::Context& context_;
+    std::map<const vdtree::VertexTree::Data*, render::GpuTree> trees_;
+    std::vector<render::Item> items_;
+};
+
+// The backdrop hides, too, but is hidden from nobody.
 Result<std::vector<float>> depths_of(const Session& session, const render::Context& context,
                                      const std::vector<vdtree::Cut>& cuts, const vdtree::View& view, int samples) {
-    std::vector<render::Item> items;
-    std::map<const vdtree::VertexTree::Data*, render::GpuTree> trees; // objects share them
-    for (std::size_t i = 0; i < cuts.size(); ++i) {
-        auto tree = trees.find(&session.tree(i).data());
-        if (tree == trees.end()) {
-            auto made = render::GpuTree::create(context, session.tree(i));
-            if (!made) return made.error();
-            tree = trees.emplace(&session.tree(i).data(), std::move(*made)).first;
-        }
-        render::GpuCut cut(tree->second);
-        if (auto followed = cut.follow(cuts[i]); !followed) return followed.error();
-        items.push_back({std::move(cut), session.scene().objects[i].placement});
+    Items items(context);
+    const Scene& scene = session.scene();
+    for (std::size_t i = 0; i < cuts.size(); ++i)
+        if (auto added = items.add(cuts[i], session.tree(i), scene.objects[i].placement); !added) return added.error();
+    for (const Object& part : scene.backdrop) {
+        vdtree::Cut whole(part.tree);
+        whole.unfold_all();
+        if (auto added = items.add(whole, part.tree, part.placement); !added) return added.error();
     }
-    return render::farthest_depth(context, items, view, samples);
+    return render::farthest_depth(context, items.items(), view, samples);
 }
 
 } // namespace
