@@ -1,4 +1,5 @@
-// How one band of the reference is seen: the weights of differences, or, with THRESHOLDS, the least step that is visible.
+// How one band of the reference is seen: the weights of differences; with THRESHOLDS, the least step that is visible; with
+// MASKERS, by how many thresholds it masks.
 // With GAZE by eccentricity.
 layout(binding = 0) uniform sampler2D luminances;
 layout(binding = 1) uniform sampler2D contrasts;
@@ -15,8 +16,10 @@ layout(location = 7) uniform ivec2 window;
 layout(location = 8) uniform uint level;
 #endif
 
-#ifdef THRESHOLDS
+#if defined(THRESHOLDS)
 layout(location = 0) out vec4 steps;
+#elif defined(MASKERS)
+layout(location = 0) out vec4 maskers;
 #else
 layout(location = 0) out vec4 own;
 layout(location = 1) out vec4 smoothed;
@@ -75,6 +78,9 @@ void main() {
         float sensitivity = exact_exp2(node.x);
         // Maskers work where they are: their contrasts count in thresholds of patches.
         float masker = abs(node.y * contrast[i] + node.z * around[i]) * sensitivity * of_band.x;
+#ifdef MASKERS
+        maskers[i] = 4 * at.x + i < size.x ? min(masker, masking.w) : 0.0; // nothing is outside
+#else
         float raised = 1.0 + exact_exp2(masking.x * exact_log2(clamp(masker, masking.z, masking.w)));
         float elevation = exact_exp2(exact_log2(raised) / masking.y);
 #ifdef THRESHOLDS
@@ -83,6 +89,7 @@ void main() {
         float to_thresholds = of_band.y * (sensitivity / (luminance[i] * elevation));
         own[i] = to_thresholds * node.y;
         smoothed[i] = to_thresholds * node.z;
+#endif
 #endif
     }
 }

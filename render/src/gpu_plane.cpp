@@ -63,11 +63,11 @@ void PlanePasses::bind(unsigned unit, unsigned texture) {
 }
 
 void PlanePasses::draw(const Program& program, const GpuPlanes& to, glm::ivec2 texels,
-                       std::initializer_list<unsigned> textures) {
+                       std::initializer_list<unsigned> textures, int first_row) {
     unsigned unit = 0;
     for (const unsigned texture : textures) bind(unit++, texture);
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, to.framebuffer());
-    glViewport(0, 0, texels.x, texels.y);
+    glViewport(0, first_row, texels.x, texels.y);
     program.use();
     glDrawArrays(GL_TRIANGLES, 0, 3);
 }

@@ -47,8 +47,9 @@ public:
     PlanePasses(const PlanePasses&) = delete;
     PlanePasses& operator=(const PlanePasses&) = delete;
 
-    // Binds the textures from unit 0 on, and computes the first `texels` of the planes.
-    void draw(const Program& program, const GpuPlanes& to, glm::ivec2 texels, std::initializer_list<unsigned> textures);
+    // Binds the textures from unit 0 on, and computes so many texels of the planes, from the first of a row on.
+    void draw(const Program& program, const GpuPlanes& to, glm::ivec2 texels, std::initializer_list<unsigned> textures,
+              int first_row = 0);
     void bind(unsigned unit, unsigned texture);
 
 private:

@@ -30,6 +30,10 @@ constexpr int group_columns = 64, group_rows = 16; // of examine.comp
 constexpr float half_energy_scale = 1.f / 2048, largest_half = 65504;
 constexpr float half_weights_reach = 32768; // half of the largest: the bound of the weights is one at nodes
 
+constexpr int largest_cell_px = 64;
+// A Gaussian of 1.5 samples: as far as one part of a pattern is seen with another, about.
+constexpr std::array<float, 5> pooling_kernel = {0.26656f, 0.21344f, 0.10959f, 0.03608f, 0.00761f};
+
 glm::ivec2 halved(glm::ivec2 size) { return (size + 1) / 2; }
 
 glm::vec4 taps(const VisibilityTables& tables) { return {tables.kernel[0], tables.kernel[1], tables.kernel[2], 0}; }
@@ -291,7 +295,7 @@ struct VisibilityPasses::Impl {
         GpuPlanes visibility;
         Buffer found_in_test, found_visible;
     };
-    enum class Sight { weights, thresholds };
+    enum class Sight { weights, thresholds, maskers };
 
     Result<void> prepare(const LuminanceTexture& picture);
     Result<void> find_programs(Sight sight);
@@ -306,11 +310,12 @@ struct VisibilityPasses::Impl {
     Result<void> prepare_judging();
     Result<void> judge(const LuminanceTexture& test);
     void add_energies(PlanePasses& passes, std::size_t level);
-    void blur(PlanePasses& passes, unsigned from, glm::ivec2 from_size, const std::vector<float>& kernel,
-              const GpuPlanes& to);
+    void blur(PlanePasses& passes, unsigned from, glm::ivec2 from_size, std::span<const float> kernel,
+              const GpuPlanes& rows, const GpuPlanes& to);
     void pool(PlanePasses& passes, const Program& program, const std::vector<GpuPlanes>& from, const GpuPlanes& packed,
               const GpuPlanes& to);
     Result<void> map_thresholds();
+    Result<void> map_elevations(int cell_px);
 
     PlaneFormat kept() const { return is_half ? PlaneFormat::half : PlaneFormat::full; }
     float energy_scale() const { return is_half ? half_energy_scale : 1; }
@@ -325,11 +330,17 @@ struct VisibilityPasses::Impl {
     std::optional<Judging> judging;
     bool is_judged = false;
     GpuPlanes thresholds;
+    struct Elevations {
+        int cell_px;
+        glm::ivec2 cells;
+        GpuPlanes planes; // one band below the other
+    };
+    std::optional<Elevations> elevations;
 
     const Program *copy = nullptr, *subtract = nullptr, *reduce_rows = nullptr, *reduce_columns = nullptr,
                   *split_reference = nullptr, *split_base = nullptr, *split_difference = nullptr, *weigh = nullptr,
                   *step = nullptr, *square = nullptr, *halve = nullptr, *raise = nullptr, *pool_powers = nullptr,
-                  *pool_thresholds = nullptr, *unpack = nullptr, *look = nullptr;
+                  *pool_thresholds = nullptr, *unpack = nullptr, *look = nullptr, *mask = nullptr, *elevate = nullptr;
     std::array<const Program*, 3> blur_rows = {}, blur_columns = {};
 };
 
@@ -343,8 +354,14 @@ Result<void> VisibilityPasses::Impl::find_programs(Sight sight) {
     programs.find(split_reference, "split reference", shaders::split_frag, {"REFERENCE"});
     programs.find(split_base, "split base", shaders::split_frag, {"REFERENCE", "BASE"});
     const bool is_step = sight == Sight::thresholds;
-    const Program*& seen = is_step ? step : weigh;
-    if (is_step && tables.gaze) programs.find(seen, "step by gaze", shaders::sight_frag, {"THRESHOLDS", "GAZE"});
+    const Program*& seen = is_step ? step : sight == Sight::maskers ? mask : weigh;
+    if (sight == Sight::maskers) {
+        if (tables.gaze) programs.find(seen, "mask by gaze", shaders::sight_frag, {"MASKERS", "GAZE"});
+        else programs.find(seen, "mask", shaders::sight_frag, {"MASKERS"});
+        programs.find(elevate, "elevation", shaders::elevation_frag);
+        programs.find(blur_rows[0], "blur rows by 4", shaders::blur_frag, {"ALONG_ROWS", "REACH_1"});
+        programs.find(blur_columns[0], "blur columns by 4", shaders::blur_frag, {"REACH_1"});
+    } else if (is_step && tables.gaze) programs.find(seen, "step by gaze", shaders::sight_frag, {"THRESHOLDS", "GAZE"});
     else if (is_step) programs.find(seen, "step", shaders::sight_frag, {"THRESHOLDS"});
     else if (tables.gaze) programs.find(seen, "weigh by gaze", shaders::sight_frag, {"GAZE"});
     else programs.find(seen, "weigh", shaders::sight_frag);
@@ -429,7 +446,7 @@ Result<void> VisibilityPasses::Impl::for_each_reference_band(PlanePasses& passes
 
 void VisibilityPasses::Impl::see(PlanePasses& passes, std::size_t level, const GpuPlanes& of_reference, Sight sight,
                                  const GpuPlanes& to) {
-    const Program& program = sight == Sight::thresholds ? *step : *weigh;
+    const Program& program = sight == Sight::thresholds ? *step : sight == Sight::maskers ? *mask : *weigh;
     const Band& band = bands[level];
     program.set(0, band.size);
     program.set(1, glm::vec4(tables.masking_power, tables.masking_knee, tables.least_masker, tables.most_masker));
@@ -546,8 +563,9 @@ Result<void> VisibilityPasses::Impl::prepare_judging() {
     return {};
 }
 
+// `rows`: for what is blurred along the rows alone.
 void VisibilityPasses::Impl::blur(PlanePasses& passes, unsigned from, glm::ivec2 from_size,
-                                  const std::vector<float>& kernel, const GpuPlanes& to) {
+                                  std::span<const float> kernel, const GpuPlanes& rows, const GpuPlanes& to) {
     std::array<float, most_taps> padded = {};
     std::copy(kernel.begin(), kernel.end(), padded.begin());
     const std::size_t reach = kernel.size() - 1, variant = reach <= 4 ? 0 : reach <= 8 ? 1 : 2;
@@ -557,8 +575,8 @@ void VisibilityPasses::Impl::blur(PlanePasses& passes, unsigned from, glm::ivec2
         program.set(1, used);
         passes.draw(program, into, texels_of(from_size), {source});
     };
-    pass(*blur_rows[variant], from, judging->blurred_rows);
-    pass(*blur_columns[variant], judging->blurred_rows.texture(), to);
+    pass(*blur_rows[variant], from, rows);
+    pass(*blur_columns[variant], rows.texture(), to);
 }
 
 // From the energies of a band to what the window holds of them, as powers.
@@ -577,7 +595,7 @@ void VisibilityPasses::Impl::add_energies(PlanePasses& passes, std::size_t level
             passes.draw(*halve, to, texels_of(from_size), {from->texture()});
             from = &to;
         }
-        blur(passes, from->texture(), from_size, window[i].kernel, judging->blurred[i]);
+        blur(passes, from->texture(), from_size, window[i].kernel, judging->blurred_rows, judging->blurred[i]);
         sizes[i] = from_size;
     }
     raise->set(0, glm::vec4(window[0].weight, window[1].weight, window[2].weight, 1 / energy_scale()));
@@ -661,6 +679,44 @@ Result<void> VisibilityPasses::Impl::map_thresholds() {
     return {};
 }
 
+Result<void> VisibilityPasses::Impl::map_elevations(int cell_px) {
+    if (cell_px < 1 || cell_px > largest_cell_px)
+        return judge_error("cells of elevations have 1 to " + std::to_string(largest_cell_px) + " pixels a side, not " +
+                           std::to_string(cell_px));
+    if (elevations && elevations->cell_px == cell_px) return {};
+    if (auto ok = find_programs(Sight::maskers); !ok) return ok;
+    const glm::ivec2 cells = (size + cell_px - 1) / cell_px;
+    const auto band_count = static_cast<int>(bands.size());
+    if (cells.y * band_count > largest_target_side())
+        return unsupported("judge: the elevations of " + std::to_string(band_count) + " bands in " +
+                           size_text(cells.x, cells.y) + " cells are larger than this GPU's textures; take larger cells");
+    GpuPlanes maskers, rows, pooled;
+    for (const auto& [planes, label] :
+         {std::pair{&maskers, "maskers"}, {&rows, "pooled maskers"}, {&pooled, "pooled maskers"}}) {
+        auto made = GpuPlanes::create(size, 1, PlaneFormat::full, label);
+        if (!made) return made.error();
+        *planes = std::move(*made);
+    }
+    auto grid = GpuPlanes::create({cells.x, cells.y * band_count}, 1, PlaneFormat::single, "elevations");
+    if (!grid) return grid.error();
+    PlanePasses passes;
+    auto done = for_each_reference_band(passes, [&](std::size_t level, const GpuPlanes& of_reference) -> Result<void> {
+        const glm::ivec2 here = bands[level].size;
+        see(passes, level, of_reference, Sight::maskers, maskers);
+        blur(passes, maskers.texture(), here, pooling_kernel, rows, pooled);
+        const int first_row = static_cast<int>(level) * cells.y;
+        elevate->set(0, here);
+        elevate->set(1, glm::vec4(tables.masking_power, tables.masking_knee, tables.least_masker, tables.most_masker));
+        elevate->set(2, glm::ivec2(cell_px, static_cast<int>(level)));
+        elevate->set(3, glm::ivec2(0, first_row));
+        passes.draw(*elevate, *grid, cells, {pooled.texture()}, first_row);
+        return {};
+    });
+    if (!done) return done;
+    elevations = Elevations{cell_px, cells, std::move(*grid)};
+    return {};
+}
+
 VisibilityPasses::VisibilityPasses(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 VisibilityPasses::VisibilityPasses(VisibilityPasses&&) noexcept = default;
 VisibilityPasses& VisibilityPasses::operator=(VisibilityPasses&&) noexcept = default;
@@ -722,6 +778,23 @@ Result<std::vector<float>> VisibilityPasses::read_thresholds() const {
     });
     if (!done) return done.error();
     return values;
+}
+
+Result<void> VisibilityPasses::map_elevations(int cell_px) {
+    return in_context(impl_->context, "Mapping elevations", [&] { return impl_->map_elevations(cell_px); });
+}
+
+Result<ElevationGrid> VisibilityPasses::read_elevations() const {
+    if (!impl_->elevations) return judge_error("there is no map of elevations yet");
+    const Impl::Elevations& from = *impl_->elevations;
+    ElevationGrid grid{from.cell_px, from.cells.x, from.cells.y, {}};
+    auto done = in_context(impl_->context, "Reading elevations", [&]() -> Result<void> {
+        grid.elevation = read_floats(from.planes.texture(),
+                                     {from.cells.x, from.cells.y * static_cast<int>(impl_->bands.size())});
+        return {};
+    });
+    if (!done) return done.error();
+    return grid;
 }
 
 unsigned VisibilityPasses::thresholds_texture() const noexcept {

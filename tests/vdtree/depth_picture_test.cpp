@@ -65,9 +65,10 @@ std::vector<glm::dvec3> random_places(std::mt19937_64& random, int count) {
     return places;
 }
 
-DepthPicture::Footprint footprint_of(const DepthPicture& picture, std::span<const glm::dvec3> places) {
-    DepthPicture::Footprint all;
-    for (const glm::dvec3& place : places) all.add(picture.footprint(place));
+Footprint footprint_of(const DepthPicture& picture, std::span<const glm::dvec3> places) {
+    Footprint all;
+    const Projector project(picture.view());
+    for (const glm::dvec3& place : places) all.add(project(place));
     return all;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <perception/judge.h>
+#include <perception/units.h>
 
 namespace unseen::perception {
 
@@ -47,6 +48,7 @@ struct JudgeTables {
         std::vector<float> kernel; // from the middle on, along one axis; at most 12 values
     };
     struct Band { // level 0 first, the base last
+        CyclesPerDegree nominal = {}; // the frequency that it sees best
         float of_patch = 1;
         std::array<Gaussian, 3> window; // the law of area; from the widest on
         std::vector<Node> nodes;        // [e * luminances + l]

@@ -182,16 +182,17 @@ struct Dimming {
 class Eye {
 public:
     Eye(const CsfTable& csf, double eccentricity_deg, double luminance_cdm2, const Screen& screen, const Bands& bands,
-        const Dimming& dimming, const FoldModel& model)
+        const Dimming& dimming, const BandElevation& masking, const FoldModel& model)
         : screen_(screen), model_(model) {
         // To contrasts over the pattern's own luminance, by octaves that the mean around it is less: [octaves][band].
         Sensitivities sensitivities(dimming.most + 1);
         for (std::size_t octaves = 0; octaves <= dimming.most; ++octaves)
             for (std::size_t band = 0; band < bands.lowest_cpd.size(); ++band) {
                 const double less = std::exp2(static_cast<double>(octaves));
-                const double here =
-                    less * csf.monotone_sensitivity(CyclesPerDegree(bands.lowest_cpd[band]), Degrees(eccentricity_deg),
-                                                    Luminance(luminance_cdm2 / less));
+                const double cpd = bands.lowest_cpd[band];
+                const double here = less / masking.at(cpd) *
+                                    csf.monotone_sensitivity(CyclesPerDegree(cpd), Degrees(eccentricity_deg),
+                                                             Luminance(luminance_cdm2 / less));
                 sensitivities[octaves].push_back(octaves > 0 ? std::max(here, sensitivities[octaves - 1][band]) : here);
             }
         const double needed = needed_sensitivity(model, Degrees(eccentricity_deg));
@@ -270,11 +271,11 @@ private:
 // for the rows' numbers, begin again with coarser ones.
 class SwitchDistances {
 public:
-    // `added`: rows that add() will ask for.
+    // `most_patterns`: for which there are rows, besides the first row and those that add() will ask for.
     SwitchDistances(const Levels& levels, const Screen& screen, const CsfTable& csf, const FoldModel& model,
-                    const Surround& surround, std::size_t bins, std::size_t added)
-        : levels_(levels), screen_(screen), csf_(csf), model_(model), surround_(surround),
-          bands_(screen.highest_cpd, model, csf.samples().summation), bins_(bins), most_patterns_(last_row - added),
+                    const Surround& surround, const BandElevation& masking, std::size_t bins, std::size_t most_patterns)
+        : levels_(levels), screen_(screen), csf_(csf), model_(model), surround_(surround), masking_(masking),
+          bands_(screen.highest_cpd, model, csf.samples().summation), bins_(bins), most_patterns_(most_patterns),
           discs_(luminance_count), eyes_(luminance_count) {
         begin();
     }
@@ -325,8 +326,6 @@ public:
     std::vector<float> take() { return std::move(switch_distance_); }
 
 private:
-    static constexpr std::size_t last_row = std::numeric_limits<std::uint16_t>::max();
-
     void begin() {
         rows_.clear();
         switch_distance_.assign(bins_, DistanceCriterion::never_visible); // row 0: what changes nothing
@@ -340,7 +339,7 @@ private:
             const Dimming dimming(bands_, surround_, cdm2, screen_.highest_cpd, model_);
             for (std::size_t b = 0; b < bins_; ++b)
                 eyes.emplace_back(csf_, static_cast<double>(b) * degrees_per_bin, cdm2, screen_, bands_, dimming,
-                                  model_);
+                                  masking_, model_);
         }
         return eyes[bin];
     }
@@ -415,6 +414,7 @@ private:
     const CsfTable& csf_;
     const FoldModel& model_;
     const Surround surround_;
+    const BandElevation& masking_;
     const Bands bands_;
     std::size_t bins_, most_patterns_;
     int coarseness_ = 1;
@@ -573,8 +573,9 @@ void fold_in_stages(const vdtree::SoundTree& tree, std::span<const FoldError> er
 
 } // namespace
 
-Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const FoldErrors& measured,
-                                       const vdtree::View& view, const FoldTestOptions& options) {
+DistanceCriterion::Parts criterion_parts(const vdtree::SoundTree& tree, const FoldErrors& measured,
+                                         const vdtree::View& view, const FoldTestOptions& options,
+                                         const BandElevation& masking, std::size_t most_rows) {
     const std::span<const FoldError> errors = measured.of_nodes;
     const NodeId nodes = tree.interior_count();
     const Screen screen(view, options);
@@ -591,13 +592,13 @@ Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const Fold
     parts.silhouette_lengths.resize(nodes);
     const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
     const Surround surround = surround_of(tree, options);
-    SwitchDistances switch_distances(levels, screen, csf, options.model, surround, parts.eccentricity_bins,
-                                     measured.stages.size());
+    SwitchDistances switch_distances(levels, screen, csf, options.model, surround, masking, parts.eccentricity_bins,
+                                     most_rows - 1 - measured.stages.size());
     std::vector<Shown> patches, strips;
     while (!find_shown(tree, errors, options, levels, csf, screen.highest_cpd, switch_distances, patches, strips))
         switch_distances.coarsen();
     const std::vector<float> distances =
-        stage_distances(tree, measured.stages, screen, options, parts.eccentricity_bins);
+        stage_distances(tree, measured.stages, screen, options, masking, parts.eccentricity_bins);
     if (!distances.empty() && object_radius > 0) {
         std::vector<Shown> stages;
         for (std::size_t first = 0; first < distances.size(); first += parts.eccentricity_bins) {
@@ -615,7 +616,13 @@ Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const Fold
         parts.silhouette_lengths[node] = strips[node].length;
     }
     parts.switch_distance = switch_distances.take();
-    return DistanceCriterion::create(tree, std::move(parts));
+    return parts;
+}
+
+Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const FoldErrors& measured,
+                                       const vdtree::View& view, const FoldTestOptions& options) {
+    constexpr std::size_t all_rows = std::size_t{std::numeric_limits<std::uint16_t>::max()} + 1;
+    return DistanceCriterion::create(tree, criterion_parts(tree, measured, view, options, {}, all_rows));
 }
 
 double needed_sensitivity(const FoldModel& model, Degrees eccentricity) {

@@ -7,6 +7,7 @@
 #include <perception/criterion.h>
 #include <vdtree/vertex_tree.h>
 
+#include "fold/band_elevation.h"
 #include "fold/fold_screen.h"
 #include "measure/fold_stages.h"
 
@@ -17,6 +18,7 @@ namespace unseen::perception {
 // will do. Never less than the diameter of the mesh's sphere: from nearer the eye may be among what the pictures show
 // from outside. Empty where there are no stages.
 std::vector<float> stage_distances(const vdtree::VertexTree& tree, std::span<const FoldStage> stages,
-                                   const Screen& screen, const FoldTestOptions& options, std::size_t bins);
+                                   const Screen& screen, const FoldTestOptions& options, const BandElevation& masking,
+                                   std::size_t bins);
 
 } // namespace unseen::perception

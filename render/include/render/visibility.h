@@ -92,6 +92,13 @@ struct VisibilitySummary {
     std::uint64_t visible_pixels = 0;
 };
 
+// By how much a picture raises thresholds, at least, in cells of a grid over it.
+struct ElevationGrid {
+    int cell_px = 0;              // a side; cells at the right and the bottom may reach beyond the picture
+    int columns = 0, rows = 0;
+    std::vector<float> elevation; // [(band * rows + row) * columns + column], 1 or more; bands as in the tables
+};
+
 // Prepares a reference once, and judges any number of pictures by it. What is not called for is not made: planes for
 // judging at the first judge(), the map of thresholds at the first map_thresholds(), and without a gaze nothing knows of
 // eccentricity. The same pictures give the same bits on the same GPU. Move-only; keeps a handle to the context.
@@ -123,6 +130,13 @@ public:
     Result<void> map_thresholds();
     Result<std::vector<float>> read_thresholds() const; // fails where there is no map yet
     unsigned thresholds_texture() const noexcept;       // 0 before there is a map
+
+    // What the reference masks, band by band: the masker of a band is the mean around a sample, by a Gaussian of 1.5
+    // samples, and a cell has the least of all samples that stand in it, or around it. So what lies in some cells is
+    // masked by no less than the least of theirs. Reading waits for the GPU, but for less than reading a picture would.
+    // Fails on cells of less than 1 pixel, and of more than 64.
+    Result<void> map_elevations(int cell_px = 8);
+    Result<ElevationGrid> read_elevations() const; // fails where there is no map yet
 
 private:
     struct Impl;

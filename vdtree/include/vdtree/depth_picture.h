@@ -6,9 +6,8 @@
 #include <span>
 #include <vector>
 
-#include <glm/vec3.hpp>
-
 #include <vdtree/distance_criterion.h>
+#include <vdtree/footprint.h>
 #include <vdtree/result.h>
 #include <vdtree/vertex_tree.h>
 #include <vdtree/view.h>
@@ -26,15 +25,6 @@ public:
 
     const View& view() const noexcept { return levels_->view; }
 
-    // What points cover of the window, and how near they come. That of all of several points holds all between them.
-    struct Footprint {
-        double left = 1e300, top = 1e300, right = -1e300, bottom = -1e300; // pixels
-        double nearest = 1e300; // along the view's axis, world units; not above 0: beside or behind the eye
-
-        void add(const Footprint& other) noexcept;
-    };
-    Footprint footprint(glm::dvec3 point) const noexcept; // in the world
-
     // Whether nothing between these points can be seen: at all pixels that they cover, and a pixel around, what is shown
     // is nearer than all of them. What is beside the window is not seen, either. A footprint that holds one that is seen
     // is seen.
@@ -47,8 +37,6 @@ private:
     };
     struct Levels {
         View view;
-        CameraFrame camera;
-        double focal_px = 0;
         std::vector<Level> levels;
     };
     explicit DepthPicture(std::shared_ptr<const Levels> levels) : levels_(std::move(levels)) {}
@@ -57,10 +45,8 @@ private:
     std::shared_ptr<const Levels> levels_;
 };
 
-// Which interior nodes' folds the picture hides, a bit a node, the first node's lowest. Hidden is what lies between the
-// corners of all triangles that touch the support, the node's proxy, and those of all nodes under it: so what is there
-// before and after the fold, as long as the neighbours are unfolded, or hidden as well. Fails where VertexTree::check()
-// does. Cost: some 50 ns a triangle, and 40 bytes a node meanwhile.
+// Which interior nodes' folds the picture hides, a bit a node, the first node's lowest: those of whose footprints it
+// shows nothing (find_footprints()). Fails where VertexTree::check() does. Cost: some 50 ns a triangle, and 40 bytes a node meanwhile.
 Result<std::vector<std::uint64_t>> find_hidden(const VertexTree& tree, const Similarity& placement,
                                                const DepthPicture& picture);
 

@@ -33,6 +33,7 @@
 #include <vdtree/cut.h>
 #include <vdtree/depth_picture.h>
 #include <vdtree/distance_criterion.h>
+#include <vdtree/footprint.h>
 #include <vdtree/geomorph.h>
 #include <vdtree/lighting.h>
 #include <vdtree/occluders.h>

@@ -4,10 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <string>
 
-#include <glm/geometric.hpp>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -38,8 +36,6 @@ Result<DepthPicture> DepthPicture::create(const View& view, std::span<const floa
         if (!(depth[i] > 0)) return invalid_argument("The depth at pixel " + std::to_string(i) + " must be above 0.");
     auto all = std::make_shared<Levels>();
     all->view = view;
-    all->camera = camera_frame(view);
-    all->focal_px = view.height / (2 * std::tan(view.fov_y_degrees * std::numbers::pi / 360));
     all->levels.push_back({view.width, view.height, {depth.begin(), depth.end()}});
     while (all->levels.back().width > 1 || all->levels.back().height > 1) {
         const Level& fine = all->levels.back();
@@ -73,22 +69,6 @@ float DepthPicture::farthest(int left, int top, int right, int bottom) const noe
     return most;
 }
 
-void DepthPicture::Footprint::add(const Footprint& other) noexcept {
-    left = std::min(left, other.left), top = std::min(top, other.top);
-    right = std::max(right, other.right), bottom = std::max(bottom, other.bottom);
-    nearest = std::min(nearest, other.nearest);
-}
-
-DepthPicture::Footprint DepthPicture::footprint(glm::dvec3 point) const noexcept {
-    const Levels& all = *levels_;
-    const glm::dvec3 from_eye = point - all.view.eye;
-    const double along = -glm::dot(from_eye, all.camera.back), scale = all.focal_px / along;
-    if (!(along > 0)) return {.nearest = 0};
-    const double x = 0.5 * all.view.width + scale * glm::dot(from_eye, all.camera.right);
-    const double y = 0.5 * all.view.height - scale * glm::dot(from_eye, all.camera.up);
-    return {x, y, x, y, along};
-}
-
 bool DepthPicture::hides(const Footprint& of) const noexcept {
     if (!(of.nearest > 0)) return false;
     const int width = levels_->view.width, height = levels_->view.height;
@@ -102,22 +82,9 @@ bool DepthPicture::hides(const Footprint& of) const noexcept {
 
 Result<std::vector<std::uint64_t>> find_hidden(const VertexTree& tree, const Similarity& placement,
                                                const DepthPicture& picture) {
-    const auto sound = SoundTree::of(tree);
-    if (!sound) return sound.error();
+    const auto footprints = find_footprints(tree, placement, picture.view());
+    if (!footprints) return footprints.error();
     const NodeId interior = tree.interior_count();
-    const auto at = [&](NodeId node) {
-        return picture.footprint(placement.to_world(tree.origin() + glm::dvec3(tree.positions()[node])));
-    };
-    std::vector<DepthPicture::Footprint> footprints(tree.node_count());
-    tbb::parallel_for(NodeId{0}, tree.node_count(), [&](NodeId node) { footprints[node] = at(node); });
-    // Leaves: all triangles that touch them. From their own places, not from what has grown.
-    std::vector<DepthPicture::Footprint> leaves(footprints.begin() + interior, footprints.end());
-    for (const Triangle& triangle : sound->triangles())
-        for (const Index corner : triangle)
-            for (const Index other : triangle) leaves[corner].add(footprints[interior + other]);
-    std::copy(leaves.begin(), leaves.end(), footprints.begin() + interior);
-    for (NodeId node = tree.node_count(); node-- > 1;) footprints[sound->parents()[node]].add(footprints[node]);
-
     constexpr NodeId word = 64;
     std::vector<std::uint64_t> hidden((interior + word - 1) / word, 0);
     constexpr std::size_t grain = 64;
@@ -125,7 +92,7 @@ Result<std::vector<std::uint64_t>> find_hidden(const VertexTree& tree, const Sim
         for (std::size_t w = range.begin(); w < range.end(); ++w) {
             const NodeId end = std::min(static_cast<NodeId>((w + 1) * word), interior);
             for (auto node = static_cast<NodeId>(w * word); node < end; ++node)
-                if (picture.hides(footprints[node])) hidden[w] |= std::uint64_t{1} << (node % word);
+                if (picture.hides((*footprints)[node])) hidden[w] |= std::uint64_t{1} << (node % word);
         }
     });
     return hidden;
