@@ -58,7 +58,7 @@ bool is_limited(const session::Request& request) {
 
 FlightChanges::FlightChanges(const session::Session& session, Renderers renderers)
     : session_(session), renderers_(std::move(renderers)), full_cut_(session.tree()), follower_(session),
-      watch_(judge_options()) {
+      watch_(session::judge_options(session.observer())) {
     full_cut_.unfold_all();
 }
 
@@ -72,15 +72,6 @@ Result<FlightChanges> FlightChanges::create(const session::Session& session, con
     if (glide_s)
         if (auto set = changes.follower_.set_glide(*glide_s); !set) return set.error();
     return changes;
-}
-
-perception::JudgeOptions FlightChanges::judge_options() const {
-    const session::Observer& observer = session_.observer();
-    perception::JudgeOptions options{.display = observer.display};
-    options.csf_table = observer.csf;
-    options.gain = observer.csf ? 1 : observer.person.gain;
-    if (observer.gaze) options.gaze_px = observer.gaze->px;
-    return options;
 }
 
 // By how many pixels the picture of the scene moves at most from one view to another, by points all over its sphere.
@@ -131,7 +122,7 @@ Result<FrameChange> FlightChanges::after(const session::Follower& flight, const 
     const auto drawn = renderers_.full.draw(full_cut_, view, options, session_.scene().objects.front().placement);
     if (!drawn) return drawn.error();
     const perception::Image full = luminance_image(*drawn, display), now = luminance_image(frame, display);
-    const perception::JudgeOptions judging = judge_options();
+    const perception::JudgeOptions judging = session::judge_options(session_.observer());
     const auto judge = perception::Judge::create(full, judging);
     if (!judge) return judge.error();
     const auto judged = judge->judge(now);

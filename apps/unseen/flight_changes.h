@@ -44,7 +44,6 @@ private:
         render::Renderer full, cut;
     };
     FlightChanges(const session::Session& session, Renderers renderers);
-    perception::JudgeOptions judge_options() const;
     double picture_pixels(const vdtree::View& from, const vdtree::View& to) const;
     Result<perception::Image> draw_cut(const session::Follower& follower, const vdtree::View& view,
                                        const render::DrawOptions& options);

@@ -30,6 +30,14 @@ std::string describe(const Observer& observer) {
            ": of measured people, " + rounded(100 * person.share_above, 2) + "% see more)";
 }
 
+perception::JudgeOptions judge_options(const Observer& observer) {
+    perception::JudgeOptions options{.display = observer.display};
+    options.csf_table = observer.csf;
+    options.gain = observer.csf ? 1 : observer.person.gain;
+    if (observer.gaze) options.gaze_px = observer.gaze->px;
+    return options;
+}
+
 Result<ObserverChoice> choose_observer(const std::string& name_or_file) {
     const auto person = perception::person(name_or_file);
     if (person) return ObserverChoice{*person, {}};

@@ -10,6 +10,7 @@
 #include <glm/vec4.hpp>
 
 #include <render/draw.h>
+#include <render/visibility.h>
 
 namespace unseen::render {
 
@@ -47,6 +48,9 @@ public:
     // The mean, the background where nothing was added: linear RGB and relative luminance, row-major from the top left.
     // Waits for the GPU. The pixels are the sum's and stay until the next call.
     Result<std::span<const glm::vec4>> mean();
+
+    // The mean relative luminance where it is, on the GPU, for passes that read it: of what was added so far.
+    LuminanceTexture mean_luminance() const noexcept;
 
 private:
     struct Impl;

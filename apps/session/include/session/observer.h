@@ -10,6 +10,7 @@
 
 #include <perception/csf.h>
 #include <perception/display.h>
+#include <perception/judge.h>
 #include <perception/person.h>
 #include <vdtree/view.h>
 
@@ -34,6 +35,9 @@ struct Observer {
 
 // Whose eyes, in words: "the default observer (castleCSF x 2: of measured people, 8.7% see more)".
 std::string describe(const Observer& observer);
+
+// How judges of pictures take this observer; of a gaze its place alone.
+perception::JudgeOptions judge_options(const Observer& observer);
 
 // A person by name (perception/person.h), or the file of a viewer's table.
 struct ObserverChoice {

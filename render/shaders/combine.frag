@@ -1,0 +1,44 @@
+// Layers put together by their depths, all of them or all but one; or, of block by block pixels, the mean of that.
+// What is nearer hides what is farther. Of equal depths the earlier layer is taken, and the background last, as where
+// all is drawn at once.
+layout(binding = 0) uniform sampler2DArray colours; // slice 0: the background
+layout(binding = 1) uniform sampler2DArray depths;  // 1 at the near plane, 0 at infinity
+#ifdef MASKED
+layout(binding = 2) uniform sampler2DArray masks;
+#endif
+layout(location = 0) uniform ivec4 layers; // how many, the one that is left out (-1: none), pixels of a block's side
+layout(location = 1) uniform ivec2 size;   // of the layers
+
+layout(location = 0) out vec4 pixel;
+
+vec4 nearest_at(ivec2 at) {
+    float nearest = 0.0;
+    int chosen = 0;
+    for (int i = 1; i <= layers.x; ++i) {
+        if (i - 1 == layers.y)
+            continue;
+        float depth = texelFetch(depths, ivec3(at, i), 0).r;
+        if (depth > nearest) {
+            nearest = depth;
+            chosen = i;
+        }
+    }
+    if (texelFetch(depths, ivec3(at, 0), 0).r > nearest)
+        chosen = 0;
+    vec4 colour = texelFetch(colours, ivec3(at, chosen), 0);
+#ifdef MASKED
+    if (layers.y >= 0)
+        colour *= texelFetch(masks, ivec3(at, 1 + layers.y), 0).r;
+#endif
+    return colour;
+}
+
+void main() {
+    ivec2 first = ivec2(gl_FragCoord.xy) * layers.z, past = min(first + layers.z, size);
+    vec4 sum = vec4(0.0);
+    for (int y = first.y; y < past.y; ++y)
+        for (int x = first.x; x < past.x; ++x)
+            sum += nearest_at(ivec2(x, y));
+    ivec2 count = past - first;
+    pixel = sum / float(count.x * count.y);
+}

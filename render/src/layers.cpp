@@ -1,0 +1,311 @@
+// Layers are slices of array textures, so that one pass reads any number of them.
+#include <render/layers.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include <vdtree/internal/errors.h>
+
+#include "gl.h"
+#include "shaders.h"
+#include "surface_pass.h"
+
+namespace unseen::render {
+namespace {
+
+constexpr int most_block = 16;
+// Of the farthest centre's distance over the nearest's: planes nearer than that would part what touches the eye.
+constexpr double largest_ratio = 1e3;
+
+enum UniformLocation { layers_location = 0, size_location = 1 };
+
+Texture2d array_texture(const char* label) {
+    GLuint id = 0;
+    glCreateTextures(GL_TEXTURE_2D_ARRAY, 1, &id);
+    if (id != 0) glObjectLabel(GL_TEXTURE, id, -1, label);
+    return Texture2d::wrap(id);
+}
+
+std::uint64_t bytes_a_pixel(ColourFormat format) { return format == ColourFormat::rgba32f ? 16 : 8; }
+
+Result<void> check_layers(int layers) {
+    if (layers >= 1 && layers <= most_layers) return {};
+    return invalid_argument("A picture is split into 1 to " + std::to_string(most_layers) + " layers, not " +
+                            std::to_string(layers) + ".");
+}
+
+} // namespace
+
+Result<LayerSplit> split_into_layers(std::span<const glm::dvec3> centres, const vdtree::View& view, int layers) {
+    if (auto valid = check_layers(layers); !valid) return valid.error();
+    if (auto valid = vdtree::validate(view); !valid) return valid.error();
+    const glm::dvec3 back = vdtree::camera_frame(view).back;
+    std::vector<double> depths;
+    double nearest = 0, farthest = 0;
+    for (std::size_t i = 0; i < centres.size(); ++i) {
+        const double depth = glm::dot(view.eye - centres[i], back);
+        if (!std::isfinite(depth))
+            return invalid_argument("Object " + std::to_string(i) +
+                                    " cannot be put into a layer: its centre is not finite.");
+        depths.push_back(depth);
+        if (!(depth > 0)) continue;
+        nearest = nearest > 0 ? std::min(nearest, depth) : depth;
+        farthest = std::max(farthest, depth);
+    }
+    LayerSplit split;
+    split.layer_of.assign(centres.size(), 0);
+    if (!(farthest > nearest)) return split;
+    nearest = std::max(nearest, farthest / largest_ratio);
+    const double factor = std::log(farthest / nearest) / layers;
+    std::vector<int> occupied(static_cast<std::size_t>(layers), 0);
+    for (std::size_t i = 0; i < depths.size(); ++i) {
+        const double steps = depths[i] > nearest ? std::log(depths[i] / nearest) / factor : 0;
+        split.layer_of[i] = std::min(static_cast<int>(steps), layers - 1);
+        occupied[static_cast<std::size_t>(split.layer_of[i])] = 1;
+    }
+    std::vector<int> number(occupied.size(), 0);
+    for (std::size_t i = 0; i < occupied.size(); ++i) {
+        number[i] = split.count;
+        if (occupied[i] == 0) continue;
+        if (split.count > 0) split.borders.push_back(nearest * std::exp(factor * static_cast<double>(i)));
+        ++split.count;
+    }
+    for (int& layer : split.layer_of) layer = number[static_cast<std::size_t>(layer)];
+    if (split.count > 1) return split;
+    split.count = 0;
+    split.borders.clear();
+    return split;
+}
+
+struct LayerPasses::Impl {
+    Impl(const Context& context_, Target composite_, Target combination_, const LayerOptions& options_)
+        : context(context_), options(options_), composite(std::move(composite_)), combination(std::move(combination_)) {
+    }
+    Impl(const Impl&) = delete;
+    Impl& operator=(const Impl&) = delete;
+    ~Impl() { static_cast<void>(context.make_current()); } // for the objects, which go next
+
+    struct Slice {
+        FramebufferObject framebuffer; // outlives the target
+        Target target;
+    };
+
+    Result<void> need_slices(int count);
+    Result<void> draw_slice(std::size_t slice, std::span<const Item> items, const glm::vec4& clear);
+    Result<void> put_together(int left_out, int block, const Target& to);
+
+    Context context; // first, and so gone last
+    LayerOptions options;
+    Target composite, combination;
+    Texture2d colours, depths, masks;
+    std::vector<Slice> slices; // the background, then layers
+    const Program *combine = nullptr, *combine_masked = nullptr;
+    VertexArray no_arrays; // for the full-screen triangle, which comes from nowhere
+
+    // Of the last draw.
+    Camera camera;
+    std::vector<Item> behind; // the background, for combinations of scenes without layers
+    glm::vec4 clear = glm::vec4(0);
+    int layer_count = 0, combinations = 0;
+    bool has_background = false; // in its slice
+    LayerCounts done;
+};
+
+// One framebuffer a slice: the slices are made at once, for textures do not grow.
+Result<void> LayerPasses::Impl::need_slices(int count) {
+    if (slices.size() >= static_cast<std::size_t>(count)) return {};
+    slices.clear();
+    const int width = composite.width(), height = composite.height();
+    colours = array_texture("layers");
+    depths = array_texture("depths of layers");
+    const GLenum format = options.format == ColourFormat::rgba32f ? GL_RGBA32F : GL_RGBA16F;
+    glTextureStorage3D(colours.id(), 1, format, width, height, count);
+    glTextureStorage3D(depths.id(), 1, GL_DEPTH_COMPONENT32F, width, height, count);
+    if (options.has_masks) {
+        masks = array_texture("masks of layers");
+        glTextureStorage3D(masks.id(), 1, GL_R16F, width, height, count);
+    }
+    for (int i = 0; i < count; ++i) {
+        FramebufferObject framebuffer = FramebufferObject::create(i == 0 ? "background" : "layer");
+        const GLuint id = framebuffer.id();
+        glNamedFramebufferTextureLayer(id, GL_COLOR_ATTACHMENT0, colours.id(), 0, i);
+        glNamedFramebufferTextureLayer(id, GL_DEPTH_ATTACHMENT, depths.id(), 0, i);
+        if (masks) glNamedFramebufferTextureLayer(id, GL_COLOR_ATTACHMENT1, masks.id(), 0, i);
+        if (glCheckNamedFramebufferStatus(id, GL_DRAW_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE) {
+            slices.clear();
+            return unsupported(
+                "A picture of " + std::to_string(width) + "x" + std::to_string(height) +
+                " pixels cannot be split into " + std::to_string(count - 1) +
+                " layers: the graphics memory does not suffice; choose fewer layers, or a smaller size.");
+        }
+        auto target = Target::foreign(context, width, height, {id, false, true});
+        if (!target) {
+            slices.clear();
+            return target.error();
+        }
+        slices.push_back({std::move(framebuffer), std::move(*target)});
+    }
+    return {};
+}
+
+Result<void> LayerPasses::Impl::draw_slice(std::size_t slice, std::span<const Item> items, const glm::vec4& cleared) {
+    Target& target = slices[slice].target;
+    if (masks) {
+        const float lit = 1;
+        glClearTexSubImage(masks.id(), 0, 0, 0, static_cast<GLint>(slice), target.width(), target.height(), 1, GL_RED,
+                           GL_FLOAT, &lit);
+    }
+    ++done.surface_passes;
+    return render::draw(items, camera, target, {.colour = cleared});
+}
+
+Result<void> LayerPasses::Impl::put_together(int left_out, int block, const Target& to) {
+    const ShaderSource sources[] = {{ShaderSource::Stage::vertex, shaders::full_screen_vert},
+                                    {ShaderSource::Stage::fragment, shaders::combine_frag}};
+    const bool is_masked = masks && left_out >= 0;
+    const Program*& program = is_masked ? combine_masked : combine;
+    if (!program) {
+        const std::string_view masked[] = {"MASKED"};
+        auto found = is_masked ? context.impl().programs.named("combine masked", sources, masked)
+                               : context.impl().programs.named("combine", sources);
+        if (!found) return found.error();
+        program = *found;
+    }
+    if (!no_arrays) no_arrays = VertexArray::create("full screen");
+    set_fixed_state(to.impl());
+    glDisable(GL_DEPTH_TEST);
+    glDisable(GL_CULL_FACE);
+    glDisable(GL_BLEND);
+    to.impl().bind(0);
+    glBindTextureUnit(0, colours.id());
+    glBindTextureUnit(1, depths.id());
+    if (is_masked) glBindTextureUnit(2, masks.id());
+    glProgramUniform4i(program->id(), layers_location, layer_count, left_out, block, 0);
+    program->set(size_location, glm::ivec2(composite.width(), composite.height()));
+    program->use();
+    glBindVertexArray(no_arrays.id());
+    glDrawArrays(GL_TRIANGLES, 0, 3);
+    glBindVertexArray(0);
+    for (GLuint unit = 0; unit < 3; ++unit) glBindTextureUnit(unit, 0);
+    ++done.full_screen_passes;
+    return {};
+}
+
+LayerPasses::LayerPasses(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+LayerPasses::LayerPasses(LayerPasses&&) noexcept = default;
+LayerPasses& LayerPasses::operator=(LayerPasses&&) noexcept = default;
+LayerPasses::~LayerPasses() = default;
+
+Result<LayerPasses> LayerPasses::create(const Context& context, int width, int height, const LayerOptions& options) {
+    if (auto valid = check_layers(options.most); !valid) return valid.error();
+    if (options.format == ColourFormat::srgb8)
+        return invalid_argument("Layers keep luminance: choose rgba32f or rgba16f.");
+    if (options.block < 1 || options.block > most_block)
+        return invalid_argument("A combination's pixel is of 1 to " + std::to_string(most_block) +
+                                " pixels a side, not " + std::to_string(options.block) + ".");
+    auto composite = Target::create(context, width, height, {.colours = {options.format}, .label = "composite"});
+    if (!composite) return composite.error();
+    const auto blocks = [&](int pixels) { return (pixels + options.block - 1) / options.block; };
+    auto combination = Target::create(context, blocks(width), blocks(height),
+                                      {.colours = {options.format}, .depth = false, .label = "combination"});
+    if (!combination) return combination.error();
+    return LayerPasses(std::make_unique<Impl>(context, std::move(*composite), std::move(*combination), options));
+}
+
+Result<void> LayerPasses::draw(std::span<const Item> objects, std::span<const Item> background, const Camera& camera,
+                               const LayerSplit& split, const glm::vec4& clear) {
+    Impl& own = *impl_;
+    own.done = {};
+    own.layer_count = own.combinations = 0;
+    own.has_background = false;
+    if (split.layer_of.size() != objects.size())
+        return invalid_argument("The layers are of " + std::to_string(split.layer_of.size()) + " objects, not of " +
+                                std::to_string(objects.size()) + ".");
+    if (split.count > own.options.most)
+        return invalid_argument("The objects are in " + std::to_string(split.count) + " layers, and there are only " +
+                                std::to_string(own.options.most) + ".");
+    const auto is_none = [&](int layer) { return layer < 0 || layer >= std::max(split.count, 1); };
+    if (std::ranges::any_of(split.layer_of, is_none)) return invalid_argument("An object is in a layer that is none.");
+    std::vector<Item> all(objects.begin(), objects.end());
+    all.insert(all.end(), background.begin(), background.end());
+    own.camera = camera;
+    if (!camera.near_plane) {
+        const auto near = render::near_plane(all, camera.view);
+        if (!near) return near.error();
+        own.camera.near_plane = *near;
+    }
+    own.behind.assign(background.begin(), background.end());
+    own.clear = clear;
+    return in_context(own.context, "Drawing layers", [&]() -> Result<void> {
+        if (split.count == 0) {
+            ++own.done.surface_passes;
+            if (auto drawn = render::draw(all, own.camera, own.composite, {.colour = clear}); !drawn) return drawn;
+            own.combinations = objects.empty() ? 0 : 1;
+            return {};
+        }
+        if (auto made = own.need_slices(own.options.most + 1); !made) return made;
+        if (auto drawn = own.draw_slice(0, background, clear); !drawn) return drawn;
+        own.has_background = true;
+        std::vector<Item> items;
+        for (int layer = 0; layer < split.count; ++layer) {
+            items.clear();
+            for (std::size_t i = 0; i < objects.size(); ++i)
+                if (split.layer_of[i] == layer) items.push_back(objects[i]);
+            if (auto drawn = own.draw_slice(static_cast<std::size_t>(layer) + 1, items, glm::vec4(0)); !drawn)
+                return drawn;
+        }
+        own.layer_count = own.combinations = split.count;
+        return own.put_together(-1, 1, own.composite);
+    });
+}
+
+Result<void> LayerPasses::combine(int left_out) {
+    Impl& own = *impl_;
+    if (left_out < 0 || left_out >= own.combinations)
+        return invalid_argument("There is no layer " + std::to_string(left_out) + " to leave out, only " +
+                                std::to_string(own.combinations) + ".");
+    return in_context(own.context, "Combining layers", [&]() -> Result<void> {
+        if (!own.has_background) { // the scene was drawn at once
+            if (auto made = own.need_slices(1); !made) return made;
+            if (auto drawn = own.draw_slice(0, own.behind, own.clear); !drawn) return drawn;
+            own.has_background = true;
+        }
+        return own.put_together(own.layer_count == 0 ? -1 : left_out, own.options.block, own.combination);
+    });
+}
+
+int LayerPasses::combination_count() const noexcept { return impl_->combinations; }
+const Target& LayerPasses::composite() const noexcept { return impl_->composite; }
+const Target& LayerPasses::combination() const noexcept { return impl_->combination; }
+double LayerPasses::near_plane() const noexcept { return impl_->camera.near_plane.value_or(1); }
+
+const Target* LayerPasses::layer(int number) const noexcept {
+    if (number < 0 || number >= impl_->layer_count) return nullptr;
+    return &impl_->slices[static_cast<std::size_t>(number) + 1].target;
+}
+
+const Target* LayerPasses::background() const noexcept {
+    return impl_->has_background ? &impl_->slices.front().target : nullptr;
+}
+
+unsigned LayerPasses::colour_array() const noexcept { return impl_->colours.id(); }
+unsigned LayerPasses::depth_array() const noexcept { return impl_->depths.id(); }
+unsigned LayerPasses::mask_array() const noexcept { return impl_->masks.id(); }
+
+LayerCounts LayerPasses::counts() const noexcept {
+    LayerCounts counts = impl_->done;
+    const auto pixels = [](const Target& t) {
+        return static_cast<std::uint64_t>(t.width()) * static_cast<std::uint64_t>(t.height());
+    };
+    const std::uint64_t colour = bytes_a_pixel(impl_->options.format);
+    counts.textures = 3;
+    counts.texture_bytes = pixels(impl_->composite) * (colour + 4) + pixels(impl_->combination) * colour;
+    if (!impl_->slices.empty()) {
+        counts.textures += impl_->masks ? 3 : 2;
+        counts.texture_bytes += impl_->slices.size() * pixels(impl_->composite) * (colour + 4 + (impl_->masks ? 2 : 0));
+    }
+    return counts;
+}
+
+} // namespace unseen::render

@@ -1,0 +1,243 @@
+// Layers: where planes stand, that together they are the picture, and that without one they are the others'.
+#include "gl_test.h"
+#include "scenes.h"
+
+#include <limits>
+
+#define GL_GLEXT_PROTOTYPES 1
+#include <GL/glcorearb.h>
+#include <gmock/gmock.h>
+
+#include <render/layers.h>
+
+namespace {
+
+using namespace unseen::render;
+using namespace unseen::render::testing;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using LayersTest = unseen::render::testing::GlTest;
+using unseen::vdtree::View;
+
+// Looks along -z from the origin.
+View ahead(int width, int height) {
+    View view = frontal_view(width, height);
+    view.eye = {0, 0, 0}, view.target = {0, 0, -1};
+    return view;
+}
+
+TEST(LayerSplit, StandsAtEqualFactorsOfDistance) {
+    const std::vector<glm::dvec3> centres = {{0, 0, -1}, {5, 0, -3}, {0, 0, -9}, {0, 2, -27}, {0, 0, -81}, {0, 0, 4}};
+    const auto split = split_into_layers(centres, ahead(8, 8), 4);
+    ASSERT_TRUE(split) << split.error().message;
+    EXPECT_EQ(split->count, 4);
+    EXPECT_THAT(split->layer_of, ElementsAre(0, 1, 2, 3, 3, 0));
+    ASSERT_EQ(split->borders.size(), 3u);
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(split->borders[static_cast<std::size_t>(i)], std::pow(3, i + 1), 1e-9);
+}
+
+TEST(LayerSplit, LeavesOutWhatHoldsNothing) {
+    const std::vector<glm::dvec3> centres = {{0, 0, -1}, {0, 0, -100}, {0, 0, -101}};
+    const auto split = split_into_layers(centres, ahead(8, 8));
+    ASSERT_TRUE(split);
+    EXPECT_EQ(split->count, 2);
+    EXPECT_THAT(split->layer_of, ElementsAre(0, 1, 1));
+    // One object, one distance, or none at all: no layers.
+    for (const auto& few :
+         {std::vector<glm::dvec3>{}, {{0, 0, -1}}, {{0, 0, -2}, {1, 0, -2}}, {{0, 0, 3}, {0, 0, 4}}}) {
+        const auto none = split_into_layers(few, ahead(8, 8));
+        ASSERT_TRUE(none);
+        EXPECT_EQ(none->count, 0);
+        EXPECT_THAT(none->borders, IsEmpty());
+        EXPECT_EQ(none->layer_of, std::vector<int>(few.size(), 0));
+    }
+}
+
+TEST(LayerSplit, RefusesWhatIsNone) {
+    const std::vector<glm::dvec3> one = {{0, 0, -1}};
+    EXPECT_THAT(split_into_layers(one, ahead(8, 8), 0).error().message, HasSubstr("1 to 16 layers, not 0"));
+    EXPECT_THAT(split_into_layers(one, ahead(8, 8), 17).error().message, HasSubstr("not 17"));
+    const std::vector<glm::dvec3> bad = {{0, 0, -1}, {0, std::nan(""), 1}};
+    EXPECT_THAT(split_into_layers(bad, ahead(8, 8)).error().message, HasSubstr("Object 1 "));
+    View view = ahead(8, 8);
+    view.target = view.eye;
+    EXPECT_FALSE(split_into_layers(one, view));
+}
+
+// Three slanted strips that cross each other, and a wall.
+class Strips {
+public:
+    explicit Strips(const Context& context) {
+        const auto slanted = [](double turn, glm::vec4 colour) {
+            return transformed(rectangle({-0.9, -0.4}, {0.9, 0.4}, 0, colour), [=](glm::dvec3 p) {
+                return glm::dvec3(p.x * std::cos(turn) - p.y * std::sin(turn),
+                                  p.x * std::sin(turn) + p.y * std::cos(turn),
+                                  -2 + 0.8 * p.x - 0.01 * turn); // no two of one depth
+            });
+        };
+        add(context, slanted(0, {0.5, 0.1, 0.1, 1}), objects);
+        add(context, slanted(1, {0.1, 0.6, 0.1, 1}), objects);
+        add(context, slanted(2, {0.1, 0.1, 0.7, 1}), objects);
+        add(context, rectangle({-2, -1}, {2, 1.2}, -3, grey(0.3f)), background);
+    }
+
+    std::vector<Item> objects, background;
+    const LayerSplit split = {.layer_of = {2, 0, 1}, .count = 3, .borders = {1, 2}};
+
+private:
+    void add(const Context& context, const Mesh& mesh, std::vector<Item>& to) {
+        Scene& scene = *scenes_.emplace_back(std::make_unique<Scene>(mesh));
+        auto tree = GpuTree::create(context, scene.tree);
+        ASSERT_TRUE(tree);
+        GpuCut cut(*tree);
+        ASSERT_TRUE(cut.follow(scene.cut));
+        to.push_back({cut});
+    }
+    std::vector<std::unique_ptr<Scene>> scenes_;
+};
+
+std::vector<glm::vec4> drawn(const Context& context, std::vector<Item> items, const std::vector<Item>& background,
+                             const View& view, ColourFormat format = ColourFormat::rgba32f) {
+    auto target = Target::create(context, view.width, view.height, {.colours = {format}});
+    items.insert(items.end(), background.begin(), background.end());
+    EXPECT_TRUE(draw(items, {.view = view, .near_plane = 0.01}, *target));
+    return *read_pixels(*target);
+}
+
+TEST_F(LayersTest, TogetherAreThePictureToTheBit) {
+    const Strips strips(context());
+    for (const auto& [width, height] : {std::pair{37, 23}, {64, 64}, {1, 1}})
+        for (const ColourFormat format : {ColourFormat::rgba32f, ColourFormat::rgba16f}) {
+            const View view = ahead(width, height);
+            auto passes = LayerPasses::create(context(), width, height, {.format = format});
+            ASSERT_TRUE(passes) << passes.error().message;
+            ASSERT_TRUE(
+                passes->draw(strips.objects, strips.background, {.view = view, .near_plane = 0.01}, strips.split));
+            EXPECT_EQ(*read_pixels(passes->composite()),
+                      drawn(context(), strips.objects, strips.background, view, format));
+            ASSERT_EQ(passes->combination_count(), 3);
+            for (int left_out = 0; left_out < 3; ++left_out) {
+                ASSERT_TRUE(passes->combine(left_out));
+                std::vector<Item> others;
+                for (std::size_t i = 0; i < 3; ++i)
+                    if (strips.split.layer_of[i] != left_out) others.push_back(strips.objects[i]);
+                EXPECT_EQ(*read_pixels(passes->combination()),
+                          drawn(context(), others, strips.background, view, format));
+            }
+            // 3 layers, the background; the composite and 3 combinations.
+            EXPECT_EQ(passes->counts().surface_passes, 4);
+            EXPECT_EQ(passes->counts().full_screen_passes, 4);
+            EXPECT_EQ(passes->counts().textures, 5);
+            const std::uint64_t pixels = static_cast<std::uint64_t>(width * height);
+            const std::uint64_t colour = format == ColourFormat::rgba32f ? 16 : 8;
+            EXPECT_EQ(passes->counts().texture_bytes, pixels * (6 * (colour + 4) + (colour + 4) + colour));
+        }
+}
+
+TEST_F(LayersTest, ALayerHasItsObjectsAlone) {
+    const Strips strips(context());
+    auto passes = LayerPasses::create(context(), 32, 32);
+    ASSERT_TRUE(
+        passes->draw(strips.objects, strips.background, {.view = ahead(32, 32), .near_plane = 0.01}, strips.split));
+    const std::vector<Item> first = {strips.objects[1]};
+    auto target = Target::create(context(), 32, 32);
+    ASSERT_TRUE(draw(first, {.view = ahead(32, 32), .near_plane = 0.01}, *target, {.colour = glm::vec4(0)}));
+    EXPECT_EQ(*read_pixels(*passes->layer(0)), *read_pixels(*target));
+    EXPECT_EQ(*read_pixels(*passes->background()), drawn(context(), {}, strips.background, ahead(32, 32)));
+    EXPECT_EQ(passes->layer(3), nullptr);
+    EXPECT_NE(passes->colour_array(), 0u);
+    EXPECT_NE(passes->depth_array(), 0u);
+    EXPECT_EQ(passes->mask_array(), 0u);
+}
+
+TEST_F(LayersTest, DrawsAtOnceWhatIsNotSplit) {
+    const Strips strips(context());
+    const View view = ahead(40, 30);
+    auto passes = LayerPasses::create(context(), 40, 30);
+    const std::vector<Item> one = {strips.objects[0]};
+    ASSERT_TRUE(passes->draw(one, strips.background, {.view = view, .near_plane = 0.01}, {.layer_of = {0}}));
+    EXPECT_EQ(*read_pixels(passes->composite()), drawn(context(), one, strips.background, view));
+    EXPECT_EQ(passes->counts().surface_passes, 1);
+    EXPECT_EQ(passes->counts().full_screen_passes, 0);
+    EXPECT_EQ(passes->counts().textures, 3) << "no layers";
+    // All but the object is the background.
+    ASSERT_EQ(passes->combination_count(), 1);
+    ASSERT_TRUE(passes->combine(0));
+    EXPECT_EQ(*read_pixels(passes->combination()), drawn(context(), {}, strips.background, view));
+    EXPECT_EQ(passes->counts().surface_passes, 2);
+    // Without objects there is the background, and nothing to leave out.
+    ASSERT_TRUE(passes->draw({}, strips.background, {.view = view, .near_plane = 0.01}, {}));
+    EXPECT_EQ(*read_pixels(passes->composite()), drawn(context(), {}, strips.background, view));
+    EXPECT_EQ(passes->combination_count(), 0);
+    EXPECT_THAT(passes->combine(0).error().message, HasSubstr("no layer 0 to leave out"));
+    // And without anything, what it is cleared to.
+    ASSERT_TRUE(passes->draw({}, {}, {.view = view}, {}, glm::vec4(0.25f)));
+    EXPECT_THAT(*read_pixels(passes->composite()), ::testing::Each(glm::vec4(0.25f)));
+}
+
+TEST_F(LayersTest, BlocksAreMeans) {
+    const Strips strips(context());
+    const View view = ahead(37, 23);
+    auto passes = LayerPasses::create(context(), 37, 23, {.block = 4});
+    ASSERT_TRUE(passes->draw(strips.objects, strips.background, {.view = view, .near_plane = 0.01}, strips.split));
+    ASSERT_TRUE(passes->combine(0));
+    ASSERT_EQ(passes->combination().width(), 10);
+    ASSERT_EQ(passes->combination().height(), 6);
+    const auto full = drawn(context(), {strips.objects[0], strips.objects[2]}, strips.background, view);
+    const auto small = *read_pixels(passes->combination());
+    for (int y = 0; y < 6; ++y)
+        for (int x = 0; x < 10; ++x) {
+            glm::vec4 sum(0);
+            float count = 0;
+            for (int row = 4 * y; row < std::min(4 * y + 4, 23); ++row)
+                for (int column = 4 * x; column < std::min(4 * x + 4, 37); ++column, ++count)
+                    sum += full[static_cast<std::size_t>(row * 37 + column)];
+            EXPECT_NEAR(small[static_cast<std::size_t>(y * 10 + x)].a, sum.a / count, 1e-6f);
+        }
+}
+
+TEST_F(LayersTest, AMaskDarkensTheCombinationWithoutItsLayer) {
+    const Strips strips(context());
+    const View view = ahead(16, 16);
+    auto passes = LayerPasses::create(context(), 16, 16, {.has_masks = true});
+    ASSERT_TRUE(passes->draw(strips.objects, strips.background, {.view = view, .near_plane = 0.01}, strips.split));
+    ASSERT_TRUE(passes->combine(1));
+    const auto before = *read_pixels(passes->combination());
+    const float half = 0.5f;
+    glClearTexSubImage(passes->mask_array(), 0, 0, 0, 2, 16, 16, 1, GL_RED, GL_FLOAT, &half);
+    ASSERT_TRUE(passes->combine(1));
+    const auto after = *read_pixels(passes->combination());
+    for (std::size_t i = 0; i < before.size(); ++i) EXPECT_EQ(after[i], 0.5f * before[i]);
+    ASSERT_TRUE(passes->combine(0));
+    EXPECT_EQ(*read_pixels(passes->combination()),
+              drawn(context(), {strips.objects[0], strips.objects[2]}, strips.background, view));
+}
+
+TEST_F(LayersTest, RefusesWhatCannotBeSplit) {
+    const auto why = [&](int width, int height, const LayerOptions& options) {
+        const auto made = LayerPasses::create(context(), width, height, options);
+        return made ? std::string() : made.error().message;
+    };
+    EXPECT_THAT(why(8, 8, {.most = 17}), HasSubstr("1 to 16 layers, not 17"));
+    EXPECT_THAT(why(8, 8, {.most = 0}), HasSubstr("not 0"));
+    EXPECT_THAT(why(8, 8, {.format = ColourFormat::srgb8}), HasSubstr("rgba32f or rgba16f"));
+    EXPECT_THAT(why(8, 8, {.block = 17}), HasSubstr("1 to 16 pixels a side"));
+    EXPECT_THAT(why(0, 8, {}), HasSubstr("at least 1x1"));
+    EXPECT_THAT(why(largest_target_side() + 1, 8, {}), HasSubstr("choose a smaller size"));
+
+    const Strips strips(context());
+    auto passes = LayerPasses::create(context(), 8, 8, {.most = 2});
+    const auto refused = [&](const LayerSplit& split) {
+        const auto done = passes->draw(strips.objects, {}, {.view = ahead(8, 8)}, split);
+        return done ? std::string() : done.error().message;
+    };
+    EXPECT_THAT(refused(strips.split), HasSubstr("in 3 layers, and there are only 2"));
+    EXPECT_THAT(refused({.layer_of = {0, 1}, .count = 2}), HasSubstr("of 2 objects, not of 3"));
+    EXPECT_THAT(refused({.layer_of = {0, 1, 2}, .count = 2}), HasSubstr("a layer that is none"));
+    EXPECT_THAT(
+        passes->draw(strips.objects, {}, {.view = ahead(9, 8)}, {.layer_of = {0, 1, 0}, .count = 2}).error().message,
+        HasSubstr("9x8"));
+}
+
+} // namespace
