@@ -433,6 +433,15 @@ void add_visibility_option(CLI::App& verb, WhatOptions& o) {
         verb, "--visibility", o.visibility, {{"spheres", Visibility::spheres}, {"picture", Visibility::picture}},
         "What counts as hidden: what faces away or lies behind spheres inside solids (spheres; of 'unseen render' the "
         "default), or also all that lies behind what this picture shows (picture)");
+    add_choice<bool, bool>(
+        verb, "--masking", o.masks, {{"none", false}, {"scene", true}},
+        "Whether patterns of the scene mask what folds change (scene): bars before a statue, leaves, "
+        "and the statue's own; default: none");
+    verb.add_option(
+            "--layers", o.layers,
+            "With --masking scene: of depth, 1 to 16 (default: 5); objects are masked by what is in other layers")
+        ->type_name("N")
+        ->check(whole(1, 16));
 }
 
 } // namespace unseen::app

@@ -82,6 +82,8 @@ struct WhatOptions {
     std::optional<glm::dvec2> gaze_px;
     std::optional<double> velocity_deg_s; // of everything, on the retina
     Visibility visibility = Visibility::spheres;
+    bool masks = false; // the scene masks what folds change
+    int layers = 5;     // of depth, that mask each other
     perception::DegreesPerSecond velocity() const { return perception::DegreesPerSecond(velocity_deg_s.value_or(0)); }
 };
 

@@ -31,9 +31,13 @@ Result<void> run_calibration_window(calibration::Procedure&, const CalibrationWi
 Result<std::vector<GammaMatch>> match_gamma(const CalibrationWindowOptions&) { return no_window(); }
 Result<void> show_chart(const CalibrationWindowOptions&, const std::string&) { return no_window(); }
 
-Result<session::Simplification> simplify_as_seen(session::Session&, const vdtree::View&, const session::Request&) {
-    return Error{ErrorCode::unsupported, "--visibility picture is not in this build, for it was made without OpenGL; "
-                                         "configure it with -DUNSEEN_BUILD_RENDER=ON."};
+Result<session::Simplification> simplify_by(const WhatOptions& what, session::Session& session,
+                                            const vdtree::View& view, const session::Request& request,
+                                            const render::Context*) {
+    if (what.visibility == Visibility::spheres && !what.masks) return session.simplify(view, request);
+    return Error{ErrorCode::unsupported,
+                 "--visibility picture and --masking scene are not in this build, for it was made without OpenGL; "
+                 "configure it with -DUNSEEN_BUILD_RENDER=ON."};
 }
 
 Result<GpuComparison> compare_on_gpu(const perception::Image&, const perception::Image&,

@@ -4,7 +4,6 @@
 
 #include <perception/image.h>
 #include <render/renderer.h>
-#include <session_gpu/as_seen.h>
 
 #include "cut_report.h"
 #include "fly_through.h"
@@ -16,6 +15,7 @@
 #include "session_options.h"
 #include "terminal.h"
 #include "verbs.h"
+#include "visibility.h"
 
 namespace unseen::app {
 namespace {
@@ -68,9 +68,7 @@ Result<int> run(RenderArguments& a) {
         return Error{ErrorCode::invalid_argument, "--show is of one object, and the scene has " +
                                                       grouped(session->scene().objects.size()) +
                                                       ": leave it out, or give --as model."};
-    const auto result = a.what.visibility == Visibility::picture
-                            ? session::simplify_as_seen(*session, *context, view, request)
-                            : session->simplify(view, request);
+    const auto result = simplify_by(a.what, *session, view, request, &*context);
     if (!result) return result.error();
 
     auto renderer = SceneRenderer::create(*context, *session);
@@ -169,6 +167,7 @@ void check(const RenderArguments& a) {
     if (a.map) refuse("--show is for single pictures, and excludes --path.");
     if (a.what.visibility == Visibility::picture)
         refuse("--visibility picture is for single pictures, and excludes --path.");
+    if (a.what.masks) refuse("--masking scene is for single pictures, and excludes --path.");
     if (o.judges_changes && o.draws && !*o.draws) refuse("--no-draw and --changes exclude each other.");
     if (o.judges_changes && a.draw.wireframe) refuse("--changes are those of the model: leave --wireframe away.");
     if (a.out.empty()) return;

@@ -63,8 +63,7 @@ Result<int> run(const SimplifyArguments& a) {
                                                       ".glb or .gltf, or make one mesh of it with --as model."};
     const vdtree::View seen = make_view(*session, view);
     const session::Request request = a.what.request_for(session->triangle_count());
-    auto result = a.what.visibility == Visibility::picture ? simplify_as_seen(*session, seen, request)
-                                                           : session->simplify(seen, request);
+    auto result = simplify_by(a.what, *session, seen, request);
     if (!result) return result.error();
     const auto start = std::chrono::steady_clock::now();
     for (const vdtree::Cut& cut : result->cuts) cut.indices();

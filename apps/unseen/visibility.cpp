@@ -4,11 +4,18 @@
 
 namespace unseen::app {
 
-Result<session::Simplification> simplify_as_seen(session::Session& session, const vdtree::View& view,
-                                                 const session::Request& request) {
-    const auto context = render::Context::headless();
-    if (!context) return context.error();
-    return session::simplify_as_seen(session, *context, view, request);
+Result<session::Simplification> simplify_by(const WhatOptions& what, session::Session& session,
+                                            const vdtree::View& view, const session::Request& request,
+                                            const render::Context* context) {
+    if (what.visibility == Visibility::spheres && !what.masks) return session.simplify(view, request);
+    session::AsSeenOptions options;
+    options.folds_hidden = what.visibility == Visibility::picture;
+    options.masking = what.masks ? session::Masking::scene : session::Masking::none;
+    options.layers = what.layers;
+    if (context) return session::simplify_as_seen(session, *context, view, request, options);
+    const auto own = render::Context::headless();
+    if (!own) return own.error();
+    return session::simplify_as_seen(session, *own, view, request, options);
 }
 
 } // namespace unseen::app

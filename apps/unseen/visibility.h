@@ -1,12 +1,20 @@
-// What pictures hide, for verbs that draw none.
+// What pictures hide and mask, for verbs that draw none.
 #pragma once
 
 #include <session/session.h>
 
+#include "options.h"
+
+namespace unseen::render {
+class Context;
+}
+
 namespace unseen::app {
 
-// session::simplify_as_seen(), in a context of its own. In builds without OpenGL it fails.
-Result<session::Simplification> simplify_as_seen(session::Session& session, const vdtree::View& view,
-                                                 const session::Request& request);
+// Where the options go by pictures session::simplify_as_seen(), by default in a context of its own; in builds without
+// OpenGL it fails. Else the session's own simplification.
+Result<session::Simplification> simplify_by(const WhatOptions& what, session::Session& session,
+                                            const vdtree::View& view, const session::Request& request,
+                                            const render::Context* context = nullptr);
 
 } // namespace unseen::app

@@ -219,6 +219,18 @@ Effect hidden_effect(const Sight& sight, const Decision& decision, const std::op
             "what is behind one of " + std::to_string(facts->occluders) + " spheres inside the solid is folded"};
 }
 
+Effect masking_effect(const Sight& sight, const Decision& decision) {
+    if (decision.masking)
+        return {"masking", true,
+                "folds are tested against thresholds that the scene around the object raises in this view, by " +
+                    std::to_string(decision.masking->bands().size()) + " bands of frequency"};
+    if (decision.request.masking.empty())
+        return {"masking", false, "without request.masking nothing masks what folds change"};
+    if (decision.test != FoldTest::error)
+        return {"masking", false, "the fold test " + name_of(decision.test) + " does not know it"};
+    return {"masking", false, why_unmasked(sight)};
+}
+
 Effect translucency_effect(const Sight& sight, const Decision& decision) {
     if (!is_perceptual(decision)) return {"translucency", false, "only the perceptual fold test knows it"};
     if (!is_translucent(sight)) return {"translucency", false, "no vertex has an alpha below 1"};
@@ -248,6 +260,7 @@ std::vector<Effect> effects_of(const Sight& sight, const Decision& decision, con
     if (is_full(decision)) return effects;
     effects.push_back(back_face_effect(sight, purpose));
     effects.push_back(hidden_effect(sight, decision, facts));
+    effects.push_back(masking_effect(sight, decision));
     effects.push_back(time_limit_effect(decision, facts));
     return effects;
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <perception/motion.h>
 #include <vdtree/internal/errors.h>
 
 #include <glm/geometric.hpp>
@@ -145,10 +146,15 @@ Result<vdtree::DistanceCriterion> make_criterion(const Sight& sight, const Decis
         if (!bounds) return bounds.error();
         return perception::lit_safe_distances(tree, **rings, std::move(*bounds), view, options);
     }
-    if (!sight.lighting) return perception::error_distances(tree, view, options);
+    const auto by_errors = [&](const vdtree::VertexTree& of) {
+        return decision.masking
+                   ? perception::masked_error_distances(of, sight.object.placement, *decision.masking, view, options)
+                   : perception::error_distances(of, view, options);
+    };
+    if (!sight.lighting) return by_errors(tree);
     const auto lit = sight.cache.lit_folds->under(tree, *sight.lighting);
     if (!lit) return lit.error();
-    return perception::error_distances(*lit, view, options);
+    return by_errors(*lit);
 }
 
 vdtree::Viewpoint viewpoint_of(const Sight& sight, const Decision& decision) {
@@ -189,9 +195,13 @@ struct KeptCriterion {
     vdtree::DistanceCriterion criterion;
 };
 
-Result<Decision> decide(const Sight& sight, const Request& request) {
+Result<Decision> decide(const Sight& sight, const Request& request, std::size_t object) {
     if (request.shown && !is_same(request.shown->view(), sight.view))
         return invalid_argument("request.shown is of another view.");
+    if (!request.masking.empty() && object >= request.masking.size())
+        return invalid_argument("request.masking has fewer pictures than the scene has objects.");
+    if (!request.masking.empty() && !is_same(request.masking[object].view(), sight.view))
+        return invalid_argument("request.masking is of another view.");
     const bool folds = request.goal.kind != Goal::Kind::full;
     const bool has_errors =
         sight.lighting ? sight.cache.lit_folds.has_value() : perception::has_fold_measurement(sight.object.tree);
@@ -206,7 +216,15 @@ Result<Decision> decide(const Sight& sight, const Request& request) {
         return invalid_argument(
             "request.fold_test = error goes by errors that the tree does not hold: allow request.may_measure, or call "
             "session::measured().");
-    return Decision{request, choice.test, choice.why, measures};
+    const bool is_masked = !request.masking.empty() && choice.test == FoldTest::error && !why_unmasked(sight);
+    return Decision{request, choice.test, choice.why, measures, is_masked ? &request.masking[object] : nullptr};
+}
+
+const char* why_unmasked(const Sight& sight) {
+    if (sight.observer.gaze && sight.observer.gaze->margin_deg > 0) return "the gaze is not known for sure";
+    if (sight.observer.velocity > perception::least_velocity) return "what moves over the retina masks otherwise";
+    if (is_translucent(sight)) return "what is behind the object may show through it";
+    return nullptr;
 }
 
 bool is_perceptual(const Decision& decision) {
@@ -245,18 +263,21 @@ bool folds_unseen(const Sight& sight, const Decision& decision) {
 
 Result<CutRecipe> make_recipe(const Sight& sight, const Decision& decision) {
     const Key key = key_of(sight, decision);
-    // Objects with one tree share all but what their own lights make of it.
+    // Objects with one tree share all but what their own lights make of it. What a view masks is of that view alone.
     std::shared_ptr<const KeptCriterion>& last = key.still_lights ? sight.lit_criterion : sight.cache.criterion;
-    if (!last || !(last->key == key)) {
+    std::shared_ptr<const KeptCriterion> masked;
+    if (decision.masking || !last || !(last->key == key)) {
         auto made = make_criterion(sight, decision, key);
         if (!made) return made.error();
-        last = std::make_shared<const KeptCriterion>(KeptCriterion{key, std::move(*made)});
+        (decision.masking ? masked : last) =
+            std::make_shared<const KeptCriterion>(KeptCriterion{key, std::move(*made)});
     }
-    CutRecipe recipe{{last, &last->criterion}, viewpoint_of(sight, decision), follow_options(sight, decision.request)};
+    const auto& kept = decision.masking ? masked : last;
+    CutRecipe recipe{{kept, &kept->criterion}, viewpoint_of(sight, decision), follow_options(sight, decision.request)};
     if (!folds_unseen(sight, decision)) return recipe;
     const auto hidden = vdtree::find_hidden(sight.object.tree, sight.object.placement, *decision.request.shown);
     if (!hidden) return hidden.error();
-    auto without = vdtree::folding_hidden(sight.object.tree, last->criterion, *hidden);
+    auto without = vdtree::folding_hidden(sight.object.tree, kept->criterion, *hidden);
     if (!without) return without.error();
     recipe.criterion = std::make_shared<const vdtree::DistanceCriterion>(std::move(*without));
     return recipe;

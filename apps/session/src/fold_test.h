@@ -1,14 +1,15 @@
 // Which fold test a cut of an object goes by, and what it looks at.
 #pragma once
 
+#include <cstddef>
 #include <memory>
 
 #include "sight.h"
 
 namespace unseen::session {
 
-// Fails where the request asks for a test that does not know what there is to see.
-Result<Decision> decide(const Sight& sight, const Request& request);
+// Of the scene's object of this number. Fails where the request asks for a test that does not know what there is to see.
+Result<Decision> decide(const Sight& sight, const Request& request, std::size_t object);
 
 // By contrast sensitivity, and for a goal that folds.
 bool is_perceptual(const Decision& decision);
@@ -23,6 +24,8 @@ bool culls_back_faces(
 // Whether what lies outside of the window folds, and all of the object does, by more than any rounding.
 bool is_out_of_sight(const Sight& sight, const Decision& decision);
 bool folds_hidden(const Sight& sight, const Decision& decision); // what a solid's inside hides
+// Why what a scene masks does not count for an object; null where it may.
+const char* why_unmasked(const Sight& sight);
 bool folds_unseen(const Sight& sight, const Decision& decision); // what lies behind what the view shows
 
 } // namespace unseen::session

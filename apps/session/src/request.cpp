@@ -36,6 +36,8 @@ std::string name_of(FoldTest test) { return std::string(perception::fold_test_na
 Result<void> validate(const Request& r) {
     if (r.shown && r.purpose != Purpose::picture)
         return invalid_argument("request.shown is of pictures: set request.purpose = picture.");
+    if (!r.masking.empty() && r.purpose != Purpose::picture)
+        return invalid_argument("request.masking is of pictures: set request.purpose = picture.");
     if (const auto goal = validate_goal(r); !goal) return goal;
     // Where none is asked for, one that knows colours is taken.
     const bool knows_chroma =

@@ -301,8 +301,8 @@ Result<Prepared> Session::State::prepare(const vdtree::View& view, const Request
     auto sights = look(view);
     if (!sights) return sights.error();
     std::vector<Decision> decisions;
-    for (const Sight& sight : *sights) {
-        auto decision = decide(sight, request);
+    for (std::size_t i = 0; i < sights->size(); ++i) {
+        auto decision = decide((*sights)[i], request, i);
         if (!decision) return decision.error();
         decisions.push_back(std::move(*decision));
     }
@@ -388,7 +388,7 @@ Result<Plan> Session::plan(const vdtree::View& view, const Request& request, std
     if (const auto valid = validate(request); !valid) return valid.error();
     const auto sights = state_->look(view);
     if (!sights) return sights.error();
-    const auto decision = decide((*sights)[object], request);
+    const auto decision = decide((*sights)[object], request, object);
     if (!decision) return decision.error();
     return plan_of((*sights)[object], *decision, object);
 }

@@ -49,8 +49,9 @@ struct Sight {
 struct Decision {
     const Request& request;
     FoldTest test;
-    std::string_view why;  // not the default
-    bool measures = false; // the tree lacks the errors of its folds
+    std::string_view why;                                // not the default
+    bool measures = false;                               // the tree lacks the errors of its folds
+    const perception::MaskingPicture* masking = nullptr; // of what the scene masks of the object; null: nothing is
 };
 
 WorldSphere world_sphere(const Object& object);

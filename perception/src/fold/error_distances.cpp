@@ -271,11 +271,11 @@ private:
 // for the rows' numbers, begin again with coarser ones.
 class SwitchDistances {
 public:
-    // `most_patterns`: for which there are rows, besides the first row and those that add() will ask for.
+    // `added`: rows that add() will ask for.
     SwitchDistances(const Levels& levels, const Screen& screen, const CsfTable& csf, const FoldModel& model,
-                    const Surround& surround, const BandElevation& masking, std::size_t bins, std::size_t most_patterns)
+                    const Surround& surround, const BandElevation& masking, std::size_t bins, std::size_t added)
         : levels_(levels), screen_(screen), csf_(csf), model_(model), surround_(surround), masking_(masking),
-          bands_(screen.highest_cpd, model, csf.samples().summation), bins_(bins), most_patterns_(most_patterns),
+          bands_(screen.highest_cpd, model, csf.samples().summation), bins_(bins), most_patterns_(last_row - added),
           discs_(luminance_count), eyes_(luminance_count) {
         begin();
     }
@@ -326,6 +326,8 @@ public:
     std::vector<float> take() { return std::move(switch_distance_); }
 
 private:
+    static constexpr std::size_t last_row = std::numeric_limits<std::uint16_t>::max();
+
     void begin() {
         rows_.clear();
         switch_distance_.assign(bins_, DistanceCriterion::never_visible); // row 0: what changes nothing
@@ -575,7 +577,7 @@ void fold_in_stages(const vdtree::SoundTree& tree, std::span<const FoldError> er
 
 DistanceCriterion::Parts criterion_parts(const vdtree::SoundTree& tree, const FoldErrors& measured,
                                          const vdtree::View& view, const FoldTestOptions& options,
-                                         const BandElevation& masking, std::size_t most_rows) {
+                                         const BandElevation& masking) {
     const std::span<const FoldError> errors = measured.of_nodes;
     const NodeId nodes = tree.interior_count();
     const Screen screen(view, options);
@@ -593,7 +595,7 @@ DistanceCriterion::Parts criterion_parts(const vdtree::SoundTree& tree, const Fo
     const float object_radius = tree.support_spheres()[vdtree::VertexTree::root()].radius;
     const Surround surround = surround_of(tree, options);
     SwitchDistances switch_distances(levels, screen, csf, options.model, surround, masking, parts.eccentricity_bins,
-                                     most_rows - 1 - measured.stages.size());
+                                     measured.stages.size());
     std::vector<Shown> patches, strips;
     while (!find_shown(tree, errors, options, levels, csf, screen.highest_cpd, switch_distances, patches, strips))
         switch_distances.coarsen();
@@ -621,8 +623,7 @@ DistanceCriterion::Parts criterion_parts(const vdtree::SoundTree& tree, const Fo
 
 Result<DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const FoldErrors& measured,
                                        const vdtree::View& view, const FoldTestOptions& options) {
-    constexpr std::size_t all_rows = std::size_t{std::numeric_limits<std::uint16_t>::max()} + 1;
-    return DistanceCriterion::create(tree, criterion_parts(tree, measured, view, options, {}, all_rows));
+    return DistanceCriterion::create(tree, criterion_parts(tree, measured, view, options, {}));
 }
 
 double needed_sensitivity(const FoldModel& model, Degrees eccentricity) {

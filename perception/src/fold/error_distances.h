@@ -1,8 +1,6 @@
 // The test by errors, of errors that are given.
 #pragma once
 
-#include <cstddef>
-
 #include <perception/criterion.h>
 
 #include "fold/band_elevation.h"
@@ -14,9 +12,9 @@ namespace unseen::perception {
 Result<vdtree::DistanceCriterion> criterion_of(const vdtree::SoundTree& tree, const FoldErrors& measured,
                                                const vdtree::View& view, const FoldTestOptions& options);
 
-// The same, where something masks what folds change, as parts of a criterion with at most so many rows.
+// The same, where something masks what folds change, as parts of a criterion.
 vdtree::DistanceCriterion::Parts criterion_parts(const vdtree::SoundTree& tree, const FoldErrors& measured,
                                                  const vdtree::View& view, const FoldTestOptions& options,
-                                                 const BandElevation& masking, std::size_t most_rows);
+                                                 const BandElevation& masking);
 
 } // namespace unseen::perception

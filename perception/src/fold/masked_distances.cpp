@@ -1,6 +1,6 @@
 // The test by errors under a scene's masking. Nodes differ in what masks them, and a table of switch distances holds for
-// one such way. So a few ways are chosen that most nodes are masked by at least; each has the rows of its own, and each
-// node goes by one that masks no more than what it has.
+// one such way. So a few ways are chosen that most nodes are masked by at least; for each there is a table, and each node
+// goes by one that masks no more than what it has. What comes out is the unmasked criterion with shorter lengths.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -110,19 +110,56 @@ BandElevation elevation_of(const Way& way, std::span<const CyclesPerDegree> band
     return {std::move(cpd), std::move(elevation)};
 }
 
-// Whether a node goes unseen from no farther by one table than by another, whatever it faces.
-bool is_no_farther(const DistanceCriterion::Parts& a, const DistanceCriterion::Parts& b, NodeId node) {
-    const std::size_t bins = a.eccentricity_bins;
-    for (std::size_t bin = 0; bin < bins; ++bin) {
-        const auto at = [&](const DistanceCriterion::Parts& p, std::size_t row, float length) {
-            return length * std::max(p.switch_distance[row * bins + bin], 0.0f);
-        };
-        if (at(a, a.classes[node].interior, a.lengths[node]) > at(b, b.classes[node].interior, b.lengths[node]) ||
-            at(a, a.classes[node].silhouette, a.silhouette_lengths[node]) >
-                at(b, b.classes[node].silhouette, b.silhouette_lengths[node]))
-            return false;
+// A kind of class that nodes have, and their lengths.
+struct Kind {
+    std::uint16_t vdtree::FoldClass::*row;
+    std::vector<float> DistanceCriterion::Parts::*lengths;
+};
+constexpr Kind kinds[] = {{&vdtree::FoldClass::interior, &DistanceCriterion::Parts::lengths},
+                          {&vdtree::FoldClass::silhouette, &DistanceCriterion::Parts::silhouette_lengths}};
+
+// From how far a node goes unseen, by bin.
+class Distances {
+public:
+    Distances(const DistanceCriterion::Parts& parts, const Kind& kind, NodeId node)
+        : length_((parts.*kind.lengths)[node]),
+          switch_distance_(
+              std::span(parts.switch_distance)
+                  .subspan(parts.classes[node].*kind.row * parts.eccentricity_bins, parts.eccentricity_bins)) {}
+
+    // The largest share that these are of others, at most 1.
+    float share_of(const Distances& others) const {
+        constexpr float rounding = 4e-6f; // of the products
+        float share = 0;
+        for (std::size_t bin = 0; bin < switch_distance_.size(); ++bin) {
+            const float of = others.at(bin);
+            if (of > 0) share = std::max(share, at(bin) / of * (1 + rounding));
+        }
+        return share < 1 ? share : 1; // 1 where both reach everywhere
     }
-    return true;
+
+private:
+    float at(std::size_t bin) const { return length_ * std::max(switch_distance_[bin], 0.0f); }
+
+    float length_;
+    std::span<const float> switch_distance_;
+};
+
+// By node, which share of its unmasked distances is left.
+std::vector<float> shares_left(const DistanceCriterion::Parts& unmasked,
+                               std::span<const DistanceCriterion::Parts> masked, const Kind& kind,
+                               std::span<const std::uint8_t> ways, std::span<const NodeId> parents) {
+    std::vector<float> shares(ways.size(), 0);
+    for (std::size_t i = ways.size(); i-- > 0;) { // children before parents
+        const auto node = static_cast<NodeId>(i);
+        const Distances all(unmasked, kind, node);
+        const float own = ways[i] == 0 ? 1 : Distances(masked[ways[i]], kind, node).share_of(all);
+        shares[i] = std::max(shares[i], own); // no nearer than the children
+        if (i == 0) break;
+        const NodeId parent = parents[node];
+        shares[parent] = std::max(shares[parent], std::min(1.0f, shares[i] * all.share_of({unmasked, kind, parent})));
+    }
+    return shares;
 }
 
 } // namespace
@@ -143,26 +180,18 @@ Result<DistanceCriterion> masked_error_distances(const vdtree::VertexTree& tree,
 
     const std::vector<Way> of_nodes = ways_of_nodes(masking, *footprints), chosen = choose_ways(of_nodes);
     const std::vector<std::uint8_t> assigned = assign_ways(of_nodes, chosen, sound->parents());
-    constexpr std::size_t all_rows = std::size_t{std::numeric_limits<std::uint16_t>::max()} + 1;
-    const std::size_t most_rows = all_rows / chosen.size();
-    DistanceCriterion::Parts parts = criterion_parts(*sound, *errors, view, options, {}, most_rows);
-    for (std::size_t way = 1; way < chosen.size(); ++way) {
-        if (std::ranges::find(assigned, way) == assigned.end()) continue;
-        const DistanceCriterion::Parts masked =
-            criterion_parts(*sound, *errors, view, options, elevation_of(chosen[way], masking.bands()), most_rows);
-        const auto first_row = static_cast<std::uint16_t>(parts.switch_distance.size() / parts.eccentricity_bins);
-        parts.switch_distance.insert(parts.switch_distance.end(), masked.switch_distance.begin(),
-                                     masked.switch_distance.end());
-        for (NodeId node = 0; node < tree.interior_count(); ++node) {
-            // Rounding to fewer rows may come out larger.
-            if (assigned[node] != way || !is_no_farther(masked, parts, node)) continue;
-            parts.classes[node] = {static_cast<std::uint16_t>(first_row + masked.classes[node].interior),
-                                   static_cast<std::uint16_t>(first_row + masked.classes[node].silhouette)};
-            parts.lengths[node] = masked.lengths[node];
-            parts.silhouette_lengths[node] = masked.silhouette_lengths[node];
-        }
-    }
-    return DistanceCriterion::create(tree, std::move(parts));
+    DistanceCriterion::Parts unmasked = criterion_parts(*sound, *errors, view, options, {});
+    std::vector<DistanceCriterion::Parts> masked(chosen.size()); // none of the first
+    for (std::size_t way = 1; way < chosen.size(); ++way)
+        if (std::ranges::find(assigned, way) != assigned.end())
+            masked[way] = criterion_parts(*sound, *errors, view, options, elevation_of(chosen[way], masking.bands()));
+    std::vector<float> shares[std::size(kinds)];
+    for (std::size_t kind = 0; kind < std::size(kinds); ++kind)
+        shares[kind] = shares_left(unmasked, masked, kinds[kind], assigned, sound->parents());
+    for (std::size_t kind = 0; kind < std::size(kinds); ++kind)
+        for (NodeId node = 0; node < tree.interior_count(); ++node)
+            (unmasked.*kinds[kind].lengths)[node] *= shares[kind][node];
+    return DistanceCriterion::create(tree, std::move(unmasked));
 }
 
 } // namespace unseen::perception

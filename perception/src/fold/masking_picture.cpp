@@ -64,8 +64,8 @@ Result<MaskingPicture> MaskingPicture::create(const vdtree::View& view, std::spa
                                               static_cast<std::size_t>(fine.columns) +
                                           static_cast<std::size_t>(std::min(column, fine.columns - 1))];
                     };
-                    coarse.least.push_back(std::min({at(2 * x, 2 * y), at(2 * x + 1, 2 * y), at(2 * x, 2 * y + 1),
-                                                     at(2 * x + 1, 2 * y + 1)}));
+                    coarse.least.push_back(std::min(
+                        {at(2 * x, 2 * y), at(2 * x + 1, 2 * y), at(2 * x, 2 * y + 1), at(2 * x + 1, 2 * y + 1)}));
                 }
         grids->levels.push_back(std::move(coarse));
     }
@@ -95,10 +95,10 @@ void MaskingPicture::least(const vdtree::Footprint& of, std::span<float> elevati
         float least = std::numeric_limits<float>::max();
         for (int y = top >> level; y <= bottom >> level; ++y)
             for (int x = left >> level; x <= right >> level; ++x)
-                least = std::min(least, grid.least[(band * static_cast<std::size_t>(grid.rows) +
-                                                    static_cast<std::size_t>(y)) *
-                                                       static_cast<std::size_t>(grid.columns) +
-                                                   static_cast<std::size_t>(x)]);
+                least = std::min(least,
+                                 grid.least[(band * static_cast<std::size_t>(grid.rows) + static_cast<std::size_t>(y)) *
+                                                static_cast<std::size_t>(grid.columns) +
+                                            static_cast<std::size_t>(x)]);
         elevation[band] = least;
     }
 }

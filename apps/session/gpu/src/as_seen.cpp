@@ -1,3 +1,4 @@
+// One drawing for the depths, and one for each picture that masks: of the scene, and of it without each layer's objects.
 #include <session_gpu/as_seen.h>
 
 #include <algorithm>
@@ -6,18 +7,52 @@
 #include <utility>
 #include <vector>
 
+#include <perception/judge_tables.h>
 #include <render/depth.h>
 #include <render/gpu_tree.h>
+#include <render/layers.h>
+#include <render/sample_sum.h>
+#include <session_gpu/gpu_judge.h>
 
 namespace unseen::session {
 namespace {
 
-// Everything of a scene on the GPU, to be drawn for its depth.
-class Items {
+// Everything of a scene on the GPU.
+class Drawn {
 public:
-    explicit Items(const render::Context& context) : context_(context) {}
+    Drawn(const Session& session, const render::Context& context, const vdtree::View& view)
+        : session_(session), context_(context), view_(view) {}
 
-    Result<void> add(const vdtree::Cut& cut, const vdtree::VertexTree& tree, const vdtree::Similarity& placement) {
+    Result<void> add(const std::vector<vdtree::Cut>& cuts) {
+        const Scene& scene = session_.scene();
+        for (std::size_t i = 0; i < cuts.size(); ++i) {
+            auto lighting = session_.lighting(view_, i);
+            if (!lighting) return lighting.error();
+            if (auto ok = add(cuts[i], session_.tree(i), scene.objects[i].placement, std::move(*lighting)); !ok)
+                return ok;
+        }
+        for (std::size_t i = 0; i < scene.backdrop.size(); ++i) {
+            auto lighting = session_.backdrop_lighting(view_, i);
+            if (!lighting) return lighting.error();
+            const Object& part = scene.backdrop[i];
+            vdtree::Cut whole(part.tree);
+            whole.unfold_all();
+            if (auto ok = add(whole, part.tree, part.placement, std::move(*lighting)); !ok) return ok;
+        }
+        return {};
+    }
+
+    std::span<const render::Item> all() const { return items_; }
+    std::vector<render::Item> without_layer(const std::vector<int>& layer_of, int layer) const {
+        std::vector<render::Item> rest;
+        for (std::size_t i = 0; i < items_.size(); ++i)
+            if (i >= layer_of.size() || layer_of[i] != layer) rest.push_back(items_[i]);
+        return rest;
+    }
+
+private:
+    Result<void> add(const vdtree::Cut& cut, const vdtree::VertexTree& tree, const vdtree::Similarity& placement,
+                     std::optional<vdtree::Lighting> lighting) {
         auto known = trees_.find(&tree.data()); // objects share them
         if (known == trees_.end()) {
             auto made = render::GpuTree::create(context_, tree);
@@ -26,51 +61,125 @@ public:
         }
         render::GpuCut drawn(known->second);
         if (auto followed = drawn.follow(cut); !followed) return followed;
-        items_.push_back({std::move(drawn), placement});
+        items_.push_back({.cut = std::move(drawn), .placement = placement, .lighting = std::move(lighting)});
         return {};
     }
 
-    std::span<const render::Item> items() const { return items_; }
-
-private:
+    const Session& session_;
     const render::Context& context_;
+    const vdtree::View& view_;
     std::map<const vdtree::VertexTree::Data*, render::GpuTree> trees_;
-    std::vector<render::Item> items_;
+    std::vector<render::Item> items_; // objects first
 };
 
-// The backdrop hides, too, but is hidden from nobody.
-Result<std::vector<float>> depths_of(const Session& session, const render::Context& context,
-                                     const std::vector<vdtree::Cut>& cuts, const vdtree::View& view, int samples) {
-    Items items(context);
-    const Scene& scene = session.scene();
-    for (std::size_t i = 0; i < cuts.size(); ++i)
-        if (auto added = items.add(cuts[i], session.tree(i), scene.objects[i].placement); !added) return added.error();
-    for (const Object& part : scene.backdrop) {
-        vdtree::Cut whole(part.tree);
-        whole.unfold_all();
-        if (auto added = items.add(whole, part.tree, part.placement); !added) return added.error();
+// What pictures of a view mask, for this observer.
+class Masks {
+public:
+    static Result<Masks> create(const Session& session, const render::Context& context, const vdtree::View& view,
+                                int samples) {
+        const perception::Display& display = session.observer().display;
+        const double black = perception::to_luminance(display, 0).value(),
+                     white = perception::to_luminance(display, 1).value();
+        auto tables = perception::judge_tables(view.width, view.height, static_cast<float>(black),
+                                               static_cast<float>(white), judge_options(session.observer()));
+        if (!tables) return tables.error();
+        auto sum = render::SampleSum::create(context, view.width, view.height);
+        if (!sum) return sum.error();
+        return Masks(context, view, {samples, 1, session.background()}, std::move(*tables), std::move(*sum), black,
+                     white);
     }
-    return render::farthest_depth(context, items.items(), view, samples);
+
+    Result<perception::Elevations> of(std::span<const render::Item> items) {
+        if (auto drawn = sum_.draw(items, view_, sampling_); !drawn) return drawn.error();
+        render::LuminanceTexture picture = sum_.mean_luminance();
+        picture.scale *= static_cast<float>(white_ - black_);
+        picture.offset = static_cast<float>(black_ + static_cast<double>(picture.offset) * (white_ - black_));
+        auto passes = render::VisibilityPasses::create(context_, visibility_tables(tables_), picture);
+        if (!passes) return passes.error();
+        if (auto mapped = passes->map_elevations(); !mapped) return mapped.error();
+        auto grid = passes->read_elevations();
+        if (!grid) return grid.error();
+        perception::Elevations elevations{grid->cell_px, grid->columns, grid->rows, {}, std::move(grid->elevation)};
+        for (const perception::JudgeTables::Band& band : tables_.bands) elevations.bands.push_back(band.nominal);
+        return elevations;
+    }
+
+private:
+    Masks(const render::Context& context, const vdtree::View& view, const render::Sampling& sampling,
+          perception::JudgeTables tables, render::SampleSum sum, double black, double white)
+        : context_(context), view_(view), sampling_(sampling), tables_(std::move(tables)), sum_(std::move(sum)),
+          black_(black), white_(white) {}
+
+    const render::Context& context_;
+    const vdtree::View& view_;
+    render::Sampling sampling_;
+    perception::JudgeTables tables_;
+    render::SampleSum sum_;
+    double black_, white_; // cd/m2
+};
+
+Result<render::LayerSplit> layers_of(const Session& session, const vdtree::View& view, int layers) {
+    std::vector<glm::dvec3> centres;
+    for (std::size_t i = 0; i < session.scene().objects.size(); ++i) {
+        const vdtree::VertexTree& tree = session.tree(i);
+        centres.push_back(
+            session.scene().objects[i].placement.to_world(tree.origin() + glm::dvec3(tree.bounding_sphere().centre)));
+    }
+    return render::split_into_layers(centres, view, layers);
+}
+
+// By object. What one layer masks is the same for all its objects.
+Result<std::vector<perception::MaskingPicture>> masking_of(const Session& session, const render::Context& context,
+                                                           const Drawn& drawn, const vdtree::View& view,
+                                                           const AsSeenOptions& options) {
+    const auto split = layers_of(session, view, options.layers);
+    if (!split) return split.error();
+    auto masks = Masks::create(session, context, view, options.samples);
+    if (!masks) return masks.error();
+    auto whole = masks->of(drawn.all());
+    if (!whole) return whole.error();
+    std::vector<perception::MaskingPicture> by_layer;
+    for (int layer = 0; layer < std::max(split->count, 1); ++layer) {
+        auto rest = masks->of(drawn.without_layer(split->layer_of, layer));
+        if (!rest) return rest.error();
+        const perception::Elevations both[] = {*whole, std::move(*rest)};
+        auto masking = perception::MaskingPicture::create(view, both);
+        if (!masking) return masking.error();
+        by_layer.push_back(std::move(*masking));
+    }
+    std::vector<perception::MaskingPicture> of_objects;
+    for (const int layer : split->layer_of) of_objects.push_back(by_layer[static_cast<std::size_t>(layer)]);
+    return of_objects;
 }
 
 } // namespace
 
 Result<Simplification> simplify_as_seen(Session& session, const render::Context& context, const vdtree::View& view,
-                                        Request request, int samples) {
+                                        Request request, const AsSeenOptions& options) {
     request.purpose = Purpose::picture;
     request.shown.reset();
+    request.masking.clear();
     auto all = session.simplify(view, request);
     if (!all) return all;
     const bool can_tell = request.goal.kind != Goal::Kind::full && !all->fold_tests.empty() &&
                           is_perceptual(all->fold_tests.front()) &&
                           (!session.scene().lights ||
                            std::ranges::all_of(all->fold_tests, [](FoldTest test) { return test == FoldTest::error; }));
-    if (!can_tell) return all;
-    const auto depths = depths_of(session, context, all->cuts, view, samples);
-    if (!depths) return depths.error();
-    auto shown = vdtree::DepthPicture::create(view, *depths);
-    if (!shown) return shown.error();
-    request.shown = std::move(*shown);
+    if (!can_tell || (!options.folds_hidden && options.masking == Masking::none)) return all;
+    Drawn drawn(session, context, view);
+    if (auto added = drawn.add(all->cuts); !added) return added.error();
+    if (options.folds_hidden) {
+        const auto depths = render::farthest_depth(context, drawn.all(), view, options.samples);
+        if (!depths) return depths.error();
+        auto shown = vdtree::DepthPicture::create(view, *depths);
+        if (!shown) return shown.error();
+        request.shown = std::move(*shown);
+    }
+    if (options.masking == Masking::scene) {
+        auto masking = masking_of(session, context, drawn, view, options);
+        if (!masking) return masking.error();
+        request.masking = std::move(*masking);
+    }
     return session.simplify(view, request);
 }
 

@@ -3,7 +3,9 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
+#include <perception/masking.h>
 #include <vdtree/depth_picture.h>
 #include <vdtree/mesh.h>
 #include <vdtree/result.h>
@@ -54,6 +56,9 @@ struct Request {
     // Of pictures: what this view, and no other, shows. What lies behind that is folded, too: simplify_as_seen() of
     // <session_gpu/as_seen.h> draws it. Under lights only by the test error.
     std::optional<vdtree::DepthPicture> shown = {};
+    // Of pictures: what the scene of this view, and of no other, masks of each object; by object, or empty: nothing.
+    // Counts for the test error, for gazes that are known for sure and where nothing moves over the retina.
+    std::vector<perception::MaskingPicture> masking = {};
     // Measure the errors of folds where the test needs them and the tree lacks them: up to a minute.
     bool may_measure = true;
     // Report::effects: some 20 us an object, which flights through scenes of many can do without.
