@@ -22,8 +22,8 @@ using vdtree::DistanceCriterion;
 using vdtree::NodeId;
 
 constexpr std::size_t most_bands = 16;
-// Elevations are rounded down to half octaves, and up to eight: what is masked by more is rare.
-constexpr int steps_per_octave = 2, most_steps = 6;
+// Elevations are rounded down to quarters of octaves, and up to eight: what is masked by more is rare.
+constexpr int steps_per_octave = 4, most_steps = 12;
 // Ways of being masked that a criterion knows, that of not being masked included. Eight have nearly all that more would.
 constexpr std::size_t most_ways = 8;
 // The ways that these are chosen from: the most frequent ones.
