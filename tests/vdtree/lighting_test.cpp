@@ -467,7 +467,9 @@ void expect_cuts_without_history(const Subject& s, bool with_gaze, bool eye_move
         if (frame % 10 == 9) {
             ASSERT_EQ(support::fault_in_cut(cut), "");
         }
-        move_lights(random, viewpoint.lighting, radius, frame % 13 == 12 ? 1 : 0.02 * random_unit(random));
+        const bool do_rest = seed % 4 < 2 && frame / 10 % 2 == 0; // they begin to move, and stand still again
+        if (!do_rest)
+            move_lights(random, viewpoint.lighting, radius, frame % 13 == 12 ? 1 : 0.02 * random_unit(random));
         if (eye_moves) viewpoint.eye += 0.02 * radius * random_direction(random);
         if (eye_moves && with_gaze) viewpoint.gaze = glm::normalize(*viewpoint.gaze + 0.01 * random_direction(random));
     }

@@ -38,7 +38,7 @@ private:
     CutSettler::Rules rules();
     float keeping_factor() const;
     // Where the eye is.
-    Motion with_lights(Motion motion, const Viewpoint& viewpoint) const;
+    Motion with_lights(Motion motion, const Viewpoint& viewpoint, bool is_same);
     void start_at(const Viewpoint& viewpoint);
     void move_to(const Viewpoint& viewpoint, const Motion& motion);
     void look_from(const Viewpoint& viewpoint);

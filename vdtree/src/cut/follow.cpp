@@ -43,13 +43,16 @@ void CutFollower::prepare(const DistanceCriterion& criterion, const FollowOption
     criterion_ = criterion.id();
     options_ = options;
     threshold_ = options.threshold;
+    is_tracking_ = false;
     make_tester(criterion);
 }
 
 // Also where the values are the same, but another object has them: the one that was tested may be gone.
 void CutFollower::make_tester(const DistanceCriterion& criterion) {
     const bool has_budget = options_.triangle_budget.has_value();
+    const bool do_lights_move = tester_ && tester_->has_moving_lights() && is_tracking_;
     tester_.emplace(tree_, criterion, options_.cull_back_faces, threshold_, !has_budget);
+    tester_->let_lights_move(do_lights_move); // they stand still until they move
     tested_ = criterion.object_id();
     watches_ancestors_ = !criterion.is_monotone();
 }
@@ -67,7 +70,7 @@ AdjustStats CutFollower::follow(CutState& cut, const DistanceCriterion& criterio
     else if (tested_ != criterion.object_id()) make_tester(criterion);
     Motion motion = is_same ? FoldTester::motion(tree_, viewpoint_, viewpoint, length_per_radian_)
                             : Motion{.position = std::numeric_limits<double>::infinity()};
-    if (criterion.parts().lit) motion = with_lights(motion, viewpoint);
+    if (criterion.parts().lit) motion = with_lights(motion, viewpoint, is_same);
     const bool is_still =
         is_same && motion.position == 0 && motion.facing == 0 && motion.planes == 0 && motion.light == 0;
     settler_.keep_costs_if(is_still);
@@ -89,10 +92,14 @@ AdjustStats CutFollower::follow(CutState& cut, const DistanceCriterion& criterio
     return stats_;
 }
 
-Motion CutFollower::with_lights(Motion motion, const Viewpoint& viewpoint) const {
+// Lights that begin to move are a jump: up to then verdicts held for where they were. So are lights at another place
+// after a jump.
+Motion CutFollower::with_lights(Motion motion, const Viewpoint& viewpoint, bool is_same) {
     const double turn = light_motion(tree_, viewpoint_.lighting, viewpoint_.eye, viewpoint.lighting, viewpoint.eye);
     motion.light = light_weight * length_per_radian_ * turn;
-    if (!(turn < longest_light_step)) motion.position = std::numeric_limits<double>::infinity();
+    const bool begins = turn > 0 && !tester_->has_moving_lights();
+    if (!(turn < longest_light_step) || begins) motion.position = std::numeric_limits<double>::infinity();
+    if (is_same && turn > 0) tester_->let_lights_move(true);
     return motion;
 }
 
@@ -107,7 +114,7 @@ void CutFollower::start_at(const Viewpoint& viewpoint) {
     settler_.front().set_longest_slack(distance + static_cast<double>(root.radius));
     settler_.watch_nothing();
     look_from(viewpoint);
-    settler_.front().use(tester_->has_lights(), tester_->has_planes());
+    settler_.front().use(tester_->has_moving_lights(), tester_->has_planes());
     settler_.front().move_to(viewpoint.eye, 0);
 }
 

@@ -49,14 +49,16 @@ void CutSettler::watch_border(const CutState& cut, Deadlines deadlines) {
     front_.reserve(next_wave_.size());
     for (std::size_t first = 0; first < next_wave_.size(); first += piece_tests) {
         const auto piece = std::span(next_wave_).subspan(first, std::min(piece_tests, next_wave_.size() - first));
-        wave_slots_.clear();
+        candidates_.clear();
         for (std::size_t i = 0; i < piece.size(); ++i) {
             constexpr std::size_t ahead = 16; // nodes between a prefetch and its use
             if (i + ahead < piece.size()) rules_.tester->prefetch(piece[i + ahead]);
-            FoldCandidate candidate = rules_.tester->candidate(piece[i]);
-            candidate.is_unfolded = cut.is_unfolded_interior(piece[i]);
-            wave_slots_.push_back(front_.append(candidate));
+            candidates_.push_back(rules_.tester->candidate(piece[i]));
+            candidates_.back().is_unfolded = cut.is_unfolded_interior(piece[i]);
         }
+        rules_.tester->find_still_rows(candidates_);
+        wave_slots_.clear();
+        for (const FoldCandidate& candidate : candidates_) wave_slots_.push_back(front_.append(candidate));
         front_.end_append();
         if (deadlines == Deadlines::found) test_slots(wave_slots_);
         else
@@ -266,25 +268,26 @@ void CutSettler::test_parents(const CutState& cut) {
     parents_.erase(std::unique(parents_.begin(), parents_.end()), parents_.end());
     std::erase_if(parents_,
                   [&](NodeId node) { return !cut.is_unfolded_interior(node) || front_.slot_of(node) != no_slot; });
-    parent_candidates_.clear();
+    candidates_.clear();
     for (const NodeId node : parents_) {
         rules_.tester->prefetch(node);
         prefetch(&unchecked_links(tree_).subtree_end[node]);
     }
     for (const NodeId node : parents_) {
-        parent_candidates_.push_back(rules_.tester->candidate(node));
-        parent_candidates_.back().is_unfolded = true;
+        candidates_.push_back(rules_.tester->candidate(node));
+        candidates_.back().is_unfolded = true;
     }
     parents_.clear();
-    if (parent_candidates_.empty()) return;
+    if (candidates_.empty()) return;
+    rules_.tester->find_still_rows(candidates_);
     use_threshold_of(true);
-    verdicts_.resize(parent_candidates_.size());
-    rules_.tester->test(parent_candidates_, verdicts_);
-    node_tests_ += parent_candidates_.size();
-    for (std::size_t i = 0; i < parent_candidates_.size(); ++i) {
-        const NodeId node = parent_candidates_[i].node;
+    verdicts_.resize(candidates_.size());
+    rules_.tester->test(candidates_, verdicts_);
+    node_tests_ += candidates_.size();
+    for (std::size_t i = 0; i < candidates_.size(); ++i) {
+        const NodeId node = candidates_[i].node;
         if (!verdicts_[i].unfolded || !has_unfolded_child(node, cut.unfolded()))
-            front_.set_deadlines(front_.insert(parent_candidates_[i], near_children_of(node)), verdicts_[i]);
+            front_.set_deadlines(front_.insert(candidates_[i], near_children_of(node)), verdicts_[i]);
         if (!verdicts_[i].unfolded) folding_.push_back(node);
         else if (front_.is_within_rounding(verdicts_[i])) ask_parent(node);
     }
@@ -302,10 +305,13 @@ void CutSettler::apply_unfold(CutState& cut, NodeId node, std::span<const NodeId
     cut.apply_unfold(node, children);
     front_.set_unfolded(front_.slot_of(node), true);
     if (node != VertexTree::root() && !rules_.watches_ancestors) front_.remove(unchecked_links(tree_).parents[node]);
-    for (const NodeId child : children) {
-        if (tree_.is_leaf(child)) continue;
-        front_.insert(rules_.tester->candidate(child), front_.slot_of(node));
-        next_wave_.push_back(child);
+    candidates_.clear();
+    for (const NodeId child : children)
+        if (!tree_.is_leaf(child)) candidates_.push_back(rules_.tester->candidate(child));
+    rules_.tester->find_still_rows(candidates_);
+    for (const FoldCandidate& candidate : candidates_) {
+        front_.insert(candidate, front_.slot_of(node));
+        next_wave_.push_back(candidate.node);
     }
 }
 

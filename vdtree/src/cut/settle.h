@@ -108,7 +108,7 @@ private:
     // Scratch. A wave is what changes together: its nodes do not lie under each other.
     std::vector<NodeId> wave_, next_wave_, unfolding_, folding_, parents_;
     std::vector<Slot> kept_, wave_slots_;
-    std::vector<FoldCandidate> parent_candidates_;
+    std::vector<FoldCandidate> candidates_;
     std::vector<Verdict> verdicts_;
     std::vector<float> costs_, seen_costs_;
     std::vector<std::uint64_t> unfolds_;

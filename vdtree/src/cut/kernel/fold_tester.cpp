@@ -109,7 +109,7 @@ void FoldTester::test(std::span<const FoldCandidate> candidates, std::span<const
         vdtree::prefetch(&candidates[which[i]]);
     std::array<const FoldCandidate*, kernel_lanes> lanes;
     for (std::size_t i = 0; i < count; ++i) lanes[i] = &candidates[which[first + i]];
-    if (!lit_) return vdtree::test(view_, {lanes.data(), count}, tested);
+    if (!has_moving_lights()) return vdtree::test(view_, {lanes.data(), count}, tested);
     for (std::size_t i = first + kernel_lanes; i < std::min(first + 2 * kernel_lanes, which.size()); ++i)
         lit_->prefetch(candidates[which[i]].node);
     test_lit({lanes.data(), count}, tested);
@@ -121,11 +121,12 @@ void FoldTester::test(std::span<const FoldCandidate> candidates, std::span<Verdi
         const std::size_t count = std::min(kernel_lanes, candidates.size() - first);
         for (std::size_t i = 0; i < count; ++i) lanes[i] = &candidates[first + i];
         TestBatch tested;
-        if (lit_) test_lit({lanes.data(), count}, tested);
+        if (has_moving_lights()) test_lit({lanes.data(), count}, tested);
         else vdtree::test(view_, {lanes.data(), count}, tested);
         for (std::size_t i = 0; i < count; ++i)
             verdicts[first + i] = {tested.position_slack[i], tested.facing_slack[i], tested.plane_slack[i],
-                                   lit_ ? tested.light_slack[i] : infinity, ((tested.unfolded >> i) & 1) != 0};
+                                   has_moving_lights() ? tested.light_slack[i] : infinity,
+                                   ((tested.unfolded >> i) & 1) != 0};
     }
 }
 
@@ -198,20 +199,38 @@ void FoldTester::for_each_batch(const KernelView& view, std::span<const NodeId> 
     }
 }
 
-// By the rows that lights give.
-void FoldTester::find_lit_verdicts(const KernelView& view, Lanes lanes, LitFindings& lit, FoldBatch& batch) const {
-    for (std::size_t i = 0; i < kernel_lanes; ++i) {
-        const FoldCandidate& of = *lanes[std::min(i, lanes.size() - 1)];
+template <class Candidate>
+void FoldTester::find_lit_rows(Candidate&& candidate, std::size_t count, LitFindings& lit) const {
+    for (std::size_t i = 0; i < kernel_lanes; ++i) { // unused lanes repeat the last
+        const FoldCandidate& of = candidate(std::min(i, count - 1));
         lit_->set(i, of.node, of.ring, lit);
     }
     lit_->find_rows(lit);
+    for (std::size_t i = 0; i < count; ++i) {
+        if (!(candidate(i).flags & translucent_ring)) continue;
+        lit.translucent |= 1u << i;
+        lit.row[i] = lit_->silhouette_row();
+    }
+}
+
+void FoldTester::find_still_rows(std::span<FoldCandidate> candidates) const {
+    if (!lit_ || do_lights_move_) return;
+    for (std::size_t first = 0; first < candidates.size(); first += kernel_lanes) {
+        const auto batch = candidates.subspan(first, std::min(kernel_lanes, candidates.size() - first));
+        LitFindings lit;
+        find_lit_rows([&](std::size_t i) -> const FoldCandidate& { return batch[i]; }, batch.size(), lit);
+        for (std::size_t i = 0; i < batch.size(); ++i)
+            batch[i].rows = {static_cast<std::uint16_t>(lit.row[i]),
+                             static_cast<std::uint16_t>(lit_->silhouette_row())};
+    }
+}
+
+// By the rows that lights give.
+void FoldTester::find_lit_verdicts(const KernelView& view, Lanes lanes, LitFindings& lit, FoldBatch& batch) const {
+    find_lit_rows([&](std::size_t i) -> const FoldCandidate& { return *lanes[i]; }, lanes.size(), lit);
     std::array<FoldCandidate, kernel_lanes> lit_candidates;
     std::array<const FoldCandidate*, kernel_lanes> lit_lanes;
     for (std::size_t i = 0; i < lanes.size(); ++i) {
-        if (lanes[i]->flags & translucent_ring) {
-            lit.translucent |= 1u << i;
-            lit.row[i] = lit_->silhouette_row();
-        }
         lit_candidates[i] = *lanes[i];
         lit_candidates[i].rows = {static_cast<std::uint16_t>(lit.row[i]),
                                   static_cast<std::uint16_t>(lit_->silhouette_row())};

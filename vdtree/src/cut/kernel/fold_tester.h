@@ -58,6 +58,9 @@ public:
     bool has_planes() const noexcept { return !view_.planes.empty(); }
 
     FoldCandidate candidate(NodeId node) const;
+    // Where lights stand still, rows are found once for a candidate, and tests are those without lights. Else it does
+    // nothing, for each test finds them anew.
+    void find_still_rows(std::span<FoldCandidate> candidates) const;
     void prefetch(NodeId node) const; // what candidate(node) will read
 
     // Tests those of the candidates that `which` names from place `first` on, up to sixteen, and fetches some after
@@ -78,6 +81,10 @@ public:
     void find_cost_bounds(std::span<const NodeId> nodes, const float* folded_at, float* cost,
                           float* seen_cost) const override;
     bool has_lights() const noexcept { return lit_.has_value(); }
+    // Whether verdicts are to say how far the lights may move, as by default, or hold for these lights alone. Candidates
+    // from before do not count from then on.
+    void let_lights_move(bool do_move) noexcept { do_lights_move_ = do_move; }
+    bool has_moving_lights() const noexcept { return lit_ && do_lights_move_; }
     bool is_monotone() const noexcept override { return criterion_.is_monotone(); }
     // But for the lights: from one viewpoint to another with as many frusta of as many planes; infinite where these
     // differ.
@@ -89,6 +96,8 @@ private:
     template <class F>
     void for_each_batch(const KernelView& view, std::span<const NodeId> nodes, F&& f) const;
     void find_lit_verdicts(const KernelView& view, Lanes lanes, LitFindings& lit, FoldBatch& batch) const;
+    template <class Candidate> // that the place of a lane leads to
+    void find_lit_rows(Candidate&& candidate, std::size_t count, LitFindings& lit) const;
     void test_lit(Lanes lanes, TestBatch& tested) const;
     void leave_room_for_lights(LitFindings& lit, FoldBatch& batch) const;
     CostTables cost_tables() const;
@@ -98,6 +107,7 @@ private:
     std::vector<float> switch_distance_; // of the criterion; infinite where the fold is seen from everywhere
     KernelView view_, costs_view_;
     std::optional<LitTester> lit_; // where lights give the classes
+    bool do_lights_move_ = true;
 };
 
 } // namespace unseen::vdtree
