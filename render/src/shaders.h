@@ -8,6 +8,7 @@ namespace unseen::render::shaders {
 extern const std::string_view accumulate_frag;
 extern const std::string_view blur_frag;
 extern const std::string_view combine_frag;
+extern const std::string_view elevate_frag;
 extern const std::string_view energy_frag;
 extern const std::string_view examine_comp;
 extern const std::string_view full_screen_vert;
@@ -21,6 +22,7 @@ extern const std::string_view pool_frag;
 extern const std::string_view power_frag;
 extern const std::string_view reduce_frag;
 extern const std::string_view sight_frag;
+extern const std::string_view smooth_frag;
 extern const std::string_view split_frag;
 extern const std::string_view surface_vert;
 extern const std::string_view surface_geom;
