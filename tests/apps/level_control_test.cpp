@@ -22,11 +22,11 @@ TEST(Probe, Museum) {
     const auto print = [&](const std::string& what, app::MakeSceneOptions o, LevelControlOptions lo) {
         const auto file = folder.path() / "m.glb";
         if (auto made = app::make_scene(file, o); !made) { ADD_FAILURE() << made.error().message; return; }
-        auto scene = Scene::load(file, {});
+        auto scene = Scene::load(file, {.as = LoadAs::scene});
         ASSERT_TRUE(scene) << scene.error().message;
         auto s = Session::create(std::move(*scene));
         vdtree::View v = *s->camera_view({});
-        v.width = v.height = 256;
+        v.width = v.height = 256; printf("fov %g\n", v.fov_y_degrees);
         auto control = LevelControl::create(context, *s, v, lo);
         ASSERT_TRUE(control) << control.error().message;
         const auto f = control->settle(v);
