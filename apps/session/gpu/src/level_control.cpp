@@ -544,38 +544,72 @@ bool LevelControl::is_settled() const noexcept {
     });
 }
 
+Result<LevelFrame> LevelControl::wait() {
+    if (auto done = impl_->context.finish(); !done) return done.error();
+    LevelFrame known;
+    if (auto taken = impl_->take_counts(known); !taken) return taken.error();
+    impl_->take_times(known);
+    return known;
+}
+
 Result<LevelFrame> LevelControl::settle(const vdtree::View& view, int most_frames) {
     std::vector<LevelTest> tests;
     std::vector<LevelTimes> times;
+    const auto keep = [&](const LevelFrame& known) {
+        tests.insert(tests.end(), known.tests.begin(), known.tests.end());
+        times.insert(times.end(), known.times.begin(), known.times.end());
+    };
     Impl& own = *impl_;
     own.tests_all = true;
     Result<LevelFrame> frame = LevelFrame{};
-    bool is_done = false;
-    for (int i = 0; i < std::max(most_frames, 1) && !is_done; ++i) {
+    for (int i = 0; i < std::max(most_frames, 1); ++i) {
         frame = own.draw(view);
         if (!frame) break;
-        if (auto done = own.context.finish(); !done) {
-            frame = done.error();
+        keep(*frame);
+        // Its counts come before the next one: the picture shows what they leave as it is.
+        const auto known = wait();
+        if (!known) {
+            frame = known.error();
             break;
         }
-        tests.insert(tests.end(), frame->tests.begin(), frame->tests.end());
-        times.insert(times.end(), frame->times.begin(), frame->times.end());
-        // Its counts are there already; the picture shows what they leave.
-        LevelFrame known;
-        if (auto taken = own.take_counts(known); !taken) {
-            frame = taken.error();
-            break;
-        }
-        own.take_times(known);
-        tests.insert(tests.end(), known.tests.begin(), known.tests.end());
-        times.insert(times.end(), known.times.begin(), known.times.end());
-        is_done = is_settled();
+        keep(*known);
+        if (is_settled()) break;
     }
     own.tests_all = false;
     if (!frame) return frame;
     frame->tests = std::move(tests);
     frame->times = std::move(times);
     return frame;
+}
+
+// Of the objects of each level the depth alone: the nearest level is what a pixel shows.
+Result<std::vector<int>> LevelControl::read_levels() {
+    Impl& own = *impl_;
+    auto target =
+        render::Target::create(own.context, own.passes->width, own.passes->height, {.colours = {}, .label = "levels"});
+    if (!target) return target.error();
+    const auto pixels = static_cast<std::size_t>(target->width()) * static_cast<std::size_t>(target->height());
+    std::vector<int> levels(pixels, -1);
+    std::vector<float> nearest(pixels, 0);
+    for (int level = -1; level < most_levels; ++level) {
+        std::vector<render::Item> items;
+        if (level < 0)
+            for (std::size_t i = 0; i < own.backdrop.size(); ++i)
+                items.push_back({own.backdrop[i], own.session.scene().backdrop[i].placement});
+        for (const Impl::Thing& thing : own.things)
+            if (level >= 0 && thing.drawn_level == level && is_in_sight(thing.sphere, own.view))
+                items.push_back({thing.levels->cuts[static_cast<std::size_t>(level)], thing.placement});
+        if (items.empty()) continue;
+        if (auto drawn = render::draw(items, {.view = own.view, .near_plane = own.passes->layers.near_plane()}, *target,
+                                      {.colour = std::nullopt});
+            !drawn)
+            return drawn.error();
+        const auto depth = render::read_depth(*target);
+        if (!depth) return depth.error();
+        for (std::size_t i = 0; i < pixels; ++i)
+            if ((*depth)[i] > nearest[i]) nearest[i] = (*depth)[i], levels[i] = level;
+    }
+    return levels;
 }
 
 const render::Target& LevelControl::picture() const noexcept { return impl_->passes->layers.composite(); }

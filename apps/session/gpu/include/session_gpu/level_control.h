@@ -102,6 +102,10 @@ public:
     // one; then by turns. Fails as drawing does. Counts that are not there yet decide later.
     Result<LevelFrame> draw(const vdtree::View& view);
 
+    // Waits for the GPU, and lets what it has counted decide: for programs that write each frame down, and not for those
+    // that show it. Only tests and times of what it returns are filled in.
+    Result<LevelFrame> wait();
+
     // Frames of this view until nothing changes any more, at most so many; waits for the GPU after each. The last frame,
     // with all tests and times since the first.
     Result<LevelFrame> settle(const vdtree::View& view, int most_frames = 200);
@@ -113,6 +117,7 @@ public:
     const render::LayerPasses& layers() const noexcept;  // of the last frame
     Result<void> combine(int left_out);                  // of the last frame, for people to look at
     Result<std::vector<float>> thresholds(int left_out); // the map of that combination, cd/m2; waits
+    Result<std::vector<int>> read_levels();              // by pixel; -1: no object; draws and waits
     int map_width() const noexcept;
     int map_height() const noexcept;
 
