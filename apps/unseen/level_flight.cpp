@@ -299,7 +299,8 @@ void print_summary(const LevelFlightOptions& options, const Records& records, co
                grouped(totals.triangles / frames) + " of " + grouped(session.triangle_count()) +
                " triangles, by method " + name_of(options.control.method));
     if (records.settling_frames > 0)
-        print_line("levels were found in " + grouped(records.settling_frames) + " frames of the first view");
+        print_line("levels were found in " + grouped(records.settling_frames) +
+                   (records.settling_frames == 1 ? " frame" : " frames") + " of the first view");
     std::vector<std::vector<std::string>> rows = {{"level"}, {"drawn"}, {"for control"}};
     for (std::size_t level = 0; level < totals.drawn.size(); ++level) {
         rows[0].push_back(std::to_string(level));
