@@ -17,6 +17,7 @@
 #include "flight_changes.h"
 #include "frame_image.h"
 #include "interruption.h"
+#include "numbered_pictures.h"
 #include "output_files.h"
 #include "progress_bar.h"
 #include "report.h"
@@ -30,7 +31,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr double not_drawn = std::numeric_limits<double>::quiet_NaN();
-constexpr std::size_t most_digits = 9; // of a frame's number in a file name
 
 // What one frame came to. Times in milliseconds of the wall clock.
 struct FrameRecord {
@@ -43,29 +43,6 @@ struct FrameRecord {
 
     std::uint64_t changes() const { return stats.folds + stats.unfolds; }
 };
-
-// A name with a number: what stands before it, how many digits at least, and what stands after.
-struct NamePattern {
-    std::string before, after;
-    std::size_t digits = 0;
-
-    std::string with(std::size_t number) const {
-        const std::string text = std::to_string(number);
-        return before + std::string(digits > text.size() ? digits - text.size() : 0, '0') + text + after;
-    }
-};
-
-std::optional<NamePattern> parse_pattern(const std::string& pattern) {
-    const std::size_t begin = pattern.find('%');
-    if (begin == std::string::npos || pattern.find_first_of("%/", begin + 1) != std::string::npos) return std::nullopt;
-    std::size_t end = begin + 1;
-    while (end < pattern.size() && pattern[end] >= '0' && pattern[end] <= '9') ++end;
-    if (end == pattern.size() || pattern[end] != 'd' || end - begin > 3) return std::nullopt;
-    NamePattern result{pattern.substr(0, begin), pattern.substr(end + 1), 0};
-    if (end > begin + 1)
-        result.digits = static_cast<std::size_t>(std::stoi(pattern.substr(begin + 1, end - begin - 1)));
-    return result.digits <= most_digits ? std::optional(result) : std::nullopt;
-}
 
 // The parts that draw, where anything is drawn.
 struct Drawing {
@@ -80,30 +57,6 @@ Result<std::optional<Drawing>> make_drawing(const session::Session& session, std
     if (!renderer) return renderer.error();
     return std::optional<Drawing>(Drawing{std::move(kept), std::move(*renderer)});
 }
-
-// What a flight has written so far, frame by frame; of one that fails nothing is left.
-class Pictures {
-public:
-    explicit Pictures(const std::string& pattern) : names_(parse_pattern(pattern)) {}
-    Pictures(const Pictures&) = delete;
-    Pictures& operator=(const Pictures&) = delete;
-    ~Pictures() {
-        std::error_code ignored;
-        for (std::size_t frame = 0; frame < written_; ++frame) std::filesystem::remove(names_->with(frame), ignored);
-    }
-
-    Result<void> write_next(const perception::Image& image) {
-        auto written = perception::write_image(names_->with(written_), image);
-        if (written) ++written_;
-        return written;
-    }
-    bool are_wanted() const { return names_.has_value(); }
-    void keep() { written_ = 0; }
-
-private:
-    std::optional<NamePattern> names_;
-    std::size_t written_ = 0;
-};
 
 std::string cell(double value) { return std::isfinite(value) ? shortest(value) : std::string(); }
 
@@ -388,13 +341,6 @@ private:
 };
 
 } // namespace
-
-std::string complaint_about_picture_names(const std::string& pattern) {
-    if (parse_pattern(pattern) && has_ending(pattern, ".png")) return {};
-    return "with --path, -o must be a name with one %d or %04d for the frame's number, not in its folder's name, and "
-           "end in .png, not '" +
-           pattern + "'.";
-}
 
 Result<void> fly_through(const std::string& model, const ViewOptions& view, const DisplayOptions& display,
                          const FlyThroughOptions& options) {

@@ -25,9 +25,6 @@ struct FlyThroughOptions {
     render::DrawOptions draw;
 };
 
-// Ends in an error about --output unless it is a pattern for names of PNGs.
-std::string complaint_about_picture_names(const std::string& pattern);
-
 // Prints a summary, and writes what was asked for; of a flight that the user interrupts, the rows and pictures so far. Reads and checks all files before anything that takes long, such as
 // the fold errors that the fold test may need.
 Result<void> fly_through(const std::string& model, const ViewOptions& view, const DisplayOptions& display,

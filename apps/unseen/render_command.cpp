@@ -9,6 +9,8 @@
 #include "fly_through.h"
 #include "fold_map.h"
 #include "frame_image.h"
+#include "level_flight.h"
+#include "numbered_pictures.h"
 #include "output_files.h"
 #include "report.h"
 #include "scene_renderer.h"
@@ -24,6 +26,14 @@ namespace {
 // seen.
 constexpr int samples_to_judge = 64;
 
+enum class Method { tree, perceptual, distance, area };
+
+// What --show draws instead of the picture.
+struct Shown {
+    std::optional<FoldMap> map;
+    std::optional<LevelPicture> levels;
+};
+
 struct RenderArguments {
     std::string model, out, json;
     ViewOptions view;
@@ -31,8 +41,10 @@ struct RenderArguments {
     WhatOptions what;
     bool is_verbose = false;
     render::DrawOptions draw;
-    std::optional<FoldMap> map; // instead of the picture
-    FlyThroughOptions flight;   // where a path is given
+    Shown show;
+    FlyThroughOptions flight; // where a path is given
+    Method method = Method::tree;
+    LevelFlightOptions levels; // of the other methods
 };
 
 bool is_for_people(const std::string& file) { return has_ending(file, ".png"); }
@@ -47,7 +59,23 @@ Result<int> run_flight(RenderArguments& a) {
     return exit_done;
 }
 
+Result<int> run_levels(RenderArguments& a) {
+    a.levels.control.method = a.method == Method::distance ? session::LevelMethod::distance
+                              : a.method == Method::area   ? session::LevelMethod::area
+                                                           : session::LevelMethod::perceptual;
+    a.levels.path = a.flight.path;
+    a.levels.out = a.out;
+    a.levels.json = a.json;
+    a.levels.show = a.show.levels;
+    a.levels.frames_a_second = a.flight.frames_a_second;
+    a.levels.what = a.what;
+    a.levels.is_verbose = a.is_verbose;
+    if (auto drawn = draw_levels(a.model, a.view, a.display, a.levels); !drawn) return drawn.error();
+    return exit_done;
+}
+
 Result<int> run(RenderArguments& a) {
+    if (a.method != Method::tree) return run_levels(a);
     if (!a.flight.path.empty()) return run_flight(a);
     if (const auto ready = check_outputs(inputs_of(a.model, a.view, a.display), {a.out, a.json}); !ready)
         return ready.error();
@@ -64,7 +92,7 @@ Result<int> run(RenderArguments& a) {
     session->set_velocity(a.what.velocity());
     session::Request request = a.what.request_for(session->triangle_count());
     request.purpose = session::Purpose::picture;
-    if (a.map && session->scene().objects.size() != 1)
+    if (a.show.map && session->scene().objects.size() != 1)
         return Error{ErrorCode::invalid_argument, "--show is of one object, and the scene has " +
                                                       grouped(session->scene().objects.size()) +
                                                       ": leave it out, or give --as model."};
@@ -80,8 +108,8 @@ Result<int> run(RenderArguments& a) {
 
     const perception::Display& display = session->observer().display;
     perception::Image image = is_for_people(a.out) ? code_image(*frame, display) : luminance_image(*frame, display);
-    if (a.map) {
-        auto drawn = draw_fold_map(result->cuts.front(), *session, view, request, *a.map, view);
+    if (a.show.map) {
+        auto drawn = draw_fold_map(result->cuts.front(), *session, view, request, *a.show.map, view);
         if (!drawn) return drawn.error();
         image = std::move(*drawn);
     }
@@ -141,8 +169,39 @@ bool is_moving(const GazeOptions& gaze) {
     return gaze.source == GazeSource::trace || gaze.source == GazeSource::simulated;
 }
 
+// Of discrete levels.
+void check_levels(const RenderArguments& a) {
+    const FlyThroughOptions& o = a.flight;
+    if (a.show.map) refuse("--show cost, frequency, contrast and eccentricity are of cuts, and exclude --method.");
+    if (a.show.levels && *a.show.levels != LevelPicture::levels && a.method != Method::perceptual)
+        refuse("--show layers, combinations and maps need --method perceptual.");
+    if (a.what.request.goal.kind != Goal::Kind::imperceptible)
+        refuse("--full, --triangles and --pixels are of cuts, and exclude --method: give --bias to have as many "
+               "triangles.");
+    if (o.threshold != 1 || o.geomorph_seconds || o.judges_changes || !o.csv.empty() || !o.plot.empty())
+        refuse(
+            "--threshold, --geomorph, --changes, --csv and --plot are of cuts, and exclude --method; --json says all.");
+    if (o.gaze.source != GazeSource::none)
+        refuse("--gaze-trace and --gaze-mode are of cuts, and exclude --method: give --gaze.");
+    if (a.what.visibility == Visibility::picture) refuse("--visibility picture is of cuts, and excludes --method.");
+    if (a.draw.wireframe || a.draw.shading != render::Shading::smooth)
+        refuse("--wireframe and --shading flat exclude --method.");
+    if (a.out.empty() && a.json.empty()) refuse("--method needs -o or --json.");
+    if (o.path.empty()) {
+        if (a.show.levels && !is_for_people(a.out)) refuse("--show draws pictures for people: -o must end in .png.");
+        return;
+    }
+    if (a.out.empty()) return;
+    if (const auto complaint = complaint_about_picture_names(a.out); !complaint.empty()) refuse(complaint);
+}
+
 void check(const RenderArguments& a) {
     const FlyThroughOptions& o = a.flight;
+    if (a.method != Method::tree) {
+        check_levels(a);
+        return;
+    }
+    if (a.show.levels) refuse("--show layers, combinations, maps and levels need --method.");
     if (o.path.empty() && is_moving(o.gaze)) refuse("--gaze-trace and --gaze-mode simulated need --path.");
     check_gaze(a.what, o.gaze);
     check_geomorph(o.geomorph_seconds, a.view);
@@ -153,18 +212,18 @@ void check(const RenderArguments& a) {
             "--threshold is of --imperceptible: --full, --triangles and --pixels say themselves how much is folded.");
     if (o.path.empty()) {
         if (a.out.empty()) refuse("-o is required (or --path).");
-        if (a.map && !is_for_people(a.out)) refuse("--show draws pictures for people: -o must end in .png.");
-        if (a.map == FoldMap::cost && a.what.request.goal.kind == Goal::Kind::full)
+        if (a.show.map && !is_for_people(a.out)) refuse("--show draws pictures for people: -o must end in .png.");
+        if (a.show.map == FoldMap::cost && a.what.request.goal.kind == Goal::Kind::full)
             refuse("--show cost and --full exclude each other: nothing is folded.");
-        if (a.map == FoldMap::contrast && !a.view.lights.empty())
+        if (a.show.map == FoldMap::contrast && !a.view.lights.empty())
             refuse("--show contrast is of the mesh's own light, and excludes --lights.");
-        if (a.map == FoldMap::eccentricity && !a.what.gaze_px && o.gaze.source == GazeSource::none)
+        if (a.show.map == FoldMap::eccentricity && !a.what.gaze_px && o.gaze.source == GazeSource::none)
             refuse("--show eccentricity needs --gaze: without one all counts as looked at.");
         if (!o.csv.empty() || !o.plot.empty() || o.threshold != 1 || o.draws || o.geomorph_seconds || o.judges_changes)
             refuse("--csv, --plot, --threshold, --geomorph, --changes and --draw need --path.");
         return;
     }
-    if (a.map) refuse("--show is for single pictures, and excludes --path.");
+    if (a.show.map) refuse("--show is for single pictures, and excludes --path.");
     if (a.what.visibility == Visibility::picture)
         refuse("--visibility picture is for single pictures, and excludes --path.");
     if (a.what.masks) refuse("--masking scene is for single pictures, and excludes --path.");
@@ -173,6 +232,42 @@ void check(const RenderArguments& a) {
     if (a.out.empty()) return;
     if (o.draws && !*o.draws) refuse("--no-draw and -o exclude each other.");
     if (const auto complaint = complaint_about_picture_names(a.out); !complaint.empty()) refuse(complaint);
+}
+
+void add_level_options(CLI::App& verb, RenderArguments& a) {
+    CLI::App& group = *verb.add_option_group(
+        "LEVELS", "Discrete levels of detail in place of cuts, for comparison; one sample a pixel");
+    add_choice<Method, Method>(group, "--method", a.method,
+                               {{"tree", Method::tree},
+                                {"perceptual", Method::perceptual},
+                                {"distance", Method::distance},
+                                {"area", Method::area}},
+                               "tree (default): cuts. Or levels by what the rest of the picture masks (perceptual, "
+                               "after Drettakis and others 2007), by distance, or by the area of the bounding sphere. "
+                               "Without --path, the picture in which nothing changes any more");
+    auto& control = a.levels.control;
+    group
+        .add_option("--bias", control.bias,
+                    "Of distance and area: above 1 finer levels, below coarser ones (default: 1)")
+        ->type_name("X")
+        ->check(positive());
+    group
+        .add_option("--levels", control.chain.levels,
+                    "Levels of each mesh at most, the whole one included (default: 6)")
+        ->type_name("N")
+        ->check(whole(1, session::most_levels));
+    group.add_option("--layers", control.layers, "Of perceptual: layers of depth at most (default: 5)")
+        ->type_name("N")
+        ->check(whole(1, render::most_layers));
+    add_choice<session::MapRecipe, session::MapRecipe>(
+        group, "--maps", control.maps, {{"modern", session::MapRecipe::modern}, {"rpg99", session::MapRecipe::rpg99}},
+        "Of perceptual: thresholds by the modern judge (default), or as in the paper");
+    group
+        .add_option("--map-block", control.map_block,
+                    "Of perceptual: a threshold is of so many by so many pixels (default: 1)")
+        ->type_name("N")
+        ->check(whole(1, 16));
+    group.add_flag("--half-floats", control.half_floats, "Of perceptual: keep layers in 16-bit floats");
 }
 
 } // namespace
@@ -197,17 +292,38 @@ Command render_command(CLI::App& app) {
     add_choice<render::Shading, render::Shading>(*verb, "--shading", a->draw.shading,
                                                  {{"smooth", render::Shading::smooth}, {"flat", render::Shading::flat}},
                                                  "smooth (default) or flat");
-    std::vector<std::pair<std::string, FoldMap>> maps;
+    std::vector<std::pair<std::string, Shown>> maps;
     for (std::size_t i = 0; i < std::size(fold_map_names); ++i)
-        maps.emplace_back(fold_map_names[i], static_cast<FoldMap>(i));
-    add_choice(
-        *verb, "--show", a->map, std::move(maps),
-        "Instead of the model, of its folds: cost, frequency or contrast (of their worst gratings), or eccentricity");
+        maps.emplace_back(fold_map_names[i], Shown{static_cast<FoldMap>(i), {}});
+    for (const auto& [name, picture] : {std::pair{"layers", LevelPicture::layers},
+                                        {"combinations", LevelPicture::combinations},
+                                        {"maps", LevelPicture::maps},
+                                        {"levels", LevelPicture::levels}})
+        maps.emplace_back(name, Shown{{}, picture});
+    add_choice(*verb, "--show", a->show, std::move(maps),
+               "Instead of the model, of its folds: cost, frequency or contrast (of their worst gratings), or "
+               "eccentricity; with --method the layers, what is left without each, maps of thresholds for that, or the "
+               "levels");
     add_json_option(*verb, a->json);
     add_verbose_option(*verb, a->is_verbose);
     add_path_options(*verb, a->flight);
+    add_level_options(*verb, *a);
     CLI::Option* frames_a_second = verb->get_option("--fps");
-    verb->callback([a, samples, frames_a_second] {
+    const std::vector<CLI::Option*> of_levels = {verb->get_option("--bias"),      verb->get_option("--levels"),
+                                                 verb->get_option("--layers"),    verb->get_option("--maps"),
+                                                 verb->get_option("--map-block"), verb->get_option("--half-floats")};
+    verb->callback([a, samples, frames_a_second, of_levels] {
+        const bool has_levels = a->method != Method::tree;
+        for (std::size_t i = 0; i < of_levels.size(); ++i) {
+            const bool fits = i == 0   ? a->method == Method::distance || a->method == Method::area
+                              : i == 1 ? has_levels
+                                       : a->method == Method::perceptual;
+            if (!of_levels[i]->empty() && !fits)
+                refuse(of_levels[i]->get_name() + (i == 0   ? " needs --method distance or area."
+                                                   : i == 1 ? " needs --method."
+                                                            : " needs --method perceptual."));
+        }
+        if (has_levels && !samples->empty()) refuse("--samples is of cuts: levels are drawn with one sample a pixel.");
         if (!frames_a_second->empty() && !a->flight.geomorph_seconds && a->view.lights.empty() &&
             !a->flight.judges_changes && !is_moving(a->flight.gaze))
             refuse("--fps needs --geomorph, --changes, --lights, --gaze-trace or --gaze-mode simulated.");
@@ -235,7 +351,9 @@ Command render_command(CLI::App& app) {
         "  unseen render dragon.vdt -o lit.png --lights lights.json\n"
         "  unseen render dragon.vdt --path orbit:0:240 --lights lights.json --fps 60 --csv light.csv\n"
         "  unseen render dragon.vdt --path orbit:1 -o frames/%04d.png --triangles 20000 --geomorph 0.25 --fps 60\n"
-        "  unseen render dragon.vdt --path orbit:1:60 --changes --gaze 1603 512 --csv changes.csv");
+        "  unseen render dragon.vdt --path orbit:1:60 --changes --gaze 1603 512 --csv changes.csv\n"
+        "  unseen render museum.glb --method perceptual --maps rpg99 -o levels.png --show levels\n"
+        "  unseen render house.glb --method area --bias 0.5 --path orbit:1:90 -o frames/%04d.png --json stats.json");
     return {verb, [a] { return run(*a); }};
 }
 

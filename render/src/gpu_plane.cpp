@@ -25,6 +25,9 @@ Result<GpuPlanes> GpuPlanes::create(glm::ivec2 pixels, int count, PlaneFormat fo
         drawn.push_back(GL_COLOR_ATTACHMENT0 + static_cast<GLenum>(i));
         glNamedFramebufferTexture(id, drawn.back(), texture.id(), 0);
     }
+    const std::uint64_t texel_bytes = format == PlaneFormat::full ? 16 : format == PlaneFormat::half ? 8 : 4;
+    planes.bytes_ = texel_bytes * static_cast<std::uint64_t>(texels.x) * static_cast<std::uint64_t>(texels.y) *
+                    static_cast<std::uint64_t>(count);
     glNamedFramebufferDrawBuffers(id, count, drawn.data());
     if (glCheckNamedFramebufferStatus(id, GL_DRAW_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
         return unsupported(
@@ -70,6 +73,7 @@ void PlanePasses::draw(const Program& program, const GpuPlanes& to, glm::ivec2 t
     glViewport(0, first_row, texels.x, texels.y);
     program.use();
     glDrawArrays(GL_TRIANGLES, 0, 3);
+    ++count_;
 }
 
 } // namespace unseen::render

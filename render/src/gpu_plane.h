@@ -1,6 +1,7 @@
 // Planes of numbers that passes read and write, four of a row in each texel (shaders/planes.glsl).
 #pragma once
 
+#include <cstdint>
 #include <initializer_list>
 #include <vector>
 
@@ -29,8 +30,10 @@ public:
     unsigned framebuffer() const noexcept { return framebuffer_.id(); }
     unsigned texture(std::size_t number = 0) const noexcept { return textures_[number].id(); }
     explicit operator bool() const noexcept { return static_cast<bool>(framebuffer_); }
+    std::uint64_t bytes() const noexcept { return bytes_; } // of all planes
 
 private:
+    std::uint64_t bytes_ = 0;
     std::vector<Texture2d> textures_;
     FramebufferObject framebuffer_;
 };
@@ -51,8 +54,10 @@ public:
     void draw(const Program& program, const GpuPlanes& to, glm::ivec2 texels, std::initializer_list<unsigned> textures,
               int first_row = 0);
     void bind(unsigned unit, unsigned texture);
+    int count() const noexcept { return count_; } // of draws
 
 private:
+    int count_ = 0;
     VertexArray no_arrays_; // for the full-screen triangle, which comes from nowhere
     Sampler nearest_;
     unsigned used_units_ = 0;

@@ -21,6 +21,7 @@ enum class Output {
 struct ProgramKey {
     bool lit = false, textured = false, flat = false, wireframe = false;
     Output output = Output::linear;
+    bool compares = false; // drops pixels that look like a picture: compare.frag
     auto operator<=>(const ProgramKey&) const = default;
 };
 

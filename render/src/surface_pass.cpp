@@ -26,6 +26,7 @@ enum UniformLocation {
     lights_location = 6,
     lod_bias_location = 60,
     uv_bounds_location = 61,
+    compared_location = 70,
 };
 
 bool is_finite(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
@@ -135,7 +136,7 @@ SurfacePass::Cull SurfacePass::cull_for(vdtree::Closedness closedness, bool eye_
 }
 
 Result<SurfacePass> SurfacePass::prepare(std::span<const Item> items, const Camera& camera, const Target::Impl& target,
-                                         int attachment) {
+                                         int attachment, Use use) {
     const vdtree::View& view = camera.view;
     if (auto valid = vdtree::validate(view); !valid) return valid.error();
     if (view.width != target.width || view.height != target.height)
@@ -154,14 +155,16 @@ Result<SurfacePass> SurfacePass::prepare(std::span<const Item> items, const Came
     auto projections = projections_of(items, view, camera.near_plane);
     if (!projections) return projections.error();
 
-    const Output output = target.output(attachment);
+    const bool compares = use == Use::comparison;
+    const Output output = compares ? Output::linear : target.output(attachment);
     SurfacePass pass(view, attachment, output);
+    pass.use_ = use;
     for (std::size_t i = 0; i < items.size(); ++i) {
         const Item& item = items[i];
         GpuTree::Impl& tree = item.cut.tree().impl();
         const auto program =
             target.context.impl().programs.surface({item.lighting.has_value(), tree.texture.has_value(),
-                                                    item.shading == Shading::flat, item.wireframe, output});
+                                                    item.shading == Shading::flat, item.wireframe, output, compares});
         if (!program) return program.error();
         const Projection& projection = (*projections)[i];
         PreparedItem prepared{item.cut, projection, *program, cull_for(tree.tree.closedness(), projection.eye_inside)};
@@ -217,6 +220,15 @@ void SurfacePass::draw(const Target::Impl& target, glm::dvec2 point, const Clear
     for (const PreparedItem& item : items_) draw_item(item, point, lod_bias);
 }
 
+void SurfacePass::compare(const Target::Impl& target, glm::dvec2 point, const glm::vec4& compared) const {
+    set_fixed_state(target);
+    target.bind(attachment_);
+    for (const PreparedItem& item : items_) {
+        item.program->set(compared_location, compared);
+        draw_item(item, point, 0);
+    }
+}
+
 void SurfacePass::draw_item(const PreparedItem& item, glm::dvec2 point, float lod_bias) const {
     GpuCut::Impl& cut = item.cut.impl();
     GpuTree::Impl& tree = cut.tree.impl();
@@ -225,7 +237,8 @@ void SurfacePass::draw_item(const PreparedItem& item, glm::dvec2 point, float lo
 
     glDisable(GL_BLEND);
     glEnable(GL_DEPTH_TEST);
-    glDepthFunc(GL_GREATER); // depth is reversed
+    // Depth is reversed. What compares is at the depth that was drawn before, of which it is a part.
+    glDepthFunc(use_ == Use::comparison ? GL_GEQUAL : GL_GREATER);
     glFrontFace(GL_CCW);
     if (item.cull == Cull::nothing) {
         glDisable(GL_CULL_FACE);

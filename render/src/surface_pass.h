@@ -37,13 +37,19 @@ class SurfacePass {
 public:
     // Checks everything that can be wrong, compiles what is missing and aims at each item. The pass keeps the items'
     // cuts. Of the camera's point nothing is taken.
+    // `use`: of a pass that compares, whose target has no colours, see compare().
+    enum class Use { drawing, comparison };
     static Result<SurfacePass> prepare(std::span<const Item> items, const Camera& camera, const Target::Impl& target,
-                                       int attachment);
+                                       int attachment, Use use = Use::drawing);
 
     // `sample_count`: of draws that will be averaged, each of which stands for so small a part of a pixel. `only`:
     // nothing else is touched.
     void draw(const Target::Impl& target, glm::dvec2 point, const Clear& clear, std::size_t sample_count = 1,
               const PixelBox* only = nullptr) const;
+
+    // Draws nothing but what an occlusion query counts: where the items are at the target's depth, and do not look like
+    // the picture that is bound. `compared`: as compare.frag has it.
+    void compare(const Target::Impl& target, glm::dvec2 point, const glm::vec4& compared) const;
 
     // Which pixels of draws of these points can show anything: all of them where a part of an item may lie behind the
     // eye.
@@ -70,6 +76,7 @@ private:
     vdtree::View view_;
     int attachment_;
     Output output_;
+    Use use_ = Use::drawing;
     std::vector<PreparedItem> items_;
 };
 

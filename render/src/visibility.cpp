@@ -15,6 +15,8 @@
 #include "context_impl.h"
 #include "gl.h"
 #include "gpu_plane.h"
+#include "luminance_texture.h"
+#include "plane_program.h"
 #include "shaders.h"
 
 namespace unseen::render {
@@ -37,42 +39,6 @@ constexpr std::array<float, 5> pooling_kernel = {0.26656f, 0.21344f, 0.10959f, 0
 glm::ivec2 halved(glm::ivec2 size) { return (size + 1) / 2; }
 
 glm::vec4 taps(const VisibilityTables& tables) { return {tables.kernel[0], tables.kernel[1], tables.kernel[2], 0}; }
-
-std::string size_text(int width, int height) { return std::to_string(width) + "x" + std::to_string(height); }
-
-Error judge_error(const std::string& message) { return invalid_argument("judge: " + message); }
-
-Result<void> check_size(int width, int height) {
-    if (width < 1 || height < 1)
-        return judge_error("a picture of " + size_text(width, height) + " pixels has none; it needs at least 1x1");
-    const int most = largest_target_side();
-    if (width > most || height > most)
-        return unsupported("judge: a picture of " + size_text(width, height) +
-                           " pixels is larger than this GPU's textures, at most " + size_text(most, most) +
-                           "; judge parts of it, or on the CPU");
-    return {};
-}
-
-// In its context.
-Result<void> check_texture(const LuminanceTexture& t) {
-    if (auto ok = check_size(t.width, t.height); !ok) return ok;
-    if (t.channel < 0 || t.channel > 3) return judge_error("a texture's channel must be 0 to 3");
-    if (!(std::isfinite(t.scale) && std::isfinite(t.offset)))
-        return judge_error("a texture's scale and offset must be finite");
-    if (!glIsTexture(t.id)) return judge_error("there is no texture " + std::to_string(t.id) + " in this context");
-    GLint target = 0, width = 0, height = 0, kind = GL_NONE;
-    glGetTextureParameteriv(t.id, GL_TEXTURE_TARGET, &target);
-    if (target != GL_TEXTURE_2D) return judge_error("a picture must be a texture of two dimensions, without samples");
-    glGetTextureLevelParameteriv(t.id, 0, GL_TEXTURE_WIDTH, &width);
-    glGetTextureLevelParameteriv(t.id, 0, GL_TEXTURE_HEIGHT, &height);
-    if (width != t.width || height != t.height)
-        return judge_error("the texture of a picture of " + size_text(t.width, t.height) + " pixels is " +
-                           size_text(width, height));
-    glGetTextureLevelParameteriv(t.id, 0, GL_TEXTURE_RED_TYPE, &kind);
-    if (kind == GL_INT || kind == GL_UNSIGNED_INT || kind == GL_NONE)
-        return judge_error("the texture of a picture must hold floats or normalised values");
-    return {};
-}
 
 Result<void> check(const VisibilityTables& t) {
     const auto refuse = [](const std::string& what) { return judge_error("the tables are none: " + what); };
@@ -98,34 +64,6 @@ Result<void> check(const VisibilityTables& t) {
         return unsupported("judge: the tables are larger than this GPU's textures; judge on the CPU");
     return {};
 }
-
-Result<const Program*> plane_program(const Context& context, std::string_view label, std::string_view fragment,
-                                     std::initializer_list<std::string_view> defines = {}) {
-    const std::string text = std::string(shaders::planes_glsl) + "#line 1\n" + std::string(fragment);
-    const ShaderSource sources[] = {{ShaderSource::Stage::vertex, shaders::full_screen_vert},
-                                    {ShaderSource::Stage::fragment, text}};
-    return context.impl().programs.named(label, sources, {defines.begin(), defines.size()});
-}
-
-// Programs by name, found when they are first needed; the first error is kept.
-class PlanePrograms {
-public:
-    explicit PlanePrograms(const Context& context) : context_(context) {}
-
-    bool find(const Program*& program, std::string_view label, std::string_view fragment,
-              std::initializer_list<std::string_view> defines = {}) {
-        if (program || error_) return !error_;
-        const auto found = plane_program(context_, label, fragment, defines);
-        if (found) program = *found;
-        else error_ = found.error();
-        return !error_;
-    }
-    Result<void> result() const { return error_ ? Result<void>(*error_) : Result<void>(); }
-
-private:
-    const Context& context_;
-    std::optional<Error> error_;
-};
 
 // ---- what is in a picture ---------------------------------------------------------------------------------------------
 
@@ -172,33 +110,6 @@ Result<void> check(const Found& found, int width, const char* which) {
     return judge_error("luminance of the " + std::string(which) + " at pixel (" +
                        std::to_string(found.first_bad % columns) + ", " + std::to_string(found.first_bad / columns) +
                        ") is negative or not finite");
-}
-
-// ---- textures and memory ----------------------------------------------------------------------------------------------
-
-void reset_pixel_stores() {
-    for (const GLenum four : {GL_PACK_ALIGNMENT, GL_UNPACK_ALIGNMENT}) glPixelStorei(four, 4);
-    for (const GLenum zero : {GL_PACK_ROW_LENGTH, GL_PACK_SKIP_ROWS, GL_PACK_SKIP_PIXELS, GL_UNPACK_ROW_LENGTH,
-                              GL_UNPACK_SKIP_ROWS, GL_UNPACK_SKIP_PIXELS})
-        glPixelStorei(zero, 0);
-    glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
-    glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
-}
-
-std::vector<float> read_floats(unsigned texture, glm::ivec2 size) {
-    std::vector<float> values(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y));
-    reset_pixel_stores();
-    const std::size_t bytes = values.size() * sizeof(float);
-    // GL counts bytes as an int; rows are read in parts where there are more.
-    const auto row_bytes = static_cast<std::size_t>(size.x) * sizeof(float);
-    const auto rows = static_cast<int>(std::min<std::size_t>(std::size_t{1} << 30, bytes) / row_bytes);
-    for (int y = 0; y < size.y; y += rows) {
-        const int count = std::min(rows, size.y - y);
-        glGetTextureSubImage(texture, 0, 0, y, 0, size.x, count, 1, GL_RED, GL_FLOAT,
-                             static_cast<GLsizei>(static_cast<std::size_t>(count) * row_bytes),
-                             values.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(size.x));
-    }
-    return values;
 }
 
 } // namespace
@@ -296,8 +207,23 @@ struct VisibilityPasses::Impl {
         Buffer found_in_test, found_visible;
     };
     enum class Sight { weights, thresholds, maskers };
+    // What mapping and weighing need meanwhile.
+    struct Scratch {
+        GpuPlanes split, across, odd, even; // luminance and contrast; levels of the reference
+        std::vector<GpuPlanes> steps;       // thresholds by band
+        std::array<GpuPlanes, 3> maskers;   // as they are, pooled along rows, and pooled
+        GpuPlanes packed;
+    };
 
     Result<void> prepare(const LuminanceTexture& picture);
+    Result<void> copy_reference(const LuminanceTexture& picture);
+    Result<void> check_reference(const LuminanceTexture& picture) const;
+    Result<void> set_reference(const LuminanceTexture& picture);
+    Result<void> weigh_reference();
+    Result<void> need_scratch();
+    void end_scratch() {
+        if (!keeps_scratch) scratch.reset();
+    }
     Result<void> find_programs(Sight sight);
     void upload_nodes();
     float weights_scale(const VisibilityTables::Band& band) const;
@@ -314,8 +240,10 @@ struct VisibilityPasses::Impl {
               const GpuPlanes& rows, const GpuPlanes& to);
     void pool(PlanePasses& passes, const Program& program, const std::vector<GpuPlanes>& from, const GpuPlanes& packed,
               const GpuPlanes& to);
-    Result<void> map_thresholds();
     Result<void> map_elevations(int cell_px);
+    Result<void> map_thresholds(std::size_t number);
+
+    std::uint64_t texture_bytes() const;
 
     PlaneFormat kept() const { return is_half ? PlaneFormat::half : PlaneFormat::full; }
     float energy_scale() const { return is_half ? half_energy_scale : 1; }
@@ -328,12 +256,20 @@ struct VisibilityPasses::Impl {
     GpuPlanes reference;
     std::vector<Band> bands;
     std::optional<Judging> judging;
-    bool is_judged = false;
-    GpuPlanes thresholds;
+    bool is_judged = false, is_weighed = false;
+    std::optional<Scratch> scratch;
+    bool keeps_scratch = false;
+    struct Map {
+        GpuPlanes planes;
+        bool is_of_reference = false; // of the present one
+    };
+    std::vector<Map> maps;
+    mutable int passes_done = 0;
     struct Elevations {
         int cell_px;
         glm::ivec2 cells;
         GpuPlanes planes; // one band below the other
+        bool is_of_reference;
     };
     std::optional<Elevations> elevations;
 
@@ -347,7 +283,6 @@ struct VisibilityPasses::Impl {
 // Programs that nothing calls for are not compiled.
 Result<void> VisibilityPasses::Impl::find_programs(Sight sight) {
     PlanePrograms programs(context);
-    programs.find(copy, "luminance", shaders::luminance_frag);
     programs.find(unpack, "unpack", shaders::unpack_frag);
     programs.find(reduce_columns, "reduce columns", shaders::reduce_frag);
     programs.find(reduce_rows, "reduce rows", shaders::reduce_frag, {"ALONG_ROWS"});
@@ -358,7 +293,7 @@ Result<void> VisibilityPasses::Impl::find_programs(Sight sight) {
     if (sight == Sight::maskers) {
         if (tables.gaze) programs.find(seen, "mask by gaze", shaders::sight_frag, {"MASKERS", "GAZE"});
         else programs.find(seen, "mask", shaders::sight_frag, {"MASKERS"});
-        programs.find(elevate, "elevation", shaders::elevation_frag);
+        programs.find(elevate, "least elevation", shaders::least_elevation_frag);
         programs.find(blur_rows[0], "blur rows by 4", shaders::blur_frag, {"ALONG_ROWS", "REACH_1"});
         programs.find(blur_columns[0], "blur columns by 4", shaders::blur_frag, {"REACH_1"});
     } else if (is_step && tables.gaze) programs.find(seen, "step by gaze", shaders::sight_frag, {"THRESHOLDS", "GAZE"});
@@ -411,35 +346,44 @@ void VisibilityPasses::Impl::reduce(PlanePasses& passes, unsigned from, glm::ive
     passes.draw(*reduce_rows, to, texels_of(halved(from_size)), {across.texture()});
 }
 
-template <class Use>
-Result<void> VisibilityPasses::Impl::for_each_reference_band(PlanePasses& passes, Use use) {
+Result<void> VisibilityPasses::Impl::need_scratch() {
+    if (scratch) return {};
     const glm::ivec2 second = halved(size), third = halved(second);
+    Scratch made;
     auto split = GpuPlanes::create(size, 2, PlaneFormat::full, "luminance and contrast");
     if (!split) return split.error();
-    GpuPlanes across, odd, even; // levels of the reference
+    made.split = std::move(*split);
     if (bands.size() > 1)
         for (const auto& [planes, pixels] :
-             {std::pair{&across, glm::ivec2(size.x, second.y)}, {&odd, second}, {&even, third}}) {
-            auto made = GpuPlanes::create(pixels, 1, PlaneFormat::full, "levels of a reference");
-            if (!made) return made.error();
-            *planes = std::move(*made);
+             {std::pair{&made.across, glm::ivec2(size.x, second.y)}, {&made.odd, second}, {&made.even, third}}) {
+            auto level = GpuPlanes::create(pixels, 1, PlaneFormat::full, "levels of a reference");
+            if (!level) return level.error();
+            *planes = std::move(*level);
         }
+    scratch = std::move(made);
+    return {};
+}
+
+template <class Use>
+Result<void> VisibilityPasses::Impl::for_each_reference_band(PlanePasses& passes, Use use) {
+    if (auto made = need_scratch(); !made) return made;
+    const GpuPlanes& split = scratch->split;
     unsigned fine = reference.texture();
     for (std::size_t level = 0; level < bands.size(); ++level) {
         const glm::ivec2 here = bands[level].size;
         if (level + 1 == bands.size()) {
             split_base->set(2, tables.floor_cdm2);
-            passes.draw(*split_base, *split, texels_of(here), {fine});
+            passes.draw(*split_base, split, texels_of(here), {fine});
         } else {
-            const GpuPlanes& next = level % 2 == 0 ? odd : even;
-            reduce(passes, fine, here, across, next);
+            const GpuPlanes& next = level % 2 == 0 ? scratch->odd : scratch->even;
+            reduce(passes, fine, here, scratch->across, next);
             split_reference->set(0, halved(here));
             split_reference->set(1, taps(tables));
             split_reference->set(2, tables.floor_cdm2);
-            passes.draw(*split_reference, *split, texels_of(here), {fine, next.texture()});
+            passes.draw(*split_reference, split, texels_of(here), {fine, next.texture()});
             fine = next.texture();
         }
-        if (auto used = use(level, *split); !used) return used;
+        if (auto used = use(level, split); !used) return used;
     }
     return {};
 }
@@ -463,36 +407,70 @@ void VisibilityPasses::Impl::see(PlanePasses& passes, std::size_t level, const G
     passes.draw(program, to, texels_of(band.size), {of_reference.texture(0), of_reference.texture(1), nodes.id()});
 }
 
-Result<void> VisibilityPasses::Impl::prepare(const LuminanceTexture& picture) {
-    if (auto ok = check(tables); !ok) return ok;
+Result<void> VisibilityPasses::Impl::check_reference(const LuminanceTexture& picture) const {
     if (auto ok = check_texture(picture); !ok) return ok;
     if (picture.width != size.x || picture.height != size.y)
         return judge_error("the tables are for pictures of " + size_text(size.x, size.y) + ", not " +
                            size_text(picture.width, picture.height));
-    if (auto ok = find_programs(Sight::weights); !ok) return ok;
+    return {};
+}
+
+Result<void> VisibilityPasses::Impl::prepare(const LuminanceTexture& picture) {
+    if (auto ok = check(tables); !ok) return ok;
+    if (auto ok = check_reference(picture); !ok) return ok;
+    PlanePrograms programs(context);
+    programs.find(copy, "luminance", shaders::luminance_frag);
+    if (auto ok = programs.result(); !ok) return ok;
     upload_nodes();
     auto copied = GpuPlanes::create(size, 1, PlaneFormat::full, "reference");
     if (!copied) return copied.error();
     reference = std::move(*copied);
+    bands.resize(tables.bands.size());
+    for (std::size_t level = 0; level < bands.size(); ++level) {
+        bands[level].size = level == 0 ? size : halved(bands[level - 1].size);
+        bands[level].scale = weights_scale(tables.bands[level]);
+    }
+    return copy_reference(picture);
+}
+
+Result<void> VisibilityPasses::Impl::copy_reference(const LuminanceTexture& picture) {
     PlanePasses passes;
     copy->set(0, size);
     copy->set(1, static_cast<unsigned>(picture.channel));
     copy->set(2, glm::vec4(picture.scale, picture.offset, 0, 0));
     passes.draw(*copy, reference, texels_of(size), {picture.id});
+    passes_done += passes.count();
+    return {};
+}
 
-    bands.resize(tables.bands.size());
-    for (std::size_t level = 0; level < bands.size(); ++level) {
-        Band& band = bands[level];
-        band.size = level == 0 ? size : halved(bands[level - 1].size);
-        band.scale = weights_scale(tables.bands[level]);
+Result<void> VisibilityPasses::Impl::set_reference(const LuminanceTexture& picture) {
+    if (auto ok = check_reference(picture); !ok) return ok;
+    is_judged = is_weighed = false;
+    keeps_scratch = true;
+    for (Map& map : maps) map.is_of_reference = false;
+    if (elevations) elevations->is_of_reference = false;
+    return copy_reference(picture);
+}
+
+// What judging needs of the reference.
+Result<void> VisibilityPasses::Impl::weigh_reference() {
+    if (is_weighed) return {};
+    if (auto ok = find_programs(Sight::weights); !ok) return ok;
+    for (Band& band : bands) {
+        if (band.weights) continue;
         auto weights = GpuPlanes::create(band.size, 2, kept(), "weights of a band");
         if (!weights) return weights.error();
         band.weights = std::move(*weights);
     }
-    return for_each_reference_band(passes, [&](std::size_t level, const GpuPlanes& of_reference) -> Result<void> {
+    PlanePasses passes;
+    auto done = for_each_reference_band(passes, [&](std::size_t level, const GpuPlanes& of_reference) -> Result<void> {
         see(passes, level, of_reference, Sight::weights, bands[level].weights);
         return {};
     });
+    end_scratch();
+    passes_done += passes.count();
+    is_weighed = static_cast<bool>(done);
+    return done;
 }
 
 Result<void> VisibilityPasses::Impl::prepare_judging() {
@@ -622,6 +600,7 @@ Result<void> VisibilityPasses::Impl::judge(const LuminanceTexture& test) {
     if (test.width != size.x || test.height != size.y)
         return judge_error("the images differ in size: reference " + size_text(size.x, size.y) + ", test " +
                            size_text(test.width, test.height));
+    if (auto ok = weigh_reference(); !ok) return ok;
     if (auto ok = prepare_judging(); !ok) return ok;
     const auto& j = *judging;
     const float most = is_half ? std::min(tables.most_thresholds, std::sqrt(largest_half / (2 * half_energy_scale)))
@@ -654,28 +633,42 @@ Result<void> VisibilityPasses::Impl::judge(const LuminanceTexture& test) {
     pool_powers->set(2, tables.beta);
     pool(passes, *pool_powers, j.powers, j.differences[0], j.visibility); // the difference is needed no more
     examine(*look, passes, {.id = j.visibility.texture(), .width = size.x, .height = size.y}, j.found_visible);
+    passes_done += passes.count();
     return {};
 }
 
-Result<void> VisibilityPasses::Impl::map_thresholds() {
-    if (thresholds) return {};
+Result<void> VisibilityPasses::Impl::map_thresholds(std::size_t number) {
+    if (number < maps.size() && maps[number].is_of_reference) return {};
     if (auto ok = find_programs(Sight::thresholds); !ok) return ok;
-    auto made = GpuPlanes::create(size, 1, PlaneFormat::single, "thresholds");
-    if (!made) return made.error();
-    std::vector<GpuPlanes> steps;
-    PlanePasses passes;
-    auto done = for_each_reference_band(passes, [&](std::size_t level, const GpuPlanes& of_reference) -> Result<void> {
+    if (maps.size() <= number) maps.resize(number + 1);
+    GpuPlanes& map = maps[number].planes;
+    if (!map) {
+        auto made = GpuPlanes::create(size, 1, PlaneFormat::single, "thresholds");
+        if (!made) return made.error();
+        map = std::move(*made);
+    }
+    if (auto ok = need_scratch(); !ok) return ok;
+    auto& steps = scratch->steps;
+    for (std::size_t level = steps.size(); level < bands.size(); ++level) {
         auto here = GpuPlanes::create(bands[level].size, 1, PlaneFormat::full, "thresholds of a band");
         if (!here) return here.error();
-        see(passes, level, of_reference, Sight::thresholds, *here);
         steps.push_back(std::move(*here));
+    }
+    if (!scratch->packed) {
+        auto packed = GpuPlanes::create(size, 1, PlaneFormat::full, "thresholds");
+        if (!packed) return packed.error();
+        scratch->packed = std::move(*packed);
+    }
+    PlanePasses passes;
+    auto done = for_each_reference_band(passes, [&](std::size_t level, const GpuPlanes& of_reference) -> Result<void> {
+        see(passes, level, of_reference, Sight::thresholds, steps[level]);
         return {};
     });
     if (!done) return done;
-    const auto packed = GpuPlanes::create(size, 1, PlaneFormat::full, "thresholds");
-    if (!packed) return packed.error();
-    pool(passes, *pool_thresholds, steps, *packed, *made);
-    thresholds = std::move(*made);
+    pool(passes, *pool_thresholds, steps, scratch->packed, map);
+    passes_done += passes.count();
+    end_scratch();
+    maps[number].is_of_reference = true;
     return {};
 }
 
@@ -683,38 +676,62 @@ Result<void> VisibilityPasses::Impl::map_elevations(int cell_px) {
     if (cell_px < 1 || cell_px > largest_cell_px)
         return judge_error("cells of elevations have 1 to " + std::to_string(largest_cell_px) + " pixels a side, not " +
                            std::to_string(cell_px));
-    if (elevations && elevations->cell_px == cell_px) return {};
+    if (elevations && elevations->cell_px == cell_px && elevations->is_of_reference) return {};
     if (auto ok = find_programs(Sight::maskers); !ok) return ok;
     const glm::ivec2 cells = (size + cell_px - 1) / cell_px;
     const auto band_count = static_cast<int>(bands.size());
     if (cells.y * band_count > largest_target_side())
         return unsupported("judge: the elevations of " + std::to_string(band_count) + " bands in " +
-                           size_text(cells.x, cells.y) + " cells are larger than this GPU's textures; take larger cells");
-    GpuPlanes maskers, rows, pooled;
-    for (const auto& [planes, label] :
-         {std::pair{&maskers, "maskers"}, {&rows, "pooled maskers"}, {&pooled, "pooled maskers"}}) {
-        auto made = GpuPlanes::create(size, 1, PlaneFormat::full, label);
+                           size_text(cells.x, cells.y) +
+                           " cells are larger than this GPU's textures; take larger cells");
+    if (auto ok = need_scratch(); !ok) return ok;
+    for (GpuPlanes& planes : scratch->maskers) {
+        if (planes) continue;
+        auto made = GpuPlanes::create(size, 1, PlaneFormat::full, "maskers");
         if (!made) return made.error();
-        *planes = std::move(*made);
+        planes = std::move(*made);
     }
     auto grid = GpuPlanes::create({cells.x, cells.y * band_count}, 1, PlaneFormat::single, "elevations");
     if (!grid) return grid.error();
     PlanePasses passes;
     auto done = for_each_reference_band(passes, [&](std::size_t level, const GpuPlanes& of_reference) -> Result<void> {
         const glm::ivec2 here = bands[level].size;
-        see(passes, level, of_reference, Sight::maskers, maskers);
-        blur(passes, maskers.texture(), here, pooling_kernel, rows, pooled);
+        see(passes, level, of_reference, Sight::maskers, scratch->maskers[0]);
+        blur(passes, scratch->maskers[0].texture(), here, pooling_kernel, scratch->maskers[1], scratch->maskers[2]);
         const int first_row = static_cast<int>(level) * cells.y;
         elevate->set(0, here);
         elevate->set(1, glm::vec4(tables.masking_power, tables.masking_knee, tables.least_masker, tables.most_masker));
         elevate->set(2, glm::ivec2(cell_px, static_cast<int>(level)));
         elevate->set(3, glm::ivec2(0, first_row));
-        passes.draw(*elevate, *grid, cells, {pooled.texture()}, first_row);
+        passes.draw(*elevate, *grid, cells, {scratch->maskers[2].texture()}, first_row);
         return {};
     });
     if (!done) return done;
-    elevations = Elevations{cell_px, cells, std::move(*grid)};
+    passes_done += passes.count();
+    end_scratch();
+    elevations = Elevations{cell_px, cells, std::move(*grid), true};
     return {};
+}
+
+std::uint64_t VisibilityPasses::Impl::texture_bytes() const {
+    std::uint64_t bytes = reference.bytes();
+    for (const Band& band : bands) bytes += band.weights.bytes();
+    for (const Map& map : maps) bytes += map.planes.bytes();
+    if (elevations) bytes += elevations->planes.bytes();
+    if (scratch) {
+        for (const GpuPlanes* planes :
+             {&scratch->split, &scratch->across, &scratch->odd, &scratch->even, &scratch->packed})
+            bytes += planes->bytes();
+        for (const GpuPlanes& planes : scratch->steps) bytes += planes.bytes();
+        for (const GpuPlanes& planes : scratch->maskers) bytes += planes.bytes();
+    }
+    if (!judging) return bytes;
+    for (const GpuPlanes* planes : {&judging->reduced, &judging->band, &judging->blurred_rows, &judging->visibility})
+        bytes += planes->bytes();
+    for (const auto* some : {&judging->differences, &judging->energies, &judging->blurred})
+        for (const GpuPlanes& planes : *some) bytes += planes.bytes();
+    for (const GpuPlanes& planes : judging->powers) bytes += planes.bytes();
+    return bytes;
 }
 
 VisibilityPasses::VisibilityPasses(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -765,15 +782,24 @@ unsigned VisibilityPasses::visibility_texture() const noexcept {
     return impl_->is_judged ? impl_->judging->visibility.texture() : 0;
 }
 
-Result<void> VisibilityPasses::map_thresholds() {
-    return in_context(impl_->context, "Mapping thresholds", [&] { return impl_->map_thresholds(); });
+Result<void> VisibilityPasses::set_reference(const LuminanceTexture& reference) {
+    return in_context(impl_->context, "Preparing a judge's reference", [&] { return impl_->set_reference(reference); });
 }
 
-Result<std::vector<float>> VisibilityPasses::read_thresholds() const {
-    if (!impl_->thresholds) return judge_error("there is no map of thresholds yet");
+Result<void> VisibilityPasses::map_thresholds(int number) {
+    if (number < 0 || number >= most_maps)
+        return judge_error("maps of thresholds have the numbers 0 to " + std::to_string(most_maps - 1) + ", not " +
+                           std::to_string(number));
+    return in_context(impl_->context, "Mapping thresholds",
+                      [&] { return impl_->map_thresholds(static_cast<std::size_t>(number)); });
+}
+
+Result<std::vector<float>> VisibilityPasses::read_thresholds(int number) const {
+    const unsigned texture = thresholds_texture(number);
+    if (texture == 0) return judge_error("there is no map of thresholds yet");
     std::vector<float> values;
     auto done = in_context(impl_->context, "Reading thresholds", [&]() -> Result<void> {
-        values = read_floats(impl_->thresholds.texture(), impl_->size);
+        values = read_floats(texture, impl_->size);
         return {};
     });
     if (!done) return done.error();
@@ -785,20 +811,28 @@ Result<void> VisibilityPasses::map_elevations(int cell_px) {
 }
 
 Result<ElevationGrid> VisibilityPasses::read_elevations() const {
-    if (!impl_->elevations) return judge_error("there is no map of elevations yet");
+    if (!impl_->elevations || !impl_->elevations->is_of_reference)
+        return judge_error("there is no map of elevations yet");
     const Impl::Elevations& from = *impl_->elevations;
     ElevationGrid grid{from.cell_px, from.cells.x, from.cells.y, {}};
     auto done = in_context(impl_->context, "Reading elevations", [&]() -> Result<void> {
-        grid.elevation = read_floats(from.planes.texture(),
-                                     {from.cells.x, from.cells.y * static_cast<int>(impl_->bands.size())});
+        grid.elevation =
+            read_floats(from.planes.texture(), {from.cells.x, from.cells.y * static_cast<int>(impl_->bands.size())});
         return {};
     });
     if (!done) return done.error();
     return grid;
 }
 
-unsigned VisibilityPasses::thresholds_texture() const noexcept {
-    return impl_->thresholds ? impl_->thresholds.texture() : 0;
+unsigned VisibilityPasses::thresholds_texture(int number) const noexcept {
+    const auto& maps = impl_->maps;
+    if (number < 0 || static_cast<std::size_t>(number) >= maps.size()) return 0;
+    const GpuPlanes& planes = maps[static_cast<std::size_t>(number)].planes;
+    return planes ? planes.texture() : 0;
 }
+
+int VisibilityPasses::full_screen_passes() const noexcept { return impl_->passes_done; }
+
+std::uint64_t VisibilityPasses::texture_bytes() const noexcept { return impl_->texture_bytes(); }
 
 } // namespace unseen::render

@@ -77,4 +77,30 @@ struct JudgeTables {
 Result<JudgeTables> judge_tables(int width, int height, float darkest_cdm2, float brightest_cdm2,
                                  const JudgeOptions& options);
 
+// What rpg99_map() of a reference alone (Rpg99Options::masked_by_both off) knows of an observer. Its steps:
+//
+//   a_0 = picture,  a_i+1 = a_i blurred by the kernel along both axes,
+//   c_i = |a_i - a_i+1| / max(a_i+2, floor),  A = max(a_adaptation_level, floor),
+//   elevation = sum c_i frequency_factor_i m(c_i csf_i(A)) / max(sum c_i, floor), within 1..largest_elevation,
+//   m(x) = (1 + (masking_scale (masking_gain x)^masking_power)^4)^(1/4),  threshold = elevation tvi(A).
+//
+// What lies before a picture is its mirror image about the first pixel, what follows it that about the last one's edge.
+struct Rpg99Tables {
+    static constexpr int band_count = 6, level_count = 8; // c_0.., a_0..
+
+    std::array<float, 3> kernel = {}; // by distance in pixels
+    std::array<float, band_count> frequency_factor = {};
+    int adaptation_level = 0; // 0..level_count - 1
+    float floor = 0, largest_elevation = 0;
+    float masking_scale = 0, masking_gain = 0, masking_power = 0;
+    // Node l is at the luminance 2^(first_log2 + l / nodes_an_octave) cd/m2; in between logarithms are linear.
+    float first_log2 = 0;
+    int nodes_an_octave = 0, luminances = 0;
+    std::vector<float> log2_tvi; // by node
+    std::vector<float> log2_csf; // [band * luminances + node]
+};
+
+// For pictures so wide. Fails where rpg99_map() does, and on widths below 1.
+Result<Rpg99Tables> rpg99_tables(int width, const Rpg99Options& options);
+
 } // namespace unseen::perception

@@ -14,11 +14,15 @@
 
 #include <render/context.h>
 #include <render/depth.h>
+#include <render/difference_count.h>
 #include <render/draw.h>
+#include <render/elevation.h>
 #include <render/gpu_tree.h>
+#include <render/layers.h>
 #include <render/overlay.h>
 #include <render/renderer.h>
 #include <render/sample_sum.h>
+#include <render/stage_times.h>
 #include <render/target.h>
 #include <render/test_pattern.h>
 #include <render/visibility.h>

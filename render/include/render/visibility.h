@@ -99,12 +99,14 @@ struct ElevationGrid {
     std::vector<float> elevation; // [(band * rows + row) * columns + column], 1 or more; bands as in the tables
 };
 
-// Prepares a reference once, and judges any number of pictures by it. What is not called for is not made: planes for
-// judging at the first judge(), the map of thresholds at the first map_thresholds(), and without a gaze nothing knows of
-// eccentricity. The same pictures give the same bits on the same GPU. Move-only; keeps a handle to the context.
+// Prepares a reference once, and judges any number of pictures by it. What is not called for is not made: the
+// reference's weights and planes for judging at the first judge(), the map of thresholds at the first map_thresholds(),
+// and without a gaze nothing knows of eccentricity. The same pictures give the same bits on the same GPU. Move-only;
+// keeps a handle to the context.
 //
-// Memory, in bytes a pixel: 15 for the reference (half floats: 9) and 11 more while it is prepared; some 35 for judging
-// (28), 4 for thresholds and 25 more while they are mapped.
+// Memory, in bytes a pixel: 4 for the reference; for judging 11 of its weights (half floats: 5), 11 more while it is
+// prepared, and some 35 (28); 4 for each map of thresholds and 25 more while it is mapped. From the first
+// set_reference() on, what is needed meanwhile is kept for the next one.
 class VisibilityPasses {
 public:
     // The reference is copied. Fails on tables that contradict themselves or the picture, on more than this GL takes, and
@@ -116,6 +118,11 @@ public:
     VisibilityPasses& operator=(VisibilityPasses&&) noexcept;
     ~VisibilityPasses();
 
+    // Another reference, of the same size and within the tables' luminances; what is judged and mapped from now on goes by
+    // it. Waits for nothing, and makes no textures from the second time on. Fails where create() does; then the reference
+    // is as before.
+    Result<void> set_reference(const LuminanceTexture& reference);
+
     // Judges a picture of the reference's size. Waits for nothing.
     Result<void> judge(const LuminanceTexture& test);
 
@@ -126,10 +133,15 @@ public:
     // The same in one channel of 32-bit floats; another picture overwrites it. 0 before the first.
     unsigned visibility_texture() const noexcept;
 
-    // The step of luminance that is just visible, cd/m2, by pixel.
-    Result<void> map_thresholds();
-    Result<std::vector<float>> read_thresholds() const; // fails where there is no map yet
-    unsigned thresholds_texture() const noexcept;       // 0 before there is a map
+    // The step of luminance that is just visible, cd/m2, by pixel: of this reference. Maps of several references are kept
+    // side by side by number, 0 to most_maps - 1; one of the same number is overwritten.
+    static constexpr int most_maps = 16;
+    Result<void> map_thresholds(int number = 0);
+    Result<std::vector<float>> read_thresholds(int number = 0) const; // fails where there is no map yet
+    unsigned thresholds_texture(int number = 0) const noexcept;       // 0 before there is a map
+
+    int full_screen_passes() const noexcept;      // since create()
+    std::uint64_t texture_bytes() const noexcept; // of all that is kept but the tables
 
     // What the reference masks, band by band: the masker of a band is the mean around a sample, by a Gaussian of 1.5
     // samples, and a cell has the least of all samples that stand in it, or around it. So what lies in some cells is

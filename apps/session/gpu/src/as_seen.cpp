@@ -94,10 +94,15 @@ public:
         render::LuminanceTexture picture = sum_.mean_luminance();
         picture.scale *= static_cast<float>(white_ - black_);
         picture.offset = static_cast<float>(black_ + static_cast<double>(picture.offset) * (white_ - black_));
-        auto passes = render::VisibilityPasses::create(context_, visibility_tables(tables_), picture);
-        if (!passes) return passes.error();
-        if (auto mapped = passes->map_elevations(); !mapped) return mapped.error();
-        auto grid = passes->read_elevations();
+        if (!passes_) {
+            auto made = render::VisibilityPasses::create(context_, visibility_tables(tables_), picture);
+            if (!made) return made.error();
+            passes_ = std::move(*made);
+        } else if (auto set = passes_->set_reference(picture); !set) {
+            return set.error();
+        }
+        if (auto mapped = passes_->map_elevations(); !mapped) return mapped.error();
+        auto grid = passes_->read_elevations();
         if (!grid) return grid.error();
         perception::Elevations elevations{grid->cell_px, grid->columns, grid->rows, {}, std::move(grid->elevation)};
         for (const perception::JudgeTables::Band& band : tables_.bands) elevations.bands.push_back(band.nominal);
@@ -115,6 +120,7 @@ private:
     render::Sampling sampling_;
     perception::JudgeTables tables_;
     render::SampleSum sum_;
+    std::optional<render::VisibilityPasses> passes_ = {};
     double black_, white_; // cd/m2
 };
 

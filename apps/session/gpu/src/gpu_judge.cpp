@@ -49,6 +49,24 @@ render::VisibilityTables visibility_tables(const perception::JudgeTables& tables
     return to;
 }
 
+render::ElevationTables elevation_tables(const perception::Rpg99Tables& t) {
+    static_assert(render::ElevationTables::band_count == perception::Rpg99Tables::band_count &&
+                  render::ElevationTables::level_count == perception::Rpg99Tables::level_count);
+    return {.kernel = t.kernel,
+            .frequency_factor = t.frequency_factor,
+            .adaptation_level = t.adaptation_level,
+            .floor = t.floor,
+            .largest_elevation = t.largest_elevation,
+            .masking_scale = t.masking_scale,
+            .masking_gain = t.masking_gain,
+            .masking_power = t.masking_power,
+            .first_log2 = t.first_log2,
+            .nodes_an_octave = t.nodes_an_octave,
+            .luminances = t.luminances,
+            .log2_tvi = t.log2_tvi,
+            .log2_csf = t.log2_csf};
+}
+
 Result<GpuJudge> GpuJudge::create(const render::Context& context, const perception::Image& reference,
                                   const perception::JudgeOptions& options, render::VisibilityPrecision precision) {
     const auto uploaded = upload(context, reference, "reference");

@@ -12,6 +12,7 @@
 #include <perception/judge.h>
 #include <perception/judge_tables.h>
 #include <render/context.h>
+#include <render/elevation.h>
 #include <render/visibility.h>
 
 namespace unseen::session {
@@ -52,5 +53,6 @@ private:
 
 // The tables in render's terms.
 render::VisibilityTables visibility_tables(const perception::JudgeTables& tables);
+render::ElevationTables elevation_tables(const perception::Rpg99Tables& tables);
 
 } // namespace unseen::session

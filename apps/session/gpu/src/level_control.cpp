@@ -1,0 +1,634 @@
+#include <session_gpu/level_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <glm/geometric.hpp>
+
+#include <perception/judge_tables.h>
+#include <render/difference_count.h>
+#include <render/elevation.h>
+#include <render/gpu_tree.h>
+#include <render/stage_times.h>
+#include <render/visibility.h>
+#include <session_gpu/gpu_judge.h>
+
+namespace unseen::session {
+namespace {
+
+constexpr int most_block = 16; // of render::LayerOptions
+// A level that was too coarse is not tried again before the eye has moved by this share of its distance to the object:
+// else the object would go to and fro between two levels.
+constexpr double moved_share = 0.02;
+
+Error bad_option(const std::string& message) { return {ErrorCode::invalid_argument, "levels: " + message}; }
+
+Result<void> check(const LevelControlOptions& o) {
+    if (!(o.bias > 0 && std::isfinite(o.bias))) return bad_option("the bias must be above 0 and finite");
+    if (!(o.lower_share >= 0 && o.upper_share >= o.lower_share && o.upper_share <= 1))
+        return bad_option("shares of pixels lie between 0 and 1, and the lower one is not above the upper one");
+    if (o.frames_a_layer < 1) return bad_option("objects are tested every frame at most");
+    if (o.map_block < 1 || o.map_block > most_block) return bad_option("a map's threshold is of 1 to 16 pixels a side");
+    return {};
+}
+
+struct Sphere {
+    glm::dvec3 centre = glm::dvec3(0);
+    double radius = 0;
+};
+
+Sphere sphere_of(const vdtree::VertexTree& tree, const vdtree::Similarity& placement) {
+    const vdtree::Sphere sphere = tree.bounding_sphere();
+    return {placement.to_world(tree.origin() + glm::dvec3(sphere.centre)),
+            placement.scale * static_cast<double>(sphere.radius)};
+}
+
+bool is_in_sight(const Sphere& sphere, const vdtree::View& view) {
+    const vdtree::CameraFrame frame = vdtree::camera_frame(view);
+    const glm::dvec3 to = sphere.centre - view.eye;
+    const double half_up = std::tan(view.fov_y_degrees * std::numbers::pi / 360),
+                 half_right = half_up * view.width / view.height;
+    const double ahead = -glm::dot(to, frame.back);
+    if (ahead < -sphere.radius) return false;
+    // Beyond a side of the window: the distance from its plane through the eye.
+    const auto is_beyond = [&](double aside, double half) {
+        return (std::abs(aside) - half * ahead) / std::sqrt(1 + half * half) > sphere.radius;
+    };
+    return !is_beyond(glm::dot(to, frame.right), half_right) && !is_beyond(glm::dot(to, frame.up), half_up);
+}
+
+// Of the sphere's outline, within the field that a flat window has at its middle.
+double pixels_of(const Sphere& sphere, const vdtree::View& view) {
+    const double distance = std::max(glm::length(sphere.centre - view.eye), sphere.radius);
+    const double focal = view.height / (2 * std::tan(view.fov_y_degrees * std::numbers::pi / 360));
+    const double radius = focal * sphere.radius / distance;
+    return std::min(std::numbers::pi * radius * radius,
+                    static_cast<double>(view.width) * static_cast<double>(view.height));
+}
+
+bool same_gaze(const std::optional<Gaze>& a, const std::optional<Gaze>& b) {
+    return a.has_value() == b.has_value() && (!a || a->px == b->px);
+}
+
+} // namespace
+
+struct LevelControl::Impl {
+    // Of a tree, and of all objects that share it.
+    struct Levels {
+        LevelChain chain;
+        std::vector<render::GpuCut> cuts; // by level
+    };
+    struct Thing {
+        Levels* levels = nullptr;
+        vdtree::Similarity placement;
+        Sphere sphere;
+        int level = 0, drawn_level = -1;
+        bool is_known = false;                 // an own test has let it keep a level
+        bool is_open = false;                  // a test is on its way
+        int refused = most_levels;             // levels from this one on were too coarse ...
+        glm::dvec3 refused_at = glm::dvec3(0); // ... for an eye here
+        std::uint64_t tested = 0;              // the last frame whose test let it keep its level
+    };
+    struct OpenTest {
+        std::uint64_t name = 0;
+        LevelTest test;
+        bool first = false; // in the beginning
+    };
+    // What depends on the size of the window, and on the gaze.
+    struct Passes {
+        int width = 0, height = 0;
+        std::optional<Gaze> gaze;
+        render::LayerPasses layers;
+        render::DifferenceCounts counts;
+        std::optional<render::VisibilityPasses> modern;
+        std::optional<render::ElevationPasses> rpg99;
+    };
+
+    Impl(const render::Context& context_, Session& session_, const LevelControlOptions& options_,
+         render::StageTimes times_)
+        : context(context_), session(session_), options(options_), times(std::move(times_)) {}
+
+    Result<void> load(const vdtree::View& view, const Request& request);
+    Result<void> need_passes(const vdtree::View& view);
+    Result<void> take_counts(LevelFrame& frame);
+    void take_times(LevelFrame& frame);
+    void decide(const OpenTest& open, std::uint64_t pixels, LevelFrame& frame);
+    int best_of_layer(int layer, const std::vector<std::size_t>& in_sight, const std::vector<int>& layer_of) const;
+    int to_compare_with(const Thing& thing, int best) const;
+    bool is_due(std::size_t object, int layer) const;
+    int chosen_level(const Thing& thing, const vdtree::View& view) const;
+    Result<render::Item> item(std::size_t object, int level, const vdtree::View& view) const;
+    render::LuminanceTexture luminance_of(const render::Target& target) const;
+    Result<void> map(int left_out);
+    render::ThresholdTexture thresholds_texture(int left_out) const;
+    Result<LevelFrame> draw(const vdtree::View& view);
+    int passes_done() const;
+
+    render::Context context;
+    Session& session;
+    LevelControlOptions options;
+    std::map<const vdtree::VertexTree::Data*, Levels> trees;
+    std::vector<Thing> things;
+    std::vector<render::GpuCut> backdrop;
+    std::optional<Passes> passes;
+    render::StageTimes times;
+    struct OpenTimes {
+        std::uint64_t frame = 0;
+        std::size_t combinations = 0;
+    };
+    std::deque<OpenTimes> open_times;
+    std::deque<OpenTest> open;
+    std::uint64_t frames = 0, last_change = 0;
+    bool tests_all = false;
+    vdtree::View view;
+};
+
+Result<void> LevelControl::Impl::load(const vdtree::View& from, const Request& request) {
+    if (auto ready = session.prepare(from, request); !ready) return ready.error();
+    std::map<const vdtree::VertexTree::Data*, render::GpuTree> on_gpu; // objects share them
+    const auto tree_of = [&](const vdtree::VertexTree& tree) -> Result<render::GpuTree> {
+        const auto known = on_gpu.find(&tree.data());
+        if (known != on_gpu.end()) return known->second;
+        auto made = render::GpuTree::create(context, tree);
+        if (made) on_gpu.emplace(&tree.data(), *made);
+        return made;
+    };
+    const Scene& scene = session.scene();
+    for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+        const vdtree::VertexTree& tree = session.tree(i);
+        auto levels = trees.find(&tree.data());
+        if (levels == trees.end()) {
+            auto chain = level_chain(session, from, request, i, options.chain);
+            if (!chain) return chain.error();
+            const auto uploaded = tree_of(tree);
+            if (!uploaded) return uploaded.error();
+            levels = trees.emplace(&tree.data(), Levels{std::move(*chain), {}}).first;
+            for (int level = 0; level < levels->second.chain.size(); ++level) {
+                render::GpuCut& cut = levels->second.cuts.emplace_back(*uploaded);
+                if (auto followed = cut.follow(levels->second.chain.cut(level)); !followed) return followed;
+            }
+        }
+        Thing& thing = things.emplace_back();
+        thing.levels = &levels->second;
+        thing.placement = scene.objects[i].placement;
+        thing.sphere = sphere_of(tree, thing.placement);
+        thing.level = levels->second.chain.size() - 1;
+    }
+    std::map<const vdtree::VertexTree::Data*, render::GpuCut> whole;
+    for (const Object& part : scene.backdrop) {
+        auto known = whole.find(&part.tree.data());
+        if (known == whole.end()) {
+            const auto tree = tree_of(part.tree);
+            if (!tree) return tree.error();
+            vdtree::Cut all(part.tree);
+            all.unfold_all();
+            render::GpuCut cut(*tree);
+            if (auto followed = cut.follow(all); !followed) return followed;
+            known = whole.emplace(&part.tree.data(), cut).first;
+        }
+        backdrop.push_back(known->second);
+    }
+    return {};
+}
+
+Result<void> LevelControl::Impl::need_passes(const vdtree::View& wanted) {
+    const Observer& observer = session.observer();
+    if (passes && passes->width == wanted.width && passes->height == wanted.height &&
+        same_gaze(passes->gaze, observer.gaze))
+        return {};
+    passes.reset(); // the old ones first, so that both sizes need not fit at a time
+    open.clear();
+    for (Thing& thing : things) thing.is_open = false;
+    auto layers = render::LayerPasses::create(
+        context, wanted.width, wanted.height,
+        {.most = options.layers,
+         .format = options.half_floats ? render::ColourFormat::rgba16f : render::ColourFormat::rgba32f,
+         .block = options.map_block});
+    if (!layers) return layers.error();
+    auto counts = render::DifferenceCounts::create(context, wanted.width, wanted.height);
+    if (!counts) return counts.error();
+    Passes made{wanted.width, wanted.height, observer.gaze, std::move(*layers), std::move(*counts), {}, {}};
+    const render::Target& combination = made.layers.combination();
+    perception::Display display = observer.display;
+    if (options.map_block > 1)
+        perception::set_pixels_per_degree(
+            display,
+            perception::PixelsPerDegree(perception::pixels_per_degree(observer.display).value() / options.map_block));
+    if (options.method != LevelMethod::perceptual) {
+        // Nothing is mapped.
+    } else if (options.maps == MapRecipe::rpg99) {
+        const auto tables = perception::rpg99_tables(
+            combination.width(), {.field_degrees = perception::physical_field(display, combination.width()).value(),
+                                  .masked_by_both = false});
+        if (!tables) return tables.error();
+        auto maps = render::ElevationPasses::create(context, combination.width(), combination.height(),
+                                                    elevation_tables(*tables));
+        if (!maps) return maps.error();
+        made.rpg99 = std::move(*maps);
+    } else {
+        perception::JudgeOptions judging{.display = display};
+        judging.csf_table = observer.csf;
+        judging.gain = observer.csf ? 1 : observer.person.gain;
+        if (observer.gaze) judging.gaze_px = observer.gaze->px / static_cast<double>(options.map_block);
+        // Whatever a picture holds: all that the display shows.
+        const auto tables = perception::judge_tables(
+            combination.width(), combination.height(), static_cast<float>(perception::black_level(display).value()),
+            std::nextafter(static_cast<float>(perception::to_luminance(display, 1).value()),
+                           std::numeric_limits<float>::infinity()),
+            judging);
+        if (!tables) return tables.error();
+        auto maps = render::VisibilityPasses::create(context, visibility_tables(*tables), luminance_of(combination));
+        if (!maps) return maps.error();
+        made.modern = std::move(*maps);
+    }
+    passes = std::move(made);
+    return {};
+}
+
+render::LuminanceTexture LevelControl::Impl::luminance_of(const render::Target& target) const {
+    const perception::Display& display = session.observer().display;
+    const double black = perception::black_level(display).value();
+    return {.id = target.colour_texture(),
+            .width = target.width(),
+            .height = target.height(),
+            .channel = 3,
+            .scale = static_cast<float>(perception::to_luminance(display, 1).value() - black),
+            .offset = static_cast<float>(black)};
+}
+
+Result<void> LevelControl::Impl::map(int left_out) {
+    const render::LuminanceTexture picture = luminance_of(passes->layers.combination());
+    if (passes->rpg99) return passes->rpg99->map_thresholds(picture, left_out);
+    if (auto set = passes->modern->set_reference(picture); !set) return set;
+    return passes->modern->map_thresholds(left_out);
+}
+
+render::ThresholdTexture LevelControl::Impl::thresholds_texture(int left_out) const {
+    return {passes->rpg99 ? passes->rpg99->thresholds_texture(left_out) : passes->modern->thresholds_texture(left_out),
+            options.map_block};
+}
+
+int LevelControl::Impl::passes_done() const {
+    return (passes->modern ? passes->modern->full_screen_passes() : 0) +
+           (passes->rpg99 ? passes->rpg99->full_screen_passes() : 0);
+}
+
+// ---- decisions --------------------------------------------------------------------------------------------------------
+
+// l_HQ of the paper: the best level for the first layer, the next one for the second, and so on; better where an object of
+// the layer has reached it.
+int LevelControl::Impl::best_of_layer(int layer, const std::vector<std::size_t>& in_sight,
+                                      const std::vector<int>& layer_of) const {
+    int best = layer;
+    for (std::size_t i = 0; i < in_sight.size(); ++i)
+        if (layer_of[i] == layer) best = std::min(best, things[in_sight[i]].level - 1);
+    return std::max(best, 0);
+}
+
+// What a level is held against: one that is better, but that is the next worse one for the best level, to see whether
+// that would do; and the next better one for the worst level. In the beginning the best one.
+int LevelControl::Impl::to_compare_with(const Thing& thing, int best) const {
+    const int worst = thing.levels->chain.size() - 1;
+    if (thing.level == 0) return std::min(1, worst);
+    if (!thing.is_known) return 0;
+    if (thing.level == worst) return worst - 1;
+    return std::min(best, thing.level - 1);
+}
+
+bool LevelControl::Impl::is_due(std::size_t object, int layer) const {
+    const Thing& thing = things[object];
+    if (thing.is_open || thing.levels->chain.size() < 2) return false;
+    if (tests_all || !thing.is_known) return true;
+    const auto period = static_cast<std::uint64_t>(options.frames_a_layer) * (static_cast<std::uint64_t>(layer) + 1);
+    return (frames + object) % period == 0;
+}
+
+void LevelControl::Impl::decide(const OpenTest& asked, std::uint64_t pixels, LevelFrame& frame) {
+    LevelTest test = asked.test;
+    Thing& thing = things[test.object];
+    thing.is_open = false;
+    test.pixels = pixels;
+    const double all = static_cast<double>(passes->width) * static_cast<double>(passes->height);
+    const bool is_too_coarse = static_cast<double>(pixels) > options.upper_share * all,
+               could_be_coarser = static_cast<double>(pixels) < options.lower_share * all;
+    const int worst = thing.levels->chain.size() - 1;
+    if (glm::length(view.eye - thing.refused_at) > moved_share * glm::length(thing.sphere.centre - view.eye))
+        thing.refused = most_levels;
+    if (test.level > 0 && is_too_coarse) {
+        test.decision = LevelDecision::better;
+        thing.refused = std::min(thing.refused, test.level);
+        thing.refused_at = view.eye;
+        --thing.level;
+    } else {
+        thing.is_known = true;
+        // The worst one was compared with the next better one: that they look alike lets it stay.
+        if (could_be_coarser && test.level < worst && test.level + 1 < thing.refused) {
+            test.decision = LevelDecision::worse;
+            ++thing.level;
+        }
+    }
+    if (test.decision != LevelDecision::keep) last_change = frames;
+    else thing.tested = test.frame;
+    frame.tests.push_back(test);
+}
+
+Result<void> LevelControl::Impl::take_counts(LevelFrame& frame) {
+    if (!passes) return {};
+    const auto counts = passes->counts.take();
+    if (!counts) return counts.error();
+    for (const auto& count : *counts) {
+        if (open.empty() || open.front().name != count.name) continue; // of passes that are gone
+        const OpenTest asked = open.front();
+        open.pop_front();
+        decide(asked, count.pixels, frame);
+    }
+    return {};
+}
+
+void LevelControl::Impl::take_times(LevelFrame& frame) {
+    for (const std::vector<double>& stages : times.take()) {
+        const OpenTimes of = open_times.front();
+        open_times.pop_front();
+        if (stages.size() != 3 + 2 * of.combinations) continue;
+        LevelTimes& t = frame.times.emplace_back();
+        t.frame = of.frame;
+        t.layers_ms = stages[0];
+        for (std::size_t i = 0; i < of.combinations; ++i) {
+            t.combinations_ms += stages[1 + 2 * i];
+            t.maps_ms += stages[2 + 2 * i];
+        }
+        t.depth_ms = stages[1 + 2 * of.combinations];
+        t.control_ms = stages[2 + 2 * of.combinations];
+    }
+}
+
+int LevelControl::Impl::chosen_level(const Thing& thing, const vdtree::View& from) const {
+    const LevelChain& chain = thing.levels->chain;
+    int level = chain.size() - 1;
+    if (options.method == LevelMethod::distance) {
+        const double distance =
+            std::max(glm::length(thing.sphere.centre - from.eye) - thing.sphere.radius, 0.0) / thing.placement.scale;
+        while (level > 0 && !(chain.unseen_from(level) * options.bias <= distance)) --level;
+    } else {
+        const double triangles = options.bias * pixels_of(thing.sphere, from);
+        while (level > 0 && static_cast<double>(chain.triangles(level)) < triangles) --level;
+    }
+    return level;
+}
+
+Result<render::Item> LevelControl::Impl::item(std::size_t object, int level, const vdtree::View& from) const {
+    auto lighting = session.lighting(from, object);
+    if (!lighting) return lighting.error();
+    render::Item made{things[object].levels->cuts[static_cast<std::size_t>(level)], things[object].placement};
+    made.lighting = std::move(*lighting);
+    return made;
+}
+
+// ---- a frame ----------------------------------------------------------------------------------------------------------
+
+Result<LevelFrame> LevelControl::Impl::draw(const vdtree::View& from) {
+    if (auto valid = vdtree::validate(from); !valid) return valid.error();
+    LevelFrame frame;
+    frame.number = frames;
+    if (auto taken = take_counts(frame); !taken) return taken.error();
+    take_times(frame);
+    if (auto made = need_passes(from); !made) return made.error();
+    view = from;
+    const int maps_before = passes_done();
+    const bool is_perceptual = options.method == LevelMethod::perceptual;
+
+    std::vector<std::size_t> in_sight;
+    std::vector<render::Item> objects, background;
+    std::vector<glm::dvec3> centres;
+    frame.levels.assign(things.size(), -1);
+    frame.tested_with.assign(things.size(), -1);
+    for (std::size_t i = 0; i < things.size(); ++i) {
+        Thing& thing = things[i];
+        if (!is_in_sight(thing.sphere, view)) continue;
+        if (!is_perceptual) thing.level = chosen_level(thing, view);
+        auto made = item(i, thing.level, view);
+        if (!made) return made.error();
+        objects.push_back(std::move(*made));
+        in_sight.push_back(i);
+        centres.push_back(thing.sphere.centre);
+        frame.levels[i] = thing.level;
+        frame.changed += thing.drawn_level >= 0 && thing.drawn_level != thing.level;
+        thing.drawn_level = thing.level;
+        frame.triangles += thing.levels->chain.triangles(thing.level);
+    }
+    for (std::size_t i = 0; i < backdrop.size(); ++i) {
+        auto lighting = session.backdrop_lighting(view, i);
+        if (!lighting) return lighting.error();
+        render::Item& made = background.emplace_back(render::Item{backdrop[i], session.scene().backdrop[i].placement});
+        made.lighting = std::move(*lighting);
+    }
+
+    // Layers.
+    auto split = render::split_into_layers(centres, view, options.layers);
+    if (!split) return split.error();
+    if (!is_perceptual) *split = {.layer_of = std::vector<int>(objects.size(), 0), .count = 0, .borders = {}};
+    frame.layers = split->count;
+    times.begin();
+    render::LayerPasses& layers = passes->layers;
+    if (auto drawn = layers.draw(objects, background, {.view = view}, *split, glm::vec4(session.background())); !drawn)
+        return drawn.error();
+    times.end_stage();
+
+    // Which objects are tested, and what at.
+    struct Test {
+        std::size_t place = 0; // in sight
+        int compared_with = 0;
+    };
+    std::vector<std::vector<Test>> tests(static_cast<std::size_t>(layers.combination_count()));
+    bool any = false;
+    for (std::size_t layer = 0; is_perceptual && layer < tests.size(); ++layer) {
+        const int number = static_cast<int>(layer), best = best_of_layer(number, in_sight, split->layer_of);
+        for (std::size_t i = 0; i < in_sight.size(); ++i) {
+            if (split->layer_of[i] != number || !is_due(in_sight[i], number)) continue;
+            const int compared_with = to_compare_with(things[in_sight[i]], best);
+            if (compared_with == things[in_sight[i]].level) continue; // a chain of one level
+            tests[layer].push_back({i, compared_with});
+            frame.tested_with[in_sight[i]] = compared_with;
+            any = true;
+        }
+    }
+
+    // Combinations and maps.
+    OpenTimes open_time{frames, 0};
+    for (std::size_t layer = 0; is_perceptual && layer < tests.size(); ++layer) {
+        if (tests[layer].empty() && !options.maps_all_layers) continue;
+        const int number = static_cast<int>(layer);
+        if (auto combined = layers.combine(number); !combined) return combined.error();
+        times.end_stage();
+        if (auto mapped = map(number); !mapped) return mapped.error();
+        times.end_stage();
+        ++open_time.combinations;
+    }
+
+    // Depth: what is tested as it will be drawn once more, all else as coarsely as can be.
+    std::vector<render::Item> tested = objects;
+    if (any) {
+        for (std::size_t i = 0; i < in_sight.size(); ++i) {
+            const Thing& thing = things[in_sight[i]];
+            const int with = frame.tested_with[in_sight[i]];
+            tested[i].cut = with < 0 ? thing.levels->cuts.back() : thing.levels->cuts[static_cast<std::size_t>(with)];
+        }
+        std::vector<render::Item> all = tested;
+        all.insert(all.end(), background.begin(), background.end());
+        if (auto drawn = passes->counts.draw_depth(all, {.view = view, .near_plane = layers.near_plane()}); !drawn)
+            return drawn.error();
+        ++frame.surface_passes;
+    }
+    times.end_stage();
+
+    // What is seen of the difference.
+    for (std::size_t layer = 0; layer < tests.size(); ++layer)
+        for (const Test& test : tests[layer]) {
+            const std::size_t object = in_sight[test.place];
+            const auto name = passes->counts.begin(tested[test.place], luminance_of(layers.composite()),
+                                                   thresholds_texture(static_cast<int>(layer)));
+            if (!name) return name.error();
+            OpenTest& asked = open.emplace_back();
+            asked.name = *name;
+            asked.test = {
+                .frame = frames, .object = object, .level = things[object].level, .compared_with = test.compared_with};
+            things[object].is_open = true;
+        }
+    times.end_stage();
+    times.end();
+    open_times.push_back(open_time);
+
+    const render::LayerCounts counts = layers.counts();
+    frame.surface_passes += counts.surface_passes;
+    frame.full_screen_passes = counts.full_screen_passes + passes_done() - maps_before;
+    frame.texture_bytes = counts.texture_bytes + (passes->modern ? passes->modern->texture_bytes() : 0) +
+                          (passes->rpg99 ? passes->rpg99->texture_bytes() : 0) +
+                          4 * static_cast<std::uint64_t>(view.width) * static_cast<std::uint64_t>(view.height);
+    ++frames;
+    return frame;
+}
+
+LevelControl::LevelControl(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+LevelControl::LevelControl(LevelControl&&) noexcept = default;
+LevelControl& LevelControl::operator=(LevelControl&&) noexcept = default;
+LevelControl::~LevelControl() = default;
+
+Result<LevelControl> LevelControl::create(const render::Context& context, Session& session, const vdtree::View& view,
+                                          const LevelControlOptions& options, Request request) {
+    if (auto valid = check(options); !valid) return valid.error();
+    request.goal = Goal::imperceptible();
+    auto times = render::StageTimes::create(context);
+    if (!times) return times.error();
+    auto impl = std::make_unique<Impl>(context, session, options, std::move(*times));
+    if (auto loaded = impl->load(view, request); !loaded) return loaded.error();
+    if (auto made = impl->need_passes(view); !made) return made.error();
+    return LevelControl(std::move(impl));
+}
+
+Result<LevelFrame> LevelControl::draw(const vdtree::View& view) { return impl_->draw(view); }
+
+bool LevelControl::is_settled() const noexcept {
+    const Impl& own = *impl_;
+    if (own.options.method != LevelMethod::perceptual) return own.frames > 0;
+    if (own.frames == 0) return false;
+    return std::ranges::all_of(own.things, [&](const Impl::Thing& thing) {
+        return thing.levels->chain.size() < 2 || !is_in_sight(thing.sphere, own.view) ||
+               (thing.is_known && thing.tested >= own.last_change);
+    });
+}
+
+Result<LevelFrame> LevelControl::wait() {
+    if (auto done = impl_->context.finish(); !done) return done.error();
+    LevelFrame known;
+    if (auto taken = impl_->take_counts(known); !taken) return taken.error();
+    impl_->take_times(known);
+    return known;
+}
+
+Result<LevelFrame> LevelControl::settle(const vdtree::View& view, int most_frames) {
+    std::vector<LevelTest> tests;
+    std::vector<LevelTimes> times;
+    const auto keep = [&](const LevelFrame& known) {
+        tests.insert(tests.end(), known.tests.begin(), known.tests.end());
+        times.insert(times.end(), known.times.begin(), known.times.end());
+    };
+    Impl& own = *impl_;
+    own.tests_all = true;
+    Result<LevelFrame> frame = LevelFrame{};
+    for (int i = 0; i < std::max(most_frames, 1); ++i) {
+        frame = own.draw(view);
+        if (!frame) break;
+        keep(*frame);
+        // Its counts come before the next one: the picture shows what they leave as it is.
+        const auto known = wait();
+        if (!known) {
+            frame = known.error();
+            break;
+        }
+        keep(*known);
+        if (is_settled()) break;
+    }
+    own.tests_all = false;
+    if (!frame) return frame;
+    frame->tests = std::move(tests);
+    frame->times = std::move(times);
+    return frame;
+}
+
+// Of the objects of each level the depth alone: the nearest level is what a pixel shows.
+Result<std::vector<int>> LevelControl::read_levels() {
+    Impl& own = *impl_;
+    auto target =
+        render::Target::create(own.context, own.passes->width, own.passes->height, {.colours = {}, .label = "levels"});
+    if (!target) return target.error();
+    const auto pixels = static_cast<std::size_t>(target->width()) * static_cast<std::size_t>(target->height());
+    std::vector<int> levels(pixels, -1);
+    std::vector<float> nearest(pixels, 0);
+    for (int level = -1; level < most_levels; ++level) {
+        std::vector<render::Item> items;
+        if (level < 0)
+            for (std::size_t i = 0; i < own.backdrop.size(); ++i)
+                items.push_back({own.backdrop[i], own.session.scene().backdrop[i].placement});
+        for (const Impl::Thing& thing : own.things)
+            if (level >= 0 && thing.drawn_level == level && is_in_sight(thing.sphere, own.view))
+                items.push_back({thing.levels->cuts[static_cast<std::size_t>(level)], thing.placement});
+        if (items.empty()) continue;
+        if (auto drawn = render::draw(items, {.view = own.view, .near_plane = own.passes->layers.near_plane()}, *target,
+                                      {.colour = std::nullopt});
+            !drawn)
+            return drawn.error();
+        const auto depth = render::read_depth(*target);
+        if (!depth) return depth.error();
+        for (std::size_t i = 0; i < pixels; ++i)
+            if ((*depth)[i] > nearest[i]) nearest[i] = (*depth)[i], levels[i] = level;
+    }
+    return levels;
+}
+
+const render::Target& LevelControl::picture() const noexcept { return impl_->passes->layers.composite(); }
+const render::LayerPasses& LevelControl::layers() const noexcept { return impl_->passes->layers; }
+Result<void> LevelControl::combine(int left_out) { return impl_->passes->layers.combine(left_out); }
+
+Result<std::vector<float>> LevelControl::thresholds(int left_out) {
+    Impl& own = *impl_;
+    if (!own.passes->modern && !own.passes->rpg99)
+        return bad_option("only the method perceptual has maps of thresholds");
+    if (auto combined = own.passes->layers.combine(left_out); !combined) return combined.error();
+    if (auto mapped = own.map(left_out); !mapped) return mapped.error();
+    return own.passes->rpg99 ? own.passes->rpg99->read_thresholds(left_out)
+                             : own.passes->modern->read_thresholds(left_out);
+}
+
+int LevelControl::map_width() const noexcept { return impl_->passes->layers.combination().width(); }
+int LevelControl::map_height() const noexcept { return impl_->passes->layers.combination().height(); }
+
+const LevelChain& LevelControl::chain(std::size_t object) const noexcept { return impl_->things[object].levels->chain; }
+
+} // namespace unseen::session

@@ -1,0 +1,36 @@
+// Pictures of a scene whose objects have discrete levels of detail: one, or along a camera's path.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <session_gpu/level_control.h>
+
+#include "options.h"
+
+namespace unseen::app {
+
+// Instead of the picture.
+enum class LevelPicture {
+    layers,       // the background and each layer
+    combinations, // for each layer, all the others
+    maps,         // for each layer, which steps of luminance go unseen in that
+    levels,       // the picture, coloured by level
+};
+
+struct LevelFlightOptions {
+    session::LevelControlOptions control;
+    std::string path; // see camera_path.h; empty: one picture, of the view in which nothing changes any more
+    std::string out;  // of pictures: with a path a name with one %d; empty: none
+    std::string json;
+    std::optional<LevelPicture> show;
+    double frames_a_second = 60;
+    WhatOptions what;
+    bool is_verbose = false;
+};
+
+// Prints a summary, and writes what was asked for.
+Result<void> draw_levels(const std::string& model, const ViewOptions& view, const DisplayOptions& display,
+                         const LevelFlightOptions& options);
+
+} // namespace unseen::app

@@ -1,0 +1,149 @@
+// unseen render --method: discrete levels of detail as a user asks for them.
+#include "run_command.h"
+
+#include <numeric>
+
+namespace {
+
+using namespace unseen::app::testing;
+using ::testing::HasSubstr;
+
+class LevelCommandTest : public CommandTest {
+protected:
+    void SetUp() override {
+        CommandTest::SetUp();
+        const Outcome made = run({"scene", "make", "treasure", "-o", "scene.glb", "--triangles", "30000"});
+        ASSERT_EQ(made.status, 0) << made.err;
+        const Outcome probe = run({"render", "scene.glb", "-o", "probe.png", "--size", "8x8", "--samples", "1"});
+        if (probe.err.find("No OpenGL") != std::string::npos) GTEST_SKIP() << probe.err;
+        fs::remove(path("probe.png"));
+    }
+    Outcome render(std::vector<std::string> more) const {
+        std::vector<std::string> words = {"render", "scene.glb", "--size", "128x96"};
+        words.insert(words.end(), more.begin(), more.end());
+        return run(words);
+    }
+};
+
+TEST_F(LevelCommandTest, AStillPictureAndItsFigures) {
+    const Outcome drawn = render({"--method", "perceptual", "-o", "still.png", "--json", "-"});
+    ASSERT_EQ(drawn.status, 0) << drawn.err;
+    const Json json = drawn.json();
+    EXPECT_EQ(json["method"], "perceptual");
+    EXPECT_EQ(json["maps"], "modern");
+    EXPECT_EQ(json["is_settled"], true);
+    EXPECT_GT(json["settling_frames"], 1);
+    ASSERT_EQ(json["frames"].size(), 1u);
+    const Json& frame = json["frames"][0];
+    EXPECT_EQ(frame["layers"], 5);
+    EXPECT_EQ(frame["surface_passes"], 7) << "5 layers, the background, the depth";
+    EXPECT_GT(frame["full_screen_passes"], 5);
+    EXPECT_GT(frame["texture_bytes"], 128 * 96 * 16 * 6);
+    EXPECT_LT(frame["triangles"], json["source_triangles"]);
+    for (const char* stage : {"layers", "combinations", "maps", "depth", "control"}) EXPECT_GE(frame["ms"][stage], 0);
+    std::uint64_t triangles = 0;
+    for (std::size_t i = 0; i < frame["levels"].size(); ++i)
+        if (frame["levels"][i] >= 0)
+            triangles +=
+                json["objects"][i]["level_triangles"][frame["levels"][i].get<std::size_t>()].get<std::uint64_t>();
+    EXPECT_EQ(triangles, frame["triangles"]);
+    EXPECT_FALSE(frame["tests"].empty());
+    for (const Json& test : frame["tests"]) {
+        EXPECT_NE(test["level"], test["compared_with"]);
+        EXPECT_EQ(test["decision"], "keep");
+        EXPECT_GE(test["p_pass"], 0);
+    }
+    const auto picture = unseen::perception::read_image(path("still.png"));
+    ASSERT_TRUE(picture);
+    EXPECT_EQ(picture->image.width, 128);
+    // Luminance for judging, and a summary for people.
+    const Outcome judged = render({"--method", "perceptual", "--maps", "rpg99", "-o", "still.pfm"});
+    ASSERT_EQ(judged.status, 0) << judged.err;
+    EXPECT_THAT(judged.out, HasSubstr("for control"));
+    EXPECT_TRUE(unseen::perception::read_image(path("still.pfm")));
+}
+
+TEST_F(LevelCommandTest, APathAndItsTotals) {
+    const Outcome flown = render({"--method", "perceptual", "--maps", "rpg99", "--half-floats", "--map-block", "2",
+                                  "--path", "orbit:1:9", "-o", "f%02d.png", "--json", "stats.json"});
+    ASSERT_EQ(flown.status, 0) << flown.err;
+    const Json json = Json::parse(read_text(path("stats.json")));
+    ASSERT_EQ(json["frames"].size(), 9u);
+    EXPECT_TRUE(fs::exists(path("f08.png")));
+    std::uint64_t tested = 0, triangles = 0;
+    for (const Json& frame : json["frames"]) {
+        EXPECT_FALSE(frame["ms"].is_null());
+        tested += frame["tests"].size();
+        triangles += frame["triangles"].get<std::uint64_t>();
+    }
+    const Json& totals = json["totals"];
+    EXPECT_EQ(totals["control_renderings"], tested) << "every count has come";
+    EXPECT_EQ(totals["triangles"], triangles);
+    const auto sum = [](const Json& by_level) {
+        const auto counts = by_level.get<std::vector<std::uint64_t>>();
+        return std::accumulate(counts.begin(), counts.end(), std::uint64_t{0});
+    };
+    EXPECT_EQ(totals["renderings"], sum(totals["renderings_by_level"]));
+    EXPECT_LT(totals["control_renderings"], totals["renderings"]);
+    EXPECT_GT(totals["mean_ms"]["maps"], 0);
+    // The same once more.
+    const Outcome again = render({"--method", "perceptual", "--maps", "rpg99", "--half-floats", "--map-block", "2",
+                                  "--path", "orbit:1:9", "--json", "-"});
+    ASSERT_EQ(again.status, 0) << again.err;
+    for (std::size_t i = 0; i < 9; ++i)
+        EXPECT_EQ(again.json()["frames"][i]["levels"], json["frames"][i]["levels"]) << i;
+}
+
+TEST_F(LevelCommandTest, TheBiasSaysHowManyTriangles) {
+    for (const std::string method : {"distance", "area"}) {
+        int before = 0;
+        for (const std::string bias : {"1e-6", method == "area" ? "3" : "0.03", "1e6"}) {
+            const Outcome drawn = render({"--method", method, "--bias", bias, "--json", "-"});
+            ASSERT_EQ(drawn.status, 0) << drawn.err;
+            const int triangles = drawn.json()["frames"][0]["triangles"];
+            EXPECT_GT(triangles, before) << method << " " << bias;
+            before = triangles;
+        }
+    }
+}
+
+TEST_F(LevelCommandTest, ShowsWhatItGoesBy) {
+    for (const std::string show : {"layers", "combinations", "maps", "levels"}) {
+        const Outcome drawn = render({"--method", "perceptual", "-o", show + ".png", "--show", show});
+        ASSERT_EQ(drawn.status, 0) << drawn.err;
+        const auto picture = unseen::perception::read_image(path(show + ".png"));
+        ASSERT_TRUE(picture);
+        const int panels = show == "levels" ? 1 : show == "layers" ? 6 : 5;
+        EXPECT_GE(picture->image.width, panels * 128 + (panels - 1) * 4) << show;
+    }
+    // One object is in no layers.
+    ASSERT_EQ(run({"scene", "make", "museum", "-o", "scene.glb", "--triangles", "10000"}).status, 0);
+    for (const std::string show : {"layers", "combinations", "maps", "levels"}) {
+        const Outcome drawn = render({"--method", "perceptual", "-o", show + ".png", "--show", show});
+        EXPECT_EQ(drawn.status, 0) << drawn.err;
+    }
+}
+
+TEST_F(LevelCommandTest, RefusesWhatDoesNotGoTogether) {
+    const auto refused = [&](const std::vector<std::string>& words) {
+        const Outcome outcome = render(words);
+        EXPECT_EQ(outcome.status, 2) << outcome.out;
+        return outcome.err;
+    };
+    EXPECT_THAT(refused({"--method", "perceptual"}), HasSubstr("-o or --json"));
+    EXPECT_THAT(refused({"--method", "perceptual", "--bias", "2", "--json", "-"}), HasSubstr("distance or area"));
+    EXPECT_THAT(refused({"--method", "area", "--layers", "3", "--json", "-"}), HasSubstr("perceptual"));
+    EXPECT_THAT(refused({"--method", "perceptual", "--layers", "17", "--json", "-"}), HasSubstr("--layers"));
+    EXPECT_THAT(refused({"--levels", "3", "-o", "a.png"}), HasSubstr("needs --method"));
+    EXPECT_THAT(refused({"--show", "levels", "-o", "a.png"}), HasSubstr("need --method"));
+    EXPECT_THAT(refused({"--method", "area", "--show", "maps", "-o", "a.png"}), HasSubstr("perceptual"));
+    EXPECT_THAT(refused({"--method", "area", "--show", "cost", "-o", "a.png"}), HasSubstr("exclude --method"));
+    EXPECT_THAT(refused({"--method", "area", "--full", "--json", "-"}), HasSubstr("--bias"));
+    EXPECT_THAT(refused({"--method", "area", "--samples", "4", "--json", "-"}), HasSubstr("one sample"));
+    EXPECT_THAT(refused({"--method", "area", "--path", "orbit:1:3", "-o", "a.png"}), HasSubstr("%d"));
+    EXPECT_THAT(refused({"--method", "area", "--show", "levels", "-o", "a.pfm"}), HasSubstr(".png"));
+    EXPECT_THAT(refused({"--method", "nearest", "-o", "a.png"}), HasSubstr("--method"));
+    EXPECT_EQ(files(), std::set<std::string>({"scene.glb"}));
+}
+
+} // namespace

@@ -1,0 +1,371 @@
+// Levels of detail by what the rest of a picture masks: in scenes made for it, and in museums.
+#include <session_gpu/level_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include <make_scene.h>
+#include <perception/judge.h>
+#include <render/renderer.h>
+
+#include "gl_test.h"
+#include "measured.h"
+#include "shapes.h"
+#include "temp_folder.h"
+
+namespace {
+
+using namespace unseen;
+using namespace unseen::session;
+using ::testing::Each;
+using ::testing::HasSubstr;
+using LevelControlTest = render::testing::GlTest;
+
+const vdtree::VertexTree& body() {
+    static const vdtree::VertexTree tree = support::measured(support::built(shapes::bumpy_sphere(6, 0.05)));
+    return tree;
+}
+
+// Bodies of radius about 1 at these places, all of one tree.
+Session bodies(const std::vector<glm::dvec3>& places) {
+    Scene scene;
+    for (const glm::dvec3& at : places) {
+        Object& object = scene.objects.emplace_back(Object{body().share()});
+        object.placement.translation = at;
+    }
+    return *Session::create(std::move(scene));
+}
+
+vdtree::View ahead(int side) {
+    vdtree::View view;
+    view.eye = {0, 0, 0}, view.target = {0, 0, -1};
+    view.fov_y_degrees = 40;
+    view.width = view.height = side;
+    return view;
+}
+
+// A row of them that goes away, side by side.
+const std::vector<glm::dvec3> row = {{-1, 0.3, -5}, {1.4, -0.5, -8}, {-3, 0.4, -13}, {4, -1, -20},
+                                     {-6, 1, -33},  {8, -2, -60},    {-18, 3, -100}};
+
+perception::JudgeOptions judging(const Session& session) {
+    return {.display = session.observer().display, .gain = session.observer().person.gain};
+}
+
+// ---- chains -----------------------------------------------------------------------------------------------------------
+
+TEST(LevelChain, GetsCoarserByOneFactorOfDistance) {
+    Session session = bodies({{0, 0, -3}});
+    const auto chain = level_chain(session, ahead(256), {});
+    ASSERT_TRUE(chain) << chain.error().message;
+    ASSERT_EQ(chain->size(), 6);
+    EXPECT_EQ(chain->triangles(0), body().triangle_count());
+    EXPECT_EQ(chain->unseen_from(0), 0);
+    EXPECT_LE(chain->triangles(1), body().triangle_count() / 2);
+    for (int level = 0; level < 6; ++level) {
+        EXPECT_EQ(chain->cut(level).triangle_count(), chain->triangles(level)) << level;
+        if (level > 0) {
+            EXPECT_LT(chain->triangles(level), chain->triangles(level - 1));
+        }
+        if (level > 2) {
+            EXPECT_NEAR(chain->unseen_from(level) / chain->unseen_from(level - 1),
+                        chain->unseen_from(2) / chain->unseen_from(1), 1e-6);
+        }
+    }
+    for (const LevelChainOptions& bad :
+         {LevelChainOptions{.levels = 0}, LevelChainOptions{.levels = 17}, LevelChainOptions{.most_share = 0},
+          LevelChainOptions{.least_share = -1}, LevelChainOptions{.least_share = std::nan("")},
+          LevelChainOptions{.most_share = 0.1, .least_share = 0.2}})
+        EXPECT_FALSE(level_chain(session, ahead(256), {}, 0, bad));
+    EXPECT_EQ(level_chain(session, ahead(256), {}, 0, {.levels = 1})->size(), 1);
+    EXPECT_EQ(level_chain(session, ahead(256), {}, 0, {.levels = 2})->size(), 2);
+    // All of a small mesh is its only level.
+    Session small = *Session::create(Scene::of(support::measured(support::built(shapes::cube(1)))));
+    EXPECT_EQ(level_chain(small, small.default_view(), {})->size(), 1);
+}
+
+// How visible a level is, over how visible the one before was: alike from level to level, and more so than where
+// triangles shrink by one factor.
+TEST_F(LevelControlTest, LevelsAreEven) {
+    Session session = bodies({{0, 0, 0}});
+    vdtree::View window;
+    window.width = window.height = 400;
+    window.fov_y_degrees = 15;
+    ASSERT_TRUE(session.prepare(session.default_view(), {}));
+    const auto recipe = session.recipe(session.default_view(), {});
+    ASSERT_TRUE(recipe);
+    auto renderer = render::Renderer::create(context(), session.tree());
+    ASSERT_TRUE(renderer);
+    const auto spread = [&](const LevelChain& chain, glm::dvec3 direction) {
+        std::vector<perception::Image> pictures;
+        for (int level = 0; level < chain.size(); ++level) {
+            const auto frame = renderer->draw(chain.cut(level), session.frame(direction, 0.8, window));
+            EXPECT_TRUE(frame);
+            pictures.push_back({frame->width, frame->height, 1, frame->luminance});
+            for (float& v : pictures.back().values)
+                v = static_cast<float>(
+                    perception::to_luminance(session.observer().display, static_cast<double>(v)).value());
+        }
+        const auto judge = perception::Judge::create(pictures[0], judging(session));
+        double before = 0, least = 1e300, most = 0;
+        for (std::size_t level = 1; level < pictures.size(); ++level) {
+            const double v = judge->judge(pictures[level])->max_ratio;
+            if (level > 1) least = std::min(least, v / before), most = std::max(most, v / before);
+            before = v;
+        }
+        return most / least;
+    };
+    const auto even = LevelChain::create(session.tree(), *recipe->criterion),
+               halving = LevelChain::by_triangles(session.tree(), *recipe->criterion);
+    ASSERT_TRUE(even && halving);
+    ASSERT_EQ(even->triangles(5), halving->triangles(5)) << "the same ends";
+    double ours = 0, theirs = 0;
+    for (const glm::dvec3 direction : {glm::dvec3(0.3, 0.2, 1), {1, 0, 0}, {-0.5, 0.7, -0.4}}) {
+        ours += std::log(spread(*even, direction)) / 3;
+        theirs += std::log(spread(*halving, direction)) / 3;
+    }
+    EXPECT_LT(ours, theirs);
+    RecordProperty("spread", std::to_string(std::exp(ours)));
+    RecordProperty("spread_by_triangles", std::to_string(std::exp(theirs)));
+}
+
+// ---- control ----------------------------------------------------------------------------------------------------------
+
+TEST_F(LevelControlTest, AStillPictureSettlesAndStays) {
+    Session session = bodies(row);
+    for (const MapRecipe maps : {MapRecipe::modern, MapRecipe::rpg99}) {
+        auto control = LevelControl::create(context(), session, ahead(128), {.maps = maps});
+        ASSERT_TRUE(control) << control.error().message;
+        EXPECT_FALSE(control->is_settled());
+        int frames = 0;
+        for (; frames < 300 && !control->is_settled(); ++frames) ASSERT_TRUE(control->draw(ahead(128)));
+        ASSERT_LT(frames, 300) << "it does not settle";
+        const std::vector<int> levels = control->draw(ahead(128))->levels;
+        for (int i = 0; i < 60; ++i) {
+            const auto frame = control->draw(ahead(128));
+            ASSERT_TRUE(frame);
+            ASSERT_EQ(frame->levels, levels) << i << " frames after it was settled in " << frames;
+        }
+        // Near ones are finer than far ones, and there are both.
+        EXPECT_LT(levels.front(), levels.back());
+        // Waiting or not, it settles alike.
+        auto other = LevelControl::create(context(), session, ahead(128), {.maps = maps});
+        const auto settled = other->settle(ahead(128));
+        ASSERT_TRUE(settled) << settled.error().message;
+        EXPECT_TRUE(other->is_settled());
+        for (std::size_t i = 0; i < levels.size(); ++i) EXPECT_LE(std::abs(settled->levels[i] - levels[i]), 1) << i;
+        for (const LevelTest& test : settled->tests) EXPECT_NE(test.level, test.compared_with);
+        ASSERT_FALSE(settled->times.empty());
+        EXPECT_GT(settled->times.front().layers_ms, 0);
+        EXPECT_GT(settled->times.front().maps_ms, 0);
+    }
+}
+
+TEST_F(LevelControlTest, CountsDecideALaterFrame) {
+    Session session = bodies({{0, 0, -4}, {3, 0, -9}});
+    auto control = LevelControl::create(context(), session, ahead(128));
+    ASSERT_TRUE(control);
+    const int worst = control->chain(0).size() - 1;
+    const auto first = control->draw(ahead(128));
+    ASSERT_TRUE(first) << first.error().message;
+    EXPECT_THAT(first->levels, Each(worst)) << "it begins with the worst";
+    EXPECT_THAT(first->tested_with, Each(0)) << "and asks for the best";
+    EXPECT_TRUE(first->tests.empty());
+    EXPECT_EQ(first->triangles, 2u * control->chain(0).triangles(worst));
+    EXPECT_EQ(first->layers, 2);
+    // Two layers, the background, the depth; the composite, and a combination and a map for each layer.
+    EXPECT_EQ(first->surface_passes, 4);
+    EXPECT_GT(first->full_screen_passes, 3);
+    ASSERT_TRUE(context().finish());
+    const auto second = control->draw(ahead(128));
+    ASSERT_EQ(second->tests.size(), 2u);
+    for (const LevelTest& test : second->tests) {
+        EXPECT_EQ(test.frame, 0u);
+        EXPECT_EQ(test.level, worst);
+        EXPECT_EQ(test.compared_with, 0);
+        EXPECT_EQ(test.decision, LevelDecision::better);
+        EXPECT_EQ(second->levels[test.object], worst - 1);
+    }
+    EXPECT_EQ(second->changed, 2);
+    // Without layers all is drawn at once, and the background apart for the map.
+    Session one = bodies({{0, 0, -4}});
+    auto alone = LevelControl::create(context(), one, ahead(128));
+    const auto frame = alone->draw(ahead(128));
+    EXPECT_EQ(frame->layers, 0);
+    EXPECT_EQ(frame->surface_passes, 3) << "the picture, the background, the depth";
+}
+
+// Both ends of the chain.
+TEST_F(LevelControlTest, TheBestIsHeldAgainstTheNextAndTheWorstToo) {
+    Session session = bodies({{0, 0, -2.5}, {300, 0, -2000}});
+    auto control = LevelControl::create(context(), session, ahead(256), {.maps = MapRecipe::rpg99});
+    const auto settled = control->settle(ahead(256));
+    ASSERT_TRUE(settled && control->is_settled());
+    const int worst = control->chain(0).size() - 1;
+    ASSERT_EQ(settled->levels[0], 0);
+    ASSERT_EQ(settled->levels[1], worst);
+    for (int i = 0; i < 8; ++i) {
+        const auto frame = control->draw(ahead(256));
+        EXPECT_THAT(frame->tested_with[0], ::testing::AnyOf(-1, 1));
+        EXPECT_THAT(frame->tested_with[1], ::testing::AnyOf(-1, worst - 1));
+    }
+}
+
+// l_HQ: the farther the layer, the worse is what its levels are held against; every so many frames.
+TEST_F(LevelControlTest, FartherLayersAreTestedLessOftenAndAgainstLess) {
+    Session session = bodies(row);
+    auto control = LevelControl::create(context(), session, ahead(128));
+    ASSERT_TRUE(control->settle(ahead(128)));
+    const auto centres = [&] {
+        std::vector<glm::dvec3> all;
+        for (const glm::dvec3& at : row) all.push_back(at);
+        return all;
+    }();
+    const auto split = render::split_into_layers(centres, ahead(128));
+    ASSERT_TRUE(split);
+    ASSERT_EQ(split->count, 5);
+    std::vector<int> tested(row.size(), 0);
+    constexpr int frames = 240; // of which 60, 30, 20, 15, 12 are a layer's
+    for (int i = 0; i < frames; ++i) {
+        const auto frame = control->draw(ahead(128));
+        ASSERT_TRUE(context().finish()); // so that no test waits for another
+        for (std::size_t k = 0; k < row.size(); ++k) {
+            if (frame->tested_with[k] < 0) continue;
+            ++tested[k];
+            const int level = frame->levels[k], worst = control->chain(k).size() - 1, layer = split->layer_of[k];
+            if (level > 0 && level < worst) {
+                EXPECT_LT(frame->tested_with[k], level);
+                EXPECT_LE(frame->tested_with[k], layer);
+            }
+        }
+    }
+    for (std::size_t k = 0; k < row.size(); ++k) EXPECT_EQ(tested[k], frames / (4 * (split->layer_of[k] + 1))) << k;
+}
+
+TEST_F(LevelControlTest, MapsAreThoseOfTheCpu) {
+    Session session = bodies(row);
+    for (const MapRecipe maps : {MapRecipe::modern, MapRecipe::rpg99})
+        for (const int block : {1, 2}) {
+            auto control = LevelControl::create(context(), session, ahead(127), {.maps = maps, .map_block = block});
+            ASSERT_TRUE(control) << control.error().message;
+            ASSERT_TRUE(control->draw(ahead(127)));
+            const auto map = control->thresholds(1);
+            ASSERT_TRUE(map) << map.error().message;
+            ASSERT_EQ(control->map_width(), block == 1 ? 127 : 64);
+            const auto relative = render::read_luminance(control->layers().combination());
+            perception::Image picture{control->map_width(), control->map_height(), 1, *relative};
+            for (float& v : picture.values)
+                v = static_cast<float>(
+                    perception::to_luminance(session.observer().display, static_cast<double>(v)).value());
+            auto options = judging(session);
+            perception::set_pixels_per_degree(
+                options.display,
+                perception::PixelsPerDegree(perception::pixels_per_degree(options.display).value() / block));
+            const double field = perception::physical_field(options.display, picture.width).value();
+            std::vector<float> wanted;
+            if (maps == MapRecipe::modern) wanted = perception::threshold_map_modern(picture, options)->values;
+            else wanted = perception::rpg99_map(picture, picture, {field, false})->threshold.values;
+            std::vector<double> errors;
+            for (std::size_t i = 0; i < wanted.size(); ++i)
+                errors.push_back(std::abs(static_cast<double>((*map)[i]) / static_cast<double>(wanted[i]) - 1));
+            std::sort(errors.begin(), errors.end());
+            EXPECT_LT(errors[errors.size() - 1 - errors.size() / 1000], 1e-3) << block;
+        }
+}
+
+TEST_F(LevelControlTest, OtherMethodsGoByDistanceAndByArea) {
+    Session session = bodies(row);
+    for (const LevelMethod method : {LevelMethod::distance, LevelMethod::area}) {
+        std::uint64_t before = ~0ull;
+        for (const double bias : {1e6, 10.0, 0.3, 1e-2, 1e-6}) {
+            auto control = LevelControl::create(context(), session, ahead(128), {.method = method, .bias = bias});
+            ASSERT_TRUE(control) << control.error().message;
+            const auto frame = control->draw(ahead(128));
+            ASSERT_TRUE(frame) << frame.error().message;
+            EXPECT_EQ(frame->surface_passes, 1);
+            EXPECT_EQ(frame->full_screen_passes, 0);
+            // Above 1 is finer: by distance the bias stretches how far a level is unseen from.
+            EXPECT_TRUE(std::is_sorted(frame->levels.begin(), frame->levels.end())) << "the farther, the coarser";
+            EXPECT_LE(frame->triangles, before);
+            before = frame->triangles;
+            EXPECT_FALSE(control->thresholds(0));
+        }
+    }
+}
+
+TEST_F(LevelControlTest, TakesWhatComes) {
+    Session session = bodies({{0, 0, -4}, {0, 0, 30}, {1, 1, -7}});
+    auto control = LevelControl::create(context(), session, ahead(64));
+    const auto frame = control->draw(ahead(64));
+    ASSERT_TRUE(frame);
+    EXPECT_EQ(frame->levels[1], -1) << "behind the eye";
+    // Another size, and a view of nothing.
+    const auto wide = [] {
+        vdtree::View view = ahead(50);
+        view.width = 81;
+        return view;
+    }();
+    ASSERT_TRUE(control->settle(wide));
+    EXPECT_EQ(control->picture().width(), 81);
+    vdtree::View aside = ahead(64);
+    aside.target = {0, 1, 0}, aside.up = {1, 0, 0};
+    const auto nothing = control->draw(aside);
+    ASSERT_TRUE(nothing) << nothing.error().message;
+    EXPECT_THAT(nothing->levels, Each(-1));
+    EXPECT_EQ(nothing->triangles, 0u);
+    EXPECT_TRUE(control->is_settled());
+    aside.target = aside.eye;
+    EXPECT_FALSE(control->draw(aside));
+
+    const auto refused = [&](const LevelControlOptions& options) {
+        const auto made = LevelControl::create(context(), session, ahead(64), options);
+        return made ? std::string("none") : made.error().message;
+    };
+    EXPECT_THAT(refused({.bias = 0}), HasSubstr("bias"));
+    EXPECT_THAT(refused({.bias = std::nan("")}), HasSubstr("bias"));
+    EXPECT_THAT(refused({.chain = {.levels = 0}}), HasSubstr("1 to 16 levels"));
+    EXPECT_THAT(refused({.layers = 17}), HasSubstr("1 to 16 layers"));
+    EXPECT_THAT(refused({.map_block = 0}), HasSubstr("pixels a side"));
+    EXPECT_THAT(refused({.upper_share = 0.1, .lower_share = 0.2}), HasSubstr("shares"));
+    EXPECT_THAT(refused({.frames_a_layer = 0}), HasSubstr("every frame"));
+}
+
+// ---- museums ----------------------------------------------------------------------------------------------------------
+
+// The statue's level behind a gate of so many bars a metre; 0: without one.
+int level_behind(const render::Context& context, double bars_per_metre) {
+    const support::TempFolder folder;
+    const auto file = folder / "museum.glb";
+    app::MakeSceneOptions options{.triangles = 20'000, .bars = app::MuseumBars::none};
+    if (bars_per_metre > 0) options.bars = app::MuseumBars::gate, options.bars_per_metre = bars_per_metre;
+    EXPECT_TRUE(app::make_scene(file, options));
+    auto scene = Scene::load(file, {.as = LoadAs::scene});
+    EXPECT_TRUE(scene);
+    auto session = Session::create(std::move(*scene));
+    vdtree::View view = *session->camera_view({});
+    view.width = view.height = 256;
+    auto control = LevelControl::create(context, *session, view, {.maps = MapRecipe::rpg99});
+    EXPECT_TRUE(control) << control.error().message;
+    const auto settled = control->settle(view);
+    EXPECT_TRUE(settled && control->is_settled());
+    return settled->levels[0];
+}
+
+// The paper's figure 1, with bars before the statue.
+TEST_F(LevelControlTest, TheFinerTheBarsTheCoarserTheStatue) {
+    const int without = level_behind(context(), 0), coarse = level_behind(context(), 1);
+    EXPECT_EQ(coarse, without);
+    int before = coarse;
+    for (const double bars_per_metre : {4.0, 12.0, 32.0}) {
+        const int level = level_behind(context(), bars_per_metre);
+        EXPECT_GE(level, before) << bars_per_metre;
+        before = level;
+    }
+    EXPECT_GE(before, without + 2);
+}
+
+} // namespace
