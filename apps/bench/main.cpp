@@ -15,6 +15,7 @@
 #include "effects_bench.h"
 #include "engine_bench.h"
 #include "fit_bench.h"
+#include "make_scene.h"
 #include "options.h"
 #include "output_files.h"
 #include "people_bench.h"
@@ -22,6 +23,7 @@
 #include "program.h"
 #include "report.h"
 #include "requests_bench.h"
+#include "scenes_bench.h"
 #include "terminal.h"
 
 namespace unseen::app {
@@ -390,6 +392,47 @@ Command people_command(CLI::App& app) {
     return {verb, [a] { return run(*a); }};
 }
 
+struct ScenesArguments {
+    ScenesBenchOptions options;
+    ReportArguments report;
+    bool quick = false;
+};
+
+Result<int> run(ScenesArguments& a) {
+    auto bench = BenchRun::open(a.options.scenes, {}, a.report);
+    if (!bench) return bench.error();
+    const auto result = bench_scenes(a.options);
+    if (!result) return result.error();
+    return bench->close({{"rows", result->rows}, {"walks", result->walks}}, result->tables);
+}
+
+Command scenes_command(CLI::App& app) {
+    auto a = std::make_shared<ScenesArguments>();
+    CLI::App* verb = app.add_subcommand(
+        "scenes", "What masking and occlusion save in scenes, and what discrete levels of detail make of the same");
+    verb->add_option("SCENE", a->options.scenes,
+                     "Scenes with cameras (default: museum, treasure, house and forest of 'unseen scene make')")
+        ->type_name("SCENE.glb");
+    verb->add_option("--triangles", a->options.triangles, "Of each of the default scenes, about (default: 500000)")
+        ->type_name("N")
+        ->check(whole(static_cast<double>(MakeSceneOptions::least_triangles),
+                      static_cast<double>(MakeSceneOptions::most_triangles)));
+    verb->add_option("--window", a->options.window_px, "Its side (default: 512)")
+        ->type_name("PIXELS")
+        ->check(whole(64, 4096));
+    verb->add_flag("--quick", a->quick,
+                   "Fewer samples a pixel, a short walk, and no search for levels that show nothing");
+    add_report_options(*verb, a->report);
+    verb->callback([a] {
+        if (!a->quick) return;
+        a->options.samples = 16, a->options.path_frames = 6;
+        a->options.searches = false;
+    });
+    verb->footer(
+        "Examples:\n  unseen-bench scenes --quick\n  unseen-bench scenes mine.glb --window 1024 --json scenes.json");
+    return {verb, [a] { return run(*a); }};
+}
+
 constexpr const char* about =
     "unseen-bench measures how fast, how small and how invisible Unseen is on this machine, against what is promised.";
 constexpr const char* examples = R"(Examples:
@@ -406,6 +449,6 @@ int main(int argc, char** argv) {
     return run_program(argc, argv, {"unseen-bench", about, examples, UNSEEN_VERSION, {}}, [](CLI::App& app) {
         return std::vector<Command>{engine_command(app), perception_command(app), effects_command(app),
                                     budget_command(app), requests_command(app),   fit_command(app),
-                                    people_command(app)};
+                                    people_command(app), scenes_command(app)};
     });
 }

@@ -3,6 +3,7 @@
 #include "fit_bench.h"
 #include "perception_bench.h"
 #include "requests_bench.h"
+#include "scenes_bench.h"
 
 namespace unseen::app {
 namespace {
@@ -19,6 +20,7 @@ Result<PerceptionBenchResult> bench_perception(const PerceptionBenchOptions&) { 
 Result<BudgetBenchResult> bench_budget(const BudgetBenchOptions&) { return no_pictures(); }
 Result<RequestsBenchResult> bench_requests(const std::string&) { return no_pictures(); }
 Result<FitBenchResult> bench_fit(const FitBenchOptions&) { return no_pictures(); }
+Result<ScenesBenchResult> bench_scenes(const ScenesBenchOptions&) { return no_pictures(); }
 std::vector<std::string> fit_factors() { return {}; }
 
 } // namespace unseen::app

@@ -17,6 +17,10 @@
 namespace unseen::session {
 namespace {
 
+// People differ in how much they see of a masker, too, and models of sight do. Changes are looked for by the observer, and
+// maskers count as for somebody who sees half as much: of the default observer, as for the median person.
+constexpr double maskers_gain = 0.5;
+
 // Everything of a scene on the GPU.
 class Drawn {
 public:
@@ -80,8 +84,10 @@ public:
         const perception::Display& display = session.observer().display;
         const double black = perception::to_luminance(display, 0).value(),
                      white = perception::to_luminance(display, 1).value();
+        perception::JudgeOptions judging = judge_options(session.observer());
+        judging.gain *= maskers_gain;
         auto tables = perception::judge_tables(view.width, view.height, static_cast<float>(black),
-                                               static_cast<float>(white), judge_options(session.observer()));
+                                               static_cast<float>(white), judging);
         if (!tables) return tables.error();
         auto sum = render::SampleSum::create(context, view.width, view.height);
         if (!sum) return sum.error();

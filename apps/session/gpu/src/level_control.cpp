@@ -1,6 +1,7 @@
 #include <session_gpu/level_control.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <deque>
 #include <limits>
@@ -533,6 +534,11 @@ Result<LevelControl> LevelControl::create(const render::Context& context, Sessio
 }
 
 Result<LevelFrame> LevelControl::draw(const vdtree::View& view) { return impl_->draw(view); }
+
+void LevelControl::set_bias(double bias) {
+    assert(bias > 0 && std::isfinite(bias));
+    impl_->options.bias = bias;
+}
 
 bool LevelControl::is_settled() const noexcept {
     const Impl& own = *impl_;

@@ -102,6 +102,9 @@ public:
     // one; then by turns. Fails as drawing does. Counts that are not there yet decide later.
     Result<LevelFrame> draw(const vdtree::View& view);
 
+    // LevelControlOptions::bias, from the next frame on; above 0 and finite.
+    void set_bias(double bias);
+
     // Waits for the GPU, and lets what it has counted decide: for programs that write each frame down, and not for those
     // that show it. Only tests and times of what it returns are filled in.
     Result<LevelFrame> wait();
