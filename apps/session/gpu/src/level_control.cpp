@@ -27,6 +27,8 @@ constexpr int most_block = 16; // of render::LayerOptions
 // A level that was too coarse is not tried again before the eye has moved by this share of its distance to the object:
 // else the object would go to and fro between two levels.
 constexpr double moved_share = 0.02;
+// Nor, under lights that move, in so many of its tests.
+constexpr int tests_until_retried = 16;
 
 Error bad_option(const std::string& message) { return {ErrorCode::invalid_argument, "levels: " + message}; }
 
@@ -90,16 +92,18 @@ struct LevelControl::Impl {
         vdtree::Similarity placement;
         Sphere sphere;
         int level = 0, drawn_level = -1;
-        bool is_known = false;                 // an own test has let it keep a level
-        bool is_open = false;                  // a test is on its way
-        int refused = most_levels;             // levels from this one on were too coarse ...
-        glm::dvec3 refused_at = glm::dvec3(0); // ... for an eye here
-        std::uint64_t tested = 0;              // the last frame whose test let it keep its level
+        std::optional<vdtree::Lighting> lighting;   // of the last frame
+        bool is_known = false;                      // an own test has let it keep a level
+        bool is_open = false;                       // a test is on its way
+        int refused = most_levels;                  // levels from this one on were too coarse ...
+        glm::dvec3 refused_at = glm::dvec3(0);      // ... for an eye here
+        std::optional<vdtree::Lighting> refused_in; // ... in this light
+        int tests_since = 0;                        // then
+        std::uint64_t tested = 0;                   // the last frame whose test let it keep its level
     };
     struct OpenTest {
         std::uint64_t name = 0;
         LevelTest test;
-        bool first = false; // in the beginning
     };
     // What depends on the size of the window, and on the gaze.
     struct Passes {
@@ -319,12 +323,16 @@ void LevelControl::Impl::decide(const OpenTest& asked, std::uint64_t pixels, Lev
     const bool is_too_coarse = static_cast<double>(pixels) > options.upper_share * all,
                could_be_coarser = static_cast<double>(pixels) < options.lower_share * all;
     const int worst = thing.levels->chain.size() - 1;
-    if (glm::length(view.eye - thing.refused_at) > moved_share * glm::length(thing.sphere.centre - view.eye))
+    const bool has_moved =
+        glm::length(view.eye - thing.refused_at) > moved_share * glm::length(thing.sphere.centre - view.eye);
+    if (has_moved || (++thing.tests_since >= tests_until_retried && thing.refused_in != thing.lighting))
         thing.refused = most_levels;
     if (test.level > 0 && is_too_coarse) {
         test.decision = LevelDecision::better;
         thing.refused = std::min(thing.refused, test.level);
         thing.refused_at = view.eye;
+        thing.refused_in = thing.lighting;
+        thing.tests_since = 0;
         --thing.level;
     } else {
         thing.is_known = true;
@@ -415,6 +423,7 @@ Result<LevelFrame> LevelControl::Impl::draw(const vdtree::View& from) {
         if (!is_perceptual) thing.level = chosen_level(thing, view);
         auto made = item(i, thing.level, view);
         if (!made) return made.error();
+        thing.lighting = made->lighting;
         objects.push_back(std::move(*made));
         in_sight.push_back(i);
         centres.push_back(thing.sphere.centre);
