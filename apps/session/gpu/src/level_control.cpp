@@ -37,6 +37,7 @@ Result<void> check(const LevelControlOptions& o) {
     if (!(o.lower_share >= 0 && o.upper_share >= o.lower_share && o.upper_share <= 1))
         return bad_option("shares of pixels lie between 0 and 1, and the lower one is not above the upper one");
     if (o.frames_a_layer < 1) return bad_option("objects are tested every frame at most");
+    if (o.fade_frames < 0) return bad_option("a fade cannot last less than no frame");
     if (o.map_block < 1 || o.map_block > most_block) return bad_option("a map's threshold is of 1 to 16 pixels a side");
     return {};
 }
@@ -92,6 +93,8 @@ struct LevelControl::Impl {
         vdtree::Similarity placement;
         Sphere sphere;
         int level = 0, drawn_level = -1;
+        int fading_from = -1, fade_left = 0;        // level, frames
+        bool is_fading = false;                     // in the last frame
         std::optional<vdtree::Lighting> lighting;   // of the last frame
         bool is_known = false;                      // an own test has let it keep a level
         bool is_open = false;                       // a test is on its way
@@ -308,7 +311,7 @@ int LevelControl::Impl::to_compare_with(const Thing& thing, int best) const {
 
 bool LevelControl::Impl::is_due(std::size_t object, int layer) const {
     const Thing& thing = things[object];
-    if (thing.is_open || thing.levels->chain.size() < 2) return false;
+    if (thing.is_open || thing.is_fading || thing.levels->chain.size() < 2) return false;
     if (tests_all || !thing.is_known) return true;
     const auto period = static_cast<std::uint64_t>(options.frames_a_layer) * (static_cast<std::uint64_t>(layer) + 1);
     return (frames + object) % period == 0;
@@ -428,7 +431,9 @@ Result<LevelFrame> LevelControl::Impl::draw(const vdtree::View& from) {
         in_sight.push_back(i);
         centres.push_back(thing.sphere.centre);
         frame.levels[i] = thing.level;
-        frame.changed += thing.drawn_level >= 0 && thing.drawn_level != thing.level;
+        const bool has_changed = thing.drawn_level >= 0 && thing.drawn_level != thing.level;
+        frame.changed += has_changed;
+        if (has_changed && !tests_all) thing.fading_from = thing.drawn_level, thing.fade_left = options.fade_frames;
         thing.drawn_level = thing.level;
         frame.triangles += thing.levels->chain.triangles(thing.level);
     }
@@ -444,9 +449,27 @@ Result<LevelFrame> LevelControl::Impl::draw(const vdtree::View& from) {
     if (!split) return split.error();
     if (!is_perceptual) *split = {.layer_of = std::vector<int>(objects.size(), 0), .count = 0, .borders = {}};
     frame.layers = split->count;
+    // Those that fade are drawn at both levels.
+    std::vector<render::Item> shown = objects;
+    render::LayerSplit split_of_shown = *split;
+    for (std::size_t i = 0; i < in_sight.size(); ++i) {
+        Thing& thing = things[in_sight[i]];
+        thing.is_fading = thing.fade_left > 0;
+        if (!thing.is_fading) continue;
+        const float share = 1 - static_cast<float>(thing.fade_left) / static_cast<float>(options.fade_frames + 1);
+        --thing.fade_left;
+        shown[i].stipple = {0, share};
+        render::Item before = objects[i];
+        before.cut = thing.levels->cuts[static_cast<std::size_t>(thing.fading_from)];
+        before.stipple = {share, 1};
+        shown.push_back(std::move(before));
+        split_of_shown.layer_of.push_back(split->layer_of[i]);
+        frame.triangles += thing.levels->chain.triangles(thing.fading_from);
+    }
     times.begin();
     render::LayerPasses& layers = passes->layers;
-    if (auto drawn = layers.draw(objects, background, {.view = view}, *split, glm::vec4(session.background())); !drawn)
+    if (auto drawn = layers.draw(shown, background, {.view = view}, split_of_shown, glm::vec4(session.background()));
+        !drawn)
         return drawn.error();
     times.end_stage();
 
