@@ -267,6 +267,11 @@ void add_level_options(CLI::App& verb, RenderArguments& a) {
                     "Of perceptual: a threshold is of so many by so many pixels (default: 1)")
         ->type_name("N")
         ->check(whole(1, 16));
+    group
+        .add_option("--fade", control.fade_frames,
+                    "With --path: for so many frames both levels of an object share its pixels (default: 0)")
+        ->type_name("N")
+        ->check(whole(0, 1000));
     group.add_flag("--half-floats", control.half_floats, "Of perceptual: keep layers in 16-bit floats");
 }
 
@@ -311,18 +316,22 @@ Command render_command(CLI::App& app) {
     CLI::Option* frames_a_second = verb->get_option("--fps");
     const std::vector<CLI::Option*> of_levels = {verb->get_option("--bias"),      verb->get_option("--levels"),
                                                  verb->get_option("--layers"),    verb->get_option("--maps"),
-                                                 verb->get_option("--map-block"), verb->get_option("--half-floats")};
+                                                 verb->get_option("--map-block"), verb->get_option("--half-floats"),
+                                                 verb->get_option("--fade")};
     verb->callback([a, samples, frames_a_second, of_levels] {
         const bool has_levels = a->method != Method::tree;
         for (std::size_t i = 0; i < of_levels.size(); ++i) {
-            const bool fits = i == 0   ? a->method == Method::distance || a->method == Method::area
-                              : i == 1 ? has_levels
-                                       : a->method == Method::perceptual;
+            const bool is_of_all = i == 1 || i + 1 == of_levels.size();
+            const bool fits = i == 0      ? a->method == Method::distance || a->method == Method::area
+                              : is_of_all ? has_levels
+                                          : a->method == Method::perceptual;
             if (!of_levels[i]->empty() && !fits)
-                refuse(of_levels[i]->get_name() + (i == 0   ? " needs --method distance or area."
-                                                   : i == 1 ? " needs --method."
-                                                            : " needs --method perceptual."));
+                refuse(of_levels[i]->get_name() + (i == 0      ? " needs --method distance or area."
+                                                   : is_of_all ? " needs --method."
+                                                               : " needs --method perceptual."));
         }
+        if (a->levels.control.fade_frames > 0 && a->flight.path.empty())
+            refuse("--fade needs --path: a still picture does not change.");
         if (has_levels && !samples->empty()) refuse("--samples is of cuts: levels are drawn with one sample a pixel.");
         if (!frames_a_second->empty() && !a->flight.geomorph_seconds && a->view.lights.empty() &&
             !a->flight.judges_changes && !is_moving(a->flight.gaze))

@@ -11,12 +11,11 @@ namespace {
 Result<Program> build_surface(const ProgramKey& key) {
     std::vector<ShaderSource> sources = {{ShaderSource::Stage::vertex, shaders::surface_vert}};
     if (key.output == Output::depth) return Program::build("depth", sources);
-    std::string comparing;
-    if (key.compares)
-        comparing = "#define main surface_main\n#line 1\n" + std::string(shaders::surface_frag) +
-                    "#undef main\n#line 1\n" + std::string(shaders::compare_frag);
-    sources.push_back(
-        {ShaderSource::Stage::fragment, key.compares ? std::string_view(comparing) : shaders::surface_frag});
+    std::string wrapped;
+    if (key.compares || key.stippled)
+        wrapped = "#define main surface_main\n#line 1\n" + std::string(shaders::surface_frag) +
+                  "#undef main\n#line 1\n" + std::string(key.compares ? shaders::compare_frag : shaders::stipple_frag);
+    sources.push_back({ShaderSource::Stage::fragment, wrapped.empty() ? shaders::surface_frag : wrapped});
     if (key.flat || key.wireframe) sources.push_back({ShaderSource::Stage::geometry, shaders::surface_geom});
 
     std::vector<std::string_view> defines;

@@ -22,6 +22,7 @@ struct ProgramKey {
     bool lit = false, textured = false, flat = false, wireframe = false;
     Output output = Output::linear;
     bool compares = false; // drops pixels that look like a picture: compare.frag
+    bool stippled = false; // drops pixels of a pattern: stipple.frag; not of what compares
     auto operator<=>(const ProgramKey&) const = default;
 };
 

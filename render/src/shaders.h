@@ -26,6 +26,7 @@ extern const std::string_view reduce_frag;
 extern const std::string_view sight_frag;
 extern const std::string_view smooth_frag;
 extern const std::string_view split_frag;
+extern const std::string_view stipple_frag;
 extern const std::string_view surface_vert;
 extern const std::string_view surface_geom;
 extern const std::string_view surface_frag;

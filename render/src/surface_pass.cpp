@@ -27,6 +27,7 @@ enum UniformLocation {
     lod_bias_location = 60,
     uv_bounds_location = 61,
     compared_location = 70,
+    stipple_location = 71,
 };
 
 bool is_finite(glm::dvec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
@@ -162,12 +163,14 @@ Result<SurfacePass> SurfacePass::prepare(std::span<const Item> items, const Came
     for (std::size_t i = 0; i < items.size(); ++i) {
         const Item& item = items[i];
         GpuTree::Impl& tree = item.cut.tree().impl();
-        const auto program =
-            target.context.impl().programs.surface({item.lighting.has_value(), tree.texture.has_value(),
-                                                    item.shading == Shading::flat, item.wireframe, output, compares});
+        const bool is_stippled = !compares && item.stipple != glm::vec2(0, 1);
+        const auto program = target.context.impl().programs.surface(
+            {item.lighting.has_value(), tree.texture.has_value(), item.shading == Shading::flat, item.wireframe, output,
+             compares, is_stippled});
         if (!program) return program.error();
         const Projection& projection = (*projections)[i];
         PreparedItem prepared{item.cut, projection, *program, cull_for(tree.tree.closedness(), projection.eye_inside)};
+        if (is_stippled && output != Output::depth) prepared.stipple = item.stipple;
         if (item.lighting && output != Output::depth) {
             if (auto made = tree.need_lit_vertices(); !made) return made.error();
             prepared.is_lit = true;
@@ -267,6 +270,7 @@ void SurfacePass::set_colours(const PreparedItem& item, float lod_bias) const {
     // A texture that is lit is cut off at white behind it.
     const glm::vec4 highest_lit = tree.texture ? glm::vec4(brightest_light) : tree.highest_hue;
     program.set(highest_shade_location, item.is_lit ? highest_lit : tree.highest_shade);
+    if (item.stipple) glProgramUniform2f(program.id(), stipple_location, item.stipple->x, item.stipple->y);
     if (item.is_lit) {
         program.set(material_location, item.lights.material);
         program.set(eye_location, item.lights.eye);

@@ -1,6 +1,7 @@
 // Draws a scene's items; what has to be found out about them is found out once for any number of draws.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -65,6 +66,7 @@ private:
         Cull cull = Cull::nothing;
         bool is_lit = false;
         LightUniforms lights = {};
+        std::optional<glm::vec2> stipple = {}; // none: all pixels
     };
 
     SurfacePass(const vdtree::View& view, int attachment, Output output)

@@ -135,6 +135,8 @@ TEST_F(LevelCommandTest, RefusesWhatDoesNotGoTogether) {
     EXPECT_THAT(refused({"--method", "area", "--layers", "3", "--json", "-"}), HasSubstr("perceptual"));
     EXPECT_THAT(refused({"--method", "perceptual", "--layers", "17", "--json", "-"}), HasSubstr("--layers"));
     EXPECT_THAT(refused({"--levels", "3", "-o", "a.png"}), HasSubstr("needs --method"));
+    EXPECT_THAT(refused({"--fade", "3", "-o", "a.png"}), HasSubstr("needs --method"));
+    EXPECT_THAT(refused({"--method", "area", "--fade", "3", "-o", "a.png"}), HasSubstr("needs --path"));
     EXPECT_THAT(refused({"--show", "levels", "-o", "a.png"}), HasSubstr("need --method"));
     EXPECT_THAT(refused({"--method", "area", "--show", "maps", "-o", "a.png"}), HasSubstr("perceptual"));
     EXPECT_THAT(refused({"--method", "area", "--show", "cost", "-o", "a.png"}), HasSubstr("exclude --method"));

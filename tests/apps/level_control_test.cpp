@@ -246,6 +246,31 @@ TEST_F(LevelControlTest, FartherLayersAreTestedLessOftenAndAgainstLess) {
     for (std::size_t k = 0; k < row.size(); ++k) EXPECT_EQ(tested[k], frames / (4 * (split->layer_of[k] + 1))) << k;
 }
 
+TEST_F(LevelControlTest, AChangeFades) {
+    Session session = bodies({{0, 0, -4}, {3, 0, -9}});
+    auto control = LevelControl::create(context(), session, ahead(128), {.fade_frames = 3});
+    ASSERT_TRUE(control->draw(ahead(128)));
+    ASSERT_TRUE(context().finish());
+    const auto sum = [&](const std::vector<int>& levels) {
+        return std::uint64_t{control->chain(0).triangles(levels[0])} + control->chain(1).triangles(levels[1]);
+    };
+    for (int i = 0; i < 3; ++i) {
+        const auto frame = control->draw(ahead(128));
+        ASSERT_TRUE(frame);
+        EXPECT_EQ(frame->changed, i == 0 ? 2 : 0);
+        EXPECT_GT(frame->triangles, sum(frame->levels)) << "both levels are drawn";
+        EXPECT_THAT(frame->tested_with, Each(-1)) << "what fades is not tested";
+        ASSERT_TRUE(context().finish());
+    }
+    const auto after = control->draw(ahead(128));
+    EXPECT_EQ(after->triangles, sum(after->levels));
+    EXPECT_THAT(after->tested_with, Each(0));
+    // At rest there is nothing of it to be seen.
+    auto plain = LevelControl::create(context(), session, ahead(128));
+    ASSERT_TRUE(plain->settle(ahead(128)) && control->settle(ahead(128)));
+    EXPECT_EQ(*render::read_pixels(control->picture()), *render::read_pixels(plain->picture()));
+}
+
 TEST_F(LevelControlTest, MapsAreThoseOfTheCpu) {
     Session session = bodies(row);
     for (const MapRecipe maps : {MapRecipe::modern, MapRecipe::rpg99})
@@ -331,6 +356,7 @@ TEST_F(LevelControlTest, TakesWhatComes) {
     EXPECT_THAT(refused({.layers = 17}), HasSubstr("1 to 16 layers"));
     EXPECT_THAT(refused({.map_block = 0}), HasSubstr("pixels a side"));
     EXPECT_THAT(refused({.upper_share = 0.1, .lower_share = 0.2}), HasSubstr("shares"));
+    EXPECT_THAT(refused({.fade_frames = -1}), HasSubstr("fade"));
     EXPECT_THAT(refused({.frames_a_layer = 0}), HasSubstr("every frame"));
 }
 

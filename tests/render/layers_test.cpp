@@ -2,6 +2,7 @@
 #include "gl_test.h"
 #include "scenes.h"
 
+#include <algorithm>
 #include <limits>
 
 #define GL_GLEXT_PROTOTYPES 1
@@ -212,6 +213,30 @@ TEST_F(LayersTest, AMaskDarkensTheCombinationWithoutItsLayer) {
     ASSERT_TRUE(passes->combine(0));
     EXPECT_EQ(*read_pixels(passes->combination()),
               drawn(context(), {strips.objects[0], strips.objects[2]}, strips.background, view));
+}
+
+// Two cuts of one object on the way from one to the other.
+TEST_F(LayersTest, StippledItemsShareThePixels) {
+    const Strips strips(context());
+    const View view = ahead(32, 32);
+    const auto walls = [&](float share) {
+        std::vector<Item> both = {strips.background[0], strips.background[0]};
+        both[0].stipple = {0, share}, both[1].stipple = {share, 1};
+        return both;
+    };
+    for (const float share : {0.f, 0.25f, 0.5f, 1.f}) {
+        auto both = walls(share);
+        EXPECT_EQ(drawn(context(), both, {}, view), drawn(context(), {}, strips.background, view)) << share;
+        // The first alone.
+        both.pop_back();
+        const auto alone = drawn(context(), both, {}, view);
+        const auto covered = std::count_if(alone.begin(), alone.end(),
+                                           [](const glm::vec4& pixel) { return pixel.a > default_background + 0.01f; });
+        const auto whole = drawn(context(), {}, strips.background, view);
+        const auto all = std::count_if(whole.begin(), whole.end(),
+                                       [](const glm::vec4& pixel) { return pixel.a > default_background + 0.01f; });
+        EXPECT_NEAR(static_cast<double>(covered) / static_cast<double>(all), static_cast<double>(share), 0.03);
+    }
 }
 
 TEST_F(LayersTest, RefusesWhatCannotBeSplit) {

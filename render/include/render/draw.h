@@ -29,6 +29,9 @@ struct Item {
     bool wireframe = false; // the triangles' edges over the shaded surface, hidden lines removed
     // In the tree's frame; none: the luminance of vertices is the tree's. Not for cuts with vertices that glide.
     std::optional<vdtree::Lighting> lighting = {};
+    // For fading from one cut to another: each pixel of a pattern of 4x4 has a value of its own in 0..1, and only those
+    // from x to below y are drawn. Items with {0, a} and {a, 1} share the pixels. Depth alone is drawn everywhere.
+    glm::vec2 stipple = {0, 1};
 };
 
 struct Camera {

@@ -28,6 +28,8 @@ constexpr int most_block = 16; // of render::LayerOptions
 // A level that was too coarse is not tried again before the eye has moved by this share of its distance to the object:
 // else the object would go to and fro between two levels.
 constexpr double moved_share = 0.02;
+// Nor, under lights that move, in so many of its tests.
+constexpr int tests_until_retried = 16;
 
 Error bad_option(const std::string& message) { return {ErrorCode::invalid_argument, "levels: " + message}; }
 
@@ -36,6 +38,7 @@ Result<void> check(const LevelControlOptions& o) {
     if (!(o.lower_share >= 0 && o.upper_share >= o.lower_share && o.upper_share <= 1))
         return bad_option("shares of pixels lie between 0 and 1, and the lower one is not above the upper one");
     if (o.frames_a_layer < 1) return bad_option("objects are tested every frame at most");
+    if (o.fade_frames < 0) return bad_option("a fade cannot last less than no frame");
     if (o.map_block < 1 || o.map_block > most_block) return bad_option("a map's threshold is of 1 to 16 pixels a side");
     return {};
 }
@@ -91,16 +94,20 @@ struct LevelControl::Impl {
         vdtree::Similarity placement;
         Sphere sphere;
         int level = 0, drawn_level = -1;
-        bool is_known = false;                 // an own test has let it keep a level
-        bool is_open = false;                  // a test is on its way
-        int refused = most_levels;             // levels from this one on were too coarse ...
-        glm::dvec3 refused_at = glm::dvec3(0); // ... for an eye here
-        std::uint64_t tested = 0;              // the last frame whose test let it keep its level
+        int fading_from = -1, fade_left = 0;        // level, frames
+        bool is_fading = false;                     // in the last frame
+        std::optional<vdtree::Lighting> lighting;   // of the last frame
+        bool is_known = false;                      // an own test has let it keep a level
+        bool is_open = false;                       // a test is on its way
+        int refused = most_levels;                  // levels from this one on were too coarse ...
+        glm::dvec3 refused_at = glm::dvec3(0);      // ... for an eye here
+        std::optional<vdtree::Lighting> refused_in; // ... in this light
+        int tests_since = 0;                        // then
+        std::uint64_t tested = 0;                   // the last frame whose test let it keep its level
     };
     struct OpenTest {
         std::uint64_t name = 0;
         LevelTest test;
-        bool first = false; // in the beginning
     };
     // What depends on the size of the window, and on the gaze.
     struct Passes {
@@ -305,7 +312,7 @@ int LevelControl::Impl::to_compare_with(const Thing& thing, int best) const {
 
 bool LevelControl::Impl::is_due(std::size_t object, int layer) const {
     const Thing& thing = things[object];
-    if (thing.is_open || thing.levels->chain.size() < 2) return false;
+    if (thing.is_open || thing.is_fading || thing.levels->chain.size() < 2) return false;
     if (tests_all || !thing.is_known) return true;
     const auto period = static_cast<std::uint64_t>(options.frames_a_layer) * (static_cast<std::uint64_t>(layer) + 1);
     return (frames + object) % period == 0;
@@ -320,12 +327,16 @@ void LevelControl::Impl::decide(const OpenTest& asked, std::uint64_t pixels, Lev
     const bool is_too_coarse = static_cast<double>(pixels) > options.upper_share * all,
                could_be_coarser = static_cast<double>(pixels) < options.lower_share * all;
     const int worst = thing.levels->chain.size() - 1;
-    if (glm::length(view.eye - thing.refused_at) > moved_share * glm::length(thing.sphere.centre - view.eye))
+    const bool has_moved =
+        glm::length(view.eye - thing.refused_at) > moved_share * glm::length(thing.sphere.centre - view.eye);
+    if (has_moved || (++thing.tests_since >= tests_until_retried && thing.refused_in != thing.lighting))
         thing.refused = most_levels;
     if (test.level > 0 && is_too_coarse) {
         test.decision = LevelDecision::better;
         thing.refused = std::min(thing.refused, test.level);
         thing.refused_at = view.eye;
+        thing.refused_in = thing.lighting;
+        thing.tests_since = 0;
         --thing.level;
     } else {
         thing.is_known = true;
@@ -416,11 +427,14 @@ Result<LevelFrame> LevelControl::Impl::draw(const vdtree::View& from) {
         if (!is_perceptual) thing.level = chosen_level(thing, view);
         auto made = item(i, thing.level, view);
         if (!made) return made.error();
+        thing.lighting = made->lighting;
         objects.push_back(std::move(*made));
         in_sight.push_back(i);
         centres.push_back(thing.sphere.centre);
         frame.levels[i] = thing.level;
-        frame.changed += thing.drawn_level >= 0 && thing.drawn_level != thing.level;
+        const bool has_changed = thing.drawn_level >= 0 && thing.drawn_level != thing.level;
+        frame.changed += has_changed;
+        if (has_changed && !tests_all) thing.fading_from = thing.drawn_level, thing.fade_left = options.fade_frames;
         thing.drawn_level = thing.level;
         frame.triangles += thing.levels->chain.triangles(thing.level);
     }
@@ -436,9 +450,27 @@ Result<LevelFrame> LevelControl::Impl::draw(const vdtree::View& from) {
     if (!split) return split.error();
     if (!is_perceptual) *split = {.layer_of = std::vector<int>(objects.size(), 0), .count = 0, .borders = {}};
     frame.layers = split->count;
+    // Those that fade are drawn at both levels.
+    std::vector<render::Item> shown = objects;
+    render::LayerSplit split_of_shown = *split;
+    for (std::size_t i = 0; i < in_sight.size(); ++i) {
+        Thing& thing = things[in_sight[i]];
+        thing.is_fading = thing.fade_left > 0;
+        if (!thing.is_fading) continue;
+        const float share = 1 - static_cast<float>(thing.fade_left) / static_cast<float>(options.fade_frames + 1);
+        --thing.fade_left;
+        shown[i].stipple = {0, share};
+        render::Item before = objects[i];
+        before.cut = thing.levels->cuts[static_cast<std::size_t>(thing.fading_from)];
+        before.stipple = {share, 1};
+        shown.push_back(std::move(before));
+        split_of_shown.layer_of.push_back(split->layer_of[i]);
+        frame.triangles += thing.levels->chain.triangles(thing.fading_from);
+    }
     times.begin();
     render::LayerPasses& layers = passes->layers;
-    if (auto drawn = layers.draw(objects, background, {.view = view}, *split, glm::vec4(session.background())); !drawn)
+    if (auto drawn = layers.draw(shown, background, {.view = view}, split_of_shown, glm::vec4(session.background()));
+        !drawn)
         return drawn.error();
     times.end_stage();
 

@@ -52,6 +52,8 @@ struct LevelControlOptions {
     int frames_a_layer =
         4; // objects of the nearest layer are tested every so many frames, of the second every twice so many
     bool maps_all_layers = false; // also those of which no object is tested
+    int fade_frames =
+        0; // that two levels of an object share its pixels for where it changes; it is not tested meanwhile
 };
 
 enum class LevelDecision { better, keep, worse };
