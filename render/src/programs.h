@@ -21,6 +21,8 @@ enum class Output {
 struct ProgramKey {
     bool lit = false, textured = false, flat = false, wireframe = false;
     Output output = Output::linear;
+    int casting = 0;   // lights that cast shadows, and are drawn with them
+    bool mask = false; // writes the shadows' mask as well
     auto operator<=>(const ProgramKey&) const = default;
 };
 
@@ -28,6 +30,7 @@ struct ProgramKey {
 class Programs {
 public:
     Result<const Program*> surface(ProgramKey key);
+    std::size_t surface_count() const noexcept { return surfaces_.size(); }
 
     // The one program of this label, a literal.
     Result<const Program*> named(std::string_view label, std::span<const ShaderSource> sources,

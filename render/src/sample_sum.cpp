@@ -107,7 +107,7 @@ Result<void> SampleSum::draw(std::span<const Item> items, const vdtree::View& vi
     if (auto valid = check(sampling); !valid) return valid;
     return in_context(impl_->context(), "Drawing", [&]() -> Result<void> {
         const Target::Impl& sample = impl_->sample.impl();
-        const auto pass = SurfacePass::prepare(items, {.view = view}, sample, 0);
+        const auto pass = SurfacePass::prepare(items, {.view = view, .shadows = sampling.shadows}, sample, 0);
         if (!pass) return pass.error();
         const std::vector<glm::dvec2> points = n_rooks(sampling.samples, sampling.seed);
         const PixelBox used = pass->pixels_of(points); // elsewhere the sum stays 0: the background
