@@ -108,7 +108,7 @@ private:
         const bool has_window = options_.bars == MuseumBars::both || options_.bars == MuseumBars::window;
         if (has_gate) bars("gate", {0, 0, 1.6}, 3, 2.8, false);
         if (has_window) bars("window bars", {-4.15, 1.2, 0}, 2.4, 2.2, true);
-        draft_.add_sun({-0.85, 0.3, 0.25}, sun_lux, true);
+        draft_.add_sun({-0.85, 0.3, 0.05}, sun_lux, true); // so that its beam meets the statue
         draft_.add_lamp({1.5, 3.2, 2.5}, 1.2);
         draft_.set_light(0.75, 0.12);
         draft_.set_camera({0.4, 1.6, 4.2}, {0, 1.45, 0}, 36);

@@ -1,5 +1,6 @@
 #include "scene_renderer.h"
 
+#include <algorithm>
 #include <chrono>
 #include <unordered_map>
 
@@ -21,11 +22,13 @@ struct SceneRenderer::Impl {
     const render::Context& context;
     const session::Session& session;
     std::vector<render::GpuCut> objects, backdrop;
-    std::optional<render::SampleSum> sum; // made for the first frame off screen, and for each of another size
+    std::optional<render::SampleSum> sum;   // made for the first frame off screen, and for each of another size
+    std::optional<render::Shadows> shadows; // made when a light first casts some
 
     Result<void> load();
     Result<std::vector<render::Item>> items(std::span<const DrawnCut> cuts, const vdtree::View& view,
                                             const render::DrawOptions& options);
+    Result<const render::Shadows*> cast(std::span<const render::Item> items);
 };
 
 Result<void> SceneRenderer::Impl::load() {
@@ -84,8 +87,30 @@ Result<std::vector<render::Item>> SceneRenderer::Impl::items(std::span<const Dra
     return items;
 }
 
+// Null where no light casts any. The maps reach over all that there may be, whatever the cuts leave of it.
+Result<const render::Shadows*> SceneRenderer::Impl::cast(std::span<const render::Item> items) {
+    const bool any = std::any_of(items.begin(), items.end(), [](const render::Item& item) {
+        return item.lighting && vdtree::shadow_lights(*item.lighting) > 0;
+    });
+    if (!any) {
+        shadows.reset();
+        return static_cast<const render::Shadows*>(nullptr);
+    }
+    if (!shadows) {
+        const session::Scene& scene = session.scene();
+        std::vector<render::Item> all;
+        for (std::size_t i = 0; i < objects.size(); ++i) all.push_back({objects[i], scene.objects[i].placement});
+        for (std::size_t i = 0; i < backdrop.size(); ++i) all.push_back({backdrop[i], scene.backdrop[i].placement});
+        auto made = render::Shadows::create(context, {.bounds = render::ball_around(all)});
+        if (!made) return made.error();
+        shadows = std::move(*made);
+    }
+    if (const auto updated = shadows->update(items); !updated) return updated.error();
+    return &*shadows;
+}
+
 Result<SceneRenderer> SceneRenderer::create(const render::Context& context, const session::Session& session) {
-    auto impl = std::make_unique<Impl>(Impl{context, session, {}, {}, {}});
+    auto impl = std::make_unique<Impl>(Impl{context, session, {}, {}, {}, {}});
     if (const auto loaded = impl->load(); !loaded) return loaded.error();
     return SceneRenderer(std::move(impl));
 }
@@ -104,7 +129,9 @@ Result<render::Frame> SceneRenderer::draw(std::span<const DrawnCut> cuts, const 
     if (!items) return items.error();
     if (auto done = impl_->context.finish(); !done) return done.error(); // what came before is not this frame's time
     const auto start = std::chrono::steady_clock::now();
-    if (auto drawn = sum->draw(*items, view, {options.samples, options.seed, options.background}); !drawn)
+    const auto shadows = impl_->cast(*items);
+    if (!shadows) return shadows.error();
+    if (auto drawn = sum->draw(*items, view, {options.samples, options.seed, options.background, *shadows}); !drawn)
         return drawn.error();
     const auto pixels = sum->mean();
     if (!pixels) return pixels.error();
@@ -128,13 +155,21 @@ Result<void> SceneRenderer::draw_to_window(std::span<const DrawnCut> cuts, const
     if (!window) return window.error();
     const auto items = impl_->items(cuts, view, options);
     if (!items) return items.error();
-    return render::draw(*items, {.view = view}, *window, {.colour = glm::vec4(options.background)});
+    const auto shadows = impl_->cast(*items);
+    if (!shadows) return shadows.error();
+    return render::draw(*items, {.view = view, .shadows = *shadows}, *window,
+                        {.colour = glm::vec4(options.background)});
 }
 
 std::uint64_t SceneRenderer::uploaded_bytes() const noexcept {
     std::uint64_t bytes = 0;
     for (const render::GpuCut& cut : impl_->objects) bytes += cut.uploaded_bytes();
     return bytes;
+}
+
+std::optional<render::ShadowFacts> SceneRenderer::shadows() const {
+    if (!impl_->shadows) return std::nullopt;
+    return impl_->shadows->facts();
 }
 
 SceneRenderer::SceneRenderer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

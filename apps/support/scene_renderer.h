@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <render/renderer.h>
+#include <render/shadows.h>
 #include <session/session.h>
 
 namespace unseen::app {
@@ -37,6 +38,9 @@ public:
                                 const render::DrawOptions& options);
 
     std::uint64_t uploaded_bytes() const noexcept; // of objects, by the last draw
+
+    // Of the last draw; nothing where no light casts shadows. Waits for the GPU.
+    std::optional<render::ShadowFacts> shadows() const;
 
 private:
     struct Impl;

@@ -37,6 +37,16 @@ struct RenderArguments {
 
 bool is_for_people(const std::string& file) { return has_ending(file, ".png"); }
 
+Json shadows_json(const render::ShadowFacts& shadows, const session::Session& session) {
+    const auto& lights = *session.scene().lights;
+    return {{"casting_lights", lights.casting()},
+            {"of_lights", lights.light_count()},
+            {"maps", shadows.maps},
+            {"map_size", shadows.size},
+            {"bytes", shadows.bytes},
+            {"draw_ms", shadows.draw_ms}};
+}
+
 Result<int> run_flight(RenderArguments& a) {
     a.flight.pictures = a.out;
     a.flight.json = a.json;
@@ -89,6 +99,7 @@ Result<int> run(RenderArguments& a) {
     }
     Json json = to_json(*result, frame->draw_ms);
     add_scene(json, *session, result->cuts);
+    if (const auto shadows = renderer->shadows()) json["shadows"] = shadows_json(*shadows, *session);
     if (auto ok = report->prepare(json); !ok) return ok.error();
     if (auto ok = perception::write_image(a.out, image); !ok) return ok.error();
     if (auto ok = report->publish(); !ok) return ok.error();

@@ -292,6 +292,13 @@ Result<void> LightRig::set_shadows(bool cast) {
     return {};
 }
 
+std::vector<std::size_t> LightRig::casting() const {
+    std::vector<std::size_t> numbers;
+    for (std::size_t i = 0; i < lights_.size(); ++i)
+        if (lights_[i].at_rest.casts_shadow) numbers.push_back(i);
+    return numbers;
+}
+
 vdtree::Lighting LightRig::at(double seconds, const vdtree::VertexTree& tree, const vdtree::View& view,
                               const vdtree::Similarity& placement) const {
     vdtree::Lighting lighting;

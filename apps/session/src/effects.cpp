@@ -151,6 +151,14 @@ Effect light_effect(const Sight& sight, const Decision& decision) {
             sight.object.tree.is_prelit() ? "the colours are pre-lit" : "the light that the tree was built for"};
 }
 
+Effect shadow_effect(const Sight& sight) {
+    const std::size_t casting = sight.lighting ? vdtree::shadow_lights(*sight.lighting) : 0;
+    if (casting == 0) return {"shadows", false, "no light casts a shadow: no pass"};
+    const std::size_t all = sight.lighting->lights.size();
+    return {"shadows", true,
+            std::to_string(casting) + " of " + std::to_string(all) + (casting == 1 ? " lights casts" : " lights cast")};
+}
+
 Effect frustum_effect(const Decision& decision) {
     if (is_full(decision)) return {"frustum culling", false, "nothing is folded in the full model"};
     if (decision.request.purpose == Purpose::mesh)
@@ -237,13 +245,21 @@ Effect time_limit_effect(const Decision& decision, const std::optional<CutFacts>
 
 std::vector<Effect> effects_of(const Sight& sight, const Decision& decision, const std::optional<CutFacts>& facts) {
     const Purpose purpose = decision.request.purpose;
-    std::vector<Effect> effects = {fold_test_effect(sight, decision),  gaze_effect(sight, decision),
-                                   silhouette_effect(sight, decision), csf_effect(sight, decision),
-                                   motion_effect(sight, decision),     reach_effect(sight, decision),
-                                   chroma_effect(sight, decision),     translucency_effect(sight, decision),
-                                   texture_effect(sight, decision),    prelit_effect(sight),
-                                   light_effect(sight, decision),      frustum_effect(decision),
-                                   culling_effect(sight, purpose),     magnification_effect(sight, decision),
+    std::vector<Effect> effects = {fold_test_effect(sight, decision),
+                                   gaze_effect(sight, decision),
+                                   silhouette_effect(sight, decision),
+                                   csf_effect(sight, decision),
+                                   motion_effect(sight, decision),
+                                   reach_effect(sight, decision),
+                                   chroma_effect(sight, decision),
+                                   translucency_effect(sight, decision),
+                                   texture_effect(sight, decision),
+                                   prelit_effect(sight),
+                                   light_effect(sight, decision),
+                                   shadow_effect(sight),
+                                   frustum_effect(decision),
+                                   culling_effect(sight, purpose),
+                                   magnification_effect(sight, decision),
                                    distance_effect(decision, facts)};
     if (is_full(decision)) return effects;
     effects.push_back(back_face_effect(sight, purpose));

@@ -46,6 +46,9 @@ public:
     vdtree::Lighting at(double seconds, const vdtree::VertexTree& tree, const vdtree::View& view,
                         const vdtree::Similarity& placement) const;
 
+    std::size_t light_count() const noexcept { return lights_.size(); }
+    std::vector<std::size_t> casting() const; // the numbers of those that cast shadows
+
     bool moves() const noexcept { return moves_; } // with time
     bool follows_camera() const noexcept { return follows_camera_; }
     // Whether they are the same at all times and from everywhere, but for highlights.
