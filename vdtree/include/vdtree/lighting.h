@@ -117,7 +117,8 @@ private:
     std::vector<float> radii_;
 };
 
-// Contains lit_luminance() of every vertex in the sphere whose normal and albedo are in the cone. Larger for larger
+// Contains lit_luminance() of every vertex in the sphere whose normal and albedo are in the cone, whichever of the lights
+// that cast shadows are hidden from it. Larger for larger
 // spheres and cones without boxes. Cost: some ten nanoseconds a light.
 LuminanceRange lit_range(const Lighting& lighting, const VertexCone& cone, const Sphere& sphere, glm::dvec3 eye);
 
