@@ -589,7 +589,7 @@ TEST_F(RenderCommandTest, LightsCastShadowsWhereTheyAreToldTo) {
     EXPECT_EQ(own["shadows"]["bytes"], 4 * 2048 * 2048);
     EXPECT_GE(own["shadows"]["draw_ms"].get<double>(), 0);
     EXPECT_EQ(effect(own)["on"], true);
-    EXPECT_THAT(effect(own)["why"].get<std::string>(), HasSubstr("1 of 2 lights casts"));
+    EXPECT_THAT(effect(own)["why"].get<std::string>(), HasSubstr("1 of 2 lights casts; folds are tested"));
     const Json all = render({"--lights", "lights.json", "--shadows"}, "all.png");
     EXPECT_EQ(all["shadows"]["casting_lights"], Json({0, 1}));
     const Json none = render({"--lights", "lights.json", "--no-shadows"}, "none.png");

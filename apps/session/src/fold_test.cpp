@@ -10,6 +10,7 @@
 #include <glm/geometric.hpp>
 
 #include "loaded_tree.h"
+#include "shadow_limit.h"
 
 namespace unseen::session {
 namespace {
@@ -127,6 +128,21 @@ Key key_of(const Sight& sight, const Decision& decision) {
     return key;
 }
 
+// What is left of the lights for each set of those that shadows may be of; not where nothing is.
+std::vector<vdtree::Lighting> without_hidden(const vdtree::Lighting& lighting) {
+    std::vector<vdtree::Lighting> all;
+    const std::size_t casting = vdtree::shadow_lights(lighting);
+    for (unsigned hidden = 1; hidden < 1u << casting; ++hidden) {
+        vdtree::Lighting left = lighting;
+        left.lights.clear();
+        unsigned number = 0;
+        for (const vdtree::LightSource& light : lighting.lights)
+            if (!light.casts_shadow || (hidden >> number++ & 1) == 0) left.lights.push_back(light);
+        if (vdtree::validate(left)) all.push_back(std::move(left));
+    }
+    return all;
+}
+
 Result<vdtree::DistanceCriterion> make_criterion(const Sight& sight, const Decision& decision, const Key& key) {
     const vdtree::VertexTree& tree = sight.object.tree;
     const vdtree::View& view = sight.view;
@@ -148,12 +164,37 @@ Result<vdtree::DistanceCriterion> make_criterion(const Sight& sight, const Decis
     if (!sight.lighting) return perception::error_distances(tree, view, options);
     const auto lit = sight.cache.lit_folds->under(tree, *sight.lighting);
     if (!lit) return lit.error();
-    return perception::error_distances(*lit, view, options);
+    if (!casts_shadows(sight)) return perception::error_distances(*lit, view, options);
+    std::vector<perception::TreeAsLit> all;
+    all.push_back({lit->share(), *sight.lighting});
+    for (vdtree::Lighting& left : without_hidden(*sight.lighting)) {
+        const auto darker = sight.cache.lit_folds->under(tree, left);
+        if (!darker) return darker.error();
+        all.push_back({darker->share(), std::move(left)});
+    }
+    return perception::error_distances(all, view, options);
+}
+
+Result<std::optional<perception::ShadowEdges>> edges_of(const Sight& sight, const Decision& decision, const Key& key) {
+    if (!casts_shadows(sight) || !is_perceptual(decision.test)) return std::optional<perception::ShadowEdges>();
+    perception::FoldTestOptions options = test_options(sight, decision.request);
+    if (key.farthest_gaze_px)
+        options.gaze_px = glm::dvec2(sight.view.width * 0.5 + *key.farthest_gaze_px, sight.view.height * 0.5);
+    // A highlight may be all there is on what is otherwise black.
+    const double ambient = sight.lighting->specular > 0 ? 0 : sight.lighting->ambient;
+    auto made = perception::ShadowEdges::create(sight.view, options, ambient);
+    if (!made) return made.error();
+    return std::optional(std::move(*made));
+}
+
+FrameBall in_frame(const WorldSphere& sphere, const Object& object) {
+    return {object.placement.to_mesh(sphere.centre) - object.tree.origin(), sphere.radius / object.placement.scale};
 }
 
 vdtree::Viewpoint viewpoint_of(const Sight& sight, const Decision& decision) {
     // Where all is seen, a turning window must not cost anything.
-    const bool window_only = decision.request.purpose == Purpose::picture && !is_wholly_in_window(sight);
+    const bool window_only =
+        decision.request.purpose == Purpose::picture && !casts_shadows(sight) && !is_wholly_in_window(sight);
     vdtree::Viewpoint viewpoint = perception::viewpoint_of(
         sight.object.tree, sight.view, test_options(sight, decision.request), sight.object.placement, window_only);
     if (sight.lighting && decision.test != FoldTest::error) viewpoint.lighting = *sight.lighting;
@@ -168,7 +209,7 @@ vdtree::FollowOptions follow_options(const Sight& sight, const Request& request)
     vdtree::FollowOptions options;
     options.threshold = static_cast<float>(request.threshold);
     options.milliseconds = request.milliseconds;
-    options.cull_back_faces = request.purpose == Purpose::picture && culls_back_faces(sight);
+    options.cull_back_faces = request.purpose == Purpose::picture && !casts_shadows(sight) && culls_back_faces(sight);
     if (request.goal.kind == Goal::Kind::budget) {
         options.triangle_budget = request.goal.triangles;
         options.fill_budget = request.goal.fill;
@@ -187,7 +228,41 @@ bool is_same(const vdtree::View& a, const vdtree::View& b) {
 struct KeptCriterion {
     Key key;
     vdtree::DistanceCriterion criterion;
+    std::optional<perception::ShadowEdges> edges; // where lights cast shadows
 };
+
+bool casts_shadows(const Sight& sight) { return sight.lighting && vdtree::shadow_lights(*sight.lighting) > 0; }
+
+namespace {
+
+// The criterion, and outlines kept whose shadows would move visibly.
+Result<std::shared_ptr<const vdtree::DistanceCriterion>>
+keep_outlines(const Sight& sight, const std::shared_ptr<const KeptCriterion>& base, double threshold) {
+    using Made = std::shared_ptr<const vdtree::DistanceCriterion>;
+    const vdtree::VertexTree& tree = sight.object.tree;
+    const vdtree::DistanceCriterion::Parts& parts = base->criterion.parts();
+    const bool is_measured = base->key.test == FoldTest::error; // what folds move, and where they face in any cut
+    const auto still = is_measured ? sight.lighting : nullptr;
+    ShadowState& state = sight.shadow;
+    if (state.of != base || state.lighting != still) {
+        state = {base, still, {}, 0, nullptr};
+        state.shifts = is_measured ? outline_shifts(tree, parts.silhouette_lengths, parts.facing, still.get())
+                                   : outline_shifts(tree, tree.displacement(), {}, nullptr);
+    }
+    const WorldSphere all = sphere_of_all(sight.object, sight.cache);
+    const double unseen = threshold * unseen_shift(*sight.lighting, *base->edges, in_frame(all, sight.object),
+                                                   in_frame(sight.scene_sphere, sight.object),
+                                                   vdtree::eye_in_tree(tree, sight.view, sight.object.placement));
+    const double limit = steady_limit(unseen, state.limit);
+    if (state.criterion && limit == state.limit) return state.criterion;
+    state.limit = limit;
+    auto kept = vdtree::keeping(tree, base->criterion, beyond(state.shifts, limit));
+    if (!kept) return kept.error();
+    state.criterion = std::make_shared<const vdtree::DistanceCriterion>(std::move(*kept));
+    return Made(state.criterion);
+}
+
+} // namespace
 
 Result<Decision> decide(const Sight& sight, const Request& request) {
     if (request.shown && !is_same(request.shown->view(), sight.view))
@@ -224,7 +299,7 @@ bool culls_back_faces(const Sight& sight) {
 }
 
 bool is_out_of_sight(const Sight& sight, const Decision& decision) {
-    if (decision.request.purpose != Purpose::picture) return false;
+    if (decision.request.purpose != Purpose::picture || casts_shadows(sight)) return false;
     const WorldSphere sphere = sphere_of_all(sight.object, sight.cache);
     const glm::dvec3 away = sphere.centre - sight.view.eye;
     // Far more than planes and spheres in single floats are off by.
@@ -236,11 +311,12 @@ bool is_out_of_sight(const Sight& sight, const Decision& decision) {
 
 // Extent and displacement look at supports, which do not contain all that a fold changes.
 bool folds_hidden(const Sight& sight, const Decision& decision) {
-    return decision.request.purpose == Purpose::picture && is_perceptual(decision) && culls_back_faces(sight);
+    return decision.request.purpose == Purpose::picture && is_perceptual(decision) && !casts_shadows(sight) &&
+           culls_back_faces(sight);
 }
 
 bool folds_unseen(const Sight& sight, const Decision& decision) {
-    return decision.request.shown && is_perceptual(decision) && !is_translucent(sight);
+    return decision.request.shown && is_perceptual(decision) && !casts_shadows(sight) && !is_translucent(sight);
 }
 
 Result<CutRecipe> make_recipe(const Sight& sight, const Decision& decision) {
@@ -250,9 +326,16 @@ Result<CutRecipe> make_recipe(const Sight& sight, const Decision& decision) {
     if (!last || !(last->key == key)) {
         auto made = make_criterion(sight, decision, key);
         if (!made) return made.error();
-        last = std::make_shared<const KeptCriterion>(KeptCriterion{key, std::move(*made)});
+        auto edges = edges_of(sight, decision, key);
+        if (!edges) return edges.error();
+        last = std::make_shared<const KeptCriterion>(KeptCriterion{key, std::move(*made), std::move(*edges)});
     }
     CutRecipe recipe{{last, &last->criterion}, viewpoint_of(sight, decision), follow_options(sight, decision.request)};
+    if (last->edges) {
+        auto kept = keep_outlines(sight, last, decision.request.threshold);
+        if (!kept) return kept.error();
+        recipe.criterion = std::move(*kept);
+    }
     if (!folds_unseen(sight, decision)) return recipe;
     const auto hidden = vdtree::find_hidden(sight.object.tree, sight.object.placement, *decision.request.shown);
     if (!hidden) return hidden.error();

@@ -37,7 +37,8 @@ Result<Simplification> simplify_as_seen(Session& session, const render::Context&
     request.shown.reset();
     auto all = session.simplify(view, request);
     if (!all) return all;
-    const bool can_tell = request.goal.kind != Goal::Kind::full && !all->fold_tests.empty() &&
+    const bool casts = session.scene().lights && !session.scene().lights->casting().empty(); // what is hidden may, too
+    const bool can_tell = !casts && request.goal.kind != Goal::Kind::full && !all->fold_tests.empty() &&
                           is_perceptual(all->fold_tests.front()) &&
                           (!session.scene().lights ||
                            std::ranges::all_of(all->fold_tests, [](FoldTest test) { return test == FoldTest::error; }));
