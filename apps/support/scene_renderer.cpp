@@ -28,7 +28,7 @@ struct SceneRenderer::Impl {
     Result<void> load();
     Result<std::vector<render::Item>> items(std::span<const DrawnCut> cuts, const vdtree::View& view,
                                             const render::DrawOptions& options);
-    Result<const render::Shadows*> cast(std::span<const render::Item> items);
+    Result<render::Shadows*> cast(std::span<const render::Item> items);
 };
 
 Result<void> SceneRenderer::Impl::load() {
@@ -88,13 +88,13 @@ Result<std::vector<render::Item>> SceneRenderer::Impl::items(std::span<const Dra
 }
 
 // Null where no light casts any. The maps reach over all that there may be, whatever the cuts leave of it.
-Result<const render::Shadows*> SceneRenderer::Impl::cast(std::span<const render::Item> items) {
+Result<render::Shadows*> SceneRenderer::Impl::cast(std::span<const render::Item> items) {
     const bool any = std::any_of(items.begin(), items.end(), [](const render::Item& item) {
         return item.lighting && vdtree::shadow_lights(*item.lighting) > 0;
     });
     if (!any) {
         shadows.reset();
-        return static_cast<const render::Shadows*>(nullptr);
+        return static_cast<render::Shadows*>(nullptr);
     }
     if (!shadows) {
         const session::Scene& scene = session.scene();

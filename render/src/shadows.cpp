@@ -199,7 +199,8 @@ void Shadows::Impl::draw_layer(const Program& program, std::size_t layer) {
                                   (caster.placement.scale * tree.frame.unit));
         ball_from_unit[3] =
             glm::dvec4(caster.placement.to_world(tree.tree.origin() + tree.frame.centre) - ball.centre, 1);
-        program.set(0, glm::mat4(layers[layer].clip_from_ball * ball_from_unit));
+        const glm::dmat4 shifted = glm::translate(glm::dmat4(1), glm::dvec3(shift, 0));
+        program.set(0, glm::mat4(shifted * layers[layer].clip_from_ball * ball_from_unit));
         glVertexArrayElementBuffer(tree.arrays.id(), cut.indices.buffer());
         glBindVertexArray(tree.arrays.id());
         for (std::uint64_t first = 0; first < cut.indices.count(); first += most_indices_a_call)
@@ -225,7 +226,16 @@ void Shadows::Impl::draw(const Program& program) {
     glDepthFunc(GL_GREATER); // depth is reversed
     for (std::size_t layer = 0; layer < layers.size(); ++layer) draw_layer(program, layer);
     glQueryCounter(ended.id(), GL_TIMESTAMP);
-    ++redraws;
+}
+
+Result<void> Shadows::Impl::shift_texels(glm::dvec2 by) {
+    const glm::dvec2 wanted = (by - 0.5) * (2.0 / options.size);
+    if (lights.empty() || wanted == shift) return {};
+    const auto program = context.impl().programs.surface({.output = Output::depth});
+    if (!program) return program.error();
+    shift = wanted;
+    draw(**program);
+    return {};
 }
 
 Result<void> Shadows::Impl::update(std::span<const Item> casters) {
@@ -256,7 +266,7 @@ Result<void> Shadows::Impl::update(std::span<const Item> casters) {
     const bool is_known = lit == lights && around.centre == ball.centre && around.radius == ball.radius &&
                           std::equal(now.begin(), now.end(), drawn.begin(), drawn.end(),
                                      [](const Caster& a, const Caster& b) { return a.is_same(b); });
-    if (is_known) return {};
+    if (is_known) return shift_texels(glm::dvec2(0.5));
     lights.clear(); // until it is done
     drawn.clear();
     int wanted = 0;
@@ -270,7 +280,9 @@ Result<void> Shadows::Impl::update(std::span<const Item> casters) {
     const auto program = context.impl().programs.surface({.output = Output::depth});
     if (!program) return lights.clear(), program.error();
     drawn = std::move(now);
+    shift = glm::dvec2(0);
     draw(**program);
+    ++redraws;
     return {};
 }
 

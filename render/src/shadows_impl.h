@@ -54,6 +54,9 @@ struct Shadows::Impl {
     };
 
     Result<void> update(std::span<const Item> casters);
+    // Draws the maps of the last update's casters with their texels elsewhere, by so many in 0..1 of them; 0.5: as
+    // update() does. Needs a current context.
+    Result<void> shift_texels(glm::dvec2 by);
     Result<void> reserve(std::size_t layers);
     void aim();
     void draw(const Program& program);
@@ -77,6 +80,7 @@ struct Shadows::Impl {
     FramebufferObject framebuffer;
     Timestamp begun, ended;
     std::uint64_t redraws = 0;
+    glm::dvec2 shift = glm::dvec2(0); // of the maps' windows, in their coordinates
 };
 
 } // namespace unseen::render

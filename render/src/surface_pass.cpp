@@ -285,7 +285,13 @@ void SurfacePass::set_colours(const PreparedItem& item, float lod_bias) const {
     }
     if (is_shadowed) {
         if (!tree.texture) program.set(whitest_shade_location, tree.highest_hue);
-        program.set(layers_location, item.shadows.layers);
+        std::vector<glm::mat4> layers = item.shadows.layers;
+        for (glm::mat4& layer : layers)
+            for (int column = 0; column < 4; ++column) {
+                layer[column].x += static_cast<float>(shadows_->shift.x) * layer[column].w;
+                layer[column].y += static_cast<float>(shadows_->shift.y) * layer[column].w;
+            }
+        program.set(layers_location, layers);
         program.set(shadow_lights_location, item.shadows.lights);
         program.set(shadow_kinds_location, item.shadows.kinds);
         program.set(world_from_unit_location, item.shadows.world_from_unit);

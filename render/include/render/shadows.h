@@ -39,7 +39,7 @@ struct ShadowFacts {
     int lights = 0, maps = 0;  // that cast shadows; layers
     int size = 0;              // texels a side
     std::uint64_t bytes = 0;   // on the GPU
-    std::uint64_t redraws = 0; // of all maps, since they were made
+    std::uint64_t redraws = 0; // of all maps, since they were made; those of single samples do not count
     double draw_ms = 0;        // of the last one, on the GPU
 };
 
@@ -60,7 +60,7 @@ public:
     ShadowFacts facts() const; // waits for the GPU
 
     struct Impl; // the library's own
-    const Impl& impl() const noexcept { return *impl_; }
+    Impl& impl() const noexcept { return *impl_; }
 
 private:
     explicit Shadows(std::unique_ptr<Impl> impl);
