@@ -46,9 +46,11 @@ layout(location = 100) uniform vec4 shadow_kinds[CASTING];
 layout(location = 104) uniform mat4 world_from_unit;       // rotation alone
 layout(binding = 2) uniform sampler2DArray shadow_maps;    // depth; 0 outside
 
-// What rounding may be off by, texels: of places in single floats, and of triangles' corners, which rasterisers put on a
-// grid of a 256th of a pixel. On slopes depth is off by so many texels times the slope.
-const float bias_texels = 0.0625;
+// What is nearer to the light than the triangle's plane by less than this hides nothing, in texels, on slopes times the
+// slope: that much rounding, the grid that rasterisers put corners on, and surfaces that curve up beside the triangle come
+// to. From there on it takes another `fading_texels` until it hides all, so that where it is by a little does not matter.
+const float bias_texels = 0.5;
+const float fading_texels = 0.5;
 // Steeper slopes, as depth over width, are of triangles that the light grazes, which it hardly lights.
 const float steepest = 64.0;
 
@@ -83,7 +85,7 @@ float visibility_of(int light, vec3 across, vec3 along) {
     float slope = length(gradient);
     if (!(slope <= steepest * upright))
         gradient = slope > 0.0 && slope < 1e30 ? gradient * (steepest * upright / slope) : vec2(0.0);
-    float bias = bias_texels * texel * (upright + length(gradient));
+    float unit = texel * (upright + length(gradient));
 
     vec2 place = (here.xy * 0.5 + 0.5) * size - 0.5;
     vec2 first = floor(place), part = place - first;
@@ -95,7 +97,7 @@ float visibility_of(int light, vec3 across, vec3 along) {
             vec4 depths = textureGather(shadow_maps, vec3((first + vec2(i, j)) / size, float(layer)));
             vec2 off = vec2(i, j) - 1.0 - part;
             vec4 own = here.z + texel * (gradient.x * (off.x + vec4(0, 1, 1, 0)) + gradient.y * (off.y + vec4(1, 1, 0, 0)));
-            vec4 open = vec4(lessThanEqual(depths, own + bias));
+            vec4 open = clamp(1.0 + ((own - depths) / unit + bias_texels) / fading_texels, 0.0, 1.0);
             seen += dot(open, vec4(weights_x[i] * weights_y[j + 1], weights_x[i + 1] * weights_y[j + 1],
                                    weights_x[i + 1] * weights_y[j], weights_x[i] * weights_y[j]));
         }

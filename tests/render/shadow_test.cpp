@@ -238,6 +238,17 @@ TEST_F(ShadowTest, NothingThatFacesTheLightHidesItself) {
     }
 }
 
+// Nor do the facets of a hollow, finer than the maps' texels, that the light looks straight into.
+TEST_F(ShadowTest, AHollowHidesNothingOfItself) {
+    vdtree::Mesh bowl = shapes::placed(shapes::grid(160), 1.0 / 80, {-1, -1, 0});
+    for (glm::dvec3& p : bowl.positions) p.z = 0.4 * (p.x * p.x + p.y * p.y);
+    const Scene hollow(bowl);
+    const Drawn drawn = draw({&hollow}, {.lights = {sun({0.3, 0.2, 1})}, .ambient = 0.2}, from_above());
+    for (int y = window_px / 8; y < window_px * 7 / 8; ++y)
+        for (int x = window_px / 8; x < window_px * 7 / 8; ++x)
+            ASSERT_NEAR(drawn.mask_at(x, y)[0], 1, 1e-6) << place(x) << " " << place(y);
+}
+
 // A box that stands on the floor: its shadow begins at its foot.
 TEST_F(ShadowTest, BeginsAtTheFoot) {
     const Scene box(
